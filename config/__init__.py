@@ -1,0 +1,1 @@
+"""Configuration: YAML to frozen models; whatever is unknown, missing or impossible is refused."""

@@ -1,0 +1,90 @@
+"""YAML files to frozen models. Every mistake of a file is reported at once: file, key, reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+CONFIG_DIR = Path(__file__).resolve().parent
+
+
+class ConfigError(Exception):
+    """A YAML file is missing, is not YAML, or says something unknown, wrong or impossible."""
+
+
+class Section(BaseModel):
+    """Base of every part of the configuration: strict types, no unknown keys, no NaN, immutable."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+SectionT = TypeVar("SectionT", bound=Section)
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """SafeLoader that refuses a key given twice: the second would silently win."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[object, object]:
+        seen: set[object] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key!r} is given twice", key_node.start_mark
+                )
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: Path) -> object:
+    """The plain content of a YAML file. Raises ConfigError in one line."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text ({error.reason}); is it a YAML file?") from error
+    try:
+        return yaml.load(text, Loader=_UniqueKeyLoader)
+    except yaml.YAMLError as error:
+        reason = " ".join(str(error).split())
+        raise ConfigError(f"{path}: is not valid YAML: {reason}") from error
+
+
+def load(path: Path, model: type[SectionT]) -> SectionT:
+    """Read path as model. Raises ConfigError with one line naming each wrong key and why."""
+    content = read_yaml(path)
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path}: must hold keys and values, found {type(content).__name__}")
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {describe(error)}") from error
+
+
+def describe(error: ValidationError) -> str:
+    """All mistakes of a validation in one line: ``key: reason; key: reason``."""
+    parts = []
+    for detail in error.errors(include_url=False):
+        key = ".".join(str(step) for step in detail["loc"]) or "(file)"
+        reason = detail["msg"].removeprefix("Value error, ")
+        if detail["type"] == "extra_forbidden":
+            reason = "unknown key; check its spelling against the documentation"
+        elif detail["type"] == "missing":
+            reason = "missing key"
+        elif not isinstance(detail["input"], dict | list):
+            reason = f"{reason}, found {detail['input']!r}"
+        parts.append(f"{key}: {reason}")
+    return "; ".join(parts)
+
+
+def resolve(path: str, relative_to: Path) -> Path:
+    """A file named in a YAML: absolute, beside that YAML, or among the files that ship here."""
+    given = Path(path).expanduser()
+    if given.is_absolute():
+        return given
+    beside = relative_to.parent / given
+    return beside if beside.exists() else CONFIG_DIR / given

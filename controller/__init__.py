@@ -1,0 +1,1 @@
+"""The program: command line, composition, runners, decide, shape, path following, service."""

@@ -1,0 +1,85 @@
+"""The boundary to the outside, on one screen. Implementations: hal/cameras, hal/chassis, hal/links, sim."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Protocol, Self
+
+from hal.types import CanFrame, ChassisState, Intrinsics, Pose, RgbdFrame, Setpoint
+
+
+class Closing(Protocol):
+    """A device is open between __enter__ and __exit__; leaving is safe in any state."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+
+class Clock(Protocol):
+    """The only clock, monotonic. A simulated one advances when told."""
+
+    def now_ns(self) -> int: ...
+
+    def sleep_until_ns(self, deadline_ns: int) -> None: ...
+
+
+class FrameSource(Closing, Protocol):
+    """A camera, simulated, recorded or real."""
+
+    @property
+    def intrinsics(self) -> Intrinsics: ...
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """The next frame. Raises FrameTimeout, EndOfStream, LinkLost."""
+        ...
+
+
+class OdometrySource(Protocol):
+    """Dead reckoning of the camera: a prior for ego-motion, never the truth."""
+
+    def camera_pose(self, stamp_ns: int) -> Pose | None:
+        """The camera (optical frame) in the odometry frame at stamp_ns; None where not known."""
+        ...
+
+
+class Chassis(Closing, Protocol):
+    """A tracked base. Stepped by the control loop; never blocks, starts no thread."""
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        """Send what is due, read what has arrived. None asks for no motion: an explicit zero."""
+        ...
+
+    def arm(self, now_ns: int) -> None:
+        """The operator's consent to move: from standby, or after a latched fault has gone."""
+        ...
+
+    def stop(self, now_ns: int) -> None:
+        """Explicit zero, then standby. Safe in any state, also on a lost link; idempotent."""
+        ...
+
+
+class CanLink(Closing, Protocol):
+    """Whole CAN frames. Knows nothing of chassis."""
+
+    def send(self, frame: CanFrame) -> None:
+        """Queue one frame, without blocking. Raises LinkLost."""
+        ...
+
+    def receive(self) -> CanFrame | None:
+        """The oldest frame that has arrived; None is silence. Raises LinkLost."""
+        ...
+
+
+class SerialLink(Closing, Protocol):
+    """Bytes over a port. Framing belongs to the protocol above."""
+
+    def write(self, data: bytes) -> None:
+        """Write all of data within a short bound. Raises LinkLost."""
+        ...
+
+    def read(self) -> bytes:
+        """All bytes that have arrived, without waiting; b"" is silence. Raises LinkLost."""
+        ...

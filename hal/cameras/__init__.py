@@ -1,0 +1,1 @@
+"""Cameras: TUM-folder replay, RealSense."""

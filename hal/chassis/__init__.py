@@ -1,0 +1,1 @@
+"""Chassis drivers, one file a protocol, around one arming state machine."""

@@ -1,0 +1,159 @@
+"""Data that crosses the boundary to the outside. SI units; time is monotonic nanoseconds.
+
+Frames follow REP 103: body x forward, y left, z up; camera optical x right, y down, z forward.
+A value that is not known is NaN or None, never 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+ColourImage = NDArray[np.uint8]
+DepthImage = NDArray[np.uint16]
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """Pinhole camera (eq. 4 of Daeef 2020, with cx, cy instead of w/2, h/2).
+
+    Integer coordinates are pixel centres. The images of a frame are already undistorted.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+
+@dataclass(frozen=True, slots=True)
+class GyroSamples:
+    """Gyro readings since the frame before: stamps_ns (N,), rates_radps (N, 3) in optical axes."""
+
+    stamps_ns: NDArray[np.int64]
+    rates_radps: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RgbdFrame:
+    """One colour image and the depth aligned to it, taken at one time.
+
+    colour: (H, W, 3) uint8, BGR. depth: (H, W) uint16, metres = depth * depth_scale_m, 0 = no data.
+    captured_ns: monotonic time of exposure. device_s: the camera's own clock. sequence counts the
+    frames of the device, so a gap shows a lost frame.
+    """
+
+    colour: ColourImage
+    depth: DepthImage
+    depth_scale_m: float
+    captured_ns: int
+    device_s: float
+    sequence: int
+    intrinsics: Intrinsics
+    gyro: GyroSamples | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Where a frame stands in another: p_outer = rotation @ p_inner + translation_m.
+
+    rotation: (3, 3); translation_m: (3,).
+    """
+
+    rotation: FloatArray
+    translation_m: FloatArray
+
+    def inverse(self) -> Pose:
+        """The outer frame as seen from the inner one."""
+        transposed = self.rotation.T
+        return Pose(transposed, -transposed @ self.translation_m)
+
+    def __matmul__(self, other: Pose) -> Pose:
+        """Chain: (a in b) @ (c in a) = c in b."""
+        return Pose(
+            self.rotation @ other.rotation,
+            self.rotation @ other.translation_m + self.translation_m,
+        )
+
+    def apply(self, points_m: FloatArray) -> FloatArray:
+        """Points (N, 3) of the inner frame, in the outer one."""
+        return points_m @ self.rotation.T + self.translation_m
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarPose:
+    """The body on the floor of a fixed frame (odometry or world): metres, radians."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class CameraMount:
+    """Where the camera sits on the body. forward_m is ahead of the turning centre.
+
+    pitch_rad: positive looks down (as camera_pitch_deg of the recordings).
+    """
+
+    forward_m: float
+    left_m: float
+    height_m: float
+    pitch_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """What the chassis shall do from stamp_ns on: a point of the jerk-limited profile."""
+
+    stamp_ns: int
+    v_mps: float
+    a_mps2: float
+    w_radps: float
+
+
+class ChassisMode(Enum):
+    """The arming state machine that every driver owns (see hal/chassis/arming.py)."""
+
+    STANDBY = "standby"
+    ARMING = "arming"
+    ARMED = "armed"
+    STOPPING = "stopping"
+    ESTOP = "e-stop"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class ChassisState:
+    """What is known of the chassis after one exchange.
+
+    feedback_ns: when the newest motion feedback arrived (None: never). v_mps, w_radps: as measured
+    (NaN: unknown). pose: dead reckoning from the chassis' own feedback since the driver was opened.
+    sent: the setpoint that really went out after clamping, None if none did. faults: plain
+    sentences. reason: why the mode is what it is.
+    """
+
+    stamp_ns: int
+    mode: ChassisMode
+    reason: str
+    feedback_ns: int | None
+    v_mps: float
+    w_radps: float
+    pose: PlanarPose
+    battery_v: float
+    faults: tuple[str, ...]
+    sent: Setpoint | None
+
+
+@dataclass(frozen=True, slots=True)
+class CanFrame:
+    """One classic CAN frame with an 11-bit identifier and 0..8 data bytes."""
+
+    arbitration_id: int
+    data: bytes

@@ -1,0 +1,1 @@
+"""The outside, simulated: world, RGB-D renderer, chassis emulators that speak the real protocols."""
