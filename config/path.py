@@ -1,0 +1,79 @@
+"""The planned path as a person writes it: a start pose, then straight lines and arcs, end to end."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from config.loader import Section
+
+MaxSpeed = Annotated[float | None, Field(default=None, gt=0, le=5)]
+
+
+class StartSpec(Section):
+    """Where the turning centre stands at the beginning, on the floor; heading counts from x to y."""
+
+    x_m: float = Field(default=0.0, ge=-1e4, le=1e4)
+    y_m: float = Field(default=0.0, ge=-1e4, le=1e4)
+    heading_deg: float = Field(default=0.0, ge=-360, le=360)
+
+
+class LineSpec(Section):
+    """Straight on for length_m."""
+
+    kind: Literal["line"]
+    length_m: float = Field(gt=0, le=1e4)
+    max_speed_mps: MaxSpeed = None
+
+
+class ArcSpec(Section):
+    """A turn by angle_deg (positive: to the left) on a circle of radius_m.
+
+    With blend_m, the curvature grows from zero and falls back to it linearly over that length at each end
+    (a clothoid), so that the yaw rate has no step; the angle stays what is asked.
+    """
+
+    kind: Literal["arc"]
+    radius_m: float = Field(gt=0, le=1e4)
+    angle_deg: float = Field(ge=-360, le=360)
+    max_speed_mps: MaxSpeed = None
+    blend_m: float = Field(default=0.0, ge=0, le=100)
+
+    @property
+    def length_m(self) -> float:
+        """Along the arc, both blends included."""
+        return self.radius_m * abs(math.radians(self.angle_deg)) + self.blend_m
+
+    @model_validator(mode="after")
+    def _has_an_angle_and_room_to_blend(self) -> Self:
+        if self.angle_deg == 0:
+            raise ValueError("angle_deg must not be zero; write a line instead")
+        turn_m = self.radius_m * abs(math.radians(self.angle_deg))
+        if self.blend_m > turn_m:
+            raise ValueError(
+                f"blend_m must not exceed radius_m x angle = {turn_m:.3f} m; shorten it or widen the turn"
+            )
+        return self
+
+
+SegmentSpec = Annotated[LineSpec | ArcSpec, Field(discriminator="kind")]
+
+
+class PathSpec(Section):
+    """The whole path. controller.path.Path measures along it."""
+
+    start: StartSpec = StartSpec()
+    segments: Annotated[tuple[SegmentSpec, ...], Field(strict=False)]
+
+    @model_validator(mode="after")
+    def _has_segments(self) -> Self:
+        if not self.segments:
+            raise ValueError("segments must hold at least one line or arc")
+        return self
+
+    @property
+    def length_m(self) -> float:
+        """From the start to the target point."""
+        return sum(segment.length_m for segment in self.segments)
