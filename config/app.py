@@ -1,0 +1,87 @@
+"""The whole configuration of one program: robot, camera, chassis, what it does and how it runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from config.camera import CameraConfig
+from config.chassis import ChassisConfig
+from config.decision import DecisionConfig
+from config.loader import Section, load
+from config.path import PathSpec
+from config.perception import PerceptionConfig
+from config.robot import Robot
+
+
+class PlantConfig(Section):
+    """The simulated base behind the emulator: how a real tracked chassis differs from its commands."""
+
+    lag_s: float = Field(default=0.12, gt=0, le=2, description="first-order lag of each track")
+    yaw_slip: float = Field(default=0.10, ge=0, lt=1, description="share of the yaw rate lost to slip")
+    max_track_accel_mps2: float = Field(default=3.0, gt=0, le=20)
+
+
+class SimulationConfig(Section):
+    """The simulated outside: a world with moving things, and the plant that the emulator drives."""
+
+    scenario: str = Field(description="YAML file of the world")
+    seed: int = Field(default=1, ge=0)
+    plant: PlantConfig = PlantConfig()
+
+
+class LockstepRunner(Section):
+    """One thread, simulated or recorded time, repeatable to the bit."""
+
+    kind: Literal["lockstep"]
+    control_rate_hz: float = Field(default=50.0, ge=10, le=500)
+    perception_latency_s: float = Field(
+        default=0.060, ge=0, le=1, description="from exposure until the decision can use the scene"
+    )
+    max_duration_s: float = Field(default=300.0, gt=0, description="give up after this much time")
+
+
+class RealtimeRunner(Section):
+    """Perception and control as two processes on the monotonic clock."""
+
+    kind: Literal["realtime"]
+    control_rate_hz: float = Field(default=50.0, ge=10, le=500)
+    priority: int = Field(default=50, ge=0, le=90, description="SCHED_FIFO; 0: ordinary scheduling")
+    frame_timeout_s: float = Field(default=1.0, gt=0, le=10)
+    max_duration_s: float | None = Field(default=None, gt=0)
+
+
+RunnerConfig = Annotated[LockstepRunner | RealtimeRunner, Field(discriminator="kind")]
+
+
+class AppConfig(Section):
+    """What `treadwatch run --config FILE` reads."""
+
+    robot: Robot = Robot()
+    camera: CameraConfig
+    chassis: ChassisConfig
+    perception: PerceptionConfig = PerceptionConfig()
+    decision: DecisionConfig = DecisionConfig()
+    path: PathSpec | None = Field(default=None, description="the route; a simulation has its own")
+    simulation: SimulationConfig | None = None
+    runner: RunnerConfig
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        simulated = self.camera.kind == "simulated"
+        if simulated and self.simulation is None:
+            raise ValueError("camera.kind 'simulated' needs a 'simulation' section with a scenario")
+        if not simulated and self.path is None:
+            raise ValueError(f"camera.kind {self.camera.kind!r} needs a 'path': there is no scenario to give one")
+        if simulated and self.path is not None:
+            raise ValueError("give the path in the scenario or here, not both")
+        if self.runner.kind == "lockstep" and not simulated:
+            raise ValueError("runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'")
+        return self
+
+
+def load_app(path: Path) -> AppConfig:
+    """Read and check one program's YAML. Raises ConfigError."""
+    return load(path, AppConfig)

@@ -1,0 +1,137 @@
+"""Where the robot is on the floor: the chassis' odometry, its yaw corrected by what the camera sees.
+
+Tracks slip when they turn: the odometry of a skid-steered base is wrong in yaw by 10 % and more,
+while its distance is good. The camera's own rotation, measured against the static scene, is not
+fooled by slip. So distance comes from the tracks and yaw from both: the share of the commanded
+turn that really happens (the slip) is estimated from the pairs (odometry yaw, visual yaw) of all
+frames, and what slip does not explain is corrected frame by frame.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections import deque
+
+import numpy as np
+
+from hal.clocks import NS_PER_S
+from hal.geometry import body_in_floor, camera_in_body, camera_in_floor, wrap_angle_rad
+from hal.types import CameraMount, PlanarPose, Pose
+from vision.scene import EgoMotion
+
+HISTORY_S = 2.0
+# Prior of the yaw ratio (true / odometry): 1 +/- 0.15, a skid-steered base on a hard floor.
+PRIOR_RATIO_SIGMA = 0.15
+
+
+class PoseHistory:
+    """The last poses with their times, interpolated; nothing is extrapolated beyond a short reach."""
+
+    def __init__(self, reach_s: float = 0.1) -> None:
+        self._stamps_ns: deque[int] = deque()
+        self._poses: deque[PlanarPose] = deque()
+        self._reach_ns = int(reach_s * NS_PER_S)
+
+    def append(self, stamp_ns: int, pose: PlanarPose) -> None:
+        """Add a pose; a stamp that does not advance replaces the last one."""
+        while self._stamps_ns and self._stamps_ns[-1] >= stamp_ns:
+            self._stamps_ns.pop()
+            self._poses.pop()
+        self._stamps_ns.append(stamp_ns)
+        self._poses.append(pose)
+        while self._stamps_ns[0] < stamp_ns - HISTORY_S * NS_PER_S:
+            self._stamps_ns.popleft()
+            self._poses.popleft()
+
+    def at(self, stamp_ns: int) -> PlanarPose | None:
+        """The pose at stamp_ns between two known ones; None where it is not known."""
+        if not self._stamps_ns or stamp_ns < self._stamps_ns[0]:
+            return None
+        after = bisect_left(self._stamps_ns, stamp_ns)
+        if after == len(self._stamps_ns):
+            newest_ns = self._stamps_ns[-1]
+            return self._poses[-1] if stamp_ns - newest_ns <= self._reach_ns else None
+        if self._stamps_ns[after] == stamp_ns:
+            return self._poses[after]
+        return _interpolate(
+            self._stamps_ns[after - 1], self._poses[after - 1], self._stamps_ns[after], self._poses[after], stamp_ns
+        )
+
+
+def _interpolate(t0_ns: int, p0: PlanarPose, t1_ns: int, p1: PlanarPose, t_ns: int) -> PlanarPose:
+    share = (t_ns - t0_ns) / (t1_ns - t0_ns)
+    return PlanarPose(
+        p0.x_m + share * (p1.x_m - p0.x_m),
+        p0.y_m + share * (p1.y_m - p0.y_m),
+        wrap_angle_rad(p0.heading_rad + share * wrap_angle_rad(p1.heading_rad - p0.heading_rad)),
+    )
+
+
+class Localiser:
+    """Fuses odometry increments with the visual yaw. Poses are in the frame of the path.
+
+    `add_odometry` at every control step, `add_ego_motion` at every scene; `pose` is the newest one.
+    """
+
+    def __init__(self, start: PlanarPose, mount: CameraMount) -> None:
+        self.pose = start
+        self._mount = mount
+        self._camera_in_body = camera_in_body(mount).rotation
+        self._odometry = PoseHistory()
+        self._fused = PoseHistory()
+        self._last_odometry: PlanarPose | None = None
+        self._sum_odometry_visual = 1.0 / PRIOR_RATIO_SIGMA**2
+        self._sum_odometry_odometry = 1.0 / PRIOR_RATIO_SIGMA**2
+
+    @property
+    def yaw_ratio(self) -> float:
+        """Estimated share of the odometry's yaw that really happens: 1 - slip."""
+        return self._sum_odometry_visual / self._sum_odometry_odometry
+
+    def add_odometry(self, stamp_ns: int, odometry: PlanarPose) -> PlanarPose:
+        """Dead reckoning of the chassis at stamp_ns, in its own frame; returns the fused pose."""
+        if self._last_odometry is not None:
+            self.pose = _move(self.pose, self._last_odometry, odometry, self.yaw_ratio)
+        self._last_odometry = odometry
+        self._odometry.append(stamp_ns, odometry)
+        self._fused.append(stamp_ns, self.pose)
+        return self.pose
+
+    def add_ego_motion(self, captured_ns: int, ego: EgoMotion) -> None:
+        """Learn from the rotation that the camera saw between the frame before and captured_ns."""
+        before = self._odometry.at(captured_ns - round(ego.dt_s * NS_PER_S))
+        after = self._odometry.at(captured_ns)
+        if ego.source != "visual" or before is None or after is None or not ego.sigma_rotation_rad > 0.0:
+            return
+        in_body = self._camera_in_body @ ego.motion.rotation @ self._camera_in_body.T
+        visual_rad = math.atan2(in_body[1, 0], in_body[0, 0])
+        odometry_rad = wrap_angle_rad(after.heading_rad - before.heading_rad)
+        weight = 1.0 / ego.sigma_rotation_rad**2
+        self._sum_odometry_visual += weight * odometry_rad * visual_rad
+        self._sum_odometry_odometry += weight * odometry_rad**2
+
+    def body_pose(self, stamp_ns: int) -> PlanarPose | None:
+        """The body in the path's frame at stamp_ns, as known now."""
+        return self._fused.at(stamp_ns)
+
+    def camera_pose(self, stamp_ns: int) -> Pose | None:
+        """The camera by dead reckoning alone (hal.api.OdometrySource): the prior of ego-motion.
+
+        Not the fused pose: perception must not hear its own measurements again as odometry.
+        """
+        odometry = self._odometry.at(stamp_ns)
+        return None if odometry is None else camera_in_floor(odometry, self._mount)
+
+
+def _move(pose: PlanarPose, before: PlanarPose, after: PlanarPose, yaw_ratio: float) -> PlanarPose:
+    """pose, moved as odometry moved from before to after, with only yaw_ratio of its yaw."""
+    step = body_in_floor(before).inverse() @ body_in_floor(after)
+    turn_rad = wrap_angle_rad(after.heading_rad - before.heading_rad)
+    distance_m = math.copysign(float(np.hypot(step.translation_m[0], step.translation_m[1])), step.translation_m[0])
+    heading_rad = pose.heading_rad + 0.5 * yaw_ratio * turn_rad
+    return PlanarPose(
+        pose.x_m + distance_m * math.cos(heading_rad),
+        pose.y_m + distance_m * math.sin(heading_rad),
+        wrap_angle_rad(pose.heading_rad + yaw_ratio * turn_rad),
+    )

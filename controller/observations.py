@@ -1,0 +1,89 @@
+"""Observations: one JSON line a frame, for people and programs (the format is in docs/design.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, Self, TextIO
+
+from controller.decide import Decision
+from hal.clocks import NS_PER_S
+from hal.types import FloatArray
+from vision.scene import Obstacle, Scene
+
+
+class ObservationSink(Protocol):
+    """Takes what was seen and decided at one frame."""
+
+    def write(self, scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> None: ...
+
+
+def observation(scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> dict[str, Any]:
+    """What was seen and decided at one frame, as plain JSON values; unknown numbers become null.
+
+    timing_ms is empty where time is simulated: a duration that was not measured is not reported.
+    """
+    return {
+        "stamp": round(scene.captured_ns / NS_PER_S, 6),
+        "frame": scene.sequence,
+        "obstacles": [_obstacle(obstacle) for obstacle in scene.obstacles],
+        "decision": None if decision is None else _decision(decision),
+        "camera": {"condition": scene.health.condition.value, "reason": scene.health.reason},
+        "timing_ms": {stage: round(duration, 3) for stage, duration in timing_ms.items()},
+    }
+
+
+def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
+    return {
+        "id": obstacle.id,
+        "bbox": [_number(edge, 1) for edge in obstacle.bbox_px],
+        "position": _vector(obstacle.position_m),
+        "velocity": _vector(obstacle.velocity_mps),
+        "moving": obstacle.moving,
+        "score": _number(obstacle.score, 3),
+        "fragments": obstacle.fragments,
+    }
+
+
+def _decision(decision: Decision) -> dict[str, Any]:
+    return {
+        "action": decision.action.value,
+        "target_speed_mps": _number(decision.target_speed_mps, 4),
+        "reason": decision.reason.sentence,
+        "rule": decision.reason.rule,
+        "obstacle": decision.reason.obstacle_id,
+    }
+
+
+def _vector(values: FloatArray) -> list[float | None]:
+    return [_number(float(value), 4) for value in values]
+
+
+def _number(value: float, digits: int) -> float | None:
+    return round(float(value), digits) if math.isfinite(value) else None
+
+
+class ObservationFile:
+    """Writes JSON lines to a file as they come. Context manager."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: TextIO | None = None
+
+    def __enter__(self) -> Self:
+        self._file = self._path.open("w", encoding="utf-8")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def write(self, scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> None:
+        """Append one line."""
+        assert self._file is not None, "ObservationFile is used inside its with block"
+        line = json.dumps(observation(scene, decision, timing_ms), separators=(", ", ": "), allow_nan=False)
+        self._file.write(line + "\n")

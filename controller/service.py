@@ -1,0 +1,93 @@
+"""What a service owes its manager: readiness, a watchdog that the control loop itself feeds, a clean end.
+
+The notify protocol is the one of sd_notify(3): datagrams to the socket named in NOTIFY_SOCKET.
+"""
+
+from __future__ import annotations
+
+import signal
+import socket
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from types import FrameType
+
+from hal.clocks import NS_PER_S
+
+
+class ServiceManager:
+    """Speaks to systemd if it started us, to nobody otherwise.
+
+    A notice that cannot be delivered must not stop a robot: it is counted in ``lost_notices``, and
+    systemd will notice the missing watchdog by itself.
+    """
+
+    def __init__(self, environment: Mapping[str, str], pid: int) -> None:
+        address = environment.get("NOTIFY_SOCKET", "")
+        self._address = "\0" + address[1:] if address.startswith("@") else address
+        self._interval_ns = _watchdog_interval_ns(environment, pid)
+        self._next_ns = 0
+        self.lost_notices = 0
+
+    def ready(self, status: str) -> None:
+        """The loop runs and the devices answer (Type=notify waits for this)."""
+        self._send(f"READY=1\nSTATUS={status}")
+
+    def status(self, status: str) -> None:
+        """One line for `systemctl status`."""
+        self._send(f"STATUS={status}")
+
+    def stopping(self, status: str) -> None:
+        """The stop has begun."""
+        self._send(f"STOPPING=1\nSTATUS={status}")
+
+    def feed_watchdog(self, now_ns: int) -> None:
+        """Call once per healthy control step; sends at half the interval that systemd allows."""
+        if self._interval_ns is not None and now_ns >= self._next_ns:
+            self._next_ns = now_ns + self._interval_ns // 2
+            self._send("WATCHDOG=1")
+
+    def _send(self, message: str) -> None:
+        if not self._address:
+            return
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as notify:
+                notify.sendto(message.encode(), self._address)
+        except OSError:
+            self.lost_notices += 1
+
+
+def _watchdog_interval_ns(environment: Mapping[str, str], pid: int) -> int | None:
+    """WATCHDOG_USEC, if it is meant for this process (sd_watchdog_enabled(3))."""
+    meant_for = environment.get("WATCHDOG_PID", "")
+    if meant_for and meant_for != str(pid):
+        return None
+    microseconds = environment.get("WATCHDOG_USEC", "")
+    if not microseconds.isdigit() or int(microseconds) == 0:
+        return None
+    return int(microseconds) * (NS_PER_S // 1_000_000)
+
+
+class StopRequest:
+    """Set by SIGTERM or SIGINT; read by the runner once per control step."""
+
+    def __init__(self) -> None:
+        self.reason: str | None = None
+
+    def __bool__(self) -> bool:
+        return self.reason is not None
+
+    def handle(self, number: int, _frame: FrameType | None) -> None:
+        """A signal handler: it only notes the wish, the loop does the stopping."""
+        self.reason = signal.Signals(number).name
+
+
+@contextmanager
+def stop_on_signals() -> Iterator[StopRequest]:
+    """Turn SIGTERM and SIGINT into a StopRequest while the body runs."""
+    request = StopRequest()
+    before = {number: signal.signal(number, request.handle) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield request
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,85 @@
+"""What a run adds up to: limits kept by the setpoints that were really sent, and how long stages took."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from config.robot import Limits
+from hal.clocks import NS_PER_S
+from hal.types import Setpoint
+
+TOLERANCE = 1e-6
+
+
+@dataclass
+class SetpointTally:
+    """Watches every setpoint that went out: speed, acceleration, jerk, direction.
+
+    Acceleration and jerk are the differences of consecutive sent speeds and accelerations over their time, so
+    they judge the commands themselves, not what the profile claims. The emergency limits are the
+    outer bounds; how often braking went beyond comfort is counted on its own.
+    """
+
+    limits: Limits
+    count: int = 0
+    max_speed_mps: float = 0.0
+    max_accel_mps2: float = 0.0
+    max_jerk_mps3: float = 0.0
+    reversals: int = 0
+    emergency_count: int = 0
+    violations: int = 0
+    _last: Setpoint | None = None
+
+    def add(self, sent: Setpoint | None) -> None:
+        """A setpoint as the driver reports it sent; None and repeats of the same one count nothing."""
+        if sent is None or (self._last is not None and sent.stamp_ns == self._last.stamp_ns):
+            return
+        self.count += 1
+        self.max_speed_mps = max(self.max_speed_mps, sent.v_mps)
+        self.reversals += sent.v_mps < -TOLERANCE
+        accel_mps2, jerk_mps3 = self._differences(sent)
+        self.max_accel_mps2 = max(self.max_accel_mps2, abs(accel_mps2))
+        self.max_jerk_mps3 = max(self.max_jerk_mps3, abs(jerk_mps3))
+        self.emergency_count += sent.a_mps2 < -self.limits.max_accel_mps2 - TOLERANCE
+        self.violations += (
+            sent.v_mps > self.limits.max_speed_mps + TOLERANCE
+            or sent.v_mps < -TOLERANCE
+            or accel_mps2 > self.limits.max_accel_mps2 + TOLERANCE
+            or accel_mps2 < -self.limits.emergency_decel_mps2 - TOLERANCE
+            or abs(jerk_mps3) > self.limits.emergency_jerk_mps3 + TOLERANCE
+        )
+        self._last = sent
+
+    def _differences(self, sent: Setpoint) -> tuple[float, float]:
+        if self._last is None:
+            return 0.0, 0.0
+        dt_s = (sent.stamp_ns - self._last.stamp_ns) / NS_PER_S
+        return (sent.v_mps - self._last.v_mps) / dt_s, (sent.a_mps2 - self._last.a_mps2) / dt_s
+
+
+@dataclass
+class TimingTally:
+    """Durations of named stages, in milliseconds."""
+
+    samples_ms: dict[str, list[float]] = field(default_factory=dict)
+
+    def add(self, timing_ms: dict[str, float]) -> None:
+        """One frame's durations."""
+        for stage, duration_ms in timing_ms.items():
+            self.samples_ms.setdefault(stage, []).append(duration_ms)
+
+    def line(self) -> str:
+        """Median and 99th percentile of the sum, medians of the stages."""
+        if not self.samples_ms:
+            return "not measured"
+        total_ms = np.sum([self.samples_ms[stage] for stage in self.samples_ms], axis=0)
+        stages = ", ".join(f"{stage} {np.median(values):.1f}" for stage, values in self.samples_ms.items())
+        return f"{np.median(total_ms):.1f} ms median, {np.percentile(total_ms, 99):.1f} ms p99 a frame ({stages})"
+
+
+def mean_speed_mps(distance_m: float, duration_s: float) -> float:
+    """NaN when no time has passed."""
+    return distance_m / duration_s if duration_s > 0.0 else math.nan
