@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from config.loader import Section
 
@@ -47,4 +47,39 @@ class RealsenseCameraConfig(Section):
     )
 
 
-CameraConfig = Annotated[ReplayCameraConfig | RealsenseCameraConfig, Field(discriminator="kind")]
+class SimulatedCameraConfig(Section):
+    """A D435i-like camera in the simulated world: depth aligned to colour, both at one time.
+
+    depth_noise: standard deviation z^2 * 0.0075 / m (realsense: what a real one was measured to do),
+    z^2 * 0.0005 / m (paper: 5 cm at 10 m), or none.
+    """
+
+    kind: Literal["simulated"] = "simulated"
+    width: int = Field(default=640, ge=32, le=4096)
+    height: int = Field(default=480, ge=32, le=4096)
+    fx: float = Field(default=610.0, gt=0)
+    fy: float = Field(default=610.0, gt=0)
+    cx: float = 319.5
+    cy: float = 239.5
+    fps: float = Field(default=30.0, gt=0, le=300)
+    depth_min_m: float = Field(default=0.3, ge=0.05, le=5)
+    depth_max_m: float = Field(default=10.0, gt=0, le=65)
+    depth_noise: Literal["realsense", "paper", "none"] = "realsense"
+    hole_ratio: float = Field(default=0.01, ge=0, le=0.5, description="share of pixels lost at random")
+    depth_edges: bool = Field(
+        default=True, description="lose what only one of the two infrared cameras sees, beside nearer things"
+    )
+    colour_noise: bool = True
+    vibration_deg: float = Field(default=0.0, ge=0, le=5, description="amplitude of a pitching to and fro")
+    vibration_hz: float = Field(default=8.0, gt=0, le=100)
+
+    @model_validator(mode="after")
+    def _has_a_depth_range(self) -> Self:
+        if self.depth_min_m >= self.depth_max_m:
+            raise ValueError("depth_min_m must be smaller than depth_max_m")
+        return self
+
+
+CameraConfig = Annotated[
+    ReplayCameraConfig | RealsenseCameraConfig | SimulatedCameraConfig, Field(discriminator="kind")
+]

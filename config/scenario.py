@@ -1,0 +1,242 @@
+"""A simulated world as a person writes it: the path, the building, the light, and the things in it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from config.loader import CONFIG_DIR, ConfigError, Section, load
+from config.path import PathSpec
+
+SCENARIO_DIR = CONFIG_DIR / "scenarios"
+
+Texture = Literal["fine", "coarse", "plain"]
+Metres = Annotated[float, Field(ge=-1e4, le=1e4)]
+Size = Annotated[float, Field(gt=0, le=200)]
+Seconds = Annotated[float, Field(ge=0, le=3600)]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class Go(Section):
+    """Walk or drive straight to a point. Below 60 degrees a corner is rounded in passing, above it the
+    mover stops, turns on the spot and goes on."""
+
+    kind: Literal["go"]
+    x_m: Metres
+    y_m: Metres
+    speed_mps: float = Field(gt=0, le=10)
+
+
+class Wait(Section):
+    """Stand still."""
+
+    kind: Literal["wait"]
+    duration_s: Seconds
+
+
+Step = Annotated[Go | Wait, Field(discriminator="kind")]
+
+
+class Motion(Section):
+    """A plan in time. start_jitter_s: the seed shifts the start by up to this much, either way."""
+
+    start_s: Seconds = 0.0
+    start_jitter_s: Seconds = 0.0
+    accel_mps2: float = Field(default=1.5, gt=0, le=20)
+    turn_rate_degps: float = Field(default=150.0, gt=0, le=720)
+    steps: Annotated[tuple[Step, ...], Field(strict=False, min_length=1)]
+
+    @model_validator(mode="after")
+    def _starts_after_zero(self) -> Self:
+        if self.start_jitter_s > self.start_s:
+            raise ValueError(
+                "start_jitter_s must not exceed start_s: the motion would begin before time zero"
+            )
+        return self
+
+
+class _Placed(Section):
+    """name must be unique; x, y: the middle of the footprint on the floor; z_m: height of its underside.
+
+    texture: fine (printed cardboard, labels, fabric), coarse (large patches), plain (nothing to track).
+    """
+
+    name: str = Field(min_length=1, max_length=40)
+    x_m: Metres
+    y_m: Metres
+    z_m: float = Field(default=0.0, ge=0, le=50)
+    heading_deg: float = Field(default=0.0, ge=-360, le=360)
+    texture: Texture = "fine"
+    motion: Motion | None = None
+
+
+class Crate(_Placed):
+    """A box: cardboard (fine), wood (coarse) or painted (plain). Length along its heading."""
+
+    kind: Literal["crate"]
+    length_m: Size = 0.6
+    width_m: Size = 0.6
+    height_m: Size = 0.6
+
+
+class Shelf(_Placed):
+    """A pallet rack with posts, beams and goods; its long side along the heading."""
+
+    kind: Literal["shelf"]
+    length_m: Size = 5.4
+    width_m: Size = 1.1
+    height_m: Size = 3.2
+    levels: int = Field(default=3, ge=1, le=8)
+    bay_m: float = Field(default=2.7, ge=0.5, le=10)
+    goods: Share = Field(default=0.6, description="share of the places with a box that stands out")
+
+
+class Column(_Placed):
+    """A round pillar."""
+
+    kind: Literal["column"]
+    diameter_m: Size = 0.4
+    height_m: Size = 5.0
+    sides: int = Field(default=16, ge=3, le=48)
+
+
+class Pole(_Placed):
+    """A thin upright tube."""
+
+    kind: Literal["pole"]
+    diameter_m: Size = 0.05
+    height_m: Size = 1.2
+    texture: Texture = "plain"
+
+
+class Pallet(_Placed):
+    """A wooden pallet; with load_height_m > 0, wrapped goods on top."""
+
+    kind: Literal["pallet"]
+    length_m: Size = 1.2
+    width_m: Size = 0.8
+    height_m: Size = 0.144
+    load_height_m: float = Field(default=0.0, ge=0, le=5)
+
+
+class Wall(_Placed):
+    """A flat wall; its long side along the heading."""
+
+    kind: Literal["wall"]
+    length_m: Size = 6.0
+    width_m: Size = 0.2
+    height_m: Size = 3.0
+    texture: Texture = "plain"
+
+
+class Beam(_Placed):
+    """A bar that hangs at z_m over the floor; its long side along the heading."""
+
+    kind: Literal["beam"]
+    z_m: float = Field(default=1.6, ge=0, le=50)
+    length_m: Size = 4.0
+    width_m: Size = 0.2
+    height_m: Size = 0.2
+
+
+class Person(_Placed):
+    """A walking person of several parts; faces the heading while standing."""
+
+    kind: Literal["person"]
+    height_m: float = Field(default=1.75, ge=0.8, le=2.3)
+
+
+class RobotBody(_Placed):
+    """Another transport robot on wheels; load_height_m: what it carries."""
+
+    kind: Literal["robot"]
+    length_m: Size = 1.1
+    width_m: Size = 0.75
+    height_m: Size = 0.55
+    load_height_m: float = Field(default=0.0, ge=0, le=3)
+
+
+BodySpec = Annotated[
+    Crate | Shelf | Column | Pole | Pallet | Wall | Beam | Person | RobotBody, Field(discriminator="kind")
+]
+
+
+class TapeLine(Section):
+    """A painted line on the floor from a to b."""
+
+    ax_m: Metres
+    ay_m: Metres
+    bx_m: Metres
+    by_m: Metres
+    width_m: float = Field(default=0.08, gt=0, le=1)
+    colour: Literal["yellow", "white", "red"] = "yellow"
+
+
+class Room(Section):
+    """The building, a box: floor at z = 0, four walls, a ceiling."""
+
+    x_min_m: Metres = -4.0
+    x_max_m: Metres = 32.0
+    y_min_m: Metres = -6.0
+    y_max_m: Metres = 6.0
+    height_m: Size = 6.0
+    floor: Texture = "fine"
+    walls: Texture = "coarse"
+    ceiling: Texture = "coarse"
+    tape: Annotated[tuple[TapeLine, ...], Field(strict=False)] = ()
+
+    @model_validator(mode="after")
+    def _has_an_inside(self) -> Self:
+        if self.x_min_m >= self.x_max_m or self.y_min_m >= self.y_max_m:
+            raise ValueError("x_min_m and y_min_m must be smaller than x_max_m and y_max_m")
+        return self
+
+
+class Light(Section):
+    """ambient: share of light that reaches every face alike; the rest comes down from the ceiling and from
+    the side that azimuth_deg points to."""
+
+    ambient: float = Field(default=0.55, ge=0, le=1)
+    azimuth_deg: float = Field(default=115.0, ge=-360, le=360)
+    exposure: float = Field(default=1.0, ge=0.1, le=2)
+
+
+class Scenario(Section):
+    """One world. duration_s: how long a mission in it may take at most."""
+
+    name: str = Field(min_length=1)
+    description: str = ""
+    duration_s: float = Field(default=120.0, gt=0, le=3600)
+    path: PathSpec
+    room: Room = Room()
+    light: Light = Light()
+    bodies: Annotated[tuple[BodySpec, ...], Field(strict=False)] = ()
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> Self:
+        twice = [name for name, count in Counter(body.name for body in self.bodies).items() if count > 1]
+        if twice:
+            raise ValueError(f"body names must be unique; {', '.join(sorted(twice))} is given twice")
+        return self
+
+
+def scenario_names() -> tuple[str, ...]:
+    """The scenarios that ship with the program."""
+    return tuple(sorted(path.stem for path in SCENARIO_DIR.glob("*.yaml")))
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """A scenario that ships here, by name, or any YAML file. Raises ConfigError."""
+    given = Path(name_or_path)
+    if given.suffix in {".yaml", ".yml"}:
+        return load(given, Scenario)
+    shipped = SCENARIO_DIR / f"{given.name}.yaml"
+    if len(given.parts) != 1 or not shipped.exists():
+        raise ConfigError(
+            f"{name_or_path}: there is no such scenario; give a YAML file or one of: "
+            f"{', '.join(scenario_names())}"
+        )
+    return load(shipped, Scenario)
