@@ -74,11 +74,15 @@ class AppConfig(Section):
         if simulated and self.simulation is None:
             raise ValueError("camera.kind 'simulated' needs a 'simulation' section with a scenario")
         if not simulated and self.path is None:
-            raise ValueError(f"camera.kind {self.camera.kind!r} needs a 'path': there is no scenario to give one")
+            raise ValueError(
+                f"camera.kind {self.camera.kind!r} needs a 'path': there is no scenario to give one"
+            )
         if simulated and self.path is not None:
             raise ValueError("give the path in the scenario or here, not both")
         if self.runner.kind == "lockstep" and not simulated:
-            raise ValueError("runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'")
+            raise ValueError(
+                "runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'"
+            )
         return self
 
 

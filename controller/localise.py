@@ -55,7 +55,11 @@ class PoseHistory:
         if self._stamps_ns[after] == stamp_ns:
             return self._poses[after]
         return _interpolate(
-            self._stamps_ns[after - 1], self._poses[after - 1], self._stamps_ns[after], self._poses[after], stamp_ns
+            self._stamps_ns[after - 1],
+            self._poses[after - 1],
+            self._stamps_ns[after],
+            self._poses[after],
+            stamp_ns,
         )
 
 
@@ -128,7 +132,9 @@ def _move(pose: PlanarPose, before: PlanarPose, after: PlanarPose, yaw_ratio: fl
     """pose, moved as odometry moved from before to after, with only yaw_ratio of its yaw."""
     step = body_in_floor(before).inverse() @ body_in_floor(after)
     turn_rad = wrap_angle_rad(after.heading_rad - before.heading_rad)
-    distance_m = math.copysign(float(np.hypot(step.translation_m[0], step.translation_m[1])), step.translation_m[0])
+    distance_m = math.copysign(
+        float(np.hypot(step.translation_m[0], step.translation_m[1])), step.translation_m[0]
+    )
     heading_rad = pose.heading_rad + 0.5 * yaw_ratio * turn_rad
     return PlanarPose(
         pose.x_m + distance_m * math.cos(heading_rad),

@@ -77,7 +77,8 @@ class TimingTally:
             return "not measured"
         total_ms = np.sum([self.samples_ms[stage] for stage in self.samples_ms], axis=0)
         stages = ", ".join(f"{stage} {np.median(values):.1f}" for stage, values in self.samples_ms.items())
-        return f"{np.median(total_ms):.1f} ms median, {np.percentile(total_ms, 99):.1f} ms p99 a frame ({stages})"
+        median_ms, p99_ms = np.median(total_ms), np.percentile(total_ms, 99)
+        return f"{median_ms:.1f} ms median, {p99_ms:.1f} ms p99 a frame ({stages})"
 
 
 def mean_speed_mps(distance_m: float, duration_s: float) -> float:

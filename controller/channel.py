@@ -1,0 +1,59 @@
+"""Whole messages between the two processes of the real-time runner, without ever waiting for the other.
+
+A pair of SOCK_SEQPACKET sockets: a message arrives whole or not at all, so a peer that freezes or dies in the
+middle of something cannot make the reader wait for the rest.
+"""
+
+from __future__ import annotations
+
+import pickle
+import socket
+
+BUFFER_BYTES = 1 << 20
+
+
+class PeerGone(Exception):
+    """Raised by receive and send when the other process has closed its end or died."""
+
+
+class Channel:
+    """One end. Carries any picklable object; both ends are this program's own processes."""
+
+    def __init__(self, end: socket.socket) -> None:
+        self._end = end
+        self._end.setblocking(False)
+
+    def send(self, message: object) -> bool:
+        """True if sent; False if the peer does not read and the buffer is full. Raises PeerGone."""
+        try:
+            self._end.send(pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL))
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise PeerGone(f"the other process is gone ({error.strerror})") from error
+        return True
+
+    def receive(self) -> object | None:
+        """The oldest message that has arrived; None is silence. Raises PeerGone."""
+        try:
+            data = self._end.recv(BUFFER_BYTES)
+        except BlockingIOError:
+            return None
+        except OSError as error:
+            raise PeerGone(f"the other process is gone ({error.strerror})") from error
+        if not data:
+            raise PeerGone("the other process has closed its end")
+        message: object = pickle.loads(data)
+        return message
+
+    def close(self) -> None:
+        """Close this end; the peer's next call raises PeerGone."""
+        self._end.close()
+
+
+def channel_sockets() -> tuple[socket.socket, socket.socket]:
+    """Two connected ends; one goes to the other process as an argument."""
+    here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    for end in (here, there):
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
+    return here, there

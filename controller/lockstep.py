@@ -1,0 +1,75 @@
+"""The lock-step runner: one thread, simulated time, the same bytes every time.
+
+Each instant has the same order: the outside moves on, then the camera exposes, then the control
+steps. A scene becomes known to the control perception_latency_s after its exposure, as it would on
+a robot.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from config.app import LockstepRunner
+from controller.control import ControlLoop, ControlStep
+from controller.perceive import Look, Perceiver
+from hal.api import Clock
+from hal.clocks import NS_PER_S
+from hal.types import RgbdFrame
+from vision.scene import Scene
+
+
+class Outside(Protocol):
+    """Everything that goes on by itself while the program runs."""
+
+    def advance_to(self, now_ns: int) -> None: ...
+
+
+class ScheduledCamera(Protocol):
+    """A frame source that knows when it exposes next."""
+
+    @property
+    def next_capture_ns(self) -> int: ...
+
+    def read(self, timeout_s: float) -> RgbdFrame: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One control step, with the looks that the camera took since the step before."""
+
+    looks: tuple[Look, ...]
+    control: ControlStep
+
+
+def run_lockstep(
+    config: LockstepRunner,
+    clock: Clock,
+    outside: Outside,
+    camera: ScheduledCamera,
+    perceiver: Perceiver,
+    loop: ControlLoop,
+) -> Iterator[Moment]:
+    """Step until the loop has finished or max_duration_s is over; yields after each control step."""
+    period_ns = round(NS_PER_S / config.control_rate_hz)
+    latency_ns = round(config.perception_latency_s * NS_PER_S)
+    control_ns = clock.now_ns()
+    give_up_ns = control_ns + round(config.max_duration_s * NS_PER_S)
+    on_its_way: deque[Scene] = deque()
+    known: Scene | None = None
+    looks: list[Look] = []
+    while not loop.finished and control_ns < give_up_ns:
+        if camera.next_capture_ns <= control_ns:
+            outside.advance_to(camera.next_capture_ns)
+            looks.append(perceiver.look(camera.read(timeout_s=0.0)))
+            on_its_way.append(looks[-1].scene)
+            continue
+        clock.sleep_until_ns(control_ns)
+        outside.advance_to(control_ns)
+        while on_its_way and on_its_way[0].captured_ns + latency_ns <= control_ns:
+            known = on_its_way.popleft()
+        yield Moment(tuple(looks), loop.step(known, control_ns))
+        looks.clear()
+        control_ns += period_ns

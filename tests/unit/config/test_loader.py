@@ -1,0 +1,79 @@
+from pathlib import Path
+
+import pytest
+from pydantic import Field
+
+from config.loader import CONFIG_DIR, ConfigError, Section, load, resolve
+
+
+class Inner(Section):
+    speed_mps: float = Field(default=1.0, gt=0)
+
+
+class Outer(Section):
+    count: int
+    inner: Inner = Inner()
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "robot.yaml"
+    path.write_text(text)
+    return path
+
+
+def refusal(tmp_path: Path, text: str) -> str:
+    with pytest.raises(ConfigError) as caught:
+        load(written(tmp_path, text), Outer)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert str(tmp_path / "robot.yaml") in message
+    return message
+
+
+def test_a_good_file_is_read(tmp_path: Path) -> None:
+    config = load(written(tmp_path, "count: 3\ninner: {speed_mps: 2}\n"), Outer)
+    assert config == Outer(count=3, inner=Inner(speed_mps=2.0))
+
+
+def test_every_mistake_is_named_with_its_key(tmp_path: Path) -> None:
+    message = refusal(tmp_path, "inner: {speed_mps: -1, sped_mps: 2}\n")
+    assert "count: missing key" in message
+    assert "inner.speed_mps: Input should be greater than 0, found -1" in message
+    assert "inner.sped_mps: unknown key" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("count: true", "found True"),
+        ("count: '3'", "found '3'"),
+        ("count: 1.5", "found 1.5"),
+        ("count: 3\ninner: {speed_mps: .nan}", "finite"),
+        ("count: 3\ncount: 4", "given twice"),
+        ("count: [3", "not valid YAML"),
+        ("- 3", "must hold keys and values"),
+        ("", "must hold keys and values"),
+    ],
+)
+def test_wrong_content_is_refused_in_one_line(tmp_path: Path, text: str, reason: str) -> None:
+    assert reason in refusal(tmp_path, text)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"none\.yaml: cannot be read \(No such file"):
+        load(tmp_path / "none.yaml", Outer)
+
+
+def test_a_binary_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "image.yaml"
+    path.write_bytes(b"\x89PNG\xff\xfe")
+    with pytest.raises(ConfigError, match="not UTF-8"):
+        load(path, Outer)
+
+
+def test_a_named_file_is_found_beside_the_yaml_first_then_among_those_that_ship(tmp_path: Path) -> None:
+    main = tmp_path / "main.yaml"
+    (tmp_path / "near.yaml").touch()
+    assert resolve("near.yaml", main) == tmp_path / "near.yaml"
+    assert resolve("far.yaml", main) == CONFIG_DIR / "far.yaml"
+    assert resolve("/abs/a.yaml", main) == Path("/abs/a.yaml")
