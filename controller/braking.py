@@ -1,0 +1,259 @@
+"""The one stopping model: how far and how long a jerk-limited stop takes, from any speed and acceleration.
+
+decide, shape, the speed that the camera's range admits, the envelope report, the campaign's oracle and the
+tests all ask this file, so "the distance we brake at >= the distance the profile needs" can be tested.
+
+Plain floats on purpose: one call costs about a microsecond, a NumPy call on one number ten times that, and
+nobody needs these for arrays in the control loop (controller/profile.py samples whole profiles in arrays).
+
+Symbols: A is the greatest deceleration, J the greatest jerk, tau the latency, V_o the obstacle's own speed
+towards the robot. An infinite J with tau = 0 gives the formulas of Daeef 2020 (problem statement).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from config.robot import Limits
+
+_NEWTON_STEPS = 60
+_CONVERGED = 1e-14
+
+
+@dataclass(frozen=True, slots=True)
+class BrakeLimits:
+    """How hard a stop may be. jerk_mps3 may be infinite (the paper's model); both must be positive."""
+
+    decel_mps2: float
+    jerk_mps3: float
+
+    def __post_init__(self) -> None:
+        if not (0 < self.decel_mps2 < math.inf and self.jerk_mps3 > 0):
+            raise ValueError(f"limits must be positive: {self.decel_mps2} m/s2, {self.jerk_mps3} m/s3")
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """What a stop takes until standstill."""
+
+    distance_m: float
+    time_s: float
+
+
+def comfort(limits: Limits) -> BrakeLimits:
+    """The everyday stop."""
+    return BrakeLimits(limits.max_accel_mps2, limits.max_jerk_mps3)
+
+
+def emergency(limits: Limits) -> BrakeLimits:
+    """The hardest stop that the robot is allowed."""
+    return BrakeLimits(limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
+
+
+def stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
+    """The shortest stop that ends with v = 0 and a = 0 (motion-formulas 4.7).
+
+    An acceleration outside the limits is first brought inside them. Where the speed is too small to let go of
+    a deceleration in time (v < a^2 / 2J, only after a fault), the deceleration drops to zero at standstill:
+    the robot never reverses. Raises ValueError for a negative or unknown speed or acceleration.
+    """
+    _check_state(v_mps, a_mps2)
+    big_a, j = limits.decel_mps2, limits.jerk_mps3
+    if math.isinf(j):
+        return Stop(v_mps * v_mps / (2.0 * big_a), v_mps / big_a)
+    if a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * j):
+        return _standstill_while_letting_go(v_mps, a_mps2, j)
+    excess = abs(a_mps2) - big_a
+    if excess > 0.0:
+        return _bring_inside_then_stop(v_mps, a_mps2, excess / j, limits)
+    speed_at_rest_of_a = v_mps + a_mps2 * a_mps2 / (2.0 * j)
+    rest = _stop_from_steady(speed_at_rest_of_a, big_a, j)
+    return Stop(
+        rest.distance_m + a_mps2 * v_mps / j + a_mps2**3 / (3.0 * j * j),
+        rest.time_s + a_mps2 / j,
+    )
+
+
+def onset_only_stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
+    """The stop whose jerk is limited at its onset only: the deceleration is dropped at standstill.
+
+    The last resort of a brake, and never longer than stop() from within the limits; for a = 0 it is the emergency variant of
+    motion-formulas 4.7. Raises ValueError as stop().
+    """
+    _check_state(v_mps, a_mps2)
+    big_a, j = limits.decel_mps2, limits.jerk_mps3
+    if math.isinf(j):
+        return stop(v_mps, a_mps2, limits)
+    start = max(a_mps2, -big_a)
+    onset_s = (start + big_a) / j
+    after_mps = v_mps + (start * start - big_a * big_a) / (2.0 * j)
+    if after_mps < 0.0:
+        onset_s = (start + math.sqrt(start * start + 2.0 * j * v_mps)) / j
+        after_mps = 0.0
+    onset_m = v_mps * onset_s + start * onset_s**2 / 2.0 - j * onset_s**3 / 6.0
+    return Stop(onset_m + after_mps**2 / (2.0 * big_a), onset_s + after_mps / big_a)
+
+
+def required_distance(
+    v_mps: float,
+    a_mps2: float,
+    closing_mps: float,
+    latency_s: float,
+    limits: BrakeLimits,
+    margin_m: float = 0.0,
+) -> float:
+    """The distance at which something must be seen so that the robot stands before it arrives, in metres.
+
+    S_n = (V + V_o) tau + S(V, a) + V_o T(V, a) + margin (motion-formulas 4.8). closing_mps is the speed of
+    the obstacle itself towards the robot; what moves away counts as standing.
+    """
+    whole = stop(v_mps, a_mps2, limits)
+    towards_mps = max(closing_mps, 0.0)
+    return (v_mps + towards_mps) * latency_s + whole.distance_m + towards_mps * whole.time_s + margin_m
+
+
+def speed_for_distance(
+    distance_m: float,
+    limits: BrakeLimits,
+    *,
+    latency_s: float = 0.0,
+    closing_mps: float = 0.0,
+    margin_m: float = 0.0,
+    a_mps2: float = 0.0,
+) -> float:
+    """The greatest speed with required_distance(...) <= distance_m: its inverse; 0 where none fits.
+
+    a_mps2: the present acceleration. Without it, where A is reached, this is
+    v = -A b + sqrt(A^2 b^2 + 2 A d) with b = tau + A / 2J + V_o / A (4.7), else the root of a cubic in
+    sqrt(v).
+    """
+    towards_mps = max(closing_mps, 0.0)
+    free_m = distance_m - margin_m
+    if math.isinf(limits.jerk_mps3):
+        a_mps2 = 0.0  # it is gone at once
+    if free_m <= required_distance(0.0, a_mps2, towards_mps, latency_s, limits):
+        return 0.0
+    if abs(a_mps2) > limits.decel_mps2:
+        return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, limits)
+    j = limits.jerk_mps3
+    # In terms of u = v + a^2 / 2J, every a adds only a linear term and a constant to the law for a = 0.
+    extra_s = latency_s + a_mps2 / j
+    shift_mps = a_mps2 * a_mps2 / (2.0 * j)
+    constant_m = (
+        a_mps2**3 / (3.0 * j * j) - extra_s * shift_mps + towards_mps * (latency_s + a_mps2 / j) - free_m
+    )
+    speed = _solve_from_steady(extra_s, towards_mps, constant_m, limits) - shift_mps
+    if a_mps2 < 0.0 and speed < shift_mps:
+        return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, limits)
+    return max(speed, 0.0)
+
+
+def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float:
+    """From steady v down to steady end_mps <= v: by symmetry the mean speed times the time, in metres."""
+    if not 0.0 <= end_mps <= v_mps:
+        raise ValueError(f"can only slow down to a speed in 0..{v_mps} m/s, asked for {end_mps}")
+    drop_mps = v_mps - end_mps
+    return 0.5 * (v_mps + end_mps) * _stop_from_steady(drop_mps, limits.decel_mps2, limits.jerk_mps3).time_s
+
+
+def speed_before_section(distance_m: float, section_mps: float, limits: BrakeLimits) -> float:
+    """The greatest steady speed from which section_mps is reached within distance_m."""
+    if distance_m <= 0.0:
+        return section_mps
+    low, high = section_mps, section_mps + math.sqrt(2.0 * limits.decel_mps2 * distance_m)
+    for _ in range(_NEWTON_STEPS):
+        middle = 0.5 * (low + high)
+        if slowing_distance(middle, section_mps, limits) <= distance_m:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def paper_speed(distance_m: float, decel_mps2: float) -> float:
+    """V_r of Daeef 2020, eq. 1: the speed from which the robot stops within distance_m."""
+    return math.sqrt(2.0 * decel_mps2 * distance_m)
+
+
+def paper_braking_distance(v_mps: float, decel_mps2: float) -> float:
+    """S_r of Daeef 2020, eq. 2: stop() with infinite jerk."""
+    return stop(v_mps, 0.0, BrakeLimits(decel_mps2, math.inf)).distance_m
+
+
+def paper_stopping_time(v_mps: float, decel_mps2: float) -> float:
+    """T_t of Daeef 2020: stop() with infinite jerk."""
+    return stop(v_mps, 0.0, BrakeLimits(decel_mps2, math.inf)).time_s
+
+
+def paper_detection_distance(v_mps: float, closing_mps: float, decel_mps2: float) -> float:
+    """S_n of Daeef 2020: required_distance() with infinite jerk, no latency and no margin."""
+    return required_distance(v_mps, 0.0, closing_mps, 0.0, BrakeLimits(decel_mps2, math.inf))
+
+
+def _check_state(v_mps: float, a_mps2: float) -> None:
+    if not (0.0 <= v_mps < math.inf and math.isfinite(a_mps2)):
+        raise ValueError(f"a stop needs a known speed >= 0 and acceleration, got {v_mps} m/s, {a_mps2} m/s2")
+
+
+def _stop_from_steady(v_mps: float, big_a: float, j: float) -> Stop:
+    """From a = 0: a trapezoid of deceleration, or a triangle when A is not reached."""
+    reached = v_mps * j >= big_a * big_a
+    time_s = v_mps / big_a + big_a / j if reached else 2.0 * math.sqrt(v_mps / j)
+    return Stop(0.5 * v_mps * time_s, time_s)
+
+
+def _standstill_while_letting_go(v_mps: float, a_mps2: float, j: float) -> Stop:
+    """Easing a < 0 off at J, the robot stands before a has gone."""
+    time_s = (-a_mps2 - math.sqrt(max(a_mps2 * a_mps2 - 2.0 * j * v_mps, 0.0))) / j
+    return Stop(v_mps * time_s + a_mps2 * time_s**2 / 2.0 + j * time_s**3 / 6.0, time_s)
+
+
+def _bring_inside_then_stop(v_mps: float, a_mps2: float, ease_s: float, limits: BrakeLimits) -> Stop:
+    j = math.copysign(limits.jerk_mps3, a_mps2)
+    eased_m = v_mps * ease_s + a_mps2 * ease_s**2 / 2.0 - j * ease_s**3 / 6.0
+    eased_mps = v_mps + a_mps2 * ease_s - j * ease_s**2 / 2.0
+    rest = stop(max(eased_mps, 0.0), math.copysign(limits.decel_mps2, a_mps2), limits)
+    return Stop(eased_m + rest.distance_m, ease_s + rest.time_s)
+
+
+def _solve_from_steady(linear_s: float, towards_mps: float, constant_m: float, limits: BrakeLimits) -> float:
+    """The u >= 0 with S_0(u) + linear_s u + V_o T_0(u) + constant_m = 0."""
+    big_a, j = limits.decel_mps2, limits.jerk_mps3
+    b = linear_s + big_a / (2.0 * j) + towards_mps / big_a
+    c = constant_m + towards_mps * big_a / j
+    discriminant = big_a * big_a * b * b - 2.0 * big_a * c
+    if discriminant >= 0.0:
+        u = -big_a * b + math.sqrt(discriminant)
+        if u * j >= big_a * big_a:
+            return u
+    # A is not reached: x^3 / sqrt(J) + linear x^2 + 2 V_o x / sqrt(J) + constant = 0 with x = sqrt(u).
+    root_j = math.sqrt(j)
+    low, high = 0.0, big_a / root_j
+    x = high
+    for _ in range(_NEWTON_STEPS):
+        value = ((x / root_j + linear_s) * x + 2.0 * towards_mps / root_j) * x + constant_m
+        slope = (3.0 * x / root_j + 2.0 * linear_s) * x + 2.0 * towards_mps / root_j
+        low, high = (low, x) if value > 0.0 else (x, high)
+        newton = x - value / slope if slope > 0.0 else low
+        following = newton if low <= newton <= high else 0.5 * (low + high)
+        if abs(following - x) <= _CONVERGED:
+            break
+        x = following
+    return x * x
+
+
+def _bisect_speed(
+    free_m: float, a_mps2: float, towards_mps: float, latency_s: float, limits: BrakeLimits
+) -> float:
+    """The rare states: the law is not one closed form, but it still grows with the speed."""
+    low, high = 0.0, math.sqrt(2.0 * limits.decel_mps2 * free_m) + abs(a_mps2) + a_mps2**2 / limits.jerk_mps3
+    while required_distance(high, a_mps2, towards_mps, latency_s, limits) <= free_m:
+        high *= 2.0
+    for _ in range(_NEWTON_STEPS):
+        middle = 0.5 * (low + high)
+        if required_distance(middle, a_mps2, towards_mps, latency_s, limits) <= free_m:
+            low = middle
+        else:
+            high = middle
+    return low
