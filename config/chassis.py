@@ -1,0 +1,125 @@
+"""The chassis that the robot drives on, and the link that reaches it. Chosen by ``kind``."""
+
+from __future__ import annotations
+
+import ipaddress
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from config.loader import Section
+
+CanInterface = Literal["virtual", "udp_multicast", "socketcan", "slcan", "pcan", "gs_usb"]
+
+# Interfaces whose bit rate is set by python-can; SocketCAN's is set with `ip link`, the others have none.
+_BITRATE_INTERFACES = frozenset({"slcan", "pcan", "gs_usb"})
+
+
+class CanLinkConfig(Section):
+    """A CAN bus, as python-can names it. Keys that the interface would ignore are refused.
+
+    channel: "can0" (socketcan), a serial port (slcan), a group address (udp_multicast), any
+    name (virtual). AgileX chassis run at 500 kbit/s; with socketcan that is set by the system:
+    ``ip link set can0 up type can bitrate 500000``.
+    """
+
+    interface: CanInterface
+    channel: str = Field(min_length=1)
+    bitrate: int = Field(default=500_000, ge=10_000, le=1_000_000)
+    port: int = Field(default=43113, ge=1024, le=65535, description="UDP port of udp_multicast")
+    hop_limit: int = Field(default=0, ge=0, le=255, description="0 keeps udp_multicast on this machine")
+
+    @model_validator(mode="after")
+    def _no_idle_keys(self) -> Self:
+        given = self.model_fields_set
+        if self.interface == "udp_multicast" and not _is_multicast(self.channel):
+            raise ValueError(
+                f"channel: udp_multicast needs a group address such as 239.74.163.2, found {self.channel!r}"
+            )
+        if self.interface != "udp_multicast" and (idle := given & {"port", "hop_limit"}):
+            raise ValueError(f"{', '.join(sorted(idle))}: only udp_multicast has this, not {self.interface}")
+        if "bitrate" in given and self.interface == "socketcan":
+            raise ValueError(
+                "bitrate: socketcan takes it from the system; remove the key and run "
+                f"`ip link set {self.channel} up type can bitrate {self.bitrate}`"
+            )
+        if "bitrate" in given and self.interface not in _BITRATE_INTERFACES:
+            raise ValueError(f"bitrate: {self.interface} has none; remove the key")
+        return self
+
+
+def _is_multicast(address: str) -> bool:
+    try:
+        return ipaddress.ip_address(address).is_multicast
+    except ValueError:
+        return False
+
+
+class SerialLinkConfig(Section):
+    """A serial port: a device path, or a pyserial URL such as ``socket://host:port``."""
+
+    url: str = Field(min_length=1)
+    baud: int = Field(default=115_200, ge=1_200, le=4_000_000)
+
+
+class AgilexChassisConfig(Section):
+    """An AgileX base that speaks protocol V2 over CAN.
+
+    track_width_m: distance between the track centres. With it, dead reckoning counts the track
+    odometer (0x311); without it, it integrates the reported speeds (0x221), whose yaw rate needs no
+    geometry. slip_factor: effective over real track width, >= 1 because tracks scrub sideways
+    in a turn: the base turns 1 / slip_factor of what its tracks say. Measure it by turning on the spot.
+    """
+
+    kind: Literal["agilex"]
+    model: Literal["bunker"] = "bunker"
+    link: CanLinkConfig
+    command_period_ms: int = Field(default=20, ge=5, le=100)
+    command_timeout_ms: int = Field(default=200, ge=40, le=1000, description="older setpoints stop the robot")
+    feedback_timeout_ms: int = Field(default=200, ge=40, le=2000, description="of motion feedback 0x221")
+    status_timeout_ms: int = Field(default=700, ge=100, le=5000, description="of system state 0x211")
+    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
+    track_width_m: float | None = Field(default=None, gt=0.05, le=5)
+    slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
+
+
+class RoboclawChassisConfig(Section):
+    """A base with one RoboClaw for both tracks, packet serial, motor 1 left, motor 2 right.
+
+    counts_per_m: encoder counts for one metre of track. slip_factor: as for AgileX.
+    timeout_ms: after so long without a packet the controller itself stops the motors (command 14,
+    steps of 100 ms); set and read back before arming. max_qpps, accel_qpps2: the fastest speed and
+    the hardest ramp that may ever be sent, in counts per second (and second).
+    """
+
+    kind: Literal["roboclaw"]
+    link: SerialLinkConfig
+    address: int = Field(default=0x80, ge=0x80, le=0x87)
+    counts_per_m: float = Field(gt=0, le=1e7)
+    track_width_m: float = Field(gt=0.05, le=5)
+    slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
+    max_qpps: int = Field(gt=0, le=10_000_000)
+    accel_qpps2: int = Field(gt=0, le=100_000_000)
+    timeout_ms: int = Field(default=300, ge=100, le=2000, multiple_of=100)
+    invert_left: bool = False
+    invert_right: bool = False
+    command_timeout_ms: int = Field(default=200, ge=40, le=1000)
+    feedback_timeout_ms: int = Field(default=300, ge=100, le=2000)
+    status_timeout_ms: int = Field(default=1000, ge=200, le=5000)
+    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
+
+
+ChassisConfig = Annotated[AgilexChassisConfig | RoboclawChassisConfig, Field(discriminator="kind")]
+
+
+class PlantConfig(Section):
+    """The simulated tracked base behind a chassis emulator.
+
+    lag_s: time constant of each track's speed loop. slip_factor: see AgilexChassisConfig; 1.1 turns
+    about 10 % less than the tracks say.
+    """
+
+    track_width_m: float = Field(default=0.555, gt=0.05, le=5)
+    lag_s: float = Field(default=0.08, gt=0, le=2)
+    max_accel_mps2: float = Field(default=2.0, gt=0, le=50)
+    slip_factor: float = Field(default=1.1, ge=1.0, le=3.0)

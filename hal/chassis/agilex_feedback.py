@@ -1,0 +1,210 @@
+"""What an AgileX base has told: speeds, dead-reckoned pose, mode, faults, battery. Pure bookkeeping."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from config.chassis import AgilexChassisConfig
+from hal.chassis.agilex_messages import (
+    ActuatorSlow,
+    AgilexMessage,
+    Battery,
+    MotionFeedback,
+    Odometer,
+    SystemState,
+)
+from hal.chassis.agilex_models import (
+    VEHICLE_ESTOP,
+    VEHICLE_NORMAL,
+    AgilexModel,
+    describe_driver_state,
+)
+from hal.chassis.arming import NS_PER_MS
+from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
+from hal.types import PlanarPose
+
+_NS_PER_S = 1e9
+
+# Below this the tracks stand still: two steps of the wire.
+_STANDING_MPS = 0.002
+_STANDING_RADPS = 0.002
+
+# Travel that two feedbacks cannot be apart, even where frames were lost or came late.
+_JUMP_SLACK_M = 0.2
+
+# 0x221 and 0x311 tell of the same tracks. Past this difference since the last comparison, one of them lies.
+_DISAGREEMENT_M = 0.15
+_DISAGREEMENT_RATIO = 0.3
+_COMPARED_NS = 1_000_000_000
+
+
+class AgilexFeedback:
+    """The newest of everything the base says.
+
+    Dead reckoning: with the track width known, the odometer 0x311 is counted: it loses nothing
+    when frames are lost or late, and its 1 mm steps do not add up. Without it the speeds 0x221 are
+    integrated over the time of their arrival: they need no geometry.
+    """
+
+    def __init__(self, config: AgilexChassisConfig, model: AgilexModel) -> None:
+        self._model = model
+        self._slip_factor = config.slip_factor
+        self._geometry = (
+            None if config.track_width_m is None else TrackGeometry(config.track_width_m, config.slip_factor)
+        )
+        self._silence_ns = config.feedback_timeout_ms * NS_PER_MS
+        self._reckoning = DeadReckoning()
+        self._counter = TrackCounter()
+        self._disagreement = _Disagreement()
+        self._odometer_ns: int | None = None
+        self._state: SystemState | None = None
+        self._battery: Battery | None = None
+        self._driver_bits: dict[int, int] = {}
+        self.motion_ns: int | None = None
+        self.state_ns: int | None = None
+        self.v_mps = math.nan
+        self.w_radps = math.nan
+        self.faults: tuple[str, ...] = ()
+
+    @property
+    def pose(self) -> PlanarPose:
+        """Dead reckoning since the driver was made."""
+        return self._reckoning.pose
+
+    @property
+    def feedback_ns(self) -> int | None:
+        """When the older of all that dead reckoning needs arrived; None while something is missing."""
+        if self._geometry is None or self.motion_ns is None or self._odometer_ns is None:
+            return self.motion_ns if self._geometry is None else None
+        return min(self.motion_ns, self._odometer_ns)
+
+    @property
+    def obeys(self) -> bool:
+        """The newest system state says: control mode CAN."""
+        return self._state is not None and self._state.control_mode == self._model.mode_can
+
+    def obeys_since(self, since_ns: int) -> bool:
+        """Obeys, as told after since_ns."""
+        return self.obeys and self.state_ns is not None and self.state_ns > since_ns
+
+    @property
+    def standing(self) -> bool:
+        """Measured speed is zero; False while unknown."""
+        return abs(self.v_mps) <= _STANDING_MPS and abs(self.w_radps) <= _STANDING_RADPS
+
+    @property
+    def battery_v(self) -> float:
+        """Of 0x211, else of 0x361; NaN while unknown."""
+        if self._state is not None:
+            return self._state.battery_v
+        return math.nan if self._battery is None else self._battery.voltage_v
+
+    @property
+    def stop_cause(self) -> str:
+        """Why the base must not be driven now; "" for no cause.
+
+        Fault bits alone are no cause: several models set "remote control lost" whenever the remote
+        control is switched off. What stops the base shows in its vehicle state.
+        """
+        state = self._state
+        if state is None:
+            return ""
+        if state.vehicle_state == VEHICLE_ESTOP:
+            return "emergency stop is pressed"
+        if state.vehicle_state != VEHICLE_NORMAL:
+            faults = ", ".join(self.faults) or "no fault named"
+            return f"the base reports an exception (vehicle state {state.vehicle_state}: {faults})"
+        if state.control_mode in self._model.modes_manual:
+            return f"{self._model.describe_mode(state.control_mode)} has taken over"
+        return self._disagreement.sentence
+
+    def update(self, messages: Sequence[AgilexMessage], now_ns: int) -> None:
+        """Take in what arrived since the last call."""
+        motions = []
+        for message in messages:
+            match message:
+                case MotionFeedback():
+                    motions.append(message)
+                case Odometer():
+                    self._count(message, now_ns)
+                case SystemState():
+                    self._state, self.state_ns = message, now_ns
+                    self._list_faults()
+                case ActuatorSlow():
+                    if self._driver_bits.get(message.index) != message.state_bits:
+                        self._driver_bits[message.index] = message.state_bits
+                        self._list_faults()
+                case Battery():
+                    self._battery = message
+        if motions:
+            self._integrate(motions, now_ns)
+
+    def _integrate(self, motions: Sequence[MotionFeedback], now_ns: int) -> None:
+        # Several at once waited somewhere: each stands for an equal part of the time since the last.
+        # After a longer silence nobody knows what happened; the newest speed does not stand for all of it.
+        elapsed_ns = 0 if self.motion_ns is None else min(now_ns - self.motion_ns, self._silence_ns)
+        share_s = elapsed_ns / _NS_PER_S / len(motions)
+        for motion in motions:
+            self._disagreement.spoke(motion.v_mps * share_s)
+            if self._geometry is None:
+                self._reckoning.advance(motion.v_mps * share_s, motion.w_radps / self._slip_factor * share_s)
+        self.motion_ns = now_ns
+        self.v_mps = motions[-1].v_mps
+        self.w_radps = motions[-1].w_radps / self._slip_factor
+
+    def _count(self, odometer: Odometer, now_ns: int) -> None:
+        if self._geometry is None:
+            return
+        elapsed_s = 0.0 if self._odometer_ns is None else (now_ns - self._odometer_ns) / _NS_PER_S
+        self._odometer_ns = now_ns
+        fastest_mps = (
+            self._model.max_speed_mps + self._geometry.to_tracks(0.0, self._model.max_yaw_rate_radps)[1]
+        )
+        limit_mm = 1000.0 * (fastest_mps * elapsed_s + _JUMP_SLACK_M)
+        steps = self._counter.increments(odometer.left_mm, odometer.right_mm, limit_mm)
+        if steps is None:
+            self._disagreement.restart(now_ns)
+            return
+        distance_m, turn_rad = self._geometry.to_twist(steps[0] / 1000.0, steps[1] / 1000.0)
+        self._reckoning.advance(distance_m, turn_rad)
+        self._disagreement.counted(distance_m, now_ns)
+
+    def _list_faults(self) -> None:
+        bits = 0 if self._state is None else self._state.fault_bits
+        found = self._model.describe_system_faults(bits)
+        for index, driver_bits in sorted(self._driver_bits.items()):
+            found += describe_driver_state(index, driver_bits)
+        self.faults = found
+
+
+class _Disagreement:
+    """Compares, second by second, the distance counted with the distance spoken of."""
+
+    def __init__(self) -> None:
+        self.sentence = ""
+        self._counted_m = 0.0
+        self._spoken_m = 0.0
+        self._since_ns: int | None = None
+
+    def spoke(self, distance_m: float) -> None:
+        self._spoken_m += distance_m
+
+    def restart(self, now_ns: int) -> None:
+        self._counted_m = self._spoken_m = 0.0
+        self._since_ns = now_ns
+
+    def counted(self, distance_m: float, now_ns: int) -> None:
+        if self._since_ns is None:
+            self.restart(now_ns)
+        self._counted_m += distance_m
+        if self._since_ns is None or now_ns - self._since_ns < _COMPARED_NS:
+            return
+        apart_m = abs(self._counted_m - self._spoken_m)
+        allowed_m = _DISAGREEMENT_M + _DISAGREEMENT_RATIO * abs(self._spoken_m)
+        self.sentence = (
+            f"odometer and speed feedback disagree: {self._counted_m:.2f} m against {self._spoken_m:.2f} m"
+            if apart_m > allowed_m
+            else ""
+        )
+        self.restart(now_ns)

@@ -1,0 +1,159 @@
+"""The one arming state machine of all chassis drivers: pure steps from evidence to a mode.
+
+    standby --arm()--> arming --the base obeys, command zero--> armed --stop()--> stopping --> standby
+       any --emergency stop, exception, somebody else drives, mode lost--> e-stop   (latched)
+       any --link gone, feedback or status silent--> lost                          (latched)
+       e-stop, lost --arm(), cause gone, command zero--> arming
+
+A latched chassis never moves again by itself: only arm(), a person's consent, leads out (ISO 3691-4
+4.1.14). stop() does not unlatch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from hal.types import ChassisMode
+
+NS_PER_MS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class ArmingLimits:
+    """After how long silence counts as loss. stall_ns: the longest gap between two steps while
+    armed; past it the base may have stopped by its own time-out, and the old speed would be a jump."""
+
+    feedback_timeout_ns: int
+    status_timeout_ns: int
+    arming_timeout_ns: int
+    stall_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """All that a driver knows when it steps the machine.
+
+    link_error: "" while the link works. feedback_ns, status_ns: when the newest motion feedback and the
+    newest status arrived (None: never). obeys: that status says the base takes our commands.
+    stop_cause: why the robot must not move ("" for none). standing: measured speed is zero; False when
+    unknown. command_is_zero: what is asked of the chassis at this step.
+    """
+
+    now_ns: int
+    link_error: str
+    feedback_ns: int | None
+    status_ns: int | None
+    obeys: bool
+    stop_cause: str
+    standing: bool
+    command_is_zero: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Arming:
+    """Where the machine stands: the mode, why, since when, and when it was stepped last."""
+
+    mode: ChassisMode = ChassisMode.STANDBY
+    reason: str = "not armed"
+    since_ns: int = 0
+    stepped_ns: int = 0
+
+    @property
+    def may_move(self) -> bool:
+        """True in the only mode in which anything but zero may be sent."""
+        return self.mode is ChassisMode.ARMED
+
+    @property
+    def latched(self) -> bool:
+        """True where only arm() leads out."""
+        return self.mode in (ChassisMode.ESTOP, ChassisMode.LOST)
+
+
+def step(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+    """The state after one exchange."""
+    return replace(_next(state, seen, limits), stepped_ns=seen.now_ns)
+
+
+def consent(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+    """arm(): begins arming, or says in the reason why not. Armed and arming stay as they are."""
+    if state.mode in (ChassisMode.ARMED, ChassisMode.ARMING):
+        return state
+    if refusal := _refusal(state, seen, limits):
+        cause = state.reason.split("; arming refused")[0]
+        return replace(state, reason=f"{cause}; arming refused: {refusal}")
+    return Arming(ChassisMode.ARMING, "waiting for the base to obey", seen.now_ns, seen.now_ns)
+
+
+def release(state: Arming, now_ns: int) -> Arming:
+    """stop(): towards standby. A latched state stays latched."""
+    if state.mode in (ChassisMode.ARMED, ChassisMode.ARMING):
+        return Arming(ChassisMode.STOPPING, "stop was asked for", now_ns, now_ns)
+    return state
+
+
+def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+    if state.latched:
+        return state
+    if loss := _loss(seen, limits):
+        return Arming(ChassisMode.LOST, loss, seen.now_ns)
+    if seen.stop_cause:
+        return Arming(ChassisMode.ESTOP, seen.stop_cause, seen.now_ns)
+    if state.mode is ChassisMode.ARMING:
+        return _arming(state, seen, limits)
+    if state.mode is ChassisMode.ARMED:
+        return _armed(state, seen, limits)
+    if state.mode is ChassisMode.STOPPING and seen.standing and not seen.obeys:
+        return Arming(ChassisMode.STANDBY, "stopped", seen.now_ns)
+    return state
+
+
+def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+    # Only what arrived after the consent counts: an old "obeys" may be from before a restart.
+    if seen.status_ns is None or seen.status_ns <= state.since_ns:
+        waiting = "no status heard from the base"
+    elif seen.feedback_ns is None or seen.feedback_ns <= state.since_ns:
+        waiting = "no motion feedback heard from the base"
+    elif not seen.obeys:
+        waiting = "the base does not take commands"
+    elif not seen.command_is_zero:
+        waiting = "the command is not zero"
+    else:
+        return Arming(ChassisMode.ARMED, "armed", seen.now_ns)
+    if seen.now_ns - state.since_ns > limits.arming_timeout_ns:
+        waited_s = (seen.now_ns - state.since_ns) / 1e9
+        return Arming(ChassisMode.STANDBY, f"arming gave up after {waited_s:.1f} s: {waiting}", seen.now_ns)
+    return replace(state, reason=f"arming: {waiting}")
+
+
+def _armed(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+    if not seen.obeys:
+        return Arming(ChassisMode.ESTOP, "the base left command mode: restarted or switched", seen.now_ns)
+    gap_ns = seen.now_ns - state.stepped_ns
+    if not 0 <= gap_ns <= limits.stall_ns:
+        return Arming(
+            ChassisMode.ESTOP, f"the control loop stood still for {gap_ns / NS_PER_MS:.0f} ms", seen.now_ns
+        )
+    return state
+
+
+def _refusal(state: Arming, seen: Evidence, limits: ArmingLimits) -> str:
+    if state.mode is ChassisMode.STOPPING:
+        return "still stopping"
+    if problem := _loss(seen, limits) or seen.stop_cause:
+        return problem
+    if not seen.command_is_zero:
+        return "the command is not zero"
+    return ""
+
+
+def _loss(seen: Evidence, limits: ArmingLimits) -> str:
+    """Why the chassis counts as lost. What was never heard is not lost; arming waits for it."""
+    if seen.link_error:
+        return seen.link_error
+    for what, stamp_ns, limit_ns in (
+        ("motion feedback", seen.feedback_ns, limits.feedback_timeout_ns),
+        ("status", seen.status_ns, limits.status_timeout_ns),
+    ):
+        if stamp_ns is not None and seen.now_ns - stamp_ns > limit_ns:
+            return f"no {what} for {(seen.now_ns - stamp_ns) / NS_PER_MS:.0f} ms"
+    return ""

@@ -1,0 +1,52 @@
+"""The last look at a setpoint before it becomes bytes. The same for every driver."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from hal.chassis.tracks import scale_to_fit
+from hal.types import Setpoint
+
+NS_PER_MS = 1_000_000
+
+
+def is_zero(setpoint: Setpoint | None) -> bool:
+    """True where no motion is asked for. NaN is not zero."""
+    return setpoint is None or (setpoint.v_mps == 0.0 and setpoint.w_radps == 0.0)
+
+
+def zero(now_ns: int) -> Setpoint:
+    """The explicit zero."""
+    return Setpoint(now_ns, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class CommandLimits:
+    """What the base can do, and how old a setpoint may be."""
+
+    max_speed_mps: float
+    max_yaw_rate_radps: float
+    timeout_ns: int
+
+    def objection(self, setpoint: Setpoint | None, now_ns: int) -> str:
+        """Why this setpoint must stop the robot; "" if it need not. Too fast is no objection: fit() slows."""
+        if setpoint is None:
+            return ""
+        if not (math.isfinite(setpoint.v_mps) and math.isfinite(setpoint.w_radps)):
+            return f"the command is not finite: v {setpoint.v_mps} m/s, w {setpoint.w_radps} rad/s"
+        age_ns = now_ns - setpoint.stamp_ns
+        if age_ns > self.timeout_ns and not is_zero(setpoint):
+            return f"the command is {age_ns / NS_PER_MS:.0f} ms old"
+        return ""
+
+    def fit(self, setpoint: Setpoint | None, now_ns: int) -> Setpoint:
+        """The setpoint slowed to the limits on the same curve; None becomes zero."""
+        if setpoint is None:
+            return zero(now_ns)
+        v_mps, w_radps = scale_to_fit(
+            setpoint.v_mps, setpoint.w_radps, self.max_speed_mps, self.max_yaw_rate_radps
+        )
+        if v_mps == setpoint.v_mps and w_radps == setpoint.w_radps:
+            return setpoint
+        return replace(setpoint, v_mps=v_mps, w_radps=w_radps)

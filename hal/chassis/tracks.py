@@ -1,0 +1,87 @@
+"""Skid-steer kinematics of a tracked base, and dead reckoning from what it reports.
+
+Tracks scrub sideways in a turn, so the base turns less than its track speeds say: as if the tracks
+stood wider apart. effective width = real width * slip factor (Mandow et al. 2007 call the tracks'
+virtual contact points the ICRs; this is the symmetric case).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hal.geometry import advance_pose
+from hal.types import PlanarPose
+
+ORIGIN = PlanarPose(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class TrackGeometry:
+    """width_m: between the track centres. slip_factor >= 1, measured on the floor that matters."""
+
+    width_m: float
+    slip_factor: float = 1.0
+
+    @property
+    def effective_width_m(self) -> float:
+        """The width that makes w = (right - left) / width true on this floor."""
+        return self.width_m * self.slip_factor
+
+    def to_tracks(self, v_mps: float, w_radps: float) -> tuple[float, float]:
+        """Track speeds (left, right), m/s, that make this motion."""
+        half_mps = 0.5 * w_radps * self.effective_width_m
+        return v_mps - half_mps, v_mps + half_mps
+
+    def to_twist(self, left: float, right: float) -> tuple[float, float]:
+        """(v, w) of two track speeds; of two track distances: (metres ahead, radians turned)."""
+        return 0.5 * (left + right), (right - left) / self.effective_width_m
+
+
+def scale_to_fit(value: float, other: float, limit: float, other_limit: float) -> tuple[float, float]:
+    """Both values times the one ratio <= 1 that brings each within its limit: the curve stays the same."""
+    ratio = 1.0
+    if abs(value) > limit:
+        ratio = limit / abs(value)
+    if abs(other) * ratio > other_limit:
+        ratio = other_limit / abs(other)
+    return value * ratio, other * ratio
+
+
+def wrapped_difference(newer: int, older: int, bits: int = 32) -> int:
+    """newer - older of a counter that wraps at 2**bits: the shorter way round, signed."""
+    half = 1 << (bits - 1)
+    return (newer - older + half) % (1 << bits) - half
+
+
+class DeadReckoning:
+    """The pose since the start, advanced by what the base says it did."""
+
+    def __init__(self) -> None:
+        self.pose = ORIGIN
+
+    def advance(self, distance_m: float, turn_rad: float) -> None:
+        """Move along the arc of this length and turn."""
+        self.pose = advance_pose(self.pose, distance_m, turn_rad, 1.0)
+
+
+class TrackCounter:
+    """Increments of two wrapping counters; a jump that no track can make is a restart of the base.
+
+    limit: the largest believable increment in one step, counts.
+    """
+
+    def __init__(self, bits: int = 32) -> None:
+        self._bits = bits
+        self._last: tuple[int, int] | None = None
+
+    def increments(self, left: int, right: int, limit: float) -> tuple[int, int] | None:
+        """Counts since the last call; (0, 0) at the first; None after an unbelievable jump, from
+        which counting starts anew."""
+        last, self._last = self._last, (left, right)
+        if last is None:
+            return 0, 0
+        left_step = wrapped_difference(left, last[0], self._bits)
+        right_step = wrapped_difference(right, last[1], self._bits)
+        if max(abs(left_step), abs(right_step)) > limit:
+            return None
+        return left_step, right_step

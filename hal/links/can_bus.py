@@ -1,0 +1,184 @@
+"""Any CAN bus that python-can can open. The only module that imports it.
+
+No python-can Notifier (it spins after an unplug) and no send_periodic (it would go on sending the last
+command while the program hangs): the control loop sends and receives by itself.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+from types import TracebackType
+from typing import Any, Self
+
+import can
+
+from config.chassis import CanLinkConfig
+from hal.errors import DeviceNotFound, DeviceRefused, HalError, LinkLost
+from hal.types import CanFrame
+
+# Positive, because with 0 pyserial (below slcan) spins for ever on a full port.
+_SEND_TIMEOUT_S = 0.002
+
+# So many messages in a row that are none of ours end one receive(): a flood must not hold the control loop.
+_MAX_FOREIGN = 256
+
+# linux/can/error.h: the controller has left the bus.
+_ERROR_BUS_OFF = 0x40
+
+_OPEN_ERRORS = (can.CanError, OSError, ValueError, ImportError, NotImplementedError)
+
+_log = logging.getLogger(__name__)
+
+
+class CanBusLink:
+    """hal.api.CanLink over python-can. Opened by ``with``, or by the first use.
+
+    After LinkLost the next use opens the bus anew, so that a re-plugged adapter is found again;
+    whoever uses the link decides how often.
+    """
+
+    def __init__(self, config: CanLinkConfig) -> None:
+        self._config = config
+        self._bus: can.BusABC | None = None
+        self._closed = False
+
+    def __enter__(self) -> Self:
+        """Open the bus. Raises DeviceNotFound, DeviceRefused."""
+        self._closed = False
+        if self._bus is None:
+            self._bus = _open(self._config)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closed = True
+        self._shut()
+
+    def send(self, frame: CanFrame) -> None:
+        """Queue one frame; waits for room at most 2 ms. Raises LinkLost."""
+        message = can.Message(
+            arbitration_id=frame.arbitration_id, data=frame.data, is_extended_id=False, check=True
+        )
+        try:
+            self._opened().send(message, timeout=_SEND_TIMEOUT_S)
+        except (can.CanError, OSError) as error:
+            raise self._lost("sending", error) from error
+
+    def receive(self) -> CanFrame | None:
+        """The oldest classic frame with an 11-bit identifier, without waiting. Raises LinkLost."""
+        bus = self._opened()
+        for _ in range(_MAX_FOREIGN):
+            try:
+                message = bus.recv(timeout=0)
+            except (can.CanError, OSError) as error:
+                if _is_foreign_datagram(error):
+                    continue
+                raise self._lost("receiving", error) from error
+            except (ValueError, IndexError):  # slcan: noise on the line that is no frame
+                continue
+            if message is None:
+                return None
+            if message.is_error_frame:
+                if message.arbitration_id & _ERROR_BUS_OFF:
+                    raise self._lost("receiving", can.CanOperationError("bus-off"))
+                continue
+            if not (message.is_extended_id or message.is_remote_frame or message.is_fd):
+                return CanFrame(message.arbitration_id, bytes(message.data))
+        return None
+
+    def _opened(self) -> can.BusABC:
+        if self._closed:
+            raise LinkLost(f"CAN {self._config.interface} {self._config.channel!r}: the link is closed")
+        if self._bus is None:
+            try:
+                self._bus = _open(self._config)
+            except HalError as error:
+                raise LinkLost(str(error)) from error
+        return self._bus
+
+    def _lost(self, doing: str, error: Exception) -> LinkLost:
+        self._shut()
+        return LinkLost(
+            f"CAN {self._config.interface} {self._config.channel!r}: lost while {doing} ({_reason(error)}); "
+            "check the adapter, the cable and the power of the base"
+        )
+
+    def _shut(self) -> None:
+        bus, self._bus = self._bus, None
+        if bus is None:
+            return
+        try:
+            bus.shutdown()
+        except (can.CanError, OSError) as error:
+            # The bus is gone anyway; python-can raises here after an unplug.
+            _log.debug("shutting down %s: %s", self._config.channel, error)
+
+
+def open_can_link(config: CanLinkConfig) -> CanBusLink:
+    """The open bus. Raises DeviceNotFound, DeviceRefused."""
+    return CanBusLink(config).__enter__()
+
+
+def _open(config: CanLinkConfig) -> can.BusABC:
+    options: dict[str, Any] = {}
+    if config.interface == "udp_multicast":
+        options = {"port": config.port, "hop_limit": config.hop_limit, "fd": False}
+    elif config.interface == "slcan":
+        options = {"bitrate": config.bitrate, "sleep_after_open": 0.1, "timeout": 0}
+    elif config.interface not in ("virtual", "socketcan"):
+        options = {"bitrate": config.bitrate}
+    where = f"CAN {config.interface} {config.channel!r}"
+    try:
+        # ignore_config: else files and environment variables of the machine would add options unseen.
+        return can.Bus(
+            channel=config.channel,
+            interface=config.interface,
+            ignore_config=True,
+            receive_own_messages=False,
+            **options,
+        )
+    except _OPEN_ERRORS as error:
+        number = _errno(error)
+        if number in (errno.EACCES, errno.EPERM):
+            raise DeviceRefused(
+                f"{where}: permission denied; add the user to the port's group or run as the service user"
+            ) from error
+        if number in (errno.EBUSY, errno.EADDRINUSE, errno.EAGAIN):
+            raise DeviceRefused(
+                f"{where}: in use by another program ({_reason(error)}); stop that one first"
+            ) from error
+        raise DeviceNotFound(f"{where}: cannot be opened ({_reason(error)}); {_advice(config)}") from error
+
+
+def _advice(config: CanLinkConfig) -> str:
+    if config.interface == "socketcan":
+        return (
+            f"check `ip link show {config.channel}`, then "
+            f"`ip link set {config.channel} up type can bitrate 500000`"
+        )
+    if config.interface == "udp_multicast":
+        return "check that the channel is a multicast address and that the machine has a multicast route"
+    return "check interface and channel in the configuration, and that the adapter is plugged in"
+
+
+def _reason(error: BaseException) -> str:
+    """The innermost cause in one line: python-can wraps the telling error in general ones."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _errno(error: BaseException | None) -> int | None:
+    while error is not None:
+        if isinstance(error, OSError) and error.errno is not None:
+            return error.errno
+        error = error.__cause__
+    return None
+
+
+def _is_foreign_datagram(error: Exception) -> bool:
+    """udp_multicast: anybody may send to the group; what does not unpack is not a fault of the bus."""
+    cause = error.__cause__
+    return cause is not None and not isinstance(cause, OSError)

@@ -1,0 +1,254 @@
+"""A BUNKER at the other end of a CAN bus: AgileX protocol V2, stepped by a time that is passed in.
+
+Like the real base it starts in standby, obeys 0x421 before anything else, and stops by itself when 0x111
+stays away. What it reports are its tracks: slip in a turn is not visible to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+from hal.api import CanLink
+from hal.chassis.agilex_messages import (
+    ActuatorFast,
+    ActuatorSlow,
+    AgilexMessage,
+    Battery,
+    ControlModeCommand,
+    MotionCommand,
+    MotionFeedback,
+    Odometer,
+    SystemState,
+    decode,
+    encode,
+)
+from hal.errors import LinkLost
+from sim.plant import TrackedPlant
+
+_MS = 1_000_000
+_STANDBY, _CAN, _SERIAL, _REMOTE = 0, 1, 2, 3
+_NORMAL, _ESTOP, _EXCEPTION = 0, 1, 2
+_WHEEL_RADIUS_M = 0.1
+_PULSES_PER_M = 20_000
+
+
+@dataclass(slots=True)
+class _Broadcast:
+    """One kind of frame that the base sends by itself."""
+
+    period_ns: int
+    due_ns: int
+    make: Callable[[], tuple[AgilexMessage, ...]]
+
+
+class AgilexEmulator:
+    """Frames that have arrived are obeyed as of the time of the last step, so in lock-step the order
+    "advance the emulator, then exchange with the driver" has no hidden delay.
+    """
+
+    def __init__(
+        self,
+        link: CanLink,
+        plant: TrackedPlant,
+        *,
+        command_timeout_ms: int = 500,
+        state_period_ms: int = 100,
+        boot_ms: int = 1000,
+    ) -> None:
+        self._link = link
+        self._plant = plant
+        self._command_timeout_ns = command_timeout_ms * _MS
+        self._boot_ns = boot_ms * _MS
+        start_ns = plant.now_ns
+        self._now_ns = start_ns
+        self._broadcasts = (
+            _Broadcast(20 * _MS, start_ns, self._motion),
+            _Broadcast(20 * _MS, start_ns, self._odometer),
+            _Broadcast(20 * _MS, start_ns, self._actuators_fast),
+            _Broadcast(state_period_ms * _MS, start_ns, self._state),
+            _Broadcast(100 * _MS, start_ns, self._actuators_slow),
+            _Broadcast(500 * _MS, start_ns, self._battery),
+        )
+        self.mode = _STANDBY
+        self.vehicle_state = _NORMAL
+        self.fault_bits = 0
+        self.driver_bits = 0x40
+        self.battery_v = 50.0
+        self._count = 0
+        self._command_ns: int | None = None
+        self._silent_until_ns: int | None = None
+        self._frozen = False
+        self._muted: frozenset[int] = frozenset()
+        self._travel_zero_m = (0.0, 0.0)
+        self.commands_obeyed = 0
+
+    def __enter__(self) -> Self:
+        """Open the link. Raises DeviceNotFound, DeviceRefused."""
+        self._link.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._link.__exit__(kind, error, trace)
+
+    @property
+    def plant(self) -> TrackedPlant:
+        """The body that this base moves."""
+        return self._plant
+
+    def advance_to(self, now_ns: int) -> None:
+        """Obey what has arrived, move, and send what falls due up to and including now_ns."""
+        self._listen()
+        while (event_ns := self._next_event_ns()) <= now_ns:
+            self._move_to(event_ns)
+            for broadcast in self._broadcasts:
+                if broadcast.due_ns <= event_ns:
+                    broadcast.due_ns += broadcast.period_ns
+                    self._send(broadcast.make())
+        self._move_to(now_ns)
+
+    # Faults, for tests and scenarios.
+
+    def press_estop(self) -> None:
+        """Somebody presses the red button."""
+        self.vehicle_state = _ESTOP
+        self._plant.command(0.0, 0.0)
+
+    def release_estop(self) -> None:
+        """The red button is out again. The mode is as before: whatever is sent now is obeyed."""
+        self.vehicle_state = _NORMAL
+
+    def raise_exception(self, fault_bits: int) -> None:
+        """The base finds a fault of its own and stops."""
+        self.vehicle_state = _EXCEPTION
+        self.fault_bits = fault_bits
+        self._plant.command(0.0, 0.0)
+
+    def clear_exception(self) -> None:
+        """The fault has gone."""
+        self.vehicle_state = _NORMAL
+        self.fault_bits = 0
+
+    def take_over(self, v_mps: float = 0.0, w_radps: float = 0.0) -> None:
+        """Somebody drives with the remote control, which outranks everything."""
+        self.mode = _REMOTE
+        self._plant.command(v_mps, w_radps)
+
+    def hand_back(self) -> None:
+        """The remote control is switched to command mode; the host must still send 0x421."""
+        self.mode = _STANDBY
+        self._plant.command(0.0, 0.0)
+
+    def restart(self) -> None:
+        """Power interrupted: silent while booting, then standby, odometer at zero."""
+        self._silent_until_ns = self._now_ns + self._boot_ns
+        self.mode = _STANDBY
+        self.vehicle_state = _NORMAL
+        self._count = 0
+        self._command_ns = None
+        self._travel_zero_m = self._plant.track_travel_m
+        self._plant.command(0.0, 0.0)
+
+    def freeze(self) -> None:
+        """Its processor hangs: nothing is sent or obeyed, but the motors' own time-out still runs."""
+        self._frozen = True
+
+    def thaw(self) -> None:
+        """It goes on."""
+        self._frozen = False
+
+    def mute(self, *arbitration_ids: int) -> None:
+        """These frames are no longer sent; without arguments all are sent again."""
+        self._muted = frozenset(arbitration_ids)
+
+    # The base's own work.
+
+    @property
+    def _silent(self) -> bool:
+        if self._silent_until_ns is not None and self._now_ns >= self._silent_until_ns:
+            self._silent_until_ns = None
+        return self._frozen or self._silent_until_ns is not None
+
+    def _listen(self) -> None:
+        try:
+            while (frame := self._link.receive()) is not None:
+                message = decode(frame)
+                if message is not None and not self._silent:
+                    self._obey(message)
+        except LinkLost:
+            # The base does not know that its cable is out; its own time-out stops it.
+            return
+
+    def _obey(self, message: AgilexMessage) -> None:
+        if isinstance(message, ControlModeCommand):
+            if self.mode != _REMOTE and message.mode in (_STANDBY, _CAN, _SERIAL):
+                if message.mode != self.mode:
+                    self._plant.command(0.0, 0.0)
+                self.mode = message.mode
+                self._command_ns = None
+        elif isinstance(message, MotionCommand) and self.mode == _CAN and self.vehicle_state == _NORMAL:
+            self._command_ns = self._now_ns
+            self._plant.command(message.v_mps, message.w_radps)
+            self.commands_obeyed += 1
+
+    def _next_event_ns(self) -> int:
+        next_ns = min(broadcast.due_ns for broadcast in self._broadcasts)
+        if self._command_ns is not None:
+            next_ns = min(next_ns, self._command_ns + self._command_timeout_ns)
+        return next_ns
+
+    def _move_to(self, now_ns: int) -> None:
+        self._plant.advance_to(now_ns)
+        self._now_ns = max(self._now_ns, now_ns)
+        if self._command_ns is not None and self._now_ns - self._command_ns >= self._command_timeout_ns:
+            self._command_ns = None
+            self._plant.command(0.0, 0.0)
+
+    def _send(self, messages: tuple[AgilexMessage, ...]) -> None:
+        if self._silent:
+            return
+        try:
+            for message in messages:
+                frame = encode(message)
+                if frame.arbitration_id not in self._muted:
+                    self._link.send(frame)
+        except LinkLost:
+            # As in _listen: a base goes on talking to a cable that is out.
+            return
+
+    def _motion(self) -> tuple[AgilexMessage, ...]:
+        return (MotionFeedback(*self._plant.track_twist),)
+
+    def _odometer(self) -> tuple[AgilexMessage, ...]:
+        left_m, right_m = self._plant.track_travel_m
+        left_mm = round(1000.0 * (left_m - self._travel_zero_m[0]))
+        right_mm = round(1000.0 * (right_m - self._travel_zero_m[1]))
+        return (Odometer(_as_int32(left_mm), _as_int32(right_mm)),)
+
+    def _state(self) -> tuple[AgilexMessage, ...]:
+        count, self._count = self._count, (self._count + 1) % 256
+        return (SystemState(self.vehicle_state, self.mode, self.battery_v, self.fault_bits, count),)
+
+    def _actuators_fast(self) -> tuple[AgilexMessage, ...]:
+        frames = []
+        for index, (speed_mps, travel_m) in enumerate(
+            zip(self._plant.track_speeds_mps, self._plant.track_travel_m, strict=True)
+        ):
+            rpm = round(speed_mps / _WHEEL_RADIUS_M * 60.0 / 6.283185307)
+            pulses = _as_int32(round(travel_m * _PULSES_PER_M))
+            frames.append(ActuatorFast(index, rpm, 0.5 + 2.0 * abs(speed_mps), pulses))
+        return tuple(frames)
+
+    def _actuators_slow(self) -> tuple[AgilexMessage, ...]:
+        return tuple(ActuatorSlow(index, self.battery_v, 35, 40, self.driver_bits) for index in (0, 1))
+
+    def _battery(self) -> tuple[AgilexMessage, ...]:
+        return (Battery(80, 100, self.battery_v, -2.0, 25.0),)
+
+
+def _as_int32(value: int) -> int:
+    return (value + (1 << 31)) % (1 << 32) - (1 << 31)

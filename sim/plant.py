@@ -1,0 +1,107 @@
+"""A tracked base as a body on the floor: two tracks with lag and limited force, scrubbing in turns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from config.chassis import PlantConfig
+from hal.chassis.tracks import TrackGeometry
+from hal.types import PlanarPose
+
+_NS_PER_S = 1e9
+
+# Substep: 1 mm of travel at 1 m/s. Within it speeds change along the exact exponential of the lag.
+_STEP_NS = 1_000_000
+
+
+@dataclass(slots=True)
+class _Track:
+    target_mps: float = 0.0
+    speed_mps: float = 0.0
+    travel_m: float = 0.0
+
+    def advance(self, dt_s: float, lag_s: float, max_accel_mps2: float) -> float:
+        """Move for dt_s; the distance made."""
+        change = (self.target_mps - self.speed_mps) * -math.expm1(-dt_s / lag_s)
+        limit = max_accel_mps2 * dt_s
+        change = min(max(change, -limit), limit)
+        distance_m = (self.speed_mps + 0.5 * change) * dt_s
+        self.speed_mps += change
+        self.travel_m += distance_m
+        return distance_m
+
+
+class TrackedPlant:
+    """The truth that only the simulation knows. Deterministic: same calls, same numbers.
+
+    Tracks follow their targets with first-order lag, within max_accel_mps2. What the tracks say
+    (track_twist) turns faster than the body does (twist), by the slip factor.
+    """
+
+    def __init__(self, config: PlantConfig, pose: PlanarPose | None = None, start_ns: int = 0) -> None:
+        self._lag_s = config.lag_s
+        self._max_accel_mps2 = config.max_accel_mps2
+        self._nominal = TrackGeometry(config.track_width_m)
+        self._true = TrackGeometry(config.track_width_m, config.slip_factor)
+        self._left = _Track()
+        self._right = _Track()
+        self._x_m, self._y_m, self._heading_rad = (
+            (0.0, 0.0, 0.0) if pose is None else (pose.x_m, pose.y_m, pose.heading_rad)
+        )
+        self._now_ns = start_ns
+
+    @property
+    def now_ns(self) -> int:
+        """The time up to which the plant has moved."""
+        return self._now_ns
+
+    @property
+    def pose(self) -> PlanarPose:
+        """Where the body truly is."""
+        return PlanarPose(self._x_m, self._y_m, math.remainder(self._heading_rad, math.tau))
+
+    @property
+    def twist(self) -> tuple[float, float]:
+        """(v m/s, w rad/s) of the body, truly."""
+        return self._true.to_twist(self._left.speed_mps, self._right.speed_mps)
+
+    @property
+    def track_twist(self) -> tuple[float, float]:
+        """(v m/s, w rad/s) as the base believes from its tracks."""
+        return self._nominal.to_twist(self._left.speed_mps, self._right.speed_mps)
+
+    @property
+    def track_speeds_mps(self) -> tuple[float, float]:
+        """(left, right)."""
+        return self._left.speed_mps, self._right.speed_mps
+
+    @property
+    def track_travel_m(self) -> tuple[float, float]:
+        """(left, right) since the start, as encoders count it."""
+        return self._left.travel_m, self._right.travel_m
+
+    def command(self, v_mps: float, w_radps: float) -> None:
+        """Aim for this twist of the tracks, as a base does that knows nothing of slip."""
+        self._left.target_mps, self._right.target_mps = self._nominal.to_tracks(v_mps, w_radps)
+
+    def command_tracks(self, left_mps: float, right_mps: float) -> None:
+        """Aim for these track speeds."""
+        self._left.target_mps, self._right.target_mps = left_mps, right_mps
+
+    def advance_to(self, now_ns: int) -> None:
+        """Move on to now_ns; a time that has passed changes nothing."""
+        while self._now_ns < now_ns:
+            step_ns = min(_STEP_NS, now_ns - self._now_ns)
+            self._advance(step_ns / _NS_PER_S)
+            self._now_ns += step_ns
+
+    def _advance(self, dt_s: float) -> None:
+        left_m = self._left.advance(dt_s, self._lag_s, self._max_accel_mps2)
+        right_m = self._right.advance(dt_s, self._lag_s, self._max_accel_mps2)
+        distance_m, turn_rad = self._true.to_twist(left_m, right_m)
+        # The chord of so short an arc is its length to 1e-9; its direction is that of the middle.
+        middle_rad = self._heading_rad + 0.5 * turn_rad
+        self._x_m += distance_m * math.cos(middle_rad)
+        self._y_m += distance_m * math.sin(middle_rad)
+        self._heading_rad += turn_rad
