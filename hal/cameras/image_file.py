@@ -1,0 +1,97 @@
+"""One image of a recording: read whole or refused. A half-decoded image is never a frame."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import ColourImage, DepthImage
+
+_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_PNG_HEADER = struct.Struct(">II")  # width, height: the first fields of the IHDR chunk
+_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+
+
+class ImageError(Exception):
+    """An image is missing, cut off, damaged or of the wrong kind. The message completes "FILE: ..."."""
+
+
+def read_colour(path: Path, width: int, height: int) -> ColourImage:
+    """(height, width, 3) uint8, BGR. Raises ImageError."""
+    image = _decode(path, width, height)
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        raise ImageError(f"is {_describe(image)}, a colour image has 8 bits and 3 channels")
+    return image.astype(np.uint8, copy=False)
+
+
+def read_depth(path: Path, width: int, height: int) -> DepthImage:
+    """(height, width) uint16, as stored. Raises ImageError."""
+    image = _decode(path, width, height)
+    if image.dtype != np.uint16 or image.ndim != 2:
+        raise ImageError(f"is {_describe(image)}, a depth image has 16 bits and 1 channel")
+    return image.astype(np.uint16, copy=False)
+
+
+def _decode(path: Path, width: int, height: int) -> NDArray[Any]:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ImageError(f"cannot be read ({error.strerror})") from error
+    _require_whole(data, width, height)
+    # From memory: the file is read once, and OpenCV is never handed the path of a damaged file,
+    # about which it would write to standard error and possibly return half an image.
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise ImageError("is damaged: its pixels cannot be decoded")
+    _require_size(image.shape[1], image.shape[0], width, height)
+    return image
+
+
+def _require_whole(data: bytes, width: int, height: int) -> None:
+    if not data:
+        raise ImageError("is empty")
+    if data.startswith(_PNG_SIGNATURE):
+        _require_whole_png(data, width, height)
+    elif data.startswith(_JPEG_START):
+        if not data.rstrip(b"\0").endswith(_JPEG_END):
+            raise ImageError("is cut off: its end is missing")
+    else:
+        raise ImageError("is neither a PNG nor a JPEG image")
+
+
+def _require_whole_png(data: bytes, width: int, height: int) -> None:
+    """Walk the chunks to IEND and check each checksum: 0.1 ms, against 5 ms for decoding."""
+    view = memoryview(data)
+    at = len(_PNG_SIGNATURE)
+    while at + 12 <= len(data):
+        (length,) = struct.unpack_from(">I", data, at)
+        end = at + 12 + length
+        if end > len(data):
+            break
+        (checksum,) = struct.unpack_from(">I", data, end - 4)
+        if zlib.crc32(view[at + 4 : end - 4]) != checksum:
+            raise ImageError("is damaged: a checksum does not match")
+        kind = data[at + 4 : at + 8]
+        if kind == b"IHDR" and length >= _PNG_HEADER.size:
+            found_width, found_height = _PNG_HEADER.unpack_from(data, at + 8)
+            _require_size(found_width, found_height, width, height)
+        if kind == b"IEND":
+            return
+        at = end
+    raise ImageError("is cut off: its end is missing")
+
+
+def _require_size(found_width: int, found_height: int, width: int, height: int) -> None:
+    if (found_width, found_height) != (width, height):
+        raise ImageError(f"is {found_width}x{found_height}, camera.yaml says {width}x{height}")
+
+
+def _describe(image: NDArray[Any]) -> str:
+    channels = 1 if image.ndim == 2 else image.shape[2]
+    return f"{8 * image.dtype.itemsize}-bit with {channels} channel{'s' if channels > 1 else ''}"

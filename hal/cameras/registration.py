@@ -1,0 +1,71 @@
+"""Depth seen by its own camera, drawn again as the colour camera would have seen it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import DepthImage, FloatArray, Intrinsics, Pose
+
+_UNSEEN = np.uint16(65535)
+_FAR_OUTSIDE_PX = 1e6
+# A little more than half: noise moves neighbours apart, and a surface must not get pinholes from it.
+_HALF_PIXEL = 0.65
+
+
+class DepthRegistration:
+    """Projects each depth pixel into the colour image; where several meet, the nearest wins.
+
+    A depth pixel covers the colour pixels whose centres lie between the projections of its corners,
+    so a colour image with a longer focal length gets no holes (as in librealsense's rs2::align).
+    """
+
+    def __init__(
+        self, depth: Intrinsics, colour: Intrinsics, depth_in_colour: Pose, depth_scale_m: float
+    ) -> None:
+        """depth_in_colour: the depth camera as the colour camera sees it."""
+        self._colour = colour
+        self._offset = (depth_in_colour.translation_m / depth_scale_m).astype(np.float32)
+        self._first_corner = _corner_rays(depth, depth_in_colour.rotation, -_HALF_PIXEL)
+        self._last_corner = _corner_rays(depth, depth_in_colour.rotation, _HALF_PIXEL)
+        # How many colour pixels one may cover; one more, because tilt and parallax stretch it a little.
+        self._reach = int(np.ceil(2 * _HALF_PIXEL * max(colour.fx / depth.fx, colour.fy / depth.fy))) + 1
+
+    def __call__(self, depth: DepthImage) -> DepthImage:
+        """(H, W) uint16 of the depth camera -> (H, W) uint16 of the colour camera, same unit, 0 = no data."""
+        width, height = self._colour.width, self._colour.height
+        measured = np.flatnonzero(depth)
+        units = depth.reshape(-1)[measured].astype(np.float32)
+        first_u, first_v, distance = self._project(self._first_corner[:, measured] * units)
+        end_u, end_v, _ = self._project(self._last_corner[:, measured] * units)
+        image = np.full(width * height, _UNSEEN)
+        for dv in range(self._reach):
+            for du in range(self._reach):
+                u, v = first_u + du, first_v + dv
+                covered = (u < end_u) & (v < end_v) & (distance > 0)
+                covered &= (u >= 0) & (u < width) & (v >= 0) & (v < height)
+                np.minimum.at(image, (v * width + u)[covered], distance[covered])
+        image[image == _UNSEEN] = 0
+        return image.reshape(height, width)
+
+    def _project(
+        self, points: NDArray[np.float32]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.uint16]]:
+        """Points (3, N) in depth units -> first pixel centre right of and below each, distance (0: none)."""
+        x, y, z = points + self._offset[:, None]
+        ahead = (z >= 1.0) & (z < _UNSEEN)
+        z = np.where(ahead, z, np.float32(1.0))
+        u = np.ceil(np.float32(self._colour.fx) * x / z + np.float32(self._colour.cx))
+        v = np.ceil(np.float32(self._colour.fy) * y / z + np.float32(self._colour.cy))
+        return (
+            np.clip(u, -_FAR_OUTSIDE_PX, _FAR_OUTSIDE_PX).astype(np.int32),
+            np.clip(v, -_FAR_OUTSIDE_PX, _FAR_OUTSIDE_PX).astype(np.int32),
+            np.where(ahead, np.rint(z), 0).astype(np.uint16),
+        )
+
+
+def _corner_rays(camera: Intrinsics, rotation: FloatArray, shift_px: float) -> NDArray[np.float32]:
+    """Per pixel the point at unit depth behind its corner, turned by rotation: (3, H * W)."""
+    u, v = np.meshgrid(np.arange(camera.width) + shift_px, np.arange(camera.height) + shift_px)
+    ahead = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)])
+    return np.asarray(rotation @ ahead.reshape(3, -1), np.float32)

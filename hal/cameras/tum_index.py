@@ -1,0 +1,126 @@
+"""The text files of a TUM RGB-D folder: exact times, index lines, pairs of colour and depth."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from itertools import pairwise
+from pathlib import Path
+
+from hal.errors import BadRecording
+
+# Times must fit the int64 of captured_ns.
+_MAX_STAMP_S = Decimal(2**63 - 1).scaleb(-9)
+
+
+@dataclass(frozen=True, slots=True)
+class SkippedFrame:
+    """What could not be used, and why. file: an image of the recording, or ``index.txt:line``."""
+
+    file: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.reason}"
+
+
+@dataclass(frozen=True, slots=True)
+class IndexEntry:
+    """One image: its time, and its path relative to the recording."""
+
+    stamp_ns: int
+    file: str
+
+
+@dataclass(frozen=True, slots=True)
+class ImageIndex:
+    """rgb.txt or depth.txt: entries with strictly increasing times.
+
+    bad_lines: those that say nothing usable. duplicates: further images with the time of an earlier
+    one; they are left out, because nothing moves in no time. unsorted: lines that stood before an
+    earlier time.
+    """
+
+    entries: tuple[IndexEntry, ...]
+    bad_lines: tuple[SkippedFrame, ...]
+    duplicates: int
+    unsorted: int
+
+
+def parse_stamp_ns(text: str) -> int:
+    """Decimal seconds to whole nanoseconds, exactly.
+
+    Through a float, 1305031236.733922 would lose what lies below 0.2 microseconds. Raises ValueError.
+    """
+    try:
+        seconds = Decimal(text)
+    except InvalidOperation:
+        raise ValueError(f"{text!r} is not a time in seconds") from None
+    if not seconds.is_finite() or abs(seconds) > _MAX_STAMP_S:
+        raise ValueError(f"{text!r} is not a possible time in seconds")
+    return int(seconds.scaleb(9).to_integral_value())
+
+
+def format_stamp(stamp_ns: int) -> str:
+    """Whole nanoseconds as decimal seconds; the inverse of parse_stamp_ns."""
+    return f"{Decimal(stamp_ns).scaleb(-9):.9f}"
+
+
+def content_lines(path: Path) -> list[tuple[int, str]]:
+    """(line number, text) of every line that is not blank or a # comment. Raises BadRecording."""
+    try:
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise BadRecording(f"{path}: cannot be read ({error.strerror}); check the recording") from error
+    stripped = ((number, line.strip()) for number, line in enumerate(text.splitlines(), start=1))
+    return [(number, line) for number, line in stripped if line and not line.startswith("#")]
+
+
+def read_index(path: Path) -> ImageIndex:
+    """Read ``time path`` lines, sorted by time. Raises BadRecording if the file cannot be read."""
+    entries: list[IndexEntry] = []
+    bad_lines: list[SkippedFrame] = []
+    for number, line in content_lines(path):
+        where = f"{path.name}:{number}"
+        parts = line.split(maxsplit=1)
+        if len(parts) != 2:
+            bad_lines.append(SkippedFrame(where, f"is not a time and a path: {line!r}"))
+            continue
+        try:
+            entries.append(IndexEntry(parse_stamp_ns(parts[0]), parts[1]))
+        except ValueError as error:
+            bad_lines.append(SkippedFrame(where, str(error)))
+    unsorted = sum(b.stamp_ns < a.stamp_ns for a, b in pairwise(entries))
+    first_of_time: dict[int, IndexEntry] = {}
+    for entry in entries:
+        first_of_time.setdefault(entry.stamp_ns, entry)
+    ordered = tuple(first_of_time[stamp_ns] for stamp_ns in sorted(first_of_time))
+    return ImageIndex(ordered, tuple(bad_lines), len(entries) - len(ordered), unsorted)
+
+
+def associate(colour_ns: Sequence[int], depth_ns: Sequence[int], max_gap_ns: int) -> list[tuple[int, int]]:
+    """Pairs (index of colour, index of depth) in time order; both inputs strictly increase.
+
+    As the benchmark's own associate.py does: of all couples not further apart than max_gap_ns the
+    closest is taken first, and each image serves once. A pair that would take depth back in time
+    behind the pair before it is dropped.
+    """
+    couples: list[tuple[int, int, int]] = []
+    for i, stamp_ns in enumerate(colour_ns):
+        j = bisect_left(depth_ns, stamp_ns - max_gap_ns)
+        while j < len(depth_ns) and depth_ns[j] <= stamp_ns + max_gap_ns:
+            couples.append((abs(depth_ns[j] - stamp_ns), i, j))
+            j += 1
+    depth_of: dict[int, int] = {}
+    used: set[int] = set()
+    for _, i, j in sorted(couples):
+        if i not in depth_of and j not in used:
+            depth_of[i] = j
+            used.add(j)
+    pairs: list[tuple[int, int]] = []
+    for i in sorted(depth_of):
+        if not pairs or depth_of[i] > pairs[-1][1]:
+            pairs.append((i, depth_of[i]))
+    return pairs

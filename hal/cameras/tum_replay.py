@@ -1,0 +1,192 @@
+"""A recording in a TUM RGB-D folder as a camera."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from hal.cameras.calibration import RecordingCalibration
+from hal.cameras.image_file import ImageError, read_colour, read_depth
+from hal.cameras.tum_index import ImageIndex, IndexEntry, SkippedFrame, associate, read_index
+from hal.clocks import NS_PER_S
+from hal.errors import BadRecording, DeviceRefused, EndOfStream
+from hal.types import CameraMount, Intrinsics, RgbdFrame
+
+_NEEDED = ("rgb.txt", "depth.txt", "camera.yaml")
+_FORMAT_HINT = "a recording is a folder with rgb.txt, depth.txt, camera.yaml and the images they name"
+
+
+@dataclass(frozen=True, slots=True)
+class _Pair:
+    """One frame to be read. sequence counts the colour images, so a gap shows an unpaired one."""
+
+    sequence: int
+    colour: IndexEntry
+    depth: IndexEntry
+
+
+class TumReplay:
+    """FrameSource over a folder with rgb.txt, depth.txt and camera.yaml; see config/recording.py.
+
+    Index and calibration are read at once (raises BadRecording), images when entered. captured_ns
+    is the time of the colour image as recorded. A frame that cannot be used is left out and told
+    in ``skipped``. Entering again starts from the beginning.
+    """
+
+    def __init__(self, folder: Path, max_pair_gap_s: float = 0.02, read_ahead: int = 2) -> None:
+        """read_ahead: frames that one background thread decodes in advance; 0: decode in read()."""
+        self._folder = folder
+        _require_recording(folder)
+        self._calibration = RecordingCalibration.from_file(folder / "camera.yaml")
+        colour, depth = read_index(folder / "rgb.txt"), read_index(folder / "depth.txt")
+        self._pairs = _pairs(folder, colour, depth, max_pair_gap_s)
+        self._bad_lines = colour.bad_lines + depth.bad_lines
+        self.unpaired_colour = len(colour.entries) - len(self._pairs)
+        self.unpaired_depth = len(depth.entries) - len(self._pairs)
+        self.duplicates = colour.duplicates + depth.duplicates
+        self._unsorted = colour.unsorted + depth.unsorted
+        self._read_ahead = read_ahead
+        self._reader: ThreadPoolExecutor | None = None
+        self._rewind()
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Of the undistorted images that read() gives."""
+        return self._calibration.intrinsics
+
+    @property
+    def mount(self) -> CameraMount | None:
+        """Where the camera sat on the robot; None where the recording does not say."""
+        return self._calibration.mount
+
+    @property
+    def frame_count(self) -> int:
+        """Pairs of colour and depth, of which some may prove unusable."""
+        return len(self._pairs)
+
+    @property
+    def skipped(self) -> tuple[SkippedFrame, ...]:
+        """What could not be used so far, and why, in the order of the recording; bad index lines first."""
+        return self._bad_lines + tuple(self._skipped)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Plain sentences for the summary: what was assumed, left out or put in order."""
+        counted = {
+            "colour images without depth of the same time": self.unpaired_colour,
+            "depth images without colour of the same time": self.unpaired_depth,
+            "images with the time of an earlier one, left out": self.duplicates,
+            "index lines out of time order, sorted": self._unsorted,
+        }
+        return self._calibration.notes + tuple(f"{count} {what}" for what, count in counted.items() if count)
+
+    def __enter__(self) -> Self:
+        self._rewind()
+        # One thread: OpenCV decodes without the interpreter's lock, so the images of the next
+        # frames get ready while this one is being looked at, and the order stays as recorded.
+        self._reader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="tum-replay")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._reader is not None:
+            self._reader.shutdown(wait=True, cancel_futures=True)
+            self._reader = None
+        self._ahead.clear()
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """The next usable frame. A recording is never late: timeout_s plays no part.
+
+        Raises EndOfStream after the last frame, BadRecording instead if not one frame was usable,
+        DeviceRefused outside of a with block.
+        """
+        if self._reader is None:
+            raise DeviceRefused(f"{self._folder}: the recording is not open; read it inside a with block")
+        while (outcome := self._next_outcome(self._reader)) is not None:
+            if isinstance(outcome, RgbdFrame):
+                self._usable += 1
+                return outcome
+            self._skipped.append(outcome)
+        if self._usable == 0:
+            raise BadRecording(
+                f"{self._folder}: none of the {len(self._pairs)} frames is usable; "
+                f"the first: {self._skipped[0]}"
+            )
+        raise EndOfStream(f"{self._folder}: no further frame")
+
+    def _rewind(self) -> None:
+        self._next = 0
+        self._usable = 0
+        self._skipped: list[SkippedFrame] = []
+        self._ahead: deque[Future[RgbdFrame | SkippedFrame]] = deque()
+
+    def _next_outcome(self, reader: ThreadPoolExecutor) -> RgbdFrame | SkippedFrame | None:
+        """The next frame or why there is none; None after the last."""
+        while self._next < len(self._pairs) and len(self._ahead) <= self._read_ahead:
+            self._ahead.append(reader.submit(self._load, self._pairs[self._next]))
+            self._next += 1
+        return self._ahead.popleft().result() if self._ahead else None
+
+    def _load(self, pair: _Pair) -> RgbdFrame | SkippedFrame:
+        calibration = self._calibration
+        file = pair.colour.file
+        try:
+            colour = read_colour(
+                self._folder / file, calibration.intrinsics.width, calibration.intrinsics.height
+            )
+            file = pair.depth.file
+            depth = read_depth(self._folder / file, calibration.depth_width, calibration.depth_height)
+        except ImageError as error:
+            return SkippedFrame(file, str(error))
+        colour, depth = calibration.rectify(colour, depth)
+        return RgbdFrame(
+            colour=colour,
+            depth=depth,
+            depth_scale_m=calibration.depth_scale_m,
+            captured_ns=pair.colour.stamp_ns,
+            device_s=pair.colour.stamp_ns / NS_PER_S,
+            sequence=pair.sequence,
+            intrinsics=calibration.intrinsics,
+        )
+
+
+def _require_recording(folder: Path) -> None:
+    if not folder.is_dir():
+        found = "it is not a folder" if folder.exists() else "there is no such folder"
+        raise BadRecording(f"{folder}: {found}; {_FORMAT_HINT}")
+    missing = [name for name in _NEEDED if not (folder / name).is_file()]
+    if missing:
+        raise BadRecording(f"{folder}: {', '.join(missing)} missing; {_FORMAT_HINT}")
+
+
+def _pairs(folder: Path, colour: ImageIndex, depth: ImageIndex, max_pair_gap_s: float) -> list[_Pair]:
+    """Raises BadRecording when an index is empty or not one pair can be made."""
+    for name, index in (("rgb.txt", colour), ("depth.txt", depth)):
+        if not index.entries:
+            why = f"; the first bad line: {index.bad_lines[0]}" if index.bad_lines else ""
+            raise BadRecording(f"{folder / name}: names no image; each line must be a time and a path{why}")
+    colour_ns = [entry.stamp_ns for entry in colour.entries]
+    depth_ns = [entry.stamp_ns for entry in depth.entries]
+    pairs = associate(colour_ns, depth_ns, round(max_pair_gap_s * NS_PER_S))
+    if not pairs:
+        raise BadRecording(
+            f"{folder}: no colour and depth image within {max_pair_gap_s} s of each other; the closest are "
+            f"{_closest_s(colour_ns, depth_ns):.3f} s apart; check the times in rgb.txt and depth.txt"
+        )
+    return [_Pair(i, colour.entries[i], depth.entries[j]) for i, j in pairs]
+
+
+def _closest_s(colour_ns: Sequence[int], depth_ns: Sequence[int]) -> float:
+    """Least distance between any two times; both inputs are sorted."""
+    gaps_ns: list[int] = []
+    for stamp_ns in colour_ns:
+        after = bisect_left(depth_ns, stamp_ns)
+        gaps_ns.extend(abs(near_ns - stamp_ns) for near_ns in depth_ns[max(after - 1, 0) : after + 1])
+    return min(gaps_ns) / NS_PER_S

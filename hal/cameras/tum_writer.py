@@ -1,0 +1,109 @@
+"""Writes frames into a TUM RGB-D folder that TumReplay, and any TUM tool, reads back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TextIO
+
+import cv2
+import yaml
+
+from hal.cameras.tum_index import format_stamp
+from hal.errors import DeviceRefused
+from hal.types import CameraMount, Pose, RgbdFrame
+
+# Zlib's fastest: a third of the time of the default for a tenth more bytes.
+_PNG_FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
+
+
+class TumWriter:
+    """One open recording. Frames must share size, intrinsics and depth scale, and go forward in time."""
+
+    def __init__(self, folder: Path, mount: CameraMount | None = None) -> None:
+        self._folder = folder
+        self._mount = mount
+        self._first: RgbdFrame | None = None
+        self._last_ns = -1
+
+    def __enter__(self) -> Self:
+        """Raises DeviceRefused if the folder holds a recording already or cannot be made."""
+        if (self._folder / "rgb.txt").exists():
+            raise DeviceRefused(f"{self._folder}: holds a recording already; choose another folder")
+        try:
+            for name in ("rgb", "depth"):
+                (self._folder / name).mkdir(parents=True, exist_ok=True)
+            self._colour_index = self._index("rgb.txt", "# time of the colour image in seconds, file")
+            self._depth_index = self._index("depth.txt", "# time of the depth image in seconds, file")
+        except OSError as error:
+            raise DeviceRefused(f"{self._folder}: cannot be written ({error.strerror})") from error
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._colour_index.close()
+        self._depth_index.close()
+
+    def write(self, frame: RgbdFrame) -> None:
+        """Add one frame under its captured_ns. Raises ValueError if it does not fit those before."""
+        if self._first is None:
+            self._first = frame
+            self._write_calibration(frame)
+        if (frame.intrinsics, frame.depth_scale_m) != (self._first.intrinsics, self._first.depth_scale_m):
+            raise ValueError("a recording has one camera: intrinsics or depth scale changed")
+        if frame.captured_ns <= self._last_ns:
+            raise ValueError(f"frame {frame.sequence} is not later than the one before it")
+        self._last_ns = frame.captured_ns
+        stamp = format_stamp(frame.captured_ns)
+        self._image(self._colour_index, f"rgb/{stamp}.png", frame.colour, stamp)
+        self._image(self._depth_index, f"depth/{stamp}.png", frame.depth, stamp)
+
+    def _image(self, index: TextIO, file: str, image: cv2.typing.MatLike, stamp: str) -> None:
+        if not cv2.imwrite(str(self._folder / file), image, _PNG_FAST):
+            raise DeviceRefused(f"{self._folder / file}: cannot be written; is the disk full?")
+        index.write(f"{stamp} {file}\n")
+
+    def _index(self, name: str, heading: str) -> TextIO:
+        # A line at a time reaches the disk, so a recording that ends abruptly can still be read.
+        index = (self._folder / name).open("w", encoding="utf-8", buffering=1)
+        index.write(f"{heading}\n")
+        return index
+
+    def _write_calibration(self, frame: RgbdFrame) -> None:
+        k = frame.intrinsics
+        content: dict[str, float | int | bool] = {
+            "width": k.width,
+            "height": k.height,
+            "fx": k.fx,
+            "fy": k.fy,
+            "cx": k.cx,
+            "cy": k.cy,
+            "depth_factor": 1.0 / frame.depth_scale_m,
+            "depth_registered": True,
+        }
+        if self._mount is not None:
+            content["camera_height_m"] = self._mount.height_m
+            content["camera_pitch_deg"] = math.degrees(self._mount.pitch_rad)
+            content["camera_forward_m"] = self._mount.forward_m
+        (self._folder / "camera.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+
+
+def write_poses(path: Path, stamped_poses: list[tuple[int, Pose]]) -> None:
+    """odometry.txt or groundtruth.txt: ``t tx ty tz qx qy qz qw`` lines of the camera in the world."""
+    lines = ["# time in seconds, tx ty tz, qx qy qz qw: the camera optical frame in the world"]
+    for stamp_ns, pose in stamped_poses:
+        numbers = " ".join(f"{value:.9f}" for value in (*pose.translation_m, *quaternion(pose)))
+        lines.append(f"{format_stamp(stamp_ns)} {numbers}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def quaternion(pose: Pose) -> tuple[float, float, float, float]:
+    """(qx, qy, qz, qw) of its rotation."""
+    vector, _ = cv2.Rodrigues(pose.rotation)
+    angle_rad = float(math.hypot(*vector.ravel()))
+    # sin(x / 2) / x tends to 1 / 2: no turn has no axis to divide by.
+    share = math.sin(angle_rad / 2) / angle_rad if angle_rad > 0 else 0.5
+    x, y, z = (float(value) * share for value in vector.ravel())
+    return x, y, z, math.cos(angle_rad / 2)
