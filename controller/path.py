@@ -1,0 +1,286 @@
+"""The planned path: where the robot is along it, how it bends, and how fast it may be driven.
+
+A path is a chain of pieces of constant curvature; a blend (a clothoid) is a chain of short ones. Every
+measure is closed-form on a piece, and points are projected in arrays over pieces.
+
+Path coordinates: s_m along the path from its start, d_m to the left of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.loader import ConfigError
+from config.path import ArcSpec, PathSpec
+from config.robot import Robot
+from controller.braking import comfort, slowing_distance, speed_before_section
+from hal.geometry import wrap_angle_rad
+from hal.types import FloatArray, PlanarPose
+
+_BLEND_PIECES = 16
+_EXTENSION_M = 20.0
+_LOOK_BACK_M = 0.25
+_LOOK_AHEAD_M = 2.0
+_SPEED_STEP_M = 0.05
+# A yaw rate near its limit leaves nothing to correct the track with.
+_YAW_RATE_FOR_THE_BEND = 0.9
+_SLOWEST_BEND_MPS = 0.1
+_OPPOSED_RAD = math.radians(120.0)
+
+
+class PathError(ConfigError):
+    """The path cannot be driven by this robot: what, where and what to do, in one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class OnPath:
+    """A pose in path coordinates: s_m along, d_m to the left, heading_rad relative to the path."""
+
+    s_m: float
+    d_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    s_m: float
+    length_m: float
+    x_m: float
+    y_m: float
+    heading_rad: float
+    curvature_1pm: float
+
+
+class Path:
+    """The path in the frame of its start pose; immutable.
+
+    Raises PathError when a bend is tighter than the robot can drive or the path doubles back on itself.
+    """
+
+    def __init__(self, spec: PathSpec, robot: Robot) -> None:
+        pieces = list(_chain(spec))
+        self.length_m = pieces[-1].s_m + pieces[-1].length_m
+        _check_bends(spec, robot)
+        # The body overhangs both ends, so what stands beyond them is measured along straight extensions.
+        pieces = [_extension_back(pieces[0]), *pieces, _extension_ahead(pieces[-1])]
+        self._s = np.array([piece.s_m for piece in pieces])
+        self._length = np.array([piece.length_m for piece in pieces])
+        self._x = np.array([piece.x_m for piece in pieces])
+        self._y = np.array([piece.y_m for piece in pieces])
+        self._heading = np.array([piece.heading_rad for piece in pieces])
+        self._curvature = np.array([piece.curvature_1pm for piece in pieces])
+        self._check_doubling_back(robot.body.width_m)
+        self._speed_s, self._speed = _section_speeds(spec, robot, self._curvature[1:-1], self._s[1:-1])
+
+    @property
+    def start(self) -> PlanarPose:
+        """Where the path begins."""
+        return self.pose(0.0)
+
+    def pose(self, s_m: float) -> PlanarPose:
+        """The path's point and direction at s_m (straight on beyond the ends)."""
+        x, y, heading = self.poses(np.array([s_m]))
+        return PlanarPose(float(x[0]), float(y[0]), wrap_angle_rad(float(heading[0])))
+
+    def poses(self, s_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """x_m, y_m and heading_rad (not wrapped) of the path at s_m, each of the shape of s_m."""
+        k = self._piece_at(s_m)
+        along = s_m - self._s[k]
+        half_turn = 0.5 * self._curvature[k] * along
+        chord = along * np.sinc(half_turn / math.pi)
+        middle = self._heading[k] + half_turn
+        return (
+            self._x[k] + chord * np.cos(middle),
+            self._y[k] + chord * np.sin(middle),
+            middle + half_turn,
+        )
+
+    def curvature(self, s_m: float) -> float:
+        """1/m at s_m, positive to the left."""
+        return float(self._curvature[self._piece_at(np.array([s_m]))[0]])
+
+    def curvatures(self, s_m: FloatArray) -> FloatArray:
+        """1/m at each s_m."""
+        return self._curvature[self._piece_at(s_m)]
+
+    def project(self, pose: PlanarPose, hint_s_m: float) -> OnPath:
+        """The pose in path coordinates, searched near hint_s_m only, so that it cannot jump to another turn
+        of the path: at most 0.25 m behind the hint and 2 m ahead of it."""
+        point = np.array([[pose.x_m, pose.y_m]])
+        s, d = self.project_points(point, hint_s_m - _LOOK_BACK_M, hint_s_m + _LOOK_AHEAD_M)
+        s_m = min(max(float(s[0]), hint_s_m - _LOOK_BACK_M), hint_s_m + _LOOK_AHEAD_M)
+        turned = wrap_angle_rad(pose.heading_rad - self.pose(s_m).heading_rad)
+        return OnPath(s_m, float(d[0]), turned)
+
+    def project_points(
+        self, points_m: FloatArray, from_s_m: float = -math.inf, to_s_m: float = math.inf
+    ) -> tuple[FloatArray, FloatArray]:
+        """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m."""
+        near = (self._s + self._length >= from_s_m) & (self._s <= to_s_m)
+        if not near.any():
+            near[np.argmin(np.abs(self._s + self._length / 2.0 - from_s_m))] = True
+        s0, length = self._s[near], self._length[near]
+        curvature, heading = self._curvature[near], self._heading[near]
+        dx = points_m[:, :1] - self._x[near]
+        dy = points_m[:, 1:2] - self._y[near]
+        cos, sin = np.cos(heading), np.sin(heading)
+        ahead = dx * cos + dy * sin
+        left = dy * cos - dx * sin
+        along, lateral = _project_on_arcs(ahead, left, curvature)
+        first, last = np.maximum(from_s_m - s0, 0.0), np.minimum(to_s_m - s0, length)
+        clamped = np.clip(along, first, np.maximum(first, last))
+        turn = curvature * clamped
+        half_chord = clamped * np.sinc(turn / (2.0 * math.pi))
+        off_x = ahead - half_chord * np.cos(turn / 2.0)
+        off_y = left - half_chord * np.sin(turn / 2.0)
+        distance = np.where(along == clamped, np.abs(lateral), np.hypot(off_x, off_y))
+        best = np.argmin(distance, axis=1)
+        rows = np.arange(len(points_m))
+        side = np.where(off_y * np.cos(turn) - off_x * np.sin(turn) < 0.0, -1.0, 1.0)
+        return (s0 + clamped)[rows, best], (side * distance)[rows, best]
+
+    def speed_limit(self, s_m: float) -> float:
+        """The greatest speed at s_m so that every section and bend ahead is entered slowly enough, m/s."""
+        return float(np.interp(s_m, self._speed_s, self._speed))
+
+    def _piece_at(self, s_m: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
+        return np.clip(np.searchsorted(self._s, s_m, side="right") - 1, 0, len(self._s) - 1)
+
+    def _check_doubling_back(self, width_m: float) -> None:
+        s = np.append(np.arange(0.0, self.length_m, width_m / 4.0), self.length_m)
+        x, y, heading = self.poses(s)
+        for k in range(len(s)):
+            near = np.hypot(x[k:] - x[k], y[k:] - y[k]) < width_m
+            turned = np.abs((heading[k:] - heading[k] + math.pi) % (2.0 * math.pi) - math.pi)
+            again = np.flatnonzero(near & (turned > _OPPOSED_RAD))
+            if not len(again):
+                continue
+            first, second = s[k], s[k + again[0]]
+            raise PathError(
+                f"path: doubles back on itself: the robot would sweep the same floor at {first:.1f} m and, "
+                f"the other way, at {second:.1f} m; widen the turn to a radius above {width_m / 2:.2f} m"
+            )
+
+
+def compose(outer: PlanarPose, inner: PlanarPose) -> PlanarPose:
+    """A pose given in the frame that stands at outer, in the frame that outer is given in.
+
+    compose(path.start, odometry_pose) puts dead reckoning that began at the path's start on the path.
+    """
+    c, s = math.cos(outer.heading_rad), math.sin(outer.heading_rad)
+    return PlanarPose(
+        outer.x_m + c * inner.x_m - s * inner.y_m,
+        outer.y_m + s * inner.x_m + c * inner.y_m,
+        wrap_angle_rad(outer.heading_rad + inner.heading_rad),
+    )
+
+
+def _project_on_arcs(
+    ahead: FloatArray, left: FloatArray, curvature: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Along and left of circles (lines for 0) that start at the origin towards +ahead; (N, M) each."""
+    straight = np.abs(curvature) < 1e-9
+    safe = np.where(straight, 1.0, curvature)
+    radius = 1.0 / safe
+    # Angle travelled about the centre (0, radius), counted in the sense of the turn, in [-pi, pi).
+    angle = np.arctan2(ahead, (radius - left) * np.sign(safe))
+    along = np.where(straight, ahead, angle / np.abs(safe))
+    lateral = np.where(straight, left, radius - np.sign(safe) * np.hypot(ahead, radius - left))
+    return along, lateral
+
+
+def _chain(spec: PathSpec) -> Iterator[_Piece]:
+    """The pieces of constant curvature, end to end."""
+    s = 0.0
+    x, y = spec.start.x_m, spec.start.y_m
+    heading = math.radians(spec.start.heading_deg)
+    for segment in spec.segments:
+        steps = _arc_pieces(segment) if isinstance(segment, ArcSpec) else [(segment.length_m, 0.0)]
+        for length, curvature in steps:
+            yield _Piece(s, length, x, y, heading, curvature)
+            half_turn = 0.5 * curvature * length
+            chord = length * float(np.sinc(half_turn / math.pi))
+            x += chord * math.cos(heading + half_turn)
+            y += chord * math.sin(heading + half_turn)
+            heading += 2.0 * half_turn
+            s += length
+
+
+def _arc_pieces(arc: ArcSpec) -> list[tuple[float, float]]:
+    """(length, curvature): the blend in, the circle, the blend out; a blend turns by half its length."""
+    curvature = math.copysign(1.0 / arc.radius_m, arc.angle_deg)
+    circle_m = arc.length_m - 2.0 * arc.blend_m
+    # No piece turns by more than 90 degrees: the angle of a point about its centre is never ambiguous.
+    parts = max(1, math.ceil(circle_m * abs(curvature) / (math.pi / 2.0) - 1e-9))
+    circle = [(circle_m / parts, curvature)] * parts if circle_m > 0.0 else []
+    if arc.blend_m == 0.0:
+        return circle
+    step_m = arc.blend_m / _BLEND_PIECES
+    rise = [(step_m, curvature * (k + 0.5) / _BLEND_PIECES) for k in range(_BLEND_PIECES)]
+    return [*rise, *circle, *reversed(rise)]
+
+
+def _extension_back(piece: _Piece) -> _Piece:
+    return _Piece(
+        -_EXTENSION_M,
+        _EXTENSION_M,
+        piece.x_m - _EXTENSION_M * math.cos(piece.heading_rad),
+        piece.y_m - _EXTENSION_M * math.sin(piece.heading_rad),
+        piece.heading_rad,
+        0.0,
+    )
+
+
+def _extension_ahead(piece: _Piece) -> _Piece:
+    turn = piece.curvature_1pm * piece.length_m
+    chord = piece.length_m * float(np.sinc(turn / (2.0 * math.pi)))
+    return _Piece(
+        piece.s_m + piece.length_m,
+        _EXTENSION_M,
+        piece.x_m + chord * math.cos(piece.heading_rad + turn / 2.0),
+        piece.y_m + chord * math.sin(piece.heading_rad + turn / 2.0),
+        piece.heading_rad + turn,
+        0.0,
+    )
+
+
+def _check_bends(spec: PathSpec, robot: Robot) -> None:
+    """The inner track must not run backwards, and the yaw rate must leave a speed to drive the bend with."""
+    slow_m = _SLOWEST_BEND_MPS / (robot.limits.max_yaw_rate_radps * _YAW_RATE_FOR_THE_BEND)
+    tightest_m = max(robot.body.width_m / 2.0, slow_m)
+    for number, segment in enumerate(spec.segments):
+        if isinstance(segment, ArcSpec) and segment.radius_m < tightest_m:
+            raise PathError(
+                f"path: segments.{number}: radius_m {segment.radius_m:g} is tighter than this robot can "
+                f"drive; use at least {tightest_m:.2f} m (its half width, and what its yaw rate allows)"
+            )
+
+
+def _section_speeds(
+    spec: PathSpec, robot: Robot, curvature: FloatArray, piece_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Speed over s: what section and bend allow, lowered ahead of each slower one as a comfortable
+    braking needs (controller/braking.py)."""
+    top = robot.limits.max_speed_mps
+    brake = comfort(robot.limits)
+    yaw = robot.limits.max_yaw_rate_radps * _YAW_RATE_FOR_THE_BEND
+    length = spec.length_m
+    s = np.linspace(0.0, length, max(2, math.ceil(length / _SPEED_STEP_M) + 1))
+    ends = np.cumsum([segment.length_m for segment in spec.segments])
+    asked = np.array([segment.max_speed_mps or top for segment in spec.segments])
+    speed = np.minimum(asked[np.minimum(np.searchsorted(ends, s, side="right"), len(ends) - 1)], top)
+    bend = np.abs(curvature[np.searchsorted(piece_s, s, side="right") - 1])
+    speed = np.minimum(speed, yaw / np.maximum(bend, yaw / top))
+    starts = np.flatnonzero(np.diff(speed) < 0.0) + 1
+    for start in starts:
+        # One grid step early: the step itself may lie anywhere between two grid points.
+        distances = s[start - 1] - s[:start]
+        slowed = np.flatnonzero(distances <= slowing_distance(top, float(speed[start]), brake))
+        for k in slowed:
+            reach = speed_before_section(float(distances[k]), float(speed[start]), brake)
+            speed[k] = min(speed[k], reach)
+    return s, speed
