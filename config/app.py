@@ -8,20 +8,12 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from config.camera import CameraConfig
-from config.chassis import ChassisConfig
+from config.chassis import ChassisConfig, PlantConfig
 from config.decision import DecisionConfig
 from config.loader import Section, load
 from config.path import PathSpec
 from config.perception import PerceptionConfig
 from config.robot import Robot
-
-
-class PlantConfig(Section):
-    """The simulated base behind the emulator: how a real tracked chassis differs from its commands."""
-
-    lag_s: float = Field(default=0.12, gt=0, le=2, description="first-order lag of each track")
-    yaw_slip: float = Field(default=0.10, ge=0, lt=1, description="share of the yaw rate lost to slip")
-    max_track_accel_mps2: float = Field(default=3.0, gt=0, le=20)
 
 
 class SimulationConfig(Section):
@@ -89,3 +81,21 @@ class AppConfig(Section):
 def load_app(path: Path) -> AppConfig:
     """Read and check one program's YAML. Raises ConfigError."""
     return load(path, AppConfig)
+
+
+class ReplayConfig(Section):
+    """What `treadwatch replay --config FILE` reads: how a recording is looked at.
+
+    The camera's mounting is taken from the recording if it says so, from here with assume_mount, and is
+    unknown otherwise (a hand-held camera has none).
+    """
+
+    robot: Robot = Robot()
+    perception: PerceptionConfig = PerceptionConfig()
+    decision: DecisionConfig = DecisionConfig()
+    assume_mount: bool = Field(default=False, description="use robot.camera_mount where none is recorded")
+
+
+def load_replay(path: Path) -> ReplayConfig:
+    """Read and check a replay's YAML. Raises ConfigError."""
+    return load(path, ReplayConfig)

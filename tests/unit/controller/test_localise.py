@@ -1,0 +1,93 @@
+import math
+
+import numpy as np
+import pytest
+
+from controller.localise import Localiser, PoseHistory
+from hal.geometry import advance_pose, camera_in_body
+from hal.types import CameraMount, PlanarPose, Pose
+from vision.scene import EgoMotion
+
+MOUNT = CameraMount(forward_m=0.4, left_m=0.0, height_m=0.6, pitch_rad=0.1)
+ORIGIN = PlanarPose(0.0, 0.0, 0.0)
+MS = 1_000_000
+
+
+def ego(turn_rad: float, dt_s: float, source: str = "visual") -> EgoMotion:
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    in_body = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    camera = camera_in_body(MOUNT).rotation
+    return EgoMotion(Pose(camera.T @ in_body @ camera, np.zeros(3)), dt_s, source, 1.0, 0.01, 0.002)
+
+
+def test_a_pose_between_two_known_ones_is_interpolated_the_short_way_round() -> None:
+    history = PoseHistory()
+    history.append(0, PlanarPose(0.0, 0.0, math.radians(170)))
+    history.append(100, PlanarPose(1.0, 2.0, math.radians(-170)))
+    pose = history.at(50)
+    assert pose is not None
+    assert (pose.x_m, pose.y_m) == pytest.approx((0.5, 1.0))
+    assert math.degrees(pose.heading_rad) == pytest.approx(-180.0)
+
+
+def test_what_lies_outside_the_history_is_not_known() -> None:
+    history = PoseHistory(reach_s=0.1)
+    assert history.at(0) is None
+    history.append(1000 * MS, ORIGIN)
+    assert history.at(999 * MS) is None
+    assert history.at(1100 * MS) is ORIGIN
+    assert history.at(1101 * MS) is None
+
+
+def test_a_stamp_that_does_not_advance_replaces() -> None:
+    history = PoseHistory()
+    history.append(5, ORIGIN)
+    history.append(5, PlanarPose(1.0, 0.0, 0.0))
+    assert history.at(5) == PlanarPose(1.0, 0.0, 0.0)
+
+
+def test_without_scenes_the_pose_is_the_odometry_from_the_start() -> None:
+    start = PlanarPose(2.0, 1.0, math.pi / 2)
+    localiser = Localiser(start, MOUNT)
+    odometry = PlanarPose(5.0, 5.0, 1.0)
+    for step in range(51):
+        localiser.add_odometry(step * 20 * MS, odometry)
+        odometry = advance_pose(odometry, 0.5, 0.2, 0.02)
+    expected = advance_pose(start, 0.5, 0.2, 1.0)
+    assert (localiser.pose.x_m, localiser.pose.y_m) == pytest.approx((expected.x_m, expected.y_m), abs=1e-6)
+    assert localiser.pose.heading_rad == pytest.approx(expected.heading_rad)
+
+
+def drive_with_slip(true_ratio: float, source: str) -> tuple[Localiser, PlanarPose]:
+    """10 s on an arc; the odometry turns faster than the robot does, the camera sees the truth."""
+    localiser = Localiser(ORIGIN, MOUNT)
+    odometry = truth = ORIGIN
+    for step in range(500):
+        localiser.add_odometry(step * 20 * MS, odometry)
+        if step and step % 2 == 0:
+            localiser.add_ego_motion(step * 20 * MS, ego(0.3 * true_ratio * 0.04, 0.04, source))
+        odometry = advance_pose(odometry, 0.8, 0.3, 0.02)
+        truth = advance_pose(truth, 0.8, 0.3 * true_ratio, 0.02)
+    localiser.add_odometry(500 * 20 * MS, odometry)
+    return localiser, truth
+
+
+def test_the_slip_that_the_camera_sees_is_learnt() -> None:
+    localiser, truth = drive_with_slip(0.8, "visual")
+    assert localiser.yaw_ratio == pytest.approx(0.8, abs=0.01)
+    error_rad = abs(localiser.pose.heading_rad - truth.heading_rad)
+    # Uncorrected it would be 0.2 * 3 rad = 0.6 rad.
+    assert error_rad < 0.05
+
+
+def test_a_camera_that_saw_nothing_teaches_nothing() -> None:
+    localiser, _ = drive_with_slip(0.8, "odometry")
+    assert localiser.yaw_ratio == 1.0
+
+
+def test_the_prior_for_perception_is_dead_reckoning_not_the_fused_pose() -> None:
+    localiser, _ = drive_with_slip(0.8, "visual")
+    prior = localiser.camera_pose(500 * 20 * MS)
+    assert prior is not None
+    forward = prior.rotation @ np.array([0.0, 0.0, 1.0])
+    assert math.atan2(forward[1], forward[0]) == pytest.approx(math.remainder(0.3 * 10.0, math.tau), abs=1e-6)
