@@ -1,0 +1,94 @@
+"""From exact inverse depth to what a D435i-like stereo camera reports.
+
+Stereo measures disparity, which is inverse depth times a constant: noise that is even in disparity
+gives a standard deviation that grows with the square of the distance, as real ones do.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.camera import SimulatedCameraConfig
+from hal.types import DepthImage, Intrinsics
+from sim.raster import Float32Image
+
+DEPTH_SCALE_M = 0.001
+
+# Standard deviation of inverse depth: sigma_z = z^2 * this.
+SIGMA_PER_M: dict[str, float] = {"realsense": 0.0075, "paper": 0.0005, "none": 0.0}
+
+_BASELINE_M = 0.050
+_BLOB_PX = 1.6  # matching windows smear noise over a few pixels
+_HOLE_BLOB_PX = 1.8
+_MARGIN_PX = 96  # the noise field is larger than the image by this much: room to shift it
+_TOLERATED_SHIFT_PX = 1.0  # disparity steps below this are slanted surfaces, not edges
+
+
+class DepthSensor:
+    """Noise, holes, occlusion shadows, range limits. The same seed and frame number give the same bytes."""
+
+    def __init__(self, config: SimulatedCameraConfig, intrinsics: Intrinsics, seed: int) -> None:
+        self._config = config
+        self._seed = seed
+        self._sigma = SIGMA_PER_M[config.depth_noise]
+        shape = (intrinsics.height, intrinsics.width)
+        self._shape = shape
+        self._disparity_px_m = intrinsics.fx * _BASELINE_M
+        generator = np.random.default_rng((seed, 101))
+        padded = (shape[0] + _MARGIN_PX, shape[1] + _MARGIN_PX)
+        # Two independent halves per frame, one shared with the next: neighbours in time correlate by 1/2.
+        self._noise = _field(generator, padded, _BLOB_PX) * np.float32(self._sigma / np.sqrt(2.0))
+        self._holes = _hole_field(generator, padded, config.hole_ratio)
+        self._columns = np.arange(shape[1], dtype=np.float32)[None, :]
+        self._noisy: Float32Image = np.empty(shape, np.float32)
+
+    def measure(self, inverse_depth: Float32Image, frame: int) -> DepthImage:
+        """The depth image (H, W) uint16 in millimetres, 0 where nothing was measured.
+
+        inverse_depth (H, W) in 1/m, 0: nothing there. frame: running number of the exposure.
+        """
+        noisy = self._noisy
+        if self._sigma > 0.0:
+            np.add(inverse_depth, self._cut(self._noise, frame, 0), out=noisy)
+            np.add(noisy, self._cut(self._noise, frame + 1, 0), out=noisy)
+        else:
+            np.copyto(noisy, inverse_depth)
+        # What leaves the range becomes infinitely far and then zero.
+        config = self._config
+        lost = (
+            (noisy < 1.0 / config.depth_max_m) | (noisy > 1.0 / config.depth_min_m) | (inverse_depth == 0.0)
+        )
+        if config.hole_ratio > 0.0:
+            lost |= self._cut(self._holes, frame, 1)
+        if config.depth_edges:
+            lost |= self.shadows(inverse_depth)
+        noisy[lost] = np.inf
+        return np.asarray(np.rint((1.0 / DEPTH_SCALE_M) / noisy), dtype=np.uint16)
+
+    def shadows(self, inverse_depth: Float32Image) -> NDArray[np.bool_]:
+        """What the left infrared camera sees and the right one does not (H, W): the band of background
+        to the left of every nearer thing, as wide as the difference of their disparities."""
+        seen_at = self._columns - np.float32(self._disparity_px_m) * inverse_depth
+        nearest_right = np.minimum.accumulate(seen_at[:, ::-1], axis=1)[:, ::-1]
+        return seen_at > nearest_right + _TOLERATED_SHIFT_PX
+
+    def _cut(self, field: NDArray[np.generic], frame: int, stream: int) -> NDArray[np.generic]:
+        """The field at a shift drawn for this frame."""
+        generator = np.random.default_rng((self._seed, 102 + stream, frame))
+        top, left = (int(shift) for shift in generator.integers(_MARGIN_PX, size=2))
+        return field[top : top + self._shape[0], left : left + self._shape[1]]
+
+
+def _field(generator: np.random.Generator, shape: tuple[int, int], blob_px: float) -> Float32Image:
+    """Gaussian noise of unit standard deviation, smooth over blob_px."""
+    white = generator.standard_normal(shape).astype(np.float32)
+    smooth = np.asarray(cv2.GaussianBlur(white, (0, 0), blob_px, borderType=cv2.BORDER_REFLECT))
+    return np.asarray(smooth / smooth.std(), dtype=np.float32)
+
+
+def _hole_field(generator: np.random.Generator, shape: tuple[int, int], ratio: float) -> NDArray[np.bool_]:
+    """Blobs that cover ratio of the area."""
+    field = _field(generator, shape, _HOLE_BLOB_PX)
+    return np.asarray(field > np.quantile(field, 1.0 - ratio), dtype=np.bool_)

@@ -1,0 +1,215 @@
+"""Where a mover is at any time: a pure function, so that truth can be asked for any instant."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+
+from config.scenario import Go, Motion
+from hal.geometry import wrap_angle_rad
+from hal.types import PlanarPose
+
+_ROUNDED_CORNER_RAD = math.radians(60.0)
+_CORNER_RADIUS_M = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class MotionState:
+    """Pose on the floor, velocity along the floor's axes, and the distance covered so far."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    vx_mps: float
+    vy_mps: float
+    yaw_rate_radps: float
+    distance_m: float
+
+    @property
+    def speed_mps(self) -> float:
+        """Magnitude of the velocity."""
+        return math.hypot(self.vx_mps, self.vy_mps)
+
+
+@dataclass(frozen=True, slots=True)
+class _Leg:
+    """A straight run between two points, with the speeds it is entered and left at."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    length_m: float
+    cruise_mps: float
+    turn_in_rad: float  # half of the corner at its beginning, if that is rounded
+    turn_out_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Phase:
+    """Constant acceleration along a leg, or constant yaw rate on the spot."""
+
+    start_s: float
+    leg: _Leg
+    along_m: float
+    speed_mps: float
+    accel_mps2: float
+    yaw_rate_radps: float
+    heading_rad: float
+    covered_m: float
+
+
+class Trajectory:
+    """A motion plan from a start pose, solved once into phases of constant acceleration."""
+
+    def __init__(self, start: PlanarPose, motion: Motion | None, shift_s: float = 0.0) -> None:
+        """shift_s moves the plan in time (the seed's jitter)."""
+        self._phases: list[_Phase] = []
+        self._cursor = start
+        self._covered_m = 0.0
+        self._time_s = -math.inf
+        self._stand(start.heading_rad)
+        if motion is not None:
+            self._time_s = motion.start_s + shift_s
+            self._plan(motion)
+        self._starts = [phase.start_s for phase in self._phases]
+
+    def at(self, t_s: float) -> MotionState:
+        """The state at t_s; before the first step it stands at the start, after the last where it ended."""
+        phase = self._phases[max(bisect_right(self._starts, t_s) - 1, 0)]
+        leg = phase.leg
+        dt_s = t_s - phase.start_s if math.isfinite(phase.start_s) else 0.0
+        speed = phase.speed_mps + phase.accel_mps2 * dt_s
+        gone_m = phase.speed_mps * dt_s + 0.5 * phase.accel_mps2 * dt_s * dt_s
+        along_m = phase.along_m + gone_m
+        c, s = math.cos(leg.heading_rad), math.sin(leg.heading_rad)
+        if phase.yaw_rate_radps != 0.0 or leg.length_m == 0.0:
+            heading, yaw_rate = phase.heading_rad + phase.yaw_rate_radps * dt_s, phase.yaw_rate_radps
+        else:
+            heading, yaw_rate = _rounded_heading(leg, along_m, speed)
+        return MotionState(
+            leg.x_m + along_m * c,
+            leg.y_m + along_m * s,
+            wrap_angle_rad(heading),
+            speed * c,
+            speed * s,
+            yaw_rate,
+            phase.covered_m + gone_m,
+        )
+
+    @property
+    def end_s(self) -> float:
+        """When the last step is over; -inf for a body that never moves."""
+        return self._phases[-1].start_s
+
+    def _plan(self, motion: Motion) -> None:
+        run: list[Go] = []
+        for step in motion.steps:
+            if isinstance(step, Go):
+                run.append(step)
+                continue
+            self._drive(run, motion)
+            run = []
+            self._stand(self._cursor.heading_rad)
+            self._time_s += step.duration_s
+        self._drive(run, motion)
+        self._stand(self._cursor.heading_rad)
+
+    def _stand(self, heading_rad: float) -> None:
+        leg = _Leg(self._cursor.x_m, self._cursor.y_m, heading_rad, 0.0, 0.0, 0.0, 0.0)
+        self._add(leg, 0.0, 0.0, 0.0, 0.0)
+
+    def _add(self, leg: _Leg, along_m: float, speed: float, accel: float, yaw_rate: float) -> None:
+        heading = self._cursor.heading_rad
+        self._phases.append(
+            _Phase(self._time_s, leg, along_m, speed, accel, yaw_rate, heading, self._covered_m)
+        )
+
+    def _drive(self, run: list[Go], motion: Motion) -> None:
+        legs = self._legs(run)
+        turn_rate = math.radians(motion.turn_rate_degps)
+        junctions = _junction_speeds(legs, motion.accel_mps2)
+        for index, leg in enumerate(legs):
+            if leg.turn_in_rad == 0.0:
+                self._turn_to(leg, turn_rate)
+            self._cover(leg, junctions[index], junctions[index + 1], motion.accel_mps2)
+
+    def _legs(self, run: list[Go]) -> list[_Leg]:
+        """The runs between points that differ, with every corner below the limit rounded."""
+        corners = [(self._cursor.x_m, self._cursor.y_m)]
+        speeds: list[float] = []
+        for step in run:
+            if math.hypot(step.x_m - corners[-1][0], step.y_m - corners[-1][1]) > 1e-9:
+                corners.append((step.x_m, step.y_m))
+                speeds.append(step.speed_mps)
+        pairs = list(itertools.pairwise(corners))
+        headings = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairs]
+        turns = [wrap_angle_rad(b - a) for a, b in itertools.pairwise(headings)]
+        halves = [0.0, *(0.5 * turn if abs(turn) <= _ROUNDED_CORNER_RAD else 0.0 for turn in turns), 0.0]
+        return [
+            _Leg(a[0], a[1], headings[i], math.dist(a, b), speeds[i], halves[i], halves[i + 1])
+            for i, (a, b) in enumerate(pairs)
+        ]
+
+    def _turn_to(self, leg: _Leg, turn_rate_radps: float) -> None:
+        turn = wrap_angle_rad(leg.heading_rad - self._cursor.heading_rad)
+        if abs(turn) > 1e-6:
+            spot = _Leg(leg.x_m, leg.y_m, leg.heading_rad, 0.0, 0.0, 0.0, 0.0)
+            self._add(spot, 0.0, 0.0, 0.0, math.copysign(turn_rate_radps, turn))
+            self._time_s += abs(turn) / turn_rate_radps
+        self._cursor = PlanarPose(leg.x_m, leg.y_m, leg.heading_rad)
+
+    def _cover(self, leg: _Leg, entry: float, leave: float, accel: float) -> None:
+        peak = min(leg.cruise_mps, math.sqrt(accel * leg.length_m + 0.5 * (entry**2 + leave**2)))
+        up_m = (peak**2 - entry**2) / (2.0 * accel)
+        down_m = (peak**2 - leave**2) / (2.0 * accel)
+        start_m = self._covered_m
+        for along_m, speed, rate, duration_s in (
+            (0.0, entry, accel, (peak - entry) / accel),
+            (up_m, peak, 0.0, (leg.length_m - up_m - down_m) / peak),
+            (leg.length_m - down_m, peak, -accel, (peak - leave) / accel),
+        ):
+            if duration_s > 1e-12:
+                self._covered_m = start_m + along_m
+                self._add(leg, along_m, speed, rate, 0.0)
+                self._time_s += duration_s
+        self._covered_m = start_m + leg.length_m
+        c, s = math.cos(leg.heading_rad), math.sin(leg.heading_rad)
+        self._cursor = PlanarPose(
+            leg.x_m + leg.length_m * c,
+            leg.y_m + leg.length_m * s,
+            wrap_angle_rad(leg.heading_rad),
+        )
+
+
+def _junction_speeds(legs: list[_Leg], accel: float) -> list[float]:
+    """Speed at each leg's ends that both neighbours allow and the acceleration can reach."""
+    speeds = [0.0]
+    for before, after in itertools.pairwise(legs):
+        speeds.append(min(before.cruise_mps, after.cruise_mps) if after.turn_in_rad != 0.0 else 0.0)
+    speeds.append(0.0)
+    # Straight on (no turn at all) is a corner of zero, but not a stop.
+    for index, (before, after) in enumerate(itertools.pairwise(legs)):
+        if abs(wrap_angle_rad(after.heading_rad - before.heading_rad)) < 1e-9:
+            speeds[index + 1] = min(before.cruise_mps, after.cruise_mps)
+    for index, leg in enumerate(legs):
+        reach = math.sqrt(speeds[index] ** 2 + 2.0 * accel * leg.length_m)
+        speeds[index + 1] = min(speeds[index + 1], reach)
+    for index in range(len(legs) - 1, -1, -1):
+        reach = math.sqrt(speeds[index + 1] ** 2 + 2.0 * accel * legs[index].length_m)
+        speeds[index] = min(speeds[index], reach)
+    return speeds
+
+
+def _rounded_heading(leg: _Leg, along_m: float, speed: float) -> tuple[float, float]:
+    """Heading and yaw rate on a leg: half of a rounded corner is turned before it, half after it."""
+    radius = min(_CORNER_RADIUS_M, 0.5 * leg.length_m)
+    left_m = leg.length_m - along_m
+    if leg.turn_in_rad != 0.0 and along_m < radius:
+        rate_per_m = leg.turn_in_rad / radius
+        return leg.heading_rad - leg.turn_in_rad + rate_per_m * along_m, rate_per_m * speed
+    if leg.turn_out_rad != 0.0 and left_m < radius:
+        rate_per_m = leg.turn_out_rad / radius
+        return leg.heading_rad + leg.turn_out_rad - rate_per_m * left_m, rate_per_m * speed
+    return leg.heading_rad, 0.0

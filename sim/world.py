@@ -1,0 +1,159 @@
+"""The simulated outside: where every face and every body is, as a pure function of time."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.scenario import BodySpec, Scenario
+from hal.geometry import body_in_floor
+from hal.types import FloatArray, PlanarPose
+from sim.bodies import BodyModel, build_body
+from sim.building import build_room
+from sim.mesh import Faces, join, normals
+from sim.motion import MotionState, Trajectory
+
+BUILDING_ID = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Geometry:
+    """All faces at one time, on the floor's axes. Their order never changes within a world.
+
+    corners_m (N, 4, 3), normals (N, 3), windows (N, 4), texture (N,) index into World.textures,
+    body (N,): 0 is the building, k + 1 the scenario's k-th body.
+    """
+
+    corners_m: FloatArray
+    normals: FloatArray
+    windows: FloatArray
+    texture: NDArray[np.int32]
+    body: NDArray[np.uint16]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyState:
+    """One body at one time, on the floor's axes.
+
+    id: its value in instance masks. velocity_mps (2,). footprint_m (K, 2): convex, counter-clockwise.
+    z_m: lowest and highest point. moves: whether it has a plan of motion at all.
+    """
+
+    id: int
+    name: str
+    kind: str
+    pose: PlanarPose
+    velocity_mps: FloatArray
+    yaw_rate_radps: float
+    footprint_m: FloatArray
+    z_m: tuple[float, float]
+    moves: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Body:
+    id: int
+    spec: BodySpec
+    model: BodyModel
+    trajectory: Trajectory
+
+
+class World:
+    """A scenario brought to life. The seed picks textures and the jitter of the movers' start times."""
+
+    def __init__(self, scenario: Scenario, seed: int = 0) -> None:
+        self.scenario = scenario
+        self.seed = seed
+        self._bodies = tuple(
+            _Body(index + 1, spec, build_body(spec, seed), _trajectory(spec, seed))
+            for index, spec in enumerate(scenario.bodies)
+        )
+        still = [body for body in self._bodies if body.spec.motion is None]
+        self._movers = [body for body in self._bodies if body.spec.motion is not None]
+        parts = [(BUILDING_ID, build_room(scenario.room))]
+        parts.extend((body.id, faces) for body in still for faces in _placed_parts(body, 0.0))
+        fixed = join([faces for _, faces in parts])
+        swung = [(body.id, faces) for body in self._movers for faces in body.model.parts]
+        moving = join([faces for _, faces in swung])
+        self._compile(fixed, moving)
+        self._still_count = len(fixed)
+        owners = [id_ for id_, faces in (*parts, *swung) for _ in range(len(faces))]
+        self._body_of_face = np.array(owners, dtype=np.uint16)
+        part_sizes = [len(faces) for _, faces in swung]
+        self._part_of_face = np.repeat(np.arange(len(part_sizes)), part_sizes)
+
+    def _compile(self, fixed: Faces, moving: Faces) -> None:
+        keys = fixed.textures + moving.textures
+        self.textures: tuple[str, ...] = tuple(dict.fromkeys(keys))
+        number = {key: index for index, key in enumerate(self.textures)}
+        self._texture_of_face = np.array([number[key] for key in keys], dtype=np.int32)
+        self._windows = np.concatenate([fixed.windows, moving.windows])
+        self._corners = np.concatenate([fixed.corners_m, moving.corners_m])
+        self._normals = normals(self._corners)
+
+    def geometry(self, t_s: float) -> Geometry:
+        """Every face at t_s."""
+        corners, outward = self._corners.copy(), self._normals.copy()
+        if self._movers:
+            rotations, translations = self._part_poses(t_s)
+            which, first = self._part_of_face, self._still_count
+            turn = rotations[which]
+            corners[first:] = np.matmul(self._corners[first:], turn.transpose(0, 2, 1))
+            corners[first:] += translations[which][:, None, :]
+            outward[first:] = np.matmul(turn, self._normals[first:, :, None])[:, :, 0]
+        return Geometry(corners, outward, self._windows, self._texture_of_face, self._body_of_face)
+
+    def bodies(self, t_s: float) -> tuple[BodyState, ...]:
+        """Every body at t_s, in the scenario's order."""
+        return tuple(_state(body, t_s) for body in self._bodies)
+
+    def _part_poses(self, t_s: float) -> tuple[FloatArray, FloatArray]:
+        rotations, translations = [], []
+        for body in self._movers:
+            state = body.trajectory.at(t_s)
+            outer = body_in_floor(PlanarPose(state.x_m, state.y_m, state.heading_rad))
+            for part in body.model.pose_parts(state):
+                pose = outer @ part
+                rotations.append(pose.rotation)
+                translations.append(pose.translation_m)
+        return np.array(rotations), np.array(translations)
+
+
+def _trajectory(spec: BodySpec, seed: int) -> Trajectory:
+    start = PlanarPose(spec.x_m, spec.y_m, math.radians(spec.heading_deg))
+    jitter_s = 0.0
+    if spec.motion is not None and spec.motion.start_jitter_s > 0.0:
+        generator = np.random.default_rng((seed, zlib.crc32(spec.name.encode()), 1))
+        jitter_s = spec.motion.start_jitter_s * float(generator.uniform(-1.0, 1.0))
+    return Trajectory(start, spec.motion, jitter_s)
+
+
+def _placed_parts(body: _Body, t_s: float) -> list[Faces]:
+    state = body.trajectory.at(t_s)
+    outer = body_in_floor(PlanarPose(state.x_m, state.y_m, state.heading_rad))
+    poses = [outer @ part for part in body.model.pose_parts(state)]
+    return [
+        faces.moved(pose.rotation, pose.translation_m)
+        for faces, pose in zip(body.model.parts, poses, strict=True)
+    ]
+
+
+def _state(body: _Body, t_s: float) -> BodyState:
+    state: MotionState = body.trajectory.at(t_s)
+    c, s = math.cos(state.heading_rad), math.sin(state.heading_rad)
+    turn = np.array([[c, -s], [s, c]])
+    return BodyState(
+        id=body.id,
+        name=body.spec.name,
+        kind=body.spec.kind,
+        pose=PlanarPose(state.x_m, state.y_m, state.heading_rad),
+        velocity_mps=np.array([state.vx_mps, state.vy_mps]),
+        yaw_rate_radps=state.yaw_rate_radps,
+        footprint_m=body.model.footprint_m @ turn.T + np.array([state.x_m, state.y_m]),
+        z_m=body.model.z_m,
+        moves=body.spec.motion is not None,
+    )
