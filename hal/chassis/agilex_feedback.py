@@ -62,7 +62,7 @@ class AgilexFeedback:
         self._battery: Battery | None = None
         self._driver_bits: dict[int, int] = {}
         self.motion_ns: int | None = None
-        self.state_ns: int | None = None
+        self.status_ns: int | None = None
         self.v_mps = math.nan
         self.w_radps = math.nan
         self.faults: tuple[str, ...] = ()
@@ -80,13 +80,13 @@ class AgilexFeedback:
         return min(self.motion_ns, self._odometer_ns)
 
     @property
-    def obeys(self) -> bool:
-        """The newest system state says: control mode CAN."""
-        return self._state is not None and self._state.control_mode == self._model.mode_can
-
-    def obeys_since(self, since_ns: int) -> bool:
-        """Obeys, as told after since_ns."""
-        return self.obeys and self.state_ns is not None and self.state_ns > since_ns
+    def disobeys(self) -> str:
+        """Why the base does not take commands, as its newest system state tells; "" when it does."""
+        if self._state is None:
+            return "no system state heard"
+        if self._state.control_mode == self._model.mode_can:
+            return ""
+        return f"control mode is {self._model.describe_mode(self._state.control_mode)}"
 
     @property
     def standing(self) -> bool:
@@ -129,7 +129,7 @@ class AgilexFeedback:
                 case Odometer():
                     self._count(message, now_ns)
                 case SystemState():
-                    self._state, self.state_ns = message, now_ns
+                    self._state, self.status_ns = message, now_ns
                     self._list_faults()
                 case ActuatorSlow():
                     if self._driver_bits.get(message.index) != message.state_bits:

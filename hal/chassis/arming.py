@@ -34,16 +34,16 @@ class Evidence:
     """All that a driver knows when it steps the machine.
 
     link_error: "" while the link works. feedback_ns, status_ns: when the newest motion feedback and the
-    newest status arrived (None: never). obeys: that status says the base takes our commands.
-    stop_cause: why the robot must not move ("" for none). standing: measured speed is zero; False when
-    unknown. command_is_zero: what is asked of the chassis at this step.
+    newest status arrived (None: never). disobeys: why the base does not take our commands, as that
+    status tells ("" when it takes them). stop_cause: why the robot must not move ("" for none).
+    standing: measured speed is zero; False when unknown. command_is_zero: what is asked at this step.
     """
 
     now_ns: int
     link_error: str
     feedback_ns: int | None
     status_ns: int | None
-    obeys: bool
+    disobeys: str
     stop_cause: str
     standing: bool
     command_is_zero: bool
@@ -51,12 +51,25 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Arming:
-    """Where the machine stands: the mode, why, since when, and when it was stepped last."""
+    """Where the machine stands: the mode, its cause, since when, and when it was stepped last.
+
+    cleared: the cause of a latch has gone, only consent is missing. refusal: why the last arm() was
+    not followed.
+    """
 
     mode: ChassisMode = ChassisMode.STANDBY
-    reason: str = "not armed"
+    cause: str = "not armed"
     since_ns: int = 0
     stepped_ns: int = 0
+    cleared: bool = False
+    refusal: str = ""
+
+    @property
+    def reason(self) -> str:
+        """All of it in one line."""
+        cleared = "; gone now, arm again to go on" if self.cleared else ""
+        refusal = f"; arming refused: {self.refusal}" if self.refusal else ""
+        return self.cause + cleared + refusal
 
     @property
     def may_move(self) -> bool:
@@ -79,9 +92,8 @@ def consent(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     if state.mode in (ChassisMode.ARMED, ChassisMode.ARMING):
         return state
     if refusal := _refusal(state, seen, limits):
-        cause = state.reason.split("; arming refused")[0]
-        return replace(state, reason=f"{cause}; arming refused: {refusal}")
-    return Arming(ChassisMode.ARMING, "waiting for the base to obey", seen.now_ns, seen.now_ns)
+        return replace(state, refusal=refusal)
+    return Arming(ChassisMode.ARMING, "arming", seen.now_ns, seen.now_ns)
 
 
 def release(state: Arming, now_ns: int) -> Arming:
@@ -92,9 +104,10 @@ def release(state: Arming, now_ns: int) -> Arming:
 
 
 def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+    loss = _loss(seen, limits)
     if state.latched:
-        return state
-    if loss := _loss(seen, limits):
+        return replace(state, cleared=not loss and not seen.stop_cause)
+    if loss:
         return Arming(ChassisMode.LOST, loss, seen.now_ns)
     if seen.stop_cause:
         return Arming(ChassisMode.ESTOP, seen.stop_cause, seen.now_ns)
@@ -102,7 +115,7 @@ def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
         return _arming(state, seen, limits)
     if state.mode is ChassisMode.ARMED:
         return _armed(state, seen, limits)
-    if state.mode is ChassisMode.STOPPING and seen.standing and not seen.obeys:
+    if state.mode is ChassisMode.STOPPING and seen.standing and seen.disobeys:
         return Arming(ChassisMode.STANDBY, "stopped", seen.now_ns)
     return state
 
@@ -113,8 +126,8 @@ def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
         waiting = "no status heard from the base"
     elif seen.feedback_ns is None or seen.feedback_ns <= state.since_ns:
         waiting = "no motion feedback heard from the base"
-    elif not seen.obeys:
-        waiting = "the base does not take commands"
+    elif seen.disobeys:
+        waiting = f"the base does not take commands: {seen.disobeys}"
     elif not seen.command_is_zero:
         waiting = "the command is not zero"
     else:
@@ -122,12 +135,12 @@ def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     if seen.now_ns - state.since_ns > limits.arming_timeout_ns:
         waited_s = (seen.now_ns - state.since_ns) / 1e9
         return Arming(ChassisMode.STANDBY, f"arming gave up after {waited_s:.1f} s: {waiting}", seen.now_ns)
-    return replace(state, reason=f"arming: {waiting}")
+    return replace(state, cause=f"arming: {waiting}")
 
 
 def _armed(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
-    if not seen.obeys:
-        return Arming(ChassisMode.ESTOP, "the base left command mode: restarted or switched", seen.now_ns)
+    if seen.disobeys:
+        return Arming(ChassisMode.ESTOP, f"the base no longer obeys: {seen.disobeys}", seen.now_ns)
     gap_ns = seen.now_ns - state.stepped_ns
     if not 0 <= gap_ns <= limits.stall_ns:
         return Arming(

@@ -1,0 +1,178 @@
+"""What all chassis drivers share: arming, a link that may go, the last look at the command.
+
+A driver adds its protocol in three methods: _listen, _speak, _speak_stop. They may raise LinkLost; nobody
+else needs to know. exchange(), arm() and stop() never raise.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import Protocol, Self
+
+from hal.api import Closing
+from hal.chassis import arming
+from hal.chassis.arming import NS_PER_MS, Arming, ArmingLimits, Evidence
+from hal.chassis.command import CommandLimits, is_zero, zero
+from hal.errors import LinkLost
+from hal.types import ChassisState, PlanarPose, Setpoint
+
+# How often a lost link is tried again. Opening a port can take milliseconds, so not at every exchange.
+_RETRY_NS = 500 * NS_PER_MS
+
+
+class Told(Protocol):
+    """What the base has told; hal.types.ChassisState and arming.Evidence say what each means."""
+
+    @property
+    def feedback_ns(self) -> int | None: ...
+    @property
+    def status_ns(self) -> int | None: ...
+    @property
+    def disobeys(self) -> str: ...
+    @property
+    def stop_cause(self) -> str: ...
+    @property
+    def v_mps(self) -> float: ...
+    @property
+    def w_radps(self) -> float: ...
+    @property
+    def standing(self) -> bool: ...
+    @property
+    def pose(self) -> PlanarPose: ...
+    @property
+    def battery_v(self) -> float: ...
+    @property
+    def faults(self) -> tuple[str, ...]: ...
+
+
+class ChassisDriver(ABC):
+    """hal.api.Chassis, but for the protocol."""
+
+    def __init__(self, link: Closing, told: Told, commands: CommandLimits, limits: ArmingLimits) -> None:
+        self._closing = link
+        self._told = told
+        self._commands = commands
+        self._limits = limits
+        self._arming = Arming()
+        self._asked: Setpoint | None = None
+        self._objection = ""
+        self._link_error = ""
+        self._retry_ns = 0
+        self._now_ns = 0
+
+    def __enter__(self) -> Self:
+        """Open the link. Raises DeviceNotFound, DeviceRefused."""
+        self._closing.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self.stop(self._now_ns)
+        finally:
+            self._closing.__exit__(kind, error, trace)
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        """See hal.api.Chassis. sent is the setpoint slowed to the base's limits, before rounding to
+        the steps of the wire."""
+        self._now_ns = now_ns
+        self._asked = setpoint
+        self._objection = self._commands.objection(setpoint, now_ns)
+        self._hear(now_ns)
+        self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
+        command = self._commands.fit(setpoint, now_ns) if self._arming.may_move else zero(now_ns)
+        return self._state(now_ns, self._say(command, now_ns))
+
+    def arm(self, now_ns: int) -> None:
+        """See hal.api.Chassis. A refusal is told in the state's reason."""
+        self._now_ns = now_ns
+        before = self._arming.mode
+        self._arming = arming.consent(self._arming, self._evidence(now_ns), self._limits)
+        if self._arming.mode is not before:
+            self._begin_arming()
+
+    def stop(self, now_ns: int) -> None:
+        """See hal.api.Chassis."""
+        self._now_ns = now_ns
+        self._arming = arming.release(self._arming, now_ns)
+        if self._link_error:
+            return
+        try:
+            self._speak_stop(now_ns)
+        except LinkLost as error:
+            self._lose(error, now_ns)
+
+    @abstractmethod
+    def _listen(self, now_ns: int) -> None:
+        """Read what has arrived, without waiting, and keep it. Must touch the link, so that a
+        link that works again is noticed. May raise LinkLost."""
+
+    @abstractmethod
+    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        """Send what is due; the motion command that went out, None if none was due. May raise LinkLost.
+
+        command is already zero in every mode but armed. A zero that replaces motion is due at once.
+        """
+
+    @abstractmethod
+    def _speak_stop(self, now_ns: int) -> None:
+        """Send an explicit zero, then standby, now. May raise LinkLost."""
+
+    @abstractmethod
+    def _begin_arming(self) -> None:
+        """arm() was followed: forget what the base said about obeying before."""
+
+    def _hear(self, now_ns: int) -> None:
+        if self._link_error and now_ns < self._retry_ns:
+            return
+        try:
+            self._listen(now_ns)
+        except LinkLost as error:
+            self._lose(error, now_ns)
+        else:
+            self._link_error = ""
+
+    def _say(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        if self._link_error:
+            return None
+        try:
+            return self._speak(command, now_ns)
+        except LinkLost as error:
+            self._lose(error, now_ns)
+            return None
+
+    def _lose(self, error: LinkLost, now_ns: int) -> None:
+        """Told to the machine at once: the state of this very exchange says lost."""
+        self._link_error = str(error)
+        self._retry_ns = now_ns + _RETRY_NS
+        self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
+
+    def _evidence(self, now_ns: int) -> Evidence:
+        told = self._told
+        return Evidence(
+            now_ns=now_ns,
+            link_error=self._link_error,
+            feedback_ns=told.feedback_ns,
+            status_ns=told.status_ns,
+            disobeys=told.disobeys,
+            stop_cause=told.stop_cause or self._objection,
+            standing=told.standing,
+            command_is_zero=is_zero(self._asked),
+        )
+
+    def _state(self, now_ns: int, sent: Setpoint | None) -> ChassisState:
+        told = self._told
+        return ChassisState(
+            stamp_ns=now_ns,
+            mode=self._arming.mode,
+            reason=self._arming.reason,
+            feedback_ns=told.feedback_ns,
+            v_mps=told.v_mps,
+            w_radps=told.w_radps,
+            pose=told.pose,
+            battery_v=told.battery_v,
+            faults=told.faults,
+            sent=sent,
+        )

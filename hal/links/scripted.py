@@ -1,0 +1,159 @@
+"""Links in memory that misbehave on demand, for tests and for emulators in the same process.
+
+``can_pair()`` and ``serial_pair()`` make two ends of one wire. Each end can be unplugged, can refuse to
+write, and can be made to hear noise, wrong bytes, little at a time or nothing.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from hal.errors import LinkLost
+from hal.types import CanFrame
+
+
+class _ScriptedLink:
+    """What both kinds of end share: being plugged in, and the next writes failing."""
+
+    def __init__(self) -> None:
+        self._plugged = True
+        self._failing_writes = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        return None
+
+    def unplug(self) -> None:
+        """Every use raises LinkLost until plug()."""
+        self._plugged = False
+
+    def plug(self) -> None:
+        """The adapter is back."""
+        self._plugged = True
+
+    def fail_writes(self, count: int) -> None:
+        """The next count writes raise LinkLost, though reading goes on."""
+        self._failing_writes = count
+
+    def _check(self) -> None:
+        if not self._plugged:
+            raise LinkLost("scripted link: unplugged")
+
+    def _check_write(self) -> None:
+        self._check()
+        if self._failing_writes > 0:
+            self._failing_writes -= 1
+            raise LinkLost("scripted link: write failed")
+
+
+class ScriptedCanLink(_ScriptedLink):
+    """One end of a CAN wire. sent lists what went out, in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sent: list[CanFrame] = []
+        self.peer: ScriptedCanLink | None = None
+        self._arrived: deque[CanFrame] = deque()
+        self._filter: Callable[[CanFrame], CanFrame | None] = lambda frame: frame
+
+    def send(self, frame: CanFrame) -> None:
+        """See hal.api.CanLink."""
+        self._check_write()
+        self.sent.append(frame)
+        if self.peer is not None:
+            self.peer.deliver(frame)
+
+    def receive(self) -> CanFrame | None:
+        """See hal.api.CanLink."""
+        self._check()
+        return self._arrived.popleft() if self._arrived else None
+
+    def deliver(self, *frames: CanFrame) -> None:
+        """Let these frames arrive here, through the filter; nothing arrives at an unplugged end."""
+        for frame in frames:
+            passed = self._filter(frame) if self._plugged else None
+            if passed is not None:
+                self._arrived.append(passed)
+
+    def hear_through(self, change: Callable[[CanFrame], CanFrame | None]) -> None:
+        """Change (or, with None, drop) every frame before it arrives here."""
+        self._filter = change
+
+    def hear_nothing(self) -> None:
+        """The wire to here is cut: silence without an error."""
+        self._filter = lambda frame: None
+
+    def hear_all(self) -> None:
+        """The wire is whole again."""
+        self._filter = lambda frame: frame
+
+
+class ScriptedSerialLink(_ScriptedLink):
+    """One end of a serial wire. sent holds every byte that went out, written each write by itself."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sent = bytearray()
+        self.written: list[bytes] = []
+        self.peer: ScriptedSerialLink | None = None
+        self._arrived = bytearray()
+        self._filter: Callable[[bytes], bytes] = lambda data: data
+        self._at_most: int | None = None
+
+    def write(self, data: bytes) -> None:
+        """See hal.api.SerialLink."""
+        self._check_write()
+        self.sent += data
+        self.written.append(data)
+        if self.peer is not None:
+            self.peer.deliver(data)
+
+    def read(self) -> bytes:
+        """See hal.api.SerialLink."""
+        self._check()
+        count = len(self._arrived) if self._at_most is None else self._at_most
+        data = bytes(self._arrived[:count])
+        del self._arrived[:count]
+        return data
+
+    def deliver(self, data: bytes) -> None:
+        """Let these bytes arrive here, through the filter; nothing arrives at an unplugged end."""
+        if self._plugged:
+            self._arrived += self._filter(data)
+
+    def read_at_most(self, count: int | None) -> None:
+        """Short reads of count bytes; None gives all that is there (several messages merged)."""
+        self._at_most = count
+
+    def hear_through(self, change: Callable[[bytes], bytes]) -> None:
+        """Change every write of the peer before it arrives here: noise, wrong bytes, nothing."""
+        self._filter = change
+
+    def hear_nothing(self) -> None:
+        """The wire to here is cut: silence without an error."""
+        self._filter = lambda data: b""
+
+    def hear_all(self) -> None:
+        """The wire is whole again."""
+        self._filter = lambda data: data
+
+
+def can_pair() -> tuple[ScriptedCanLink, ScriptedCanLink]:
+    """Two ends of one CAN wire."""
+    one, other = ScriptedCanLink(), ScriptedCanLink()
+    one.peer, other.peer = other, one
+    return one, other
+
+
+def serial_pair() -> tuple[ScriptedSerialLink, ScriptedSerialLink]:
+    """Two ends of one serial wire."""
+    one, other = ScriptedSerialLink(), ScriptedSerialLink()
+    one.peer, other.peer = other, one
+    return one, other

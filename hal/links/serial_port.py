@@ -1,0 +1,127 @@
+"""Any serial port that pyserial can open, by path or URL. The only module that imports it."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import termios
+from types import TracebackType
+from typing import Self
+
+import serial
+
+from config.chassis import SerialLinkConfig
+from hal.errors import DeviceNotFound, DeviceRefused, HalError, LinkLost
+
+# Short, because the control loop waits for it; positive, because with 0 pyserial spins for ever when the
+# peer stops reading.
+_WRITE_TIMEOUT_S = 0.02
+
+_MAX_READ = 4096
+
+# An unplugged port raises all three kinds; termios.error is not an OSError.
+_ERRORS = (serial.SerialException, OSError, termios.error)
+
+_log = logging.getLogger(__name__)
+
+
+class SerialPortLink:
+    """hal.api.SerialLink over pyserial: exclusive, raw, 8N1. Opened by ``with``, or by the first use.
+
+    After LinkLost the next use opens the port anew, so that a re-plugged adapter is found again;
+    whoever uses the link decides how often.
+    """
+
+    def __init__(self, config: SerialLinkConfig) -> None:
+        self._config = config
+        self._port: serial.SerialBase | None = None
+        self._closed = False
+
+    def __enter__(self) -> Self:
+        """Open the port. Raises DeviceNotFound, DeviceRefused."""
+        self._closed = False
+        if self._port is None:
+            self._port = _open(self._config)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closed = True
+        self._shut()
+
+    def write(self, data: bytes) -> None:
+        """Hand all of data to the system within 20 ms. Raises LinkLost; part of data may then be out."""
+        try:
+            written = self._opened().write(data)
+        except _ERRORS as error:
+            raise self._lost("writing", error) from error
+        if written != len(data):
+            raise self._lost("writing", OSError(f"{written} of {len(data)} bytes accepted"))
+
+    def read(self) -> bytes:
+        """What has arrived, at most 4096 bytes, without waiting. Raises LinkLost."""
+        try:
+            return self._opened().read(_MAX_READ)
+        except _ERRORS as error:
+            raise self._lost("reading", error) from error
+
+    def _opened(self) -> serial.SerialBase:
+        if self._closed:
+            raise LinkLost(f"serial port {self._config.url}: the link is closed")
+        if self._port is None:
+            try:
+                self._port = _open(self._config)
+            except HalError as error:
+                raise LinkLost(str(error)) from error
+        return self._port
+
+    def _lost(self, doing: str, error: Exception) -> LinkLost:
+        self._shut()
+        return LinkLost(
+            f"serial port {self._config.url}: lost while {doing} ({_reason(error)}); "
+            "check the adapter, the cable and the power of the base"
+        )
+
+    def _shut(self) -> None:
+        port, self._port = self._port, None
+        if port is None:
+            return
+        try:
+            port.close()
+        except _ERRORS as error:
+            # The port is gone anyway.
+            _log.debug("closing %s: %s", self._config.url, error)
+
+
+def open_serial_link(config: SerialLinkConfig) -> SerialPortLink:
+    """The open port. Raises DeviceNotFound, DeviceRefused."""
+    return SerialPortLink(config).__enter__()
+
+
+def _open(config: SerialLinkConfig) -> serial.SerialBase:
+    where = f"serial port {config.url}"
+    try:
+        port: serial.SerialBase = serial.serial_for_url(
+            config.url, baudrate=config.baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True
+        )
+    except (*_ERRORS, ValueError) as error:
+        number = getattr(error, "errno", None)
+        if number in (errno.EACCES, errno.EPERM):
+            raise DeviceRefused(
+                f"{where}: permission denied; add the user to the port's group (often dialout)"
+            ) from error
+        if number in (errno.EBUSY, errno.EAGAIN):
+            raise DeviceRefused(f"{where}: in use by another program; stop that one first") from error
+        if number is not None and number != errno.ENOENT:
+            raise DeviceRefused(
+                f"{where}: is not a serial port that takes {config.baud} baud ({_reason(error)})"
+            ) from error
+        raise DeviceNotFound(
+            f"{where}: cannot be opened ({_reason(error)}); check the url and that the adapter is plugged in"
+        ) from error
+    return port
+
+
+def _reason(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
