@@ -1,0 +1,296 @@
+"""A stand-in for the module pyrealsense2 that follows a script, also a bad one.
+
+Only what hal/cameras/realsense.py uses. Time passes on a SimulatedClock: waiting for a frame takes the clock
+to when that frame arrives, or to the end of the wait.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.clocks import SimulatedClock
+
+WIDTH, HEIGHT, FPS = 640, 480, 30
+SERIAL = "000000000001"
+PERIOD_MS = 1000.0 / FPS
+NS_PER_MS = 1_000_000
+
+
+class FakeFrame:
+    """A video frame; falsy if it is not there, as in the original."""
+
+    def __init__(self, data: NDArray[np.generic] | None, number: int = 0, device_ms: float = 0.0) -> None:
+        self._data = data
+        self._number = number
+        self._device_ms = device_ms
+
+    def __bool__(self) -> bool:
+        return self._data is not None
+
+    def get_data(self) -> NDArray[np.generic]:
+        assert self._data is not None
+        return self._data
+
+    def get_frame_number(self) -> int:
+        return self._number
+
+    def get_timestamp(self) -> float:
+        return self._device_ms
+
+
+@dataclass
+class FakeFrameset:
+    colour: FakeFrame
+    depth: FakeFrame
+    arrival_ms: float
+
+    def get_color_frame(self) -> FakeFrame:
+        return self.colour
+
+    def get_depth_frame(self) -> FakeFrame:
+        return self.depth
+
+
+@dataclass
+class FakeGyro:
+    device_ms: float
+    rate_radps: tuple[float, float, float]
+
+    def as_motion_frame(self) -> FakeGyro:
+        return self
+
+    def get_motion_data(self) -> SimpleNamespace:
+        x, y, z = self.rate_radps
+        return SimpleNamespace(x=x, y=y, z=z)
+
+    def get_timestamp(self) -> float:
+        return self.device_ms
+
+
+def frameset(
+    number: int,
+    *,
+    arrival_ms: float | None = None,
+    device_ms: float | None = None,
+    colour: bool = True,
+    depth: bool = True,
+    depth_number: int | None = None,
+    depth_device_ms: float | None = None,
+) -> FakeFrameset:
+    """The pair of frames number ``number``; by default it arrives 20 ms after the device stamped it."""
+    stamp_ms = number * PERIOD_MS if device_ms is None else device_ms
+    depth_stamp_ms = stamp_ms if depth_device_ms is None else depth_device_ms
+    colour_data = np.full((HEIGHT, WIDTH, 3), number % 256, np.uint8) if colour else None
+    depth_data = np.full((HEIGHT, WIDTH), 1000 + number, np.uint16) if depth else None
+    return FakeFrameset(
+        FakeFrame(colour_data, number, stamp_ms),
+        FakeFrame(depth_data, number if depth_number is None else depth_number, depth_stamp_ms),
+        stamp_ms + 20.0 if arrival_ms is None else arrival_ms,
+    )
+
+
+def framesets(first: int, count: int) -> Iterator[FakeFrameset]:
+    return (frameset(number) for number in range(first, first + count))
+
+
+class FakeSensor:
+    def __init__(self, supported: set[str]) -> None:
+        self._supported = supported
+        self.options: dict[str, float] = {}
+
+    def supports(self, option: str) -> bool:
+        return option in self._supported
+
+    def set_option(self, option: str, value: float) -> None:
+        self.options[option] = value
+
+    def get_depth_scale(self) -> float:
+        return float(np.float32(0.001))
+
+
+@dataclass
+class FakeStream:
+    """A video or gyro stream profile."""
+
+    name: str
+    pixel_format: str
+    size: tuple[int, int] = (WIDTH, HEIGHT)
+    rate: int = FPS
+    intrinsics: SimpleNamespace = field(
+        default_factory=lambda: SimpleNamespace(
+            width=WIDTH,
+            height=HEIGHT,
+            fx=615.0,
+            fy=614.0,
+            ppx=321.5,
+            ppy=238.5,
+            coeffs=[0.0] * 5,
+            model="none",
+        )
+    )
+    # Column by column: x to y, y to -x, so that mixing rows up with columns shows.
+    rotation: tuple[float, ...] = (0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+    def as_video_stream_profile(self) -> FakeStream:
+        return self
+
+    def width(self) -> int:
+        return self.size[0]
+
+    def height(self) -> int:
+        return self.size[1]
+
+    def fps(self) -> int:
+        return self.rate
+
+    def format(self) -> str:
+        return self.pixel_format
+
+    def stream_name(self) -> str:
+        return self.name
+
+    def get_intrinsics(self) -> SimpleNamespace:
+        return self.intrinsics
+
+    def get_extrinsics_to(self, other: FakeStream) -> SimpleNamespace:
+        return SimpleNamespace(rotation=list(self.rotation), translation=[0.0, 0.0, 0.0])
+
+
+@dataclass
+class FakeDevice:
+    serial: str = SERIAL
+    connected: bool = True
+    sensors: list[FakeSensor] = field(
+        default_factory=lambda: [FakeSensor({"global_time_enabled"}), FakeSensor({"auto_exposure_priority"})]
+    )
+    depth_sensor: FakeSensor = field(default_factory=lambda: FakeSensor(set()))
+
+    def get_info(self, key: str) -> str:
+        return {"serial_number": self.serial, "name": "D435I (fake)"}[key]
+
+    def query_sensors(self) -> list[FakeSensor]:
+        return self.sensors
+
+    def is_connected(self) -> bool:
+        return self.connected
+
+    def first_depth_sensor(self) -> FakeSensor:
+        return self.depth_sensor
+
+
+class FakeConfig:
+    def __init__(self) -> None:
+        self.serial: str | None = None
+        self.streams: list[tuple[object, ...]] = []
+
+    def enable_device(self, serial: str) -> None:
+        self.serial = serial
+
+    def enable_stream(self, *what: object) -> None:
+        self.streams.append(what)
+
+
+class FakeGyroQueue:
+    def __init__(self, capacity: int, keep_frames: bool) -> None:
+        self.samples: deque[FakeGyro] = deque(maxlen=capacity)
+
+    def poll_for_frame(self) -> FakeGyro | None:
+        return self.samples.popleft() if self.samples else None
+
+
+class FakePipeline:
+    def __init__(self, vendor: FakeRealsense) -> None:
+        self._vendor = vendor
+        self.running = False
+
+    def start(self, config: FakeConfig, queue: FakeGyroQueue | None = None) -> SimpleNamespace:
+        refusal = self._vendor.refuse_gyro if queue is not None else self._vendor.refuse_video
+        if refusal:
+            raise RuntimeError(refusal)
+        self.running = True
+        self._vendor.pipelines.append(self)
+        self._vendor.configs.append(config)
+        if queue is not None:
+            self._vendor.gyro_queue = queue
+        return SimpleNamespace(
+            get_device=lambda: self._vendor.device, get_stream=lambda kind: self._vendor.streams[kind]
+        )
+
+    def stop(self) -> None:
+        if not self._vendor.device.connected:
+            raise RuntimeError("device is gone")
+        self.running = False
+
+    def try_wait_for_frames(self, timeout_ms: int) -> tuple[bool, FakeFrameset | None]:
+        if not self.running:
+            raise RuntimeError("try_wait_for_frames cannot be called before start()")
+        return self._vendor.wait(timeout_ms)
+
+
+class FakeAlign:
+    def __init__(self, stream: str) -> None:
+        assert stream == "color"
+
+    def process(self, frames: FakeFrameset) -> FakeFrameset:
+        return frames
+
+
+class FakeRealsense:
+    """What ``import pyrealsense2`` would give. events: what the camera does, in order; then silence."""
+
+    stream = SimpleNamespace(color="color", depth="depth", gyro="gyro")
+    format = SimpleNamespace(bgr8="bgr8", z16="z16", motion_xyz32f="motion_xyz32f")
+    option = SimpleNamespace(
+        auto_exposure_priority="auto_exposure_priority", global_time_enabled="global_time_enabled"
+    )
+    camera_info = SimpleNamespace(serial_number="serial_number", name="name")
+    config = FakeConfig
+    align = FakeAlign
+    frame_queue = FakeGyroQueue
+
+    def __init__(self, clock: SimulatedClock, events: list[FakeFrameset | FakeGyro | RuntimeError]) -> None:
+        self._clock = clock
+        self.events = deque(events)
+        self.device = FakeDevice()
+        self.devices = [self.device]
+        self.streams = {
+            "color": FakeStream("Color", "bgr8"),
+            "depth": FakeStream("Depth", "z16"),
+            "gyro": FakeStream("Gyro", "motion_xyz32f", rate=200),
+        }
+        self.refuse_video = ""
+        self.refuse_gyro = ""
+        self.pipelines: list[FakePipeline] = []
+        self.configs: list[FakeConfig] = []
+        self.gyro_queue = FakeGyroQueue(1, False)
+
+    def context(self) -> SimpleNamespace:
+        return SimpleNamespace(query_devices=lambda: self.devices)
+
+    def pipeline(self, context: object) -> FakePipeline:
+        return FakePipeline(self)
+
+    def wait(self, timeout_ms: int) -> tuple[bool, FakeFrameset | None]:
+        deadline_ns = self._clock.now_ns() + timeout_ms * NS_PER_MS
+        while self.events:
+            event = self.events[0]
+            if isinstance(event, RuntimeError):
+                self.events.popleft()
+                raise event
+            if isinstance(event, FakeGyro):
+                self.gyro_queue.samples.append(event)
+                self.events.popleft()
+                continue
+            if event.arrival_ms * NS_PER_MS > deadline_ns:
+                break
+            self.events.popleft()
+            self._clock.sleep_until_ns(round(event.arrival_ms * NS_PER_MS))
+            return True, event
+        self._clock.sleep_until_ns(deadline_ns)
+        return False, None
