@@ -108,6 +108,16 @@ class RoboclawChassisConfig(Section):
     status_timeout_ms: int = Field(default=1000, ge=200, le=5000)
     arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
 
+    @property
+    def left_sign(self) -> int:
+        """Counts of motor 1 that mean ahead."""
+        return -1 if self.invert_left else 1
+
+    @property
+    def right_sign(self) -> int:
+        """Counts of motor 2 that mean ahead."""
+        return -1 if self.invert_right else 1
+
 
 ChassisConfig = Annotated[AgilexChassisConfig | RoboclawChassisConfig, Field(discriminator="kind")]
 

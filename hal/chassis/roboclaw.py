@@ -1,0 +1,121 @@
+"""A tracked base on one RoboClaw, packet serial, stepped by the control loop.
+
+The controller answers one request at a time, so motion commands and queries take turns: with a 50 Hz
+loop a motion command goes out every 40 ms. A motion command whose answer is lost is never sent again: the
+next one is newer. Only settings are repeated.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from itertools import cycle
+
+from config.chassis import RoboclawChassisConfig
+from hal.api import SerialLink
+from hal.chassis import roboclaw_packets as packets
+from hal.chassis.arming import NS_PER_MS, ArmingLimits
+from hal.chassis.command import CommandLimits, is_zero
+from hal.chassis.driver import ChassisDriver
+from hal.chassis.roboclaw_feedback import RoboclawFeedback
+from hal.chassis.roboclaw_packets import Request
+from hal.chassis.roboclaw_port import RoboclawPort
+from hal.chassis.tracks import TrackGeometry, scale_to_fit
+from hal.types import ChassisMode, Setpoint
+
+# Encoders every other turn, the status (emergency stop) every fourth, the rest in between. The time-out is
+# asked for again and again because a restart forgets it.
+_QUERIES = (
+    packets.ENCODERS_REQUEST,
+    packets.STATUS_REQUEST,
+    packets.ENCODERS_REQUEST,
+    packets.MAIN_BATTERY_REQUEST,
+    packets.ENCODERS_REQUEST,
+    packets.STATUS_REQUEST,
+    packets.ENCODERS_REQUEST,
+    packets.GET_TIMEOUT_REQUEST,
+    packets.ENCODERS_REQUEST,
+    packets.STATUS_REQUEST,
+    packets.ENCODERS_REQUEST,
+    packets.CURRENTS_REQUEST,
+)
+
+_SETTINGS = frozenset({packets.SET_TIMEOUT, packets.GET_TIMEOUT})
+
+
+class RoboclawChassis(ChassisDriver):
+    """hal.api.Chassis for RoboClaw. Motor 1 drives the left track, motor 2 the right one."""
+
+    def __init__(self, link: SerialLink, config: RoboclawChassisConfig) -> None:
+        geometry = TrackGeometry(config.track_width_m, config.slip_factor)
+        feedback = RoboclawFeedback(config, geometry)
+        max_track_mps = config.max_qpps / config.counts_per_m
+        commands = CommandLimits(
+            max_speed_mps=max_track_mps,
+            max_yaw_rate_radps=2.0 * max_track_mps / geometry.effective_width_m,
+            timeout_ns=config.command_timeout_ms * NS_PER_MS,
+        )
+        limits = ArmingLimits(
+            feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
+            status_timeout_ns=config.status_timeout_ms * NS_PER_MS,
+            arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
+            stall_ns=config.timeout_ms * NS_PER_MS,
+        )
+        super().__init__(link, feedback, commands, limits)
+        self._config = config
+        self._geometry = geometry
+        self._feedback = feedback
+        self._max_track_mps = max_track_mps
+        self._port = RoboclawPort(link, config.address)
+        self._setup: deque[Request] = deque()
+        self._queries = cycle(_QUERIES)
+        self._queries_turn = False
+        self._moving = False
+
+    def _listen(self, now_ns: int) -> None:
+        answer = self._port.poll(now_ns)
+        if answer is None:
+            return
+        if answer.data is not None:
+            self._feedback.take(answer.request, answer.data, now_ns)
+        elif answer.request.command in _SETTINGS and self._arming.mode is ChassisMode.ARMING:
+            self._setup.appendleft(answer.request)
+
+    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        if not self._port.idle(now_ns):
+            return None
+        stops = self._moving and is_zero(command)
+        if self._setup and not stops:
+            self._port.start(self._setup.popleft(), now_ns)
+            return None
+        self._queries_turn = not self._queries_turn and not stops
+        if self._queries_turn:
+            self._port.start(next(self._queries), now_ns)
+            return None
+        return self._send_motion(command, now_ns)
+
+    def _speak_stop(self, now_ns: int) -> None:
+        # Zero does not wait for the answer that is under way; the controller takes packets in order.
+        self._port.abandon(now_ns)
+        self._setup.clear()
+        self._feedback.forget_setup()
+        self._port.start(packets.speeds(0, 0), now_ns)
+        self._port.abandon(now_ns)
+        self._moving = False
+
+    def _begin_arming(self) -> None:
+        self._feedback.await_setup()
+        self._setup = deque((packets.set_timeout(self._config.timeout_ms), packets.GET_TIMEOUT_REQUEST))
+
+    def _send_motion(self, command: Setpoint, now_ns: int) -> Setpoint:
+        config, limit = self._config, self._max_track_mps
+        wanted = self._geometry.to_tracks(command.v_mps, command.w_radps)
+        left_mps, right_mps = fitted = scale_to_fit(*wanted, limit, limit)
+        left_qpps = config.left_sign * left_mps * config.counts_per_m
+        right_qpps = config.right_sign * right_mps * config.counts_per_m
+        self._port.start(packets.ramped_speeds(config.accel_qpps2, left_qpps, right_qpps), now_ns)
+        self._moving = not is_zero(command)
+        if fitted == wanted:
+            return command
+        v_mps, w_radps = self._geometry.to_twist(left_mps, right_mps)
+        return replace(command, v_mps=v_mps, w_radps=w_radps)

@@ -1,0 +1,262 @@
+"""A RoboClaw with two tracks behind it, at the other end of a serial line, stepped by a time passed in.
+
+It knows the packets that the manual documents for speed control. What is wrong on the line is met with
+silence, as by the device: no acknowledgement for a bad CRC, and a packet with a gap of 10 ms is dropped.
+"""
+
+from __future__ import annotations
+
+import struct
+from binascii import crc_hqx
+from collections.abc import Callable, Mapping
+from types import MappingProxyType, TracebackType
+from typing import Self
+
+from hal.api import SerialLink
+from hal.errors import LinkLost
+from sim.plant import TrackedPlant
+
+_MS = 1_000_000
+_STEP_NS = 1 * _MS
+_GAP_NS = 10 * _MS
+_ACK = b"\xff"
+
+# Bytes of data that a write carries. Everything else that is known is a read, which carries none.
+_WRITES: Mapping[int, int] = MappingProxyType(
+    {14: 1, 32: 2, 33: 2, 34: 4, 35: 4, 36: 4, 37: 8, 38: 8, 39: 8, 40: 12}
+)
+_READS = frozenset({15, 16, 17, 18, 19, 24, 25, 30, 31, 49, 78, 79, 82, 83, 90, 108})
+
+_ESTOP_BIT = {2: 0x4, 4: 0x1}
+
+
+class RoboclawEmulator:
+    """Motor 1 is the left track, motor 2 the right one.
+
+    Bytes that have arrived count as of the time of the last step. status_bytes: 4 as of firmware
+    4.1.29, 2 before. The serial time-out is off at power-up, as a host must expect it to be.
+    """
+
+    def __init__(
+        self,
+        link: SerialLink,
+        plant: TrackedPlant,
+        *,
+        counts_per_m: float = 20_000.0,
+        address: int = 0x80,
+        status_bytes: int = 4,
+        boot_ms: int = 500,
+    ) -> None:
+        self._link = link
+        self._plant = plant
+        self._counts_per_m = counts_per_m
+        self._address = address
+        self._status_bytes = status_bytes
+        self._boot_ns = boot_ms * _MS
+        self._now_ns = plant.now_ns
+        self._buffer = bytearray()
+        self._heard_ns = self._now_ns
+        self._valid_ns = self._now_ns
+        self._silent_until_ns = self._now_ns
+        self._travel_zero_m = plant.track_travel_m
+        self._goal_mps = [0.0, 0.0]
+        self._ramp_mps2 = [float("inf"), float("inf")]
+        self._target_mps = [0.0, 0.0]
+        self._frozen = False
+        self._estop = False
+        self.status_bits = 0
+        self.timeout_ms = 0
+        self.settable_timeout = True
+        self.battery_v = 25.2
+        self.rejected = 0
+        self.commands_obeyed = 0
+
+    def __enter__(self) -> Self:
+        """Open the link. Raises DeviceNotFound, DeviceRefused."""
+        self._link.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._link.__exit__(kind, error, trace)
+
+    @property
+    def plant(self) -> TrackedPlant:
+        """The body that the tracks move."""
+        return self._plant
+
+    def advance_to(self, now_ns: int) -> None:
+        """Answer what has arrived, then move on to now_ns."""
+        self._listen()
+        while self._now_ns < now_ns:
+            step_ns = min(_STEP_NS, now_ns - self._now_ns)
+            self._ramp(step_ns)
+            self._now_ns += step_ns
+            self._plant.advance_to(self._now_ns)
+
+    # Faults, for tests and scenarios.
+
+    def press_estop(self) -> None:
+        """The emergency stop input opens: motors off, commands are acknowledged but not followed."""
+        self._estop = True
+        self._stop_motors()
+
+    def release_estop(self) -> None:
+        """The input closes (automatic reset): the next command is followed."""
+        self._estop = False
+
+    def restart(self) -> None:
+        """Power interrupted: silent while booting, encoders at zero, time-out off again."""
+        self._silent_until_ns = self._now_ns + self._boot_ns
+        self._travel_zero_m = self._plant.track_travel_m
+        self._buffer.clear()
+        self.timeout_ms = 0
+        self._stop_motors()
+
+    def freeze(self) -> None:
+        """It hears and says nothing, but its own time-out still runs."""
+        self._frozen = True
+
+    def thaw(self) -> None:
+        """It goes on."""
+        self._frozen = False
+
+    # The controller's own work.
+
+    @property
+    def _silent(self) -> bool:
+        return self._frozen or self._now_ns < self._silent_until_ns
+
+    def _listen(self) -> None:
+        try:
+            arrived = self._link.read()
+        except LinkLost:
+            # The controller does not know that its cable is out; its own time-out stops it.
+            return
+        if self._silent:
+            return
+        if self._now_ns - self._heard_ns > _GAP_NS:
+            self._buffer.clear()
+        if arrived:
+            self._heard_ns = self._now_ns
+            self._buffer += arrived
+        while self._take_packet():
+            pass
+
+    def _take_packet(self) -> bool:
+        """Handle the packet at the start of the buffer; False when there is no whole one."""
+        buffer = self._buffer
+        while buffer and buffer[0] != self._address:
+            del buffer[0]
+        if len(buffer) < 2:
+            return False
+        command = buffer[1]
+        if command in _READS:
+            del buffer[:2]
+            self._valid_ns = self._now_ns
+            data = self._read(command)
+            self._reply(data + self._crc(bytes((self._address, command)) + data))
+            return True
+        if command not in _WRITES:
+            buffer.clear()
+            self.rejected += 1
+            return False
+        length = 2 + _WRITES[command] + 2
+        if len(buffer) < length:
+            return False
+        packet = bytes(buffer[:length])
+        del buffer[:length]
+        if self._crc(packet[:-2]) != packet[-2:]:
+            # No acknowledgement; the rest of the burst is not trusted either.
+            buffer.clear()
+            self.rejected += 1
+            return False
+        self._valid_ns = self._now_ns
+        self._write(command, packet[2:-2])
+        self._reply(_ACK)
+        return True
+
+    def _reply(self, data: bytes) -> None:
+        try:
+            self._link.write(data)
+        except LinkLost:
+            # As in _listen: it goes on talking to a cable that is out.
+            return
+
+    @staticmethod
+    def _crc(data: bytes) -> bytes:
+        return crc_hqx(data, 0).to_bytes(2, "big")
+
+    def _read(self, command: int) -> bytes:
+        left, right = self._counts()
+        left_qpps, right_qpps = (round(speed * self._counts_per_m) for speed in self._plant.track_speeds_mps)
+        replies: dict[int, Callable[[], bytes]] = {
+            15: lambda: bytes((self.timeout_ms // 100,)),
+            16: lambda: struct.pack(">IB", left, left_qpps < 0),
+            17: lambda: struct.pack(">IB", right, right_qpps < 0),
+            18: lambda: struct.pack(">iB", left_qpps, left_qpps < 0),
+            19: lambda: struct.pack(">iB", right_qpps, right_qpps < 0),
+            24: lambda: struct.pack(">H", round(self.battery_v * 10)),
+            25: lambda: struct.pack(">H", 50),
+            30: lambda: struct.pack(">iB", left_qpps, left_qpps < 0),
+            31: lambda: struct.pack(">iB", right_qpps, right_qpps < 0),
+            49: lambda: struct.pack(">hh", *(round(50 + 300 * abs(v)) for v in self._target_mps)),
+            78: lambda: struct.pack(">II", left, right),
+            79: lambda: struct.pack(">ii", left_qpps, right_qpps),
+            82: lambda: struct.pack(">H", 315),
+            83: lambda: struct.pack(">H", 320),
+            90: self._status,
+            108: lambda: struct.pack(">ii", left_qpps, right_qpps),
+        }
+        return replies[command]()
+
+    def _status(self) -> bytes:
+        bits = self.status_bits | (_ESTOP_BIT[self._status_bytes] if self._estop else 0)
+        return bits.to_bytes(self._status_bytes, "big")
+
+    def _counts(self) -> tuple[int, int]:
+        left_m, right_m = self._plant.track_travel_m
+        return (
+            round((left_m - self._travel_zero_m[0]) * self._counts_per_m) % (1 << 32),
+            round((right_m - self._travel_zero_m[1]) * self._counts_per_m) % (1 << 32),
+        )
+
+    def _write(self, command: int, data: bytes) -> None:
+        if command == 14:
+            if self.settable_timeout:
+                self.timeout_ms = data[0] * 100
+            return
+        self.commands_obeyed += not self._estop
+        if command in (32, 33, 34):
+            # Duty: here as a share of 1.5 m/s of track.
+            speeds = [duty / 32767 * 1.5 for duty in struct.unpack(f">{len(data) // 2}h", data)]
+            ramp_mps2 = float("inf")
+        elif command in (35, 36, 37):
+            speeds = [qpps / self._counts_per_m for qpps in struct.unpack(f">{len(data) // 4}i", data)]
+            ramp_mps2 = float("inf")
+        else:
+            accel, *qpps_all = struct.unpack(f">I{len(data) // 4 - 1}i", data)
+            speeds = [qpps / self._counts_per_m for qpps in qpps_all]
+            ramp_mps2 = accel / self._counts_per_m
+        if self._estop:
+            return
+        first = 1 if command in (33, 36, 39) else 0
+        for track, speed_mps in enumerate(speeds, start=first):
+            self._goal_mps[track] = speed_mps
+            self._ramp_mps2[track] = ramp_mps2
+
+    def _ramp(self, step_ns: int) -> None:
+        """Move the targets along their ramps; stop the motors when the serial time-out has passed."""
+        if self.timeout_ms and self._now_ns - self._valid_ns >= self.timeout_ms * _MS:
+            self._stop_motors()
+        for track in (0, 1):
+            limit = self._ramp_mps2[track] * step_ns / 1e9
+            change = self._goal_mps[track] - self._target_mps[track]
+            self._target_mps[track] += min(max(change, -limit), limit)
+        self._plant.command_tracks(*self._target_mps)
+
+    def _stop_motors(self) -> None:
+        self._goal_mps = [0.0, 0.0]
+        self._target_mps = [0.0, 0.0]
+        self._plant.command_tracks(0.0, 0.0)
