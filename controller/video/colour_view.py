@@ -1,0 +1,157 @@
+"""The camera's colour image with what was found in it: fragments, obstacles, the corridor on the floor."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.video import draw, text
+from controller.video.corridor import Corridor
+from controller.video.labels import Label, draw_labels
+from controller.video.moment import VideoMoment
+from controller.video.picture import Placement, placement
+from controller.video.seen import Seen
+from controller.video.style import (
+    DARK_TEXT,
+    MOVING,
+    OWN,
+    PANEL,
+    STATIC,
+    UNMEASURED,
+    WARNING,
+    Image,
+    Rect,
+)
+from hal.geometry import camera_in_body
+from hal.types import CameraMount, FloatArray, Intrinsics
+from vision.scene import CameraCondition, Fragments
+
+# A little darker than it was taken, so that lines and labels stand out against bright floors.
+_BRIGHTNESS = 0.82
+_NEAREST_FLOOR_M = 0.25
+_BANNER_PX = 24
+
+
+class ColourView:
+    """Draws into one panel of the picture."""
+
+    def __init__(self, panel: Rect) -> None:
+        self._panel = panel
+
+    def draw_backdrop(self, canvas: Image) -> None:
+        """What never changes."""
+        text.caption(canvas, self._panel, "COLOUR")
+
+    def draw(self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: Corridor | None) -> None:
+        """The image first, then what lies on the floor, the fragments, the obstacles, their labels."""
+        view = self._panel.of(canvas)
+        height, width = moment.frame.colour.shape[:2]
+        placed = placement(width, height, self._panel)
+        _draw_image(view, moment.frame.colour, placed)
+        inside = placed.place.of(view)
+        origin = np.array([placed.place.x, placed.place.y])
+        if corridor is not None and moment.mount is not None:
+            _draw_corridor(inside, corridor, moment.mount, moment.frame.intrinsics, placed, origin)
+        _draw_fragments(inside, moment.fragments, placed, origin)
+        boxes = [
+            (one, placed.to_panel(np.reshape(one.obstacle.bbox_px, (2, 2))) - origin)
+            for one in seen
+            if np.isfinite(one.obstacle.bbox_px).all()
+        ]
+        for one, corners in reversed(boxes):
+            _draw_box(inside, one, draw.box(corners))
+        banner = _draw_health(inside, moment)
+        labels = [Label(one.describe(), one.colour, corners, one.decides) for one, corners in boxes]
+        draw_labels(inside, labels, banner)
+        text.caption_note(canvas, self._panel, _count(moment))
+
+
+def _count(moment: VideoMoment) -> str:
+    obstacles, fragments = moment.scene.obstacles, moment.fragments
+    moving_obstacles = sum(obstacle.moving for obstacle in obstacles)
+    moving_fragments = np.count_nonzero(fragments.moving)
+    return (
+        f"{len(fragments.ids)} fragments, {moving_fragments} moving   "
+        f"{len(obstacles)} obstacles, {moving_obstacles} moving"
+    )
+
+
+def _draw_image(view: Image, colour: Image, placed: Placement) -> None:
+    place = placed.place
+    if (place.width, place.height) != (view.shape[1], view.shape[0]):
+        view[:] = PANEL
+    inside = place.of(view)
+    if placed.scale != 1.0:
+        shrinks = placed.scale < 1.0
+        colour = cv2.resize(
+            colour,
+            (place.width, place.height),
+            interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR,
+        ).astype(np.uint8, copy=False)
+    cv2.convertScaleAbs(colour, dst=inside, alpha=_BRIGHTNESS)
+
+
+def _draw_corridor(
+    inside: Image,
+    corridor: Corridor,
+    mount: CameraMount,
+    intrinsics: Intrinsics,
+    placed: Placement,
+    origin: NDArray[np.int64],
+) -> None:
+    left, right = (
+        placed.to_panel(_floor_to_image(edge_m, mount, intrinsics)) - origin
+        for edge_m in (corridor.left_m, corridor.right_m)
+    )
+    visible = np.isfinite(left).all(axis=1) & np.isfinite(right).all(axis=1)
+    if np.count_nonzero(visible) < 2:
+        return
+    left, right = left[visible], right[visible]
+    draw.tint(inside, np.concatenate([left, right[::-1]]), OWN, 0.12)
+    draw.lines(inside, np.stack([left, right]), OWN)
+
+
+def _floor_to_image(points_m: FloatArray, mount: CameraMount, intrinsics: Intrinsics) -> FloatArray:
+    """(N, 2) of the floor in the body frame to pixels; NaN where too close to the camera or behind it."""
+    on_floor_m = np.column_stack([points_m, np.zeros(len(points_m))])
+    x, y, z = camera_in_body(mount).inverse().apply(on_floor_m).T
+    z = np.where(z > _NEAREST_FLOOR_M, z, np.nan)
+    return np.column_stack(
+        [intrinsics.fx * x / z + intrinsics.cx, intrinsics.fy * y / z + intrinsics.cy],
+    )
+
+
+def _draw_fragments(
+    inside: Image, fragments: Fragments, placed: Placement, origin: NDArray[np.int64]
+) -> None:
+    ends = placed.to_panel(fragments.ends_px) - origin
+    measured = np.isfinite(fragments.velocity_mps).all(axis=1)
+    draw.lines(inside, ends[~measured & ~fragments.moving], UNMEASURED)
+    draw.lines(inside, ends[measured & ~fragments.moving], STATIC)
+    draw.lines(inside, ends[fragments.moving], MOVING)
+
+
+def _draw_box(inside: Image, one: Seen, corners: FloatArray) -> None:
+    if one.decides:
+        draw.line(inside, corners, OWN, one.thickness + 4, closed=True)
+    if one.predicted:
+        draw.dashed(inside, np.concatenate([corners, corners[:1]]), one.colour, one.thickness)
+    else:
+        draw.line(inside, corners, DARK_TEXT, one.thickness + 2, closed=True)
+        draw.line(inside, corners, one.colour, one.thickness, closed=True)
+
+
+def _draw_health(inside: Image, moment: VideoMoment) -> list[Rect]:
+    """A banner where the camera is not good; what it covers."""
+    health = moment.scene.health
+    if health.condition is CameraCondition.GOOD:
+        return []
+    height, width = inside.shape[:2]
+    banner = Rect(0, height - _BANNER_PX, width, _BANNER_PX)
+    banner.of(inside)[:] = WARNING
+    sentence = f"camera {health.condition.value}: {health.reason}"
+    text.put(
+        inside, text.fit(sentence, width - 16, 14, text.MEDIUM), 8, height - 8, DARK_TEXT, 14, text.MEDIUM
+    )
+    return [banner]

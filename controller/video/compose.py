@@ -1,0 +1,64 @@
+"""One picture of the video from one moment."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controller.video.colour_view import ColourView
+from controller.video.corridor import corridor_ahead
+from controller.video.depth_view import DepthView
+from controller.video.header import Header
+from controller.video.legend import draw_legend
+from controller.video.moment import VideoMoment
+from controller.video.seen import seen_obstacles
+from controller.video.speed_strip import SpeedStrip
+from controller.video.style import (
+    BACKGROUND,
+    COLOUR_VIEW,
+    DEPTH_SCALE,
+    DEPTH_VIEW,
+    HEADER,
+    HEIGHT_PX,
+    LEGEND,
+    SPEED_STRIP,
+    TOP_VIEW,
+    WIDTH_PX,
+    Image,
+)
+from controller.video.top_view import TopView
+
+
+class Composer:
+    """Draws moments in the order of time: the speed strip remembers the last history_s.
+
+    top_speed_mps: the scale of the speed strip. range_m: of the top view and of the colours of depth.
+    """
+
+    def __init__(self, top_speed_mps: float = 1.5, range_m: float = 10.0, history_s: float = 10.0) -> None:
+        self._range_m = range_m
+        self._header = Header(HEADER)
+        self._colour = ColourView(COLOUR_VIEW)
+        self._depth = DepthView(DEPTH_VIEW, DEPTH_SCALE, range_m)
+        self._top = TopView(TOP_VIEW, range_m)
+        self._speed = SpeedStrip(SPEED_STRIP, top_speed_mps, history_s)
+        self._backdrop = self._draw_backdrop()
+
+    def compose(self, moment: VideoMoment) -> Image:
+        """(720, 1280, 3) uint8, BGR; a new array each time."""
+        canvas = self._backdrop.copy()
+        seen = seen_obstacles(moment)
+        corridor = corridor_ahead(moment, self._range_m)
+        self._header.draw(canvas, moment)
+        self._colour.draw(canvas, moment, seen, corridor)
+        self._depth.draw(canvas, moment, seen)
+        self._top.draw(canvas, moment, seen, corridor)
+        self._speed.draw(canvas, moment)
+        return canvas
+
+    def _draw_backdrop(self) -> Image:
+        canvas = np.empty((HEIGHT_PX, WIDTH_PX, 3), np.uint8)
+        canvas[:] = BACKGROUND
+        for panel in (self._header, self._colour, self._depth, self._top, self._speed):
+            panel.draw_backdrop(canvas)
+        draw_legend(canvas, LEGEND)
+        return canvas

@@ -1,0 +1,33 @@
+"""Everything that one picture of the video shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from config.robot import Body
+from controller.decide import Decision
+from hal.types import CameraMount, FloatArray, RgbdFrame
+from vision.scene import Fragments, Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VideoMoment:
+    """A frame, what was seen in it, what was decided and how fast the robot went.
+
+    decision: None when nothing decides (a recording that is only looked at). commanded_mps: the speed of
+    the setpoint that was sent; measured_mps: the chassis' feedback; None or NaN: not known.
+    mount: None draws the top view from the camera, taken as level. body: None draws no robot.
+    path_ahead_m: (N, 2) points of the planned path in the body frame, nearest first;
+    corridor_half_width_m: how far to either side of the path the robot sweeps.
+    """
+
+    frame: RgbdFrame
+    scene: Scene
+    fragments: Fragments
+    decision: Decision | None = None
+    commanded_mps: float | None = None
+    measured_mps: float | None = None
+    mount: CameraMount | None = None
+    body: Body | None = None
+    path_ahead_m: FloatArray | None = None
+    corridor_half_width_m: float | None = None

@@ -1,0 +1,85 @@
+"""Obstacles as all views name them: in the body frame, the one that decides first, then the nearest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.video.moment import VideoMoment
+from controller.video.style import MOVING, STATIC, Colour
+from hal.geometry import camera_in_body
+from hal.types import CameraMount, FloatArray
+from vision.scene import Obstacle
+
+# Without a mount the top view is the camera's own: level, standing at the origin.
+LEVEL_CAMERA = CameraMount(0.0, 0.0, 0.0, 0.0)
+# A surface seen edge-on, or one whose size is not known, is still drawn.
+_SMALLEST_M = 0.12
+_CORNERS: FloatArray = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """An obstacle on the floor of the body frame.
+
+    centre_m, velocity_mps: (2,) forward, left; velocity_cov: (2, 2). corners_m: (4, 2) its visible surface
+    from above. distance_m: from the camera over the floor. decides: the decision rests on it.
+    """
+
+    obstacle: Obstacle
+    centre_m: FloatArray
+    corners_m: FloatArray
+    velocity_mps: FloatArray
+    velocity_cov: FloatArray
+    distance_m: float
+    decides: bool
+
+    @property
+    def colour(self) -> Colour:
+        """By static or moving."""
+        return MOVING if self.obstacle.moving else STATIC
+
+    @property
+    def thickness(self) -> int:
+        """Of its box: moving is told by more than the hue."""
+        return 3 if self.obstacle.moving else 2
+
+    @property
+    def predicted(self) -> bool:
+        """Not seen in this frame."""
+        return self.obstacle.unseen_s > 0.0
+
+    def describe(self) -> str:
+        """Its number, distance, and how it moves."""
+        motion = "static"
+        if self.obstacle.moving:
+            speed_mps = math.hypot(*self.velocity_mps)
+            motion = f"{speed_mps:.1f} m/s" if math.isfinite(speed_mps) else "moving, speed unknown"
+        return f"#{self.obstacle.id}  {self.distance_m:.1f} m  {motion}"
+
+
+def seen_obstacles(moment: VideoMoment) -> list[Seen]:
+    """Those whose position is known, in the order in which their labels may claim room."""
+    camera = camera_in_body(moment.mount or LEVEL_CAMERA)
+    deciding_id = None if moment.decision is None else moment.decision.reason.obstacle_id
+    seen = []
+    for obstacle in moment.scene.obstacles:
+        if not np.isfinite(obstacle.position_m).all():
+            continue
+        centre_m = camera.apply(obstacle.position_m[np.newaxis])[0, :2]
+        half_m = 0.5 * np.fmax(obstacle.extent_m[[2, 0]], _SMALLEST_M)
+        in_body = camera.rotation[:2]
+        seen.append(
+            Seen(
+                obstacle=obstacle,
+                centre_m=centre_m,
+                corners_m=centre_m + _CORNERS * half_m,
+                velocity_mps=in_body @ obstacle.velocity_mps,
+                velocity_cov=in_body @ obstacle.velocity_cov @ in_body.T,
+                distance_m=math.hypot(*(centre_m - camera.translation_m[:2])),
+                decides=obstacle.id == deciding_id,
+            )
+        )
+    return sorted(seen, key=lambda one: (not one.decides, one.distance_m))

@@ -1,0 +1,57 @@
+"""Text in OpenCV's built-in TrueType face: proportional, anti-aliased, with the few symbols used here."""
+
+from __future__ import annotations
+
+import cv2
+
+from controller.video.style import FAINT_TEXT, Colour, Image, Rect
+
+REGULAR, MEDIUM, BOLD = 400, 500, 600
+ELLIPSIS = "…"
+_FACE = cv2.FontFace("sans")
+
+
+def put(
+    image: Image, text: str, x: int, baseline: int, colour: Colour, size: int, weight: int = REGULAR
+) -> int:
+    """Write text from x on; returns the x at which it could go on."""
+    end, _ = cv2.putText(image, text, (x, baseline), colour, _FACE, size, weight)
+    return int(end[0])
+
+
+def put_right(
+    image: Image, text: str, right: int, baseline: int, colour: Colour, size: int, weight: int = REGULAR
+) -> int:
+    """Write text so that it ends at right; returns the x at which it begins."""
+    x = right - width(text, size, weight)
+    put(image, text, x, baseline, colour, size, weight)
+    return x
+
+
+def width(text: str, size: int, weight: int = REGULAR) -> int:
+    """How far the text advances, in pixels."""
+    return int(cv2.getTextSize((0, 0), text, (0, 0), _FACE, size, weight)[2])
+
+
+def fit(text: str, room_px: int, size: int, weight: int = REGULAR) -> str:
+    """The text, cut at the end and marked with an ellipsis where it is longer than the room."""
+    if width(text, size, weight) <= room_px:
+        return text
+    shortest, longest = 0, len(text)
+    while shortest < longest:
+        middle = (shortest + longest + 1) // 2
+        if width(text[:middle].rstrip() + ELLIPSIS, size, weight) <= room_px:
+            shortest = middle
+        else:
+            longest = middle - 1
+    return text[:shortest].rstrip() + ELLIPSIS
+
+
+def caption(image: Image, panel: Rect, title: str) -> int:
+    """The title above a panel; returns the x at which it ends."""
+    return put(image, title, panel.x, panel.y - 6, FAINT_TEXT, 12, BOLD)
+
+
+def caption_note(image: Image, panel: Rect, note: str) -> None:
+    """A changing note above a panel, at its right end."""
+    put_right(image, note, panel.right, panel.y - 6, FAINT_TEXT, 12)

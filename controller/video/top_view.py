@@ -1,0 +1,170 @@
+"""The floor from above: robot below, what lies ahead of it above; true to scale."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.robot import Body
+from controller.video import draw, text
+from controller.video.corridor import Corridor
+from controller.video.labels import Label, draw_labels
+from controller.video.moment import VideoMoment
+from controller.video.seen import LEVEL_CAMERA, Seen
+from controller.video.style import (
+    BACKGROUND,
+    FAINT_TEXT,
+    FREE_SPACE,
+    GRID,
+    OWN,
+    PANEL,
+    SURFACE,
+    Image,
+    Rect,
+)
+from hal.types import CameraMount, FloatArray
+from vision.scene import FreeSpace
+
+_BEHIND_M = 0.85
+_BEYOND_M = 0.35
+_RING_M = 2.0
+# Ring labels stand to the right: clear of the corridor, and inside the panel also on the far rings.
+_RING_LABEL_SIN, _RING_LABEL_RIGHT_M = 0.5, 2.7
+_PATH_PX = 1.0  # to either side
+_ARROW_S = 1.0
+_WIDEST_SIGMA_M = 2.5
+_TRACK_SHARE = 0.24
+
+
+class TopView:
+    """Draws into one panel. The origin of the body frame stands at the middle of its foot."""
+
+    def __init__(self, panel: Rect, range_m: float) -> None:
+        self._panel = panel
+        self._range_m = range_m
+        self._px_per_m = panel.height / (_BEHIND_M + range_m + _BEYOND_M)
+        self._origin_px = (0.5 * (panel.width - 1), panel.height - 1 - _BEHIND_M * self._px_per_m)
+
+    def to_pixels(self, points_m: FloatArray) -> FloatArray:
+        """(..., 2) of the body frame (forward, left) to pixels of the panel (right, down)."""
+        return np.stack(
+            [
+                self._origin_px[0] - points_m[..., 1] * self._px_per_m,
+                self._origin_px[1] - points_m[..., 0] * self._px_per_m,
+            ],
+            axis=-1,
+        )
+
+    def draw_backdrop(self, canvas: Image) -> None:
+        """What never changes."""
+        self._panel.of(canvas)[:] = PANEL
+        text.caption(canvas, self._panel, "TOP VIEW")
+        text.caption_note(canvas, self._panel, "distance from the camera")
+
+    def draw(self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: Corridor | None) -> None:
+        """From the floor upwards."""
+        view = self._panel.of(canvas)
+        mount = moment.mount or LEVEL_CAMERA
+        scan = _Scan(moment.scene.free_space, mount, self._range_m)
+        if len(scan.free_m):
+            draw.area(view, self.to_pixels(scan.free_m), FREE_SPACE)
+        if corridor is not None:
+            draw.tint(view, self.to_pixels(corridor.outline_m), OWN, 0.13)
+        ring_labels = self._draw_rings(view, mount)
+        draw.lines(view, self.to_pixels(scan.surfaces_m), SURFACE, 2)
+        if corridor is not None:
+            edges_m = np.stack([corridor.left_m, corridor.right_m])
+            draw.lines(view, self.to_pixels(edges_m), FAINT_TEXT)
+            draw.area(view, self.to_pixels(corridor.ribbon_m(_PATH_PX / self._px_per_m)), OWN)
+        if moment.body is not None:
+            self._draw_robot(view, moment.body)
+        self._draw_camera(view, mount)
+        for one in reversed(seen):
+            self._draw_obstacle(view, one)
+        labels = [Label(f"#{one.obstacle.id}", one.colour, self._label_box(one), one.decides) for one in seen]
+        draw_labels(view, labels, ring_labels, size=12)
+
+    def _draw_rings(self, view: Image, mount: CameraMount) -> list[Rect]:
+        """Rings around the camera's foot; where their labels stand."""
+        foot_m = np.array([mount.forward_m, mount.left_m])
+        radii_m = np.arange(_RING_M, self._range_m + 1e-6, _RING_M)
+        angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 61)
+        circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        draw.lines(view, self.to_pixels(foot_m + radii_m[:, np.newaxis, np.newaxis] * circle), GRID)
+        right_m = np.minimum(_RING_LABEL_SIN * radii_m, _RING_LABEL_RIGHT_M)
+        at_m = foot_m + np.column_stack([np.sqrt(radii_m**2 - right_m**2), -right_m])
+        places = []
+        for radius_m, (x, y) in zip(radii_m, self.to_pixels(at_m), strict=True):
+            label = f"{radius_m:g} m"
+            places.append(Rect(round(x), round(y) - 17, text.width(label, 12), 16))
+            text.put(view, label, places[-1].x, places[-1].y + 12, FAINT_TEXT, 12)
+        return places
+
+    def _draw_robot(self, view: Image, body: Body) -> None:
+        half_m = 0.5 * body.width_m
+        track_m = _TRACK_SHARE * body.width_m
+        hull_m = draw.box((-body.rear_m, -half_m, body.front_m, half_m))
+        draw.area(view, self.to_pixels(hull_m), BACKGROUND)
+        for inner_m, outer_m in ((half_m - track_m, half_m), (track_m - half_m, -half_m)):
+            draw.area(view, self.to_pixels(draw.box((-body.rear_m, inner_m, body.front_m, outer_m))), GRID)
+        draw.line(view, self.to_pixels(hull_m), OWN, 2, closed=True)
+        nose_m, size_m = 0.5 * (body.front_m - body.rear_m), 0.17 * body.width_m
+        arrowhead_m = np.array(
+            [[nose_m - size_m, size_m], [nose_m + size_m, 0.0], [nose_m - size_m, -size_m]]
+        )
+        draw.area(view, self.to_pixels(arrowhead_m), OWN)
+
+    def _draw_camera(self, view: Image, mount: CameraMount) -> None:
+        foot = self.to_pixels(np.array([mount.forward_m, mount.left_m]))
+        draw.disc(view, foot, 3.5, OWN)
+
+    def _draw_obstacle(self, view: Image, one: Seen) -> None:
+        centre, corners = self.to_pixels(one.centre_m), self.to_pixels(one.corners_m)
+        draw.tint(view, corners, one.colour, 0.45)
+        if one.decides:
+            draw.line(view, corners, OWN, 6, closed=True)
+        if one.predicted:
+            draw.dashed(view, np.concatenate([corners, corners[:1]]), one.colour, 2, dash_px=4.0)
+        else:
+            draw.line(view, corners, one.colour, 2, closed=True)
+        if one.obstacle.moving and np.isfinite(one.velocity_mps).all():
+            self._draw_velocity(view, one, centre)
+
+    def _draw_velocity(self, view: Image, one: Seen, centre: NDArray[np.float64]) -> None:
+        tip = self.to_pixels(one.centre_m + _ARROW_S * one.velocity_mps)
+        draw.arrow(view, centre, tip, one.colour)
+        spread_m2 = _ARROW_S**2 * one.velocity_cov
+        if np.isfinite(spread_m2).all() and np.trace(spread_m2) < _WIDEST_SIGMA_M**2:
+            # Forward, left to right, down: both axes swap and turn, so only their order changes.
+            draw.ellipse(view, tip, spread_m2[::-1, ::-1] * self._px_per_m**2, one.colour)
+
+    def _label_box(self, one: Seen) -> FloatArray:
+        corners = self.to_pixels(one.corners_m)
+        return np.stack([corners.min(axis=0) - 2.0, corners.max(axis=0) + 2.0])
+
+
+class _Scan:
+    """The free-space scan as shapes on the floor of the body frame.
+
+    free_m: (K, 2) polygon of what was seen to be free, (0, 2) if nothing. surfaces_m: (S, 2, 2), one
+    stroke for each band that ends at a surface within range.
+    """
+
+    def __init__(self, free: FreeSpace, mount: CameraMount, range_m: float) -> None:
+        edges_tan = free.bearing_tan[:, np.newaxis] + free.half_width_tan * np.array([-1.0, 1.0])
+        foot_m = np.array([mount.forward_m, mount.left_m])
+        reach_m = np.minimum(np.nan_to_num(np.minimum(free.nearest_m, free.known_m), nan=0.0), range_m)
+        far_m = foot_m + _forward_left(reach_m, edges_tan)
+        self.free_m = (
+            np.concatenate([foot_m[np.newaxis], far_m.reshape(-1, 2)]) if len(reach_m) else far_m[:, 0]
+        )
+        struck = np.isfinite(free.nearest_m) & (free.nearest_m <= range_m)
+        self.surfaces_m = foot_m + _forward_left(free.nearest_m[struck], edges_tan[struck])
+
+
+def _forward_left(forward_m: FloatArray, bearings_tan: FloatArray) -> FloatArray:
+    """(N,) distances ahead and (N, 2) bearings, positive to the right, as (N, 2, 2) points forward, left."""
+    forward = np.broadcast_to(forward_m[:, np.newaxis], bearings_tan.shape)
+    return np.stack([forward, -forward * bearings_tan], axis=-1)

@@ -1,0 +1,133 @@
+"""Pictures into a video file. The file's suffix chooses container and codec."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+
+from controller.errors import UserError
+from controller.video.style import Image
+
+# What OpenCV's wheel really encodes (it has no H.264 encoder). VP8 in WebM is what browsers play, at some ten
+# times the time of MPEG-4; VP9, which it also has, takes half a second a picture.
+CODECS = {
+    ".mp4": "mp4v",
+    ".m4v": "mp4v",
+    ".mov": "mp4v",
+    ".mkv": "mp4v",
+    ".webm": "VP80",
+    ".avi": "MJPG",
+}
+
+
+_STDERR_FD = 2
+
+
+class VideoError(UserError):
+    """The video cannot be written there or so."""
+
+
+class VideoWriter:
+    """Context manager; the file is created by the first picture, whose size all others must have.
+
+    Raises VideoError: at once where the suffix is unknown or the file cannot be written, so that no long run
+    fails at its end; from write where no encoder opens or a picture has another size than the first.
+    """
+
+    def __init__(self, path: Path, fps: float) -> None:
+        if not fps > 0.0:
+            raise VideoError(f"{path}: {fps:g} pictures a second make no video; give a rate above 0")
+        self._codec = _codec_for(path)
+        _check_writable(path)
+        # Absolute: FFmpeg takes a relative name such as "pipe:1.mp4" for a protocol.
+        self._path = path.absolute()
+        self._fps = fps
+        self._size: tuple[int, int] | None = None
+        self._writer: cv2.VideoWriter | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def write(self, picture: Image) -> None:
+        """Append one picture, (H, W, 3) uint8 BGR."""
+        height, width = picture.shape[:2]
+        if self._writer is None:
+            self._writer = self._open((width, height))
+            self._size = (width, height)
+        if (width, height) != self._size:
+            raise VideoError(
+                f"{self._path}: a picture of {width}x{height} after others of another size; "
+                "write one video for each size"
+            )
+        self._writer.write(picture)
+
+    def close(self) -> None:
+        """Finish the file. Idempotent; without a picture there is no file."""
+        if self._writer is not None:
+            with _native_stderr_silenced():
+                self._writer.release()
+            self._writer = None
+
+    def _open(self, size: tuple[int, int]) -> cv2.VideoWriter:
+        fourcc = cv2.VideoWriter.fourcc(*self._codec)
+        with _native_stderr_silenced():
+            writer = cv2.VideoWriter(str(self._path), cv2.CAP_FFMPEG, fourcc, self._fps, size)
+        if not writer.isOpened():
+            raise VideoError(
+                f"{self._path}: OpenCV opens no {self._codec} encoder for {size[0]}x{size[1]} at "
+                f"{self._fps:g} pictures a second; try another suffix: {', '.join(CODECS)}"
+            )
+        return writer
+
+
+def _codec_for(path: Path) -> str:
+    codec = CODECS.get(path.suffix.lower())
+    if codec is None:
+        found = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
+        raise VideoError(f"{path}: {found} names no kind of video; use one of {', '.join(CODECS)}")
+    return codec
+
+
+def _check_writable(path: Path) -> None:
+    """By trying: permissions alone do not tell of a read-only disk. An existing file is left as it is."""
+    existed = path.exists()
+    try:
+        path.open("ab").close()
+        if not existed:
+            path.unlink()
+    except OSError as error:
+        raise VideoError(
+            f"{path}: the video cannot be written there ({error.strerror}); name a file in a folder that "
+            "exists and that you may write to"
+        ) from error
+
+
+@contextmanager
+def _native_stderr_silenced() -> Iterator[None]:
+    """FFmpeg prints remarks for developers straight to the process' standard error; no setting stops all."""
+    sys.stderr.flush()
+    try:
+        kept = os.dup(_STDERR_FD)
+    except OSError:  # a service may run with standard error closed: nothing to silence
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, _STDERR_FD)
+        yield
+    finally:
+        os.dup2(kept, _STDERR_FD)
+        os.close(kept)
+        os.close(nowhere)
