@@ -1,0 +1,361 @@
+"""detect: an RGB-D frame and the odometry of its time -> tracked fragments, ego-motion and motion evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import PerceptionConfig
+from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
+from vision import optical_flow
+from vision.depth_grid import DepthGrid, make_grid
+from vision.depth_mask import depth_sigma_m, surface_depth
+from vision.edges import GreyImage
+from vision.ego_motion import (
+    Anchors,
+    CameraEstimate,
+    MotionPrior,
+    estimate,
+    odometry_prior,
+    steady_prior,
+    with_gyro,
+)
+from vision.fragments import AnchorEnds, FragmentStore
+from vision.health import Continuity, HealthMonitor, worsened
+from vision.lens import project, rays
+from vision.renewal import Renewal
+from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
+from vision.velocities import PointMotion, chi2_2d, static_miss
+
+_IDENTITY = Pose(np.eye(3), np.zeros(3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection:
+    """What one frame yields before anything is called an obstacle.
+
+    N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: evidence of the 2N
+    ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
+    the fixed frame has begun anew, what was tracked before cannot be compared.
+    """
+
+    captured_ns: int
+    sequence: int
+    dt_s: float
+    camera: Intrinsics
+    grid: DepthGrid
+    ids: NDArray[np.int64]
+    ends_px: NDArray[np.float32]
+    near_m: NDArray[np.float32]
+    age_frames: NDArray[np.intp]
+    motion: PointMotion
+    pose: Pose
+    pose_covariance: FloatArray
+    ego_motion: EgoMotion
+    health: CameraHealth
+    restarted: bool
+
+
+class Detector:
+    """Keeps the fragments, the last image and the camera's pose in a fixed frame of its own."""
+
+    def __init__(self, config: PerceptionConfig, mount: CameraMount | None) -> None:
+        self._config = config
+        self._mount = mount
+        self._store = FragmentStore()
+        self._renewal = Renewal(config)
+        self._health = HealthMonitor(config)
+        self._grey: GreyImage | None = None
+        self._last_ns = 0
+        self._pose = _IDENTITY
+        self._odometry: Pose | None = None
+        self._motion = _IDENTITY
+        self._motion_dt_s = 0.0
+
+    def step(self, frame: RgbdFrame, odometry: Pose | None, previous: Fragments | None = None) -> Detection:
+        """One frame. odometry: the camera by dead reckoning at captured_ns, None where not known.
+
+        previous: the fragments as tracking left them, so that those on moving things are kept out of
+        the ego-motion and searched for where their obstacle goes.
+        """
+        grey = np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        grid = make_grid(frame, self._config, self._mount)
+        check = self._health.check(frame, grey, grid)
+        usable = check.usable_colour and check.usable_depth
+        known = self._grey is not None and self._grey.shape == grey.shape
+        if not usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
+            return self._blind(frame, grid, check.health)
+        if check.continuity is not Continuity.NEXT or not known:
+            return self._restart(frame, grey, grid, odometry, check.health)
+        dt_s = (frame.captured_ns - self._last_ns) * 1e-9
+        if dt_s > self._config.max_gap_s:
+            return self._restart(frame, grey, grid, odometry, check.health)
+        return self._follow(frame, grey, grid, odometry, previous, dt_s, check.health)
+
+    def _follow(
+        self,
+        frame: RgbdFrame,
+        grey: GreyImage,
+        grid: DepthGrid,
+        odometry: Pose | None,
+        previous: Fragments | None,
+        dt_s: float,
+        health: CameraHealth,
+    ) -> Detection:
+        store, config, camera = self._store, self._config, frame.intrinsics
+        prior = self._prior(frame, odometry, dt_s)
+        moving, velocity = _hint(store.ids, previous)
+        guess = self._guess(prior.motion, velocity, dt_s, camera)
+        assert self._grey is not None
+        flow = optical_flow.track(
+            self._grey,
+            grey,
+            store.ends_px.reshape(-1, 2),
+            guess,
+            config.fragments,
+            config.fragments.lk_levels,
+        )
+        both = flow.found.reshape(-1, 2).all(axis=1)
+        store.ends_px = flow.pixels.reshape(-1, 2, 2)
+        store.keep(both)
+        moving = moving[both]
+        surface = surface_depth(
+            frame.depth,
+            frame.depth_scale_m,
+            store.ends_px.reshape(-1, 2),
+            config.min_depth_m,
+            config.max_depth_m,
+            config.depth_noise,
+        )
+        store.near_m = surface.near_m.reshape(-1, 2).astype(np.float32)
+        store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
+        anchor = store.anchors(frame.captured_ns, config.motion.window_s)
+        result = self._camera(anchor, moving, prior, camera)
+        motion = self._evidence(anchor, result, camera)
+        step = self._pose.inverse() @ result.pose
+        ego = _ego(step, dt_s, result, prior)
+        health = _judge(health, ego, len(store))
+        self._pose = result.pose
+        self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
+        detection = self._detection(frame, grid, dt_s, motion, result.covariance, ego, health, False)
+        self._renew(frame, grey)
+        if ego.source == "none":
+            self._store.break_history()
+        self._commit(frame, grey, odometry)
+        return detection
+
+    def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
+        new = self._renewal.find(frame, grey, self._store.ends_px)
+        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
+
+    def _commit(self, frame: RgbdFrame, grey: GreyImage, odometry: Pose | None) -> None:
+        self._store.commit(frame.captured_ns, self._pose)
+        self._grey, self._last_ns, self._odometry = grey, frame.captured_ns, odometry
+
+    def _restart(
+        self,
+        frame: RgbdFrame,
+        grey: GreyImage,
+        grid: DepthGrid,
+        odometry: Pose | None,
+        health: CameraHealth,
+    ) -> Detection:
+        """Begin anew: after the first frame, a gap, or a change of the image's size."""
+        self._store.clear()
+        self._motion, self._motion_dt_s = _IDENTITY, 0.0
+        ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
+        self._renew(frame, grey)
+        motion = _no_motion(2 * len(self._store))
+        detection = self._detection(frame, grid, 0.0, motion, np.eye(6), ego, health, True)
+        self._commit(frame, grey, odometry)
+        return detection
+
+    def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
+        """Nothing can be followed through this frame; the fragments wait for the next good one."""
+        ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
+        motion = _no_motion(2 * len(self._store))
+        return self._detection(frame, grid, 0.0, motion, np.eye(6), ego, health, False)
+
+    def _detection(
+        self,
+        frame: RgbdFrame,
+        grid: DepthGrid,
+        dt_s: float,
+        motion: PointMotion,
+        covariance: FloatArray,
+        ego: EgoMotion,
+        health: CameraHealth,
+        restarted: bool,
+    ) -> Detection:
+        store = self._store
+        return Detection(
+            frame.captured_ns,
+            frame.sequence,
+            dt_s,
+            frame.intrinsics,
+            grid,
+            store.ids,
+            store.ends_px,
+            store.near_m,
+            store.age_frames.copy(),
+            motion,
+            self._pose,
+            covariance,
+            ego,
+            health,
+            restarted,
+        )
+
+    def _prior(self, frame: RgbdFrame, odometry: Pose | None, dt_s: float) -> MotionPrior:
+        settings = self._config.ego_motion
+        if odometry is not None and self._odometry is not None:
+            prior = odometry_prior(self._odometry.inverse() @ odometry, dt_s, settings)
+        else:
+            prior = steady_prior(self._motion, self._motion_dt_s, dt_s, settings)
+        if frame.gyro is not None:
+            prior = with_gyro(prior, frame.gyro, self._last_ns, frame.captured_ns, settings)
+        return prior
+
+    def _guess(
+        self, motion: Pose, velocity: FloatArray, dt_s: float, camera: Intrinsics
+    ) -> NDArray[np.float32]:
+        """Where the ends are expected now: (2N, 2). velocity (N, 3) over ground in the camera before."""
+        store = self._store
+        pixels = store.ends_px.reshape(-1, 2)
+        if len(pixels) == 0:
+            return pixels
+        depth_m = np.nan_to_num(store.near_m.ravel().astype(float), nan=5.0)
+        points = rays(pixels, camera) * depth_m[:, None] + np.repeat(velocity, 2, axis=0) * dt_s
+        moved = (points - motion.translation_m) @ motion.rotation
+        moved[:, 2] = np.maximum(moved[:, 2], 0.1)
+        return project(moved, camera).astype(np.float32)
+
+    def _camera(
+        self, anchor: AnchorEnds, moving: NDArray[np.bool_], prior: MotionPrior, camera: Intrinsics
+    ) -> CameraEstimate:
+        rotation, translation = self._store.poses(np.repeat(anchor.slot, 2))
+        ray = rays(anchor.pixels.reshape(-1, 2), camera)
+        direction = (rotation @ ray[:, :, None])[:, :, 0]
+        near_m = anchor.near_m.ravel().astype(float)
+        known = np.isfinite(near_m)
+        near_m = np.where(known, near_m, 1.0)
+        spread = np.nan_to_num(anchor.far_m.ravel() - near_m, nan=0.0)
+        sigma = depth_sigma_m(near_m, self._config.depth_noise)
+        covariance = self._store.pixel_cov.reshape(-1, 3)
+        variance = 0.5 * (covariance[:, 0] + covariance[:, 2]).astype(float)
+        usable = known & (spread <= 3.0 * sigma) & np.repeat(~moving, 2)
+        points = direction * near_m[:, None] + translation
+        anchors = Anchors(points, direction, sigma, variance, usable)
+        pixels = self._store.ends_px.reshape(-1, 2).astype(float)
+        return estimate(anchors, pixels, self._pose, prior, camera)
+
+    def _evidence(self, anchor: AnchorEnds, now: CameraEstimate, camera: Intrinsics) -> PointMotion:
+        """Where every end would be if it were static, and how far from there it is."""
+        store, noise = self._store, self._config.depth_noise
+        rotation, translation = store.poses(np.repeat(anchor.slot, 2))
+        ray_before = rays(anchor.pixels.reshape(-1, 2), camera)
+        direction = (rotation @ ray_before[:, :, None])[:, :, 0] @ now.pose.rotation
+        origin = (translation - now.pose.translation_m) @ now.pose.rotation
+        near_m = anchor.near_m.ravel().astype(float)
+        far_m = anchor.far_m.ravel().astype(float)
+        known = np.isfinite(near_m)
+        near_m, far_m = np.where(known, near_m, 1.0), np.where(known, far_m, 1.0)
+        ray = rays(store.ends_px.reshape(-1, 2), camera)[:, :2]
+        static = direction * near_m[:, None] + origin
+        in_front = static[:, 2] > 0.1
+        sigma = depth_sigma_m(near_m, noise)
+        effect_per_m = ray * direction[:, 2:3] - direction[:, :2]
+        steps = np.maximum(1.0, 0.5 * np.repeat(anchor.lag_frames, 2))
+        pixel_cov = store.pixel_cov.reshape(-1, 3) * steps[:, None]
+        metres = static[:, 2:3] / np.array([camera.fx, np.sqrt(camera.fx * camera.fy), camera.fy])
+        covariance = pixel_cov * metres**2
+        covariance[:, [0, 2]] += _pose_variance(now.covariance, static[:, 2])[:, None]
+        miss = static_miss(static, ray)
+        effect = effect_per_m * sigma[:, None]
+        static_far = direction * far_m[:, None] + origin
+        sigma_far = depth_sigma_m(far_m, noise)
+        chi2 = np.minimum(
+            chi2_2d(miss, covariance, effect),
+            chi2_2d(
+                static_miss(static_far, ray),
+                covariance * np.square(static_far[:, 2:3] / np.where(in_front, static[:, 2], 1.0)[:, None]),
+                effect_per_m * sigma_far[:, None],
+            ),
+        )
+        depth_now = store.near_m.ravel().astype(float)
+        depth_step = depth_now - static[:, 2]
+        step_sigma = np.hypot(sigma, depth_sigma_m(np.nan_to_num(depth_now, nan=1.0), noise))
+        usable = known & in_front & np.isfinite(miss).all(axis=1)
+        return PointMotion(
+            static,
+            ray,
+            np.repeat(anchor.lag_s, 2),
+            miss,
+            covariance,
+            effect,
+            depth_step,
+            step_sigma,
+            chi2,
+            usable,
+        )
+
+
+def _pose_variance(covariance: FloatArray, depth_m: FloatArray) -> FloatArray:
+    """(N,) variance in metres across the view that the camera's own uncertainty makes at depth_m (N,)."""
+    turn = float(np.max(np.diag(covariance)[:3]))
+    way = float(np.max(np.diag(covariance)[3:]))
+    return way + turn * np.square(depth_m)
+
+
+def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:
+    variance = np.diag(result.covariance)
+    return EgoMotion(
+        step,
+        dt_s,
+        "visual" if result.visual else prior.source,
+        result.inlier_ratio,
+        float(np.sqrt(variance[3:].sum())),
+        float(np.sqrt(variance[:3].sum())),
+    )
+
+
+def _judge(health: CameraHealth, ego: EgoMotion, fragments: int) -> CameraHealth:
+    """What the ego-motion tells of the camera."""
+    if ego.source == "visual" or fragments == 0:
+        return health
+    if ego.source == "odometry":
+        reason = "too few static fragments: the camera's motion rests on the odometry alone"
+        return worsened(health, CameraCondition.DEGRADED, reason)
+    reason = "the camera's motion is not known: too few static fragments agree, and there is no odometry"
+    return worsened(health, CameraCondition.UNTRUSTWORTHY, reason)
+
+
+def _hint(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Which of the fragments ids tracking knew as moving, and how fast: (N,), (N, 3)."""
+    moving, velocity = np.zeros(len(ids), np.bool_), np.zeros((len(ids), 3))
+    if previous is None or len(previous.ids) == 0:
+        return moving, velocity
+    index = np.searchsorted(previous.ids, ids)
+    index = np.minimum(index, len(previous.ids) - 1)
+    same = previous.ids[index] == ids
+    moving[same] = previous.moving[index[same]]
+    velocity[moving] = np.nan_to_num(previous.velocity_mps[index[moving]])
+    return moving, velocity
+
+
+def _no_motion(count: int) -> PointMotion:
+    return PointMotion(
+        np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
+        np.zeros((count, 2)),
+        np.zeros(count),
+        np.zeros((count, 2)),
+        np.ones((count, 3)) * np.array([1.0, 0.0, 1.0]),
+        np.zeros((count, 2)),
+        np.full(count, np.nan),
+        np.ones(count),
+        np.zeros(count),
+        np.zeros(count, np.bool_),
+    )

@@ -1,0 +1,114 @@
+"""How far a frame can be trusted: fail closed, with a plain sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from config.perception import PerceptionConfig
+from hal.types import RgbdFrame
+from vision.depth_grid import DepthGrid
+from vision.edges import GreyImage
+from vision.scene import CameraCondition, CameraHealth
+
+_STEP = 16
+_BLACK_LEVEL = 12
+_WHITE_LEVEL = 243
+_BAD_SHARE = 0.9
+_MIN_DEPTH_SHARE = 0.02
+_POOR_DEPTH_SHARE = 0.25
+_FROZEN_FRAMES = 2
+
+
+class Continuity(Enum):
+    """How a frame follows the one before."""
+
+    FIRST = "first"
+    NEXT = "next"
+    REPEATED = "repeated"
+    BACKWARD = "backward"
+    GAP = "gap"
+
+
+@dataclass(frozen=True, slots=True)
+class FrameCheck:
+    """usable_colour, usable_depth: whether the images say anything. health: what the scene reports."""
+
+    usable_colour: bool
+    usable_depth: bool
+    continuity: Continuity
+    health: CameraHealth
+
+
+class HealthMonitor:
+    """Looks at each frame once. Keeps the time and a few pixels of the frame before."""
+
+    def __init__(self, config: PerceptionConfig) -> None:
+        self._config = config
+        self._last_ns: int | None = None
+        self._last_sequence = 0
+        self._last_pixels: bytes = b""
+        self._same = 0
+
+    def check(self, frame: RgbdFrame, grey: GreyImage, grid: DepthGrid) -> FrameCheck:
+        """The worst finding decides the condition; each finding has its sentence."""
+        sample = np.ascontiguousarray(grey[_STEP // 2 :: _STEP, _STEP // 2 :: _STEP])
+        continuity, gap_s = self._continuity(frame)
+        problems: list[tuple[CameraCondition, str]] = []
+        bad, poor = CameraCondition.UNTRUSTWORTHY, CameraCondition.DEGRADED
+        if continuity is Continuity.BACKWARD:
+            problems.append((bad, f"frame is {-gap_s:.3f} s older than the one before"))
+        elif continuity is Continuity.REPEATED:
+            problems.append((bad, "frame has the time of the one before: it is a repetition"))
+        elif continuity is Continuity.GAP:
+            problems.append((poor, f"{gap_s:.2f} s without a frame: motion cannot be compared across it"))
+        pixels = sample.tobytes() + grid.depth_m[::4, ::4].tobytes()
+        self._same = self._same + 1 if pixels == self._last_pixels else 0
+        if self._same >= _FROZEN_FRAMES:
+            problems.append((bad, f"image has not changed by a single grey level for {self._same} frames"))
+        dark = float(np.count_nonzero(sample <= _BLACK_LEVEL)) / sample.size
+        bright = float(np.count_nonzero(sample >= _WHITE_LEVEL)) / sample.size
+        usable_colour = max(dark, bright) < _BAD_SHARE
+        if dark >= _BAD_SHARE:
+            problems.append((bad, f"{dark:.0%} of the colour image is black: is the lens covered?"))
+        elif bright >= _BAD_SHARE:
+            problems.append((bad, f"{bright:.0%} of the colour image is saturated"))
+        share = float(np.count_nonzero(grid.valid)) / grid.valid.size
+        usable_depth = share >= _MIN_DEPTH_SHARE
+        if not usable_depth:
+            problems.append((bad, f"only {share:.1%} of the depth image holds data"))
+        elif share < _POOR_DEPTH_SHARE:
+            problems.append((poor, f"only {share:.0%} of the depth image holds data"))
+        if continuity is not Continuity.BACKWARD:
+            self._last_ns, self._last_sequence = frame.captured_ns, frame.sequence
+            self._last_pixels = pixels
+        return FrameCheck(usable_colour, usable_depth, continuity, _verdict(problems, share))
+
+    def _continuity(self, frame: RgbdFrame) -> tuple[Continuity, float]:
+        if self._last_ns is None:
+            return Continuity.FIRST, 0.0
+        gap_s = (frame.captured_ns - self._last_ns) * 1e-9
+        if gap_s < 0:
+            return Continuity.BACKWARD, gap_s
+        if gap_s == 0:
+            return Continuity.REPEATED, 0.0
+        return (Continuity.GAP if gap_s > self._config.max_gap_s else Continuity.NEXT), gap_s
+
+
+def worsened(health: CameraHealth, condition: CameraCondition, reason: str) -> CameraHealth:
+    """health with one more finding; the worse condition stands."""
+    present = [] if health.condition is CameraCondition.GOOD else [(health.condition, health.reason)]
+    return _verdict([*present, (condition, reason)], health.valid_depth_ratio)
+
+
+def _verdict(problems: list[tuple[CameraCondition, str]], share: float) -> CameraHealth:
+    conditions = [condition for condition, _ in problems]
+    if CameraCondition.UNTRUSTWORTHY in conditions:
+        condition = CameraCondition.UNTRUSTWORTHY
+    elif conditions:
+        condition = CameraCondition.DEGRADED
+    else:
+        condition = CameraCondition.GOOD
+    return CameraHealth(condition, "; ".join(reason for _, reason in problems), share)

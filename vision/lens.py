@@ -1,0 +1,50 @@
+"""Pixels to rays and back (eqs. 3 and 4 of Daeef 2020, with cx, cy instead of w/2, h/2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hal.types import FloatArray, Intrinsics
+
+
+def rays(pixels: FloatArray, camera: Intrinsics) -> FloatArray:
+    """(N, 3) points at z = 1 m behind pixels (N, 2)."""
+    result = np.ones((len(pixels), 3))
+    result[:, 0] = (pixels[:, 0] - camera.cx) / camera.fx
+    result[:, 1] = (pixels[:, 1] - camera.cy) / camera.fy
+    return result
+
+
+def project(points_m: FloatArray, camera: Intrinsics) -> FloatArray:
+    """(N, 2) pixels of points (N, 3) in the optical frame; the caller keeps z > 0."""
+    inverse_z = 1.0 / points_m[:, 2]
+    result = np.empty((len(points_m), 2))
+    result[:, 0] = points_m[:, 0] * inverse_z * camera.fx + camera.cx
+    result[:, 1] = points_m[:, 1] * inverse_z * camera.fy + camera.cy
+    return result
+
+
+def rotation_from_vector(vector_rad: FloatArray) -> FloatArray:
+    """(3, 3) rotation about the axis of vector_rad by its length (Rodrigues' formula)."""
+    angle = float(np.sqrt(vector_rad @ vector_rad))
+    x, y, z = vector_rad
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # sin(a)/a and (1 - cos(a))/a^2 through sinc, which is exact at a = 0.
+    first = float(np.sinc(angle / np.pi))
+    half = float(np.sinc(0.5 * angle / np.pi))
+    return np.eye(3) + first * skew + 0.5 * half * half * (skew @ skew)
+
+
+def vector_from_rotation(rotation: FloatArray) -> FloatArray:
+    """(3,) axis times angle of a rotation of less than half a turn."""
+    axis = 0.5 * np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    sine = float(np.sqrt(axis @ axis))
+    cosine = 0.5 * (float(np.trace(rotation)) - 1.0)
+    angle = float(np.arctan2(sine, cosine))
+    return axis if sine < 1e-9 else axis * (angle / sine)

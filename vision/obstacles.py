@@ -1,0 +1,130 @@
+"""Fragments to bodies: which fragments move together, and how fast the body does that they belong to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray
+from vision.velocities import PointMotion, chi2_2d, normal_equations, solve_velocity
+
+_ROBUST_CHI2 = 9.0
+_ITERATIONS = 3
+_INDEPENDENT_DEPTHS = 4.0  # depth noise is shared by neighbours: a body never has more looks than these
+_STATIC_END_CHI2 = 6.0
+_STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
+_NEAR_M = 0.5
+_VELOCITY_GATE_MPS = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyVelocities:
+    """Of G bodies: velocity_mps (G, 3) over ground, covariance (G, 3, 3), ends (G,) how many points
+    speak, agreement (G,): share of them that agree. end_chi2 (2N,): of each end against its body."""
+
+    velocity_mps: FloatArray
+    covariance: FloatArray
+    ends: NDArray[np.intp]
+    agreement: FloatArray
+    end_chi2: FloatArray
+
+
+def body_velocities(
+    motion: PointMotion,
+    owner: NDArray[np.intp],
+    bodies: int,
+    start_mps: FloatArray,
+    max_speed_mps: float,
+) -> BodyVelocities:
+    """Weighted least squares for one velocity per body, robust against ends that slide or swing.
+
+    owner (2N,): body of each end, -1 for none. start_mps (G, 3): velocity to judge outliers by at first.
+    """
+    use = motion.usable & (owner >= 0)
+    member = np.zeros((bodies, len(owner)))
+    chosen = np.flatnonzero(use)
+    member[owner[chosen], chosen] = 1.0
+    ends = member.sum(axis=1).astype(np.intp)
+    base = normal_equations(motion, np.ones(len(owner)))
+    per_end = np.concatenate((base.matrix.reshape(-1, 9), base.rhs, base.doubt), axis=1)
+    step_ok = np.isfinite(motion.depth_step_m)
+    step = np.where(step_ok, motion.depth_step_m, 0.0)
+    information = np.where(step_ok, 1.0 / np.square(motion.depth_step_sigma_m), 0.0)
+    per_depth = np.stack((information * motion.lag_s**2, information * step * motion.lag_s), axis=1)
+    per_end[~use] = 0.0
+    per_depth[~use] = 0.0
+    share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))[:, None]
+    velocity = start_mps
+    safe_owner = np.where(use, owner, 0)
+    for _ in range(_ITERATIONS):
+        chi2 = end_chi2(motion, velocity[safe_owner])
+        weight = np.where(use, np.square(1.0 / (1.0 + chi2 / _ROBUST_CHI2)), 0.0)
+        weighted = member * weight
+        summed = weighted @ per_end
+        depths = (weighted @ per_depth) * share
+        matrix, rhs = summed[:, :9].reshape(-1, 3, 3), summed[:, 9:12]
+        matrix[:, 2, 2] += depths[:, 0]
+        rhs[:, 2] += depths[:, 1]
+        velocity, covariance = solve_velocity(matrix, rhs, summed[:, 12:], max_speed_mps)
+    chi2 = end_chi2(motion, velocity[safe_owner])
+    agree = (member * (chi2 <= _ROBUST_CHI2)).sum(axis=1) / np.maximum(ends, 1)
+    # What the model does not explain (limbs, turning, sliding) widens the result.
+    excess = (member * np.minimum(chi2, _ROBUST_CHI2)).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
+    covariance = covariance * np.maximum(1.0, excess)[:, None, None]
+    return BodyVelocities(velocity, covariance, ends, agree, chi2)
+
+
+def end_chi2(motion: PointMotion, velocity: FloatArray) -> FloatArray:
+    """(2N,) chi-square of each end if it moves with velocity (2N, 3)."""
+    way = velocity * motion.lag_s[:, None]
+    miss = motion.miss_m - (way[:, :2] - motion.ray * way[:, 2:3])
+    return chi2_2d(miss, motion.covariance, motion.depth_effect)
+
+
+def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> tuple[FloatArray, FloatArray]:
+    """(N, 3) velocity over ground of each fragment from its two ends, and its covariance (N, 3, 3)."""
+    weight = motion.usable.astype(float)
+    base = normal_equations(motion, weight)
+    matrix = base.matrix.reshape(-1, 2, 3, 3).sum(axis=1)
+    rhs = base.rhs.reshape(-1, 2, 3).sum(axis=1)
+    doubt = base.doubt.reshape(-1, 2, 3).sum(axis=1)
+    step_ok = np.isfinite(motion.depth_step_m) & motion.usable
+    information = np.where(step_ok, 1.0 / np.square(motion.depth_step_sigma_m), 0.0)
+    step = np.where(step_ok, motion.depth_step_m, 0.0)
+    matrix[:, 2, 2] += (information * motion.lag_s**2).reshape(-1, 2).sum(axis=1)
+    rhs[:, 2] += (information * step * motion.lag_s).reshape(-1, 2).sum(axis=1)
+    return solve_velocity(matrix, rhs, doubt, max_speed_mps)
+
+
+def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """(N,) fragments that no static surface explains: both ends miss, at either depth of a silhouette."""
+    chi2 = np.where(motion.usable, motion.static_chi2, 0.0).reshape(-1, 2)
+    both = (chi2 > _STATIC_END_CHI2).all(axis=1)
+    result: NDArray[np.bool_] = both & (chi2.sum(axis=1) > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
+    return result
+
+
+def cluster(
+    position_m: FloatArray, velocity: FloatArray, covariance: FloatArray, depth_sigma_m: FloatArray
+) -> NDArray[np.intp]:
+    """(M,) group of each of M moving fragments: neighbours in space that move alike are of one body."""
+    count = len(position_m)
+    if count == 0:
+        return np.empty(0, np.intp)
+    gap = np.abs(position_m[:, None] - position_m[None])
+    sigma = depth_sigma_m[:, None] + depth_sigma_m[None]
+    near = (np.hypot(gap[..., 0], 0.6 * gap[..., 1]) <= _NEAR_M) & (gap[..., 2] <= _NEAR_M + sigma)
+    variance = np.diagonal(covariance, axis1=1, axis2=2)[:, :2]
+    tolerance = _VELOCITY_GATE_MPS + 2.0 * np.sqrt(variance[:, None] + variance[None])
+    alike = (np.abs(velocity[:, None, :2] - velocity[None, :, :2]) <= tolerance).all(axis=2)
+    linked = near & alike
+    group = np.arange(count)
+    while True:
+        lowest = np.where(linked, group[None], count).min(axis=1)
+        lowest = lowest[lowest]
+        if (lowest == group).all():
+            break
+        group = lowest
+    return np.unique(group, return_inverse=True)[1].astype(np.intp)

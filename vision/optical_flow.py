@@ -1,0 +1,61 @@
+"""Pyramidal Lucas-Kanade on the end points, with a forward-backward check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import FragmentSettings
+from vision.edges import GreyImage
+
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)
+_MIN_EIGENVALUE = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flow:
+    """pixels (N, 2) float32 in the new image; found (N,) bool: tracked, came back, still inside."""
+
+    pixels: NDArray[np.float32]
+    found: NDArray[np.bool_]
+
+
+def track(
+    before: GreyImage,
+    now: GreyImage,
+    pixels: NDArray[np.float32],
+    guess: NDArray[np.float32],
+    settings: FragmentSettings,
+    levels: int,
+) -> Flow:
+    """Where pixels (N, 2) of the image before are now, searched from guess (N, 2).
+
+    The way back starts from where the guess says that the point came from, not from the point itself:
+    a search that starts at its goal proves nothing.
+    """
+    if len(pixels) == 0:
+        return Flow(np.empty((0, 2), np.float32), np.empty(0, np.bool_))
+    window = (settings.lk_window_px, settings.lk_window_px)
+    options = {
+        "winSize": window,
+        "criteria": _CRITERIA,
+        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
+        "minEigThreshold": _MIN_EIGENVALUE,
+    }
+    start = pixels.reshape(-1, 1, 2)
+    there, there_ok, _ = cv2.calcOpticalFlowPyrLK(
+        before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=levels, **options
+    )
+    back_guess = there - (guess - pixels).reshape(-1, 1, 2)
+    back, back_ok, _ = cv2.calcOpticalFlowPyrLK(
+        now, before, there, back_guess, maxLevel=min(levels, 1), **options
+    )
+    end = there[:, 0, :]
+    miss = np.square(back[:, 0, :] - pixels).sum(axis=1)
+    height, width = now.shape
+    inside = (end[:, 0] >= 2) & (end[:, 1] >= 2) & (end[:, 0] <= width - 3) & (end[:, 1] <= height - 3)
+    found = (there_ok[:, 0] == 1) & (back_ok[:, 0] == 1) & (miss <= settings.forward_backward_px**2) & inside
+    return Flow(end, found)

@@ -1,0 +1,39 @@
+"""detect and track, composed: what the runners drive."""
+
+from __future__ import annotations
+
+from config.perception import PerceptionConfig
+from hal.types import CameraMount, PlanarPose, Pose, RgbdFrame
+from vision.detector import Detection, Detector
+from vision.scene import Fragments
+from vision.tracker import Percept, Tracker
+
+
+class Perception:
+    """One camera's eyes. detect and track stay apart so that a runner can time each."""
+
+    def __init__(
+        self,
+        config: PerceptionConfig,
+        mount: CameraMount | None,
+        body_height_m: float,
+        clearance_m: float,
+    ) -> None:
+        self._detector = Detector(config, mount)
+        self._tracker = Tracker(config, body_height_m, clearance_m)
+        self._fragments: Fragments | None = None
+
+    def detect(self, frame: RgbdFrame, odometry: Pose | None) -> Detection:
+        """RGB-D frame to fragments with motion evidence. odometry: the camera (optical frame) in the
+        odometry frame at frame.captured_ns by dead reckoning, None where not known."""
+        return self._detector.step(frame, odometry, self._fragments)
+
+    def track(self, detection: Detection, robot_pose: PlanarPose | None) -> Percept:
+        """Motion evidence to the scene. robot_pose is handed on to it."""
+        percept = self._tracker.step(detection, robot_pose)
+        self._fragments = percept.fragments
+        return percept
+
+    def perceive(self, frame: RgbdFrame, odometry: Pose | None, robot_pose: PlanarPose | None) -> Percept:
+        """detect, then track."""
+        return self.track(self.detect(frame, odometry), robot_pose)

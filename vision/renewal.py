@@ -1,0 +1,189 @@
+"""New fragments where they have thinned out, one upright band of the image at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import PerceptionConfig
+from hal.types import RgbdFrame
+from vision.contours import find_contours
+from vision.depth_mask import depth_sigma_m, surface_depth
+from vision.edges import GreyImage, find_edges
+from vision.segments import hough_segments, lengths_px, snap_to_corners
+
+BAND_PX = 160
+_MARGIN_PX = 8
+_MIN_END_DISTANCE_PX = 12.0
+_TAKEN_PX = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NewFragments:
+    """ends_px (N, 2, 2), near_m and far_m (N, 2), pixel_cov (N, 2, 3): xx, xy, yy of one flow step, px^2."""
+
+    ends_px: NDArray[np.float32]
+    near_m: NDArray[np.float32]
+    far_m: NDArray[np.float32]
+    pixel_cov: NDArray[np.float32]
+
+
+class Renewal:
+    """Decides where to look and finds segments there. Keeps only when each band was last visited."""
+
+    def __init__(self, config: PerceptionConfig) -> None:
+        self._config = config
+        self._last_visit = np.empty(0, np.intp)
+        self._visits = 0
+
+    def find(self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32]) -> NewFragments:
+        """Fragments for the tiles of one band that hold too few of ends_px (N, 2, 2); all bands at first."""
+        settings = self._config.fragments
+        height, width = grey.shape
+        bands = max(1, round(width / BAND_PX))
+        if len(self._last_visit) != bands:
+            self._last_visit = np.full(bands, -1, np.intp)
+        self._visits += 1
+        counts = _tile_counts(ends_px, settings.tile_px, height, width)
+        chosen = range(bands) if len(ends_px) == 0 else [int(self._last_visit.argmin())]
+        found = [np.empty((0, 2, 2), np.float32)]
+        for band in chosen:
+            self._last_visit[band] = self._visits
+            left = band * width // bands
+            right = (band + 1) * width // bands
+            found.append(self._segments(grey, counts, left, right))
+        candidates = np.concatenate(found)
+        room = settings.max_fragments - len(ends_px)
+        return self._select(frame, grey, candidates, ends_px, counts, room)
+
+    def _segments(
+        self, grey: GreyImage, counts: NDArray[np.intp], left: int, right: int
+    ) -> NDArray[np.float32]:
+        settings = self._config.fragments
+        start = max(0, left - _MARGIN_PX)
+        stop = min(grey.shape[1], right + _MARGIN_PX)
+        edges = find_edges(grey[:, start:stop], settings.canny_low, settings.canny_high)
+        full = counts >= 2 * settings.fragments_per_tile
+        tile = settings.tile_px
+        mask = np.repeat(np.repeat(full, tile, axis=0), tile, axis=1)[: grey.shape[0], start:stop]
+        edges[mask] = 0
+        contours = find_contours(edges, settings.min_length_px)
+        lines = hough_segments(contours.edges, settings.min_length_px)
+        segments = np.concatenate((lines, contours.ends_px))
+        segments[:, :, 0] += start
+        return segments
+
+    def _select(
+        self,
+        frame: RgbdFrame,
+        grey: GreyImage,
+        candidates: NDArray[np.float32],
+        ends_px: NDArray[np.float32],
+        counts: NDArray[np.intp],
+        room: int,
+    ) -> NewFragments:
+        """Snap, thin out to what the tiles lack, and drop what has no depth or crosses a depth edge."""
+        settings, config = self._config.fragments, self._config
+        snapped, tensor = snap_to_corners(grey, candidates)
+        order = np.argsort(-lengths_px(snapped), kind="stable")
+        snapped, tensor = snapped[order], tensor[order]
+        free = _not_taken(snapped, ends_px, grey.shape)
+        wanted = free & (lengths_px(snapped) >= _MIN_END_DISTANCE_PX)
+        snapped, tensor = snapped[wanted], tensor[wanted]
+        middle = snapped.mean(axis=1)
+        tile = (middle[:, 1] // settings.tile_px).astype(np.intp) * counts.shape[1]
+        tile += (middle[:, 0] // settings.tile_px).astype(np.intp)
+        allowed = settings.fragments_per_tile - counts.ravel()[tile] // 2
+        rank = _rank_within(tile)
+        picked = np.flatnonzero(rank < allowed)[: max(0, room)]
+        snapped, tensor = snapped[picked], tensor[picked]
+        shares = np.array([0.0, 0.25, 0.5, 0.75, 1.0], np.float32)
+        along = snapped[:, :1] + (snapped[:, 1:] - snapped[:, :1]) * shares[:, None]
+        surface = surface_depth(
+            frame.depth,
+            frame.depth_scale_m,
+            along.reshape(-1, 2),
+            config.min_depth_m,
+            config.max_depth_m,
+            config.depth_noise,
+        )
+        near = surface.near_m.reshape(-1, 5)
+        far = surface.far_m.reshape(-1, 5)
+        whole = _on_one_surface(near, shares, self._config)
+        covariance = _flow_covariance(tensor[whole], settings.pixel_sigma_px)
+        return NewFragments(
+            snapped[whole],
+            near[whole][:, [0, 4]].astype(np.float32),
+            far[whole][:, [0, 4]].astype(np.float32),
+            covariance,
+        )
+
+
+def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width: int) -> NDArray[np.intp]:
+    """Ends per tile."""
+    rows, columns = -(-height // tile_px), -(-width // tile_px)
+    flat = ends_px.reshape(-1, 2)
+    index = (flat[:, 1] // tile_px).astype(np.intp) * columns + (flat[:, 0] // tile_px).astype(np.intp)
+    return np.bincount(index, minlength=rows * columns).reshape(rows, columns)
+
+
+def _not_taken(
+    candidates: NDArray[np.float32], ends_px: NDArray[np.float32], shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Which candidates have at least one end where no other fragment, old or earlier in the list, has one."""
+    columns = shape[1] // _TAKEN_PX + 1
+    taken = np.zeros((shape[0] // _TAKEN_PX + 1) * columns, np.bool_)
+    taken[_cells(ends_px, columns).ravel()] = True
+    cells = _cells(candidates, columns)
+    fresh = ~taken[cells]
+    _, first = np.unique(cells.ravel(), return_index=True)
+    is_first = np.zeros(cells.size, np.bool_)
+    is_first[first] = True
+    result: NDArray[np.bool_] = (fresh & is_first.reshape(cells.shape)).any(axis=1)
+    return result
+
+
+def _cells(ends_px: NDArray[np.float32], columns: int) -> NDArray[np.intp]:
+    index = (ends_px // _TAKEN_PX).astype(np.intp)
+    result: NDArray[np.intp] = index[:, :, 1] * columns + index[:, :, 0]
+    return result
+
+
+def _rank_within(groups: NDArray[np.intp]) -> NDArray[np.intp]:
+    """(N,) how many earlier entries have the same group."""
+    order = np.argsort(groups, kind="stable")
+    ordered = groups[order]
+    first = np.concatenate(([True], ordered[1:] != ordered[:-1])) if len(groups) else np.empty(0, np.bool_)
+    starts = np.maximum.accumulate(np.where(first, np.arange(len(groups)), 0))
+    rank = np.empty(len(groups), np.intp)
+    rank[order] = np.arange(len(groups)) - starts
+    return rank
+
+
+def _on_one_surface(
+    near_m: NDArray[np.float64], shares: NDArray[np.float32], config: PerceptionConfig
+) -> NDArray[np.bool_]:
+    """Inverse depth runs straight along a segment of one plane; a segment across a depth edge jumps."""
+    with np.errstate(invalid="ignore"):
+        inverse = 1.0 / near_m
+        straight = inverse[:, :1] + (inverse[:, 4:] - inverse[:, :1]) * shares
+        expected_m = 1.0 / straight
+        gate_m = 0.05 + 3.0 * depth_sigma_m(expected_m, config.depth_noise)
+        inside = np.abs(near_m - expected_m)[:, 1:4] <= gate_m[:, 1:4]
+    # One of the three samples in between may fall into a hole.
+    missing = np.isnan(near_m[:, 1:4])
+    good = (inside | missing).all(axis=1) & (missing.sum(axis=1) <= 1)
+    result: NDArray[np.bool_] = good & np.isfinite(near_m[:, 0]) & np.isfinite(near_m[:, 4])
+    return result
+
+
+def _flow_covariance(tensor: NDArray[np.float32], floor_px: float) -> NDArray[np.float32]:
+    """(N, 2, 3) covariance of one flow step from the structure tensor (N, 2, 3): wide along an edge."""
+    grey_sigma = 3.0
+    uu, uv, vv = np.moveaxis(tensor, -1, 0) + np.array([50.0, 0.0, 50.0], np.float32)[:, None, None]
+    determinant = uu * vv - uv * uv
+    scale = grey_sigma**2 / determinant
+    floor = floor_px**2
+    return np.stack((vv * scale + floor, -uv * scale, uu * scale + floor), axis=-1).astype(np.float32)
