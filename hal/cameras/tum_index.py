@@ -58,7 +58,7 @@ def parse_stamp_ns(text: str) -> int:
         seconds = Decimal(text)
     except InvalidOperation:
         raise ValueError(f"{text!r} is not a time in seconds") from None
-    if not seconds.is_finite() or abs(seconds) > _MAX_STAMP_S:
+    if not seconds.is_finite() or not -_MAX_STAMP_S <= seconds <= _MAX_STAMP_S:
         raise ValueError(f"{text!r} is not a possible time in seconds")
     return int(seconds.scaleb(9).to_integral_value())
 
