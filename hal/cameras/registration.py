@@ -36,8 +36,11 @@ class DepthRegistration:
         width, height = self._colour.width, self._colour.height
         measured = np.flatnonzero(depth)
         units = depth.reshape(-1)[measured].astype(np.float32)
-        first_u, first_v, distance = self._project(self._first_corner[:, measured] * units)
-        end_u, end_v, _ = self._project(self._last_corner[:, measured] * units)
+        u0, v0, distance = self._project(self._first_corner[:, measured] * units)
+        u1, v1, _ = self._project(self._last_corner[:, measured] * units)
+        # A depth camera that is built in turned swaps the corners.
+        first_u, first_v = np.minimum(u0, u1), np.minimum(v0, v1)
+        end_u, end_v = np.maximum(u0, u1), np.maximum(v0, v1)
         image = np.full(width * height, _UNSEEN)
         for dv in range(self._reach):
             for du in range(self._reach):
