@@ -1,0 +1,78 @@
+"""What TumWriter writes, TumReplay reads back to the bit."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hal.cameras.tum_replay import TumReplay
+from hal.cameras.tum_writer import TumWriter
+from hal.errors import DeviceRefused
+from hal.types import CameraMount
+from tests.support.recordings import small_frame, write_recording
+
+
+def test_frames_times_and_calibration_come_back_as_written(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    frames = [
+        dataclasses.replace(
+            small_frame(number),
+            colour=rng.integers(0, 256, (48, 64, 3), dtype=np.uint8),
+            depth=rng.integers(0, 65536, (48, 64)).astype(np.uint16),
+            captured_ns=1305031236_733922123 + number * 33_333_333,
+        )
+        for number in range(3)
+    ]
+    with TumWriter(tmp_path) as writer:
+        for frame in frames:
+            writer.write(frame)
+    with TumReplay(tmp_path) as replay:
+        for frame in frames:
+            read = replay.read(0.0)
+            np.testing.assert_array_equal(read.colour, frame.colour)
+            np.testing.assert_array_equal(read.depth, frame.depth)
+            assert read.captured_ns == frame.captured_ns
+            assert read.depth_scale_m == frame.depth_scale_m
+            assert read.intrinsics == frame.intrinsics
+
+
+def test_the_mount_comes_back(tmp_path: Path) -> None:
+    mount = CameraMount(0.45, 0.0, 0.6, math.radians(4.0))
+    with TumWriter(tmp_path, mount) as writer:
+        writer.write(small_frame(0))
+    read = TumReplay(tmp_path).mount
+    assert read is not None
+    assert (read.forward_m, read.left_m, read.height_m) == (0.45, 0.0, 0.6)
+    assert read.pitch_rad == pytest.approx(mount.pitch_rad)
+
+
+def test_what_was_written_before_an_abrupt_end_can_be_read(tmp_path: Path) -> None:
+    writer = TumWriter(tmp_path)
+    with writer:
+        writer.write(small_frame(0))
+        assert TumReplay(tmp_path).frame_count == 1
+
+
+def test_a_folder_that_holds_a_recording_is_not_overwritten(tmp_path: Path) -> None:
+    write_recording(tmp_path)
+    with pytest.raises(DeviceRefused, match="holds a recording already"):
+        TumWriter(tmp_path).__enter__()
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DeviceRefused, match="cannot be written"):
+        TumWriter(tmp_path / "file" / "recording").__enter__()
+
+
+def test_time_must_go_on_and_the_camera_stay_the_same(tmp_path: Path) -> None:
+    with TumWriter(tmp_path) as writer:
+        writer.write(small_frame(1))
+        with pytest.raises(ValueError, match="not later"):
+            writer.write(small_frame(1))
+        with pytest.raises(ValueError, match="one camera"):
+            writer.write(dataclasses.replace(small_frame(2), depth_scale_m=0.0002))
