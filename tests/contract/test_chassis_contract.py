@@ -1,0 +1,291 @@
+"""What every chassis driver must do, over every link that its protocol has. One line for a new one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+
+import pytest
+
+from config.chassis import CanLinkConfig
+from hal.errors import HalError
+from hal.links.can_bus import open_can_link
+from hal.types import ChassisMode
+from tests.support.chassis_rig import MS, Rig, agilex_rig, can_link_config, roboclaw_rig
+
+UDP = CanLinkConfig(interface="udp_multicast", channel="239.74.163.91", port=43_191)
+
+
+def _open(name: str) -> AbstractContextManager[Rig]:
+    match name:
+        case "agilex-scripted":
+            return agilex_rig("scripted")
+        case "agilex-virtual":
+            return agilex_rig("bus", can_link_config())
+        case "agilex-udp":
+            try:
+                with open_can_link(UDP):
+                    return agilex_rig("bus", UDP)
+            except HalError as error:
+                pytest.skip(f"no multicast on this machine: {error}")
+        case "roboclaw-scripted":
+            return roboclaw_rig("scripted")
+        case "roboclaw-old-firmware":
+            return roboclaw_rig("scripted", status_bytes=2)
+        case "roboclaw-pty":
+            return roboclaw_rig("pty")
+    raise ValueError(name)
+
+
+@pytest.fixture(
+    params=[
+        "agilex-scripted",
+        "agilex-virtual",
+        "agilex-udp",
+        "roboclaw-scripted",
+        "roboclaw-old-firmware",
+        "roboclaw-pty",
+    ]
+)
+def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
+    with _open(request.param) as opened:
+        yield opened
+
+
+def test_nothing_is_known_before_the_base_speaks(rig: Rig) -> None:
+    state = rig.chassis.exchange(None, 1 * MS)
+    assert state.mode is ChassisMode.STANDBY
+    assert state.feedback_ns is None
+    assert math.isnan(state.v_mps)
+    assert math.isnan(state.w_radps)
+    assert math.isnan(state.battery_v)
+    assert state.stamp_ns == 1 * MS
+
+
+def test_does_not_move_without_consent(rig: Rig) -> None:
+    for _ in range(100):
+        state = rig.step(0.5, 0.2)
+        assert state.mode is ChassisMode.STANDBY
+        assert state.sent is None or (state.sent.v_mps, state.sent.w_radps) == (0.0, 0.0)
+    assert rig.plant.track_travel_m == (0.0, 0.0)
+
+
+def test_arms_and_stands_until_told(rig: Rig) -> None:
+    rig.run(0.5)
+    rig.arm()
+    state = rig.run(1.0)
+    assert (state.mode, state.reason) == (ChassisMode.ARMED, "armed")
+    assert rig.plant.track_travel_m == (0.0, 0.0)
+    assert state.battery_v > 20.0
+    assert state.faults == ()
+
+
+def test_does_not_arm_into_a_command(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.chassis.arm(rig.now_ns)
+    assert rig.run(0.8, 0.5).mode is ChassisMode.ARMING
+    assert rig.plant.track_travel_m == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("v_mps", "w_radps"), [(0.5, 0.0), (0.4, 0.3), (0.4, -0.3), (-0.2, 0.0), (0.0, 0.5)])
+def test_moves_as_commanded(rig: Rig, v_mps: float, w_radps: float) -> None:
+    """The true body makes the commanded twist, slip and all, and the driver reports it."""
+    rig.run(0.2)
+    rig.arm()
+    state = rig.run(2.0, v_mps, w_radps)
+    assert rig.plant.twist == pytest.approx((v_mps, w_radps), abs=0.002)
+    assert (state.v_mps, state.w_radps) == pytest.approx((v_mps, w_radps), abs=0.005)
+    assert state.feedback_ns is not None
+    assert rig.now_ns - state.feedback_ns <= 100 * MS
+
+
+def test_dead_reckoning_follows_the_true_body(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(2.0, 0.5)
+    rig.run(3.0, 0.5, 0.4)
+    rig.run(2.0, 0.5, -0.4)
+    state = rig.run(2.0)
+    true = rig.plant.pose
+    assert math.hypot(state.pose.x_m - true.x_m, state.pose.y_m - true.y_m) < 0.01
+    assert state.pose.heading_rad == pytest.approx(true.heading_rad, abs=0.01)
+    assert true.y_m > 0.5, "the path did turn"
+
+
+def test_says_what_was_sent(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    sent = [state.sent for _ in range(10) if (state := rig.step(0.3, 0.1)).sent is not None]
+    assert len(sent) >= 3, "at least every third period"
+    assert {(command.v_mps, command.w_radps) for command in sent if command is not None} == {(0.3, 0.1)}
+
+
+def test_too_fast_a_command_is_slowed_on_the_same_curve(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    sent = [state.sent for _ in range(10) if (state := rig.step(100.0, 50.0)).sent is not None]
+    assert sent
+    for command in sent:
+        assert command is not None
+        assert 0.1 < command.v_mps <= 3.0
+        assert command.w_radps == pytest.approx(0.5 * command.v_mps)
+
+
+def test_the_newest_command_arrives_within_three_periods(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(2.0, 0.5)
+    before_mps = rig.plant.twist[0]
+    rig.run(0.06, 0.0)
+    rig.step(0.0)
+    assert rig.plant.twist[0] < before_mps - 0.001, "it brakes"
+
+
+def test_stop_is_explicit_zero_then_standby_and_may_be_repeated(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    for _ in range(3):
+        rig.chassis.stop(rig.now_ns)
+    rig.coast(0.16)
+    assert rig.plant.twist[0] < 0.25, "braking by the explicit zero, well before the base's own time-out"
+    state = rig.run(2.0, 0.5)
+    assert rig.stands()
+    assert (state.mode, state.reason) == (ChassisMode.STANDBY, "stopped")
+
+
+def test_leaving_the_context_stops(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    rig.chassis.__exit__(None, None, None)
+    rig.coast(0.16)
+    assert rig.plant.twist[0] < 0.25
+
+
+def assert_latched(rig: Rig, mode: ChassisMode, word: str) -> None:
+    """The mode holds, nothing moves, whatever is commanded, until consent."""
+    assert rig.state.mode is mode
+    assert word in rig.state.reason
+    rig.run(1.5, 0.5)
+    travelled = rig.plant.track_travel_m
+    state = rig.run(1.0, 0.5)
+    assert state.mode is mode
+    assert rig.plant.track_travel_m == pytest.approx(travelled, abs=1e-4)
+    assert state.sent is None or (state.sent.v_mps, state.sent.w_radps) == (0.0, 0.0)
+
+
+def assert_drives_again_after_consent(rig: Rig) -> None:
+    rig.chassis.arm(rig.now_ns)
+    assert rig.state.mode in (ChassisMode.ESTOP, ChassisMode.LOST)
+    rig.step(0.5)
+    assert rig.state.mode in (ChassisMode.ESTOP, ChassisMode.LOST), "consent needs a zero command"
+    rig.step()
+    rig.arm()
+    rig.run(2.0, 0.3)
+    assert rig.plant.twist[0] == pytest.approx(0.3, abs=0.002)
+
+
+def test_emergency_stop_latches(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    rig.emulator.press_estop()
+    rig.run(0.5, 0.5)
+    rig.chassis.arm(rig.now_ns)
+    assert "arming refused" in rig.step(0.5).reason, "the button is still pressed"
+    rig.emulator.release_estop()
+    rig.run(0.3, 0.5)
+    assert_latched(rig, ChassisMode.ESTOP, "emergency stop")
+    assert_drives_again_after_consent(rig)
+
+
+def test_restart_of_the_base_latches(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    rig.emulator.restart()
+    rig.run(2.0, 0.5)
+    assert_latched(rig, ChassisMode.LOST, "feedback")
+    assert_drives_again_after_consent(rig)
+
+
+def test_frozen_base_latches(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    rig.emulator.freeze()
+    rig.run(rig.own_timeout_s + 1.0, 0.5)
+    assert rig.stands(), "its own time-out stopped the motors"
+    rig.emulator.thaw()
+    rig.run(0.3, 0.5)
+    assert_latched(rig, ChassisMode.LOST, "feedback")
+    assert_drives_again_after_consent(rig)
+
+
+def test_unplugging_latches_and_the_base_stops_by_itself(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    rig.plug.out = True
+    state = rig.step(0.5)
+    assert (state.mode, state.sent) == (ChassisMode.LOST, None)
+    rig.run(rig.own_timeout_s + 1.0, 0.5)
+    assert rig.stands()
+    rig.chassis.stop(rig.now_ns)
+    rig.plug.plug()
+    rig.run(1.0, 0.5)
+    assert_latched(rig, ChassisMode.LOST, "unplugged")
+    assert_drives_again_after_consent(rig)
+
+
+def test_stop_on_a_lost_link_raises_nothing(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(0.5, 0.5)
+    rig.plug.out = True
+    rig.chassis.stop(rig.now_ns)
+    rig.chassis.stop(rig.now_ns)
+    assert rig.step(0.5).mode is ChassisMode.LOST
+    rig.chassis.__exit__(None, None, None)
+
+
+def test_a_host_that_dies_leaves_a_base_that_stops(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    rig.coast(rig.own_timeout_s + 1.0)
+    assert rig.stands()
+
+
+def test_a_control_loop_that_hung_does_not_go_on_at_the_old_speed(rig: Rig) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    rig.coast(rig.own_timeout_s + 0.2)
+    rig.step(0.5)
+    assert rig.state.mode in (ChassisMode.ESTOP, ChassisMode.LOST)
+    rig.run(0.5, 0.5)
+    assert_latched(rig, rig.state.mode, "")
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_command_that_is_no_number_latches(rig: Rig, bad: float) -> None:
+    rig.run(0.2)
+    rig.arm()
+    rig.run(0.5, 0.5)
+    rig.step(bad)
+    assert_latched(rig, ChassisMode.ESTOP, "not finite")
+
+
+def test_two_lives_alike_to_the_bit() -> None:
+    """Same steps, same states: what lock-step simulation rests on."""
+
+    def life() -> list[str]:
+        with agilex_rig("bus", can_link_config()) as rig:
+            rig.run(0.2)
+            rig.arm()
+            return [repr(rig.step(0.004 * k, 0.002 * k)) for k in range(150)]
+
+    assert life() == life()

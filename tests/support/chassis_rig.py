@@ -1,0 +1,254 @@
+"""A chassis driver and the emulator at the other end of its link, stepped together in simulated time."""
+
+from __future__ import annotations
+
+import select
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Protocol, Self
+from uuid import uuid4
+
+from config.chassis import (
+    AgilexChassisConfig,
+    CanLinkConfig,
+    PlantConfig,
+    RoboclawChassisConfig,
+    SerialLinkConfig,
+)
+from hal.api import CanLink, Chassis, SerialLink
+from hal.chassis.agilex import AgilexChassis
+from hal.chassis.roboclaw import RoboclawChassis
+from hal.errors import LinkLost
+from hal.links.can_bus import CanBusLink
+from hal.links.pseudo_terminal import PseudoTerminal
+from hal.links.scripted import can_pair, serial_pair
+from hal.links.serial_port import SerialPortLink
+from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
+from sim.agilex_emulator import AgilexEmulator
+from sim.plant import TrackedPlant
+from sim.roboclaw_emulator import RoboclawEmulator
+
+MS = 1_000_000
+PERIOD_NS = 20 * MS
+SLIP_FACTOR = 1.1
+PLANT = PlantConfig(slip_factor=SLIP_FACTOR)
+COUNTS_PER_M = 20_000.0
+
+
+class Emulator(Protocol):
+    """What every chassis emulator can do."""
+
+    def advance_to(self, now_ns: int) -> None: ...
+    def press_estop(self) -> None: ...
+    def release_estop(self) -> None: ...
+    def restart(self) -> None: ...
+    def freeze(self) -> None: ...
+    def thaw(self) -> None: ...
+    @property
+    def plant(self) -> TrackedPlant: ...
+
+
+class _Plug:
+    """A plug in front of any link: out, every use raises LinkLost and nothing reaches it."""
+
+    def __init__(self) -> None:
+        self.out = False
+
+    def _check(self) -> None:
+        if self.out:
+            raise LinkLost("unplugged")
+
+
+class PluggedCan(_Plug):
+    """A CAN link that can be pulled out."""
+
+    def __init__(self, link: CanLink) -> None:
+        super().__init__()
+        self._link = link
+
+    def __enter__(self) -> Self:
+        self._link.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._link.__exit__(kind, error, trace)
+
+    def send(self, frame: CanFrame) -> None:
+        self._check()
+        self._link.send(frame)
+
+    def receive(self) -> CanFrame | None:
+        self._check()
+        return self._link.receive()
+
+    def plug(self) -> None:
+        while self._link.receive() is not None:
+            """What was sent meanwhile never got here."""
+        self.out = False
+
+
+class PluggedSerial(_Plug):
+    """A serial link that can be pulled out."""
+
+    def __init__(self, link: SerialLink) -> None:
+        super().__init__()
+        self._link = link
+
+    def __enter__(self) -> Self:
+        self._link.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._link.__exit__(kind, error, trace)
+
+    def write(self, data: bytes) -> None:
+        self._check()
+        self._link.write(data)
+
+    def read(self) -> bytes:
+        self._check()
+        return self._link.read()
+
+    def plug(self) -> None:
+        self._link.read()
+        self.out = False
+
+
+class SettledTerminal(PseudoTerminal):
+    """Waits until the kernel has carried the bytes over: simulated time must not outrun it."""
+
+    def write(self, data: bytes) -> None:
+        super().write(data)
+        select.select([self._slave], [], [], 1.0)
+
+    def wait_for_peer(self) -> None:
+        select.select([self._master], [], [], 1.0)
+
+
+class SettledPort(SerialPortLink):
+    """The same for the other direction."""
+
+    def __init__(self, config: SerialLinkConfig, terminal: SettledTerminal) -> None:
+        super().__init__(config)
+        self._terminal = terminal
+
+    def write(self, data: bytes) -> None:
+        super().write(data)
+        self._terminal.wait_for_peer()
+
+
+@dataclass
+class Rig:
+    """Emulator first, then the driver, every 20 ms: the order of the lock-step runner."""
+
+    chassis: Chassis
+    emulator: Emulator
+    plug: PluggedCan | PluggedSerial
+    own_timeout_s: float
+    now_ns: int = 0
+    state: ChassisState = field(init=False)
+
+    @property
+    def plant(self) -> TrackedPlant:
+        """The true body."""
+        return self.emulator.plant
+
+    def step(self, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
+        """One control period; without a speed the command is None."""
+        self.now_ns += PERIOD_NS
+        self.emulator.advance_to(self.now_ns)
+        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
+        self.state = self.chassis.exchange(command, self.now_ns)
+        return self.state
+
+    def run(self, seconds: float, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
+        """Many control periods."""
+        for _ in range(round(seconds * 50)):
+            self.step(v_mps, w_radps)
+        return self.state
+
+    def coast(self, seconds: float) -> None:
+        """The host is gone: only the emulator goes on."""
+        self.now_ns += round(seconds * 1e9)
+        self.emulator.advance_to(self.now_ns)
+
+    def arm(self) -> None:
+        """Consent, and wait until it is followed."""
+        self.chassis.arm(self.now_ns)
+        for _ in range(100):
+            if self.step().mode is ChassisMode.ARMED:
+                return
+        raise AssertionError(f"did not arm: {self.state.reason}")
+
+    def stands(self) -> bool:
+        """The true body does not move."""
+        v_mps, w_radps = self.plant.twist
+        return abs(v_mps) < 1e-3 and abs(w_radps) < 1e-3
+
+
+def can_link_config() -> CanLinkConfig:
+    """A virtual bus of its own."""
+    return CanLinkConfig(interface="virtual", channel=f"rig-{uuid4().hex}")
+
+
+def agilex_config(link: CanLinkConfig | None = None, **changes: object) -> AgilexChassisConfig:
+    """A BUNKER; the track width is known unless changed."""
+    values: dict[str, object] = {
+        "kind": "agilex",
+        "link": link or can_link_config(),
+        "track_width_m": PLANT.track_width_m,
+        "slip_factor": SLIP_FACTOR,
+    }
+    return AgilexChassisConfig.model_validate(values | changes)
+
+
+def roboclaw_config(**changes: object) -> RoboclawChassisConfig:
+    """A base with the plant's tracks."""
+    values: dict[str, object] = {
+        "kind": "roboclaw",
+        "link": SerialLinkConfig(url="loop://", baud=38_400),
+        "counts_per_m": COUNTS_PER_M,
+        "track_width_m": PLANT.track_width_m,
+        "slip_factor": SLIP_FACTOR,
+        "max_qpps": 40_000,
+        "accel_qpps2": 30_000,
+    }
+    return RoboclawChassisConfig.model_validate(values | changes)
+
+
+@contextmanager
+def agilex_rig(kind: str, link: CanLinkConfig | None = None) -> Iterator[Rig]:
+    """kind: "scripted", or "bus" for two python-can buses on link."""
+    config = agilex_config(link)
+    with ExitStack() as stack:
+        ends: tuple[CanLink, CanLink] = can_pair()
+        if kind == "bus":
+            ends = CanBusLink(config.link), CanBusLink(config.link)
+        plug = PluggedCan(ends[0])
+        emulator = stack.enter_context(AgilexEmulator(ends[1], TrackedPlant(PLANT)))
+        chassis = stack.enter_context(AgilexChassis(plug, config))
+        yield Rig(chassis, emulator, plug, own_timeout_s=0.5)
+
+
+@contextmanager
+def roboclaw_rig(kind: str, status_bytes: int = 4) -> Iterator[Rig]:
+    """kind: "scripted", or "pty" for pyserial on a pseudo-terminal."""
+    config = roboclaw_config()
+    with ExitStack() as stack:
+        ends: tuple[SerialLink, SerialLink] = serial_pair()
+        if kind == "pty":
+            terminal = SettledTerminal()
+            ends = SettledPort(SerialLinkConfig(url=terminal.path, baud=38_400), terminal), terminal
+        plug = PluggedSerial(ends[0])
+        plant = TrackedPlant(PLANT)
+        emulator = stack.enter_context(
+            RoboclawEmulator(ends[1], plant, counts_per_m=COUNTS_PER_M, status_bytes=status_bytes)
+        )
+        chassis = stack.enter_context(RoboclawChassis(plug, config))
+        yield Rig(chassis, emulator, plug, own_timeout_s=config.timeout_ms / 1000)

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from hal.chassis.command import CommandLimits, is_zero, zero
+from hal.types import Setpoint
+
+MS = 1_000_000
+LIMITS = CommandLimits(max_speed_mps=3.0, max_yaw_rate_radps=2.5, timeout_ns=200 * MS)
+
+
+def setpoint(v_mps: float, w_radps: float = 0.0, stamp_ns: int = 0) -> Setpoint:
+    return Setpoint(stamp_ns, v_mps, 0.1, w_radps)
+
+
+def test_zero_is_exactly_zero() -> None:
+    assert is_zero(None)
+    assert is_zero(zero(5))
+    assert is_zero(setpoint(-0.0))
+    assert not is_zero(setpoint(1e-9))
+    assert not is_zero(setpoint(0.0, 1e-9))
+    assert not is_zero(setpoint(math.nan))
+
+
+@pytest.mark.parametrize(
+    "bad", [setpoint(math.nan), setpoint(0.0, math.nan), setpoint(math.inf), setpoint(0, -math.inf)]
+)
+def test_a_command_that_is_not_finite_stops(bad: Setpoint) -> None:
+    assert "not finite" in LIMITS.objection(bad, 0)
+
+
+def test_a_command_older_than_the_limit_stops() -> None:
+    moving = setpoint(0.5)
+    assert LIMITS.objection(moving, 200 * MS) == ""
+    assert LIMITS.objection(moving, 240 * MS) == "the command is 240 ms old"
+    assert LIMITS.objection(setpoint(0.0), 10_000 * MS) == "", "an old zero is still a zero"
+    assert LIMITS.objection(None, 0) == ""
+
+
+def test_a_fast_command_is_slowed_on_the_same_curve() -> None:
+    fitted = LIMITS.fit(setpoint(6.0, 1.0, stamp_ns=7), 9)
+    assert (fitted.v_mps, fitted.w_radps) == pytest.approx((3.0, 0.5))
+    assert fitted.stamp_ns == 7
+
+
+def test_a_command_within_limits_is_left_alone() -> None:
+    slow = setpoint(1.2345, -0.3)
+    assert LIMITS.fit(slow, 0) is slow
+
+
+def test_no_command_is_an_explicit_zero() -> None:
+    assert LIMITS.fit(None, 9) == Setpoint(9, 0.0, 0.0, 0.0)
