@@ -9,54 +9,63 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.types import ColourImage
 from sim.raster import Drawn, Float32Image, LabelImage
 
 
-def smooth_edges(colour: ColourImage, labels: LabelImage, inverse_depth: Float32Image, drawn: Drawn) -> None:
-    """Blend in place along edges that are nearer to upright (across) and nearer to level (down)."""
-    edges = np.concatenate([np.zeros((1, 4, 3)), drawn.edges]).astype(np.float32)
+def smooth_edges(
+    colour: NDArray[np.uint8], labels: LabelImage, inverse_depth: Float32Image, drawn: Drawn
+) -> None:
+    """Blend colour (H, W, 4) in place, along upright edges between columns and level ones between rows."""
+    lines = np.zeros((3, 4, len(drawn) + 1), np.float32)
+    lines[:, :, 1:] = drawn.edges.transpose(2, 1, 0)
+    # Each edge is blended in one direction only: across it, as nearly as rows and columns go.
+    upright = np.abs(lines[0]) >= np.abs(lines[1])
     width = labels.shape[1]
-    flat_colour = colour.reshape(-1, 3)
+    pixels = colour.reshape(-1, 4).view(np.uint32)[:, 0]
     across = np.flatnonzero(labels[:, 1:] != labels[:, :-1])
     across += across // (width - 1)
     down = np.flatnonzero(labels[1:] != labels[:-1])
-    changes = [
-        _blend(flat_colour, labels, inverse_depth, edges, across, step=1),
-        _blend(flat_colour, labels, inverse_depth, edges, down, step=width),
-    ]
-    for pixels, values in changes:
-        flat_colour[pixels] = values
+    # An edge of the other direction never cuts: its slope is taken away.
+    columns = _blend(pixels, labels, inverse_depth, lines, np.where(upright, lines[0], 0.0), across, 1)
+    rows = _blend(pixels, labels, inverse_depth, lines, np.where(upright, 0.0, lines[1]), down, width)
+    for where, values in (columns, rows):
+        pixels[where] = values
 
 
 def _blend(
-    colour: ColourImage,
+    pixels: NDArray[np.uint32],
     labels: LabelImage,
     inverse_depth: Float32Image,
-    edges: NDArray[np.float32],
+    lines: NDArray[np.float32],
+    slopes: NDArray[np.float32],
     here: NDArray[np.intp],
-    step: int,
-) -> tuple[NDArray[np.intp], ColourImage]:
-    """New colours for the pixels that an edge between here and here + step crosses."""
-    width = labels.shape[1]
-    there = here + step
-    flat_labels, flat_depth = labels.ravel(), inverse_depth.ravel()
-    swap = flat_depth[there] > flat_depth[here]
-    inside, outside = np.where(swap, there, here), np.where(swap, here, there)
-    lines = edges[flat_labels[inside]]
-    v, u = np.divmod(inside, width)
-    at_inside = lines[:, :, 0] * u[:, None] + lines[:, :, 1] * v[:, None] + lines[:, :, 2]
-    slope = lines[:, :, 0] if step == 1 else lines[:, :, 1]
-    at_outside = at_inside + slope * np.where(swap, -1.0, 1.0).astype(np.float32)[:, None]
-    steep = np.abs(lines[:, :, 0]) >= np.abs(lines[:, :, 1])
-    crossing = (at_outside < 0.0) & (steep if step == 1 else ~steep)
-    reach = np.where(crossing, at_inside / np.where(crossing, at_inside - at_outside, 1.0), 2.0).min(axis=1)
-    found = (reach >= 0.0) & (reach <= 1.0)
-    inside, outside, reach = inside[found], outside[found], reach[found]
+    stride: int,
+) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
+    """New colours for the pixels that an edge cuts between here and the pixel stride further on."""
+    there = here + stride
+    flat_depth = inverse_depth.ravel()
+    behind = flat_depth[there] > flat_depth[here]
+    inside = np.where(behind, there, here)
+    label = labels.ravel()[inside]
+    v, u = np.divmod(inside.astype(np.int32), np.int32(labels.shape[1]))
+    slope = slopes[:, label] * np.where(behind, np.float32(-1.0), np.float32(1.0))
+    at_inside = lines[0][:, label] * u.astype(np.float32)
+    at_inside += lines[1][:, label] * v.astype(np.float32)
+    at_inside += lines[2][:, label]
+    crossing = (at_inside + slope < 0.0) & (slope < 0.0)
+    reaches = np.where(crossing, at_inside / np.where(crossing, -slope, 1.0), 2.0)
+    reach = np.minimum(np.minimum(reaches[0], reaches[1]), np.minimum(reaches[2], reaches[3]))
+    found = np.flatnonzero((reach >= 0.0) & (reach <= 1.0))
+    inside, reach = inside[found], reach[found]
+    outside = inside + np.where(behind[found], -stride, stride)
     # The edge lies reach pixels beyond the inner pixel's centre: it cuts that pixel or the next one.
     cuts_inner = reach < 0.5
     pixel = np.where(cuts_inner, inside, outside)
     partner = np.where(cuts_inner, outside, inside)
-    share = np.abs(reach - 0.5)[:, None]
-    mixed = colour[pixel] * (1.0 - share) + colour[partner] * share
-    return pixel, (mixed + 0.5).astype(np.uint8)
+    own, other = _channels(pixels, pixel), _channels(pixels, partner)
+    mixed = own + (other - own) * np.abs(reach - 0.5)[:, None] + 0.5
+    return pixel, mixed.astype(np.uint8).view(np.uint32)[:, 0]
+
+
+def _channels(pixels: NDArray[np.uint32], where: NDArray[np.intp]) -> NDArray[np.float32]:
+    return pixels[where][:, None].view(np.uint8).astype(np.float32)

@@ -13,6 +13,7 @@ from hal.clocks import NS_PER_S
 from hal.errors import FrameTimeout
 from hal.geometry import camera_in_floor
 from hal.types import CameraMount, ColourImage, Intrinsics, PlanarPose, Pose, RgbdFrame
+from sim.colour_noise import ColourSensor
 from sim.depth_noise import DEPTH_SCALE_M, DepthSensor
 from sim.render import Picture, Renderer
 from sim.world import World
@@ -42,6 +43,7 @@ class SimulatedCamera:
         self._intrinsics = intrinsics_of(config)
         self._renderer = Renderer(world, self._intrinsics)
         self._depth = DepthSensor(config, self._intrinsics, world.seed)
+        self._sensor = ColourSensor(self._intrinsics, world.seed)
         self._picture: Picture | None = None
 
     def __enter__(self) -> Self:
@@ -105,6 +107,8 @@ class SimulatedCamera:
         )
 
     def _colour(self, clean: ColourImage) -> ColourImage:
+        if self._config.colour_noise:
+            return self._sensor.expose(clean, self._index)
         return clean.copy()
 
 

@@ -46,9 +46,9 @@ class Drawn:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Spans:
-    """The columns first <= u < last that a face covers in each of its rows.
+    """The columns first <= u < last that each face covers in each of its rows, row after row.
 
-    Row v of face k is entry start[k] + v - row[k] of first and last; it has count[k] rows.
+    Face k's rows begin at entry start[k] and at row row[k]; there are count[k] of them.
     """
 
     start: NDArray[np.intp]
@@ -67,7 +67,7 @@ class Rasteriser:
         self.inverse_depth: Float32Image = np.zeros(shape, np.float32)
         self.labels: LabelImage = np.zeros(shape, np.uint16)
         self._columns = np.arange(intrinsics.width, dtype=np.int16)[None, :]
-        self._columns_f = np.arange(intrinsics.width, dtype=np.float32)[None, :]
+        self._steps = np.arange(intrinsics.width, dtype=np.float32)[None, :]
         self._plane = np.empty(shape[0] * shape[1], np.float32)
         self._label = np.empty(shape[0] * shape[1], np.uint16)
         self._inside = np.empty(shape[0] * shape[1], np.bool_)
@@ -83,8 +83,7 @@ class Rasteriser:
         self.labels.fill(NOTHING)
         face, corners = self._facing(geometry, camera)
         drawn, spans = self._prepare(face, corners)
-        for number in range(len(drawn)):
-            self._draw_face(number, drawn, spans)
+        self._draw_faces(drawn, spans)
         return drawn
 
     def _facing(self, geometry: Geometry, camera: Pose) -> tuple[NDArray[np.intp], FloatArray]:
@@ -104,75 +103,115 @@ class Rasteriser:
         return facing[~outside], corners[~outside]
 
     def _prepare(self, face: NDArray[np.intp], corners: FloatArray) -> tuple[Drawn, _Spans]:
-        edges = np.cross(corners, np.roll(corners, -1, axis=1)) @ self._pixel_to_ray
-        origin = corners[:, 0]
-        frame = np.stack([corners[:, 1] - origin, corners[:, 3] - origin, origin], axis=2)
-        to_plane = np.linalg.inv(frame) @ self._pixel_to_ray
-        spans = self._spans(_half_planes(edges, to_plane[:, 2]), *self._rows(corners))
+        spans = self._spans(_clip_near(corners))
         bounds = _bounds(spans)
         keep = bounds[:, 2] > 0
         seen = _Spans(spans.start[keep], spans.row[keep], spans.count[keep], spans.first, spans.last)
-        return Drawn(face[keep], edges[keep], to_plane[keep], bounds[keep]), seen
+        corners = corners[keep]
+        edges = np.cross(corners, np.roll(corners, -1, axis=1)) @ self._pixel_to_ray
+        to_plane = np.linalg.inv(texture_frames(corners)) @ self._pixel_to_ray
+        return Drawn(face[keep], edges, to_plane, bounds[keep]), seen
 
-    def _rows(self, corners: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """The first row that each face may touch, and how many; all rows where it passes beside the eye."""
+    def _spans(self, polygons: FloatArray) -> _Spans:
+        """Walk down the edges of convex polygons (M, K, 3), clockwise as seen, all ahead of the eye."""
         k = self.intrinsics
-        z = corners[:, :, 2]
-        ahead = z.min(axis=1) > NEAR_M
-        v = corners[:, :, 1] * k.fy / np.where(ahead[:, None], z, 1.0) + k.cy
-        first = np.where(ahead, np.ceil(v.min(axis=1) - 1e-6), 0.0).clip(0, k.height)
-        last = np.where(ahead, np.floor(v.max(axis=1) + 1e-6) + 1.0, k.height).clip(0, k.height)
-        return first.astype(np.intp), np.maximum(last - first, 0.0).astype(np.intp)
-
-    def _spans(self, lines: FloatArray, row: NDArray[np.intp], count: NDArray[np.intp]) -> _Spans:
-        """Cut every row by half planes (M, L, 3): inside is where lines @ (u, v, 1) >= 0 for all L."""
-        width = self.intrinsics.width
-        owner = np.repeat(np.arange(len(count)), count)
+        v = polygons[:, :, 1] * (k.fy / polygons[:, :, 2]) + k.cy
+        top = np.ceil(v).clip(0, k.height).astype(np.intp)
+        row = top.min(axis=1)
+        count = top.max(axis=1) - row
         start = np.cumsum(count) - count
-        rows = np.arange(len(owner)) + (row - start)[owner]
-        a, b, c = (np.ascontiguousarray(lines[:, :, i].T) for i in range(3))
-        level = a == 0.0
-        inverse = -1.0 / np.where(level, 1.0, a)
-        crossing = (b * inverse)[:, owner] * rows + (c * inverse)[:, owner]
-        bound = np.ceil(crossing.clip(-1.0, width))
-        first = np.where((a > 0.0)[:, owner], bound, 0.0).max(axis=0, initial=0.0)
-        last = np.where((a < 0.0)[:, owner], bound, width).min(axis=0, initial=width)
-        for line in np.flatnonzero(level.any(axis=1)):
-            last[level[line, owner] & (b[line, owner] * rows + c[line, owner] < 0.0)] = 0.0
-        last[last <= first] = 0.0
-        return _Spans(start, row, count, first.astype(np.int16), last.astype(np.int16))
+        first = np.zeros(int(count.sum()), np.int16)
+        last = np.zeros(len(first), np.int16)
+        lines = np.cross(polygons, np.roll(polygons, -1, axis=1)) @ self._pixel_to_ray
+        below = np.roll(top, -1, axis=1)
+        # Clockwise on a screen whose v points down: edges that go down bound on the right.
+        for side, from_row, to_row in ((last, top, below), (first, below, top)):
+            owner, edge = np.nonzero(to_row > from_row)
+            length = (to_row - from_row)[owner, edge]
+            begin = np.cumsum(length) - length
+            step = np.arange(int(length.sum()))
+            a, b, c = lines[owner, edge].T
+            rows = step + np.repeat(from_row[owner, edge] - begin, length)
+            u = np.repeat(-b / a, length) * rows + np.repeat(-c / a, length)
+            entry = step + np.repeat((start - row)[owner] + from_row[owner, edge] - begin, length)
+            side[entry] = np.ceil(u).clip(0, k.width)
+        return _Spans(start, row, count, first, last)
 
-    def _draw_face(self, number: int, drawn: Drawn, spans: _Spans) -> None:
-        u0, v0, u1, v1 = drawn.bounds[number].tolist()
-        height, width = v1 - v0, u1 - u0
-        size, shape = height * width, (height, width)
-        slope_u, slope_v, offset = drawn.to_plane[number, 2].tolist()
-        begin = int(spans.start[number]) + v0 - int(spans.row[number])
-        columns = self._columns[:, u0:u1]
-        inside = self._inside[:size].reshape(shape)
-        other = self._other[:size].reshape(shape)
-        np.greater_equal(columns, spans.first[begin : begin + height, None], out=inside)
-        np.less(columns, spans.last[begin : begin + height, None], out=other)
-        np.logical_and(inside, other, out=inside)
-        plane = self._plane[:size].reshape(shape)
-        along_v = (slope_v * np.arange(v0, v1) + offset).astype(np.float32)
-        np.add(self._columns_f[:, u0:u1] * np.float32(slope_u), along_v[:, None], out=plane)
-        nearest = self.inverse_depth[v0:v1, u0:u1]
-        np.greater(plane, nearest, out=other)
-        np.logical_and(inside, other, out=inside)
-        mask = inside.view(np.uint8)
-        cv2.copyTo(plane, mask, nearest)
-        label = self._label[:size].reshape(shape)
-        label.fill(number + 1)
-        cv2.copyTo(label, mask, self.labels[v0:v1, u0:u1])
+    def _draw_faces(self, drawn: Drawn, spans: _Spans) -> None:
+        """Draw face after face where it is nearer than what is there already."""
+        columns, steps = self._columns, self._steps
+        slopes = drawn.to_plane[:, 2, 0].astype(np.float32)
+        at_left = _inverse_depth_at_left(drawn, spans)
+        begins = (spans.start - spans.row + drawn.bounds[:, 1]).tolist()
+        first, last = spans.first[:, None], spans.last[:, None]
+        for number, (u0, v0, u1, v1) in enumerate(drawn.bounds.tolist()):
+            height, width = v1 - v0, u1 - u0
+            size, shape = height * width, (height, width)
+            rows = slice(begins[number], begins[number] + height)
+            window = slice(v0, v1), slice(u0, u1)
+            inside = self._inside[:size].reshape(shape)
+            other = self._other[:size].reshape(shape)
+            plane = self._plane[:size].reshape(shape)
+            label = self._label[:size].reshape(shape)
+            nearest = self.inverse_depth[window]
+            np.add(steps[:, :width] * slopes[number], at_left[rows], out=plane)
+            np.greater(plane, nearest, out=inside)
+            np.greater_equal(columns[:, u0:u1], first[rows], out=other)
+            np.logical_and(inside, other, out=inside)
+            np.less(columns[:, u0:u1], last[rows], out=other)
+            np.logical_and(inside, other, out=inside)
+            mask = inside.view(np.uint8)
+            cv2.copyTo(plane, mask, nearest)
+            label.fill(number + 1)
+            cv2.copyTo(label, mask, self.labels[window])
 
 
-def _half_planes(edges: FloatArray, inverse_depth: FloatArray) -> FloatArray:
-    """The four edges, and the planes before NEAR_M and beyond FAR_M: (M, 6, 3)."""
-    near, far = -inverse_depth, inverse_depth.copy()
-    near[:, 2] += 1.0 / NEAR_M
-    far[:, 2] -= 1.0 / FAR_M
-    return np.concatenate([edges, near[:, None], far[:, None]], axis=1)
+def _inverse_depth_at_left(drawn: Drawn, spans: _Spans) -> Float32Image:
+    """Each face's inverse depth in each of its rows, in the first column of its bounds: (R, 1).
+
+    Counting columns from there keeps the numbers that are added in float32 small.
+    """
+    plane = drawn.to_plane[:, 2]
+    # Entries of faces that were dropped stay in the spans; only those of the kept ones are filled.
+    values = np.zeros(len(spans.first))
+    owner = np.repeat(np.arange(len(drawn)), spans.count)
+    step = np.arange(len(owner)) - np.repeat(np.cumsum(spans.count) - spans.count, spans.count)
+    at_top = plane[:, 2] + plane[:, 0] * drawn.bounds[:, 0] + plane[:, 1] * spans.row
+    values[spans.start[owner] + step] = at_top[owner] + plane[owner, 1] * step
+    return values.astype(np.float32)[:, None]
+
+
+def texture_frames(corners: FloatArray) -> FloatArray:
+    """Columns: the texture's u axis, its v axis, its origin (M, 3, 3).
+
+    Of a trapezium, the longer of the upper and lower edge spans the texture.
+    """
+    upper, lower = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 3]
+    longer = (upper * upper).sum(axis=1) >= (lower * lower).sum(axis=1)
+    along_u = np.where(longer[:, None], upper, lower)
+    middle_up = 0.5 * (corners[:, 0] + corners[:, 1])
+    along_v = 0.5 * (corners[:, 2] + corners[:, 3]) - middle_up
+    return np.stack([along_u, along_v, middle_up - 0.5 * along_u], axis=2)
+
+
+def _clip_near(corners: FloatArray) -> FloatArray:
+    """Cut four-cornered faces at NEAR_M: polygons (M, 5, 3), a corner repeated where fewer will do."""
+    polygons = np.concatenate([corners, corners[:, 3:]], axis=1)
+    crossing = np.flatnonzero(corners[:, :, 2].min(axis=1) < NEAR_M)
+    if len(crossing) == 0:
+        return polygons
+    here = corners[crossing]
+    after = np.roll(here, -1, axis=1)
+    ahead = here[:, :, 2] >= NEAR_M
+    cuts = ahead != np.roll(ahead, -1, axis=1)
+    depth = np.where(cuts, after[:, :, 2] - here[:, :, 2], 1.0)
+    cut = here + ((NEAR_M - here[:, :, 2]) / depth)[:, :, None] * (after - here)
+    points = np.stack([here, cut], axis=2).reshape(len(here), 8, 3)
+    used = np.stack([ahead, cuts], axis=2).reshape(len(here), 8)
+    order = np.argsort(~used, axis=1, kind="stable")[:, :5]
+    order = np.where(np.arange(5) < used.sum(axis=1, keepdims=True), order, order[:, :1])
+    polygons[crossing] = np.take_along_axis(points, order[:, :, None], axis=1)
+    return polygons
 
 
 def _bounds(spans: _Spans) -> NDArray[np.int32]:
@@ -181,11 +220,11 @@ def _bounds(spans: _Spans) -> NDArray[np.int32]:
     some = np.flatnonzero(spans.count)
     if len(some) == 0:
         return bounds
-    starts, empty = spans.start[some], spans.last == 0
+    starts = spans.start[some]
+    empty = spans.last <= spans.first
     rows = np.arange(len(empty)) + np.repeat((spans.row - spans.start)[some], spans.count[some])
-    high = np.int32(1 << 20)
-    bounds[some, 0] = np.minimum.reduceat(np.where(empty, high, spans.first), starts)
-    bounds[some, 1] = np.minimum.reduceat(np.where(empty, high, rows), starts)
-    bounds[some, 2] = np.maximum.reduceat(spans.last, starts)
+    bounds[some, 0] = np.minimum.reduceat(np.where(empty, np.int16(32767), spans.first), starts)
+    bounds[some, 1] = np.minimum.reduceat(np.where(empty, 1 << 20, rows), starts)
+    bounds[some, 2] = np.maximum.reduceat(np.where(empty, np.int16(0), spans.last), starts)
     bounds[some, 3] = np.maximum.reduceat(np.where(empty, 0, rows + 1), starts)
     return bounds

@@ -7,56 +7,80 @@ drawing, or sizes such as ``facade/1/5.40x3.20/2.70/3``).
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from hal.types import ColourImage
+from hal.types import ColourImage, FloatArray
 from sim import paint
-
-Painter = Callable[[np.random.Generator, tuple[str, ...]], ColourImage]
 
 # Two steps of the pyramid halve a side: fine enough that a change of step is not seen.
 STEPS_PER_OCTAVE = 2
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """A texture ready for warping: (H, W, 4) uint8 with a rim of one texel around whole tiles.
+
+    from_tiles (3, 3): from texture coordinates (a tile is 1 wide and 1 high) to the image's pixels.
+    """
+
+    image: NDArray[np.uint8]
+    from_tiles: FloatArray
+
+
 class TextureStore:
-    """Textures by key, each drawn once, and shrunk by any pair of steps along u and v when asked for.
+    """Textures by key, each drawn once; shrunk by any pair of steps along u and v, and tiled, when asked for.
 
     Shrinking each axis by itself keeps a floor seen at a shallow angle sharp across and calm along.
     """
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._shrunk: dict[tuple[str, int, int], ColourImage] = {}
+        self._base: dict[str, ColourImage] = {}
+        self._sheets: dict[tuple[str, int, int, int, int], Sheet] = {}
 
     def base(self, key: str) -> ColourImage:
         """The texture itself, (H, W, 3) uint8, BGR. Raises KeyError for a kind that nobody paints."""
-        return self.shrunk(key, 0, 0)
-
-    def shrunk(self, key: str, step_u: int, step_v: int) -> ColourImage:
-        """The texture with its width divided by 2**(step_u / 2) and its height by 2**(step_v / 2)."""
-        image = self._shrunk.get((key, step_u, step_v))
+        image = self._base.get(key)
         if image is None:
-            image = self._draw(key) if step_u == step_v == 0 else self._shrink(key, step_u, step_v)
-            self._shrunk[(key, step_u, step_v)] = image
+            kind, *variant = key.split("/")
+            generator = np.random.default_rng((self._seed, zlib.crc32(key.encode())))
+            image = self._base[key] = paint.PAINTERS[kind](generator, tuple(variant))
         return image
 
-    def _draw(self, key: str) -> ColourImage:
-        kind, *variant = key.split("/")
-        generator = np.random.default_rng((self._seed, zlib.crc32(key.encode())))
-        return paint.PAINTERS[kind](generator, tuple(variant))
+    def size(self, key: str) -> tuple[int, int]:
+        """Width and height of the texture itself."""
+        height, width = self.base(key).shape[:2]
+        return width, height
 
-    def _shrink(self, key: str, step_u: int, step_v: int) -> ColourImage:
-        image = self.base(key)
+    def sheet(self, key: str, step_u: int, step_v: int, tiles_u: int, tiles_v: int) -> Sheet:
+        """tiles_u x tiles_v copies, shrunk by 2**(step_u / 2) along u and by 2**(step_v / 2) along v."""
+        name = (key, step_u, step_v, tiles_u, tiles_v)
+        sheet = self._sheets.get(name)
+        if sheet is None:
+            sheet = self._sheets[name] = self._make(*name)
+        return sheet
+
+    def _make(self, key: str, step_u: int, step_v: int, tiles_u: int, tiles_v: int) -> Sheet:
+        image = self._shrink(self.base(key), step_u, step_v)
+        height, width = image.shape[:2]
+        tiled = np.tile(image, (tiles_v, tiles_u, 1))
+        # A single tile ends at its face's edge; several are a cut-out of a pattern that goes on.
+        border = cv2.BORDER_REPLICATE if tiles_u == tiles_v == 1 else cv2.BORDER_WRAP
+        rimmed = cv2.copyMakeBorder(cv2.cvtColor(tiled, cv2.COLOR_BGR2BGRA), 1, 1, 1, 1, border)
+        from_tiles = np.array([[width, 0.0, 0.5], [0.0, height, 0.5], [0.0, 0.0, 1.0]])
+        return Sheet(np.asarray(rimmed, dtype=np.uint8), from_tiles)
+
+    def _shrink(self, image: ColourImage, step_u: int, step_v: int) -> ColourImage:
+        if step_u == step_v == 0:
+            return image
         height, width = image.shape[:2]
         size = (
             max(1, round(width / 2.0 ** (step_u / STEPS_PER_OCTAVE))),
             max(1, round(height / 2.0 ** (step_v / STEPS_PER_OCTAVE))),
         )
         # An area mean needs no anti-aliasing filter in front of it.
-        shrunk: ColourImage = np.asarray(
-            cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8
-        )
-        return shrunk
+        return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

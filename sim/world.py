@@ -74,6 +74,7 @@ class World:
         )
         still = [body for body in self._bodies if body.spec.motion is None]
         self._movers = [body for body in self._bodies if body.spec.motion is not None]
+        self._still_states = {body.id: _state(body, 0.0) for body in still}
         parts = [(BUILDING_ID, build_room(scenario.room))]
         parts.extend((body.id, faces) for body in still for faces in _placed_parts(body, 0.0))
         fixed = join([faces for _, faces in parts])
@@ -109,7 +110,8 @@ class World:
 
     def bodies(self, t_s: float) -> tuple[BodyState, ...]:
         """Every body at t_s, in the scenario's order."""
-        return tuple(_state(body, t_s) for body in self._bodies)
+        still = self._still_states
+        return tuple(still.get(body.id) or _state(body, t_s) for body in self._bodies)
 
     def _part_poses(self, t_s: float) -> tuple[FloatArray, FloatArray]:
         rotations, translations = [], []

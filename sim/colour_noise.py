@@ -1,0 +1,50 @@
+"""What a small colour sensor adds to a clean picture: read noise everywhere, shot noise with the light."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import ColourImage, Intrinsics
+
+_READ_GREY = 1.0  # standard deviation in the dark, grey levels
+_SHOT_GREY = 0.02  # variance per grey level of light
+_MARGIN_PX = 96  # room to shift the noise field for every frame
+_BLUR_PX = 0.45  # demosaicing spreads a pixel's noise a little
+
+# Fixed point: sigma and noise are kept in these fractions, so that the sum stays within 16 bits.
+_SIGMA_STEPS = 16
+_NOISE_STEPS = 32
+
+
+class ColourSensor:
+    """The same seed and frame number give the same bytes."""
+
+    def __init__(self, intrinsics: Intrinsics, seed: int) -> None:
+        self._seed = seed
+        self._shape = (intrinsics.height, intrinsics.width)
+        generator = np.random.default_rng((seed, 201))
+        white = generator.standard_normal((self._shape[0] + _MARGIN_PX, self._shape[1] + _MARGIN_PX, 3))
+        smooth = np.asarray(cv2.GaussianBlur(white.astype(np.float32), (0, 0), _BLUR_PX))
+        unit = smooth / smooth.std()
+        self._field: NDArray[np.int16] = np.rint(unit * _NOISE_STEPS).astype(np.int16)
+        sigma = np.sqrt(_READ_GREY**2 + _SHOT_GREY * np.arange(256))
+        self._sigma = np.rint(sigma * _SIGMA_STEPS).astype(np.uint8)
+        self._noise = np.empty((*self._shape, 3), np.int16)
+
+    def expose(self, clean: ColourImage, frame: int) -> ColourImage:
+        """A new image (H, W, 3) uint8: clean, with this frame's noise."""
+        generator = np.random.default_rng((self._seed, 202, frame))
+        top, left = (int(shift) for shift in generator.integers(_MARGIN_PX, size=2))
+        field = self._field[top : top + self._shape[0], left : left + self._shape[1]]
+        np.multiply(cv2.LUT(clean, self._sigma), field, out=self._noise)
+        # Half a step first: shifting rounds down, and the mean must stay.
+        np.add(self._noise, _SIGMA_STEPS * _NOISE_STEPS // 2, out=self._noise)
+        np.right_shift(self._noise, (_SIGMA_STEPS * _NOISE_STEPS).bit_length() - 1, out=self._noise)
+        return np.asarray(cv2.add(clean, self._noise, dtype=cv2.CV_8U), dtype=np.uint8)
+
+
+def expected_sigma(grey: float) -> float:
+    """Standard deviation in grey levels at a clean value of grey, before rounding to bytes."""
+    return float(np.sqrt(_READ_GREY**2 + _SHOT_GREY * grey))

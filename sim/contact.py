@@ -1,0 +1,101 @@
+"""Exact clearance between the robot's rectangle and everything at its height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.robot import Body
+from hal.geometry import body_in_floor
+from hal.types import FloatArray, PlanarPose
+from sim.world import BodyState, World
+
+BUILDING = "building"
+
+
+@dataclass(frozen=True, slots=True)
+class Clearance:
+    """name of the body that is nearest; distance_m to it: 0 or less is contact, -depth of overlap."""
+
+    name: str
+    distance_m: float
+
+    @property
+    def touches(self) -> bool:
+        """Whether anything was touched."""
+        return self.distance_m <= 0.0
+
+
+def robot_footprint(body: Body, pose: PlanarPose) -> FloatArray:
+    """The robot's rectangle (4, 2) on the floor, counter-clockwise, when its turning centre is at pose."""
+    front, rear, half = body.front_m, -body.rear_m, 0.5 * body.width_m
+    corners = np.array([[front, -half, 0.0], [front, half, 0.0], [rear, half, 0.0], [rear, -half, 0.0]])
+    return body_in_floor(pose).apply(corners)[:, :2]
+
+
+def nearest_body(world: World, body: Body, pose: PlanarPose, t_s: float) -> Clearance:
+    """What is closest to the robot at t_s, the building's walls included.
+
+    Bodies that hang above the robot or that it may drive over do not count.
+    """
+    robot = robot_footprint(body, pose)
+    best = Clearance(BUILDING, _room_clearance(world, robot))
+    centre = robot.mean(axis=0)
+    reach = _radius(robot, centre)
+    for state in world.bodies(t_s):
+        if not overlaps_height(body, state):
+            continue
+        middle = state.footprint_m.mean(axis=0)
+        # No two circles around them are nearer than that: skip the exact test.
+        gap = float(np.hypot(*(middle - centre))) - reach - _radius(state.footprint_m, middle)
+        if gap < best.distance_m:
+            distance = polygon_distance(robot, state.footprint_m)
+            if distance < best.distance_m:
+                best = Clearance(state.name, distance)
+    return best
+
+
+def overlaps_height(body: Body, state: BodyState) -> bool:
+    """Whether a body stands in the robot's way: neither all above it nor low enough to be driven over."""
+    return state.z_m[0] < body.height_m and state.z_m[1] > body.clearance_m
+
+
+def polygon_distance(a: FloatArray, b: FloatArray) -> float:
+    """Distance between convex polygons (K, 2) and (L, 2), counter-clockwise.
+
+    Where they overlap: minus the shortest way that separates them (separating axis theorem).
+    """
+    separation = max(_separation(a, b), _separation(b, a))
+    if separation <= 0.0:
+        return separation
+    return min(_corner_distance(a, b), _corner_distance(b, a))
+
+
+def _separation(a: FloatArray, b: FloatArray) -> float:
+    """The largest gap over the directions of a's outward normals; negative: overlap in all of them."""
+    edges = np.roll(a, -1, axis=0) - a
+    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    gaps = (b @ normals.T).min(axis=0) - (a * normals).sum(axis=1)
+    return float(gaps.max())
+
+
+def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
+    """The shortest way from any corner (K, 2) to any edge of polygon (L, 2)."""
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    to_corner = corners[:, None] - polygon[None]
+    share = np.clip((to_corner * edge).sum(axis=2) / (edge * edge).sum(axis=1), 0.0, 1.0)
+    away = to_corner - share[:, :, None] * edge
+    return float(np.sqrt((away * away).sum(axis=2).min()))
+
+
+def _radius(polygon: FloatArray, centre: FloatArray) -> float:
+    return float(np.sqrt(((polygon - centre) ** 2).sum(axis=1).max()))
+
+
+def _room_clearance(world: World, robot: FloatArray) -> float:
+    room = world.scenario.room
+    low = robot.min(axis=0) - np.array([room.x_min_m, room.y_min_m])
+    high = np.array([room.x_max_m, room.y_max_m]) - robot.max(axis=0)
+    return float(min(low.min(), high.min()))
