@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,12 +40,17 @@ class GroundTruth:
         self._intrinsics = intrinsics
         self._alone = Rasteriser(intrinsics)
 
-    def bodies(self, picture: Picture) -> tuple[BodyTruth, ...]:
-        """Every body with at least one visible pixel, in the order of their ids."""
+    def bodies(self, picture: Picture, only: Collection[int] | None = None) -> tuple[BodyTruth, ...]:
+        """Every body with at least one visible pixel, in the order of their ids.
+
+        only: look at the bodies with these ids alone, which takes a fraction of the time.
+        """
         mask = picture.instance_mask()
         points = self._points(picture)
         found = []
         for state in self._world.bodies(picture.t_s):
+            if only is not None and state.id not in only:
+                continue
             v, u = np.nonzero(mask == state.id)
             if len(u) == 0:
                 continue
