@@ -1,0 +1,1 @@
+"""Measure the program on this machine: medians and ratios of one run."""

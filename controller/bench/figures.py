@@ -1,0 +1,47 @@
+"""What many measurements of one thing come down to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+NS_PER_MS = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Durations:
+    """Median and 99th percentile of count durations, in milliseconds."""
+
+    count: int
+    median_ms: float
+    p99_ms: float
+
+    @classmethod
+    def of(cls, samples_ns: Sequence[int]) -> Self:
+        """Raises ValueError when nothing was measured: a duration that is not known is not zero."""
+        if not samples_ns:
+            raise ValueError("nothing was measured")
+        values_ms = np.asarray(samples_ns, dtype=float) / NS_PER_MS
+        return cls(len(samples_ns), float(np.median(values_ms)), float(np.percentile(values_ms, 99)))
+
+    def as_json(self) -> dict[str, float]:
+        """Plain values."""
+        return {
+            "count": self.count,
+            "median_ms": round(self.median_ms, 4),
+            "p99_ms": round(self.p99_ms, 4),
+        }
+
+
+def median_ratio(numerators_ns: Sequence[int], denominators_ns: Sequence[int]) -> float:
+    """Median of the ratios of pairs that were measured side by side.
+
+    What slows the machine down for a moment hits both of a pair, so this is steadier than the ratio
+    of two medians. A pair whose denominator is zero says nothing and is left out; NaN if no pair is left.
+    """
+    pairs = zip(numerators_ns, denominators_ns, strict=True)
+    ratios = [above / below for above, below in pairs if below > 0]
+    return float(np.median(ratios)) if ratios else float("nan")

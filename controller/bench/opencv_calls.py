@@ -1,0 +1,99 @@
+"""Which OpenCV functions a package calls, with what, and how long they take when nothing is around them.
+
+The modules of the package see a stand-in for cv2 for a while; cv2 itself stays as it is, so OpenCV at
+work elsewhere (a thread that decodes images, the renderer) is not counted.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import cv2
+
+OnCall = Callable[[str, Callable[..., Any], tuple[Any, ...], dict[str, Any]], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """One call of cv2.<name>. The arguments are copies of what they were before the call."""
+
+    name: str
+    args: tuple[Any, ...]
+    kwargs: dict[str, Any]
+
+    def fresh(self) -> Call:
+        """The same call with arguments of its own: some functions write into theirs."""
+        args, kwargs = copy.deepcopy((self.args, self.kwargs))
+        return Call(self.name, args, kwargs)
+
+    def execute(self) -> Any:
+        """Do it, once: what the function writes into the arguments stays there."""
+        return getattr(cv2, self.name)(*self.args, **self.kwargs)
+
+
+class OpenCvStandIn:
+    """Looks like cv2; hands every call of a function to on_call, which must make it.
+
+    Classes and constants pass through. Methods of OpenCV objects are not seen.
+    """
+
+    def __init__(self, on_call: OnCall) -> None:
+        self._on_call = on_call
+
+    def __getattr__(self, name: str) -> Any:
+        real = getattr(cv2, name)
+        if not callable(real) or isinstance(real, type):
+            return real
+
+        def caught(*args: Any, **kwargs: Any) -> Any:
+            return self._on_call(name, real, args, kwargs)
+
+        setattr(self, name, caught)
+        return caught
+
+
+@contextmanager
+def stand_in_for_cv2(modules: Sequence[ModuleType], on_call: OnCall) -> Iterator[None]:
+    """While inside, modules that have imported cv2 call on_call instead."""
+    users = [module for module in modules if getattr(module, "cv2", None) is cv2]
+    stand_in = OpenCvStandIn(on_call)
+    for module in users:
+        vars(module)["cv2"] = stand_in
+    try:
+        yield
+    finally:
+        for module in users:
+            vars(module)["cv2"] = cv2
+
+
+@contextmanager
+def recorded_calls(modules: Sequence[ModuleType]) -> Iterator[list[Call]]:
+    """While inside, the OpenCV calls that modules make gather in the list, in order."""
+    calls: list[Call] = []
+
+    def record(name: str, real: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+        calls.append(Call(name, args, kwargs).fresh())
+        return real(*args, **kwargs)
+
+    with stand_in_for_cv2(modules, record):
+        yield calls
+
+
+def time_bare(calls: Sequence[Call], stopwatch_ns: Callable[[], int]) -> dict[str, int]:
+    """Nanoseconds by function name of executing calls one after the other, with nothing in between.
+
+    Copying the arguments and releasing the results' names is not counted; freeing the results is.
+    """
+    spent_ns: dict[str, int] = {}
+    for call in [call.fresh() for call in calls]:
+        function, args, kwargs = getattr(cv2, call.name), call.args, call.kwargs
+        started_ns = stopwatch_ns()
+        function(*args, **kwargs)
+        ended_ns = stopwatch_ns()
+        spent_ns[call.name] = spent_ns.get(call.name, 0) + ended_ns - started_ns
+    return spent_ns

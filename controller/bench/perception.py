@@ -1,0 +1,177 @@
+"""Perception beside the bare OpenCV calls that it makes on the same images, and where its time goes."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from types import ModuleType
+
+import vision
+from controller.bench.figures import Durations, median_ratio
+from controller.bench.opencv_calls import recorded_calls, time_bare
+from controller.bench.reel import Reel, Tick
+from controller.bench.stages import Spent, StageFigures, StageWatch, modules_of, summarise, watched
+from hal.types import Pose, RgbdFrame
+from vision.perception import Perception
+
+MakePerception = Callable[[], Perception]
+
+
+@dataclass
+class SideBySide:
+    """Nanoseconds of each frame, the same index for the same frame: perception, and OpenCV alone.
+
+    opencv_ns: by function name. first_ns: the first frame of each pass, which is in none of the other lists.
+    """
+
+    detect_ns: list[int] = field(default_factory=list)
+    track_ns: list[int] = field(default_factory=list)
+    bare_ns: list[int] = field(default_factory=list)
+    opencv_ns: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+    first_ns: list[int] = field(default_factory=list)
+
+    @property
+    def total_ns(self) -> list[int]:
+        """detect and track together."""
+        return [detect + track for detect, track in zip(self.detect_ns, self.track_ns, strict=True)]
+
+    def add(self, detect_ns: int, track_ns: int, opencv_ns: dict[str, int]) -> None:
+        """One frame; a function that it does not call takes no time in it."""
+        known = len(self.detect_ns)
+        self.detect_ns.append(detect_ns)
+        self.track_ns.append(track_ns)
+        self.bare_ns.append(sum(opencv_ns.values()))
+        for name in opencv_ns.keys() | self.opencv_ns.keys():
+            samples = self.opencv_ns[name]
+            samples.extend([0] * (known - len(samples)))
+            samples.append(opencv_ns.get(name, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionFigures:
+    """Of one reel. ratio_of_medians and median_ratio: perception over bare OpenCV, once of the two medians
+    and once frame by frame. functions and modules: names as in the code."""
+
+    total: Durations
+    detect: Durations
+    track: Durations
+    bare: Durations
+    first: Durations
+    ratio_of_medians: float
+    median_ratio: float
+    opencv: dict[str, Durations]
+    modules: dict[str, StageFigures]
+    functions: dict[str, StageFigures]
+
+    def as_json(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "total": self.total.as_json(),
+            "detect": self.detect.as_json(),
+            "track": self.track.as_json(),
+            "bare_opencv": self.bare.as_json(),
+            "first_frame": self.first.as_json(),
+            "ratio_of_medians": round(self.ratio_of_medians, 4),
+            "median_ratio": round(self.median_ratio, 4),
+            "opencv_functions": {name: durations.as_json() for name, durations in self.opencv.items()},
+            "modules": {name: stage.as_json() for name, stage in self.modules.items()},
+            "functions": {name: stage.as_json() for name, stage in self.functions.items()},
+        }
+
+
+def measure_perception(
+    reel: Reel, make: MakePerception, passes: int, stopwatch_ns: Callable[[], int], tick: Tick
+) -> PerceptionFigures:
+    """Side by side first, then once more with a stopwatch on every function. Two ticks a frame and pass.
+
+    make: a new perception, for each pass over reel.
+    """
+    modules = modules_of(vision)
+    side = SideBySide()
+    for _ in range(passes):
+        run_side_by_side(reel, make, modules, stopwatch_ns, side, tick)
+    spent: list[dict[str, Spent]] = []
+    for _ in range(passes):
+        spent.extend(run_watched(reel, make, modules, stopwatch_ns, tick))
+    total, bare = Durations.of(side.total_ns), Durations.of(side.bare_ns)
+    return PerceptionFigures(
+        total=total,
+        detect=Durations.of(side.detect_ns),
+        track=Durations.of(side.track_ns),
+        bare=bare,
+        first=Durations.of(side.first_ns),
+        ratio_of_medians=total.median_ms / bare.median_ms,
+        median_ratio=median_ratio(side.total_ns, side.bare_ns),
+        opencv=_slowest_first({name: Durations.of(ns) for name, ns in side.opencv_ns.items()}),
+        modules=summarise(spent, group=_module_of),
+        functions=summarise(spent),
+    )
+
+
+def run_side_by_side(
+    reel: Reel,
+    make: MakePerception,
+    modules: Sequence[ModuleType],
+    stopwatch_ns: Callable[[], int],
+    result: SideBySide,
+    tick: Tick,
+) -> None:
+    """Every frame through three: a perception that is timed and untouched, one whose OpenCV calls are
+    recorded, and those calls alone.
+
+    Which of the timed two goes first changes from frame to frame: neither shall always find warm caches.
+    The first frame searches the whole image, as after every restart, and is kept apart.
+    """
+    timed, recorded = make(), make()
+    for index, (frame, odometry) in enumerate(zip(reel.frames, reel.odometry, strict=True)):
+        with recorded_calls(modules) as calls:
+            recorded.perceive(frame, odometry, None)
+        if index % 2 == 0:
+            opencv_ns = time_bare(calls, stopwatch_ns)
+        detect_ns, track_ns = _time(timed, frame, odometry, stopwatch_ns)
+        if index % 2 == 1:
+            opencv_ns = time_bare(calls, stopwatch_ns)
+        if index == 0:
+            result.first_ns.append(detect_ns + track_ns)
+        else:
+            result.add(detect_ns, track_ns, opencv_ns)
+        tick()
+
+
+def run_watched(
+    reel: Reel,
+    make: MakePerception,
+    modules: Sequence[ModuleType],
+    stopwatch_ns: Callable[[], int],
+    tick: Tick,
+) -> list[dict[str, Spent]]:
+    """What every function of modules spent, frame by frame, without the first frame."""
+    watch = StageWatch(stopwatch_ns)
+    spent: list[dict[str, Spent]] = []
+    with watched(modules, watch):
+        perception = make()
+        for frame, odometry in zip(reel.frames, reel.odometry, strict=True):
+            perception.perceive(frame, odometry, None)
+            spent.append(watch.take())
+            tick()
+    return spent[1:]
+
+
+def _time(
+    perception: Perception, frame: RgbdFrame, odometry: Pose | None, stopwatch_ns: Callable[[], int]
+) -> tuple[int, int]:
+    started_ns = stopwatch_ns()
+    detection = perception.detect(frame, odometry)
+    detected_ns = stopwatch_ns()
+    perception.track(detection, None)
+    return detected_ns - started_ns, stopwatch_ns() - detected_ns
+
+
+def _module_of(function: str) -> str:
+    """vision.renewal of vision.renewal.Renewal.find."""
+    return ".".join(function.split(".")[:2])
+
+
+def _slowest_first(figures: dict[str, Durations]) -> dict[str, Durations]:
+    return dict(sorted(figures.items(), key=lambda item: -item[1].median_ms))

@@ -1,0 +1,56 @@
+"""Frames to measure perception on, made ready beforehand: rendered along the path, or from a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+from controller.path import Path
+from hal.api import FrameSource
+from hal.cameras.tum_replay import TumReplay
+from hal.clocks import NS_PER_S
+from hal.errors import EndOfStream
+from hal.geometry import camera_in_floor
+from hal.types import CameraMount, PlanarPose, Pose, RgbdFrame
+
+Tick = Callable[[], None]
+
+CRUISE_MPS = 1.0
+_TIMEOUT_S = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reel:
+    """Frames in the order in which they were taken, each with the camera by dead reckoning at its time."""
+
+    frames: tuple[RgbdFrame, ...]
+    odometry: tuple[Pose | None, ...]
+    mount: CameraMount | None
+
+
+def cruise(path: Path, stamp_ns: int) -> PlanarPose:
+    """The body at stamp_ns on its way along path at CRUISE_MPS; at the end it stays there."""
+    return path.pose(min(CRUISE_MPS * stamp_ns / NS_PER_S, path.length_m))
+
+
+def render_reel(camera: FrameSource, path: Path, mount: CameraMount, frames: int, tick: Tick) -> Reel:
+    """frames from a simulated camera on a body that cruises along path from time zero of its clock."""
+    taken: list[RgbdFrame] = []
+    with camera:
+        for _ in range(frames):
+            taken.append(camera.read(_TIMEOUT_S))
+            tick()
+    odometry = (camera_in_floor(cruise(path, frame.captured_ns), mount) for frame in taken)
+    return Reel(tuple(taken), tuple(odometry), mount)
+
+
+def recorded_reel(folder: FilePath) -> Reel:
+    """All frames of a recording, without odometry. Raises BadRecording."""
+    taken: list[RgbdFrame] = []
+    with TumReplay(folder) as camera:
+        while True:
+            try:
+                taken.append(camera.read(_TIMEOUT_S))
+            except EndOfStream:
+                return Reel(tuple(taken), (None,) * len(taken), camera.mount)
