@@ -1,0 +1,109 @@
+"""What the speed will be: jerk-limited ramps from the present state to many target speeds, in arrays.
+
+The law is that of ruckig's velocity interface and of controller/braking.py (a ramp to 0 is the stop), so what
+the decision foresees is what the shaper will drive.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.braking import BrakeLimits
+from hal.types import FloatArray
+
+
+class SpeedRamps:
+    """N ramps: hold v for latency_s, then reach each target speed in the shortest time, then keep it.
+
+    targets_mps: (N,) >= 0. v_mps, a_mps2: scalars or (N,). accel_mps2 and decel_mps2 bound the ramps up and
+    down (a present acceleration outside them is held, not cut), jerk_mps3 both.
+    """
+
+    def __init__(
+        self,
+        v_mps: float | FloatArray,
+        a_mps2: float | FloatArray,
+        targets_mps: FloatArray,
+        *,
+        accel_mps2: float,
+        decel_mps2: float,
+        jerk_mps3: float,
+        latency_s: float = 0.0,
+    ) -> None:
+        v = np.broadcast_to(v_mps, targets_mps.shape).astype(np.float64)
+        a = np.broadcast_to(a_mps2, targets_mps.shape).astype(np.float64)
+        # Up or down, judged by the speed that remains when a has been let go of.
+        sign = np.where(targets_mps >= v + a * np.abs(a) / (2.0 * jerk_mps3), 1.0, -1.0)
+        start = sign * a
+        bound = np.maximum(np.where(sign > 0.0, accel_mps2, decel_mps2), start)
+        wanted = sign * (targets_mps - v)
+        peak = np.minimum(np.sqrt(np.maximum(jerk_mps3 * wanted + start * start / 2.0, 0.0)), bound)
+        self._t1 = np.maximum(peak - start, 0.0) / jerk_mps3
+        self._t3 = peak / jerk_mps3
+        in_ramps = (2.0 * peak * peak - start * start) / (2.0 * jerk_mps3)
+        self._t2 = np.where(peak > 0.0, np.maximum(wanted - in_ramps, 0.0) / np.maximum(peak, 1e-12), 0.0)
+        self._v, self._a, self._target = v, a, targets_mps
+        self._jerk, self._peak = sign * jerk_mps3, sign * peak
+        self._v1 = v + a * self._t1 + self._jerk * self._t1**2 / 2.0
+        self._v2 = self._v1 + self._peak * self._t2
+        self._latency_s = latency_s
+
+    @property
+    def duration_s(self) -> FloatArray:
+        """(N,) until the target speed is reached, latency included."""
+        duration: FloatArray = self._latency_s + self._t1 + self._t2 + self._t3
+        return duration
+
+    def state(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distance m, speed m/s and acceleration m/s^2 after t_s; t_s and all results (N, K)."""
+        held, x1, x2, x3, x4 = self._split(t_s)
+        v, a, j, peak = self._v[:, None], self._a[:, None], self._jerk[:, None], self._peak[:, None]
+        v1, v2 = self._v1[:, None], self._v2[:, None]
+        distance = (
+            v * (held + x1)
+            + a * x1**2 / 2.0
+            + j * x1**3 / 6.0
+            + v1 * x2
+            + peak * x2**2 / 2.0
+            + v2 * x3
+            + peak * x3**2 / 2.0
+            - j * x3**3 / 6.0
+            + self._target[:, None] * x4
+        )
+        speed = v + a * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0
+        acceleration = np.where(x2 + x3 > 0.0, peak - j * x3, a + j * x1)
+        return distance, np.maximum(speed, 0.0), acceleration
+
+    def distance(self, t_s: FloatArray) -> FloatArray:
+        """Distance m after t_s (N, K)."""
+        return self.state(t_s)[0]
+
+    def _split(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """How long each phase has lasted at t_s: latency, jerk, constant, jerk back, done."""
+        t1, t2, t3 = self._t1[:, None], self._t2[:, None], self._t3[:, None]
+        held = np.minimum(t_s, self._latency_s)
+        rest = t_s - held
+        x1 = np.minimum(rest, t1)
+        x2 = np.clip(rest - t1, 0.0, t2)
+        x3 = np.clip(rest - t1 - t2, 0.0, t3)
+        return held, x1, x2, x3, np.maximum(rest - t1 - t2 - t3, 0.0)
+
+
+def stop_step(v_mps: float, a_mps2: float, limits: BrakeLimits, dt_s: float) -> tuple[float, float]:
+    """Speed and acceleration dt_s into the stop of braking.stop; never below zero speed."""
+    if a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * limits.jerk_mps3):
+        a = min(a_mps2 + limits.jerk_mps3 * dt_s, 0.0)
+        v = v_mps + (a_mps2 + a) / 2.0 * dt_s
+        return (v, a) if v > 0.0 else (0.0, 0.0)
+    ramp = SpeedRamps(
+        v_mps,
+        a_mps2,
+        np.zeros(1),
+        accel_mps2=math.inf,
+        decel_mps2=limits.decel_mps2,
+        jerk_mps3=limits.jerk_mps3,
+    )
+    _, speed, acceleration = ramp.state(np.full((1, 1), dt_s))
+    return float(speed[0, 0]), float(acceleration[0, 0])

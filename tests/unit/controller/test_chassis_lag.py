@@ -1,0 +1,59 @@
+"""Lag and drift of a chassis, learnt from a drive of known numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller.chassis_lag import ChassisLag
+
+STEP_S = 0.02
+
+
+def drive(lag: ChassisLag, lag_s: float, drift: float, noise_m: float = 0.0, seconds: float = 12.0) -> None:
+    """Accelerate at 0.3 m/s2 to 1.5 m/s and go on; odometry is behind by the lag and short by the drift."""
+    noise = np.random.default_rng(1)
+    v = commanded = 0.0
+    lag.update(0.0, 0.0, 0.0, 50.0)
+    for _ in range(int(seconds / STEP_S)):
+        a = 0.3 if v < 1.5 else 0.0
+        commanded += (v + 0.5 * a * STEP_S) * STEP_S
+        step = (v + 0.5 * a * STEP_S) * STEP_S
+        v += a * STEP_S
+        travelled = commanded * (1.0 - drift) - lag_s * max(v - lag_s * a, 0.0)
+        lag.update(step, v, a, 50.0 - travelled + float(noise.normal()) * noise_m)
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 0.1, 0.25, 0.4])
+@pytest.mark.parametrize("drift", [-0.03, 0.0, 0.02])
+def test_learns_lag_and_drift(lag_s: float, drift: float) -> None:
+    lag = ChassisLag(0.15)
+    drive(lag, lag_s, drift, noise_m=0.003)
+    assert lag.seconds == pytest.approx(lag_s, abs=0.02)
+    # 1 m to go at 1.5 m/s: the lag's part has been commanded already, the drift's has to be added.
+    expected = (1.0 - lag_s * 1.5) / (1.0 - drift)
+    assert lag.to_command_m(1.0, 1.5, 0.0) == pytest.approx(expected, abs=0.04)
+
+
+def test_before_driving_the_configured_lag_counts() -> None:
+    lag = ChassisLag(0.2)
+    assert lag.seconds == 0.2
+    assert lag.to_command_m(1.0, 1.0, 0.0) == pytest.approx(0.8)
+    assert lag.to_command_m(1.0, 1.0, 0.5) == pytest.approx(1.0 - 0.2 * 0.9)
+
+
+def test_an_absurd_jump_of_the_odometry_is_not_learnt() -> None:
+    lag = ChassisLag(0.1)
+    drive(lag, 0.1, 0.0)
+    before = lag.seconds
+    lag.update(0.03, 1.5, 0.0, 12.0)
+    assert lag.seconds == before
+    lag.update(0.03, 1.5, 0.0, 11.97)
+    lag.update(0.03, 1.5, 0.0, 11.94)
+    assert lag.seconds == pytest.approx(before, abs=0.005)
+
+
+def test_the_estimate_stays_within_reason() -> None:
+    lag = ChassisLag(0.5)
+    drive(lag, 0.9, 0.0)
+    assert lag.seconds <= 0.6

@@ -1,0 +1,213 @@
+"""The shaper: closing at the end, hand-over between profiles, and what happens when ruckig fails."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+from ruckig import Result, RuckigError  # type: ignore[import-not-found]  # a compiled module without stubs
+
+from config.robot import Limits
+from controller import braking
+from controller.shape import ShapedSpeed, SpeedShaper
+
+PERIOD_S = 0.02
+
+
+class Run:
+    """Drives a shaper on a chassis that lags by a first-order delay, with odometry of it."""
+
+    def __init__(self, length_m: float, lag_s: float = 0.0, delay_s: float = 0.0, gain: float = 1.0) -> None:
+        self.shaper = SpeedShaper(Limits(), PERIOD_S, delay_s)
+        self.length_m, self.lag_s, self.gain = length_m, lag_s, gain
+        self.x_m = self.v_mps = self.time_s = 0.0
+        self.commands: list[ShapedSpeed] = []
+
+    def step(self, target: float = 1.5, emergency: bool = False) -> ShapedSpeed:
+        command = self.shaper.step(target, emergency=emergency, distance_to_end_m=self.length_m - self.x_m)
+        share = 1.0 - math.exp(-PERIOD_S / self.lag_s) if self.lag_s else 1.0
+        following = self.v_mps + share * (self.gain * command.v_mps - self.v_mps)
+        self.x_m += 0.5 * (self.v_mps + following) * PERIOD_S
+        self.v_mps = following
+        self.time_s += PERIOD_S
+        self.commands.append(command)
+        return command
+
+    def until_rest(self, limit_s: float = 120.0) -> None:
+        while self.time_s < limit_s:
+            command = self.step()
+            if self.time_s > 1.0 and command.v_mps == 0.0 and self.v_mps < 1e-4:
+                return
+        raise AssertionError("never came to rest")
+
+
+@pytest.mark.parametrize("length_m", [0.05, 0.3, 1.0, 3.0, 8.25, 30.0])
+def test_stops_on_the_target_point(length_m: float) -> None:
+    run = Run(length_m)
+    run.until_rest()
+    assert run.x_m == pytest.approx(length_m, abs=0.005)
+
+
+@pytest.mark.parametrize(("lag_s", "delay_s"), [(0.1, 0.2), (0.15, 0.0), (0.2, 0.2), (0.2, 0.1), (0.3, 0.2)])
+@pytest.mark.parametrize("gain", [0.97, 1.0, 1.03])
+def test_stops_on_the_target_point_behind_a_lagging_chassis(
+    lag_s: float, delay_s: float, gain: float
+) -> None:
+    run = Run(20.0, lag_s, delay_s, gain)
+    run.until_rest()
+    assert run.x_m == pytest.approx(20.0, abs=0.012)
+
+
+def test_a_wrong_guess_of_the_lag_costs_no_time() -> None:
+    known, unknown = Run(20.0, 0.1, 0.1), Run(20.0, 0.1, 0.3)
+    known.until_rest()
+    unknown.until_rest()
+    assert unknown.time_s <= known.time_s + 0.1
+
+
+def test_the_closing_loses_little_time_and_does_not_creep() -> None:
+    run = Run(30.0)
+    run.until_rest()
+    stop = braking.stop(1.5, 0.0, braking.comfort(Limits()))
+    optimum_s = 2 * stop.time_s + (30.0 - 2 * stop.distance_m) / 1.5
+    assert run.time_s <= 1.01 * optimum_s
+    creeping = [c for c in run.commands[100:] if 0.0 < c.v_mps < 0.05]
+    assert len(creeping) * PERIOD_S < 1.0
+
+
+def test_the_closing_brakes_once() -> None:
+    """No flapping: the speed rises, stays, falls."""
+    run = Run(20.0, lag_s=0.15, delay_s=0.2)
+    run.until_rest()
+    signs = [math.copysign(1.0, c.a_mps2) for c in run.commands if abs(c.a_mps2) > 0.01]
+    assert sum(before != after for before, after in pairwise(signs)) == 1
+
+
+def test_a_target_behind_is_not_chased_in_reverse() -> None:
+    run = Run(5.0)
+    for _ in range(150):
+        run.step()
+    run.length_m = run.x_m - 1.0
+    passed = braking.stop(run.v_mps, run.commands[-1].a_mps2, braking.comfort(Limits()))
+    at = run.x_m
+    run.until_rest()
+    assert run.x_m == pytest.approx(at + passed.distance_m, abs=0.01)
+
+
+def test_emergency_brakes_harder_and_returns_to_comfort() -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(400):
+        shaper.step(1.5)
+    assert shaper.v_mps == pytest.approx(1.5)
+    for _ in range(50):
+        shaper.step(0.0, emergency=True)
+    assert shaper.a_mps2 == pytest.approx(-0.7)
+    first = shaper.step(0.0)
+    assert first.a_mps2 == pytest.approx(-0.7 + 2.0 * PERIOD_S)  # eased at the emergency's jerk
+    lows = [shaper.step(0.0) for _ in range(40)]
+    assert lows[-1].a_mps2 == pytest.approx(-0.3)
+
+
+def test_hand_over_at_low_speed_does_not_reverse() -> None:
+    """v 0.2, a -0.7: comfort's jerk 0.6 would need v >= 0.41; the emergency's is kept to the end."""
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(200):
+        shaper.step(0.7)
+    while shaper.v_mps > 0.2:
+        shaper.step(0.0, emergency=True)
+    assert shaper.a_mps2 < -0.5
+    while shaper.v_mps > 0.0:
+        assert shaper.step(0.0).v_mps >= 0.0
+    assert shaper.a_mps2 == pytest.approx(0.0, abs=0.04)
+
+
+def test_targets_beyond_the_limit_are_capped_also_while_accelerating() -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    speeds = [shaper.step(9.0).v_mps for _ in range(400)]
+    assert max(speeds) == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("target", [math.nan, -1.0, -math.inf])
+def test_a_senseless_target_means_stop(target: float) -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(200):
+        shaper.step(1.0)
+    for _ in range(400):
+        shaper.step(target)
+    assert shaper.v_mps == 0.0
+
+
+def test_an_unknown_distance_to_the_end_means_stop() -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(200):
+        shaper.step(1.0, distance_to_end_m=50.0)
+    for _ in range(400):
+        shaper.step(1.0, distance_to_end_m=math.nan)
+    assert shaper.v_mps == 0.0
+
+
+def _raise_error(*_: object) -> object:
+    raise RuckigError("error in step 1: 0.1\n0.2")
+
+
+def _return_nothing(*_: object) -> object:
+    return Result.ErrorInvalidInput
+
+
+@pytest.mark.parametrize("failure", [_raise_error, _return_nothing])
+@pytest.mark.parametrize("warm_up", [30, 120, 400])
+def test_when_ruckig_fails_it_brakes_by_the_stop_profile(
+    failure: Callable[..., object], warm_up: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(warm_up):
+        shaper.step(1.5)
+
+    class Broken:
+        calculate = staticmethod(failure)
+
+    monkeypatch.setattr(shaper, "_otg", Broken())
+    model = braking.stop(shaper.v_mps, shaper.a_mps2, braking.comfort(Limits()))
+    steps = distance = 0.0
+    a = shaper.a_mps2
+    while shaper.v_mps > 0.0:
+        before = shaper.v_mps
+        command = shaper.step(1.5)
+        assert command.fault.startswith("ruckig: ")
+        assert "\n" not in command.fault
+        assert abs(command.a_mps2 - a) <= 0.6 * PERIOD_S + 1e-9
+        a = command.a_mps2
+        distance += 0.5 * (before + command.v_mps) * PERIOD_S
+        steps += 1
+    assert steps * PERIOD_S == pytest.approx(model.time_s, abs=0.05)
+    assert distance == pytest.approx(model.distance_m, abs=0.005)
+
+
+def test_a_result_outside_the_limits_is_not_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(200):
+        shaper.step(1.0)
+    monkeypatch.setattr(shaper, "_follow", lambda target: (3.0, 0.0))
+    command = shaper.step(1.0)
+    assert "outside the limits" in command.fault
+    assert command.a_mps2 == pytest.approx(-0.6 * PERIOD_S)
+
+
+def test_reset_seeds_from_the_measured_speed() -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    shaper.reset(0.8)
+    assert (shaper.v_mps, shaper.a_mps2) == (0.8, 0.0)
+    shaper.reset(math.nan)
+    assert shaper.v_mps == 0.0
+    shaper.reset(-0.3)
+    assert shaper.v_mps == 0.0
+    shaper.reset(7.0)
+    assert shaper.v_mps == 1.5
+
+
+@pytest.mark.parametrize(("period_s", "delay_s"), [(0.0, 0.0), (-0.02, 0.0), (math.nan, 0.0), (0.02, -1.0)])
+def test_impossible_periods_are_refused(period_s: float, delay_s: float) -> None:
+    with pytest.raises(ValueError, match="impossible"):
+        SpeedShaper(Limits(), period_s, delay_s)
