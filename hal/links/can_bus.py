@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import logging
+from collections import deque
 from types import TracebackType
 from typing import Any, Self
 
@@ -42,6 +43,10 @@ class CanBusLink:
         self._config = config
         self._bus: can.BusABC | None = None
         self._closed = False
+        # python-can's udp_multicast hears what it sends itself, and cannot be told not to.
+        self._echoes: deque[CanFrame] | None = (
+            deque(maxlen=_MAX_FOREIGN) if config.interface == "udp_multicast" else None
+        )
 
     def __enter__(self) -> Self:
         """Open the bus. Raises DeviceNotFound, DeviceRefused."""
@@ -65,6 +70,8 @@ class CanBusLink:
             self._opened().send(message, timeout=_SEND_TIMEOUT_S)
         except (can.CanError, OSError) as error:
             raise self._lost("sending", error) from error
+        if self._echoes is not None:
+            self._echoes.append(frame)
 
     def receive(self) -> CanFrame | None:
         """The oldest classic frame with an 11-bit identifier, without waiting. Raises LinkLost."""
@@ -84,8 +91,13 @@ class CanBusLink:
                 if message.arbitration_id & _ERROR_BUS_OFF:
                     raise self._lost("receiving", can.CanOperationError("bus-off"))
                 continue
-            if not (message.is_extended_id or message.is_remote_frame or message.is_fd):
-                return CanFrame(message.arbitration_id, bytes(message.data))
+            if message.is_extended_id or message.is_remote_frame or message.is_fd:
+                continue
+            frame = CanFrame(message.arbitration_id, bytes(message.data))
+            if self._echoes and frame in self._echoes:
+                self._echoes.remove(frame)
+                continue
+            return frame
         return None
 
     def _opened(self) -> can.BusABC:

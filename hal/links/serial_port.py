@@ -100,27 +100,30 @@ def open_serial_link(config: SerialLinkConfig) -> SerialPortLink:
 
 
 def _open(config: SerialLinkConfig) -> serial.SerialBase:
-    where = f"serial port {config.url}"
     try:
         port: serial.SerialBase = serial.serial_for_url(
             config.url, baudrate=config.baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True
         )
     except (*_ERRORS, ValueError) as error:
-        number = getattr(error, "errno", None)
-        if number in (errno.EACCES, errno.EPERM):
-            raise DeviceRefused(
-                f"{where}: permission denied; add the user to the port's group (often dialout)"
-            ) from error
-        if number in (errno.EBUSY, errno.EAGAIN):
-            raise DeviceRefused(f"{where}: in use by another program; stop that one first") from error
-        if number is not None and number != errno.ENOENT:
-            raise DeviceRefused(
-                f"{where}: is not a serial port that takes {config.baud} baud ({_reason(error)})"
-            ) from error
-        raise DeviceNotFound(
-            f"{where}: cannot be opened ({_reason(error)}); check the url and that the adapter is plugged in"
-        ) from error
+        raise _translated(error, config) from error
     return port
+
+
+def _translated(error: Exception, config: SerialLinkConfig) -> HalError:
+    where = f"serial port {config.url}"
+    number = getattr(error, "errno", None)
+    if number in (errno.EACCES, errno.EPERM):
+        return DeviceRefused(f"{where}: permission denied; add the user to the port's group (often dialout)")
+    if number in (errno.EBUSY, errno.EAGAIN):
+        return DeviceRefused(f"{where}: in use by another program; stop that one first")
+    # pyserial drops the number when the file is there but does not take a port's settings.
+    if isinstance(error.__context__, termios.error) or number not in (None, errno.ENOENT):
+        return DeviceRefused(
+            f"{where}: is not a serial port that takes {config.baud} baud ({_reason(error)})"
+        )
+    return DeviceNotFound(
+        f"{where}: cannot be opened ({_reason(error)}); check the url and that the adapter is plugged in"
+    )
 
 
 def _reason(error: BaseException) -> str:

@@ -8,13 +8,10 @@ from contextlib import AbstractContextManager
 
 import pytest
 
-from config.chassis import CanLinkConfig
 from hal.errors import HalError
 from hal.links.can_bus import open_can_link
 from hal.types import ChassisMode, ChassisState
-from tests.support.chassis_rig import MS, Rig, agilex_rig, can_link_config, roboclaw_rig
-
-UDP = CanLinkConfig(interface="udp_multicast", channel="239.74.163.91", port=43_191)
+from tests.support.chassis_rig import MS, Rig, agilex_rig, can_link_config, roboclaw_rig, udp_link_config
 
 
 def _open(name: str) -> AbstractContextManager[Rig]:
@@ -24,9 +21,10 @@ def _open(name: str) -> AbstractContextManager[Rig]:
         case "agilex-virtual":
             return agilex_rig("bus", can_link_config())
         case "agilex-udp":
+            config = udp_link_config()
             try:
-                with open_can_link(UDP):
-                    return agilex_rig("bus", UDP)
+                with open_can_link(config):
+                    return agilex_rig("bus", config)
             except HalError as error:
                 pytest.skip(f"no multicast on this machine: {error}")
         case "roboclaw-scripted":

@@ -197,6 +197,12 @@ def can_link_config() -> CanLinkConfig:
     return CanLinkConfig(interface="virtual", channel=f"rig-{uuid4().hex}")
 
 
+def udp_link_config() -> CanLinkConfig:
+    """A multicast bus that no other test run is on: its port is drawn by chance."""
+    port = 20_000 + uuid4().int % 40_000
+    return CanLinkConfig(interface="udp_multicast", channel="239.74.163.91", port=port)
+
+
 def agilex_config(link: CanLinkConfig | None = None, **changes: object) -> AgilexChassisConfig:
     """A BUNKER; the track width is known unless changed."""
     values: dict[str, object] = {

@@ -1,0 +1,197 @@
+from __future__ import annotations
+
+import logging
+import socket
+from collections.abc import Iterator
+
+import can
+import pytest
+
+from config.chassis import CanLinkConfig
+from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
+from hal.links import can_bus
+from hal.links.can_bus import CanBusLink, open_can_link
+from hal.types import CanFrame
+from tests.support.chassis_rig import can_link_config, udp_link_config
+
+FRAME = CanFrame(0x111, b"\x00\x96")
+
+
+class FaultyBus(can.BusABC):
+    """A bus whose next calls raise, or give these messages."""
+
+    def __init__(self) -> None:
+        self.error: Exception | None = None
+        self.messages: list[can.Message] = []
+        self.sent: list[can.Message] = []
+        self.shut = 0
+        super().__init__(channel="faulty")
+
+    def _fail(self) -> None:
+        if self.error is not None:
+            raise self.error
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        assert timeout, "0 makes pyserial below slcan spin, None may wait for ever"
+        self._fail()
+        self.sent.append(msg)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        assert timeout == 0
+        self._fail()
+        return (self.messages.pop(0) if self.messages else None), False
+
+    def shutdown(self) -> None:
+        super().shutdown()
+        self.shut += 1
+        self._fail()
+
+
+@pytest.fixture
+def bus(monkeypatch: pytest.MonkeyPatch) -> Iterator[FaultyBus]:
+    made = FaultyBus()
+    monkeypatch.setattr(can, "Bus", lambda **options: made)
+    yield made
+    made.error = None
+    made.shutdown()
+
+
+def config(interface: str, channel: str) -> CanLinkConfig:
+    return CanLinkConfig.model_validate({"interface": interface, "channel": channel})
+
+
+@pytest.mark.parametrize(
+    ("link", "reason"),
+    [
+        (config("socketcan", "nocan0"), "ip link"),
+        (config("slcan", "/dev/ttyNotThere"), "No such file"),
+        (config("pcan", "PCAN_USBBUS1"), "pcan"),
+    ],
+)
+def test_an_interface_that_is_not_there_is_one_clear_line(link: CanLinkConfig, reason: str) -> None:
+    with pytest.raises(DeviceNotFound) as caught:
+        open_can_link(link)
+    message = str(caught.value)
+    assert message.startswith(f"CAN {link.interface} {link.channel!r}: cannot be opened (")
+    assert reason.lower() in message.lower()
+    assert "\n" not in message
+    assert caught.value.__cause__ is not None
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "words"),
+    [
+        (PermissionError(13, "Permission denied"), DeviceRefused, "permission denied"),
+        (OSError(16, "Device or resource busy"), DeviceRefused, "in use by another program"),
+        (OSError(19, "No such device"), DeviceNotFound, "No such device"),
+        (can.CanInitializationError("no driver"), DeviceNotFound, "no driver"),
+        (ValueError("Invalid bitrate"), DeviceNotFound, "Invalid bitrate"),
+    ],
+)
+def test_vendor_errors_are_translated_with_their_cause(
+    monkeypatch: pytest.MonkeyPatch, error: Exception, kind: type[Exception], words: str
+) -> None:
+    def refuse(**options: object) -> None:
+        raise error
+
+    monkeypatch.setattr(can, "Bus", refuse)
+    with pytest.raises(kind, match=words) as caught:
+        open_can_link(config("socketcan", "can0"))
+    assert caught.value.__cause__ is error
+
+
+def test_settings_of_the_machine_are_not_mixed_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    """python-can would else add options from the environment and from files in the home folder."""
+    given: list[dict[str, object]] = []
+
+    def note(**options: object) -> FaultyBus:
+        given.append(options)
+        return FaultyBus()
+
+    monkeypatch.setattr(can, "Bus", note)
+    for link in (config("slcan", "/dev/ttyACM0"), config("socketcan", "can0"), udp_link_config()):
+        with CanBusLink(link):
+            pass
+    assert [options["ignore_config"] for options in given] == [True, True, True]
+    assert given[0]["bitrate"] == 500_000
+    assert "bitrate" not in given[1]
+    assert given[2]["hop_limit"] == 0
+
+
+@pytest.mark.parametrize(
+    "error", [can.CanOperationError("Transmit buffer full"), OSError(100, "Network is down")]
+)
+def test_an_error_in_use_is_a_lost_link_and_the_next_use_opens_anew(bus: FaultyBus, error: Exception) -> None:
+    link = CanBusLink(config("socketcan", "can0"))
+    link.send(FRAME)
+    bus.error = error
+    with pytest.raises(LinkLost, match=r"CAN socketcan 'can0': lost while sending \(") as caught:
+        link.send(FRAME)
+    assert caught.value.__cause__ is error
+    assert bus.shut == 1
+    with pytest.raises(LinkLost, match="lost while receiving"):
+        link.receive()
+    bus.error = None
+    link.send(FRAME)
+    assert len(bus.sent) == 2
+
+
+def test_a_bus_that_cannot_be_opened_again_stays_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    link = CanBusLink(config("slcan", "/dev/ttyNotThere"))
+    for _ in range(2):
+        with pytest.raises(LinkLost, match="cannot be opened"):
+            link.receive()
+
+
+def test_bus_off_is_a_lost_link(bus: FaultyBus) -> None:
+    link = CanBusLink(config("socketcan", "can0"))
+    bus.messages = [can.Message(arbitration_id=0x40, is_error_frame=True)]
+    with pytest.raises(LinkLost, match="bus-off"):
+        link.receive()
+
+
+def test_what_is_no_classic_frame_is_passed_over(bus: FaultyBus) -> None:
+    bus.messages = [
+        can.Message(arbitration_id=0x4, is_error_frame=True),  # an error, but not bus-off
+        can.Message(arbitration_id=0x221, is_extended_id=True, data=b"\x01"),
+        can.Message(arbitration_id=0x221, is_extended_id=False, is_remote_frame=True, dlc=8),
+        can.Message(arbitration_id=0x221, is_extended_id=False, data=b"\x02"),
+    ]
+    link = CanBusLink(config("socketcan", "can0"))
+    assert link.receive() == CanFrame(0x221, b"\x02")
+    assert link.receive() is None
+
+
+def test_a_flood_of_foreign_messages_ends_a_receive(bus: FaultyBus) -> None:
+    foreign = can.Message(arbitration_id=0x221, is_extended_id=True)
+    bus.messages = [foreign] * 1000
+    assert CanBusLink(config("socketcan", "can0")).receive() is None
+    assert len(bus.messages) == 1000 - 256
+
+
+def test_shutting_down_a_dead_adapter_raises_nothing(
+    bus: FaultyBus, caplog: pytest.LogCaptureFixture
+) -> None:
+    """python-can's slcan raises from shutdown() after an unplug."""
+    with caplog.at_level(logging.DEBUG, logger=can_bus.__name__), CanBusLink(config("slcan", "x")):
+        bus.error = can.CanOperationError("gone")
+    assert "gone" in caplog.text
+
+
+def test_opening_twice_opens_once() -> None:
+    link = open_can_link(can_link_config())
+    with link as again:
+        assert again is link
+        link.send(FRAME)
+
+
+def test_a_datagram_that_is_no_frame_does_not_lose_the_bus() -> None:
+    """Anybody may send to a multicast group."""
+    udp = udp_link_config()
+    with CanBusLink(udp) as link, CanBusLink(udp) as peer:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+            stranger.sendto(b"hello?", (udp.channel, udp.port))
+            stranger.sendto(b"", (udp.channel, udp.port))
+        peer.send(FRAME)
+        assert link.receive() == FRAME
