@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 
 from controller.video import draw, text
 from controller.video.corridor import Corridor
-from controller.video.labels import Label, draw_labels
+from controller.video.labels import draw_labels
 from controller.video.moment import VideoMoment
 from controller.video.picture import Placement, placement
 from controller.video.seen import Seen
 from controller.video.style import (
     DARK_TEXT,
+    HEALTH,
     MOVING,
     OWN,
     PANEL,
     STATIC,
     UNMEASURED,
-    WARNING,
     Image,
     Rect,
 )
@@ -62,7 +62,7 @@ class ColourView:
         for one, corners in reversed(boxes):
             _draw_box(inside, one, draw.box(corners))
         banner = _draw_health(inside, moment)
-        labels = [Label(one.describe(), one.colour, corners, one.decides) for one, corners in boxes]
+        labels = [one.label(one.describe(), corners) for one, corners in boxes]
         draw_labels(inside, labels, banner)
         text.caption_note(canvas, self._panel, _count(moment))
 
@@ -72,8 +72,8 @@ def _count(moment: VideoMoment) -> str:
     moving_obstacles = sum(obstacle.moving for obstacle in obstacles)
     moving_fragments = np.count_nonzero(fragments.moving)
     return (
-        f"{len(fragments.ids)} fragments, {moving_fragments} moving   "
-        f"{len(obstacles)} obstacles, {moving_obstacles} moving"
+        f"fragments {len(fragments.ids)}, moving {moving_fragments}     "
+        f"obstacles {len(obstacles)}, moving {moving_obstacles}"
     )
 
 
@@ -149,7 +149,7 @@ def _draw_health(inside: Image, moment: VideoMoment) -> list[Rect]:
         return []
     height, width = inside.shape[:2]
     banner = Rect(0, height - _BANNER_PX, width, _BANNER_PX)
-    banner.of(inside)[:] = WARNING
+    banner.of(inside)[:] = HEALTH[health.condition]
     sentence = f"camera {health.condition.value}: {health.reason}"
     text.put(
         inside, text.fit(sentence, width - 16, 14, text.MEDIUM), 8, height - 8, DARK_TEXT, 14, text.MEDIUM

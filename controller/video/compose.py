@@ -47,7 +47,7 @@ class Composer:
         """(720, 1280, 3) uint8, BGR; a new array each time."""
         canvas = self._backdrop.copy()
         seen = seen_obstacles(moment)
-        corridor = corridor_ahead(moment, self._range_m)
+        corridor = corridor_ahead(moment, self._range_m + 1.0)  # to where it leaves the top view
         self._header.draw(canvas, moment)
         self._colour.draw(canvas, moment, seen, corridor)
         self._depth.draw(canvas, moment, seen)

@@ -4,36 +4,30 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 
+from controller.decision import Action, Decision
 from controller.video import draw, text
 from controller.video.moment import VideoMoment
 from controller.video.style import (
     ACTIONS,
-    ALARM,
     DARK_TEXT,
     FAINT_TEXT,
-    FINE,
     GRID,
+    HEALTH,
     MARGIN_PX,
+    OWN,
     PANEL,
     TEXT,
-    UNKNOWN_ACTION,
-    WARNING,
     Image,
     Rect,
 )
 from hal.clocks import NS_PER_S
-from vision.scene import CameraCondition
 
 _BASELINE_PX = 29
-_CHIP = Rect(MARGIN_PX, 7, 196, 30)
-_CAMERA_X, _SPEED_RIGHT, _TIME_RIGHT, _FRAME_RIGHT = 858, 1088, 1180, 1270
-_HEALTH = {
-    CameraCondition.GOOD: FINE,
-    CameraCondition.DEGRADED: WARNING,
-    CameraCondition.UNTRUSTWORTHY: ALARM,
-}
+_CHIP = Rect(MARGIN_PX, 7, 214, 30)
+_CAMERA_X, _SPEED_RIGHT, _TIME_RIGHT, _FRAME_RIGHT = 836, 1088, 1180, 1270
 
 
 class Header:
@@ -51,22 +45,17 @@ class Header:
         """Action, reason, camera, speed, time."""
         view = self._panel.of(canvas)
         decision = moment.decision
-        action = None if decision is None else decision.action.value
-        style = ACTIONS.get(action or "", UNKNOWN_ACTION)
-        _CHIP.of(view)[:] = style.colour
         if decision is None:
+            _CHIP.of(view)[:] = GRID
             text.put(view, "no decision", _CHIP.x + 10, _BASELINE_PX - 1, FAINT_TEXT, 15, text.BOLD)
         else:
-            x = text.put(view, style.symbol, _CHIP.x + 10, _BASELINE_PX, DARK_TEXT, 19)
-            to = "at" if action == "keep" else "to"
-            wanted = f"{action} {to} {decision.target_speed_mps:.2f} m/s"
-            text.put(view, wanted, x + 6, _BASELINE_PX - 1, DARK_TEXT, 15, text.BOLD)
+            _draw_action(view, decision)
             _draw_reason(view, decision.reason.sentence)
         self._draw_state(view, moment)
 
     def _draw_state(self, view: Image, moment: VideoMoment) -> None:
         condition = moment.scene.health.condition
-        draw.disc(view, np.array([_CAMERA_X, _BASELINE_PX - 6.0]), 5.0, _HEALTH[condition])
+        draw.disc(view, np.array([_CAMERA_X, _BASELINE_PX - 6.0]), 5.0, HEALTH[condition])
         text.put(view, f"camera {condition.value}", _CAMERA_X + 12, _BASELINE_PX - 1, TEXT, 14)
         stamp_ns = moment.frame.captured_ns
         self._first_ns = stamp_ns if self._first_ns is None else self._first_ns
@@ -82,9 +71,25 @@ class Header:
             view[12:-12, x] = GRID
 
 
+def _draw_action(view: Image, decision: Decision) -> None:
+    """An emergency is framed as well as worded."""
+    style = ACTIONS[decision.action]
+    _CHIP.of(view)[:] = style.colour
+    if decision.emergency:
+        cv2.rectangle(view, (_CHIP.x, _CHIP.y), (_CHIP.right - 1, _CHIP.bottom - 1), OWN, 3)
+    x = text.put(view, style.symbol, _CHIP.x + 10, _BASELINE_PX, DARK_TEXT, 19)
+    action = "emergency" if decision.emergency else decision.action.value
+    to = "at" if decision.action is Action.KEEP else "to"
+    wanted = f"{action} {to} {decision.target_speed_mps:.2f} m/s"
+    text.put(view, wanted, x + 6, _BASELINE_PX - 1, DARK_TEXT, 15, text.BOLD)
+
+
 def _draw_reason(view: Image, sentence: str) -> None:
-    """Smaller where it is long, cut where it is too long."""
+    """In one line, or smaller in two."""
     x = _CHIP.right + 14
     room_px = _CAMERA_X - 24 - x
-    size = 16 if text.width(sentence, 16) <= room_px else 13
-    text.put(view, text.fit(sentence, room_px, size), x, _BASELINE_PX - 1, TEXT, size)
+    if text.width(sentence, 16) <= room_px:
+        text.put(view, sentence, x, _BASELINE_PX - 1, TEXT, 16)
+        return
+    for baseline, line in zip((18, 35), text.wrap(sentence, room_px, 2, 13), strict=False):
+        text.put(view, line, x, baseline, TEXT, 13)

@@ -12,15 +12,22 @@ from controller.video.draw import Points
 from controller.video.style import DARK_TEXT, OWN, Colour, Image, Rect
 
 _PAD_PX = 4
+# Of one view: more would be noise; the boxes of the others are drawn all the same.
+MOST_LABELS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Label:
-    """text beside the box (2, 2) of opposite corners; outlined where it names what the decision rests on."""
+    """text beside the box (2, 2) of opposite corners.
+
+    Filled with the colour where it matters more, else only written in it; outlined where it names
+    what the decision rests on.
+    """
 
     text: str
     colour: Colour
     box: Points
+    filled: bool = False
     outlined: bool = False
 
 
@@ -44,6 +51,8 @@ def arrange(
         if place is not None:
             taken.append(place)
             arranged.append((label, place))
+        if len(arranged) == MOST_LABELS:
+            break
     return arranged
 
 
@@ -71,7 +80,8 @@ def _candidates(label: Label, bounds: Rect, size: int) -> list[Rect]:
 
 
 def _draw(image: Image, label: Label, place: Rect, size: int) -> None:
-    place.of(image)[:] = label.colour
+    place.of(image)[:] = label.colour if label.filled else DARK_TEXT
     if label.outlined:
         cv2.rectangle(image, (place.x - 1, place.y - 1), (place.right, place.bottom), OWN, 2)
-    text.put(image, label.text, place.x + _PAD_PX, place.bottom - _PAD_PX - 1, DARK_TEXT, size, text.MEDIUM)
+    colour = DARK_TEXT if label.filled else label.colour
+    text.put(image, label.text, place.x + _PAD_PX, place.bottom - _PAD_PX - 1, colour, size, text.MEDIUM)

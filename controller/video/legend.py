@@ -113,4 +113,4 @@ def _draw_actions(view: Image, y: int, height: int) -> None:
     x = _PAD_PX
     for action, style in ACTIONS.items():
         x = text.put(view, style.symbol, x, y + height // 2 + 6, style.colour, 14)
-        x = text.put(view, action, x + 3, y + height // 2 + 6, TEXT, 13) + 12
+        x = text.put(view, action.value, x + 3, y + height // 2 + 6, TEXT, 13) + 12

@@ -1,4 +1,4 @@
-"""Obstacles as all views name them: in the body frame, the one that decides first, then the nearest."""
+"""Obstacles as all views name them, in the body frame: what decides first, then what moves, then the rest."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller.video.labels import Label
 from controller.video.moment import VideoMoment
 from controller.video.style import MOVING, STATIC, Colour
 from hal.geometry import camera_in_body
@@ -52,12 +53,16 @@ class Seen:
         return self.obstacle.unseen_s > 0.0
 
     def describe(self) -> str:
-        """Its number, distance, and how it moves."""
-        motion = "static"
-        if self.obstacle.moving:
-            speed_mps = math.hypot(*self.velocity_mps)
-            motion = f"{speed_mps:.1f} m/s" if math.isfinite(speed_mps) else "moving, speed unknown"
-        return f"#{self.obstacle.id}  {self.distance_m:.1f} m  {motion}"
+        """Its number and distance, and its speed if it moves."""
+        words = f"#{self.obstacle.id}  {self.distance_m:.1f} m"
+        if not self.obstacle.moving:
+            return words
+        speed_mps = math.hypot(*self.velocity_mps)
+        return words + (f"  {speed_mps:.1f} m/s" if math.isfinite(speed_mps) else "  speed unknown")
+
+    def label(self, words: str, box: FloatArray) -> Label:
+        """words beside box, marked as this obstacle is everywhere."""
+        return Label(words, self.colour, box, filled=self.obstacle.moving, outlined=self.decides)
 
 
 def seen_obstacles(moment: VideoMoment) -> list[Seen]:
@@ -76,10 +81,15 @@ def seen_obstacles(moment: VideoMoment) -> list[Seen]:
                 obstacle=obstacle,
                 centre_m=centre_m,
                 corners_m=centre_m + _CORNERS * half_m,
-                velocity_mps=in_body @ obstacle.velocity_mps,
-                velocity_cov=in_body @ obstacle.velocity_cov @ in_body.T,
+                velocity_mps=in_body @ _known(obstacle.velocity_mps),
+                velocity_cov=in_body @ _known(obstacle.velocity_cov) @ in_body.T,
                 distance_m=math.hypot(*(centre_m - camera.translation_m[:2])),
                 decides=obstacle.id == deciding_id,
             )
         )
-    return sorted(seen, key=lambda one: (not one.decides, one.distance_m))
+    return sorted(seen, key=lambda one: (not one.decides, not one.obstacle.moving, one.distance_m))
+
+
+def _known(values: FloatArray) -> FloatArray:
+    """Infinite is as little known as NaN, which can be multiplied in silence."""
+    return np.where(np.isfinite(values), values, np.nan)

@@ -7,6 +7,7 @@ from collections import deque
 
 import numpy as np
 
+from controller.decision import Action
 from controller.video import draw, text
 from controller.video.moment import VideoMoment
 from controller.video.style import (
@@ -18,7 +19,6 @@ from controller.video.style import (
     MEASURED_SPEED,
     PANEL,
     TARGET_SPEED,
-    UNKNOWN_ACTION,
     Image,
     Rect,
 )
@@ -53,7 +53,7 @@ class SpeedStrip:
         self._ribbon = Rect(self._plot.x, self._plot.bottom + 3, self._plot.width, _RIBBON_PX - 3)
         self._stamps_s: deque[float] = deque()
         self._speeds_mps: deque[tuple[float, float, float]] = deque()
-        self._actions: deque[str | None] = deque()
+        self._actions: deque[Action | None] = deque()
 
     def to_pixels(self, age_s: FloatArray, speed_mps: FloatArray) -> FloatArray:
         """Ages and speeds that broadcast, as (..., 2) pixels of the panel; now is at the right edge."""
@@ -103,7 +103,7 @@ class SpeedStrip:
         self._speeds_mps.append(
             (_number(target_mps), _number(moment.commanded_mps), _number(moment.measured_mps))
         )
-        self._actions.append(None if decision is None else decision.action.value)
+        self._actions.append(None if decision is None else decision.action)
         while self._stamps_s[0] < stamp_s - self._history_s:
             self._stamps_s.popleft()
             self._speeds_mps.popleft()
@@ -116,12 +116,14 @@ class SpeedStrip:
         x = np.rint(self.to_pixels(ages_s, np.zeros_like(ages_s))[:, 0]).astype(int)
         for begin, end in zip(begins, [*begins[1:], len(actions) - 1], strict=True):
             action = actions[begin]
-            style = ACTIONS.get(action or "", UNKNOWN_ACTION)
+            if action is None:
+                continue
+            style = ACTIONS[action]
             band = Rect(int(x[begin]), self._ribbon.y, int(x[end] - x[begin]), self._ribbon.height)
             band.of(view)[:] = style.colour
-            for label in (f"{style.symbol} {action}", style.symbol):
+            for label in (f"{style.symbol} {action.value}", style.symbol):
                 width = text.width(label, 12, text.MEDIUM)
-                if action is not None and width + 8 <= band.width:
+                if width + 8 <= band.width:
                     text.put(view, label, band.x + 4, band.bottom - 3, DARK_TEXT, 12, text.MEDIUM)
                     break
 

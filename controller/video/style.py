@@ -12,6 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.decision import Action
+from vision.scene import CameraCondition
+
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
@@ -44,6 +47,11 @@ MEASURED_SPEED = bgr("DD8DBA")
 WARNING = bgr("F0E442")
 ALARM = bgr("E8703A")
 FINE = bgr("2BBE91")
+HEALTH = {
+    CameraCondition.GOOD: FINE,
+    CameraCondition.DEGRADED: WARNING,
+    CameraCondition.UNTRUSTWORTHY: ALARM,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +62,10 @@ class ActionStyle:
     colour: Colour
 
 
-UNKNOWN_ACTION = ActionStyle("-", GRID)
 ACTIONS = {
-    "increase": ActionStyle("▲", FINE),
-    "keep": ActionStyle("■", bgr("B4BCC6")),
-    "decrease": ActionStyle("▼", ALARM),
+    Action.INCREASE: ActionStyle("▲", FINE),
+    Action.KEEP: ActionStyle("■", bgr("B4BCC6")),
+    Action.DECREASE: ActionStyle("▼", ALARM),
 }
 
 

@@ -47,6 +47,19 @@ def fit(text: str, room_px: int, size: int, weight: int = REGULAR) -> str:
     return text[:shortest].rstrip() + ELLIPSIS
 
 
+def wrap(text: str, room_px: int, most_lines: int, size: int, weight: int = REGULAR) -> list[str]:
+    """The text broken between words into lines that fit the room; what is too much is cut from the last."""
+    lines: list[str] = []
+    words = text.split()
+    while words and len(lines) < most_lines - 1:
+        count = len(words)
+        while count > 1 and width(" ".join(words[:count]), size, weight) > room_px:
+            count -= 1
+        lines.append(fit(" ".join(words[:count]), room_px, size, weight))
+        words = words[count:]
+    return [*lines, fit(" ".join(words), room_px, size, weight)] if words else lines
+
+
 def caption(image: Image, panel: Rect, title: str) -> int:
     """The title above a panel; returns the x at which it ends."""
     return put(image, title, panel.x, panel.y - 6, FAINT_TEXT, 12, BOLD)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from config.robot import Body
 from controller.video import draw, text
 from controller.video.corridor import Corridor
-from controller.video.labels import Label, draw_labels
+from controller.video.labels import draw_labels
 from controller.video.moment import VideoMoment
 from controller.video.seen import LEVEL_CAMERA, Seen
 from controller.video.style import (
@@ -83,7 +83,7 @@ class TopView:
         self._draw_camera(view, mount)
         for one in reversed(seen):
             self._draw_obstacle(view, one)
-        labels = [Label(f"#{one.obstacle.id}", one.colour, self._label_box(one), one.decides) for one in seen]
+        labels = [one.label(f"#{one.obstacle.id}", self._label_box(one)) for one in seen]
         draw_labels(view, labels, ring_labels, size=12)
 
     def _draw_rings(self, view: Image, mount: CameraMount) -> list[Rect]:
@@ -122,7 +122,7 @@ class TopView:
 
     def _draw_obstacle(self, view: Image, one: Seen) -> None:
         centre, corners = self.to_pixels(one.centre_m), self.to_pixels(one.corners_m)
-        draw.tint(view, corners, one.colour, 0.45)
+        draw.tint(view, corners, one.colour, 0.45 if one.obstacle.moving else 0.25)
         if one.decides:
             draw.line(view, corners, OWN, 6, closed=True)
         if one.predicted:
