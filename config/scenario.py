@@ -205,11 +205,15 @@ class Light(Section):
 
 
 class Scenario(Section):
-    """One world. duration_s: how long a mission in it may take at most."""
+    """One world. duration_s: how long a mission in it may take at most.
+
+    outcome: whether a robot that drives well reaches its target, or something never leaves its path.
+    """
 
     name: str = Field(min_length=1)
     description: str = ""
     duration_s: float = Field(default=120.0, gt=0, le=3600)
+    outcome: Literal["target", "blocked"] = "target"
     path: PathSpec
     room: Room = Room()
     light: Light = Light()

@@ -60,13 +60,13 @@ def main(scenario: str, t_s: float, along_m: float, seed: int, out: Path) -> Non
 
 
 def pose_along(path: PathSpec, along_m: float) -> PlanarPose:
-    """The turning centre after along_m on the path (arcs without their blends)."""
+    """The turning centre after along_m on the path; blended arcs as circles of the same length and angle."""
     pose = PlanarPose(path.start.x_m, path.start.y_m, math.radians(path.start.heading_deg))
     for segment in path.segments:
         here_m = min(max(along_m, 0.0), segment.length_m)
         bend = 0.0
         if segment.kind == "arc":
-            bend = math.copysign(1.0 / segment.radius_m, segment.angle_deg)
+            bend = math.radians(segment.angle_deg) / segment.length_m
         pose = advance_pose(pose, here_m, bend * here_m, 1.0)
         along_m -= segment.length_m
     return pose
