@@ -26,8 +26,8 @@ _EXTENSION_M = 20.0
 _LOOK_BACK_M = 0.25
 _LOOK_AHEAD_M = 2.0
 _SPEED_STEP_M = 0.05
-# A yaw rate near its limit leaves nothing to correct the track with.
-_YAW_RATE_FOR_THE_BEND = 0.9
+# The rest is kept for holding the path: tracks slip in yaw by 10 % and more.
+_YAW_RATE_FOR_THE_BEND = 0.8
 _SLOWEST_BEND_MPS = 0.1
 _OPPOSED_RAD = math.radians(120.0)
 

@@ -13,6 +13,8 @@ import numpy as np
 from controller.braking import BrakeLimits
 from hal.types import FloatArray
 
+_STANDING_MPS = 1e-9
+
 
 class SpeedRamps:
     """N ramps: hold v for latency_s, then reach each target speed in the shortest time, then keep it.
@@ -93,8 +95,9 @@ class SpeedRamps:
 
 def stop_step(v_mps: float, a_mps2: float, limits: BrakeLimits, dt_s: float) -> tuple[float, float]:
     """Speed and acceleration dt_s into the stop of braking.stop; never below zero speed."""
-    if a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * limits.jerk_mps3):
-        a = min(a_mps2 + limits.jerk_mps3 * dt_s, 0.0)
+    lets_go = a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * limits.jerk_mps3)
+    if lets_go or a_mps2 < -limits.decel_mps2:
+        a = min(a_mps2 + limits.jerk_mps3 * dt_s, 0.0 if lets_go else -limits.decel_mps2)
         v = v_mps + (a_mps2 + a) / 2.0 * dt_s
         return (v, a) if v > 0.0 else (0.0, 0.0)
     ramp = SpeedRamps(
@@ -106,4 +109,5 @@ def stop_step(v_mps: float, a_mps2: float, limits: BrakeLimits, dt_s: float) -> 
         jerk_mps3=limits.jerk_mps3,
     )
     _, speed, acceleration = ramp.state(np.full((1, 1), dt_s))
-    return float(speed[0, 0]), float(acceleration[0, 0])
+    v, a = float(speed[0, 0]), float(acceleration[0, 0])
+    return (v, a) if v > _STANDING_MPS else (0.0, 0.0)
