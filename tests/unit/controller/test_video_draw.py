@@ -17,7 +17,7 @@ def black(width: int = 40, height: int = 30) -> Image:
 
 
 def inked(image: Image) -> NDArray[np.bool_]:
-    return image.any(axis=2)
+    return np.asarray(image.max(axis=2) > 0)
 
 
 def test_one_call_draws_many_lines_and_leaves_out_what_is_not_finite() -> None:
