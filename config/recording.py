@@ -33,7 +33,7 @@ def _five_coefficients(value: tuple[float, ...]) -> tuple[float, ...]:
 
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[Number, Field(gt=0)]
-Pixels = Annotated[int, BeforeValidator(_whole_number), Field(gt=0, le=16384)]
+Pixels = Annotated[int, BeforeValidator(_whole_number), Field(gt=0, le=4096)]
 
 # How far a rotation matrix written with few digits may be from orthonormal.
 _ROTATION_TOLERANCE = 1e-3
@@ -45,9 +45,10 @@ class RecordingCamera(Section):
     A recording often comes from somebody else, so keys that are not known here are noted
     (``ignored_keys``) and ignored, unlike those of treadwatch's own files.
 
-    depth_factor: depth image value / depth_factor = metres. distortion: [k1, k2, p1, p2, k3] of the
-    colour image, OpenCV's order. camera_pitch_deg: positive looks down. camera_forward_m: ahead of
-    the turning centre. Depth outside depth_min_m..depth_max_m counts as not measured.
+    depth_factor: depth image value / depth_factor = metres (5000 for TUM, 1000 for millimetres).
+    distortion: [k1, k2, p1, p2, k3] of the colour image, OpenCV's order. camera_pitch_deg: positive
+    looks down. camera_forward_m: ahead of the turning centre. Depth outside depth_min_m..depth_max_m
+    counts as not measured.
 
     Where depth is not registered to colour, depth_fx, depth_fy, depth_cx, depth_cy (with depth_width
     and depth_height where its size differs) and depth_to_colour_translation_m [x, y, z] and
@@ -63,7 +64,7 @@ class RecordingCamera(Section):
     fy: Positive
     cx: Number
     cy: Number
-    depth_factor: Positive
+    depth_factor: Annotated[Number, Field(ge=1, le=1e6)]
     distortion: (
         Annotated[tuple[Number, ...], Field(strict=False), AfterValidator(_five_coefficients)] | None
     ) = None

@@ -43,10 +43,15 @@ def _decode(path: Path, width: int, height: int) -> NDArray[Any]:
         data = path.read_bytes()
     except OSError as error:
         raise ImageError(f"cannot be read ({error.strerror})") from error
+    except ValueError as error:  # a NUL byte in the name
+        raise ImageError("has a name that no file can have") from error
     _require_whole(data, width, height)
     # From memory: the file is read once, and OpenCV is never handed the path of a damaged file,
     # about which it would write to standard error and possibly return half an image.
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise ImageError(f"is damaged: it cannot be decoded ({error.err})") from error
     if image is None:
         raise ImageError("is damaged: its pixels cannot be decoded")
     _require_size(image.shape[1], image.shape[0], width, height)

@@ -7,7 +7,9 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from statistics import median
 from types import TracebackType
 from typing import Self
 
@@ -69,6 +71,13 @@ class TumReplay:
     def frame_count(self) -> int:
         """Pairs of colour and depth, of which some may prove unusable."""
         return len(self._pairs)
+
+    @property
+    def fps(self) -> float | None:
+        """As camera.yaml says, else the usual rate of the colour images; None for a single frame."""
+        if self._calibration.camera.fps is not None or len(self._pairs) < 2:
+            return self._calibration.camera.fps
+        return NS_PER_S / median(b.colour.stamp_ns - a.colour.stamp_ns for a, b in pairwise(self._pairs))
 
     @property
     def skipped(self) -> tuple[SkippedFrame, ...]:

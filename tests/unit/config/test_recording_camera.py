@@ -76,7 +76,7 @@ def test_other_keys_are_noted_and_ignored(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("written", "meant"), [("5e3", 5000.0), ("1e-3", 0.001), ('"5000"', 5000.0), ("5000", 5000.0)]
+    ("written", "meant"), [("5e3", 5000.0), ("1e+3", 1000.0), ('"5000"', 5000.0), ("5000", 5000.0)]
 )
 def test_numbers_may_be_written_as_other_programs_write_them(
     tmp_path: Path, written: str, meant: float
@@ -102,7 +102,8 @@ def test_distortion_may_be_absent_or_end_before_k3(tmp_path: Path, written: str)
         ({"fy": ".nan"}, "fy: .*finite"),
         ({"width": "640.5"}, "width: .*integer"),
         ({"width": "-640"}, "width: .*greater than 0"),
-        ({"depth_factor": "0"}, "depth_factor: .*greater than 0"),
+        ({"depth_factor": "0"}, "depth_factor: .*greater than or equal to 1"),
+        ({"depth_factor": "0.001"}, r"depth_factor: .*greater than or equal to 1, found 0\.001"),
         ({"depth_factor": "true"}, "depth_factor: .*number"),
         ({"cx": "700"}, "cx, cy must lie inside the 640x480 image"),
         ({"distortion": "[0.1, 0.2]"}, r"distortion: must be \[k1, k2, p1, p2, k3\], found 2"),

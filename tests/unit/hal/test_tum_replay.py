@@ -62,6 +62,17 @@ def test_knows_its_size_calibration_and_length_before_it_is_opened(recording: Pa
     assert replay.skipped == ()
 
 
+def test_the_rate_is_that_of_camera_yaml_or_the_usual_distance_of_the_frames(recording: Path) -> None:
+    index = recording / "rgb.txt"
+    index.write_text(index.read_text().replace("1.099999999", "1.109999999", 1))
+    assert TumReplay(recording).fps == pytest.approx(30.0, rel=1e-6)
+    set_key(recording, "fps", "25")
+    assert TumReplay(recording).fps == 25
+    set_key(recording, "fps", None)
+    index.write_text("1.0 rgb/1.000000000.png\n")
+    assert TumReplay(recording).fps is None
+
+
 def test_entering_again_starts_from_the_beginning(recording: Path) -> None:
     colour_files(recording)[1].unlink()
     replay = TumReplay(recording)
