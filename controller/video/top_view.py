@@ -72,7 +72,7 @@ class TopView:
             draw.area(view, self.to_pixels(scan.free_m), FREE_SPACE)
         if corridor is not None:
             draw.tint(view, self.to_pixels(corridor.outline_m), OWN, 0.13)
-        ring_labels = self._draw_rings(view, mount)
+        self._draw_rings(view, mount)
         draw.lines(view, self.to_pixels(scan.surfaces_m), SURFACE, 2)
         if corridor is not None:
             edges_m = np.stack([corridor.left_m, corridor.right_m])
@@ -84,15 +84,20 @@ class TopView:
         for one in reversed(seen):
             self._draw_obstacle(view, one)
         labels = [one.label(f"#{one.obstacle.id}", self._label_box(one)) for one in seen]
-        draw_labels(view, labels, ring_labels, size=12)
+        draw_labels(view, labels, self._draw_ring_labels(view, mount), size=12)
 
-    def _draw_rings(self, view: Image, mount: CameraMount) -> list[Rect]:
-        """Rings around the camera's foot; where their labels stand."""
+    def _draw_rings(self, view: Image, mount: CameraMount) -> None:
+        """Around the camera's foot."""
         foot_m = np.array([mount.forward_m, mount.left_m])
-        radii_m = np.arange(_RING_M, self._range_m + 1e-6, _RING_M)
+        radii_m = self._radii_m()
         angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 61)
         circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         draw.lines(view, self.to_pixels(foot_m + radii_m[:, np.newaxis, np.newaxis] * circle), GRID)
+
+    def _draw_ring_labels(self, view: Image, mount: CameraMount) -> list[Rect]:
+        """Last, so that nothing covers them; where they stand."""
+        foot_m = np.array([mount.forward_m, mount.left_m])
+        radii_m = self._radii_m()
         right_m = np.minimum(_RING_LABEL_SIN * radii_m, _RING_LABEL_RIGHT_M)
         at_m = foot_m + np.column_stack([np.sqrt(radii_m**2 - right_m**2), -right_m])
         places = []
@@ -101,6 +106,9 @@ class TopView:
             places.append(Rect(round(x), round(y) - 17, text.width(label, 12), 16))
             text.put(view, label, places[-1].x, places[-1].y + 12, FAINT_TEXT, 12)
         return places
+
+    def _radii_m(self) -> FloatArray:
+        return np.arange(_RING_M, self._range_m + 1e-6, _RING_M)
 
     def _draw_robot(self, view: Image, body: Body) -> None:
         half_m = 0.5 * body.width_m
