@@ -136,6 +136,7 @@ class AgilexEmulator:
     def take_over(self, v_mps: float = 0.0, w_radps: float = 0.0) -> None:
         """Somebody drives with the remote control, which outranks everything."""
         self.mode = _REMOTE
+        self._command_ns = None
         self._plant.command(v_mps, w_radps)
 
     def hand_back(self) -> None:

@@ -73,6 +73,11 @@ class AgilexFeedback:
         return self._reckoning.pose
 
     @property
+    def pose_ns(self) -> int | None:
+        """When the newest of what dead reckoning rests on arrived."""
+        return self.motion_ns if self._geometry is None else self._odometer_ns
+
+    @property
     def feedback_ns(self) -> int | None:
         """When the older of all that dead reckoning needs arrived; None while something is missing."""
         if self._geometry is None or self.motion_ns is None or self._odometer_ns is None:

@@ -6,6 +6,7 @@ Source: SCOUT user manual v1.3.0 3.3.1 and BUNKER MINI manual pp. 7-9; 11-bit id
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -6,6 +6,7 @@ else needs to know. exchange(), arm() and stop() never raise.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Protocol, Self
@@ -15,6 +16,7 @@ from hal.chassis import arming
 from hal.chassis.arming import NS_PER_MS, Arming, ArmingLimits, Evidence
 from hal.chassis.command import CommandLimits, is_zero, zero
 from hal.errors import LinkLost
+from hal.geometry import advance_pose
 from hal.types import ChassisState, PlanarPose, Setpoint
 
 # How often a lost link is tried again. Opening a port can take milliseconds, so not at every exchange.
@@ -22,7 +24,10 @@ _RETRY_NS = 500 * NS_PER_MS
 
 
 class Told(Protocol):
-    """What the base has told; hal.types.ChassisState and arming.Evidence say what each means."""
+    """What the base has told; hal.types.ChassisState and arming.Evidence say what each means.
+
+    pose holds for pose_ns; None where there is none yet.
+    """
 
     @property
     def feedback_ns(self) -> int | None: ...
@@ -40,6 +45,8 @@ class Told(Protocol):
     def standing(self) -> bool: ...
     @property
     def pose(self) -> PlanarPose: ...
+    @property
+    def pose_ns(self) -> int | None: ...
     @property
     def battery_v(self) -> float: ...
     @property
@@ -171,8 +178,18 @@ class ChassisDriver(ABC):
             feedback_ns=told.feedback_ns,
             v_mps=told.v_mps,
             w_radps=told.w_radps,
-            pose=told.pose,
+            pose=self._pose_now(now_ns),
             battery_v=told.battery_v,
             faults=told.faults,
             sent=sent,
         )
+
+    def _pose_now(self, now_ns: int) -> PlanarPose:
+        """The told pose brought forward with the told speeds: feedback may come at a fraction of the rate
+        of the exchanges, and whoever compares poses must not see them stand and jump. Past the
+        feedback's time limit nobody knows, and the pose stays where it is."""
+        told = self._told
+        if told.pose_ns is None or math.isnan(told.v_mps):
+            return told.pose
+        age_ns = min(max(now_ns - told.pose_ns, 0), self._limits.feedback_timeout_ns)
+        return advance_pose(told.pose, told.v_mps, told.w_radps, age_ns / 1e9) if age_ns else told.pose

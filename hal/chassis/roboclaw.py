@@ -77,7 +77,7 @@ class RoboclawChassis(ChassisDriver):
         if answer is None:
             return
         if answer.data is not None:
-            self._feedback.take(answer.request, answer.data, now_ns)
+            self._feedback.take(answer.request.command, answer.data, answer.asked_ns, now_ns)
         elif answer.request.command in _SETTINGS and self._arming.mode is ChassisMode.ARMING:
             self._setup.appendleft(answer.request)
 

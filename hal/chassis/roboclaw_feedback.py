@@ -6,7 +6,7 @@ import math
 
 from config.chassis import RoboclawChassisConfig
 from hal.chassis import roboclaw_packets as packets
-from hal.chassis.roboclaw_packets import Request, Status
+from hal.chassis.roboclaw_packets import Status
 from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
 from hal.types import PlanarPose
 
@@ -32,11 +32,11 @@ class RoboclawFeedback:
         self._geometry = geometry
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter()
-        self._counted_ns: int | None = None
         self._status: Status | None = None
         self._timeout_ms: int | None = None
         self._restarted = False
         self._wanted = False
+        self.pose_ns: int | None = None
         self.feedback_ns: int | None = None
         self.status_ns: int | None = None
         self.v_mps = math.nan
@@ -91,11 +91,11 @@ class RoboclawFeedback:
         """The controller is no longer asked to obey."""
         self._wanted = False
 
-    def take(self, request: Request, data: bytes, now_ns: int) -> None:
-        """Take in the valid answer to a request."""
-        match request.command:
+    def take(self, command: int, data: bytes, asked_ns: int, now_ns: int) -> None:
+        """Take in the valid answer to a request that was written at asked_ns."""
+        match command:
             case packets.ENCODERS:
-                self._count(*packets.encoders(data), now_ns)
+                self._count(*packets.encoders(data), asked_ns, now_ns)
             case packets.STATUS:
                 self._status, self.status_ns = packets.status(data), now_ns
             case packets.GET_TIMEOUT:
@@ -105,10 +105,10 @@ class RoboclawFeedback:
             case packets.CURRENTS:
                 self.currents_a = packets.currents_a(data)
 
-    def _count(self, left: int, right: int, now_ns: int) -> None:
+    def _count(self, left: int, right: int, asked_ns: int, now_ns: int) -> None:
         config = self._config
-        last_ns, self._counted_ns = self._counted_ns, now_ns
-        elapsed_s = 0.0 if last_ns is None else (now_ns - last_ns) / _NS_PER_S
+        last_ns, self.pose_ns = self.pose_ns, asked_ns
+        elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / _NS_PER_S
         limit = _JUMP_RATIO * config.max_qpps * elapsed_s + _JUMP_SLACK_M * config.counts_per_m
         steps = self._counter.increments(left, right, limit)
         if steps is None:

@@ -73,7 +73,7 @@ def speeds(left_qpps: float, right_qpps: float) -> Request:
 
 def ramped_speeds(accel_qpps2: float, left_qpps: float, right_qpps: float) -> Request:
     """Both motors to these speeds along one ramp."""
-    accel = min(max(round(accel_qpps2), 0), _UINT32_MAX)
+    accel = round(min(max(accel_qpps2, 0), _UINT32_MAX))
     return Request(RAMPED_SPEEDS, struct.pack(">Iii", accel, _int32(left_qpps), _int32(right_qpps)))
 
 
@@ -200,4 +200,4 @@ def status(data: bytes) -> Status:
 
 
 def _int32(value: float) -> int:
-    return min(max(round(value), _INT32_MIN), _INT32_MAX)
+    return round(min(max(value, _INT32_MIN), _INT32_MAX))

@@ -18,10 +18,12 @@ _REPLY_TIMEOUT_NS = 30 * NS_PER_MS
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of a request. data: None when no valid answer came."""
+    """What became of a request. data: None when no valid answer came. asked_ns: when it was written;
+    the controller looks at its encoders a few milliseconds later, long before the answer is read."""
 
     request: Request
     data: bytes | None
+    asked_ns: int
 
 
 class RoboclawPort:
@@ -73,7 +75,7 @@ class RoboclawPort:
         self._request = None
         if data is None:
             self._quiet_until_ns = now_ns + _SILENCE_NS
-        return Answer(request, data)
+        return Answer(request, data, self._sent_ns)
 
     def _complete(self, request: Request, now_ns: int) -> bytes | None:
         """The data once the answer is whole. A shorter variant is whole when silence follows it:

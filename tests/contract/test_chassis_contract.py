@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
+from itertools import pairwise
 
 import pytest
 
@@ -109,6 +110,17 @@ def test_dead_reckoning_follows_the_true_body(rig: Rig) -> None:
     assert math.hypot(state.pose.x_m - true.x_m, state.pose.y_m - true.y_m) < 0.01
     assert state.pose.heading_rad == pytest.approx(true.heading_rad, abs=0.01)
     assert true.y_m > 0.5, "the path did turn"
+
+
+def test_dead_reckoning_moves_with_every_exchange(rig: Rig) -> None:
+    """However seldom the base reports: who compares poses must not see them stand and jump."""
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    travelled = [rig.step(0.5).pose.x_m for _ in range(50)]
+    steps = [after - before for before, after in pairwise(travelled)]
+    assert min(steps) > 0.008
+    assert max(steps) < 0.012
 
 
 def sent_twists(states: list[ChassisState]) -> list[tuple[float, float]]:

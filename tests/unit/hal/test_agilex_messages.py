@@ -65,7 +65,7 @@ def test_decodes_what_was_encoded(message: AgilexMessage, arbitration_id: int, d
         (32.7674, "7F FF"),
         (40.0, "7F FF"),  # int16 would wrap to -25.536 m/s
         (-40.0, "80 00"),
-        (1e300, "7F FF"),
+        (1.7e308, "7F FF"),
     ],
 )
 def test_rounds_to_the_nearest_step_and_holds_at_the_range(v_mps: float, data: str) -> None:

@@ -40,6 +40,7 @@ def test_speeds_are_rounded_and_held_at_int32() -> None:
     assert packets.speeds(1.6, -1.6).payload == bytes.fromhex("00 00 00 02 FF FF FF FE")
     assert packets.speeds(1e12, -1e12).payload == bytes.fromhex("7F FF FF FF 80 00 00 00")
     assert packets.ramped_speeds(1e12, 0, 0).payload[:4] == bytes.fromhex("FF FF FF FF")
+    assert packets.speeds(math.inf, -math.inf).payload == bytes.fromhex("7F FF FF FF 80 00 00 00")
     with pytest.raises(ValueError, match="NaN"):
         packets.speeds(math.nan, 0)
 

@@ -1,0 +1,153 @@
+"""Hostile input: whatever arrives, no exception, no wrong checksum accepted, nothing moves by it."""
+
+from __future__ import annotations
+
+import math
+from binascii import crc_hqx
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hal.chassis import roboclaw_packets as packets
+from hal.chassis.agilex import AgilexChassis
+from hal.chassis.agilex_messages import MotionCommand, Odometer, decode, encode
+from hal.chassis.roboclaw import RoboclawChassis
+from hal.chassis.roboclaw_port import RoboclawPort
+from hal.links.scripted import ScriptedCanLink, ScriptedSerialLink
+from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
+from sim.plant import TrackedPlant
+from sim.roboclaw_emulator import RoboclawEmulator
+from tests.support.chassis_rig import COUNTS_PER_M, MS, PLANT, agilex_config, roboclaw_config
+
+AGILEX_IDS = (
+    0x111,
+    0x421,
+    0x441,
+    0x211,
+    0x221,
+    0x311,
+    0x361,
+    *range(0x251, 0x259),
+    *range(0x261, 0x269),
+)
+frames = st.builds(
+    CanFrame, st.one_of(st.sampled_from(AGILEX_IDS), st.integers(0, 0x7FF)), st.binary(max_size=8)
+)
+finite = st.floats(allow_nan=False, allow_infinity=False)
+QUERIES = (
+    packets.GET_TIMEOUT_REQUEST,
+    packets.MAIN_BATTERY_REQUEST,
+    packets.CURRENTS_REQUEST,
+    packets.ENCODERS_REQUEST,
+    packets.STATUS_REQUEST,
+)
+
+
+@settings(max_examples=500)
+@given(frames)
+def test_agilex_decodes_anything_without_an_exception(frame: CanFrame) -> None:
+    message = decode(frame)
+    if message is not None:
+        again = encode(message)
+        assert again.arbitration_id == frame.arbitration_id
+        assert decode(again) == message, "what was understood can be said"
+
+
+@given(finite, finite)
+def test_agilex_motion_is_never_further_off_than_half_a_step_or_the_range(v: float, w: float) -> None:
+    sent = decode(encode(MotionCommand(v, w)))
+    assert isinstance(sent, MotionCommand)
+    for asked, went in ((v, sent.v_mps), (w, sent.w_radps)):
+        held = min(max(asked, -32.768), 32.767)
+        assert abs(went - held) <= 0.0005 + 1e-9
+        assert went * asked >= 0.0, "never the other way"
+
+
+@given(st.integers(-(2**31), 2**31 - 1), st.integers(-(2**31), 2**31 - 1))
+def test_agilex_odometer_round_trip(left_mm: int, right_mm: int) -> None:
+    assert decode(encode(Odometer(left_mm, right_mm))) == Odometer(left_mm, right_mm)
+
+
+@settings(max_examples=500)
+@given(st.sampled_from(QUERIES), st.binary(max_size=16))
+def test_roboclaw_accepts_nothing_but_a_right_checksum(request: packets.Request, received: bytes) -> None:
+    data = request.accept(0x80, received)
+    if data is not None:
+        assert len(data) in request.reply_lengths
+        assert crc_hqx(bytes((0x80, request.command)) + data, 0) == int.from_bytes(received[-2:], "big")
+
+
+@given(st.sampled_from(QUERIES), st.data())
+def test_roboclaw_accepts_every_right_answer(request: packets.Request, data: st.DataObject) -> None:
+    length = data.draw(st.sampled_from(request.reply_lengths))
+    content = data.draw(st.binary(min_size=length, max_size=length))
+    checksum = crc_hqx(bytes((0x80, request.command)) + content, 0).to_bytes(2, "big")
+    assert request.accept(0x80, content + checksum) == content
+
+
+@given(st.binary(min_size=2, max_size=2) | st.binary(min_size=4, max_size=4))
+def test_every_set_bit_of_a_roboclaw_status_is_told(data: bytes) -> None:
+    status = packets.status(data)
+    told = len(status.errors) + len(status.warnings) + status.estop
+    assert told == int.from_bytes(data, "big").bit_count()
+
+
+@settings(max_examples=50)
+@given(st.lists(st.binary(max_size=12), max_size=60), st.lists(st.integers(1, 40), min_size=60, max_size=60))
+def test_roboclaw_port_survives_any_bytes_and_always_comes_to_rest(
+    chunks: list[bytes], steps_ms: list[int]
+) -> None:
+    link = ScriptedSerialLink()
+    port = RoboclawPort(link, 0x80)
+    now_ns = 0
+    for k, (chunk, step_ms) in enumerate(zip(chunks, steps_ms, strict=False)):
+        if port.idle(now_ns):
+            port.start(QUERIES[k % len(QUERIES)], now_ns)
+        link.deliver(chunk)
+        now_ns += step_ms * MS
+        port.poll(now_ns)
+    for _ in range(5):
+        now_ns += 20 * MS
+        port.poll(now_ns)
+    assert port.idle(now_ns)
+
+
+def check_state(state: ChassisState) -> None:
+    assert state.mode is not ChassisMode.ARMED, "nobody consented"
+    assert state.sent is None or (state.sent.v_mps, state.sent.w_radps) == (0.0, 0.0)
+    assert all(math.isfinite(value) for value in (state.pose.x_m, state.pose.y_m, state.pose.heading_rad))
+
+
+@settings(max_examples=50)
+@given(st.lists(st.lists(frames, max_size=6), max_size=20))
+def test_agilex_driver_survives_any_frames(bursts: list[list[CanFrame]]) -> None:
+    link = ScriptedCanLink()
+    chassis = AgilexChassis(link, agilex_config())
+    for k, burst in enumerate(bursts, start=1):
+        link.deliver(*burst)
+        check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))
+    allowed = {0x111, 0x421}
+    assert {frame.arbitration_id for frame in link.sent} <= allowed
+    assert all(frame.data == bytes(8) for frame in link.sent if frame.arbitration_id == 0x111)
+
+
+@settings(max_examples=50)
+@given(st.lists(st.binary(max_size=20), max_size=60))
+def test_roboclaw_driver_survives_any_bytes(chunks: list[bytes]) -> None:
+    link = ScriptedSerialLink()
+    chassis = RoboclawChassis(link, roboclaw_config())
+    for k, chunk in enumerate(chunks, start=1):
+        link.deliver(chunk)
+        check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))
+
+
+@settings(max_examples=50)
+@given(st.lists(st.binary(max_size=20), max_size=40))
+def test_roboclaw_emulator_moves_only_by_right_checksums(chunks: list[bytes]) -> None:
+    link = ScriptedSerialLink()
+    claw = RoboclawEmulator(link, TrackedPlant(PLANT), counts_per_m=COUNTS_PER_M)
+    for k, chunk in enumerate(chunks, start=1):
+        link.deliver(chunk)
+        claw.advance_to(k * 5 * MS)
+    if not claw.commands_obeyed:
+        assert claw.plant.track_travel_m == (0.0, 0.0)

@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from config.chassis import AgilexChassisConfig, ChassisConfig, RoboclawChassisConfig
+from config.loader import ConfigError, Section, load
+
+
+class Holder(Section):
+    """A file with a chassis section alone."""
+
+    chassis: ChassisConfig
+
+
+AGILEX = "chassis: {kind: agilex, link: {interface: virtual, channel: sim}}"
+ROBOCLAW = (
+    "chassis: {kind: roboclaw, link: {url: /dev/ttyACM0}, counts_per_m: 9000.0, track_width_m: 0.5, "
+    "max_qpps: 20000, accel_qpps2: 20000}"
+)
+
+
+def read(tmp_path: Path, text: str) -> AgilexChassisConfig | RoboclawChassisConfig:
+    path = tmp_path / "robot.yaml"
+    path.write_text(text)
+    return load(path, Holder).chassis
+
+
+def test_kind_chooses_the_driver(tmp_path: Path) -> None:
+    agilex = read(tmp_path, AGILEX)
+    assert isinstance(agilex, AgilexChassisConfig)
+    assert (agilex.model, agilex.command_period_ms, agilex.link.bitrate) == ("bunker", 20, 500_000)
+    roboclaw = read(tmp_path, ROBOCLAW)
+    assert isinstance(roboclaw, RoboclawChassisConfig)
+    assert (roboclaw.address, roboclaw.timeout_ms, roboclaw.link.baud) == (0x80, 300, 115_200)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (AGILEX.replace("agilex", "agilax"), "chassis"),
+        (AGILEX.replace("kind: agilex, ", ""), "chassis"),
+        (AGILEX.replace("virtual", "virtuell"), "interface"),
+        (AGILEX.replace("channel: sim", "chanel: sim"), "chanel: unknown key"),
+        (AGILEX.replace("channel: sim", "channel: 0"), "channel"),
+        (AGILEX.replace("sim}", "sim, port: 5}"), "port: Input should be greater"),
+        (AGILEX.replace("sim}", "sim, port: 5000}"), "only udp_multicast has this, not virtual"),
+        (AGILEX.replace("sim}", "sim, bitrate: 500000}"), "bitrate: virtual has none"),
+        (
+            AGILEX.replace("virtual, channel: sim", "socketcan, channel: can0, bitrate: 250000"),
+            "ip link set can0 up type can bitrate 250000",
+        ),
+        (
+            AGILEX.replace("virtual, channel: sim", "udp_multicast, channel: 10.0.0.1"),
+            "needs a group address such as 239.74.163.2, found '10.0.0.1'",
+        ),
+        (AGILEX.replace("virtual, channel: sim", "udp_multicast, channel: can0"), "found 'can0'"),
+        (AGILEX.replace("}}", "}, model: bnuker}"), "model"),
+        (AGILEX.replace("}}", "}, slip_factor: 0.9}"), "slip_factor"),
+        (AGILEX.replace("}}", "}, command_period_ms: 20.5}"), "command_period_ms"),
+        (ROBOCLAW.replace("9000.0", "0.0"), "counts_per_m"),
+        (ROBOCLAW.replace("9000.0", ".nan"), "counts_per_m"),
+        (ROBOCLAW.replace("}}", "}}").replace("max_qpps: 20000", "max_qpps: '20000'"), "max_qpps"),
+        (ROBOCLAW.replace("accel_qpps2: 20000", "accel_qpps2: 1, timeout_ms: 250"), "multiple of 100"),
+        (ROBOCLAW.replace("accel_qpps2: 20000", "accel_qpps2: 1, address: 1"), "address"),
+        (ROBOCLAW.replace(", max_qpps: 20000", ""), "max_qpps: missing key"),
+    ],
+)
+def test_mistakes_are_named_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read(tmp_path, text)
+    message = str(caught.value)
+    assert words in message
+    assert "robot.yaml" in message
+    assert "\n" not in message
+
+
+def test_socketcan_without_a_bitrate_is_fine(tmp_path: Path) -> None:
+    chassis = read(tmp_path, AGILEX.replace("virtual, channel: sim", "socketcan, channel: can0"))
+    assert isinstance(chassis, AgilexChassisConfig)
+
+
+def test_mirrored_motors(tmp_path: Path) -> None:
+    text = ROBOCLAW.replace("accel_qpps2: 20000", "accel_qpps2: 20000, invert_right: true")
+    chassis = read(tmp_path, text)
+    assert isinstance(chassis, RoboclawChassisConfig)
+    assert (chassis.left_sign, chassis.right_sign) == (1, -1)

@@ -1,0 +1,355 @@
+"""The AgileX driver by the frames it sends and the frames it hears, without an emulator."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from hal.chassis.agilex import AgilexChassis
+from hal.chassis.agilex_messages import (
+    ActuatorSlow,
+    AgilexMessage,
+    Battery,
+    ControlModeCommand,
+    MotionCommand,
+    MotionFeedback,
+    Odometer,
+    SystemState,
+    decode,
+    encode,
+)
+from hal.links.scripted import ScriptedCanLink
+from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
+from tests.support.chassis_rig import MS, agilex_config
+
+STANDBY, CAN, SERIAL, REMOTE = 0, 1, 2, 3
+
+
+class Bench:
+    """The driver, and a hand that says what the base says."""
+
+    def __init__(self, **changes: object) -> None:
+        self.link = ScriptedCanLink()
+        values: dict[str, object] = {"track_width_m": None, "slip_factor": 1.0}
+        self.chassis = AgilexChassis(self.link, agilex_config(None, **(values | changes)))
+        self.now_ns = 0
+
+    def say(self, *messages: AgilexMessage) -> None:
+        self.link.deliver(*(encode(message) for message in messages))
+
+    def exchange(self, v_mps: float | None = None, w_radps: float = 0.0, after_ms: int = 20) -> ChassisState:
+        self.now_ns += after_ms * MS
+        self.link.sent.clear()
+        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
+        return self.chassis.exchange(command, self.now_ns)
+
+    def sent(self) -> list[AgilexMessage | None]:
+        return [decode(frame) for frame in self.link.sent]
+
+    def arm(self) -> None:
+        self.chassis.arm(self.now_ns)
+        self.say(state(CAN), MotionFeedback(0.0, 0.0), Odometer(0, 0))
+        assert self.exchange().mode is ChassisMode.ARMED
+
+
+def state(mode: int = CAN, vehicle: int = 0, faults: int = 0, battery_v: float = 48.0) -> SystemState:
+    return SystemState(vehicle, mode, battery_v, faults, 0)
+
+
+def test_standby_says_zero_and_leaves_the_mode_alone() -> None:
+    bench = Bench()
+    bench.exchange()
+    assert bench.link.sent == [CanFrame(0x111, bytes(8))]
+
+
+def test_arming_sends_the_mode_until_the_base_is_in_it_and_never_again() -> None:
+    """A base that restarts must not be taken out of standby by a repeated 0x421."""
+    bench = Bench()
+    bench.chassis.arm(0)
+    modes = []
+    for _ in range(6):
+        bench.say(state(STANDBY), MotionFeedback(0.0, 0.0))
+        bench.exchange()
+        modes += [message for message in bench.sent() if isinstance(message, ControlModeCommand)]
+    assert modes == [ControlModeCommand(CAN)] * 3
+    bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+    assert bench.exchange().mode is ChassisMode.ARMED
+    for _ in range(50):
+        bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+        bench.exchange(0.1)
+        assert bench.sent() == [MotionCommand(0.1, 0.0)]
+
+
+def test_the_frames_of_a_drive_byte_for_byte() -> None:
+    bench = Bench()
+    bench.chassis.arm(0)
+    bench.exchange()
+    assert bench.link.sent == [CanFrame(0x111, bytes(8)), CanFrame(0x421, b"\x01")]
+    bench.arm()
+    bench.exchange(-0.5, 0.25)
+    assert bench.link.sent == [CanFrame(0x111, bytes.fromhex("FE 0C 00 FA 00 00 00 00"))]
+    bench.link.sent.clear()
+    bench.chassis.stop(bench.now_ns)
+    assert bench.link.sent == [CanFrame(0x111, bytes(8)), CanFrame(0x421, b"\x00")]
+
+
+@pytest.mark.parametrize(("loop_ms", "sent"), [(5, 50), (10, 50), (16, 62), (20, 50), (40, 25)])
+def test_one_command_each_period_whatever_the_loop(loop_ms: int, sent: int) -> None:
+    bench = Bench()
+    bench.arm()
+    count = 0
+    for k in range(1000 // loop_ms):
+        if k * loop_ms % 20 == 0:
+            bench.say(state(), MotionFeedback(0.0, 0.0))
+        bench.exchange(0.1, after_ms=loop_ms)
+        count += len(bench.link.sent)
+    assert count == pytest.approx(sent, abs=1 if loop_ms >= 16 else 17)
+
+
+def test_a_loop_with_jitter_misses_no_period() -> None:
+    bench = Bench()
+    bench.arm()
+    for after_ms in (20, 18, 23, 17, 21, 20, 19):
+        bench.say(MotionFeedback(0.0, 0.0))
+        bench.exchange(0.1, after_ms=after_ms)
+        assert bench.sent() == [MotionCommand(0.1, 0.0)]
+
+
+def test_a_zero_that_replaces_motion_does_not_wait_for_the_period() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.exchange(0.5)
+    assert bench.exchange(0.6, after_ms=1).sent is None
+    state_ = bench.exchange(0.0, after_ms=1)
+    assert state_.sent is not None
+    assert bench.sent() == [MotionCommand(0.0, 0.0)]
+    bench.exchange(0.0, after_ms=1)
+    assert bench.sent() == []
+
+
+def test_limits_of_the_model_hold_on_the_wire() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.exchange(9.0, 0.0)
+    assert bench.sent() == [MotionCommand(3.0, 0.0)]
+    bench.exchange(0.0, -9.0)
+    assert bench.sent() == [MotionCommand(0.0, -2.524)], "-2.5235 rad/s, rounded"
+
+
+def test_slip_is_asked_for_and_taken_off() -> None:
+    """The base turns 1 / slip_factor of what its tracks say."""
+    bench = Bench(slip_factor=1.25)
+    bench.arm()
+    bench.exchange(0.5, 0.4)
+    assert bench.sent() == [MotionCommand(0.5, 0.5)]
+    bench.say(MotionFeedback(0.5, 0.5))
+    assert bench.exchange(0.5, 0.4).w_radps == pytest.approx(0.4)
+
+
+def test_speeds_are_integrated_over_the_time_they_stand_for() -> None:
+    bench = Bench()
+    bench.say(MotionFeedback(1.0, 0.0))
+    bench.exchange()
+    for _ in range(50):
+        bench.say(MotionFeedback(1.0, 0.0))
+        bench.exchange()
+    # Three at once, after 60 ms of silence: 20 ms for each.
+    bench.say(MotionFeedback(1.0, 0.0), MotionFeedback(0.5, 0.0), MotionFeedback(0.0, 0.0))
+    pose = bench.exchange(after_ms=60).pose
+    assert (pose.x_m, pose.y_m, pose.heading_rad) == pytest.approx((1.03, 0.0, 0.0))
+
+
+def test_a_speed_does_not_stand_for_a_long_silence() -> None:
+    bench = Bench()
+    bench.say(MotionFeedback(1.0, 0.0))
+    bench.exchange()
+    bench.say(MotionFeedback(1.0, 0.0))
+    assert bench.exchange(after_ms=10_000).pose.x_m == pytest.approx(0.2)
+
+
+def test_odometer_is_counted_where_the_geometry_is_known() -> None:
+    """Lost frames lose nothing, and the counter wraps."""
+    bench = Bench(track_width_m=0.5)
+    bench.say(MotionFeedback(1.0, 0.0), Odometer(2**31 - 10, 100))
+    bench.exchange()
+    bench.say(MotionFeedback(1.0, 0.0), Odometer(-(2**31) + 10, 120))
+    assert bench.exchange().pose.x_m == pytest.approx(0.02)
+    bench.say(MotionFeedback(1.0, 0.0), Odometer(-(2**31) + 110, 170))
+    pose = bench.exchange(after_ms=100).pose
+    assert pose.heading_rad == pytest.approx((0.05 - 0.1) / 0.5)
+    assert pose.x_m == pytest.approx(0.02 + 0.075, abs=1e-3)
+
+
+def test_an_odometer_that_starts_anew_is_no_travel() -> None:
+    bench = Bench(track_width_m=0.5)
+    for millimetres in (50_000, 50_010, 0, 10):
+        bench.say(MotionFeedback(0.5, 0.0), Odometer(millimetres, millimetres))
+        pose = bench.exchange().pose
+    assert pose.x_m == pytest.approx(0.02)
+
+
+def test_feedback_is_as_old_as_the_older_of_what_it_needs() -> None:
+    bench = Bench(track_width_m=0.5)
+    bench.say(MotionFeedback(0.0, 0.0))
+    assert bench.exchange().feedback_ns is None, "no odometer yet"
+    bench.say(Odometer(0, 0))
+    assert bench.exchange().feedback_ns == 20 * MS
+    bench.say(MotionFeedback(0.0, 0.0))
+    assert bench.exchange().feedback_ns == 40 * MS
+
+
+@pytest.mark.parametrize("frozen", ["odometer", "speed"])
+def test_an_odometer_and_a_speed_that_disagree_latch(frozen: str) -> None:
+    """One of the two is stuck: the pose, or the speed, would be a lie."""
+    bench = Bench(track_width_m=0.5)
+    bench.arm()
+    for k in range(110):
+        speed_mps = 0.0 if frozen == "speed" else 0.5
+        count = 0 if frozen == "odometer" else 10 * k
+        bench.say(MotionFeedback(speed_mps, 0.0), Odometer(count, count), state())
+        seen = bench.exchange(0.5)
+        if seen.mode is not ChassisMode.ARMED:
+            break
+    assert seen.mode is ChassisMode.ESTOP
+    assert seen.reason.startswith("odometer and speed feedback disagree: ")
+
+
+def test_ordinary_error_of_either_is_no_disagreement() -> None:
+    bench = Bench(track_width_m=0.5)
+    bench.arm()
+    for k in range(300):
+        bench.say(MotionFeedback(0.5 if k % 3 else 0.6, 0.0), Odometer(11 * k, 10 * k), state())
+        assert bench.exchange(0.5).mode is ChassisMode.ARMED
+
+
+@pytest.mark.parametrize(
+    ("said", "reason"),
+    [
+        (state(vehicle=1), "emergency stop is pressed"),
+        (state(vehicle=2, faults=0x0104), "exception (vehicle state 2: system fault: unknown bit 0x0004"),
+        (state(vehicle=77), "exception (vehicle state 77: no fault named)"),
+        (state(mode=REMOTE), "remote control has taken over"),
+        (state(mode=SERIAL), "serial has taken over"),
+        (state(mode=STANDBY), "no longer obeys: control mode is standby"),
+        (state(mode=9), "no longer obeys: control mode is unknown mode 9"),
+    ],
+)
+def test_what_the_base_says_can_latch(said: SystemState, reason: str) -> None:
+    bench = Bench()
+    bench.arm()
+    bench.exchange(0.5)
+    bench.say(said, MotionFeedback(0.5, 0.0))
+    seen = bench.exchange(0.5)
+    assert seen.mode is ChassisMode.ESTOP
+    assert reason in seen.reason
+    assert MotionCommand(0.0, 0.0) in bench.sent(), "zero in the very exchange"
+    modes = []
+    for _ in range(2):
+        bench.say(state(), MotionFeedback(0.0, 0.0))
+        assert bench.exchange(0.5).mode is ChassisMode.ESTOP
+        modes += [message for message in bench.sent() if isinstance(message, ControlModeCommand)]
+    assert modes == [ControlModeCommand(STANDBY)], "a base that still obeys is taken out of command mode"
+
+
+def test_a_remote_control_is_left_in_charge() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.say(state(mode=REMOTE))
+    for _ in range(10):
+        bench.exchange(0.5)
+        assert all(isinstance(message, MotionCommand) for message in bench.sent()), "no 0x421"
+
+
+def test_silence_of_the_system_state_alone_is_a_loss() -> None:
+    """Without 0x211 nobody would notice the emergency stop."""
+    bench = Bench()
+    bench.arm()
+    for _ in range(40):
+        bench.say(MotionFeedback(0.0, 0.0))
+        seen = bench.exchange()
+    assert (seen.mode, seen.reason) == (ChassisMode.LOST, "no status for 720 ms")
+
+
+def test_faults_are_sentences_and_unknown_bits_are_not_swallowed() -> None:
+    bench = Bench()
+    bench.say(state(STANDBY, faults=0x8001), ActuatorSlow(1, 48.0, 30, 30, 0x40 | 0x21))
+    assert bench.exchange().faults == (
+        "system fault: unknown bit 0x0001",
+        "system fault: unknown bit 0x8000",
+        "driver 1: supply voltage low",
+        "driver 1: driver fault",
+    )
+    bench.say(state(STANDBY), ActuatorSlow(1, 48.0, 30, 30, 0x40))
+    assert bench.exchange().faults == ()
+
+
+def test_fault_bits_alone_do_not_stop_the_drive() -> None:
+    """Several models set "remote control lost" whenever it is switched off."""
+    bench = Bench()
+    bench.arm()
+    bench.say(state(faults=0x0004), MotionFeedback(0.0, 0.0))
+    seen = bench.exchange(0.2)
+    assert seen.mode is ChassisMode.ARMED
+    assert seen.faults == ("system fault: unknown bit 0x0004",)
+
+
+def test_battery_from_either_frame() -> None:
+    bench = Bench()
+    assert math.isnan(bench.exchange().battery_v)
+    bench.say(Battery(80, 100, 47.5, 0.0, 20.0))
+    assert bench.exchange().battery_v == pytest.approx(47.5)
+    bench.say(state(battery_v=48.5))
+    assert bench.exchange().battery_v == pytest.approx(48.5)
+
+
+def test_a_write_that_fails_is_a_lost_link_in_the_same_exchange() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.link.fail_writes(1)
+    seen = bench.exchange(0.5)
+    assert (seen.mode, seen.sent) == (ChassisMode.LOST, None)
+
+
+def test_a_lost_link_is_tried_again_twice_a_second() -> None:
+    bench = Bench()
+    tries = []
+
+    class CountingLink(ScriptedCanLink):
+        def receive(self) -> CanFrame | None:
+            tries.append(bench.now_ns)
+            return super().receive()
+
+    link = CountingLink()
+    bench.chassis = AgilexChassis(link, agilex_config())
+    link.unplug()
+    for _ in range(100):
+        bench.exchange()
+    assert len(tries) == 4
+    link.plug()
+    bench.exchange(after_ms=500)
+    assert link.sent == [CanFrame(0x111, bytes(8))], "speaks again, but zero"
+
+
+def test_a_flood_does_not_hold_the_loop() -> None:
+    bench = Bench()
+    for _ in range(1000):
+        bench.say(MotionFeedback(0.0, 0.0))
+    bench.exchange()
+    heard = 0
+    while bench.link.receive() is not None:
+        heard += 1
+    assert heard == 1000 - 256
+
+
+def test_an_old_command_stops_and_latches() -> None:
+    bench = Bench()
+    bench.arm()
+    old = Setpoint(bench.now_ns, 0.5, 0.0, 0.0)
+    for _ in range(10):
+        bench.now_ns += 20 * MS
+        bench.say(MotionFeedback(0.0, 0.0))
+        assert bench.chassis.exchange(old, bench.now_ns).mode is ChassisMode.ARMED
+    bench.now_ns += 20 * MS
+    seen = bench.chassis.exchange(old, bench.now_ns)
+    assert (seen.mode, seen.reason) == (ChassisMode.ESTOP, "the command is 220 ms old")

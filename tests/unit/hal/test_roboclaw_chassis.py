@@ -1,0 +1,285 @@
+"""The RoboClaw driver and its port by the bytes they write and read, with a line that misbehaves."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import pytest
+
+from hal.chassis import roboclaw_packets as packets
+from hal.chassis.roboclaw import RoboclawChassis
+from hal.chassis.roboclaw_port import Answer, RoboclawPort
+from hal.links.scripted import ScriptedSerialLink, serial_pair
+from hal.types import ChassisMode, ChassisState, Setpoint
+from sim.plant import TrackedPlant
+from sim.roboclaw_emulator import RoboclawEmulator
+from tests.support.chassis_rig import COUNTS_PER_M, MS, PLANT, roboclaw_config
+
+ADDRESS = 0x80
+
+
+def crc(command: int, data: bytes) -> bytes:
+    return packets.crc16(bytes((ADDRESS, command)) + data).to_bytes(2, "big")
+
+
+class TestPort:
+    def test_one_request_at_a_time_and_its_answer(self) -> None:
+        link = ScriptedSerialLink()
+        port = RoboclawPort(link, ADDRESS)
+        assert port.idle(0)
+        port.start(packets.MAIN_BATTERY_REQUEST, 0)
+        assert not port.idle(0)
+        assert bytes(link.sent) == b"\x80\x18"
+        assert port.poll(1 * MS) is None
+        link.deliver(b"\x00\xfc" + crc(24, b"\x00\xfc"))
+        assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, b"\x00\xfc", 0)
+        assert port.idle(2 * MS)
+
+    def test_short_reads_are_put_together(self) -> None:
+        link = ScriptedSerialLink()
+        link.read_at_most(1)
+        port = RoboclawPort(link, ADDRESS)
+        port.start(packets.ENCODERS_REQUEST, 0)
+        data = struct.pack(">II", 1, 2)
+        link.deliver(data + crc(78, data))
+        answers = [port.poll(k * MS) for k in range(10)]
+        assert answers[:-1] == [None] * 9
+        assert answers[-1] == Answer(packets.ENCODERS_REQUEST, data, 0)
+
+    def test_a_lost_answer_ends_after_its_time_and_a_silence(self) -> None:
+        port = RoboclawPort(ScriptedSerialLink(), ADDRESS)
+        port.start(packets.ENCODERS_REQUEST, 0)
+        assert port.poll(29 * MS) is None
+        assert port.poll(30 * MS) == Answer(packets.ENCODERS_REQUEST, None, 0)
+        assert not port.idle(39 * MS)
+        assert port.idle(40 * MS)
+
+    @pytest.mark.parametrize("noise", [b"\x00", b"\xff\x55\xaa"])
+    def test_noise_before_an_answer_spoils_it(self, noise: bytes) -> None:
+        """An answer has no start mark: guessing where it begins would accept wrong checksums."""
+        link = ScriptedSerialLink()
+        port = RoboclawPort(link, ADDRESS)
+        port.start(packets.MAIN_BATTERY_REQUEST, 0)
+        link.deliver(noise + b"\x00\xfc" + crc(24, b"\x00\xfc"))
+        assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
+
+    def test_a_wrong_checksum_is_no_answer(self) -> None:
+        link = ScriptedSerialLink()
+        port = RoboclawPort(link, ADDRESS)
+        port.start(packets.MAIN_BATTERY_REQUEST, 0)
+        link.deliver(b"\x00\xfd" + crc(24, b"\x00\xfc"))
+        assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
+
+    def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(self) -> None:
+        link = ScriptedSerialLink()
+        port = RoboclawPort(link, ADDRESS)
+        port.start(packets.speeds(1, 1), 0)
+        port.poll(30 * MS)
+        link.deliver(b"\xff")
+        assert port.poll(38 * MS) is None
+        assert not port.idle(40 * MS), "the line is left quiet once more"
+        assert port.poll(48 * MS) is None
+        assert port.idle(48 * MS)
+        port.start(packets.speeds(2, 2), 48 * MS)
+        assert port.poll(50 * MS) is None
+
+    def test_the_short_status_is_whole_when_silence_follows(self) -> None:
+        link = ScriptedSerialLink()
+        port = RoboclawPort(link, ADDRESS)
+        port.start(packets.STATUS_REQUEST, 0)
+        link.deliver(b"\x00\x04" + crc(90, b"\x00\x04"))
+        assert port.poll(4 * MS) is None, "it may be the beginning of the long one"
+        assert port.poll(14 * MS) == Answer(packets.STATUS_REQUEST, b"\x00\x04", 0)
+
+    def test_the_long_status_is_whole_at_once(self) -> None:
+        link = ScriptedSerialLink()
+        port = RoboclawPort(link, ADDRESS)
+        port.start(packets.STATUS_REQUEST, 0)
+        link.deliver(bytes.fromhex("00 00 00 01 97 9D"))
+        assert port.poll(4 * MS) == Answer(packets.STATUS_REQUEST, bytes.fromhex("00 00 00 01"), 0)
+
+
+class Bench:
+    """The driver with the emulator, and the line between them."""
+
+    def __init__(self, **changes: object) -> None:
+        self.near, self.far = serial_pair()
+        self.plant = TrackedPlant(PLANT)
+        self.emulator = RoboclawEmulator(self.far, self.plant, counts_per_m=COUNTS_PER_M, boot_ms=0)
+        self.chassis = RoboclawChassis(self.near, roboclaw_config(**changes))
+        self.now_ns = 0
+
+    def step(self, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
+        self.now_ns += 20 * MS
+        self.emulator.advance_to(self.now_ns)
+        self.near.written.clear()
+        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
+        return self.chassis.exchange(command, self.now_ns)
+
+    def run(self, steps: int, v_mps: float | None = None) -> ChassisState:
+        for _ in range(steps):
+            state = self.step(v_mps)
+        return state
+
+    def arm(self) -> None:
+        self.run(10)
+        self.chassis.arm(self.now_ns)
+        state = self.run(40)
+        assert state.mode is ChassisMode.ARMED, state.reason
+
+
+def test_the_time_out_is_set_and_read_back_before_arming() -> None:
+    bench = Bench()
+    bench.run(10)
+    assert bench.emulator.timeout_ms == 0
+    bench.chassis.arm(bench.now_ns)
+    written = []
+    while bench.step().mode is not ChassisMode.ARMED:
+        written += bench.near.written
+    assert bytes.fromhex("80 0E 03 28 36") in written
+    assert b"\x80\x0f" in written
+    assert bench.emulator.timeout_ms == 300
+
+
+def test_a_time_out_that_does_not_hold_is_told() -> None:
+    bench = Bench()
+    bench.emulator.settable_timeout = False
+    bench.chassis.arm(0)
+    reasons = [bench.step().reason for _ in range(160)]
+    waiting = "the base does not take commands: its time-out reads 0 ms, not 300 ms"
+    assert f"arming: {waiting}" in reasons
+    assert reasons[-1] == f"arming gave up after 3.0 s: {waiting}"
+
+
+def test_a_lost_setting_is_repeated() -> None:
+    bench = Bench()
+    bench.run(10)
+    lost: list[bytes] = []
+
+    def lose_first_setting(data: bytes) -> bytes:
+        if data[1] == packets.SET_TIMEOUT and not lost:
+            lost.append(data)
+            return b""
+        return data
+
+    bench.far.hear_through(lose_first_setting)
+    bench.arm()
+    assert lost
+    assert bench.emulator.timeout_ms == 300
+
+
+def test_a_motion_command_whose_answer_is_lost_is_not_repeated() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.near.hear_nothing()
+    bench.near.sent.clear()
+    for k in range(8):
+        bench.step(0.1 + 0.01 * k)
+    packets_sent = [bytes(bench.near.sent[i : i + 16]) for i in range(0, len(bench.near.sent), 16)]
+    motions = [packet for packet in packets_sent if packet[1:2] == bytes((packets.RAMPED_SPEEDS,))]
+    assert len(motions) == len(set(motions)), "each is newer than the one before"
+
+
+def test_motion_packet_byte_for_byte() -> None:
+    """0.5 m/s and 0.4 rad/s: tracks of 0.555 m * 1.1 at 20 000 counts a metre."""
+    bench = Bench()
+    bench.arm()
+    while bench.step(0.5, 0.4).sent is None:
+        """A query has its turn."""
+    half_mps = 0.5 * 0.4 * 0.555 * 1.1
+    left, right = round((0.5 - half_mps) * 20_000), round((0.5 + half_mps) * 20_000)
+    body = b"\x80\x28" + struct.pack(">Iii", 30_000, left, right)
+    assert bench.near.written == [body + packets.crc16(body).to_bytes(2, "big")]
+    assert (left, right) == (7558, 12_442)
+
+
+def test_mirrored_motors_drive_and_count_the_other_way() -> None:
+    bench = Bench(invert_right=True)
+    bench.arm()
+    bench.run(30, 0.5)
+    v_mps, w_radps = bench.plant.track_twist
+    assert abs(v_mps) < 0.01, "in the emulator motor 2 is not mirrored: it turns on the spot"
+    assert abs(w_radps) > 0.3
+    assert bench.step(0.5).v_mps > 0.1, "but the driver believes in its mirror"
+
+
+def test_the_fastest_speed_holds_for_each_track() -> None:
+    bench = Bench(max_qpps=10_000)
+    bench.arm()
+    twists = [(s.sent.v_mps, s.sent.w_radps) for s in (bench.step(0.5, 1.0) for _ in range(4)) if s.sent]
+    for v_mps, w_radps in twists:
+        assert v_mps + 0.5 * w_radps * 0.555 * 1.1 == pytest.approx(0.5)
+        assert w_radps == pytest.approx(2.0 * v_mps)
+
+
+def test_stop_writes_the_explicit_zero_even_while_an_answer_is_awaited() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(20, 0.5)
+    bench.near.written.clear()
+    bench.chassis.stop(bench.now_ns)
+    assert bench.near.written == [bytes.fromhex("80 25 00 00 00 00 00 00 00 00 34 04")]
+
+
+def test_wrong_checksums_on_the_line_are_survived() -> None:
+    """Every seventh answer is spoilt: the drive goes on, and nothing wrong is believed."""
+    bench = Bench()
+    bench.arm()
+    count = 0
+
+    def spoil(data: bytes) -> bytes:
+        nonlocal count
+        count += 1
+        return bytes((data[0] ^ 0x40,)) + data[1:] if count % 7 == 0 else data
+
+    bench.near.hear_through(spoil)
+    states = [bench.step(0.5) for _ in range(400)]
+    assert {state.mode for state in states} == {ChassisMode.ARMED}
+    assert states[-1].v_mps == pytest.approx(0.5, abs=0.005)
+    assert states[-1].pose.x_m == pytest.approx(bench.plant.pose.x_m, abs=0.02)
+    assert all(math.isnan(s.v_mps) or abs(s.v_mps) < 0.6 for s in states)
+
+
+def test_a_restart_between_two_answers_shows_in_the_encoders() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(100, 0.5)
+    bench.emulator.restart()
+    state = bench.run(20, 0.5)
+    assert state.mode is ChassisMode.ESTOP
+    assert state.reason.startswith("the base no longer obeys: its encoders jumped: restarted")
+
+
+def test_a_restart_at_rest_shows_in_the_time_out() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.emulator.restart()
+    state = bench.run(60)
+    assert state.mode is ChassisMode.ESTOP
+    assert state.reason.startswith("the base no longer obeys: its time-out reads 0 ms, not 300 ms")
+
+
+@pytest.mark.parametrize(
+    ("bits", "mode", "faults"),
+    [
+        (0x40, ChassisMode.ESTOP, ("error: motor 1 driver fault",)),
+        (0x80000, ChassisMode.ARMED, ("warning: main voltage low",)),
+    ],
+)
+def test_errors_latch_and_warnings_are_told(bits: int, mode: ChassisMode, faults: tuple[str, ...]) -> None:
+    bench = Bench()
+    bench.arm()
+    bench.emulator.status_bits = bits
+    state = bench.run(20, 0.3)
+    assert (state.mode, state.faults) == (mode, faults)
+
+
+def test_nothing_is_known_before_the_second_encoder_answer() -> None:
+    """One reading of an encoder is no speed."""
+    bench = Bench()
+    seen = [bench.step() for _ in range(20)]
+    first_known = next(k for k, state in enumerate(seen) if state.feedback_ns is not None)
+    assert first_known > 3
+    assert all(math.isnan(state.v_mps) for state in seen[:first_known])
+    assert seen[first_known].v_mps == 0.0
