@@ -224,9 +224,9 @@ def encode(message: AgilexMessage) -> CanFrame:
     raw = dict(layout.unused)
     for signal in layout.signals:
         value = getattr(message, signal.field)
-        if not abs(value) < float("inf"):
+        if not math.isfinite(value):
             raise ValueError(f"{signal.field} is {value}, which no frame can say")
-        raw[signal.name] = min(max(round(value / signal.factor), signal.raw_min), signal.raw_max)
+        raw[signal.name] = round(min(max(value / signal.factor, signal.raw_min), signal.raw_max))
     data = layout.message.encode(raw, scaling=False, strict=False)
     return CanFrame(layout.message.frame_id, data)
 
