@@ -19,9 +19,14 @@ from config.robot import Robot
 class SimulationConfig(Section):
     """The simulated outside: a world with moving things, and the plant that the emulator drives."""
 
-    scenario: str = Field(description="YAML file of the world")
+    scenario: str = Field(description="a scenario that ships, by name, or a YAML file beside this one")
     seed: int = Field(default=1, ge=0)
     plant: PlantConfig = PlantConfig()
+    base: Literal["emulated", "external"] = Field(
+        default="emulated",
+        description="external: a base or an emulator of its own stands at the other end of chassis.link, "
+        "and the simulated camera follows the motion that it reports",
+    )
 
 
 class LockstepRunner(Section):

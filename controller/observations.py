@@ -6,18 +6,13 @@ import json
 import math
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, Self, TextIO
+from typing import Any, Self, TextIO
 
-from controller.decide import Decision
+from controller.decision import Decision
+from controller.errors import UserError
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray
 from vision.scene import Obstacle, Scene
-
-
-class ObservationSink(Protocol):
-    """Takes what was seen and decided at one frame."""
-
-    def write(self, scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> None: ...
 
 
 def observation(scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> dict[str, Any]:
@@ -73,7 +68,14 @@ class ObservationFile:
         self._file: TextIO | None = None
 
     def __enter__(self) -> Self:
-        self._file = self._path.open("w", encoding="utf-8")
+        """Create the file. Raises UserError where that is not possible."""
+        try:
+            self._file = self._path.open("w", encoding="utf-8")
+        except OSError as error:
+            raise UserError(
+                f"{self._path}: observations cannot be written there ({error.strerror}); "
+                "name a file in a folder that exists and that you may write to"
+            ) from error
         return self
 
     def __exit__(

@@ -5,17 +5,15 @@ from __future__ import annotations
 import signal
 import socket
 import time
-from collections import deque
-from pathlib import Path
+from pathlib import Path as FilePath
 
-from config.app import AppConfig
-from controller.build import build_perceiver, limit_vision_threads, open_camera
+from config.app import AppConfig, RealtimeRunner
+from controller.build import build_path, build_perceiver, mount_of, open_camera, surroundings
 from controller.channel import Channel, PeerGone
 from controller.control import ControlStep
 from controller.localise import PoseHistory
-from controller.perceive import Look
 from controller.realtime import Farewell, SceneMessage
-from controller.recorder import RecordingOptions, open_recorder
+from controller.recorder import RecordingOptions, RunRecorder, open_recorder
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import EndOfStream, FrameTimeout, HalError
 from hal.geometry import advance_pose, camera_in_floor
@@ -34,51 +32,62 @@ class RemoteBody:
         self._fused = PoseHistory(reach_s=0.0)
         self._odometry = PoseHistory(reach_s=0.0)
         self._newest: ControlStep | None = None
-        self.steps: deque[ControlStep] = deque(maxlen=200)
+        self._unread: list[ControlStep] = []
 
     def listen(self) -> None:
         """Take in every control step that has arrived. Raises PeerGone."""
         while (message := self._channel.receive()) is not None:
             assert isinstance(message, ControlStep), f"control sent {type(message).__name__}"
             self._newest = message
-            self.steps.append(message)
+            self._unread.append(message)
             self._fused.append(message.now_ns, message.pose)
             self._odometry.append(message.now_ns, message.chassis.pose)
+
+    def take_steps(self) -> list[ControlStep]:
+        """The control steps that have arrived since the last call."""
+        self.listen()
+        steps, self._unread = self._unread, []
+        return steps
 
     def body_pose(self, stamp_ns: int) -> PlanarPose | None:
         """The body in the path's frame."""
         self.listen()
         known = self._fused.at(stamp_ns)
-        return known if known is not None else self._carried_on(stamp_ns, odometry=False)
+        if known is None and self._newest is not None:
+            return self._carried_on(self._newest.pose, stamp_ns)
+        return known
 
     def camera_pose(self, stamp_ns: int) -> Pose | None:
         """The camera by the chassis' dead reckoning."""
         self.listen()
-        known = self._odometry.at(stamp_ns) or self._carried_on(stamp_ns, odometry=True)
+        known = self._odometry.at(stamp_ns)
+        if known is None and self._newest is not None:
+            known = self._carried_on(self._newest.chassis.pose, stamp_ns)
         return None if known is None else camera_in_floor(known, self._mount)
 
-    def _carried_on(self, stamp_ns: int, odometry: bool) -> PlanarPose | None:
-        newest = self._newest
-        if newest is None or not 0 <= stamp_ns - newest.now_ns <= REACH_S * NS_PER_S:
+    def _carried_on(self, pose: PlanarPose, stamp_ns: int) -> PlanarPose | None:
+        """pose of the newest step, moved on to stamp_ns with its twist; None if that is too far."""
+        assert self._newest is not None
+        ahead_ns = stamp_ns - self._newest.now_ns
+        state = self._newest.chassis
+        twist_known = state.v_mps == state.v_mps and state.w_radps == state.w_radps
+        if not 0 <= ahead_ns <= REACH_S * NS_PER_S or not twist_known:
             return None
-        state = newest.chassis
-        pose = state.pose if odometry else newest.pose
-        if state.v_mps != state.v_mps or state.w_radps != state.w_radps:
-            return pose
-        return advance_pose(pose, state.v_mps, state.w_radps, (stamp_ns - newest.now_ns) / NS_PER_S)
+        return advance_pose(pose, state.v_mps, state.w_radps, ahead_ns / NS_PER_S)
 
 
 def perceive_forever(
-    config: AppConfig, config_path: Path, end: socket.socket, recording: RecordingOptions
+    config: AppConfig, config_path: FilePath, end: socket.socket, start_ns: int, recording: RecordingOptions
 ) -> None:
-    """Entry point of the process. Ends when the camera ends or the control process has gone."""
+    """Entry point of the process. start_ns: time zero of a simulated world.
+
+    Ends when the camera ends or the control process has gone.
+    """
     # Ctrl-C reaches the whole process group; only the control process may decide what it means.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    limit_vision_threads()
     channel = Channel(end)
     try:
-        _look_until_the_end(config, config_path, channel, recording)
+        _look_until_the_end(config, config_path, channel, start_ns, recording)
     except PeerGone:
         return
     except EndOfStream:
@@ -88,31 +97,28 @@ def perceive_forever(
 
 
 def _look_until_the_end(
-    config: AppConfig, config_path: Path, channel: Channel, recording: RecordingOptions
+    config: AppConfig, config_path: FilePath, channel: Channel, start_ns: int, recording: RecordingOptions
 ) -> None:
-    body = RemoteBody(channel, config.robot.camera_mount.to_mount())
-    clock = MonotonicClock()
-    start = config.path.start.to_pose() if config.path is not None else None
-    del start
+    assert isinstance(config.runner, RealtimeRunner)
+    timeout_s = config.runner.frame_timeout_s
+    body = RemoteBody(channel, mount_of(config))
     with (
-        open_camera(config, config_path, clock, body.body_pose) as camera,
-        open_recorder(config, config_path, recording) as recorder,
+        open_camera(config, config_path, MonotonicClock(), body.body_pose, start_ns) as camera,
+        open_recorder(recording, surroundings(config)) as recorder,
     ):
         perceiver = build_perceiver(config, body, body.body_pose, time.perf_counter_ns)
-        waiting: deque[Look] = deque()
+        run_recorder = RunRecorder(recorder, build_path(config, config_path))
         while True:
             try:
-                frame = camera.read(config.runner.frame_timeout_s)  # type: ignore[union-attr]
+                look = perceiver.look(camera.read(timeout_s))
             except FrameTimeout:
-                body.listen()  # notices that the control process has gone
+                # The scene ages and the robot stops; the camera may come back.
+                body.listen()
                 continue
-            look = perceiver.look(frame)
             channel.send(SceneMessage(look.scene, look.timing_ms))
-            waiting.append(look)
-            while body.steps and waiting:
-                step = body.steps.popleft()
-                del step
-            recorder.flush()
+            run_recorder.saw(look)
+            for step in body.take_steps():
+                run_recorder.decided(step)
 
 
 def _say_farewell(channel: Channel, reason: str) -> None:

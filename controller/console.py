@@ -1,0 +1,58 @@
+"""What a person sees of a run: a progress line on a terminal, a line per new decision, a summary."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from controller.decision import Decision
+
+BAR = 24
+# The line is renewed this often in steps of progress, not at every control step.
+STEPS_SHOWN = 10
+
+
+class Console:
+    """Events and summary go to standard output, progress to standard error and only if that is a terminal."""
+
+    def __init__(self, quiet: bool) -> None:
+        self._quiet = quiet
+        self._live = sys.stderr.isatty() and not quiet
+        self._calls = 0
+        self._last_said: tuple[str, int | None] | None = None
+
+    def progress(self, share: float, text: str) -> None:
+        """share: 0..1 of the whole."""
+        self._calls += 1
+        if self._live and self._calls % STEPS_SHOWN == 1:
+            done = round(BAR * min(max(share, 0.0), 1.0))
+            bar = "#" * done + "." * (BAR - done)
+            click.echo(f"\r\033[K[{bar}] {text[:90]}", nl=False, err=True)
+
+    def decision(self, stamp_s: float, decision: Decision, speed_mps: float) -> None:
+        """One line whenever another rule or another obstacle decides."""
+        said = (decision.reason.rule, decision.reason.obstacle_id)
+        if said == self._last_said:
+            return
+        self._last_said = said
+        self.event(
+            f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  {decision.action.value:8}  {decision.reason.sentence}"
+        )
+
+    def event(self, line: str) -> None:
+        """A line that stays."""
+        if not self._quiet:
+            self._clear()
+            click.echo(line)
+
+    def summary(self, rows: list[tuple[str, str]]) -> None:
+        """The result, one row a subject."""
+        self._clear()
+        width = max(len(name) for name, _ in rows)
+        for name, text in rows:
+            click.echo(f"{name:<{width}}  {text}")
+
+    def _clear(self) -> None:
+        if self._live:
+            click.echo("\r\033[K", nl=False, err=True)

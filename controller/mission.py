@@ -1,0 +1,98 @@
+"""`treadwatch run`: put the parts together, drive, and say how it went."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+
+from config.app import AppConfig, LockstepRunner, load_app
+from controller.build import (
+    build_base,
+    build_control,
+    build_path,
+    build_perceiver,
+    build_simulation,
+    open_simulated_camera,
+    surroundings,
+)
+from controller.console import Console
+from controller.errors import UserError
+from controller.lockstep import run_lockstep
+from controller.realtime_mission import drive_realtime
+from controller.recorder import RecordingOptions, RunRecorder, open_recorder
+from controller.result import MissionOptions, MissionResult
+from controller.service import stop_on_signals
+from controller.summary import report, summary_rows
+from controller.tally import SetpointTally, TimingTally
+from hal.clocks import SimulatedClock
+
+
+def run_mission(options: MissionOptions) -> int:
+    """Drive once; the exit code: 0, or 1 if anything was touched or the target was missed.
+
+    Raises ConfigError, HalError, UserError.
+    """
+    config = with_overrides(load_app(options.config_path), options)
+    console = Console(options.quiet)
+    if isinstance(config.runner, LockstepRunner):
+        result = drive_lockstep(config, config.runner, options, console)
+    else:
+        result = drive_realtime(config, config.runner, options, console)
+    console.summary(summary_rows(config, result))
+    return 0 if result.succeeded else 1
+
+
+def with_overrides(config: AppConfig, options: MissionOptions) -> AppConfig:
+    """The configuration with another scenario or seed. Raises UserError where nothing is simulated."""
+    changes: dict[str, object] = {}
+    if options.scenario is not None:
+        changes["scenario"] = options.scenario
+    if options.seed is not None:
+        changes["seed"] = options.seed
+    if not changes:
+        return config
+    if config.simulation is None:
+        raise UserError(
+            f"--{' and --'.join(changes)}: {options.config_path} simulates nothing; leave the option out"
+        )
+    return config.model_copy(update={"simulation": config.simulation.model_copy(update=changes)})
+
+
+def drive_lockstep(
+    config: AppConfig, runner: LockstepRunner, options: MissionOptions, console: Console
+) -> MissionResult:
+    """One thread, simulated time."""
+    clock = SimulatedClock()
+    path = build_path(config, options.config_path)
+    chassis, emulator = build_base(config, path.start, clock.now_ns())
+    assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
+    simulation = build_simulation(config, options.config_path, emulator, clock.now_ns())
+    camera = open_simulated_camera(
+        config, options.config_path, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
+    )
+    # Time is simulated, so durations measured on this machine stay out of what must be repeatable.
+    recording = RecordingOptions(options.observations, options.video, timed=False)
+    with ExitStack() as devices:
+        devices.enter_context(simulation)
+        devices.enter_context(chassis)
+        devices.enter_context(camera)
+        recorder = devices.enter_context(open_recorder(recording, surroundings(config)))
+        stop = devices.enter_context(stop_on_signals())
+        loop = build_control(config, options.config_path, chassis)
+        result = MissionResult(loop, SetpointTally(config.robot.limits), TimingTally(), simulation=simulation)
+        perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
+        run_recorder = RunRecorder(recorder, path)
+        began_s = time.perf_counter()
+        for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop):
+            step = moment.control
+            result.take(step)
+            for look in moment.looks:
+                result.timing.add(look.timing_ms)
+                run_recorder.saw(look)
+            run_recorder.decided(step)
+            report(console, path.length_m, step)
+            if stop:
+                loop.request_stop(f"{stop.reason} received")
+        run_recorder.finish()
+        result.wall_s = time.perf_counter() - began_s
+    return result

@@ -1,0 +1,166 @@
+"""`treadwatch replay`: look at a recording as the robot would, and say what was seen."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from config.app import ReplayConfig, load_replay
+from config.camera import OdometryChoice
+from controller.build import (
+    build_replay_decision,
+    build_replay_perceiver,
+    open_replay,
+    replay_surroundings,
+    straight_ahead,
+)
+from controller.console import Console
+from controller.decide import DecisionMaker
+from controller.decision import Decision
+from controller.path import OnPath, Path
+from controller.perceive import Look
+from controller.recorder import RecordingOptions, open_recorder
+from controller.tally import TimingTally
+from hal.clocks import NS_PER_S
+from hal.errors import EndOfStream
+from hal.geometry import camera_in_body
+from hal.types import CameraMount, PlanarPose
+from vision.scene import CameraCondition, EgoMotion
+
+# A recording is looked at frame by frame, so the decision is as fresh as the frame.
+_STANDING = PlanarPose(0.0, 0.0, 0.0)
+_SPEED_FRAMES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayOptions:
+    """The command line of `treadwatch replay`."""
+
+    recording: FilePath
+    odometry: OdometryChoice
+    config_path: FilePath
+    observations: FilePath | None = None
+    video: FilePath | None = None
+    quiet: bool = False
+
+
+@dataclass
+class ReplayTally:
+    """What a replay adds up to."""
+
+    timing: TimingTally = field(default_factory=TimingTally)
+    frames: int = 0
+    first_ns: int = 0
+    last_ns: int = 0
+    ids: set[int] = field(default_factory=set)
+    moving_ids: set[int] = field(default_factory=set)
+    nearest_m: float = math.inf
+    conditions: Counter[CameraCondition] = field(default_factory=Counter)
+    actions: Counter[str] = field(default_factory=Counter)
+
+    def take(self, look: Look, decision: Decision) -> None:
+        """Account for one frame."""
+        self.timing.add(look.timing_ms)
+        self.first_ns = look.scene.captured_ns if self.frames == 0 else self.first_ns
+        self.last_ns = look.scene.captured_ns
+        self.frames += 1
+        self.ids.update(obstacle.id for obstacle in look.scene.obstacles)
+        self.moving_ids.update(obstacle.id for obstacle in look.scene.obstacles if obstacle.moving)
+        for obstacle in look.scene.obstacles:
+            self.nearest_m = min(self.nearest_m, float(obstacle.position_m[2]))
+        self.conditions[look.scene.health.condition] += 1
+        self.actions[decision.action.value] += 1
+
+
+class EgoSpeed:
+    """How fast the camera's carrier drives ahead: the median of the last frames' ego-motion."""
+
+    def __init__(self, mount: CameraMount | None) -> None:
+        self._to_body = camera_in_body(mount or CameraMount(0.0, 0.0, 0.0, 0.0)).rotation
+        self._recent_mps: list[float] = []
+
+    def step(self, ego: EgoMotion) -> float:
+        """m/s, never negative; 0 until something was measured."""
+        if ego.source != "none" and ego.dt_s > 0.0:
+            ahead_m = float((self._to_body @ ego.motion.translation_m)[0])
+            self._recent_mps = [*self._recent_mps[1 - _SPEED_FRAMES :], ahead_m / ego.dt_s]
+        return max(float(np.median(self._recent_mps)), 0.0) if self._recent_mps else 0.0
+
+
+def run_replay(options: ReplayOptions) -> None:
+    """Every frame through detect, track and decide. Raises ConfigError, HalError, UserError."""
+    config = load_replay(options.config_path)
+    console = Console(options.quiet)
+    source, odometry = open_replay(options.recording, options.odometry)
+    mount = recorded_mount(config, source.mount)
+    perceiver = build_replay_perceiver(config, mount, odometry, time.perf_counter_ns)
+    decide = build_replay_decision(config, mount)
+    path = straight_ahead(config.robot)
+    speed = EgoSpeed(mount)
+    tally = ReplayTally()
+    recording = RecordingOptions(options.observations, options.video)
+    with ExitStack() as devices:
+        devices.enter_context(source)
+        recorder = devices.enter_context(open_recorder(recording, replay_surroundings(config, mount)))
+        while True:
+            try:
+                frame = source.read(timeout_s=0.0)
+            except EndOfStream:
+                break
+            look = perceiver.look(frame)
+            v_mps = speed.step(look.scene.ego_motion)
+            decision = _decide(decide, path, look, v_mps)
+            tally.take(look, decision)
+            recorder.record(look, decision, measured_mps=v_mps, path_ahead_m=_AHEAD_M)
+            console.progress(tally.frames / source.frame_count, f"frame {tally.frames}/{source.frame_count}")
+            console.decision((tally.last_ns - tally.first_ns) / NS_PER_S, decision, v_mps)
+    console.summary(_summary(options, tally, [str(skip) for skip in source.skipped], source.notes))
+
+
+def recorded_mount(config: ReplayConfig, recorded: CameraMount | None) -> CameraMount | None:
+    """The recording's own mounting, or the robot's if that may be assumed, or unknown."""
+    if recorded is not None or not config.assume_mount:
+        return recorded
+    mount = config.robot.camera_mount
+    return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
+
+
+_AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
+
+
+def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Decision:
+    """As for a robot that stands at the start of a straight path and drives v_mps."""
+    on_path = OnPath(0.0, 0.0, 0.0)
+    return decide.step(look.scene, path, _STANDING, on_path, v_mps, 0.0, look.scene.captured_ns)
+
+
+def _summary(
+    options: ReplayOptions, tally: ReplayTally, skipped: list[str], notes: tuple[str, ...]
+) -> list[tuple[str, str]]:
+    duration_s = (tally.last_ns - tally.first_ns) / NS_PER_S
+    rows = [
+        (
+            "recording",
+            f"{options.recording}: {tally.frames} frames, {duration_s:.2f} s; {len(skipped)} skipped",
+        ),
+        (
+            "obstacles",
+            f"{len(tally.ids)} seen, {len(tally.moving_ids)} of them moving"
+            + (f"; nearest {tally.nearest_m:.2f} m ahead" if math.isfinite(tally.nearest_m) else ""),
+        ),
+        ("decisions", ", ".join(f"{count} {action}" for action, count in sorted(tally.actions.items()))),
+        (
+            "camera",
+            ", ".join(f"{count} frames {condition.value}" for condition, count in tally.conditions.items()),
+        ),
+        ("perception", tally.timing.line()),
+    ]
+    rows.extend(("skipped", text) for text in skipped)
+    rows.extend(("note", text) for text in notes)
+    return rows

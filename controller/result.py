@@ -1,0 +1,65 @@
+"""What a drive was asked to do and how it went."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+from controller.control import ControlLoop, ControlStep, Outcome
+from controller.realtime import Punctuality
+from controller.tally import SetpointTally, TimingTally
+from hal.clocks import NS_PER_S
+from sim.simulation import Simulation
+
+
+@dataclass(frozen=True, slots=True)
+class MissionOptions:
+    """The command line of `treadwatch run`."""
+
+    config_path: FilePath
+    scenario: str | None = None
+    seed: int | None = None
+    observations: FilePath | None = None
+    video: FilePath | None = None
+    quiet: bool = False
+
+
+@dataclass
+class MissionResult:
+    """What the summary is made of."""
+
+    loop: ControlLoop
+    setpoints: SetpointTally
+    timing: TimingTally
+    last: ControlStep | None = None
+    started_ns: int = 0
+    wall_s: float = math.nan
+    simulation: Simulation | None = None
+    punctuality: Punctuality | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """From the first control step to the last."""
+        return 0.0 if self.last is None else (self.last.now_ns - self.started_ns) / NS_PER_S
+
+    @property
+    def contacts(self) -> list[str]:
+        """What was touched, in a simulation."""
+        return [] if self.simulation is None else self.simulation.referee.contacts
+
+    @property
+    def succeeded(self) -> bool:
+        """Reached or stopped as asked, nothing touched, limits kept."""
+        return (
+            self.loop.outcome in (Outcome.REACHED, Outcome.STOPPED)
+            and not self.contacts
+            and self.setpoints.violations == 0
+        )
+
+    def take(self, step: ControlStep) -> None:
+        """Account for one control step."""
+        if self.last is None:
+            self.started_ns = step.now_ns
+        self.last = step
+        self.setpoints.add(step.chassis.sent)

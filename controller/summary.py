@@ -1,0 +1,102 @@
+"""A drive in words: while it goes on, and at its end."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from config.app import AppConfig
+from controller.console import Console
+from controller.control import ControlStep, Outcome
+from controller.realtime import Punctuality
+from controller.result import MissionResult
+from controller.tally import SetpointTally, mean_speed_mps
+from hal.clocks import NS_PER_S
+from sim.simulation import Simulation
+
+
+def report(console: Console, length_m: float, step: ControlStep) -> None:
+    """Progress, and the decision if it is a new one."""
+    console.progress(
+        step.progress_m / length_m,
+        f"{step.progress_m:5.1f}/{length_m:.1f} m  {step.setpoint.v_mps:4.2f} m/s  "
+        f"{step.decision.action.value}: {step.decision.reason.sentence}",
+    )
+    console.decision(step.now_ns / NS_PER_S, step.decision, step.setpoint.v_mps)
+
+
+def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, str]]:
+    """The summary as (subject, text)."""
+    rows = [("mission", _mission_text(config, result)), ("target", _target_text(result))]
+    if result.simulation is not None:
+        rows.append(("contacts", _contact_text(result.simulation)))
+    rows.append(("limits", _limits_text(config, result.setpoints)))
+    rows.append(("perception", result.timing.line()))
+    if math.isfinite(result.wall_s):
+        ratio = result.duration_s / result.wall_s
+        rows.append(
+            (
+                "speed",
+                f"{result.duration_s:.1f} s simulated in {result.wall_s:.1f} s: {ratio:.2f} x real time",
+            )
+        )
+    if result.punctuality is not None and result.punctuality.late_ns:
+        rows.append(("control", _punctuality_text(result.punctuality)))
+    return rows
+
+
+def _punctuality_text(punctuality: Punctuality) -> str:
+    late_ms = np.array(punctuality.late_ns) / 1e6
+    return (
+        f"steps began {np.median(late_ms):.2f} ms late (median), {np.percentile(late_ms, 99):.2f} ms (p99), "
+        f"{late_ms.max():.2f} ms at worst; {punctuality.skipped} of {len(late_ms)} skipped"
+    )
+
+
+def _mission_text(config: AppConfig, result: MissionResult) -> str:
+    outcome = result.loop.outcome
+    ended = "given up: max_duration_s is over" if outcome is None else outcome.value
+    if outcome is not Outcome.REACHED and result.loop.stop_reason:
+        ended += f" ({result.loop.stop_reason})"
+    length_m = 0.0 if result.last is None else result.last.progress_m
+    mean = mean_speed_mps(length_m, result.duration_s)
+    where = (
+        "" if config.simulation is None else f"{config.simulation.scenario}, seed {config.simulation.seed}: "
+    )
+    return f"{where}{ended}; {length_m:.2f} m in {result.duration_s:.1f} s, {mean:.2f} m/s on average"
+
+
+def _target_text(result: MissionResult) -> str:
+    if result.last is None:
+        return "not known"
+    left_m = result.loop.path.length_m - result.last.progress_m
+    text = (
+        f"{100 * left_m:+.1f} cm to go by odometry, {100 * abs(result.last.lateral_m):.1f} cm beside the path"
+    )
+    if result.simulation is not None:
+        target = result.loop.path.pose(result.loop.path.length_m)
+        truth = result.simulation.body_pose
+        off_m = math.hypot(target.x_m - truth.x_m, target.y_m - truth.y_m)
+        text += f"; truly {100 * off_m:.1f} cm from the target point"
+    return text
+
+
+def _contact_text(simulation: Simulation) -> str:
+    referee = simulation.referee
+    count = len(referee.contacts)
+    text = f"{count}" + (f" with {', '.join(referee.contacts)}" if count else "")
+    if referee.closest is not None:
+        text += f"; closest {referee.closest.distance_m:.2f} m to {referee.closest.name}"
+    return text
+
+
+def _limits_text(config: AppConfig, tally: SetpointTally) -> str:
+    limits = config.robot.limits
+    kept = "kept" if tally.violations == 0 else f"broken {tally.violations} times"
+    return (
+        f"{kept} in {tally.count} setpoints sent: v <= {tally.max_speed_mps:.3f} m/s, "
+        f"|a| <= {tally.max_accel_mps2:.3f} m/s^2, |jerk| <= {tally.max_jerk_mps3:.3f} m/s^3 "
+        f"(comfort {limits.max_accel_mps2:g}, {limits.max_jerk_mps3:g}; "
+        f"{tally.emergency_count} setpoints braked harder), {tally.reversals} reversals"
+    )
