@@ -88,8 +88,9 @@ def _draw_reason(view: Image, sentence: str) -> None:
     """In one line, or smaller in two."""
     x = _CHIP.right + 14
     room_px = _CAMERA_X - 24 - x
-    if text.width(sentence, 16) <= room_px:
-        text.put(view, sentence, x, _BASELINE_PX - 1, TEXT, 16)
-        return
+    for size in (16, 15, 14, 13):
+        if text.width(sentence, size) <= room_px:
+            text.put(view, sentence, x, _BASELINE_PX - 1, TEXT, size)
+            return
     for baseline, line in zip((18, 35), text.wrap(sentence, room_px, 2, 13), strict=False):
         text.put(view, line, x, baseline, TEXT, 13)

@@ -149,6 +149,13 @@ def test_a_long_reason_stays_clear_of_what_stands_beside_it() -> None:
     assert (long[24:40, 240:800] != long[0, 240]).any()
 
 
+@pytest.mark.parametrize("repeats", range(1, 9))
+def test_a_reason_stands_in_the_middle_of_the_header(repeats: int) -> None:
+    lines = header_with("the way is free " * repeats)[:, 240:820]
+    rows = np.flatnonzero((lines != lines[0, 0]).any(axis=(1, 2)))
+    assert 0.5 * (rows[0] + rows[-1]) == pytest.approx(HEADER.height / 2, abs=4.0)
+
+
 def test_time_counts_from_the_first_moment() -> None:
     composer = Composer()
     late_ns = 1_305_031_098_665_300_000
