@@ -11,6 +11,7 @@ from config.chassis import CanLinkConfig
 from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
 from hal.links import can_bus
 from hal.links.can_bus import CanBusLink, open_can_link
+from hal.links.pseudo_terminal import PseudoTerminal
 from hal.types import CanFrame
 from tests.support.chassis_rig import can_link_config, udp_link_config
 
@@ -195,3 +196,27 @@ def test_a_datagram_that_is_no_frame_does_not_lose_the_bus() -> None:
             stranger.sendto(b"", (udp.channel, udp.port))
         peer.send(FRAME)
         assert link.receive() == FRAME
+
+
+def test_slcan_adapter_on_a_serial_port() -> None:
+    """The text protocol of cheap USB adapters, at the bit rate of AgileX; noise is passed over."""
+    with PseudoTerminal() as adapter:
+        slcan = config("slcan", adapter.path)
+        with CanBusLink(slcan) as link:
+            assert b"S6\r" in adapter.read(), "500 kbit/s"
+            link.send(FRAME)
+            assert adapter.read() == b"t11120096\r"
+            adapter.write(b"t22x\rt2\rt2218FE0C00FA00000000\r")
+            assert wait_for(link) == CanFrame(0x221, bytes.fromhex("FE0C00FA00000000"))
+            adapter.unplug()
+            with pytest.raises(LinkLost, match="lost while receiving"):
+                wait_for(link)
+
+
+def wait_for(link: CanBusLink) -> CanFrame | None:
+    """The next frame; the kernel takes its time to carry bytes through a pseudo-terminal."""
+    for _ in range(100_000):
+        frame = link.receive()
+        if frame is not None:
+            return frame
+    return None
