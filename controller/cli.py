@@ -92,7 +92,7 @@ def envelope(config_path: Path) -> None:
 @click.option("--frames", type=click.IntRange(min=10), default=150, show_default=True)
 def bench(json_path: Path | None, frames: int) -> None:
     """Measure perception beside the bare OpenCV calls, renderer, control step, driver, lock-step speed."""
-    from controller.bench import run_bench
+    from controller.bench.command import run_bench
 
     run_bench(frames, json_path)
 

@@ -1,0 +1,69 @@
+"""Lock-step simulation against real time: rendering, perception, control and the emulated base together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+from config.app import AppConfig, LockstepRunner
+from controller.bench.reel import Tick
+from controller.build import (
+    build_base,
+    build_control,
+    build_path,
+    build_perceiver,
+    build_simulation,
+    open_simulated_camera,
+)
+from controller.lockstep import run_lockstep
+from hal.clocks import NS_PER_S, SimulatedClock
+
+
+@dataclass(frozen=True, slots=True)
+class LockstepFigures:
+    """A stretch of a mission from its start: how long it is, and how long it took."""
+
+    simulated_s: float
+    wall_s: float
+    frames: int
+
+    @property
+    def speed(self) -> float:
+        """Simulated seconds a second."""
+        return self.simulated_s / self.wall_s
+
+    def as_json(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "simulated_s": round(self.simulated_s, 3),
+            "wall_s": round(self.wall_s, 3),
+            "frames": self.frames,
+            "speed": round(self.speed, 4),
+        }
+
+
+def measure_lockstep(
+    config: AppConfig, config_path: FilePath, stretch_s: float, stopwatch_ns: Callable[[], int], tick: Tick
+) -> LockstepFigures:
+    """Drive the first stretch_s of config's mission, without recording it; building it is not counted."""
+    clock = SimulatedClock()
+    runner = config.runner
+    assert isinstance(runner, LockstepRunner), "the bench drives a simulated mission"
+    runner = runner.model_copy(update={"max_duration_s": stretch_s})
+    chassis, emulator = build_base(config, build_path(config, config_path).start, clock.now_ns())
+    assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
+    simulation = build_simulation(config, config_path, emulator, clock.now_ns())
+    camera = open_simulated_camera(
+        config, config_path, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
+    )
+    with simulation, chassis, camera:
+        loop = build_control(config, config_path, chassis)
+        perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, stopwatch_ns)
+        frames = 0
+        started_ns = stopwatch_ns()
+        for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop):
+            frames += len(moment.looks)
+            tick()
+        wall_ns = stopwatch_ns() - started_ns
+    return LockstepFigures(clock.now_ns() / NS_PER_S, wall_ns / NS_PER_S, frames)

@@ -1,0 +1,139 @@
+"""All figures of one run: as JSON with keys that stay, and as tables for people."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from controller.bench.driving import ControlFigures
+from controller.bench.figures import Durations
+from controller.bench.mission_speed import LockstepFigures
+from controller.bench.perception import PerceptionFigures
+from controller.bench.rendering import RendererFigures
+from controller.bench.stages import StageFigures
+
+SCHEMA = 1
+_NAME = 34
+# Rows of the stage table below this in every column are left to the JSON file.
+_SHOWN_MS = 0.02
+_BUSY_SHARE = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class BenchReport:
+    """taken_at: ISO 8601. cpu_share: processor time over real time of the whole run; what is missing to 1 went
+    to other programs. perception: by reel. drivers: one exchange each, by name of chassis and link."""
+
+    taken_at: str
+    cpu_share: float
+    machine: Mapping[str, str | int]
+    perception: Mapping[str, PerceptionFigures]
+    renderer: RendererFigures
+    control: ControlFigures
+    drivers: Mapping[str, Durations]
+    lockstep: LockstepFigures
+
+    def as_json(self) -> dict[str, object]:
+        """Plain values. A key, once published, keeps its meaning; SCHEMA counts up if one cannot."""
+        return {
+            "schema": SCHEMA,
+            "taken_at": self.taken_at,
+            "cpu_share": round(self.cpu_share, 4),
+            "machine": dict(self.machine),
+            "perception": {name: figures.as_json() for name, figures in self.perception.items()},
+            "renderer": self.renderer.as_json(),
+            "control": self.control.as_json(),
+            "drivers": {name: exchange.as_json() for name, exchange in self.drivers.items()},
+            "lockstep": self.lockstep.as_json(),
+        }
+
+    def to_text(self) -> str:
+        """The JSON as it is written to a file."""
+        return json.dumps(self.as_json(), indent=2, allow_nan=False) + "\n"
+
+    def lines(self) -> Iterator[str]:
+        """For the terminal."""
+        machine = self.machine
+        yield (
+            f"{machine['cpu']}, {machine['cores']} cores, Python {machine['python']}, "
+            f"NumPy {machine['numpy']}, OpenCV {machine['opencv']} on one thread; {self.taken_at}"
+        )
+        if self.cpu_share < _BUSY_SHARE:
+            yield (
+                f"the machine is busy: this run got {self.cpu_share:.0%} of a core, so durations are too long; "
+                "ratios hold"
+            )
+        yield ""
+        yield from _perception_lines(self.perception)
+        yield ""
+        yield from _stage_lines(self.perception)
+        yield ""
+        yield from self._other_lines()
+
+    def _other_lines(self) -> Iterator[str]:
+        size = f"{self.renderer.width}x{self.renderer.height}"
+        yield f"{'milliseconds':{_NAME}}  median     p99"
+        yield _row(f"renderer, {size}, {self.renderer.faces:.0f} faces", self.renderer.picture)
+        yield _row("renderer with the sensor's noise", self.renderer.exposure)
+        yield _row(f"control step, {self.control.obstacles} obstacles", self.control.step)
+        for name, exchange in self.drivers.items():
+            yield _row(f"exchange, {name.replace('_', ' ')}", exchange)
+        yield ""
+        lockstep = self.lockstep
+        yield (
+            f"lock-step: {lockstep.simulated_s:.1f} s of the default mission in {lockstep.wall_s:.1f} s: "
+            f"{lockstep.speed:.2f} x real time"
+        )
+
+
+def _perception_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
+    yield (
+        f"{'perception, milliseconds a frame':{_NAME}}  median     p99  detect   track"
+        "  bare OpenCV   ratio  by frame  first"
+    )
+    for name, figures in reels.items():
+        yield (
+            f"{_row(name.replace('_', ' '), figures.total)}{figures.detect.median_ms:8.2f}"
+            f"{figures.track.median_ms:8.2f}{figures.bare.median_ms:13.2f}{figures.ratio_of_medians:8.2f}"
+            f"{figures.median_ratio:10.2f}{figures.first.median_ms:7.1f}"
+        )
+    yield "bare OpenCV: the calls that perception makes on the same frames, without anything around them"
+    yield "ratio: perception over bare OpenCV, of the medians; by frame: median of the ratios of all frames"
+
+
+def _stage_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
+    """Each stage's own time and that of OpenCV in it, a column pair a reel; then OpenCV's functions alone."""
+    width = max(17, *(len(name) for name in reels))
+    heads = "".join(f"  {name.replace('_', ' '):>{width}}" for name in reels)
+    yield f"{'stage, own + OpenCV':{_NAME}}{heads}"
+    for module in _rows([figures.modules for figures in reels.values()]):
+        cells = (figures.modules.get(module) for figures in reels.values())
+        yield f"{module:{_NAME}}" + "".join(f"  {_stage_cell(cell):>{width}}" for cell in cells)
+    yield f"{'bare OpenCV':{_NAME}}{heads}"
+    functions = dict.fromkeys(name for figures in reels.values() for name in figures.opencv)
+    for function in functions:
+        times = (figures.opencv.get(function) for figures in reels.values())
+        cells_text = ("" if time is None else f"{time.median_ms:.2f}" for time in times)
+        yield f"{'cv2.' + function:{_NAME}}" + "".join(f"  {text:>{width}}" for text in cells_text)
+
+
+def _rows(columns: list[dict[str, StageFigures]]) -> list[str]:
+    """Names that matter in any column; the first column's order leads."""
+    return list(
+        dict.fromkeys(
+            name
+            for column in columns
+            for name, stage in column.items()
+            if stage.own_ms + stage.opencv_ms >= _SHOWN_MS
+        )
+    )
+
+
+def _stage_cell(stage: StageFigures | None) -> str:
+    return "" if stage is None else f"{stage.own_ms:.2f} + {stage.opencv_ms:.2f}"
+
+
+def _row(name: str, durations: Durations) -> str:
+    digits = 2 if durations.median_ms >= 1.0 else 3
+    return f"{name:{_NAME}}{durations.median_ms:8.{digits}f}{durations.p99_ms:8.{digits}f}"
