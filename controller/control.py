@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
 
 from controller.decide import DecisionMaker
 from controller.decision import Decision
@@ -51,6 +52,17 @@ class ControlStep:
     decision: Decision
     setpoint: Setpoint
     chassis: ChassisState
+
+
+class Drive(Protocol):
+    """What a runner steps; ControlLoop is the real one."""
+
+    @property
+    def finished(self) -> bool: ...
+
+    def request_stop(self, reason: str) -> None: ...
+
+    def step(self, scene: Scene | None, now_ns: int) -> ControlStep: ...
 
 
 class ControlLoop:

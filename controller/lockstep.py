@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from config.app import LockstepRunner
-from controller.control import ControlLoop, ControlStep
-from controller.perceive import Look, Perceiver
+from controller.control import ControlStep, Drive
+from controller.perceive import Look
 from hal.api import Clock
 from hal.clocks import NS_PER_S
 from hal.types import RgbdFrame
@@ -36,6 +36,12 @@ class ScheduledCamera(Protocol):
     def read(self, timeout_s: float) -> RgbdFrame: ...
 
 
+class Looking(Protocol):
+    """Frame to scene; controller.perceive.Perceiver is the real one."""
+
+    def look(self, frame: RgbdFrame) -> Look: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Moment:
     """One control step, with the looks that the camera took since the step before."""
@@ -49,8 +55,8 @@ def run_lockstep(
     clock: Clock,
     outside: Outside,
     camera: ScheduledCamera,
-    perceiver: Perceiver,
-    loop: ControlLoop,
+    perceiver: Looking,
+    loop: Drive,
 ) -> Iterator[Moment]:
     """Step until the loop has finished or max_duration_s is over; yields after each control step."""
     period_ns = round(NS_PER_S / config.control_rate_hz)
@@ -62,6 +68,7 @@ def run_lockstep(
     looks: list[Look] = []
     while not loop.finished and control_ns < give_up_ns:
         if camera.next_capture_ns <= control_ns:
+            clock.sleep_until_ns(camera.next_capture_ns)
             outside.advance_to(camera.next_capture_ns)
             looks.append(perceiver.look(camera.read(timeout_s=0.0)))
             on_its_way.append(looks[-1].scene)

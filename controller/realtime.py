@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from config.app import RealtimeRunner
 from controller.channel import Channel, PeerGone
-from controller.control import ControlLoop, ControlStep
+from controller.control import ControlStep, Drive
 from controller.lockstep import Outside
 from controller.service import ServiceManager, StopRequest
 from hal.api import Clock
@@ -91,14 +91,15 @@ def run_realtime(
     clock: Clock,
     outside: Outside | None,
     perception: PerceptionLink,
-    loop: ControlLoop,
+    loop: Drive,
     service: ServiceManager,
     stop: StopRequest,
     punctuality: Punctuality,
 ) -> Iterator[RealtimeMoment]:
     """Step at the control rate until the loop has finished; yields after each step.
 
-    An overrun skips whole periods and keeps the phase: late commands are not sent in a burst.
+    An overrun skips periods and keeps the phase, so that late commands are not sent in a burst: a step that
+    would begin more than half a period late is left out.
     """
     period_ns = round(NS_PER_S / config.control_rate_hz)
     started_ns = deadline_ns = clock.now_ns()
@@ -120,7 +121,7 @@ def run_realtime(
         service.feed_watchdog(now_ns)
         yield RealtimeMoment(tuple(arrived), step)
         deadline_ns += period_ns
-        missed = (clock.now_ns() - deadline_ns) // period_ns
+        missed = (clock.now_ns() - deadline_ns + period_ns // 2) // period_ns
         if missed > 0:
             punctuality.skipped += missed
             deadline_ns += missed * period_ns

@@ -1,0 +1,88 @@
+"""Stand-ins for what the runners step: they note what they are given."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controller.control import ControlStep
+from controller.decision import Action, Decision, Reason
+from controller.perceive import Look
+from hal.types import RgbdFrame, Setpoint
+from tests.support.scenes import ORIGIN, chassis_state, scene
+from tests.support.video_moments import fragments, frame
+from vision.scene import Scene
+
+NO_FRAGMENTS = fragments(np.zeros((0, 2, 2)), [], [])
+KEEP = Decision(Action.KEEP, 0.5, Reason("free", "the way is free"))
+
+
+def control_step(now_ns: int, sequence: int | None, decision: Decision = KEEP) -> ControlStep:
+    """A step of a robot that stands at the start."""
+    setpoint = Setpoint(now_ns, 0.0, 0.0, 0.0)
+    return ControlStep(now_ns, ORIGIN, 0.0, 0.0, sequence, decision, setpoint, chassis_state(now_ns))
+
+
+class NotingDrive:
+    """Finishes after a number of steps, or one step after it was asked to stop."""
+
+    def __init__(self, steps: int) -> None:
+        self._left = steps
+        self.seen: list[tuple[int, int | None]] = []
+        self.stop_reasons: list[str] = []
+
+    @property
+    def finished(self) -> bool:
+        """No steps left."""
+        return self._left <= 0
+
+    def request_stop(self, reason: str) -> None:
+        """Note the reason; one more step."""
+        self.stop_reasons.append(reason)
+        self._left = min(self._left, 1)
+
+    def step(self, seen: Scene | None, now_ns: int) -> ControlStep:
+        """Note which scene was known when."""
+        self._left -= 1
+        sequence = None if seen is None else seen.sequence
+        self.seen.append((now_ns, sequence))
+        return control_step(now_ns, sequence)
+
+
+class TickingCamera:
+    """Exposes every period_ns from 0 on."""
+
+    def __init__(self, period_ns: int) -> None:
+        self._period_ns = period_ns
+        self._count = 0
+
+    @property
+    def next_capture_ns(self) -> int:
+        """When the next frame is due."""
+        return self._count * self._period_ns
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """The frame that is due now."""
+        taken = frame(self._count, self.next_capture_ns)
+        self._count += 1
+        return taken
+
+
+class PlainEyes:
+    """Sees an empty scene in every frame."""
+
+    def look(self, taken: RgbdFrame) -> Look:
+        """An empty scene at the frame's time."""
+        return Look(
+            taken, scene(taken.captured_ns, taken.sequence), NO_FRAGMENTS, {"detect": 1.0, "track": 0.5}
+        )
+
+
+class NotingOutside:
+    """Notes how far it was moved on."""
+
+    def __init__(self) -> None:
+        self.times_ns: list[int] = []
+
+    def advance_to(self, now_ns: int) -> None:
+        """Note the time."""
+        self.times_ns.append(now_ns)

@@ -1,0 +1,64 @@
+import math
+
+import pytest
+
+from config.robot import Limits
+from controller.tally import SetpointTally, TimingTally, mean_speed_mps
+from hal.types import Setpoint
+
+MS = 1_000_000
+LIMITS = Limits()
+
+
+def tally_of(*points: tuple[float, float]) -> SetpointTally:
+    """Setpoints (v, a), 20 ms apart."""
+    tally = SetpointTally(LIMITS)
+    for index, (v_mps, a_mps2) in enumerate(points):
+        tally.add(Setpoint(index * 20 * MS, v_mps, a_mps2, 0.0))
+    return tally
+
+
+def test_a_gentle_start_breaks_nothing() -> None:
+    tally = tally_of((0.0, 0.0), (0.00012, 0.012), (0.00048, 0.024))
+    assert (tally.count, tally.violations, tally.reversals) == (3, 0, 0)
+    assert tally.max_jerk_mps3 == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(
+    ("points", "what"),
+    [
+        (((1.6, 0.0),), "speed"),
+        (((-0.01, 0.0),), "reversal"),
+        (((0.5, 0.0), (0.52, 0.0)), "acceleration 1.0 m/s^2"),
+        (((0.5, 0.0), (0.48, 0.0)), "deceleration 1.0 m/s^2"),
+        (((0.5, 0.0), (0.5, 0.1)), "jerk 5 m/s^3"),
+    ],
+)
+def test_each_broken_limit_is_counted(points: tuple[tuple[float, float], ...], what: str) -> None:
+    assert tally_of(*points).violations == 1, what
+
+
+def test_what_was_not_sent_and_what_was_sent_before_count_nothing() -> None:
+    tally = SetpointTally(LIMITS)
+    point = Setpoint(0, 0.1, 0.0, 0.0)
+    for sent in (None, point, point):
+        tally.add(sent)
+    assert tally.count == 1
+
+
+def test_braking_beyond_comfort_is_told_apart() -> None:
+    assert tally_of((1.0, -0.3), (0.99, -0.31)).emergency_count == 1
+
+
+def test_timing_gives_the_median_of_the_sum() -> None:
+    timing = TimingTally()
+    for detect_ms in (3.0, 4.0, 100.0):
+        timing.add({"detect": detect_ms, "track": 1.0})
+    assert timing.line().startswith("5.0 ms median, ")
+    assert "(detect 4.0, track 1.0)" in timing.line()
+    assert TimingTally().line() == "not measured"
+
+
+def test_a_mean_speed_needs_time() -> None:
+    assert mean_speed_mps(10.0, 20.0) == 0.5
+    assert math.isnan(mean_speed_mps(0.0, 0.0))
