@@ -160,6 +160,24 @@ def test_a_replay_registers_depth_when_camera_yaml_gives_the_depth_camera(tmp_pa
     assert frame.depth[24, 33] == 2000
 
 
+def test_depth_that_was_registered_here_is_straight_already_and_not_undistorted_again(tmp_path: Path) -> None:
+    folder = write_recording(tmp_path, count=1)
+    depth = np.full((48, 64), 1000, np.uint16)
+    depth[:, 50:] = 3000
+    assert cv2.imwrite(str(depth_files(folder)[0]), depth)
+    set_key(folder, "distortion", "[0.9, 0, 0, 0, 0]")
+    set_key(folder, "depth_registered", "false")
+    for key, value in {
+        "depth_fx": "60.0",
+        "depth_fy": "60.0",
+        "depth_cx": "31.5",
+        "depth_cy": "23.5",
+    }.items():
+        set_key(folder, key, value)
+    with TumReplay(folder) as replay:
+        np.testing.assert_array_equal(replay.read(0.0).depth, depth)
+
+
 def test_unregistered_depth_without_its_camera_is_used_as_it_is_and_said(tmp_path: Path) -> None:
     folder = write_recording(tmp_path, count=1)
     set_key(folder, "depth_registered", "false")
