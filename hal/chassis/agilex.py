@@ -59,7 +59,9 @@ class AgilexChassis(ChassisDriver):
                 if frame is None:
                     break
                 message = decode(frame)
-                if message is not None:
+                if message is None:
+                    self._feedback.note_foreign(frame.arbitration_id)
+                else:
                     messages.append(message)
         finally:
             # What came before the link went is still true.

@@ -30,6 +30,9 @@ _NS_PER_S = 1e9
 _STANDING_MPS = 0.002
 _STANDING_RADPS = 0.002
 
+# How the vendor's SDK tells a base of protocol V1.
+_V1_STATE_ID = 0x151
+
 # Travel that two feedbacks cannot be apart, even where frames were lost or came late.
 _JUMP_SLACK_M = 0.2
 
@@ -61,6 +64,7 @@ class AgilexFeedback:
         self._state: SystemState | None = None
         self._battery: Battery | None = None
         self._driver_bits: dict[int, int] = {}
+        self._foreign_id: int | None = None
         self.motion_ns: int | None = None
         self.status_ns: int | None = None
         self.v_mps = math.nan
@@ -92,6 +96,22 @@ class AgilexFeedback:
         if self._state.control_mode == self._model.mode_can:
             return ""
         return f"control mode is {self._model.describe_mode(self._state.control_mode)}"
+
+    @property
+    def silence(self) -> str:
+        """What came instead of 0x211, and what to check."""
+        if self._foreign_id == _V1_STATE_ID:
+            return "frames of protocol V1 came; this driver speaks V2"
+        if self.motion_ns is not None:
+            return "0x221 came, but no 0x211"
+        if self._foreign_id is not None:
+            return f"only foreign frames came, such as 0x{self._foreign_id:X}; is this the base's bus?"
+        return "not one frame came; check power, wiring, termination and 500 kbit/s"
+
+    def note_foreign(self, arbitration_id: int) -> None:
+        """A frame came that is none of protocol V2. The first of V1 is remembered, else the newest."""
+        if self._foreign_id != _V1_STATE_ID:
+            self._foreign_id = arbitration_id
 
     @property
     def standing(self) -> bool:

@@ -37,6 +37,7 @@ class Evidence:
     newest status arrived (None: never). disobeys: why the base does not take our commands, as that
     status tells ("" when it takes them). stop_cause: why the robot must not move ("" for none).
     standing: measured speed is zero; False when unknown. command_is_zero: what is asked at this step.
+    silence: what to check while no status is heard.
     """
 
     now_ns: int
@@ -47,6 +48,7 @@ class Evidence:
     stop_cause: str
     standing: bool
     command_is_zero: bool
+    silence: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +125,7 @@ def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
 def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     # Only what arrived after the consent counts: an old "obeys" may be from before a restart.
     if seen.status_ns is None or seen.status_ns <= state.since_ns:
-        waiting = "no status heard from the base"
+        waiting = "no status heard from the base" + (f": {seen.silence}" if seen.silence else "")
     elif seen.feedback_ns is None or seen.feedback_ns <= state.since_ns:
         waiting = "no motion feedback heard from the base"
     elif seen.disobeys:

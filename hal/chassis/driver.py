@@ -26,7 +26,8 @@ _RETRY_NS = 500 * NS_PER_MS
 class Told(Protocol):
     """What the base has told; hal.types.ChassisState and arming.Evidence say what each means.
 
-    pose holds for pose_ns; None where there is none yet.
+    pose holds for pose_ns; None where there is none yet. silence: what came instead of a status, and
+    what to check.
     """
 
     @property
@@ -37,6 +38,8 @@ class Told(Protocol):
     def disobeys(self) -> str: ...
     @property
     def stop_cause(self) -> str: ...
+    @property
+    def silence(self) -> str: ...
     @property
     def v_mps(self) -> float: ...
     @property
@@ -167,6 +170,7 @@ class ChassisDriver(ABC):
             stop_cause=told.stop_cause or self._objection,
             standing=told.standing,
             command_is_zero=is_zero(self._asked),
+            silence="" if told.status_ns is not None else told.silence,
         )
 
     def _state(self, now_ns: int, sent: Setpoint | None) -> ChassisState:

@@ -74,6 +74,7 @@ class RoboclawChassis(ChassisDriver):
 
     def _listen(self, now_ns: int) -> None:
         answer = self._port.poll(now_ns)
+        self._feedback.bytes_heard = self._port.bytes_heard
         if answer is None:
             return
         if answer.data is not None:

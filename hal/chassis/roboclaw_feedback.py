@@ -36,6 +36,7 @@ class RoboclawFeedback:
         self._timeout_ms: int | None = None
         self._restarted = False
         self._wanted = False
+        self.bytes_heard = 0
         self.pose_ns: int | None = None
         self.feedback_ns: int | None = None
         self.status_ns: int | None = None
@@ -66,6 +67,16 @@ class RoboclawFeedback:
         if self._timeout_ms != self._config.timeout_ms:
             return f"its time-out reads {self._timeout_ms} ms, not {self._config.timeout_ms} ms"
         return ""
+
+    @property
+    def silence(self) -> str:
+        """What came instead of a status, and what to check."""
+        if self.bytes_heard == 0:
+            return "not one byte came; check port, power and that packet serial is switched on"
+        return (
+            f"{self.bytes_heard} bytes came, none a status with a right checksum; "
+            f"check baud, address 0x{self._config.address:X} and that it is a RoboClaw"
+        )
 
     @property
     def stop_cause(self) -> str:

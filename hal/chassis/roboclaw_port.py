@@ -27,7 +27,7 @@ class Answer:
 
 
 class RoboclawPort:
-    """Stepped by poll(); start() is allowed while idle."""
+    """Stepped by poll(); start() is allowed while idle. bytes_heard counts all that ever arrived."""
 
     def __init__(self, link: SerialLink, address: int) -> None:
         self._link = link
@@ -37,6 +37,7 @@ class RoboclawPort:
         self._received = bytearray()
         self._heard_ns = 0
         self._quiet_until_ns = 0
+        self.bytes_heard = 0
 
     def idle(self, now_ns: int) -> bool:
         """No answer is awaited and the line is not being left quiet."""
@@ -60,6 +61,7 @@ class RoboclawPort:
         Raises LinkLost.
         """
         arrived = self._link.read()
+        self.bytes_heard += len(arrived)
         request = self._request
         if request is None:
             if arrived:  # Nobody asked: noise, or an answer that came too late.

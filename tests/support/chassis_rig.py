@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-import select
+import fcntl
+import os
+import sys
+import termios
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -124,11 +127,19 @@ class SettledTerminal(PseudoTerminal):
     """Waits until the kernel has carried the bytes over: simulated time must not outrun it."""
 
     def write(self, data: bytes) -> None:
+        before = _waiting(self._slave)
         super().write(data)
-        select.select([self._slave], [], [], 1.0)
+        _await(self._slave, before + len(data))
 
-    def wait_for_peer(self) -> None:
-        select.select([self._master], [], [], 1.0)
+    @contextmanager
+    def settled(self, count: int) -> Iterator[None]:
+        """Inside, the other end writes count bytes; wait until they can be read here."""
+        if not self._open:
+            yield
+            return
+        before = _waiting(self._master)
+        yield
+        _await(self._master, before + count)
 
 
 class SettledPort(SerialPortLink):
@@ -139,8 +150,22 @@ class SettledPort(SerialPortLink):
         self._terminal = terminal
 
     def write(self, data: bytes) -> None:
-        super().write(data)
-        self._terminal.wait_for_peer()
+        with self._terminal.settled(len(data)):
+            super().write(data)
+
+
+def _waiting(descriptor: int) -> int:
+    answer = bytearray(4)
+    fcntl.ioctl(descriptor, termios.FIONREAD, answer)
+    return int.from_bytes(answer, sys.byteorder)
+
+
+def _await(descriptor: int, count: int) -> None:
+    for _ in range(100_000):
+        if _waiting(descriptor) >= count:
+            return
+        os.sched_yield()
+    raise AssertionError(f"the kernel did not carry {count} bytes over")
 
 
 @dataclass

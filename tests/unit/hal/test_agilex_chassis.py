@@ -353,3 +353,23 @@ def test_an_old_command_stops_and_latches() -> None:
     bench.now_ns += 20 * MS
     seen = bench.chassis.exchange(old, bench.now_ns)
     assert (seen.mode, seen.reason) == (ChassisMode.ESTOP, "the command is 220 ms old")
+
+
+@pytest.mark.parametrize(
+    ("frames", "hint"),
+    [
+        ([], "not one frame came; check power, wiring, termination and 500 kbit/s"),
+        ([CanFrame(0x151, bytes(8)), CanFrame(0x171, bytes(8))], "frames of protocol V1 came"),
+        ([CanFrame(0x7E8, bytes(8))], "only foreign frames came, such as 0x7E8; is this the base's bus?"),
+        ([encode(MotionFeedback(0.0, 0.0))], "0x221 came, but no 0x211"),
+    ],
+)
+def test_what_came_instead_is_told_when_arming_gives_up(frames: list[CanFrame], hint: str) -> None:
+    bench = Bench()
+    bench.chassis.arm(0)
+    for _ in range(160):
+        bench.link.deliver(*frames)
+        seen = bench.exchange()
+    assert seen.mode is ChassisMode.STANDBY
+    assert seen.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
+    assert hint in seen.reason

@@ -283,3 +283,22 @@ def test_nothing_is_known_before_the_second_encoder_answer() -> None:
     assert first_known > 3
     assert all(math.isnan(state.v_mps) for state in seen[:first_known])
     assert seen[first_known].v_mps == 0.0
+
+
+@pytest.mark.parametrize(
+    ("babble", "hint"),
+    [
+        (b"", "not one byte came; check port, power and that packet serial is switched on"),
+        (b"+\r", "bytes came, none a status with a right checksum; check baud, address 0x80"),
+    ],
+)
+def test_a_device_that_is_no_roboclaw_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
+    link = ScriptedSerialLink()
+    chassis = RoboclawChassis(link, roboclaw_config())
+    chassis.arm(0)
+    for k in range(1, 160):
+        link.deliver(babble)
+        state = chassis.exchange(None, k * 20 * MS)
+    assert state.mode is ChassisMode.STANDBY
+    assert state.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
+    assert hint in state.reason
