@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from sim.raster import Drawn, Float32Image, LabelImage
 
+# The bits of a difference of 8 or more grey levels in one of three channels.
+_VISIBLE_STEP = np.uint32(0x00F8F8F8)
+
 
 def smooth_edges(
     colour: NDArray[np.uint8], labels: LabelImage, inverse_depth: Float32Image, drawn: Drawn
@@ -23,13 +26,21 @@ def smooth_edges(
     width = labels.shape[1]
     pixels = colour.reshape(-1, 4).view(np.uint32)[:, 0]
     across = np.flatnonzero(labels[:, 1:] != labels[:, :-1])
-    across += across // (width - 1)
-    down = np.flatnonzero(labels[1:] != labels[:-1])
+    across = _contrasting(pixels, across + across // (width - 1), 1)
+    down = _contrasting(pixels, np.flatnonzero(labels[1:] != labels[:-1]), width)
     # An edge of the other direction never cuts: its slope is taken away.
     columns = _blend(pixels, labels, inverse_depth, lines, np.where(upright, lines[0], 0.0), across, 1)
     rows = _blend(pixels, labels, inverse_depth, lines, np.where(upright, 0.0, lines[1]), down, width)
     for where, values in (columns, rows):
         pixels[where] = values
+
+
+def _contrasting(pixels: NDArray[np.uint32], here: NDArray[np.intp], stride: int) -> NDArray[np.intp]:
+    """Only where some channel differs by enough for a jagged edge to be seen."""
+    one, other = pixels[here].view(np.uint8), pixels[here + stride].view(np.uint8)
+    difference = np.maximum(one, other) - np.minimum(one, other)
+    kept: NDArray[np.intp] = here[(difference.view(np.uint32) & _VISIBLE_STEP) != 0]
+    return kept
 
 
 def _blend(

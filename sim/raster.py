@@ -1,9 +1,8 @@
 """Which face is seen at each pixel, and how far away it is: exactly, at the pixels' centres.
 
-A face's inverse depth is affine in image coordinates, and so is, for each of its edges, the side of the
-edge that a pixel's ray passes on (homogeneous edge functions; Olano and Greer 1997). Both are linear
-functions of (u, v), so no face needs clipping against the near plane, depth has no interpolation
-error, and faces that share an edge leave neither gap nor overlap.
+A face's inverse depth is affine in image coordinates, so depth has no interpolation error. Large faces are
+drawn one after the other, each in its rectangle; the many small ones (far goods, hands) all at once, pixel
+by pixel, because for them the calls would cost more than the pixels.
 """
 
 from __future__ import annotations
@@ -15,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray, Intrinsics, Pose
+from sim.spans import NEAR_M, Spans, convert, edge_planes
 from sim.world import Geometry
 
-NEAR_M = 0.05
-FAR_M = 250.0
-NOTHING = 0
+# Faces whose rectangle has fewer pixels than this are drawn all at once.
+SMALL_PX = 700
 
 Float32Image = NDArray[np.float32]
 LabelImage = NDArray[np.uint16]
@@ -30,32 +29,21 @@ class Drawn:
     """M faces that reach the image, numbered 1..M in label images (0: nothing there).
 
     face (M,): index into the geometry. edges (M, 4, 3): e = edges @ (u, v, 1) is >= 0 inside.
-    to_plane (M, 3, 3): takes (u, v, 1) to (s, t, 1) / z, with s, t in 0..1 from the first corner along the
-    face's upper and left edge; its last row is therefore the inverse depth. bounds (M, 4): first column and
-    row, last column and row + 1.
+    to_plane (M, 3, 3): takes (u, v, 1) to (s, t, 1) / z, with s, t in 0..1 along the upper and the left side
+    of the face (see texture_frames); its last row is therefore the inverse depth. bounds (M, 4): first column
+    and row, last column and row + 1. small (M,): bool. small_pixels (P,): flat indices of the pixels that
+    show a small face.
     """
 
     face: NDArray[np.intp]
     edges: FloatArray
     to_plane: FloatArray
-    bounds: NDArray[np.int32]
+    bounds: NDArray[np.intp]
+    small: NDArray[np.bool_]
+    small_pixels: NDArray[np.intp]
 
     def __len__(self) -> int:
         return len(self.face)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Spans:
-    """The columns first <= u < last that each face covers in each of its rows, row after row.
-
-    Face k's rows begin at entry start[k] and at row row[k]; there are count[k] of them.
-    """
-
-    start: NDArray[np.intp]
-    row: NDArray[np.intp]
-    count: NDArray[np.intp]
-    first: NDArray[np.int16]
-    last: NDArray[np.int16]
 
 
 class Rasteriser:
@@ -80,11 +68,18 @@ class Rasteriser:
     def draw(self, geometry: Geometry, camera: Pose) -> Drawn:
         """Fill inverse_depth and labels with what camera (in the floor's frame) sees."""
         self.inverse_depth.fill(0.0)
-        self.labels.fill(NOTHING)
+        self.labels.fill(0)
         face, corners = self._facing(geometry, camera)
-        drawn, spans = self._prepare(face, corners)
-        self._draw_faces(drawn, spans)
-        return drawn
+        spans = convert(corners, self.intrinsics)
+        keep = np.flatnonzero(spans.bounds[:, 2] > 0)
+        face, corners, spans = face[keep], corners[keep], spans.chosen(keep)
+        to_plane = np.linalg.inv(texture_frames(corners)) @ self._pixel_to_ray
+        size = (spans.bounds[:, 2] - spans.bounds[:, 0]) * (spans.bounds[:, 3] - spans.bounds[:, 1])
+        small = size < SMALL_PX
+        self._draw_large(np.flatnonzero(~small), to_plane[:, 2], spans)
+        small_pixels = self._draw_small(np.flatnonzero(small), to_plane[:, 2], spans)
+        edges = edge_planes(corners) @ self._pixel_to_ray
+        return Drawn(face, edges, to_plane, spans.bounds, small, small_pixels)
 
     def _facing(self, geometry: Geometry, camera: Pose) -> tuple[NDArray[np.intp], FloatArray]:
         """Faces turned to the camera that may reach into the view, and their corners in its frame."""
@@ -102,59 +97,27 @@ class Rasteriser:
         )
         return facing[~outside], corners[~outside]
 
-    def _prepare(self, face: NDArray[np.intp], corners: FloatArray) -> tuple[Drawn, _Spans]:
-        spans = self._spans(_clip_near(corners))
-        bounds = _bounds(spans)
-        keep = bounds[:, 2] > 0
-        seen = _Spans(spans.start[keep], spans.row[keep], spans.count[keep], spans.first, spans.last)
-        corners = corners[keep]
-        edges = np.cross(corners, np.roll(corners, -1, axis=1)) @ self._pixel_to_ray
-        to_plane = np.linalg.inv(texture_frames(corners)) @ self._pixel_to_ray
-        return Drawn(face[keep], edges, to_plane, bounds[keep]), seen
-
-    def _spans(self, polygons: FloatArray) -> _Spans:
-        """Walk down the edges of convex polygons (M, K, 3), clockwise as seen, all ahead of the eye."""
-        k = self.intrinsics
-        v = polygons[:, :, 1] * (k.fy / polygons[:, :, 2]) + k.cy
-        top = np.ceil(v).clip(0, k.height).astype(np.intp)
-        row = top.min(axis=1)
-        count = top.max(axis=1) - row
-        start = np.cumsum(count) - count
-        first = np.zeros(int(count.sum()), np.int16)
-        last = np.zeros(len(first), np.int16)
-        lines = np.cross(polygons, np.roll(polygons, -1, axis=1)) @ self._pixel_to_ray
-        below = np.roll(top, -1, axis=1)
-        # Clockwise on a screen whose v points down: edges that go down bound on the right.
-        for side, from_row, to_row in ((last, top, below), (first, below, top)):
-            owner, edge = np.nonzero(to_row > from_row)
-            length = (to_row - from_row)[owner, edge]
-            begin = np.cumsum(length) - length
-            step = np.arange(int(length.sum()))
-            a, b, c = lines[owner, edge].T
-            rows = step + np.repeat(from_row[owner, edge] - begin, length)
-            u = np.repeat(-b / a, length) * rows + np.repeat(-c / a, length)
-            entry = step + np.repeat((start - row)[owner] + from_row[owner, edge] - begin, length)
-            side[entry] = np.ceil(u).clip(0, k.width)
-        return _Spans(start, row, count, first, last)
-
-    def _draw_faces(self, drawn: Drawn, spans: _Spans) -> None:
+    def _draw_large(self, numbers: NDArray[np.intp], planes: FloatArray, spans: Spans) -> None:
         """Draw face after face where it is nearer than what is there already."""
         columns, steps = self._columns, self._steps
-        slopes = drawn.to_plane[:, 2, 0].astype(np.float32)
-        at_left = _inverse_depth_at_left(drawn, spans)
-        begins = (spans.start - spans.row + drawn.bounds[:, 1]).tolist()
+        chosen = spans.chosen(numbers)
+        slopes = planes[numbers, 0].astype(np.float32)
+        _, _, entry = chosen.entries()
+        at_left = np.empty((len(spans.first), 1), np.float32)
+        at_left[entry, 0] = _inverse_depth_at_left(planes[numbers], chosen)
+        begins = (chosen.start - chosen.row + chosen.bounds[:, 1]).tolist()
         first, last = spans.first[:, None], spans.last[:, None]
-        for number, (u0, v0, u1, v1) in enumerate(drawn.bounds.tolist()):
+        for index, (u0, v0, u1, v1) in enumerate(chosen.bounds.tolist()):
             height, width = v1 - v0, u1 - u0
             size, shape = height * width, (height, width)
-            rows = slice(begins[number], begins[number] + height)
+            rows = slice(begins[index], begins[index] + height)
             window = slice(v0, v1), slice(u0, u1)
             inside = self._inside[:size].reshape(shape)
             other = self._other[:size].reshape(shape)
             plane = self._plane[:size].reshape(shape)
             label = self._label[:size].reshape(shape)
             nearest = self.inverse_depth[window]
-            np.add(steps[:, :width] * slopes[number], at_left[rows], out=plane)
+            np.add(steps[:, :width] * slopes[index], at_left[rows], out=plane)
             np.greater(plane, nearest, out=inside)
             np.greater_equal(columns[:, u0:u1], first[rows], out=other)
             np.logical_and(inside, other, out=inside)
@@ -162,23 +125,44 @@ class Rasteriser:
             np.logical_and(inside, other, out=inside)
             mask = inside.view(np.uint8)
             cv2.copyTo(plane, mask, nearest)
-            label.fill(number + 1)
+            label.fill(numbers[index] + 1)
             cv2.copyTo(label, mask, self.labels[window])
 
+    def _draw_small(self, numbers: NDArray[np.intp], planes: FloatArray, spans: Spans) -> NDArray[np.intp]:
+        """Draw many faces at once; returns the pixels (flat indices) that show one of them."""
+        depth, labels = self.inverse_depth.reshape(-1), self.labels.reshape(-1)
+        chosen = spans.chosen(numbers)
+        face, row, entry = chosen.entries()
+        first = spans.first[entry].astype(np.intp)
+        length = np.maximum(spans.last[entry] - first, 0)
+        step = np.arange(int(length.sum())) - np.repeat(np.cumsum(length) - length, length)
+        slope = planes[numbers, 0].astype(np.float32)[face]
+        begin = _inverse_depth_at_left(planes[numbers], chosen)
+        begin += slope * (first - chosen.bounds[face, 0]).astype(np.float32)
+        pixel = np.repeat(row * self.intrinsics.width + first, length) + step
+        inverse = np.repeat(begin, length) + np.repeat(slope, length) * step.astype(np.float32)
+        label = np.repeat((numbers[face] + 1).astype(np.uint16), length)
+        nearer = np.flatnonzero(inverse > depth[pixel])
+        pixel, inverse, label = pixel[nearer], inverse[nearer], label[nearer]
+        candidates, wanted = pixel, inverse
+        while len(pixel):
+            # Of several faces at one pixel the last is stored: repeat with those that are nearer still.
+            depth[pixel], labels[pixel] = inverse, label
+            nearer = np.flatnonzero(inverse > depth[pixel])
+            pixel, inverse, label = pixel[nearer], inverse[nearer], label[nearer]
+        seen: NDArray[np.intp] = candidates[depth[candidates] == wanted]
+        return seen
 
-def _inverse_depth_at_left(drawn: Drawn, spans: _Spans) -> Float32Image:
-    """Each face's inverse depth in each of its rows, in the first column of its bounds: (R, 1).
+
+def _inverse_depth_at_left(planes: FloatArray, spans: Spans) -> NDArray[np.float32]:
+    """Each face's inverse depth in each of its rows, in the first column of its bounds: (R,).
 
     Counting columns from there keeps the numbers that are added in float32 small.
     """
-    plane = drawn.to_plane[:, 2]
-    # Entries of faces that were dropped stay in the spans; only those of the kept ones are filled.
-    values = np.zeros(len(spans.first))
-    owner = np.repeat(np.arange(len(drawn)), spans.count)
-    step = np.arange(len(owner)) - np.repeat(np.cumsum(spans.count) - spans.count, spans.count)
-    at_top = plane[:, 2] + plane[:, 0] * drawn.bounds[:, 0] + plane[:, 1] * spans.row
-    values[spans.start[owner] + step] = at_top[owner] + plane[owner, 1] * step
-    return values.astype(np.float32)[:, None]
+    face, row, _ = spans.entries()
+    at_top = planes[:, 2] + planes[:, 0] * spans.bounds[:, 0]
+    values: NDArray[np.float32] = (at_top[face] + planes[face, 1] * row).astype(np.float32)
+    return values
 
 
 def texture_frames(corners: FloatArray) -> FloatArray:
@@ -192,39 +176,3 @@ def texture_frames(corners: FloatArray) -> FloatArray:
     middle_up = 0.5 * (corners[:, 0] + corners[:, 1])
     along_v = 0.5 * (corners[:, 2] + corners[:, 3]) - middle_up
     return np.stack([along_u, along_v, middle_up - 0.5 * along_u], axis=2)
-
-
-def _clip_near(corners: FloatArray) -> FloatArray:
-    """Cut four-cornered faces at NEAR_M: polygons (M, 5, 3), a corner repeated where fewer will do."""
-    polygons = np.concatenate([corners, corners[:, 3:]], axis=1)
-    crossing = np.flatnonzero(corners[:, :, 2].min(axis=1) < NEAR_M)
-    if len(crossing) == 0:
-        return polygons
-    here = corners[crossing]
-    after = np.roll(here, -1, axis=1)
-    ahead = here[:, :, 2] >= NEAR_M
-    cuts = ahead != np.roll(ahead, -1, axis=1)
-    depth = np.where(cuts, after[:, :, 2] - here[:, :, 2], 1.0)
-    cut = here + ((NEAR_M - here[:, :, 2]) / depth)[:, :, None] * (after - here)
-    points = np.stack([here, cut], axis=2).reshape(len(here), 8, 3)
-    used = np.stack([ahead, cuts], axis=2).reshape(len(here), 8)
-    order = np.argsort(~used, axis=1, kind="stable")[:, :5]
-    order = np.where(np.arange(5) < used.sum(axis=1, keepdims=True), order, order[:, :1])
-    polygons[crossing] = np.take_along_axis(points, order[:, :, None], axis=1)
-    return polygons
-
-
-def _bounds(spans: _Spans) -> NDArray[np.int32]:
-    """First column and row, last column and row + 1 that each face covers (M, 4); zeros for none."""
-    bounds = np.zeros((len(spans.count), 4), np.int32)
-    some = np.flatnonzero(spans.count)
-    if len(some) == 0:
-        return bounds
-    starts = spans.start[some]
-    empty = spans.last <= spans.first
-    rows = np.arange(len(empty)) + np.repeat((spans.row - spans.start)[some], spans.count[some])
-    bounds[some, 0] = np.minimum.reduceat(np.where(empty, np.int16(32767), spans.first), starts)
-    bounds[some, 1] = np.minimum.reduceat(np.where(empty, 1 << 20, rows), starts)
-    bounds[some, 2] = np.maximum.reduceat(np.where(empty, np.int16(0), spans.last), starts)
-    bounds[some, 3] = np.maximum.reduceat(np.where(empty, 0, rows + 1), starts)
-    return bounds

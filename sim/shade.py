@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from config.scenario import Light
 from hal.types import FloatArray
 from sim.raster import Drawn, LabelImage
-from sim.textures import STEPS_PER_OCTAVE, TextureStore
+from sim.textures import STEPS_PER_OCTAVE, TexelPool, TextureStore
 from sim.world import Geometry
 
 # One pyramid step serves a part of a face over which the distance changes by this factor at most.
@@ -48,13 +48,19 @@ class Painter:
         self._sizes = np.array([textures.size(key) for key in keys], dtype=np.float64).reshape(-1, 2)
         self._patch = np.empty(shape[0] * shape[1] * 4, np.uint8)
         self._mask = np.empty(shape[0] * shape[1], np.bool_)
+        self._pool = TexelPool(textures)
 
     def paint(self, labels: LabelImage, drawn: Drawn, geometry: Geometry, light: Light) -> None:
         """Colour every labelled pixel; what nothing covers becomes black."""
         self.colour.fill(0)
+        gains = _gains(geometry.normals[drawn.face], light)
+        self._paint_large(labels, drawn, geometry, gains.tolist())
+        self._paint_small(labels, drawn, geometry, gains)
+
+    def _paint_large(self, labels: LabelImage, drawn: Drawn, geometry: Geometry, gains: list[float]) -> None:
+        """Rectangle by rectangle, by OpenCV."""
         parts = self._parts(*self._visible(labels, drawn), drawn, geometry)
         texture = geometry.texture[drawn.face].tolist()
-        gains = _gains(geometry.normals[drawn.face], light)
         for index, (left, top, right, bottom) in enumerate(parts.rectangle):
             number = parts.number[index]
             sheet = self._textures.sheet(
@@ -71,10 +77,39 @@ class Painter:
             np.equal(labels[top:bottom, left:right], number + 1, out=mask)
             cv2.copyTo(patch, mask.view(np.uint8), self.colour[top:bottom, left:right])
 
+    def _paint_small(self, labels: LabelImage, drawn: Drawn, geometry: Geometry, gains: FloatArray) -> None:
+        """All pixels of small faces at once, each from the four texels around it."""
+        pixel = drawn.small_pixels
+        label = labels.reshape(-1)[pixel]
+        shown = np.zeros(len(drawn) + 1, np.bool_)
+        shown[label] = True
+        numbers = np.flatnonzero(shown[1:])
+        if len(numbers) == 0:
+            return
+        index_of = np.zeros(len(drawn) + 1, np.intp)
+        index_of[numbers + 1] = np.arange(len(numbers))
+        index = index_of[label]
+        face = drawn.face[numbers]
+        texture = geometry.texture[face]
+        to_uv = _window_matrices(geometry.windows[face]) @ drawn.to_plane[numbers]
+        bounds = drawn.bounds[numbers].astype(np.float64)
+        steps = _pyramid_steps(to_uv, bounds, self._sizes[texture])
+        places = np.array(
+            [
+                self._pool.place(self._keys[t], u, v)
+                for t, (u, v) in zip(texture.tolist(), steps.tolist(), strict=True)
+            ]
+        )
+        u, v = _place_at(to_uv, bounds, pixel, index, labels.shape[1])
+        texels = _interpolate(self._pool.texels, places, index, u, v)
+        values = np.minimum(texels * gains[numbers].astype(np.float32)[index, None] + 0.5, 255.0)
+        self.colour.reshape(-1, 4)[pixel] = values.astype(np.uint8)
+
     def _visible(self, labels: LabelImage, drawn: Drawn) -> tuple[list[int], list[Rectangle]]:
         """The faces that show, and rectangles around what shows of them."""
         numbers, rectangles = [], []
-        for number, (u0, v0, u1, v1) in enumerate(drawn.bounds.tolist()):
+        large = np.flatnonzero(~drawn.small)
+        for number, (u0, v0, u1, v1) in zip(large.tolist(), drawn.bounds[large].tolist(), strict=True):
             mask = self._mask[: (v1 - v0) * (u1 - u0)].reshape(v1 - v0, u1 - u0)
             np.equal(labels[v0:v1, u0:u1], number + 1, out=mask)
             du, dv, width, height = cv2.boundingRect(mask.view(np.uint8))
@@ -99,14 +134,14 @@ class Painter:
         return _Parts(numbers, rectangles, to_sheet, steps.tolist(), tiles.tolist())
 
 
-def _gains(normals: FloatArray, light: Light) -> list[float]:
+def _gains(normals: FloatArray, light: Light) -> FloatArray:
     """How bright faces are: an ambient share, and one that depends on their direction."""
     azimuth = math.radians(light.azimuth_deg)
     towards_light = np.array([0.62 * math.cos(azimuth), 0.62 * math.sin(azimuth), 0.78])
     towards = normals @ (towards_light / np.linalg.norm(towards_light))
     # What is turned away from the lamps still gets light back from the floor and the goods.
     direct = np.maximum(towards, 0.0) + 0.25 * np.maximum(-towards, 0.0)
-    gains: list[float] = (light.exposure * (light.ambient + (1.0 - light.ambient) * direct)).tolist()
+    gains: FloatArray = light.exposure * (light.ambient + (1.0 - light.ambient) * direct)
     return gains
 
 
@@ -118,6 +153,50 @@ def _window_matrices(windows: FloatArray) -> FloatArray:
     matrices[:, :2, 2] = windows[:, :2]
     matrices[:, 2, 2] = 1.0
     return matrices
+
+
+def _place_at(
+    to_uv: FloatArray, bounds: FloatArray, pixel: NDArray[np.intp], index: NDArray[np.intp], width: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Texture coordinates (P,), (P,) in 0..1 at pixels, each with the matrix that index says."""
+    # Counted from each face's own corner, float32 is plenty.
+    origin = to_uv @ np.concatenate([bounds[:, :2], np.ones((len(bounds), 1))], axis=1)[:, :, None]
+    table = np.concatenate([to_uv[:, :, :2], origin], axis=2).astype(np.float32).reshape(-1, 9).T
+    row, column = np.divmod(pixel.astype(np.int32), np.int32(width))
+    du = (column - bounds[:, 0].astype(np.int32)[index]).astype(np.float32)
+    dv = (row - bounds[:, 1].astype(np.int32)[index]).astype(np.float32)
+    x, y, w = (table[k][index] * du + table[k + 1][index] * dv + table[k + 2][index] for k in (0, 3, 6))
+    u, v = x / w, y / w
+    u -= np.floor(u)
+    v -= np.floor(v)
+    return u, v
+
+
+def _interpolate(
+    texels: NDArray[np.uint8],
+    places: NDArray[np.intp],
+    index: NDArray[np.intp],
+    u: NDArray[np.float32],
+    v: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Bilinear samples (P, 4) of the sheets at places (begin, width, height with the rim of one texel)."""
+    begin, width, height = places.T
+    inner_width, inner_height = (width - 2).astype(np.float32), (height - 2).astype(np.float32)
+    x, y = u * inner_width[index] + np.float32(0.5), v * inner_height[index] + np.float32(0.5)
+    left, top = x.astype(np.intp), y.astype(np.intp)
+    right_share, lower_share = (x - left)[:, None], (y - top)[:, None]
+    stride = width[index]
+    at = begin[index] + top * stride + left
+    upper = _mix(texels[at], texels[at + 1], right_share)
+    lower = _mix(texels[at + stride], texels[at + stride + 1], right_share)
+    samples: NDArray[np.float32] = upper + (lower - upper) * lower_share
+    return samples
+
+
+def _mix(a: NDArray[np.uint8], b: NDArray[np.uint8], share: NDArray[np.float32]) -> NDArray[np.float32]:
+    first = a.astype(np.float32)
+    mixed: NDArray[np.float32] = first + (b.astype(np.float32) - first) * share
+    return mixed
 
 
 def _split(

@@ -84,3 +84,31 @@ class TextureStore:
         )
         # An area mean needs no anti-aliasing filter in front of it.
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+class TexelPool:
+    """Sheets of one tile laid end to end in one array of texels, so that many can be read at once."""
+
+    def __init__(self, textures: TextureStore) -> None:
+        self._textures = textures
+        self._places: dict[tuple[str, int, int], tuple[int, int, int]] = {}
+        self._used = 0
+        self.texels: NDArray[np.uint8] = np.zeros((1 << 16, 4), np.uint8)
+
+    def place(self, key: str, step_u: int, step_v: int) -> tuple[int, int, int]:
+        """Where a sheet begins in texels, and its width and height with the rim."""
+        name = (key, step_u, step_v)
+        place = self._places.get(name)
+        if place is None:
+            place = self._places[name] = self._add(self._textures.sheet(key, step_u, step_v, 1, 1).image)
+        return place
+
+    def _add(self, image: NDArray[np.uint8]) -> tuple[int, int, int]:
+        height, width = image.shape[:2]
+        begin, self._used = self._used, self._used + height * width
+        if self._used > len(self.texels):
+            grown = np.zeros((2 * self._used, 4), np.uint8)
+            grown[:begin] = self.texels[:begin]
+            self.texels = grown
+        self.texels[begin : self._used] = image.reshape(-1, 4)
+        return begin, width, height

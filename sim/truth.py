@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray, Intrinsics, Pose
-from sim.raster import NEAR_M, Rasteriser, texture_frames
+from sim.raster import Rasteriser, texture_frames
 from sim.render import Picture
+from sim.spans import NEAR_M
 from sim.world import BodyState, Geometry, World
 
 

@@ -1,0 +1,136 @@
+"""Scan conversion: which columns of which rows each face covers, for all faces at once.
+
+A pixel belongs to a face if its centre lies inside. Where an edge cuts a row is computed from the edge alone,
+so two faces that share it agree: there is neither gap nor overlap between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray, Intrinsics
+
+NEAR_M = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spans:
+    """The columns first <= u < last that each of M faces covers in each of its rows, row after row.
+
+    Face k's rows begin at entry start[k] and at row row[k]; there are count[k] of them. bounds (M, 4):
+    first column and row, last column and row + 1 that the face covers; zeros where it covers no pixel.
+    """
+
+    start: NDArray[np.intp]
+    row: NDArray[np.intp]
+    count: NDArray[np.intp]
+    first: NDArray[np.int16]
+    last: NDArray[np.int16]
+    bounds: NDArray[np.intp]
+
+    def chosen(self, faces: NDArray[np.intp]) -> Spans:
+        """Of these faces only; first and last stay as they are."""
+        return Spans(
+            self.start[faces], self.row[faces], self.count[faces], self.first, self.last, self.bounds[faces]
+        )
+
+    def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        """For every row of every face: the face, the row, and the entry in first and last."""
+        face = np.repeat(np.arange(len(self.count)), self.count)
+        step = np.arange(len(face)) - np.repeat(np.cumsum(self.count) - self.count, self.count)
+        return face, step + self.row[face], step + self.start[face]
+
+
+def convert(corners: FloatArray, intrinsics: Intrinsics) -> Spans:
+    """Spans of convex faces (M, 4, 3) in the optical frame, clockwise as seen."""
+    k = intrinsics
+    polygons = _clip_near(corners)
+    u = polygons[:, :, 0] * (k.fx / polygons[:, :, 2]) + k.cx
+    v = polygons[:, :, 1] * (k.fy / polygons[:, :, 2]) + k.cy
+    top = np.ceil(v).clip(0, k.height).astype(np.intp)
+    row = top.min(axis=1)
+    count = top.max(axis=1) - row
+    start = np.cumsum(count) - count
+    first = np.zeros(int(count.sum()), np.int16)
+    last = np.zeros(len(first), np.int16)
+    below, after = np.roll(top, -1, axis=1), np.roll(u, -1, axis=1)
+    lines = edge_planes(polygons)
+    # Clockwise on a screen whose v points down: edges that go down bound on the right.
+    for side, from_row, to_row in ((last, top, below), (first, below, top)):
+        owner, edge = np.nonzero(to_row > from_row)
+        begin_row = from_row[owner, edge]
+        length = to_row[owner, edge] - begin_row
+        begin = np.cumsum(length) - length
+        step = np.arange(int(length.sum()))
+        slope, offset = _columns_of(lines[owner, edge], k)
+        cut = np.repeat(slope, length) * (step + np.repeat(begin_row - begin, length))
+        cut += np.repeat(offset, length)
+        # A nearly level edge may cut its row anywhere by rounding, but not outside its own ends.
+        ends = u[owner, edge], after[owner, edge]
+        low, high = np.minimum(*ends).clip(-1.0, k.width), np.maximum(*ends).clip(-1.0, k.width)
+        np.clip(cut, np.repeat(low, length), np.repeat(high, length), out=cut)
+        side[step + np.repeat((start - row)[owner] + begin_row - begin, length)] = np.ceil(cut).clip(
+            0, k.width
+        )
+    return Spans(start, row, count, first, last, _bounds(start, row, count, first, last))
+
+
+def edge_planes(polygons: FloatArray) -> FloatArray:
+    """Normals (M, K, 3) of the planes through the eye and each edge, pointing to the inside."""
+    after = np.concatenate([polygons[:, 1:], polygons[:, :1]], axis=1)
+    planes = np.empty_like(polygons)
+    for axis, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        planes[:, :, axis] = polygons[:, :, i] * after[:, :, j] - polygons[:, :, j] * after[:, :, i]
+    return planes
+
+
+def _columns_of(lines: FloatArray, k: Intrinsics) -> tuple[FloatArray, FloatArray]:
+    """The column at which planes through the eye cut a row: slope * v + offset, for each plane (N, 3)."""
+    x, y, z = lines.T
+    across = np.where(x == 0.0, 1.0, x) / k.fx
+    slope = -y / k.fy / across
+    return slope, k.cx - z / across - slope * k.cy
+
+
+def _clip_near(corners: FloatArray) -> FloatArray:
+    """Cut four-cornered faces at NEAR_M: polygons (M, 5, 3), a corner repeated where fewer will do."""
+    polygons = np.concatenate([corners, corners[:, 3:]], axis=1)
+    crossing = np.flatnonzero(corners[:, :, 2].min(axis=1) < NEAR_M)
+    if len(crossing) == 0:
+        return polygons
+    here = corners[crossing]
+    after = np.roll(here, -1, axis=1)
+    ahead = here[:, :, 2] >= NEAR_M
+    cuts = ahead != np.roll(ahead, -1, axis=1)
+    depth = np.where(cuts, after[:, :, 2] - here[:, :, 2], 1.0)
+    cut = here + ((NEAR_M - here[:, :, 2]) / depth)[:, :, None] * (after - here)
+    points = np.stack([here, cut], axis=2).reshape(len(here), 8, 3)
+    used = np.stack([ahead, cuts], axis=2).reshape(len(here), 8)
+    order = np.argsort(~used, axis=1, kind="stable")[:, :5]
+    order = np.where(np.arange(5) < used.sum(axis=1, keepdims=True), order, order[:, :1])
+    polygons[crossing] = np.take_along_axis(points, order[:, :, None], axis=1)
+    return polygons
+
+
+def _bounds(
+    start: NDArray[np.intp],
+    row: NDArray[np.intp],
+    count: NDArray[np.intp],
+    first: NDArray[np.int16],
+    last: NDArray[np.int16],
+) -> NDArray[np.intp]:
+    bounds = np.zeros((len(count), 4), np.intp)
+    some = np.flatnonzero(count)
+    if len(some) == 0:
+        return bounds
+    starts, empty = start[some], last <= first
+    rows = np.arange(len(empty)) + np.repeat((row - start)[some], count[some])
+    bounds[some, 0] = np.minimum.reduceat(np.where(empty, np.int16(32767), first), starts)
+    bounds[some, 1] = np.minimum.reduceat(np.where(empty, 1 << 20, rows), starts)
+    bounds[some, 2] = np.maximum.reduceat(np.where(empty, np.int16(0), last), starts)
+    bounds[some, 3] = np.maximum.reduceat(np.where(empty, 0, rows + 1), starts)
+    bounds[bounds[:, 2] == 0] = 0
+    return bounds
