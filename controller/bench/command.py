@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path as FilePath
 
@@ -35,6 +36,7 @@ from controller.build import (
     build_control,
     build_path,
     mount_of,
+    open_replay,
     open_simulated_camera,
     scenario_of,
 )
@@ -42,19 +44,28 @@ from controller.errors import UserError
 from hal.clocks import SimulatedClock
 from sim.camera import SimulatedCamera
 from sim.render import Renderer
+from sim.simulation import Emulator
 from sim.world import World
 from vision.perception import Perception
 
-_MISSION = CONFIG_DIR / "sim.yaml"
 _ROBOCLAW = CONFIG_DIR / "robot-roboclaw.yaml"
 _REPLAY = CONFIG_DIR / "replay.yaml"
-_RECORDING = CONFIG_DIR.parent / "tests" / "recordings" / "desk_rpy"
 
-_SIZES = ((640, 480), (848, 480))
-_RECORDING_PASSES = 6
-_RENDERED = 60
-_CONTROL_STEPS = 500
-_STRETCH_S = 10.0
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How much is measured, and on what. mission: a simulated one in lock-step. sizes: of the simulated
+    camera; the renderer is measured at the first. A recording that is not installed is left out."""
+
+    mission: FilePath = CONFIG_DIR / "sim.yaml"
+    sizes: tuple[tuple[int, int], ...] = ((640, 480), (848, 480))
+    frames: int = 150
+    recording: FilePath = CONFIG_DIR.parent / "tests" / "recordings" / "desk_rpy"
+    recording_passes: int = 6
+    pictures: int = 60
+    control_steps: int = 500
+    stretch_s: float = 10.0
+
 
 _stopwatch_ns = time.perf_counter_ns
 
@@ -64,7 +75,7 @@ def run_bench(frames: int, json_path: FilePath | None) -> None:
     if json_path is not None:
         _prepare(json_path)
     with one_opencv_thread():
-        report = measure_all(frames)
+        report = measure_all(Plan(frames=frames))
     for line in report.lines():
         click.echo(line)
     if json_path is not None:
@@ -72,32 +83,26 @@ def run_bench(frames: int, json_path: FilePath | None) -> None:
         click.echo(f"every figure: {json_path}")
 
 
-def measure_all(
-    frames: int,
-    *,
-    rendered: int = _RENDERED,
-    recording_passes: int = _RECORDING_PASSES,
-    control_steps: int = _CONTROL_STEPS,
-    stretch_s: float = _STRETCH_S,
-) -> BenchReport:
-    """One run of everything. The recording is left out where this installation has none."""
+def measure_all(plan: Plan) -> BenchReport:
+    """One run of everything. Raises ConfigError, HalError."""
     began_s, began_cpu_s = time.perf_counter(), time.process_time()
-    config = load_app(_MISSION)
-    perception = {f"simulated_{w}x{h}": _simulated_reel_figures(config, w, h, frames) for w, h in _SIZES}
-    if _RECORDING.is_dir():
-        perception[f"recorded_{_RECORDING.name}"] = _recorded_reel_figures(recording_passes)
-    control, agilex = _driving_figures(config, control_steps)
+    config = load_app(plan.mission)
+    perception = {f"simulated_{w}x{h}": _simulated_reel_figures(config, plan, w, h) for w, h in plan.sizes}
+    if plan.recording.is_dir():
+        perception[f"recorded_{plan.recording.name}"] = _recorded_reel_figures(plan)
+    renderer = _renderer_figures(config, plan)
+    control, agilex = _driving_figures(config, plan)
+    roboclaw = _roboclaw_figures(config, plan)
+    lockstep = _lockstep_figures(config, plan)
     return BenchReport(
         taken_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        cpu_share=(time.process_time() - began_cpu_s) / (time.perf_counter() - began_s),
         machine=describe_machine(),
         perception=perception,
-        renderer=_renderer_figures(config, rendered),
+        renderer=renderer,
         control=control,
-        drivers={
-            "agilex_virtual_can": agilex,
-            "roboclaw_in_memory": _roboclaw_figures(config, control_steps),
-        },
-        lockstep=_lockstep_figures(config, stretch_s),
+        drivers={"agilex_virtual_can": agilex, "roboclaw_in_memory": roboclaw},
+        lockstep=lockstep,
     )
 
 
@@ -113,34 +118,35 @@ def _prepare(json_path: FilePath) -> None:
         raise UserError(f"{json_path}: may not be written; choose another --json or mend its permissions")
 
 
-def _simulated_camera(config: AppConfig, width: int, height: int) -> SimulatedCamera:
+def _simulated_camera(config: AppConfig, plan: Plan, width: int, height: int) -> SimulatedCamera:
     """A camera of this size on a body that cruises along the mission's path."""
-    assert isinstance(config.camera, SimulatedCameraConfig), "sim.yaml simulates its camera"
+    assert isinstance(config.camera, SimulatedCameraConfig), "the mission's camera is simulated"
     middle = {"cx": 0.5 * (width - 1), "cy": 0.5 * (height - 1)}
     camera = config.camera.model_copy(update={"width": width, "height": height, **middle})
-    path = build_path(config, _MISSION)
+    path = build_path(config, plan.mission)
     return open_simulated_camera(
         config.model_copy(update={"camera": camera}),
-        _MISSION,
+        plan.mission,
         SimulatedClock(),
         lambda stamp_ns: cruise(path, stamp_ns),
         start_ns=0,
     )
 
 
-def _simulated_reel_figures(config: AppConfig, width: int, height: int, frames: int) -> PerceptionFigures:
-    camera, path = _simulated_camera(config, width, height), build_path(config, _MISSION)
+def _simulated_reel_figures(config: AppConfig, plan: Plan, width: int, height: int) -> PerceptionFigures:
+    camera, path = _simulated_camera(config, plan, width, height), build_path(config, plan.mission)
     size = f"{width}x{height}"
-    with progress(f"rendering frames, {size}", frames) as tick:
-        reel = render_reel(camera, path, mount_of(config), frames, tick)
+    with progress(f"rendering frames, {size}", plan.frames) as tick:
+        reel = render_reel(camera, path, mount_of(config), plan.frames, tick)
     return _reel_figures(f"perception, {size}", reel, config.perception, config.robot.body, passes=1)
 
 
-def _recorded_reel_figures(passes: int) -> PerceptionFigures:
+def _recorded_reel_figures(plan: Plan) -> PerceptionFigures:
     replay = load_replay(_REPLAY)
-    reel = recorded_reel(_RECORDING)
-    label = f"perception, recording {_RECORDING.name}"
-    return _reel_figures(label, reel, replay.perception, replay.robot.body, passes)
+    camera, _ = open_replay(plan.recording, "none")
+    reel = recorded_reel(camera, camera.mount)
+    label = f"perception, recording {plan.recording.name}"
+    return _reel_figures(label, reel, replay.perception, replay.robot.body, plan.recording_passes)
 
 
 def _reel_figures(
@@ -153,40 +159,43 @@ def _reel_figures(
         return measure_perception(reel, make, passes, _stopwatch_ns, tick)
 
 
-def _renderer_figures(config: AppConfig, frames: int) -> RendererFigures:
-    assert config.simulation is not None, "sim.yaml simulates its world"
-    camera = _simulated_camera(config, *_SIZES[0])
-    world = World(scenario_of(config.simulation, _MISSION), config.simulation.seed)
+def _renderer_figures(config: AppConfig, plan: Plan) -> RendererFigures:
+    assert config.simulation is not None, "the mission is simulated"
+    camera = _simulated_camera(config, plan, *plan.sizes[0])
+    world = World(scenario_of(config.simulation, plan.mission), config.simulation.seed)
     renderer = Renderer(world, camera.intrinsics)
-    with progress("renderer", frames + 1) as tick:
-        return measure_renderer(camera, renderer, frames, _stopwatch_ns, tick)
+    with progress("renderer", plan.pictures + 1) as tick:
+        return measure_renderer(camera, renderer, plan.pictures, _stopwatch_ns, tick)
 
 
-def _driving_figures(config: AppConfig, steps: int) -> tuple[ControlFigures, Durations]:
+def _driving_figures(config: AppConfig, plan: Plan) -> tuple[ControlFigures, Durations]:
     """The control step, and the exchange of the mission's chassis driver, each in a run of its own."""
-    start = build_path(config, _MISSION).start
-    chassis, emulator = build_base(config, start, 0)
-    assert emulator is not None, "sim.yaml emulates its base"
-    timed = TimedChassis(chassis, _stopwatch_ns)
-    loop = build_control(config, _MISSION, timed)
+    steps = plan.control_steps
+    timed, emulator = _base(config, plan)
+    loop = build_control(config, plan.mission, timed)
     with progress("control step", steps) as tick:
         control = measure_control(loop, timed, emulator, steps, _stopwatch_ns, tick)
-    chassis, emulator = build_base(config, start, 0)
-    assert emulator is not None, "sim.yaml emulates its base"
+    timed, emulator = _base(config, plan)
     with progress("driver, AgileX over virtual CAN", steps) as tick:
-        return control, measure_exchange(TimedChassis(chassis, _stopwatch_ns), emulator, steps, tick)
+        return control, measure_exchange(timed, emulator, steps, tick)
 
 
-def _roboclaw_figures(config: AppConfig, exchanges: int) -> Durations:
+def _base(config: AppConfig, plan: Plan) -> tuple[TimedChassis, Emulator]:
+    chassis, emulator = build_base(config, build_path(config, plan.mission).start, 0)
+    assert emulator is not None, "the mission's base is emulated"
+    return TimedChassis(chassis, _stopwatch_ns), emulator
+
+
+def _roboclaw_figures(config: AppConfig, plan: Plan) -> Durations:
     roboclaw = load_app(_ROBOCLAW).chassis
     assert isinstance(roboclaw, RoboclawChassisConfig), "robot-roboclaw.yaml drives a RoboClaw"
-    assert config.simulation is not None, "sim.yaml simulates its base"
+    assert config.simulation is not None, "the mission is simulated"
     chassis, emulator = roboclaw_in_memory(roboclaw, config.simulation.plant)
-    with progress("driver, RoboClaw in memory", exchanges) as tick:
-        return measure_exchange(TimedChassis(chassis, _stopwatch_ns), emulator, exchanges, tick)
+    with progress("driver, RoboClaw in memory", plan.control_steps) as tick:
+        return measure_exchange(TimedChassis(chassis, _stopwatch_ns), emulator, plan.control_steps, tick)
 
 
-def _lockstep_figures(config: AppConfig, stretch_s: float) -> LockstepFigures:
-    steps = round(stretch_s * config.runner.control_rate_hz)
+def _lockstep_figures(config: AppConfig, plan: Plan) -> LockstepFigures:
+    steps = round(plan.stretch_s * config.runner.control_rate_hz)
     with progress("lock-step mission", steps) as tick:
-        return measure_lockstep(config, _MISSION, stretch_s, _stopwatch_ns, tick)
+        return measure_lockstep(config, plan.mission, plan.stretch_s, _stopwatch_ns, tick)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 
 from controller.path import Path
 from hal.api import FrameSource
-from hal.cameras.tum_replay import TumReplay
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
 from hal.geometry import camera_in_floor
@@ -45,12 +43,12 @@ def render_reel(camera: FrameSource, path: Path, mount: CameraMount, frames: int
     return Reel(tuple(taken), tuple(odometry), mount)
 
 
-def recorded_reel(folder: FilePath) -> Reel:
-    """All frames of a recording, without odometry. Raises BadRecording."""
+def recorded_reel(camera: FrameSource, mount: CameraMount | None) -> Reel:
+    """All frames of a recording, without odometry. mount: None where it is not known."""
     taken: list[RgbdFrame] = []
-    with TumReplay(folder) as camera:
+    with camera:
         while True:
             try:
                 taken.append(camera.read(_TIMEOUT_S))
             except EndOfStream:
-                return Reel(tuple(taken), (None,) * len(taken), camera.mount)
+                return Reel(tuple(taken), (None,) * len(taken), mount)

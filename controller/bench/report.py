@@ -22,8 +22,8 @@ _BUSY_SHARE = 0.9
 
 @dataclass(frozen=True, slots=True)
 class BenchReport:
-    """taken_at: ISO 8601. cpu_share: processor time over real time of the whole run; what is missing to 1 went
-    to other programs. perception: by reel. drivers: one exchange each, by name of chassis and link."""
+    """taken_at: ISO 8601. cpu_share: processor time over real time of the whole run; what is missing to 1
+    went to other programs. perception: by reel. drivers: one exchange each, by name of chassis and link."""
 
     taken_at: str
     cpu_share: float
@@ -61,8 +61,8 @@ class BenchReport:
         )
         if self.cpu_share < _BUSY_SHARE:
             yield (
-                f"the machine is busy: this run got {self.cpu_share:.0%} of a core, so durations are too long; "
-                "ratios hold"
+                f"the machine is busy: this run got {self.cpu_share:.0%} of a core; "
+                "durations are too long, ratios hold"
             )
         yield ""
         yield from _perception_lines(self.perception)
@@ -94,7 +94,7 @@ def _perception_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
     )
     for name, figures in reels.items():
         yield (
-            f"{_row(name.replace('_', ' '), figures.total)}{figures.detect.median_ms:8.2f}"
+            f"{_row(name.replace('_', ' ', 1), figures.total)}{figures.detect.median_ms:8.2f}"
             f"{figures.track.median_ms:8.2f}{figures.bare.median_ms:13.2f}{figures.ratio_of_medians:8.2f}"
             f"{figures.median_ratio:10.2f}{figures.first.median_ms:7.1f}"
         )
@@ -105,7 +105,7 @@ def _perception_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
 def _stage_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
     """Each stage's own time and that of OpenCV in it, a column pair a reel; then OpenCV's functions alone."""
     width = max(17, *(len(name) for name in reels))
-    heads = "".join(f"  {name.replace('_', ' '):>{width}}" for name in reels)
+    heads = "".join(f"  {name.replace('_', ' ', 1):>{width}}" for name in reels)
     yield f"{'stage, own + OpenCV':{_NAME}}{heads}"
     for module in _rows([figures.modules for figures in reels.values()]):
         cells = (figures.modules.get(module) for figures in reels.values())
