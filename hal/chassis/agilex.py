@@ -9,7 +9,14 @@ from __future__ import annotations
 from config.chassis import AgilexChassisConfig
 from hal.api import CanLink
 from hal.chassis.agilex_feedback import AgilexFeedback
-from hal.chassis.agilex_messages import AgilexMessage, ControlModeCommand, MotionCommand, decode, encode
+from hal.chassis.agilex_messages import (
+    ACTUATORS,
+    AgilexMessage,
+    ControlModeCommand,
+    MotionCommand,
+    decode,
+    encode,
+)
 from hal.chassis.agilex_models import model_of
 from hal.chassis.arming import NS_PER_MS, ArmingLimits
 from hal.chassis.command import CommandLimits, is_zero, zero
@@ -18,6 +25,9 @@ from hal.types import ChassisMode, Setpoint
 
 # A bus at 500 kbit/s carries about 90 frames in 20 ms; more than this in one exchange is a flood.
 _MAX_FRAMES = 256
+
+# Motor speeds and currents, 100 frames a second: nothing here depends on them.
+_NOT_NEEDED = frozenset(range(0x251, 0x251 + ACTUATORS))
 
 # A due time may be early by a quarter of the period: a loop with jitter would else miss every other one.
 _EARLY = 0.75
@@ -58,6 +68,8 @@ class AgilexChassis(ChassisDriver):
                 frame = self._link.receive()
                 if frame is None:
                     break
+                if frame.arbitration_id in _NOT_NEEDED:
+                    continue
                 message = decode(frame)
                 if message is None:
                     self._feedback.note_foreign(frame.arbitration_id)

@@ -37,7 +37,7 @@ class Evidence:
     newest status arrived (None: never). disobeys: why the base does not take our commands, as that
     status tells ("" when it takes them). stop_cause: why the robot must not move ("" for none).
     standing: measured speed is zero; False when unknown. command_is_zero: what is asked at this step.
-    silence: what to check while no status is heard.
+    silence: while no status was ever heard, what came instead and what to check.
     """
 
     now_ns: int
@@ -125,7 +125,7 @@ def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
 def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     # Only what arrived after the consent counts: an old "obeys" may be from before a restart.
     if seen.status_ns is None or seen.status_ns <= state.since_ns:
-        waiting = "no status heard from the base" + (f": {seen.silence}" if seen.silence else "")
+        waiting = "no status heard from the base"
     elif seen.feedback_ns is None or seen.feedback_ns <= state.since_ns:
         waiting = "no motion feedback heard from the base"
     elif seen.disobeys:
@@ -136,7 +136,8 @@ def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
         return Arming(ChassisMode.ARMED, "armed", seen.now_ns)
     if seen.now_ns - state.since_ns > limits.arming_timeout_ns:
         waited_s = (seen.now_ns - state.since_ns) / 1e9
-        return Arming(ChassisMode.STANDBY, f"arming gave up after {waited_s:.1f} s: {waiting}", seen.now_ns)
+        cause = f"arming gave up after {waited_s:.1f} s: {waiting}" + (seen.silence and f": {seen.silence}")
+        return Arming(ChassisMode.STANDBY, cause, seen.now_ns)
     return replace(state, cause=f"arming: {waiting}")
 
 
