@@ -1,0 +1,76 @@
+"""Background modelling (Table 1, first row): MOG2 on images freed of the camera's motion by homographies.
+
+A homography is exact for a far or flat scene only. Near things show parallax and are taken for movers: that
+is the weakness which the paper's table names ("not good for free camera motion").
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from controller.evaluation.baselines import ego
+from controller.evaluation.baselines.masks import (
+    Identities,
+    Mask,
+    half_depth_m,
+    half_grey,
+    half_intrinsics,
+    things,
+)
+from controller.evaluation.types import Answer
+from hal.types import FloatArray, Pose, RgbdFrame
+
+_HISTORY = 30
+_VARIANCE = 25.0
+_LEARNING_RATE = 0.05
+_WARM_UP_FRAMES = 4
+_MIN_OVERLAP = 0.6  # share of the reference that must still be in view
+
+
+class BackgroundModel:
+    """The model lives in a reference image; each frame is warped to it, and the mask back."""
+
+    def __init__(self) -> None:
+        ego.seed_ransac()
+        self._before: Mask | None = None
+        self._to_reference: FloatArray = np.eye(3)
+        self._identities = Identities()
+        self._start_model()
+
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+        """Odometry is not used."""
+        grey = half_grey(frame)
+        if self._before is not None:
+            step = ego.homography(self._before, grey)
+            if step is None or abs(np.linalg.det(step)) < 1e-6:
+                self._restart()
+            else:
+                self._to_reference = self._to_reference @ np.linalg.inv(step)
+        self._before = grey
+        size = (grey.shape[1], grey.shape[0])
+        covered = cv2.warpPerspective(np.full_like(grey, 255), self._to_reference, size)
+        if float(np.count_nonzero(covered)) < _MIN_OVERLAP * covered.size:
+            self._restart()
+            covered = np.full_like(grey, 255)
+        # Where the frame does not reach, the model is shown what it expects: it learns nothing there.
+        warped = cv2.warpPerspective(grey, self._to_reference, size)
+        known = self._model.getBackgroundImage() if self._age else warped
+        warped = np.where(covered == 255, warped, known)
+        moving = self._model.apply(warped, learningRate=1.0 if self._age == 0 else _LEARNING_RATE)
+        self._age += 1
+        if self._age <= _WARM_UP_FRAMES:
+            return self._identities.answer([], np.zeros_like(grey))
+        moving = np.where(covered == 255, moving, 0).astype(np.uint8)
+        back = cv2.warpPerspective(moving, self._to_reference, size, flags=cv2.WARP_INVERSE_MAP)
+        mask = np.where(back > 127, 255, 0).astype(np.uint8)
+        found = things(mask, half_depth_m(frame), half_intrinsics(frame.intrinsics))
+        return self._identities.answer(found, mask)
+
+    def _restart(self) -> None:
+        self._to_reference = np.eye(3)
+        self._start_model()
+
+    def _start_model(self) -> None:
+        self._model = cv2.createBackgroundSubtractorMOG2(_HISTORY, _VARIANCE, detectShadows=False)
+        self._age = 0

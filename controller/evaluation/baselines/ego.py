@@ -1,0 +1,99 @@
+"""The camera's own motion as the baselines need it: a homography, or a rigid motion from depth."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.evaluation.baselines.masks import HalfDepth, Mask
+from hal.types import FloatArray, Intrinsics, Pose
+
+Points = NDArray[np.float32]
+
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.01)
+_BACK_PX = 1.0
+_MIN_POINTS = 8
+_SEED = 20200127
+
+
+def seed_ransac() -> None:
+    """OpenCV draws its RANSAC samples from a generator of the thread: begin it anew for equal results."""
+    cv2.setRNGSeed(_SEED)
+
+
+def corners(grey: Mask, count: int, taken: Points | None = None, distance_px: int = 7) -> Points:
+    """(N, 2) good features to track; none near points that are taken already."""
+    mask = None
+    if taken is not None and len(taken):
+        mask = np.full(grey.shape, 255, np.uint8)
+        for u, v in np.rint(taken).astype(int):
+            cv2.circle(mask, (int(u), int(v)), distance_px, 0, -1)
+    found: object = cv2.goodFeaturesToTrack(grey, count, 0.01, distance_px, mask=mask)
+    return np.empty((0, 2), np.float32) if found is None else np.asarray(found, np.float32).reshape(-1, 2)
+
+
+def follow(before: Mask, now: Mask, points: Points) -> tuple[Points, NDArray[np.bool_]]:
+    """Pyramidal Lucas-Kanade with a forward-backward check: (N, 2) and which were found (N,)."""
+    if len(points) == 0:
+        return points, np.empty(0, np.bool_)
+    shaped = points.reshape(-1, 1, 2)
+    options = {"winSize": (15, 15), "maxLevel": 3, "criteria": _CRITERIA}
+    there, there_ok, _ = cv2.calcOpticalFlowPyrLK(before, now, shaped, None, **options)  # type: ignore[call-overload]  # the stub lacks None
+    back, back_ok, _ = cv2.calcOpticalFlowPyrLK(now, before, there, None, **options)  # type: ignore[call-overload]  # the stub lacks None
+    close = np.hypot(*(back.reshape(-1, 2) - points).T) <= _BACK_PX
+    found = (there_ok.ravel() == 1) & (back_ok.ravel() == 1) & close
+    return np.asarray(there, np.float32).reshape(-1, 2), found
+
+
+def homography(before: Mask, now: Mask) -> FloatArray | None:
+    """(3, 3) from the image before to now, by RANSAC over tracked corners; None where it cannot be had."""
+    start = corners(before, 300)
+    end, found = follow(before, now, start)
+    if np.count_nonzero(found) < _MIN_POINTS:
+        return None
+    matrix: object = cv2.findHomography(start[found], end[found], cv2.RANSAC, 2.0)[0]
+    return None if matrix is None else np.asarray(matrix, np.float64)
+
+
+def back_project(points: Points, z_m: FloatArray, k: Intrinsics) -> FloatArray:
+    """(N, 3) in the optical frame."""
+    x = (points[:, 0] - k.cx) / k.fx * z_m
+    y = (points[:, 1] - k.cy) / k.fy * z_m
+    return np.stack([x, y, z_m], axis=1)
+
+
+def depth_at(points: Points, depth_m: HalfDepth) -> FloatArray:
+    """(N,) of the nearest pixel, 0 where there is none."""
+    height, width = depth_m.shape
+    u = np.clip(np.rint(points[:, 0]).astype(int), 0, width - 1)
+    v = np.clip(np.rint(points[:, 1]).astype(int), 0, height - 1)
+    return np.asarray(depth_m[v, u], np.float64)
+
+
+def rigid_motion(points_m: FloatArray, pixels: Points, k: Intrinsics, tolerance_px: float) -> Pose | None:
+    """The camera before in the camera now (p_now = motion.apply(p_before)) that most points agree with.
+
+    points_m (N, 3) in the camera before, pixels (N, 2) where they are seen now. None where too few agree.
+    """
+    if len(points_m) < _MIN_POINTS:
+        return None
+    matrix = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
+    ok, turn, way, found = cv2.solvePnPRansac(
+        points_m, pixels.astype(np.float64), matrix, None,
+        iterationsCount=100, reprojectionError=tolerance_px, flags=cv2.SOLVEPNP_EPNP,
+    )  # fmt: skip
+    inliers: object = found
+    if not ok or inliers is None or len(found) < _MIN_POINTS:
+        return None
+    agree = np.asarray(found).ravel()
+    turn, way = cv2.solvePnPRefineLM(
+        points_m[agree], pixels[agree].astype(np.float64), matrix, np.zeros(4), turn, way
+    )
+    return Pose(np.asarray(cv2.Rodrigues(turn)[0], np.float64), np.asarray(way, np.float64).ravel())
+
+
+def project(points_m: FloatArray, k: Intrinsics) -> FloatArray:
+    """(N, 2); NaN behind the camera."""
+    z = np.where(points_m[:, 2] > 0.05, points_m[:, 2], np.nan)
+    return np.stack([k.fx * points_m[:, 0] / z + k.cx, k.fy * points_m[:, 1] / z + k.cy], axis=1)

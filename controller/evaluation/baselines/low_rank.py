@@ -1,0 +1,109 @@
+"""Low rank and sparse representation (Table 1, fourth row): windowed robust principal component analysis.
+
+The last images, aligned to the newest by homographies, are the columns of a matrix. Its low-rank part is the
+background, its sparse part what moves (principal component pursuit by an inexact augmented Lagrange
+multiplier; Candes et al. 2011, Lin et al. 2010). At an eighth of the resolution, or it would take seconds.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import cv2
+import numpy as np
+
+from controller.evaluation.baselines import ego
+from controller.evaluation.baselines.masks import (
+    Identities,
+    Mask,
+    half_depth_m,
+    half_grey,
+    half_intrinsics,
+    things,
+)
+from controller.evaluation.types import Answer
+from hal.types import FloatArray, Pose, RgbdFrame
+
+_WINDOW = 16
+_MIN_WINDOW = 6
+_SHRINK = 4  # on top of the half-size images
+_ITERATIONS = 25
+_TOLERANCE = 1e-4
+_SPARSE_LEVEL = 18.0  # grey levels
+
+
+class LowRank:
+    """Keeps the last images and the homographies that lead to the newest."""
+
+    def __init__(self) -> None:
+        ego.seed_ransac()
+        self._images: deque[Mask] = deque(maxlen=_WINDOW)
+        self._to_newest: deque[FloatArray] = deque(maxlen=_WINDOW)
+        self._identities = Identities()
+
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+        """Odometry is not used."""
+        grey = half_grey(frame)
+        if self._images:
+            step = ego.homography(self._images[-1], grey)
+            if step is None:
+                self._images.clear()
+                self._to_newest.clear()
+            else:
+                self._to_newest = deque((step @ matrix for matrix in self._to_newest), maxlen=_WINDOW)
+        self._images.append(grey)
+        self._to_newest.append(np.eye(3))
+        if len(self._images) < _MIN_WINDOW:
+            return self._identities.answer([], np.zeros_like(grey))
+        mask = self._sparse_mask(grey)
+        found = things(mask, half_depth_m(frame), half_intrinsics(frame.intrinsics))
+        return self._identities.answer(found, mask)
+
+    def _sparse_mask(self, grey: Mask) -> Mask:
+        height, width = grey.shape[0] // _SHRINK, grey.shape[1] // _SHRINK
+        columns = []
+        for image, matrix in zip(self._images, self._to_newest, strict=True):
+            # Beyond the border of an old image stands the newest one: unknown is not moving.
+            warped = grey.copy()
+            cv2.warpPerspective(
+                image, matrix, (grey.shape[1], grey.shape[0]), dst=warped, borderMode=cv2.BORDER_TRANSPARENT
+            )
+            small = cv2.resize(warped, (width, height), interpolation=cv2.INTER_AREA)
+            columns.append(np.asarray(small, np.float64).ravel())
+        sparse = robust_pca(np.stack(columns, axis=1))[:, -1]
+        moving = (np.abs(sparse) > _SPARSE_LEVEL).astype(np.uint8).reshape(height, width) * 255
+        full = cv2.resize(moving, (grey.shape[1], grey.shape[0]), interpolation=cv2.INTER_NEAREST)
+        return np.asarray(full, np.uint8)
+
+
+def robust_pca(data: FloatArray) -> FloatArray:
+    """The sparse part (N, K) of data (N, K), N much larger than K.
+
+    Minimises the nuclear norm of data - sparse plus sparse's 1-norm over sqrt(N).
+    """
+    weight = 1.0 / np.sqrt(max(data.shape))
+    scale = np.linalg.norm(data)
+    if scale == 0.0:
+        return np.zeros_like(data)
+    largest = float(np.sqrt(np.linalg.eigvalsh(data.T @ data)[-1]))
+    multiplier = data / max(largest, float(np.abs(data).max()) / weight)
+    penalty, sparse = 1.25 / largest, np.zeros_like(data)
+    for _ in range(_ITERATIONS):
+        low = _shrink_singular_values(data - sparse + multiplier / penalty, 1.0 / penalty)
+        rest = data - low + multiplier / penalty
+        sparse = np.sign(rest) * np.maximum(np.abs(rest) - weight / penalty, 0.0)
+        remainder = data - low - sparse
+        multiplier = multiplier + penalty * remainder
+        penalty *= 1.5
+        if np.linalg.norm(remainder) <= _TOLERANCE * scale:
+            break
+    return sparse
+
+
+def _shrink_singular_values(matrix: FloatArray, by: float) -> FloatArray:
+    """Singular value thresholding through the small Gram matrix (K, K)."""
+    squares, vectors = np.linalg.eigh(matrix.T @ matrix)
+    values = np.sqrt(np.maximum(squares, 0.0))
+    share = np.where(values > by, 1.0 - by / np.maximum(values, 1e-12), 0.0)
+    result: FloatArray = matrix @ (vectors * share) @ vectors.T
+    return result

@@ -1,0 +1,174 @@
+"""From a mask of moving pixels to things with an identity: what all silhouette methods share.
+
+Images are at half of the resolution. The mask is cleaned by morphology, cut where the depth jumps, and every
+connected part of at least 400 pixels of the full image within 10 m is a thing. A thing is called moving
+from its second frame on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.evaluation.assignment import assign
+from controller.evaluation.types import CALLED_MOVING, Answer, Box, Detection, unknown_vector
+from hal.types import FloatArray, Intrinsics, RgbdFrame
+
+Mask = NDArray[np.uint8]
+HalfDepth = NDArray[np.float32]
+
+SCALE = 2
+MAX_DEPTH_M = 10.0
+_MIN_PIXELS = 400 // SCALE**2
+_MIN_KNOWN = 0.3  # share of a part's pixels that have depth
+_JUMP_M = 0.3
+_JUMP_PER_M2 = 0.03
+_GATE_M = 0.6
+_FORGET_FRAMES = 8
+_CONFIRM_FRAMES = 2
+_OPEN = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+_CLOSE = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
+
+
+def half_grey(frame: RgbdFrame) -> Mask:
+    """The colour image as grey, every pixel the mean of four."""
+    grey = cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY)
+    small = cv2.resize(grey, None, fx=1.0 / SCALE, fy=1.0 / SCALE, interpolation=cv2.INTER_AREA)
+    return np.asarray(small, np.uint8)
+
+
+def half_depth_m(frame: RgbdFrame) -> HalfDepth:
+    """Metres, 0 where there is no data or beyond the range."""
+    depth_m = frame.depth[::SCALE, ::SCALE].astype(np.float32) * np.float32(frame.depth_scale_m)
+    depth_m[depth_m > MAX_DEPTH_M] = 0.0
+    return depth_m
+
+
+def half_intrinsics(k: Intrinsics) -> Intrinsics:
+    """Of the reduced images."""
+    shift = 0.5 * (SCALE - 1)
+    return Intrinsics(
+        k.width // SCALE,
+        k.height // SCALE,
+        k.fx / SCALE,
+        k.fy / SCALE,
+        (k.cx - shift) / SCALE,
+        (k.cy - shift) / SCALE,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Thing:
+    """A connected part of a mask. box in pixels of the full image; level: mean of the mask, 0..1."""
+
+    box: Box
+    position_m: FloatArray
+    extent_m: FloatArray
+    level: float
+
+
+def things(mask: Mask, depth_m: HalfDepth, k: Intrinsics) -> list[Thing]:
+    """mask (H / 2, W / 2): 0, or 1..255 how surely a pixel moves. k: of the reduced image."""
+    clean = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _OPEN)
+    clean = cv2.morphologyEx(clean, cv2.MORPH_CLOSE, _CLOSE)
+    solid = ((clean > 0) & ~depth_jumps(depth_m)).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(solid, connectivity=8)
+    found = []
+    for label in range(1, count):
+        left, top, width, height, area = (int(value) for value in stats[label])
+        if area < _MIN_PIXELS:
+            continue
+        inside = labels[top : top + height, left : left + width] == label
+        z_m = depth_m[top : top + height, left : left + width][inside]
+        known = z_m > 0.0
+        if np.count_nonzero(known) < _MIN_KNOWN * area:
+            continue
+        level = float(clean[top : top + height, left : left + width][inside].mean()) / 255.0
+        found.append(_thing(inside, left, top, z_m, known, k, level))
+    return found
+
+
+def depth_jumps(depth_m: HalfDepth) -> NDArray[np.bool_]:
+    """(H, W) where a pixel and its right or lower neighbour both have depth, and they differ by a step."""
+    allowed = _JUMP_M + _JUMP_PER_M2 * np.square(depth_m)
+    jumps = np.zeros(depth_m.shape, np.bool_)
+    for axis in (0, 1):
+        step = np.abs(np.diff(depth_m, axis=axis))
+        here = depth_m[:-1] if axis == 0 else depth_m[:, :-1]
+        there = depth_m[1:] if axis == 0 else depth_m[:, 1:]
+        limit = allowed[:-1] if axis == 0 else allowed[:, :-1]
+        cut = (step > limit) & (here > 0.0) & (there > 0.0)
+        if axis == 0:
+            jumps[:-1] |= cut
+        else:
+            jumps[:, :-1] |= cut
+    return jumps
+
+
+def _thing(
+    inside: NDArray[np.bool_],
+    left: int,
+    top: int,
+    z_m: NDArray[np.float32],
+    known: NDArray[np.bool_],
+    k: Intrinsics,
+    level: float,
+) -> Thing:
+    v, u = np.nonzero(inside)
+    middle_m = float(np.median(z_m[known]))
+    near = known & (np.abs(z_m - middle_m) <= 0.5)
+    z = z_m[near].astype(np.float64)
+    x = (u[near] + left - k.cx) / k.fx * z
+    y = (v[near] + top - k.cy) / k.fy * z
+    points = np.stack([x, y, z], axis=1)
+    box = tuple(float(SCALE * edge) for edge in (left, top, left + inside.shape[1], top + inside.shape[0]))
+    return Thing((box[0], box[1], box[2], box[3]), points.mean(axis=0), np.ptp(points, axis=0), level)
+
+
+@dataclass(slots=True)
+class _Known:
+    id: int
+    position_m: FloatArray
+    frames: int
+    unseen: int
+
+
+class Identities:
+    """Gives things the identity of the nearest one of the frame before, within a gate."""
+
+    def __init__(self) -> None:
+        self._known: list[_Known] = []
+        self._next_id = 0
+
+    def answer(self, found: Sequence[Thing], mask: Mask | None) -> Answer:
+        """Detections of this frame."""
+        apart = np.array(
+            [
+                [float(np.linalg.norm(one.position_m - known.position_m)) for known in self._known]
+                for one in found
+            ]
+        ).reshape(len(found), len(self._known))
+        owner = dict(assign(np.where(apart <= _GATE_M, apart, np.inf)))
+        for known in self._known:
+            known.unseen += 1
+        detections = []
+        for index, one in enumerate(found):
+            known = self._known[owner[index]] if index in owner else self._begin()
+            known.position_m, known.frames, known.unseen = one.position_m, known.frames + 1, 0
+            room = 1.0 - CALLED_MOVING
+            confirmed = known.frames >= _CONFIRM_FRAMES
+            confidence = CALLED_MOVING + room * one.level if confirmed else 0.99 * CALLED_MOVING * one.level
+            detections.append(
+                Detection(known.id, one.box, one.position_m, unknown_vector(), one.extent_m, confidence)
+            )
+        self._known = [known for known in self._known if known.unseen <= _FORGET_FRAMES]
+        return Answer(tuple(detections), mask)
+
+    def _begin(self) -> _Known:
+        self._known.append(_Known(self._next_id, np.zeros(3), 0, 0))
+        self._next_id += 1
+        return self._known[-1]

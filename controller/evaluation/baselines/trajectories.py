@@ -1,0 +1,125 @@
+"""Trajectory classification (Table 1, second row): long tracks, and which of them a rigid scene explains.
+
+Corners are followed over up to half a second. The camera's motion between the oldest and the newest image
+is the rigid motion that most trajectories agree with (RANSAC over points with depth); trajectories that
+stay outside of it, frame after frame, move. Neighbours in space among them are one thing.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.evaluation.baselines import ego
+from controller.evaluation.baselines.ego import Points
+from controller.evaluation.baselines.masks import (
+    SCALE,
+    Identities,
+    Mask,
+    Thing,
+    half_depth_m,
+    half_grey,
+    half_intrinsics,
+)
+from controller.evaluation.types import Answer
+from hal.types import FloatArray, Intrinsics, Pose, RgbdFrame
+
+_CORNERS = 400
+_WINDOW = 15
+_MIN_AGE = 6
+_TOLERANCE_PX = 1.0
+_MOVING_PX = 2.0
+_LINK_M = 0.45
+_MIN_TRAJECTORIES = 5
+_MEMORY = 0.6  # of the votes of the frames before
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Past:
+    """Where the trajectories ids (N,) were: pixels (N, 2), depth_m (N,)."""
+
+    ids: NDArray[np.int64]
+    pixels: Points
+    depth_m: FloatArray
+
+
+class Trajectories:
+    """Keeps the corners and where they were in the last images."""
+
+    def __init__(self) -> None:
+        ego.seed_ransac()
+        self._before: Mask | None = None
+        self._ids = np.empty(0, np.int64)
+        self._pixels: Points = np.empty((0, 2), np.float32)
+        self._votes = np.empty(0)
+        self._next_id = 0
+        self._past: deque[_Past] = deque(maxlen=_WINDOW)
+        self._identities = Identities()
+
+    def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
+        """Odometry is not used."""
+        grey, depth_m, k = half_grey(frame), half_depth_m(frame), half_intrinsics(frame.intrinsics)
+        if self._before is not None:
+            there, found = ego.follow(self._before, grey, self._pixels)
+            self._ids, self._pixels, self._votes = self._ids[found], there[found], self._votes[found]
+        self._before = grey
+        z_m = ego.depth_at(self._pixels, depth_m)
+        self._vote(k)
+        moving = (self._votes > 0.5) & (z_m > 0.0)
+        found_things = _group(self._pixels[moving], z_m[moving], k)
+        self._renew(grey)
+        self._past.append(_Past(self._ids, self._pixels, ego.depth_at(self._pixels, depth_m)))
+        return self._identities.answer(found_things, None)
+
+    def _vote(self, k: Intrinsics) -> None:
+        """Against the oldest image that enough trajectories come from."""
+        self._votes = self._votes * _MEMORY
+        for past in self._past:
+            _, old, new = np.intersect1d(past.ids, self._ids, assume_unique=True, return_indices=True)
+            known = past.depth_m[old] > 0.0
+            old, new = old[known], new[known]
+            age = len(self._past) - next(i for i, one in enumerate(self._past) if one is past)
+            if age < _MIN_AGE:
+                return
+            if len(old) < 30:
+                continue
+            points_m = ego.back_project(past.pixels[old], past.depth_m[old], k)
+            motion = ego.rigid_motion(points_m, self._pixels[new], k, _TOLERANCE_PX)
+            if motion is None:
+                return
+            miss_px = np.hypot(*(ego.project(motion.apply(points_m), k) - self._pixels[new]).T)
+            self._votes[new] += np.where(np.nan_to_num(miss_px) > _MOVING_PX, 1.0 - _MEMORY, 0.0)
+            return
+
+    def _renew(self, grey: Mask) -> None:
+        wanted = _CORNERS - len(self._ids)
+        if wanted < _CORNERS // 8:
+            return
+        fresh = ego.corners(grey, wanted, self._pixels)
+        self._ids = np.concatenate([self._ids, np.arange(self._next_id, self._next_id + len(fresh))])
+        self._next_id += len(fresh)
+        self._pixels = np.concatenate([self._pixels, fresh])
+        self._votes = np.concatenate([self._votes, np.zeros(len(fresh))])
+
+
+def _group(pixels: Points, z_m: FloatArray, k: Intrinsics) -> list[Thing]:
+    """Single linkage in space: whatever is closer than _LINK_M belongs together."""
+    points_m = ego.back_project(pixels, z_m, k)
+    label = np.arange(len(points_m))
+    close = np.linalg.norm(points_m[:, None] - points_m[None], axis=2) <= _LINK_M
+    for index in range(len(points_m)):
+        joined = np.unique(label[close[index]])
+        label[np.isin(label, joined)] = joined[0]
+    found = []
+    for one in np.unique(label):
+        own = label == one
+        if np.count_nonzero(own) < _MIN_TRAJECTORIES:
+            continue
+        low, high = pixels[own].min(axis=0) * SCALE, pixels[own].max(axis=0) * SCALE
+        box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+        members_m = points_m[own]
+        found.append(Thing(box, members_m.mean(axis=0), np.ptp(members_m, axis=0), 1.0))
+    return found

@@ -1,0 +1,137 @@
+"""The methods that are compared, each as something that answers a simulated frame and is timed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from config.perception import PerceptionConfig
+from config.robot import Body
+from controller.evaluation.baselines.background_model import BackgroundModel
+from controller.evaluation.baselines.box_tracking import BoxTracking
+from controller.evaluation.baselines.dense_flow import DenseFlow
+from controller.evaluation.baselines.low_rank import LowRank
+from controller.evaluation.baselines.trajectories import Trajectories
+from controller.evaluation.drive import MOUNT, Drive
+from controller.evaluation.eligibility import Standing, calls
+from controller.evaluation.lidar_baseline import LidarTracker
+from controller.evaluation.lidar_scan import Lidar, LidarModel
+from controller.evaluation.ours import Treadwatch
+from controller.evaluation.sequences import Sequence
+from controller.evaluation.simulate import SimulatedFrame
+from controller.evaluation.types import Answer, Method
+from hal.types import Intrinsics
+from sim.world import World
+
+Stopwatch = Callable[[], int]
+NS_PER_MS = 1_000_000
+
+OURS = "treadwatch"
+OURS_ALONE = "treadwatch, no odometry"
+LIDAR = "lidar"
+BACKGROUND = "background modelling"
+TRAJECTORIES = "trajectory classification"
+TRACKING = "object tracking"
+LOW_RANK = "low rank and sparse"
+DENSE_FLOW = "dense flow minus rigid flow"
+
+ALWAYS = (OURS, OURS_ALONE, LIDAR)
+BASELINES = (BACKGROUND, TRAJECTORIES, TRACKING, LOW_RANK, DENSE_FLOW)
+
+
+class Contestant(Protocol):
+    """Answers the frames of one sequence in order."""
+
+    def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
+        """And how many milliseconds of thinking it took; NaN where there was nothing to think about."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class CameraContestant:
+    """A method that looks at the camera's frames."""
+
+    method: Method
+    with_odometry: bool
+    stopwatch_ns: Stopwatch
+
+    def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
+        begun_ns = self.stopwatch_ns()
+        answer = self.method.observe(seen.frame, seen.odometry if self.with_odometry else None)
+        return answer, (self.stopwatch_ns() - begun_ns) / NS_PER_MS
+
+
+class TrackingContestant:
+    """Is told the first true box of every object when it becomes eligible, and nothing more."""
+
+    def __init__(self, stopwatch_ns: Stopwatch) -> None:
+        self._tracking = BoxTracking()
+        self._stopwatch_ns = stopwatch_ns
+        self._told: set[int] = set()
+
+    def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
+        for identity, call in calls([seen.truth])[0].items():
+            if call.standing is Standing.ELIGIBLE and identity not in self._told:
+                self._told.add(identity)
+                self._tracking.give(identity, next(o.box for o in seen.truth.objects if o.id == identity))
+        begun_ns = self._stopwatch_ns()
+        answer = self._tracking.observe(seen.frame, None)
+        duration_ms = (self._stopwatch_ns() - begun_ns) / NS_PER_MS
+        return answer, duration_ms if answer.detections else math.nan
+
+
+class LidarContestant:
+    """Scans the same world at its own rate; only clustering and tracking are timed."""
+
+    def __init__(
+        self, sequence: Sequence, drive: Drive, intrinsics: Intrinsics, stopwatch_ns: Stopwatch
+    ) -> None:
+        self._model = LidarModel()
+        self._lidar = Lidar(self._model, sequence.scenario().room, sequence.seed)
+        self._tracker = LidarTracker(self._model, MOUNT, intrinsics)
+        self._drive = drive
+        self._stopwatch_ns = stopwatch_ns
+        self._next_scan = 0
+
+    def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
+        now_s = seen.truth.stamp_s
+        odometry = self._drive.odometry(now_s)
+        scan = None
+        if now_s >= self._next_scan / self._model.rate_hz - 1e-6:
+            self._next_scan += 1
+            scan = self._lidar.scan(now_s, self._drive.pose(now_s), seen.bodies)
+        begun_ns = self._stopwatch_ns()
+        if scan is not None:
+            self._tracker.update(scan, odometry)
+        answer = self._tracker.answer(now_s, odometry)
+        duration_ms = (self._stopwatch_ns() - begun_ns) / NS_PER_MS
+        return answer, duration_ms if scan is not None else math.nan
+
+
+def line_up(
+    names: tuple[str, ...], sequence: Sequence, intrinsics: Intrinsics, stopwatch_ns: Stopwatch
+) -> dict[str, Contestant]:
+    """The named methods, fresh for one sequence."""
+    makers: dict[str, Callable[[], Contestant]] = {
+        OURS: lambda: CameraContestant(ours(), True, stopwatch_ns),
+        OURS_ALONE: lambda: CameraContestant(ours(), False, stopwatch_ns),
+        LIDAR: lambda: LidarContestant(sequence, sequence.drive(), intrinsics, stopwatch_ns),
+        BACKGROUND: lambda: CameraContestant(BackgroundModel(), False, stopwatch_ns),
+        TRAJECTORIES: lambda: CameraContestant(Trajectories(), False, stopwatch_ns),
+        TRACKING: lambda: TrackingContestant(stopwatch_ns),
+        LOW_RANK: lambda: CameraContestant(LowRank(), False, stopwatch_ns),
+        DENSE_FLOW: lambda: CameraContestant(DenseFlow(), False, stopwatch_ns),
+    }
+    return {name: makers[name]() for name in names}
+
+
+def ours() -> Treadwatch:
+    """Our detector as it ships, on the simulated robot."""
+    return Treadwatch(PerceptionConfig(), MOUNT, Body())
+
+
+def build_world(sequence: Sequence) -> World:
+    """The sequence's world with its seed."""
+    return World(sequence.scenario(), sequence.seed)

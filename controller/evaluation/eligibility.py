@@ -1,0 +1,63 @@
+"""Which true objects a detector is answerable for, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from controller.evaluation.types import FrameTruth, TrueObject
+
+MIN_VISIBLE_PX = 400
+MAX_DISTANCE_M = 10.0
+MIN_VISIBLE_RATIO = 0.3
+MOVING_MPS = 0.1  # slower than this nobody has to see it move
+STANDING_MPS = 0.02  # and from here down nobody may say that it does
+STANDING_S = 0.5  # once it has stood for this long
+SETTLING_S = 0.5  # the first time of an object, in which it need not be found yet
+
+
+class Standing(Enum):
+    """ELIGIBLE: must be found. EXCUSED: may be. STILL: calling it moving is wrong."""
+
+    ELIGIBLE = "eligible"
+    EXCUSED = "excused"
+    STILL = "still"
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """One object in one frame. settled: its first SETTLING_S as an eligible object are over."""
+
+    standing: Standing
+    settled: bool
+
+
+def calls(frames: Sequence[FrameTruth]) -> list[dict[int, Call]]:
+    """For each frame, the call of each object by its id."""
+    first_eligible_s: dict[int, float] = {}
+    last_moved_s: dict[int, float] = {}
+    result = []
+    for frame in frames:
+        called = {}
+        for true in frame.objects:
+            if true.speed_mps >= STANDING_MPS or true.turning:
+                last_moved_s[true.id] = frame.stamp_s
+            standing = _standing(true, frame.stamp_s, last_moved_s.get(true.id))
+            if standing is Standing.ELIGIBLE:
+                first_eligible_s.setdefault(true.id, frame.stamp_s)
+            since_s = first_eligible_s.get(true.id)
+            # Stamps are multiples of a frame's time: half a millisecond is rounding, not waiting.
+            settled = since_s is not None and frame.stamp_s - since_s >= SETTLING_S - 5e-4
+            called[true.id] = Call(standing, settled)
+        result.append(called)
+    return result
+
+
+def _standing(true: TrueObject, now_s: float, last_moved_s: float | None) -> Standing:
+    if last_moved_s is None or now_s - last_moved_s > STANDING_S:
+        return Standing.STILL
+    seen = true.visible_px >= MIN_VISIBLE_PX and true.visible_ratio >= MIN_VISIBLE_RATIO
+    if seen and true.speed_mps >= MOVING_MPS and true.distance_m <= MAX_DISTANCE_M:
+        return Standing.ELIGIBLE
+    return Standing.EXCUSED

@@ -1,0 +1,148 @@
+"""The lidar baseline: clusters tracked by Kalman filters in the odometry frame, moving by chi-square.
+
+Background-free as reference [20] of the paper is understood: no map and no model of the background, only
+consecutive scans. It is given the same odometry as the camera, with its slip.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.evaluation.assignment import assign
+from controller.evaluation.lidar_clusters import find_clusters
+from controller.evaluation.lidar_scan import LidarModel, Scan
+from controller.evaluation.types import CALLED_MOVING, NO_BOX, Answer, Detection
+from hal.geometry import camera_in_floor
+from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose
+
+_GATE_M = 0.6
+_POSITION_SIGMA_M = 0.06  # of a cluster's middle: noise, and the shape's change with the view
+_CUT_SIGMA_M = 0.35  # of one that is partly hidden
+_ACCEL_MPS2 = 1.0
+_MIN_SPEED_MPS = 0.25
+_CHI2 = 25.0  # five standard deviations of the velocity
+_MIN_SCANS = 4
+_MIN_WAY_M = 0.12  # and it must have gone somewhere
+_FORGET_S = 0.5
+
+
+@dataclass(slots=True, eq=False)
+class _Track:
+    """state: x, y, vx, vy in the odometry frame. streak: scans in a row that speak for moving."""
+
+    id: int
+    state: FloatArray
+    covariance: FloatArray
+    born_m: FloatArray
+    seen_s: float
+    scans: int = 1
+    streak: int = 0
+    moving: bool = False
+
+    def predict(self, dt_s: float) -> None:
+        """Constant velocity with random acceleration."""
+        f = np.eye(4)
+        f[0, 2] = f[1, 3] = dt_s
+        g = np.array([[0.5 * dt_s**2, 0.0], [0.0, 0.5 * dt_s**2], [dt_s, 0.0], [0.0, dt_s]])
+        self.state = f @ self.state
+        self.covariance = f @ self.covariance @ f.T + g @ g.T * _ACCEL_MPS2**2
+
+    def correct(self, seen_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
+        """A cluster's middle (2,)."""
+        innovation_cov = self.covariance[:2, :2] + np.eye(2) * sigma_m**2
+        gain = self.covariance[:, :2] @ np.linalg.inv(innovation_cov)
+        self.state = self.state + gain @ (seen_m - self.state[:2])
+        self.covariance = self.covariance - gain @ self.covariance[:2]
+        self.seen_s = stamp_s
+        self.scans += 1
+        self._judge()
+
+    @property
+    def chi2(self) -> float:
+        """Of the velocity against rest."""
+        velocity = self.state[2:]
+        return float(velocity @ np.linalg.solve(self.covariance[2:, 2:], velocity))
+
+    def _judge(self) -> None:
+        speed_mps = float(np.hypot(*self.state[2:]))
+        way_m = float(np.hypot(*(self.state[:2] - self.born_m)))
+        speaks = speed_mps >= _MIN_SPEED_MPS and self.chi2 >= _CHI2 and way_m >= _MIN_WAY_M
+        self.streak = self.streak + 1 if speaks else 0
+        if self.streak >= 2 and self.scans >= _MIN_SCANS:
+            self.moving = True
+        elif speed_mps < 0.5 * _MIN_SPEED_MPS:
+            self.moving = False
+
+
+class LidarTracker:
+    """Scans and odometry in, tracks out; predicts to the time of each camera frame."""
+
+    def __init__(self, model: LidarModel, mount: CameraMount, intrinsics: Intrinsics) -> None:
+        self._model = model
+        self._mount = mount
+        self._half_field_tan = max(intrinsics.cx, intrinsics.width - 1 - intrinsics.cx) / intrinsics.fx
+        self._tracks: list[_Track] = []
+        self._next_id = 0
+        self._now_s: float | None = None
+
+    def update(self, scan: Scan, odometry: PlanarPose) -> None:
+        """One scan, taken with the robot at odometry."""
+        clusters = find_clusters(scan)
+        self._predict_to(scan.stamp_s)
+        c, s = math.cos(odometry.heading_rad), math.sin(odometry.heading_rad)
+        turn = np.array([[c, -s], [s, c]])
+        offset = np.array([self._model.forward_m, 0.0])
+        seen_m = (clusters.middle_m + offset) @ turn.T + np.array([odometry.x_m, odometry.y_m])
+        sigma_m = np.where(clusters.whole, _POSITION_SIGMA_M, _CUT_SIGMA_M)
+        expected = np.array([track.state[:2] for track in self._tracks]).reshape(-1, 2)
+        apart_m = np.linalg.norm(seen_m[:, None] - expected[None], axis=2)
+        pairs = assign(np.where(apart_m <= _GATE_M, apart_m, np.inf))
+        for row, column in pairs:
+            self._tracks[column].correct(seen_m[row], float(sigma_m[row]), scan.stamp_s)
+        taken = {row for row, _ in pairs}
+        for row in range(len(seen_m)):
+            if row not in taken:
+                self._begin(seen_m[row], float(sigma_m[row]), scan.stamp_s)
+        self._tracks = [track for track in self._tracks if scan.stamp_s - track.seen_s <= _FORGET_S]
+
+    def answer(self, t_s: float, odometry: PlanarPose) -> Answer:
+        """The tracks in the camera's field of view at t_s, on the optical axes; height is not measured."""
+        self._predict_to(t_s)
+        camera = camera_in_floor(odometry, self._mount)
+        detections = []
+        for track in self._tracks:
+            on_floor = np.array([[track.state[0], track.state[1], self._mount.height_m]])
+            position = camera.inverse().apply(on_floor)[0]
+            if position[2] <= 0.0 or abs(position[0]) > self._half_field_tan * position[2]:
+                continue
+            velocity = np.array([track.state[2], track.state[3], 0.0]) @ camera.rotation
+            position[1] = math.nan
+            detections.append(
+                Detection(
+                    track.id, NO_BOX, position, velocity, np.full(3, math.nan), _confidence(track)
+                )
+            )  # fmt: skip
+        return Answer(tuple(detections))
+
+    def _begin(self, where_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
+        covariance = np.diag([sigma_m**2, sigma_m**2, 1.0, 1.0])
+        state = np.array([*where_m, 0.0, 0.0])
+        self._tracks.append(_Track(self._next_id, state, covariance, where_m.copy(), stamp_s))
+        self._next_id += 1
+
+    def _predict_to(self, t_s: float) -> None:
+        if self._now_s is not None and t_s > self._now_s:
+            for track in self._tracks:
+                track.predict(t_s - self._now_s)
+        self._now_s = t_s if self._now_s is None else max(t_s, self._now_s)
+
+
+def _confidence(track: _Track) -> float:
+    """By the chi-square of the velocity; from CALLED_MOVING on exactly where the track is moving."""
+    evidence = 1.0 - math.exp(-0.5 * track.chi2 / _CHI2)
+    return (
+        CALLED_MOVING + (1.0 - CALLED_MOVING) * evidence if track.moving else CALLED_MOVING * 0.999 * evidence
+    )

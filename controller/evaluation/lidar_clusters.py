@@ -1,0 +1,55 @@
+"""A scan cut into clusters where the range jumps: the candidates of background-free tracking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.evaluation.lidar_scan import Scan
+from hal.types import FloatArray
+
+_JUMP_M = 0.25  # between neighbouring beams, besides what a slanted surface does
+_JUMP_PER_M = 0.02
+_MIN_BEAMS = 4
+_MAX_SIZE_M = 1.8  # wider things are walls and racks; people and robots are not
+_MIN_SIZE_M = 0.12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clusters:
+    """middle_m (N, 2) and size_m (N,) on the sensor's axes (forward, left).
+
+    whole (N,) bool: nothing nearer cuts it off at either end, so its middle stays where it is when
+    the sensor moves.
+    """
+
+    middle_m: FloatArray
+    size_m: FloatArray
+    whole: FloatArray
+
+
+def find_clusters(scan: Scan) -> Clusters:
+    """All clusters that could be a person or a robot."""
+    back = np.isfinite(scan.range_m)
+    index = np.flatnonzero(back)
+    if len(index) == 0:
+        return Clusters(np.empty((0, 2)), np.empty(0), np.empty(0, np.bool_))
+    range_m, bearing = scan.range_m[index], scan.bearings_rad[index]
+    points = np.stack([range_m * np.cos(bearing), range_m * np.sin(bearing)], axis=1)
+    step_m = np.hypot(*np.diff(points, axis=0).T)
+    nearer_m = np.minimum(range_m[1:], range_m[:-1])
+    cut = (step_m > _JUMP_M + _JUMP_PER_M * nearer_m) | (np.diff(index) > 2)
+    first = np.concatenate([[0], np.flatnonzero(cut) + 1])
+    last = np.concatenate([first[1:], [len(index)]]) - 1
+    size_m = np.hypot(*(points[last] - points[first]).T)
+    fits = (last - first + 1 >= _MIN_BEAMS) & (size_m <= _MAX_SIZE_M) & (size_m >= _MIN_SIZE_M)
+    # A neighbour beam that ended nearer hides a part; so does the border of the field of view.
+    padded = np.concatenate([[0.0], scan.range_m, [0.0]])
+    hidden = (padded[index[first]] < range_m[first]) | (padded[index[last] + 2] < range_m[last])
+    chosen = np.flatnonzero(fits)
+    middles = np.array(
+        [0.5 * (points[first[k] : last[k] + 1].min(axis=0) + points[first[k] : last[k] + 1].max(axis=0))
+         for k in chosen]
+    ).reshape(-1, 2)  # fmt: skip
+    return Clusters(middles, size_m[chosen], ~hidden[chosen])

@@ -1,0 +1,49 @@
+"""When a detection and a true object are the same: their boxes overlap, or their middles are close."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller.evaluation.assignment import Pairs, assign
+from controller.evaluation.types import Box, Detection, TrueObject
+from hal.types import FloatArray
+
+MIN_IOU = 0.3
+MAX_DISTANCE_M = 0.5
+
+
+def iou(a: Box, b: Box) -> float:
+    """Intersection over union of two boxes; 0 where one of them is not known (NaN) or empty."""
+    if not np.isfinite([*a, *b]).all():
+        return 0.0
+    width = min(a[2], b[2]) - max(a[0], b[0])
+    height = min(a[3], b[3]) - max(a[1], b[1])
+    if width <= 0.0 or height <= 0.0:
+        return 0.0
+    shared = width * height
+    return shared / ((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - shared)
+
+
+def distance_m(detection: Detection, true: TrueObject) -> float:
+    """Between the middles, over the components that the method measures; inf where it measures none."""
+    difference = detection.position_m - true.position_m
+    known = np.isfinite(difference)
+    return float(np.linalg.norm(difference[known])) if known.any() else np.inf
+
+
+def costs(detections: Sequence[Detection], objects: Sequence[TrueObject]) -> FloatArray:
+    """(N, M): 0 for a perfect match up to 2 for the poorest one; inf where the two are not the same."""
+    cost = np.full((len(detections), len(objects)), np.inf)
+    for row, detection in enumerate(detections):
+        for column, true in enumerate(objects):
+            overlap, apart_m = iou(detection.box, true.box), distance_m(detection, true)
+            if overlap >= MIN_IOU or apart_m <= MAX_DISTANCE_M:
+                cost[row, column] = (1.0 - overlap) + min(apart_m / MAX_DISTANCE_M, 1.0)
+    return cost
+
+
+def match(detections: Sequence[Detection], objects: Sequence[TrueObject]) -> Pairs:
+    """Pairs (detection, object) by index, one to one."""
+    return assign(costs(detections, objects))

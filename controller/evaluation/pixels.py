@@ -1,0 +1,63 @@
+"""Pixel level: which pixels a method claims as moving, held against the mask of the bodies that move.
+
+A method without a silhouette of its own claims, for each obstacle, the pixels inside its box whose measured
+depth lies within the obstacle's visible surface. What counts is every pixel with a true depth up to
+10 m; moving are those of bodies that move, and those of bodies that just stopped or are too small
+count neither way, as for objects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.evaluation.eligibility import MAX_DISTANCE_M
+from controller.evaluation.totals import PixelCounts
+from controller.evaluation.types import Detection
+from hal.types import RgbdFrame
+
+STEP_PX = 2  # every second pixel of every second row is judged
+_DEPTH_MARGIN_M = 0.15  # of measured depth around the surface, and
+_DEPTH_MARGIN_PER_M2 = 0.015  # two standard deviations of a real RealSense's
+
+
+def claimed(frame: RgbdFrame, detections: Sequence[Detection]) -> NDArray[np.uint8]:
+    """(H / 2, W / 2) levels 0..255 by which the detections claim the pixels of a frame."""
+    depth_m = frame.depth[::STEP_PX, ::STEP_PX].astype(np.float32) * np.float32(frame.depth_scale_m)
+    levels = np.zeros(depth_m.shape, np.uint8)
+    height, width = depth_m.shape
+    for one in sorted(detections, key=lambda detection: detection.confidence):
+        if not np.isfinite(one.box).all() or not np.isfinite(one.position_m[2]):
+            continue
+        u0, v0, u1, v1 = one.box
+        left, right = _span(u0, u1, width)
+        top, bottom = _span(v0, v1, height)
+        z_m = float(one.position_m[2])
+        half_m = 0.5 * float(np.nan_to_num(one.extent_m[2])) + _DEPTH_MARGIN_M + _DEPTH_MARGIN_PER_M2 * z_m**2
+        inside = np.abs(depth_m[top:bottom, left:right] - z_m) <= half_m
+        levels[top:bottom, left:right][inside] = round(255 * min(max(one.confidence, 0.0), 1.0))
+    return levels
+
+
+def _span(first_px: float, last_px: float, limit: int) -> tuple[int, int]:
+    first = int(np.clip(np.ceil(first_px / STEP_PX), 0, limit))
+    return first, int(np.clip(np.floor(last_px / STEP_PX) + 1, first, limit))
+
+
+def count_pixels(
+    levels: NDArray[np.uint8],
+    instances: NDArray[np.uint16],
+    depth_m: NDArray[np.float32],
+    moving: Collection[int],
+    excused: Collection[int],
+) -> PixelCounts:
+    """levels, instances (body ids), true depth_m: (H / 2, W / 2)."""
+    judged = (depth_m > 0.0) & (depth_m <= MAX_DISTANCE_M)
+    moves = judged & np.isin(instances, list(moving))
+    rests = judged & ~moves & ~np.isin(instances, list(excused))
+    return PixelCounts(
+        np.bincount(levels[moves], minlength=256).astype(np.int64),
+        np.bincount(levels[rests], minlength=256).astype(np.int64),
+    )

@@ -1,0 +1,189 @@
+"""One sequence before all methods: each frame is drawn once, shown to everybody, and forgotten."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.evaluation.contestants import (
+    OURS,
+    CameraContestant,
+    Contestant,
+    Stopwatch,
+    build_world,
+    line_up,
+)
+from controller.evaluation.eligibility import MOVING_MPS, STANDING_MPS
+from controller.evaluation.endpoint_error import EndpointErrors, endpoint_errors
+from controller.evaluation.ours import Treadwatch
+from controller.evaluation.pixels import STEP_PX, claimed, count_pixels
+from controller.evaluation.scoring import FrameScore, score
+from controller.evaluation.sequences import Sequence
+from controller.evaluation.simulate import SimulatedFrame, simulate
+from controller.evaluation.totals import PixelCounts
+from controller.evaluation.truth import TruthTeller
+from controller.evaluation.types import Answer, Detection, FrameDetections, FrameTruth
+from hal.types import ColourImage, RgbdFrame
+from sim.camera import intrinsics_of
+from vision.scene import Fragments
+
+FAILURES_PER_SEQUENCE = 2
+_JPEG = (cv2.IMWRITE_JPEG_QUALITY, 92)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MethodRecord:
+    """What one method answered, frame by frame."""
+
+    answers: tuple[FrameDetections, ...]
+    pixels: PixelCounts
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """A frame worth a picture: our detector's view of it, and what is true."""
+
+    sequence: str
+    index: int
+    colour: ColourImage
+    depth_m: NDArray[np.float32]
+    truth: FrameTruth
+    detections: tuple[Detection, ...]
+    fragments: Fragments | None
+    score: FrameScore
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SequenceRecord:
+    """Everything that one sequence came to. failures: our worst frames; shown: the frames asked for."""
+
+    name: str
+    split: str
+    static: bool
+    truths: tuple[FrameTruth, ...]
+    methods: dict[str, MethodRecord]
+    endpoint: EndpointErrors
+    failures: tuple[Snapshot, ...]
+    shown: tuple[Snapshot, ...]
+
+
+def run_sequence(
+    sequence: Sequence,
+    methods: tuple[str, ...],
+    show_frames: tuple[int, ...],
+    stopwatch_ns: Stopwatch,
+    on_frame: Callable[[], None] = lambda: None,
+) -> SequenceRecord:
+    """show_frames: indices of frames to keep for pictures. on_frame is called after each frame."""
+    world = build_world(sequence)
+    intrinsics = intrinsics_of(sequence.camera())
+    teller = TruthTeller(world, intrinsics)
+    contestants = line_up(methods, sequence, intrinsics, stopwatch_ns)
+    recorder = _Recorder(sequence, methods, show_frames)
+    for index, seen in enumerate(simulate(sequence, teller, world)):
+        recorder.add(index, seen, contestants)
+        on_frame()
+    return recorder.result()
+
+
+class _Recorder:
+    """Collects while the frames go by."""
+
+    def __init__(self, sequence: Sequence, methods: tuple[str, ...], show_frames: tuple[int, ...]) -> None:
+        self._sequence = sequence
+        self._show_frames = show_frames
+        self._truths: list[FrameTruth] = []
+        self._answers: dict[str, list[FrameDetections]] = {name: [] for name in methods}
+        self._pixels = {name: PixelCounts.none() for name in methods}
+        self._endpoint = EndpointErrors.none()
+        self._before: tuple[SimulatedFrame, Fragments] | None = None
+        self._jpegs: list[NDArray[np.uint8]] = []
+        self._shown: dict[int, tuple[RgbdFrame, Fragments | None]] = {}
+
+    def add(self, index: int, seen: SimulatedFrame, contestants: dict[str, Contestant]) -> None:
+        """One frame before all contestants."""
+        self._truths.append(seen.truth)
+        for name, contestant in contestants.items():
+            answer, duration_ms = contestant.answer(seen)
+            self._answers[name].append(FrameDetections(seen.truth.stamp_s, answer.detections, duration_ms))
+            self._pixels[name] += self._count_pixels(seen, answer)
+        fragments = _fragments(contestants)
+        self._measure_endpoints(seen, fragments)
+        if OURS in contestants:
+            self._jpegs.append(np.asarray(cv2.imencode(".jpg", seen.frame.colour, _JPEG)[1], np.uint8))
+        if index in self._show_frames:
+            self._shown[index] = (seen.frame, fragments)
+
+    def result(self) -> SequenceRecord:
+        """When the last frame has been added."""
+        records = {
+            name: MethodRecord(tuple(answers), self._pixels[name]) for name, answers in self._answers.items()
+        }
+        scores = score(self._truths, records[OURS].answers).frames if OURS in records else ()
+        worst = sorted(range(len(scores)), key=lambda index: (-scores[index].faults, index))
+        bad = _spread([index for index in worst if scores[index].faults > 0])
+        return SequenceRecord(
+            self._sequence.name,
+            self._sequence.split,
+            self._sequence.static,
+            tuple(self._truths),
+            records,
+            self._endpoint,
+            tuple(self._snapshot(index, records, scores[index]) for index in bad),
+            tuple(self._snapshot(index, records, scores[index]) for index in self._shown if scores),
+        )
+
+    def _count_pixels(self, seen: SimulatedFrame, answer: Answer) -> PixelCounts:
+        levels = claimed(seen.frame, answer.detections) if answer.mask is None else answer.mask
+        half = np.s_[::STEP_PX, ::STEP_PX]
+        objects = seen.truth.objects
+        return count_pixels(
+            levels,
+            seen.images.instances[half],
+            seen.images.depth_m[half],
+            moving=[one.id for one in objects if one.speed_mps >= MOVING_MPS],
+            excused=[one.id for one in objects if one.turning or STANDING_MPS <= one.speed_mps < MOVING_MPS],
+        )
+
+    def _measure_endpoints(self, seen: SimulatedFrame, fragments: Fragments | None) -> None:
+        if not self._sequence.static or fragments is None:
+            return
+        if self._before is not None:
+            before, known = self._before
+            motion = seen.camera.inverse() @ before.camera
+            self._endpoint = self._endpoint + endpoint_errors(
+                known, fragments, before.images.depth_m, motion, seen.frame.intrinsics
+            )
+        self._before = (seen, fragments)
+
+    def _snapshot(self, index: int, records: dict[str, MethodRecord], scored: FrameScore) -> Snapshot:
+        if index in self._shown:
+            frame, fragments = self._shown[index]
+            colour, depth_m = frame.colour, frame.depth.astype(np.float32) * np.float32(frame.depth_scale_m)
+        else:
+            colour, fragments = np.asarray(cv2.imdecode(self._jpegs[index], cv2.IMREAD_COLOR), np.uint8), None
+            depth_m = np.empty((0, 0), np.float32)
+        detections = records[OURS].answers[index].detections
+        return Snapshot(
+            self._sequence.name, index, colour, depth_m, self._truths[index], detections, fragments, scored
+        )
+
+
+def _fragments(contestants: dict[str, Contestant]) -> Fragments | None:
+    contestant = contestants.get(OURS)
+    if isinstance(contestant, CameraContestant) and isinstance(contestant.method, Treadwatch):
+        return contestant.method.fragments
+    return None
+
+
+def _spread(indices: list[int]) -> list[int]:
+    """The first few that are at least ten frames apart: neighbours show the same fault again."""
+    chosen: list[int] = []
+    for index in indices:
+        if len(chosen) < FAILURES_PER_SEQUENCE and all(abs(index - other) >= 10 for other in chosen):
+            chosen.append(index)
+    return sorted(chosen)

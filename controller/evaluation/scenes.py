@@ -1,0 +1,285 @@
+"""The simulated set's scenes: movers placed in the robot's view, clutter around their ways."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from config.path import LineSpec, PathSpec
+from config.scenario import (
+    Beam,
+    BodySpec,
+    Column,
+    Crate,
+    Go,
+    Light,
+    Motion,
+    Pallet,
+    Person,
+    Pole,
+    RobotBody,
+    Room,
+    Scenario,
+    Shelf,
+    TapeLine,
+    Texture,
+    Wall,
+)
+from controller.evaluation.drive import Drive
+from hal.types import FloatArray, PlanarPose
+
+Kind = Literal["person", "robot", "cart"]
+
+_AT_ONCE_MPS2 = 20.0  # a mover of this acceleration is under way from the first moment
+_ROBOT_ROOM_M = 1.1  # from the robot's way to any clutter
+_MOVER_ROOM_M = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Mover:
+    """Goes straight through a point that lies ahead_m and left_m of the robot's camera at at_s.
+
+    course_deg: relative to the robot's heading then; 180 comes towards it, 90 crosses to the left.
+    starts_s: stands until then. stops_s: stands from then on. Both with an ordinary acceleration.
+    """
+
+    kind: Kind
+    ahead_m: float
+    left_m: float
+    course_deg: float
+    speed_mps: float
+    at_s: float = 2.0
+    starts_s: float | None = None
+    stops_s: float | None = None
+    texture: Texture = "fine"
+    height_m: float = 1.75
+    load_m: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """Where a mover goes, on the floor."""
+
+    start: FloatArray
+    end: FloatArray
+    heading_deg: float
+
+
+def side_by_side(leader: Mover, count: int, spacing_m: float = 0.75) -> tuple[Mover, ...]:
+    """A group that walks abreast, across its course; heights and clothes differ."""
+    course = math.radians(leader.course_deg)
+    textures: tuple[Texture, ...] = ("fine", "coarse", "fine")
+    return tuple(
+        replace(
+            leader,
+            ahead_m=leader.ahead_m + index * spacing_m * abs(math.sin(course)),
+            left_m=leader.left_m + index * spacing_m * abs(math.cos(course)),
+            height_m=leader.height_m - 0.08 * index,
+            texture=textures[index % len(textures)],
+        )
+        for index in range(count)
+    )
+
+
+def build(
+    name: str,
+    place: Literal["hall", "aisle", "workshop"],
+    drive: Drive,
+    movers: Sequence[Mover],
+    duration_s: float,
+    seed: int,
+) -> Scenario:
+    """A scene with the movers under way, and clutter where neither they nor the robot go."""
+    generator = np.random.default_rng((seed, 7))
+    ways = [_way(mover, drive, duration_s) for mover in movers]
+    bodies: list[BodySpec] = [
+        _mover_body(index, mover, way) for index, (mover, way) in enumerate(zip(movers, ways, strict=True))
+    ]
+    course = np.array([_point(drive.pose(t_s), 0.0, 0.0) for t_s in np.linspace(0.0, duration_s, 17)])
+    room, fixed, clutter = _PLACES[place](generator, course)
+    bodies.extend(fixed)
+    for body in clutter:
+        middle = np.array([body.x_m, body.y_m])
+        reach = _reach_m(body)
+        free = all(_distance_m(middle, way) > _MOVER_ROOM_M + reach for way in ways)
+        if free and np.hypot(*(course - middle).T).min() > _ROBOT_ROOM_M + reach:
+            bodies.append(body)
+    return Scenario(
+        name=name,
+        path=PathSpec(segments=(LineSpec(kind="line", length_m=10.0),)),
+        room=room,
+        light=Light(
+            ambient=float(generator.uniform(0.45, 0.65)), azimuth_deg=float(generator.uniform(0.0, 360.0))
+        ),
+        bodies=tuple(bodies),
+    )
+
+
+def _point(pose: PlanarPose, ahead_m: float, left_m: float) -> FloatArray:
+    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    return np.array([pose.x_m + ahead_m * c - left_m * s, pose.y_m + ahead_m * s + left_m * c])
+
+
+def _way(mover: Mover, drive: Drive, duration_s: float) -> _Way:
+    pose = drive.pose(mover.at_s)
+    through = _point(pose, mover.ahead_m, mover.left_m)
+    heading = pose.heading_rad + math.radians(mover.course_deg)
+    along = np.array([math.cos(heading), math.sin(heading)])
+    starts_s = 0.0 if mover.starts_s is None else mover.starts_s
+    ends_s = duration_s + 1.0 if mover.stops_s is None else mover.stops_s
+    start = through - along * mover.speed_mps * (mover.at_s - starts_s)
+    return _Way(start, start + along * mover.speed_mps * (ends_s - starts_s), math.degrees(heading))
+
+
+def _mover_body(index: int, mover: Mover, way: _Way) -> BodySpec:
+    gently = mover.starts_s is not None or mover.stops_s is not None
+    motion = Motion(
+        start_s=0.0 if mover.starts_s is None else mover.starts_s,
+        accel_mps2=1.5 if gently else _AT_ONCE_MPS2,
+        steps=(Go(kind="go", x_m=float(way.end[0]), y_m=float(way.end[1]), speed_mps=mover.speed_mps),),
+    )
+    heading_deg = math.remainder(way.heading_deg, 360.0)
+    name, x_m, y_m = f"{mover.kind} {index + 1}", float(way.start[0]), float(way.start[1])
+    if mover.kind == "person":
+        return Person(
+            kind="person", name=name, x_m=x_m, y_m=y_m, heading_deg=heading_deg,
+            texture=mover.texture, motion=motion, height_m=mover.height_m,
+        )  # fmt: skip
+    if mover.kind == "robot":
+        return RobotBody(
+            kind="robot", name=name, x_m=x_m, y_m=y_m, heading_deg=heading_deg,
+            texture=mover.texture, motion=motion, load_height_m=mover.load_m,
+        )  # fmt: skip
+    return Crate(
+        kind="crate", name=name, x_m=x_m, y_m=y_m, heading_deg=heading_deg, texture=mover.texture,
+        motion=motion, length_m=0.8, width_m=0.6, height_m=0.95,
+    )  # fmt: skip
+
+
+def _distance_m(point: FloatArray, way: _Way) -> float:
+    """From a point to a way."""
+    along = way.end - way.start
+    share = float(np.clip((point - way.start) @ along / max(float(along @ along), 1e-9), 0.0, 1.0))
+    return float(np.hypot(*(point - way.start - share * along)))
+
+
+def _reach_m(body: BodySpec) -> float:
+    """From its middle to its furthest corner over the floor."""
+    match body:
+        case Column() | Pole():
+            return 0.5 * body.diameter_m
+        case Person():
+            return 0.35
+        case _:
+            return 0.5 * math.hypot(body.length_m, body.width_m)
+
+
+def _bounds(course: FloatArray, margin_m: float) -> tuple[float, float, float, float]:
+    low, high = course.min(axis=0) - margin_m, course.max(axis=0) + margin_m
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+Place = tuple[Room, list[BodySpec], list[BodySpec]]
+
+
+def _hall(generator: np.random.Generator, course: FloatArray) -> Place:
+    """Large and half empty: columns, crates, loaded pallets, a pole; walls some metres beyond."""
+    x0, x1, y0, y1 = _bounds(course, 11.0)
+    tape = tuple(TapeLine(ax_m=x0, ay_m=y_m, bx_m=x1, by_m=y_m) for y_m in (1.4, -1.4))
+    room = Room(x_min_m=x0, x_max_m=x1, y_min_m=y0, y_max_m=y1, height_m=5.5, tape=tape)
+    return room, [], _scatter(generator, (x0 + 1.0, x1 - 1.0, y0 + 1.0, y1 - 1.0), 46)
+
+
+def _aisle(generator: np.random.Generator, course: FloatArray) -> Place:
+    """Between racks, with a gap to either side some metres ahead."""
+    end = float(course[:, 0].max())
+    tape = (TapeLine(ax_m=-4.0, ay_m=1.2, bx_m=end + 12.0, by_m=1.2, colour="white"),)
+    room = Room(x_min_m=-4.0, x_max_m=end + 12.0, y_min_m=-7.0, y_max_m=7.0, floor="coarse", tape=tape)
+    racks: list[BodySpec] = []
+    for side in (1.0, -1.0):
+        for index, (x_m, length_m) in enumerate(((0.4, 5.4), (end + 8.1, 5.4))):
+            racks.append(
+                Shelf(
+                    kind="shelf",
+                    name=f"rack {index} {'left' if side > 0 else 'right'}",
+                    x_m=x_m,
+                    y_m=side * float(generator.uniform(2.4, 2.9)),
+                    length_m=length_m,
+                    goods=float(generator.uniform(0.4, 0.8)),
+                )
+            )
+    return room, racks, _scatter(generator, (3.0, end + 10.0, -5.5, 5.5), 14)
+
+
+def _workshop(generator: np.random.Generator, course: FloatArray) -> Place:
+    """Brick walls near by, benches, poles, plain boxes, a beam overhead."""
+    x0, x1, y0, y1 = _bounds(course, 8.5)
+    room = Room(
+        x_min_m=x0,
+        x_max_m=x1,
+        y_min_m=y0,
+        y_max_m=y1,
+        height_m=4.0,
+        floor="fine",
+        walls="fine",
+        ceiling="coarse",
+    )
+    fixed: list[BodySpec] = [
+        Beam(kind="beam", name="beam", x_m=float(course[-1, 0]) + 4.0, y_m=0.0, z_m=2.4, heading_deg=90.0,
+             length_m=6.0),
+    ]  # fmt: skip
+    return room, fixed, _scatter(generator, (x0 + 0.8, x1 - 0.8, y0 + 0.8, y1 - 0.8), 34)
+
+
+_PLACES = {"hall": _hall, "aisle": _aisle, "workshop": _workshop}
+
+
+def _scatter(
+    generator: np.random.Generator, area: tuple[float, float, float, float], count: int
+) -> list[BodySpec]:
+    """Things to stand around, at least 1.2 m apart."""
+    x0, x1, y0, y1 = area
+    placed: list[FloatArray] = []
+    bodies: list[BodySpec] = []
+    for index in range(count):
+        where = np.array([generator.uniform(x0, x1), generator.uniform(y0, y1)])
+        if placed and np.hypot(*(np.array(placed) - where).T).min() < 1.2:
+            continue
+        placed.append(where)
+        bodies.append(_thing(generator, index, float(where[0]), float(where[1])))
+    return bodies
+
+
+def _thing(generator: np.random.Generator, index: int, x_m: float, y_m: float) -> BodySpec:
+    turn_deg = float(generator.uniform(-90.0, 90.0))
+    name = f"thing {index}"
+    texture: Texture = ("fine", "coarse", "plain")[int(generator.integers(3))]
+    match int(generator.integers(8)):
+        case 0:
+            return Column(kind="column", name=name, x_m=x_m, y_m=y_m, texture=texture, height_m=4.0)
+        case 1:
+            return Pole(kind="pole", name=name, x_m=x_m, y_m=y_m)
+        case 2:
+            return Pallet(kind="pallet", name=name, x_m=x_m, y_m=y_m, heading_deg=turn_deg)
+        case 3:
+            return Pallet(
+                kind="pallet", name=name, x_m=x_m, y_m=y_m, heading_deg=turn_deg, texture=texture,
+                load_height_m=float(generator.uniform(0.4, 1.3)),
+            )  # fmt: skip
+        case 4:
+            return Wall(
+                kind="wall", name=name, x_m=x_m, y_m=y_m, heading_deg=turn_deg, texture=texture, length_m=1.6,
+                height_m=1.8,
+            )  # fmt: skip
+        case 5:
+            return Person(kind="person", name=name, x_m=x_m, y_m=y_m, heading_deg=turn_deg)
+        case _:
+            return Crate(
+                kind="crate", name=name, x_m=x_m, y_m=y_m, heading_deg=turn_deg, texture=texture,
+                length_m=float(generator.uniform(0.4, 1.0)), width_m=float(generator.uniform(0.4, 0.8)),
+                height_m=float(generator.uniform(0.3, 1.3)),
+            )  # fmt: skip

@@ -1,0 +1,177 @@
+"""One method on one sequence: which moving objects it found, which things it called moving wrongly.
+
+An object is found when it is matched in at least half of its eligible frames after its first 0.5 s. An
+identity that is called moving in three frames or more without being any moving object is a wrong
+object. A second detection of an object that is matched already is false in that frame (the
+precision per frame pays for it), but it is not a wrong object: something does move there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.evaluation.eligibility import Call, Standing, calls
+from controller.evaluation.matching import costs, match
+from controller.evaluation.types import CALLED_MOVING, Detection, FrameDetections, FrameTruth, TrueObject
+
+MIN_SHARE = 0.5
+WRONG_FRAMES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """A detection that is an eligible object. speed_error_mps: norm of the difference of the velocities,
+    over the components that the method measures; NaN where it measures none."""
+
+    object_id: int
+    detection_id: int
+    distance_m: float
+    speed_error_mps: float
+    settled: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FrameScore:
+    """hits; missed: ids of eligible objects without a detection, those that are settled also in
+    missed_settled; wrong: ids of detections that are no moving object; duplicates: ids of
+    further detections of something that does move."""
+
+    stamp_s: float
+    hits: tuple[Hit, ...]
+    missed: tuple[int, ...]
+    missed_settled: tuple[int, ...]
+    wrong: tuple[int, ...]
+    duplicates: tuple[int, ...]
+
+    @property
+    def faults(self) -> int:
+        """How much is wrong with this frame."""
+        return len(self.missed_settled) + len(self.wrong) + len(self.duplicates)
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectScore:
+    """judged: eligible frames after the first 0.5 s; detected: those of them in which it was matched.
+
+    latency_s: from becoming eligible to the first match, inf if there was none. distance_m: median over
+    the judged frames.
+    """
+
+    id: int
+    kind: str
+    judged: int
+    detected: int
+    latency_s: float
+    distance_m: float
+
+    @property
+    def found(self) -> bool:
+        """In at least half of the judged frames."""
+        return self.detected >= MIN_SHARE * self.judged
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceScore:
+    """objects: those with at least one judged frame. wrong_objects: identities, sorted."""
+
+    frames: tuple[FrameScore, ...]
+    objects: tuple[ObjectScore, ...]
+    wrong_objects: tuple[int, ...]
+    duration_s: float
+
+
+def score(
+    truths: Sequence[FrameTruth], answers: Sequence[FrameDetections], threshold: float = CALLED_MOVING
+) -> SequenceScore:
+    """Score the answers; only detections of at least this confidence count.
+
+    truths and answers are the same frames in the same order; raises ValueError where they are not.
+    """
+    if len(truths) != len(answers) or any(
+        truth.stamp_s != answer.stamp_s for truth, answer in zip(truths, answers, strict=False)
+    ):
+        raise ValueError("truths and answers must be the same frames in the same order")
+    called = calls(truths)
+    frames = tuple(
+        _score_frame(truth, call, [d for d in answer.detections if d.confidence >= threshold])
+        for truth, call, answer in zip(truths, called, answers, strict=True)
+    )
+    count = Counter(identity for frame in frames for identity in frame.wrong)
+    wrong = tuple(sorted(identity for identity, times in count.items() if times >= WRONG_FRAMES))
+    return SequenceScore(frames, _score_objects(truths, called, frames), wrong, _duration_s(truths))
+
+
+def _score_frame(truth: FrameTruth, call: dict[int, Call], detections: list[Detection]) -> FrameScore:
+    eligible = [true for true in truth.objects if call[true.id].standing is Standing.ELIGIBLE]
+    excused = [true for true in truth.objects if call[true.id].standing is Standing.EXCUSED]
+    pairs = match(detections, eligible)
+    hits = tuple(_hit(detections[row], eligible[column], call) for row, column in pairs)
+    taken = {row for row, _ in pairs}
+    seen = {hit.object_id for hit in hits}
+    rest = [detection for row, detection in enumerate(detections) if row not in taken]
+    is_moving = [bool(row.any()) for row in np.isfinite(costs(rest, eligible))]
+    may_move = [bool(row.any()) for row in np.isfinite(costs(rest, excused))]
+    missed = tuple(true.id for true in eligible if true.id not in seen)
+    return FrameScore(
+        truth.stamp_s,
+        hits,
+        missed,
+        tuple(identity for identity in missed if call[identity].settled),
+        tuple(d.id for d, is_, may in zip(rest, is_moving, may_move, strict=True) if not is_ and not may),
+        tuple(d.id for d, is_, may in zip(rest, is_moving, may_move, strict=True) if is_ and not may),
+    )
+
+
+def _hit(detection: Detection, true: TrueObject, call: dict[int, Call]) -> Hit:
+    difference = detection.velocity_mps - true.velocity_mps
+    known = np.isfinite(difference)
+    error = float(np.linalg.norm(difference[known])) if known.any() else math.nan
+    return Hit(true.id, detection.id, true.distance_m, error, call[true.id].settled)
+
+
+def _score_objects(
+    truths: Sequence[FrameTruth], called: Sequence[dict[int, Call]], frames: Sequence[FrameScore]
+) -> tuple[ObjectScore, ...]:
+    first_s: dict[int, float] = {}
+    hit_s: dict[int, float] = {}
+    judged: Counter[int] = Counter()
+    detected: Counter[int] = Counter()
+    kinds: dict[int, str] = {}
+    distances_m: dict[int, list[float]] = {}
+    for truth, call, frame in zip(truths, called, frames, strict=True):
+        hits = {hit.object_id for hit in frame.hits}
+        for true in truth.objects:
+            if call[true.id].standing is not Standing.ELIGIBLE:
+                continue
+            kinds[true.id] = true.kind
+            first_s.setdefault(true.id, truth.stamp_s)
+            if true.id in hits:
+                hit_s.setdefault(true.id, truth.stamp_s)
+            if call[true.id].settled:
+                judged[true.id] += 1
+                detected[true.id] += true.id in hits
+                distances_m.setdefault(true.id, []).append(true.distance_m)
+    return tuple(
+        ObjectScore(
+            identity,
+            kinds[identity],
+            judged[identity],
+            detected[identity],
+            hit_s.get(identity, math.inf) - first_s[identity],
+            float(np.median(distances_m[identity])),
+        )
+        for identity in sorted(judged)
+    )
+
+
+def _duration_s(truths: Sequence[FrameTruth]) -> float:
+    """From the first frame to the end of the last one."""
+    if len(truths) < 2:
+        return 0.0
+    span_s = truths[-1].stamp_s - truths[0].stamp_s
+    return span_s * len(truths) / (len(truths) - 1)

@@ -1,0 +1,55 @@
+"""Runs the robot through a simulated sequence: what its camera and its tracks say, and what is true."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from controller.evaluation.drive import MOUNT
+from controller.evaluation.sequences import Sequence
+from controller.evaluation.truth import TrueImages, TruthTeller
+from controller.evaluation.types import FrameTruth
+from hal.clocks import NS_PER_S, SimulatedClock
+from hal.types import Pose, RgbdFrame
+from sim.camera import SimulatedCamera
+from sim.render import Picture
+from sim.world import BodyState, World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedFrame:
+    """odometry: the camera by dead reckoning. camera: where it truly is, on the floor's axes.
+
+    picture is valid until the next frame, everything else stays. bodies: all of them, still or not.
+    """
+
+    frame: RgbdFrame
+    odometry: Pose
+    camera: Pose
+    truth: FrameTruth
+    images: TrueImages
+    picture: Picture
+    bodies: tuple[BodyState, ...]
+
+
+def simulate(sequence: Sequence, teller: TruthTeller, world: World) -> Iterator[SimulatedFrame]:
+    """The sequence's frames in order. Every run yields the same bytes."""
+    drive = sequence.drive()
+    config = sequence.camera()
+    camera = SimulatedCamera(
+        world, config, MOUNT, SimulatedClock(), lambda stamp_ns: drive.pose(stamp_ns / NS_PER_S)
+    )
+    with camera:
+        for _ in range(round(sequence.duration_s * config.fps)):
+            frame = camera.read(timeout_s=1.0)
+            picture = camera.last_picture
+            assert picture is not None, "a frame that was read has a picture behind it"
+            yield SimulatedFrame(
+                frame,
+                drive.odometry_camera(frame.captured_ns),
+                picture.camera,
+                teller.frame(picture),
+                teller.images(picture),
+                picture,
+                world.bodies(picture.t_s),
+            )

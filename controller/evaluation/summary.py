@@ -1,0 +1,209 @@
+"""Everything the evaluation found, as plain JSON values under stable keys."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from controller.evaluation import endpoint_error
+from controller.evaluation.contestants import ALWAYS, BASELINES, OURS
+from controller.evaluation.endpoint_error import EndpointErrors
+from controller.evaluation.run_sequence import SequenceRecord
+from controller.evaluation.scoring import SequenceScore, score
+from controller.evaluation.totals import (
+    PIXEL_LEVEL,
+    ByDistance,
+    Counts,
+    Curve,
+    Figures,
+    PixelCounts,
+    Recorded,
+    bin_by_distance,
+    object_curves,
+    pixel_curve,
+    total,
+)
+
+VERSION = 1
+BEYOND_M = 2.0  # the target for endpoint errors counts from here
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MethodSummary:
+    """One method on the sequences of one split that it saw."""
+
+    figures: Figures
+    pixels: PixelCounts
+    sequences: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Summary:
+    """splits: "reporting", "tuning" and "baselines" (those sequences that every method saw), each with its
+    methods by name. curves: of our detector on the reporting split. scores: ours by sequence and method."""
+
+    splits: dict[str, dict[str, MethodSummary]]
+    per_object: Curve
+    per_frame: Curve
+    per_pixel: Curve
+    endpoint: ByDistance
+    endpoint_beyond: tuple[float, float]
+    scores: dict[str, dict[str, SequenceScore]]
+    split_of: dict[str, str]
+
+
+def summarise(records: Sequence[SequenceRecord]) -> Summary:
+    """Score all records."""
+    scores = {
+        record.name: {name: score(record.truths, one.answers) for name, one in record.methods.items()}
+        for record in records
+    }
+    reporting = [record for record in records if record.split == "reporting"]
+    splits = {
+        "reporting": _by_method(reporting, scores, ALWAYS),
+        "tuning": _by_method([record for record in records if record.split == "tuning"], scores, ALWAYS),
+        "baselines": _by_method(
+            [record for record in records if BASELINES[0] in record.methods], scores, ALWAYS + BASELINES
+        ),
+    }
+    shown = [record for record in reporting if OURS in record.methods]
+    per_object, per_frame = object_curves(
+        [Recorded(record.truths, record.methods[OURS].answers) for record in shown]
+    )
+    pixels = sum((record.methods[OURS].pixels for record in shown), PixelCounts.none())
+    endpoint = sum((record.endpoint for record in records), EndpointErrors.none())
+    beyond = endpoint.error_px[endpoint.distance_m >= BEYOND_M]
+    return Summary(
+        splits,
+        per_object,
+        per_frame,
+        pixel_curve(pixels),
+        bin_by_distance(endpoint.distance_m, endpoint.error_px, endpoint_error.DISTANCE_BINS_M),
+        (float(np.median(beyond)), float(np.mean(beyond))) if len(beyond) else (math.nan, math.nan),
+        scores,
+        {record.name: record.split for record in records},
+    )
+
+
+def _by_method(
+    records: Sequence[SequenceRecord], scores: dict[str, dict[str, SequenceScore]], names: tuple[str, ...]
+) -> dict[str, MethodSummary]:
+    result = {}
+    for name in names:
+        seen = [record for record in records if name in record.methods]
+        if not seen:
+            continue
+        durations = [answer.duration_ms for record in seen for answer in record.methods[name].answers]
+        figures = total([scores[record.name][name] for record in seen], durations)
+        pixels = sum((record.methods[name].pixels for record in seen), PixelCounts.none())
+        result[name] = MethodSummary(figures, pixels, len(seen))
+    return result
+
+
+def as_json(summary: Summary) -> dict[str, Any]:
+    """Numbers that are not known are null."""
+    return {
+        "version": VERSION,
+        "splits": {
+            split: {name: _method(one) for name, one in methods.items()}
+            for split, methods in summary.splits.items()
+        },
+        "curves": {
+            "object": _curve(summary.per_object),
+            "frame": _curve(summary.per_frame),
+            "pixel": _curve(summary.per_pixel),
+        },
+        "endpoint_error_px": {
+            **_by_distance(summary.endpoint),
+            "beyond_2_m_median": number(summary.endpoint_beyond[0]),
+            "beyond_2_m_mean": number(summary.endpoint_beyond[1]),
+        },
+        "sequences": {
+            name: {
+                "split": summary.split_of[name],
+                "methods": {method: _sequence(one) for method, one in methods.items()},
+            }
+            for name, methods in summary.scores.items()
+        },
+    }
+
+
+def number(value: float, digits: int = 4) -> float | None:
+    """Rounded; None where it is not known."""
+    return round(float(value), digits) if math.isfinite(value) else None
+
+
+def _method(one: MethodSummary) -> dict[str, Any]:
+    figures = one.figures
+    return {
+        "sequences": one.sequences,
+        "minutes": number(figures.minutes),
+        "object": _counts(figures.objects),
+        "frame": _counts(figures.settled),
+        "frame_with_first_half_second": _counts(figures.frames),
+        "pixel": _counts(one.pixels.at(PIXEL_LEVEL)),
+        "false_moving_per_minute": number(figures.wrong_per_minute, 3),
+        "speed_error_mps": {
+            "median": number(figures.speed_error_median_mps),
+            "p90": number(figures.speed_error_p90_mps),
+            **_by_distance(figures.speed_error),
+        },
+        "first_detection_s": {
+            "median": number(figures.latency_median_s),
+            "never": sum(not math.isfinite(latency) for latency in figures.latencies_s),
+        },
+        "ms_per_frame": number(figures.ms_per_frame, 2),
+    }
+
+
+def _counts(counts: Counts) -> dict[str, Any]:
+    return {
+        "correct": counts.correct,
+        "wrong": counts.wrong,
+        "missed": counts.missed,
+        "precision": number(counts.precision),
+        "recall": number(counts.recall),
+    }
+
+
+def _by_distance(one: ByDistance) -> dict[str, Any]:
+    return {
+        "edges_m": list(one.edges_m),
+        "count": list(one.count),
+        "median_by_distance": [number(value) for value in one.median],
+        "mean_by_distance": [number(value) for value in one.mean],
+        "p90_by_distance": [number(value) for value in one.p90],
+    }
+
+
+def _curve(curve: Curve) -> dict[str, Any]:
+    return {
+        "threshold": [number(value, 3) for value in curve.thresholds],
+        "precision": [number(value) for value in curve.precision],
+        "recall": [number(value) for value in curve.recall],
+    }
+
+
+def _sequence(one: SequenceScore) -> dict[str, Any]:
+    return {
+        "objects": [
+            {
+                "id": true.id,
+                "kind": true.kind,
+                "judged_frames": true.judged,
+                "detected_frames": true.detected,
+                "found": true.found,
+                "first_detection_s": number(true.latency_s),
+                "distance_m": number(true.distance_m, 2),
+            }
+            for true in one.objects
+        ],
+        "wrong_objects": list(one.wrong_objects),
+        "false_detections": sum(len(frame.wrong) for frame in one.frames),
+        "duplicate_detections": sum(len(frame.duplicates) for frame in one.frames),
+        "missed_frames": sum(len(frame.missed_settled) for frame in one.frames),
+    }

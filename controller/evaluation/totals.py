@@ -1,0 +1,229 @@
+"""The scores of many sequences as one set of figures, and as precision-recall curves."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.evaluation.scoring import FrameScore, SequenceScore, score
+from controller.evaluation.types import FrameDetections, FrameTruth
+from hal.types import FloatArray
+
+DISTANCE_BINS_M = (0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
+
+
+def ratio(part: float, whole: float) -> float:
+    """NaN where there is nothing to divide by."""
+    return part / whole if whole else math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """What a precision and a recall are made of."""
+
+    correct: int
+    wrong: int
+    missed: int
+
+    @property
+    def precision(self) -> float:
+        """correct / (correct + wrong)."""
+        return ratio(self.correct, self.correct + self.wrong)
+
+    @property
+    def recall(self) -> float:
+        """correct / (correct + missed)."""
+        return ratio(self.correct, self.correct + self.missed)
+
+
+@dataclass(frozen=True, slots=True)
+class ByDistance:
+    """A quantity in bins of the distance from the camera; NaN where a bin is empty."""
+
+    edges_m: tuple[float, ...]
+    count: tuple[int, ...]
+    median: tuple[float, ...]
+    mean: tuple[float, ...]
+    p90: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """One method on many sequences. objects: per object; settled: per frame without the first 0.5 s of
+    each object; frames: per frame, all of them. Times are those of the objects that were detected at all."""
+
+    objects: Counts
+    settled: Counts
+    frames: Counts
+    minutes: float
+    latencies_s: tuple[float, ...]
+    speed_error: ByDistance
+    speed_error_median_mps: float
+    speed_error_p90_mps: float
+    recall_by_distance: tuple[Counts, ...]
+    ms_per_frame: float
+
+    @property
+    def wrong_per_minute(self) -> float:
+        """Wrong objects a minute of recording."""
+        return ratio(self.objects.wrong, self.minutes)
+
+    @property
+    def latency_median_s(self) -> float:
+        """From eligible to detected; an object that was never detected counts as infinitely late."""
+        return float(np.median(self.latencies_s)) if self.latencies_s else math.nan
+
+
+def bin_by_distance(
+    distance_m: FloatArray, values: FloatArray, edges_m: tuple[float, ...] = DISTANCE_BINS_M
+) -> ByDistance:
+    """Median, mean and 90th percentile of values (N,) in bins of distance (N,)."""
+    which = np.digitize(distance_m, edges_m) - 1
+    groups = [values[which == index] for index in range(len(edges_m) - 1)]
+    return ByDistance(
+        edges_m,
+        tuple(len(group) for group in groups),
+        tuple(float(np.median(group)) if len(group) else math.nan for group in groups),
+        tuple(float(np.mean(group)) if len(group) else math.nan for group in groups),
+        tuple(float(np.percentile(group, 90)) if len(group) else math.nan for group in groups),
+    )
+
+
+def total(scores: Sequence[SequenceScore], durations_ms: Sequence[float]) -> Figures:
+    """Sum up. durations_ms: of every frame that the method was given, NaN where it had nothing to do."""
+    objects = [one for sequence in scores for one in sequence.objects]
+    frames = [frame for sequence in scores for frame in sequence.frames]
+    hits = [hit for frame in frames for hit in frame.hits]
+    distance = np.array([hit.distance_m for hit in hits])
+    error = np.array([hit.speed_error_mps for hit in hits])
+    known = np.isfinite(error)
+    found = sum(one.found for one in objects)
+    wrong = sum(len(sequence.wrong_objects) for sequence in scores)
+    return Figures(
+        Counts(found, wrong, len(objects) - found),
+        _settled_counts(frames),
+        _frame_counts(frames),
+        sum(sequence.duration_s for sequence in scores) / 60.0,
+        tuple(one.latency_s for one in objects),
+        bin_by_distance(distance[known], error[known]),
+        float(np.median(error[known])) if known.any() else math.nan,
+        float(np.percentile(error[known], 90)) if known.any() else math.nan,
+        _found_by_distance(scores),
+        _median_known(durations_ms),
+    )
+
+
+def _median_known(values: Sequence[float]) -> float:
+    known = [value for value in values if math.isfinite(value)]
+    return float(np.median(known)) if known else math.nan
+
+
+def _settled_counts(frames: Sequence[FrameScore]) -> Counts:
+    return Counts(
+        sum(hit.settled for frame in frames for hit in frame.hits),
+        sum(len(frame.wrong) + len(frame.duplicates) for frame in frames),
+        sum(len(frame.missed_settled) for frame in frames),
+    )
+
+
+def _frame_counts(frames: Sequence[FrameScore]) -> Counts:
+    return Counts(
+        sum(len(frame.hits) for frame in frames),
+        sum(len(frame.wrong) + len(frame.duplicates) for frame in frames),
+        sum(len(frame.missed) for frame in frames),
+    )
+
+
+def _found_by_distance(scores: Sequence[SequenceScore]) -> tuple[Counts, ...]:
+    """Objects by the median distance at which they were judged."""
+    objects = [one for sequence in scores for one in sequence.objects]
+    result = []
+    for low, high in itertools.pairwise(DISTANCE_BINS_M):
+        inside = [one for one in objects if low <= one.distance_m < high]
+        found = sum(one.found for one in inside)
+        result.append(Counts(found, 0, len(inside) - found))
+    return tuple(result)
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Precision and recall by threshold, the highest threshold first."""
+
+    thresholds: tuple[float, ...]
+    precision: tuple[float, ...]
+    recall: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recorded:
+    """One method's answers on one sequence."""
+
+    truths: Sequence[FrameTruth]
+    answers: Sequence[FrameDetections]
+
+
+THRESHOLDS = tuple(float(value) for value in np.round(np.linspace(1.0, 0.0, 41), 3))
+
+
+def object_curves(recorded: Sequence[Recorded]) -> tuple[Curve, Curve]:
+    """Curves per object and per frame, over the confidence from which a detection counts."""
+    per_object, per_frame = [], []
+    for threshold in THRESHOLDS:
+        figures = total([score(one.truths, one.answers, threshold) for one in recorded], ())
+        per_object.append(figures.objects)
+        per_frame.append(figures.settled)
+    return _curve(THRESHOLDS, per_object), _curve(THRESHOLDS, per_frame)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PixelCounts:
+    """Pixels of moving bodies and of the rest, by the level 0..255 of confidence that they were given.
+
+    moving, rest: (256,). Pixels of excused bodies, and those beyond the range, are in neither.
+    """
+
+    moving: NDArray[np.int64]
+    rest: NDArray[np.int64]
+
+    @staticmethod
+    def none() -> PixelCounts:
+        """Nothing counted yet."""
+        return PixelCounts(np.zeros(256, np.int64), np.zeros(256, np.int64))
+
+    def __add__(self, other: PixelCounts) -> PixelCounts:
+        return PixelCounts(self.moving + other.moving, self.rest + other.rest)
+
+    def at(self, level: int) -> Counts:
+        """When every pixel from this level on is called moving."""
+        return Counts(
+            int(self.moving[level:].sum()), int(self.rest[level:].sum()), int(self.moving[:level].sum())
+        )
+
+
+# What is called moving begins at half of the scale, as for objects.
+PIXEL_LEVEL = 128
+
+
+def pixel_curve(counts: PixelCounts) -> Curve:
+    """The curve over all levels but zero: a pixel of which nothing was said is never called moving."""
+    levels = range(255, 0, -1)
+    return _curve(tuple(level / 255.0 for level in levels), [counts.at(level) for level in levels])
+
+
+def _curve(thresholds: tuple[float, ...], counts: Sequence[Counts]) -> Curve:
+    """Only where something was detected: precision of nothing is not known."""
+    known = [
+        (threshold, count.precision, count.recall)
+        for threshold, count in zip(thresholds, counts, strict=True)
+        if count.correct + count.wrong > 0 and count.correct + count.missed > 0
+    ]
+    return Curve(
+        tuple(point[0] for point in known),
+        tuple(point[1] for point in known),
+        tuple(point[2] for point in known),
+    )

@@ -1,0 +1,76 @@
+"""The simulator's truth about one frame, as the scores need it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.evaluation.types import NO_BOX, FrameTruth, TrueObject
+from hal.types import FloatArray, Intrinsics, Pose
+from sim.render import Picture
+from sim.truth import BodyTruth, GroundTruth
+from sim.world import BodyState, World
+
+_MIN_TURN_RADPS = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueImages:
+    """instances (H, W) uint16: body ids; depth_m (H, W) float32, 0 where nothing is."""
+
+    instances: NDArray[np.uint16]
+    depth_m: NDArray[np.float32]
+
+
+class TruthTeller:
+    """Truth of one world through one camera."""
+
+    def __init__(self, world: World, intrinsics: Intrinsics) -> None:
+        self._world = world
+        self._truth = GroundTruth(world, intrinsics)
+        self._movers = frozenset(body.id for body in world.bodies(0.0) if body.moves)
+
+    def images(self, picture: Picture) -> TrueImages:
+        """Copies: they outlive the picture."""
+        inverse = picture.inverse_depth
+        depth_m = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=inverse > 0.0)
+        return TrueImages(picture.instance_mask(), depth_m)
+
+    def frame(self, picture: Picture) -> FrameTruth:
+        """All bodies that have a plan of motion, seen or not."""
+        if not self._movers:
+            return FrameTruth(picture.t_s, ())
+        seen = {body.state.id: body for body in self._truth.bodies(picture, self._movers)}
+        objects = tuple(
+            _seen(seen[body.id]) if body.id in seen else _unseen(body, picture.camera)
+            for body in self._world.bodies(picture.t_s)
+            if body.moves
+        )
+        return FrameTruth(picture.t_s, objects)
+
+
+def _turns(body: BodyState) -> bool:
+    return abs(body.yaw_rate_radps) > _MIN_TURN_RADPS
+
+
+def _seen(body: BodyTruth) -> TrueObject:
+    u0, v0, u1, v1 = body.bbox_px
+    return TrueObject(
+        body.state.id,
+        body.state.kind,
+        (float(u0), float(v0), float(u1), float(v1)),
+        body.visible_px,
+        body.visible_ratio,
+        body.position_m,
+        body.velocity_mps,
+        _turns(body.state),
+    )
+
+
+def _unseen(body: BodyState, camera: Pose) -> TrueObject:
+    velocity: FloatArray = np.array([*body.velocity_mps, 0.0]) @ camera.rotation
+    on_floor = np.array([[body.pose.x_m, body.pose.y_m, 0.5 * sum(body.z_m)]])
+    middle = camera.inverse().apply(on_floor)[0]
+    return TrueObject(body.id, body.kind, NO_BOX, 0, 0.0, middle, velocity, _turns(body))
