@@ -31,8 +31,9 @@ class FragmentSettings(Section):
     fragments_per_tile: int = Field(default=2, ge=1, le=16)
     lk_window_px: int = Field(default=11, ge=5, le=41)
     lk_levels: int = Field(default=3, ge=0, le=6)
-    forward_backward_px: float = Field(default=0.7, gt=0, le=5)
-    pixel_sigma_px: float = Field(default=0.2, gt=0, le=5, description="end point, one frame to the next")
+    forward_backward_px: float = Field(default=3.0, gt=0, le=20, description="also along an edge")
+    forward_backward_sigmas: float = Field(default=3.0, gt=0, le=20)
+    pixel_sigma_px: float = Field(default=0.15, gt=0, le=5, description="end point, one frame to the next")
 
     @model_validator(mode="after")
     def _thresholds_in_order(self) -> Self:

@@ -1,34 +1,43 @@
-"""Every n-th pixel of depth, with its height over the floor: what objects are made of and free space is read from."""
+"""A coarse grid of depth with its height over the floor: what bodies are made of and free space is read from."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
-from hal.types import CameraMount, FloatArray, Intrinsics, RgbdFrame
+from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
 from vision.depth_mask import depth_sigma_m
 
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
 
+CELL_NOISE = (
+    0.4  # noise of a cell over noise of a pixel: of neighbouring pixels, so less than the count tells
+)
+_AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthGrid:
-    """Cell (i, j) is pixel (offset + step i, offset + step j) of the image.
+    """Cell (i, j) stands for the pixels around (offset + step i, offset + step j) of the image.
 
-    depth_m (h, w): 0 where not valid. valid (h, w). x (w,), y (h,): ray at z = 1 m. height_m (h, w):
-    over the floor, and height_sigma_m (h, w); both NaN-free, None where the mounting is not known.
-    forward_m (h, w): distance along the floor. pitch_rad: 0 where not known.
+    depth_m (h, w): 0 where not valid. inverse_depth (h, w): 0 where not valid. valid (h, w).
+    beyond (h, w): measured, but farther than the depth mask: seen through up to there at least.
+    x (w,), y (h,): ray at z = 1 m. forward_m (h, w): distance along the floor. height_m (h, w) over the
+    floor and height_sigma_m (h, w): None where the mounting is not known. pitch_rad: 0 where not known.
     """
 
     step_px: int
-    offset_px: int
+    offset_px: float
     depth_m: FloatGrid
+    inverse_depth: FloatGrid
     valid: BoolGrid
+    beyond: BoolGrid
     x: FloatGrid
     y: FloatGrid
     forward_m: FloatGrid
@@ -47,41 +56,97 @@ class DepthGrid:
         index = np.rint((pixels_v - self.offset_px) / self.step_px).astype(np.intp)
         return np.clip(index, 0, self.depth_m.shape[0] - 1)
 
+    def points(self, cells: NDArray[np.intp]) -> FloatGrid:
+        """(K, 3) camera coordinates of flat cell indices (K,)."""
+        rows, columns = np.divmod(cells, self.depth_m.shape[1])
+        depth = self.depth_m.ravel()[cells]
+        result = np.empty((len(cells), 3), np.float32)
+        result[:, 0] = self.x[columns] * depth
+        result[:, 1] = self.y[rows] * depth
+        result[:, 2] = depth
+        return result
+
+    def project(self, points: FloatGrid) -> tuple[NDArray[np.intp], BoolGrid]:
+        """Flat cell index (K,) of camera coordinates (K, 3), and which of them fall into the grid."""
+        height, width = self.depth_m.shape
+        in_front = points[:, 2] > 0.1
+        inverse = np.float32(1.0) / np.where(in_front, points[:, 2], np.float32(1.0))
+        column = (points[:, 0] * inverse - self.x[0]) * (1.0 / (self.x[1] - self.x[0])) + 0.5
+        row = (points[:, 1] * inverse - self.y[0]) * (1.0 / (self.y[1] - self.y[0])) + 0.5
+        inside = in_front & (column >= 0) & (row >= 0) & (column < width) & (row < height)
+        flat = row.astype(np.intp) * width + column.astype(np.intp)
+        return np.where(inside, flat, 0), inside
+
 
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
     """Sub-sample the depth of frame; depth outside [min_depth_m, max_depth_m] is not valid."""
     step = config.grid_step_px
-    offset = step // 2
-    depth_m = frame.depth[offset::step, offset::step] * np.float32(frame.depth_scale_m)
+    scale_m = frame.depth_scale_m
+    if step >= 4:
+        raw, offset = _four_samples(frame.depth, step, scale_m), step // 4 + 0.5 * (step // 2)
+    else:
+        raw, offset = frame.depth[step // 2 :: step, step // 2 :: step], float(step // 2)
+    depth_m = raw * np.float32(scale_m)
     valid = (depth_m >= config.min_depth_m) & (depth_m <= config.max_depth_m)
-    depth_m *= valid
+    beyond = depth_m > config.max_depth_m
+    inverse = _smooth(np.divide(1.0, depth_m, out=np.zeros_like(depth_m), where=valid), valid)
+    depth_m = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=valid)
     x, y = _rays(frame.intrinsics, depth_m.shape, step, offset)
     if mount is None:
-        return DepthGrid(step, offset, depth_m, valid, x, y, depth_m, None, None, float("nan"), 0.0)
+        nan = float("nan")
+        return DepthGrid(step, offset, depth_m, inverse, valid, beyond, x, y, depth_m, None, None, nan, 0.0)
     cos_pitch, sin_pitch = math.cos(mount.pitch_rad), math.sin(mount.pitch_rad)
-    drop = (y * cos_pitch + sin_pitch).astype(np.float32)  # metres down per metre of depth
-    height_m = np.float32(mount.height_m) - depth_m * drop[:, None]
-    sigma_m = depth_sigma_m(depth_m, config.depth_noise)
-    forward_m = depth_m * (cos_pitch - y * sin_pitch).astype(np.float32)[:, None]
-    height_sigma_m = sigma_m * np.abs(drop)[:, None]
+    drop = (y * np.float32(cos_pitch) + np.float32(sin_pitch))[:, None]  # metres down per metre of depth
+    sigma_m = np.float32(CELL_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
     return DepthGrid(
         step,
         offset,
         depth_m,
+        inverse,
         valid,
+        beyond,
         x,
         y,
-        forward_m,
-        height_m,
-        height_sigma_m,
+        depth_m * (np.float32(cos_pitch) - y * np.float32(sin_pitch))[:, None],
+        np.float32(mount.height_m) - depth_m * drop,
+        sigma_m * np.abs(drop),
         mount.height_m,
         mount.pitch_rad,
     )
 
 
-def _rays(camera: Intrinsics, shape: tuple[int, ...], step: int, offset: int) -> tuple[FloatGrid, FloatGrid]:
-    u = offset + step * np.arange(shape[1], dtype=np.float32)
-    v = offset + step * np.arange(shape[0], dtype=np.float32)
-    x: FloatGrid = ((u - np.float32(camera.cx)) / np.float32(camera.fx)).astype(np.float32)
-    y: FloatGrid = ((v - np.float32(camera.cy)) / np.float32(camera.fy)).astype(np.float32)
+def _smooth(inverse: FloatGrid, valid: BoolGrid) -> FloatGrid:
+    """Median over 5x5 cells, but a cell that differs much keeps its own: a thin pole, a rim of a body."""
+    median = cv2.medianBlur(inverse, 5)
+    same = valid & (np.abs(inverse - median) <= np.float32(_AGREE_INVERSE))
+    return np.where(same, median, inverse)
+
+
+def _four_samples(depth: DepthImage, step: int, scale_m: float) -> DepthImage:
+    """One value per step x step block out of four samples: the mean of the middle two, or, where these
+    lie on two surfaces, the nearer. A block with more than one sample without data has none."""
+    rows, columns = depth.shape[0] // step * step, depth.shape[1] // step * step
+    low, high = step // 4, step // 4 + step // 2
+    a = depth[low:rows:step, low:columns:step]
+    b = depth[low:rows:step, high:columns:step]
+    c = depth[high:rows:step, low:columns:step]
+    d = depth[high:rows:step, high:columns:step]
+    ab_low, ab_high = np.minimum(a, b), np.maximum(a, b)
+    cd_low, cd_high = np.minimum(c, d), np.maximum(c, d)
+    first, second = np.maximum(ab_low, cd_low), np.minimum(ab_high, cd_high)
+    nearer, farther = np.minimum(first, second), np.maximum(first, second)
+    middle = nearer + (farther - nearer) // 2
+    # 1/nearer - 1/farther <= k, without a division.
+    same = (farther - nearer) <= np.float32(_AGREE_INVERSE * scale_m) * nearer * farther.astype(np.float32)
+    result: DepthImage = np.where(same, middle, nearer)
+    return result
+
+
+def _rays(
+    camera: Intrinsics, shape: tuple[int, ...], step: int, offset: float
+) -> tuple[FloatGrid, FloatGrid]:
+    u = (offset + step * np.arange(shape[1])).astype(np.float32)
+    v = (offset + step * np.arange(shape[0])).astype(np.float32)
+    x: FloatGrid = (u - np.float32(camera.cx)) / np.float32(camera.fx)
+    y: FloatGrid = (v - np.float32(camera.cy)) / np.float32(camera.fy)
     return x, y

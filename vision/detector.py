@@ -115,8 +115,8 @@ class Detector:
             grey,
             store.ends_px.reshape(-1, 2),
             guess,
+            store.pixel_cov.reshape(-1, 3),
             config.fragments,
-            config.fragments.lk_levels,
         )
         both = flow.found.reshape(-1, 2).all(axis=1)
         store.ends_px = flow.pixels.reshape(-1, 2, 2)

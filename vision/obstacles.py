@@ -11,7 +11,7 @@ from hal.types import FloatArray
 from vision.velocities import PointMotion, chi2_2d, normal_equations, solve_velocity
 
 _ROBUST_CHI2 = 9.0
-_ITERATIONS = 3
+_ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
 _INDEPENDENT_DEPTHS = 4.0  # depth noise is shared by neighbours: a body never has more looks than these
 _STATIC_END_CHI2 = 6.0
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
@@ -58,9 +58,9 @@ def body_velocities(
     share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))[:, None]
     velocity = start_mps
     safe_owner = np.where(use, owner, 0)
-    for _ in range(_ITERATIONS):
+    for scale in _ANNEAL:
         chi2 = end_chi2(motion, velocity[safe_owner])
-        weight = np.where(use, np.square(1.0 / (1.0 + chi2 / _ROBUST_CHI2)), 0.0)
+        weight = np.where(use, np.square(1.0 / (1.0 + chi2 / (scale * _ROBUST_CHI2))), 0.0)
         weighted = member * weight
         summed = weighted @ per_end
         depths = (weighted @ per_depth) * share

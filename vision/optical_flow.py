@@ -28,10 +28,13 @@ def track(
     now: GreyImage,
     pixels: NDArray[np.float32],
     guess: NDArray[np.float32],
+    covariance: NDArray[np.float32],
     settings: FragmentSettings,
-    levels: int,
 ) -> Flow:
     """Where pixels (N, 2) of the image before are now, searched from guess (N, 2).
+
+    covariance (N, 3): xx, xy, yy of one flow step. An end may slide along its edge, there and back alike;
+    across the edge it has to return. Therefore the miss is measured in its own sigmas.
 
     The way back starts from where the guess says that the point came from, not from the point itself:
     a search that starts at its goal proves nothing.
@@ -47,15 +50,30 @@ def track(
     }
     start = pixels.reshape(-1, 1, 2)
     there, there_ok, _ = cv2.calcOpticalFlowPyrLK(
-        before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=levels, **options
+        before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=settings.lk_levels, **options
     )
     back_guess = there - (guess - pixels).reshape(-1, 1, 2)
     back, back_ok, _ = cv2.calcOpticalFlowPyrLK(
-        now, before, there, back_guess, maxLevel=min(levels, 1), **options
+        now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1), **options
     )
     end = there[:, 0, :]
-    miss = np.square(back[:, 0, :] - pixels).sum(axis=1)
+    miss = back[:, 0, :] - pixels
+    chi2 = mahalanobis(miss, covariance)
     height, width = now.shape
     inside = (end[:, 0] >= 2) & (end[:, 1] >= 2) & (end[:, 0] <= width - 3) & (end[:, 1] <= height - 3)
-    found = (there_ok[:, 0] == 1) & (back_ok[:, 0] == 1) & (miss <= settings.forward_backward_px**2) & inside
+    found = (
+        (there_ok[:, 0] == 1)
+        & (back_ok[:, 0] == 1)
+        & (chi2 <= settings.forward_backward_sigmas**2)
+        & (np.abs(miss).max(axis=1) <= settings.forward_backward_px)
+        & inside
+    )
     return Flow(end, found)
+
+
+def mahalanobis(miss: NDArray[np.float32], covariance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(N,) squared length of miss (N, 2) in sigmas of covariance (N, 3)."""
+    xx, xy, yy = covariance[:, 0], covariance[:, 1], covariance[:, 2]
+    a, b = miss[:, 0], miss[:, 1]
+    result: NDArray[np.float32] = (yy * a * a - 2.0 * xy * a * b + xx * b * b) / (xx * yy - xy * xy)
+    return result

@@ -18,6 +18,9 @@ BAND_PX = 160
 _MARGIN_PX = 8
 _MIN_END_DISTANCE_PX = 12.0
 _TAKEN_PX = 6
+_NOISE_STRUCTURE = 220.0  # what image noise of 3 grey levels adds to both eigenvalues over 7x7 px
+_LEAST_STRUCTURE = 30.0
+_MATCH_SIGMA = 6.0  # grey levels by which two sights of the same patch differ
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,10 +183,21 @@ def _on_one_surface(
 
 
 def _flow_covariance(tensor: NDArray[np.float32], floor_px: float) -> NDArray[np.float32]:
-    """(N, 2, 3) covariance of one flow step from the structure tensor (N, 2, 3): wide along an edge."""
-    grey_sigma = 3.0
-    uu, uv, vv = np.moveaxis(tensor, -1, 0) + np.array([50.0, 0.0, 50.0], np.float32)[:, None, None]
-    determinant = uu * vv - uv * uv
-    scale = grey_sigma**2 / determinant
+    """(N, 2, 3) covariance of one flow step from the structure tensor (N, 2, 3): wide along an edge.
+
+    Image noise makes every direction look structured; that share is taken off first, or an end on a
+    straight edge would seem as well held along the edge as across it.
+    """
+    uu, uv, vv = np.moveaxis(tensor, -1, 0)
+    middle, half = 0.5 * (uu + vv), 0.5 * (uu - vv)
+    radius = np.sqrt(half * half + uv * uv)
+    larger = np.maximum(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
+    smaller = np.maximum(middle - radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
+    # inverse = p (I / 2) + q (direction of the larger eigenvalue), from the two inverse eigenvalues.
+    across, along = _MATCH_SIGMA**2 / larger, _MATCH_SIGMA**2 / smaller
+    mean, spread = 0.5 * (across + along), 0.5 * (across - along)
+    scale = spread / np.maximum(radius, 1e-6)
     floor = floor_px**2
-    return np.stack((vv * scale + floor, -uv * scale, uu * scale + floor), axis=-1).astype(np.float32)
+    return np.stack((mean + scale * half + floor, scale * uv, mean - scale * half + floor), axis=-1).astype(
+        np.float32
+    )

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision import kalman
-from vision.regions import Region
 
 _FIELDS = (
     "ids",
@@ -21,14 +20,14 @@ _FIELDS = (
     "confidence",
     "bbox_px",
     "extent_m",
+    "cells",
     "fragments",
-    "seen_now",
 )
 
 
 class Tracks:
-    """state (T, 6): position and velocity; covariance (T, 6, 6); evidence (T,) of motion, with hysteresis;
-    confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); seen_now (T,)."""
+    """state (T, 6): position and velocity; covariance (T, 6, 6); evidence (T,) of motion; moving (T,);
+    confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); cells (T,) of the grid covered when last seen."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -42,8 +41,8 @@ class Tracks:
         self.confidence = np.empty(0)
         self.bbox_px = np.empty((0, 4))
         self.extent_m = np.empty((0, 3))
+        self.cells = np.empty(0, np.intp)
         self.fragments = np.empty(0, np.intp)
-        self.seen_now = np.empty(0, np.bool_)
         self._next_id = 1
 
     def __len__(self) -> int:
@@ -55,6 +54,8 @@ class Tracks:
 
     def keep(self, chosen: NDArray[np.bool_]) -> None:
         """Drop all but the chosen tracks."""
+        if chosen.all():
+            return
         for name in _FIELDS:
             setattr(self, name, getattr(self, name)[chosen])
 
@@ -66,49 +67,32 @@ class Tracks:
         return np.where(self.ids[place] == ids, place, -1).astype(np.intp)
 
     def start(
-        self, position_m: FloatArray, velocity_mps: FloatArray, velocity_sigma_mps: float, now_ns: int
-    ) -> int:
-        """Begin a track; returns its index, which is the last one."""
-        covariance = np.diag([0.2**2] * 3 + [velocity_sigma_mps**2] * 3)
+        self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
+    ) -> None:
+        """Begin tracks at positions (K, 3) with unknown velocity: bounded by max_speed_mps, not zero."""
+        count = len(position_m)
+        spread = np.diag([sigma_m**2] * 3 + [max_speed_mps**2] * 3)
         new: dict[str, object] = {
-            "ids": self._next_id,
-            "state": np.concatenate((position_m, velocity_mps)),
-            "covariance": covariance,
-            "born_ns": now_ns,
-            "seen_ns": now_ns,
-            "sightings": 0,
-            "evidence": 0.0,
-            "moving": False,
-            "confidence": 0.0,
-            "bbox_px": np.zeros(4),
-            "extent_m": np.zeros(3),
-            "fragments": 0,
-            "seen_now": False,
+            "ids": np.arange(self._next_id, self._next_id + count),
+            "state": np.concatenate((position_m, np.zeros((count, 3))), axis=1),
+            "covariance": np.tile(spread, (count, 1, 1)),
+            "born_ns": np.full(count, now_ns),
+            "seen_ns": np.full(count, now_ns),
+            "sightings": np.zeros(count),
+            "evidence": np.full(count, evidence),
+            "moving": np.zeros(count),
+            "confidence": np.zeros(count),
+            "bbox_px": np.zeros((count, 4)),
+            "extent_m": np.zeros((count, 3)),
+            "cells": np.zeros(count),
+            "fragments": np.zeros(count),
         }
-        self._next_id += 1
+        self._next_id += count
         for name in _FIELDS:
             old = getattr(self, name)
-            setattr(self, name, np.concatenate((old, np.asarray(new[name], old.dtype)[None])))
-        return len(self) - 1
+            setattr(self, name, np.concatenate((old, np.asarray(new[name], old.dtype))))
 
-    def predict(self, dt_s: float, accel_mps2: float) -> None:
-        """Move every track on; nothing is seen yet."""
-        self.seen_now[:] = False
+    def predict(self, dt_s: float, accel_density: float) -> None:
+        """Move every track on."""
         if len(self) and dt_s > 0:
-            self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_mps2)
-
-    def see(self, index: int, region: Region, position_m: FloatArray, noise: FloatArray, now_ns: int) -> None:
-        """A track's surface was seen: position (3,) in the fixed frame with covariance noise (3, 3)."""
-        state, covariance = kalman.update(
-            self.state[index : index + 1],
-            self.covariance[index : index + 1],
-            position_m[None],
-            noise[None],
-            0,
-        )
-        self.state[index], self.covariance[index] = state[0], covariance[0]
-        self.seen_ns[index] = now_ns
-        self.sightings[index] += 1
-        self.seen_now[index] = True
-        self.bbox_px[index] = region.bbox_px
-        self.extent_m[index] = region.extent_m
+            self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_density)

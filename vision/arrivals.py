@@ -1,0 +1,92 @@
+"""Surfaces where there was free space a moment ago: in a world that stands still there are none.
+
+Whatever the camera saw through, from wherever it stood, was empty. A surface that is there now has
+come. The test needs no texture and no segmentation, and neither a new viewpoint nor what it uncovers
+can mislead it: what was hidden or not measured then proves nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import DepthNoise
+from hal.types import Pose
+from vision.depth_grid import BoolGrid, DepthGrid, FloatGrid
+
+_KEEP_EVERY_S = 0.06
+_LOOK_BACK_S = (0.2, 0.6)
+_MARGIN_M = 0.10
+_SIGMAS = 3.5
+_NEIGHBOURS = 5  # of a cell and its eight neighbours, this many must have arrived
+_UNKNOWN = np.float32(1e3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Memory:
+    stamp_ns: int
+    pose: Pose
+    nearest_inverse: FloatGrid  # per cell the nearest surface of its 3x3 neighbourhood; large: not known
+
+
+class FreeMemory:
+    """Remembers what was seen through during the last moments."""
+
+    def __init__(self, noise: DepthNoise) -> None:
+        self._noise = noise
+        self._memories: list[_Memory] = []
+
+    def clear(self) -> None:
+        """Forget: the poses before cannot be compared with those to come."""
+        self._memories.clear()
+
+    def arrived(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> BoolGrid:
+        """(h, w) cells of mask whose surface stands in space that was seen free."""
+        result = np.zeros(mask.shape, np.uint8)
+        cells = np.flatnonzero(mask)
+        memories = [m for m in (self._memory_of(now_ns, s) for s in _LOOK_BACK_S) if m is not None]
+        if len(cells) == 0 or not memories:
+            return result.astype(np.bool_)
+        points = grid.points(cells)
+        for memory in memories:
+            result.ravel()[cells] |= self._free_then(grid, points, pose, memory)
+        if result.any():
+            count = cv2.boxFilter(result, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+            result &= np.asarray(count >= _NEIGHBOURS, np.uint8)
+        return result.astype(np.bool_)
+
+    def remember(self, grid: DepthGrid, pose: Pose, now_ns: int) -> None:
+        """Keep this view, unless the last one kept is very young."""
+        if self._memories and (now_ns - self._memories[-1].stamp_ns) * 1e-9 < _KEEP_EVERY_S:
+            return
+        known = grid.valid | grid.beyond
+        nearest = cv2.dilate(np.where(known, grid.inverse_depth, _UNKNOWN), np.ones((3, 3), np.uint8))
+        self._memories.append(_Memory(now_ns, pose, np.asarray(nearest, np.float32)))
+        horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))
+        self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
+
+    def _memory_of(self, now_ns: int, wanted_s: float) -> _Memory | None:
+        """The view closest to wanted_s ago, if there is one between half and one and a half of it."""
+        best, gap = None, 0.5 * wanted_s
+        for memory in self._memories:
+            off = abs((now_ns - memory.stamp_ns) * 1e-9 - wanted_s)
+            if off <= gap:
+                best, gap = memory, off
+        return best
+
+    def _free_then(
+        self, grid: DepthGrid, points: FloatGrid, pose: Pose, memory: _Memory
+    ) -> NDArray[np.bool_]:
+        """(K,) which of points (K, 3), camera axes now, lay in what memory saw through."""
+        relative = memory.pose.inverse() @ pose
+        there = points @ relative.rotation.T.astype(np.float32) + relative.translation_m.astype(np.float32)
+        cell, inside = grid.project(there)
+        inverse = np.float32(1.0) / np.maximum(there[:, 2], np.float32(0.05))
+        seen = memory.nearest_inverse.ravel()[cell]
+        sigma = np.float32(np.sqrt(2.0) * self._noise.quadratic_per_m)
+        margin = np.float32(_MARGIN_M) * inverse * inverse + np.float32(_SIGMAS) * sigma
+        result: NDArray[np.bool_] = inside & (inverse - seen > margin)
+        return result

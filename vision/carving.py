@@ -1,0 +1,112 @@
+"""Movers that connected depth hides in something large: a person close to a wall is one part with it.
+
+Cells that have arrived, and cells around fragments that no static surface explains, are cut out and
+become tracks of their own. They are suspects only: without further evidence they go, and their cells
+fall back to what is around them.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import PerceptionConfig
+from vision import obstacles, regions
+from vision.depth_grid import BoolGrid, DepthGrid
+from vision.depth_mask import depth_sigma_m
+from vision.detector import Detection
+from vision.regions import IntGrid
+from vision.tracks import Tracks
+
+_SUSPECT_EVIDENCE = 0.3
+_COMPACT_M = 1.6
+_MIN_CELLS = 12
+_AROUND_M = 0.2
+_MIN_FRAGMENTS = 2
+
+
+def carve(
+    tracks: Tracks, detection: Detection, labels: IntGrid, arrived: BoolGrid, config: PerceptionConfig
+) -> IntGrid:
+    """labels (h, w), track index + 1, with suspects cut out; they are started in tracks."""
+    if len(tracks) == 0:
+        return labels
+    grid = detection.grid
+    evidence = arrived | _around_moving_fragments(detection, labels, config)
+    if not evidence.any():
+        return labels
+    measured = regions.measure(grid, labels, len(tracks))
+    mover = tracks.moving | (tracks.evidence > 0.0)
+    compact = (measured.extent_m[:, 0] <= _COMPACT_M) & (
+        measured.extent_m[:, 2]
+        <= _COMPACT_M + 2.0 * depth_sigma_m(measured.position_m[:, 2], config.depth_noise)
+    )
+    large = np.concatenate(([False], ~mover & ~compact))
+    inside = large[labels]
+    grown = np.asarray(cv2.dilate((evidence & inside).astype(np.uint8), np.ones((3, 3), np.uint8)))
+    grown = grown.astype(np.bool_) & inside
+    if np.count_nonzero(grown) < _MIN_CELLS:
+        return labels
+    count, parts = regions.components(grid, grown)
+    cells = np.bincount(parts.ravel(), minlength=count + 1)
+    keep = np.flatnonzero(cells[1:] >= _MIN_CELLS) + 1
+    if len(keep) == 0:
+        return labels
+    number = np.zeros(count + 1, np.int32)
+    number[keep] = np.arange(1, len(keep) + 1)
+    own = number[parts]
+    suspects = regions.measure(grid, own, len(keep))
+    first = len(tracks)
+    tracks.start(
+        detection.pose.apply(suspects.position_m),
+        0.2,
+        config.motion.max_speed_mps,
+        _SUSPECT_EVIDENCE,
+        detection.captured_ns,
+    )
+    return np.where(own > 0, own + first, labels).astype(np.int32)
+
+
+def _around_moving_fragments(detection: Detection, labels: IntGrid, config: PerceptionConfig) -> BoolGrid:
+    """(h, w) cells close to fragments that move in company, at their depth."""
+    result = np.zeros(labels.shape, np.bool_)
+    motion = detection.motion
+    candidate = obstacles.moving_candidates(motion, detection.age_frames)
+    chosen = np.flatnonzero(candidate)
+    if len(chosen) < _MIN_FRAGMENTS:
+        return result
+    limit = config.motion.max_speed_mps
+    velocity, covariance = obstacles.fragment_velocities(motion, limit)
+    position = 0.5 * (motion.static_m[0::2] + motion.static_m[1::2])[chosen]
+    sigma = depth_sigma_m(position[:, 2], config.depth_noise)
+    group = obstacles.cluster(position, velocity[chosen], covariance[chosen], sigma)
+    company = np.bincount(group)[group] >= _MIN_FRAGMENTS
+    chosen = chosen[company]
+    if len(chosen) == 0:
+        return result
+    return _near_ends(
+        detection.grid, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
+    )
+
+
+def _near_ends(
+    grid: DepthGrid, ends_px: NDArray[np.float32], depth_m: NDArray[np.float32], focal_px: float
+) -> BoolGrid:
+    depth = depth_m.ravel().astype(float)
+    known = np.isfinite(depth)
+    ends, depth = ends_px.reshape(-1, 2)[known].astype(float), depth[known]
+    seeds = np.ones(grid.depth_m.shape, np.uint8)
+    if len(depth) == 0:
+        return seeds == 0
+    rows, columns = grid.rows(ends[:, 1]), grid.columns(ends[:, 0])
+    seeds[rows, columns] = 0
+    distance, label = cv2.distanceTransformWithLabels(seeds, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
+    label = np.asarray(label)
+    there = np.zeros(int(label.max()) + 1)
+    there[label[rows, columns]] = depth
+    nearest_m = there[label]
+    reach = np.asarray(distance) * grid.step_px * nearest_m <= _AROUND_M * focal_px
+    agrees = np.abs(grid.depth_m - nearest_m) <= 0.3 + 0.015 * nearest_m * nearest_m
+    result: BoolGrid = reach & agrees & grid.valid
+    return result

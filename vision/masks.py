@@ -1,0 +1,114 @@
+"""Which cells of the grid belong to which track: what was its surface before, moved on, claims its depth.
+
+Connected depth alone would merge a person with the wall that he passes. So every track keeps the cells
+it covered; moved on by its velocity and by the camera's motion they vote for the connected parts that
+they fall into. A part that only one track votes for is that track's, whole; a part that a mover shares
+is divided by the nearest vote.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray, Pose
+from vision.depth_grid import DepthGrid, FloatGrid
+from vision.regions import IntGrid, spread_labels
+
+_LEAST_VOTES = 4
+_SHARE_OF_PART = 0.15
+_SHARE_OF_TRACK = 0.30
+_DEPTH_GATE_INVERSE = 0.03  # 1/m
+_DEPTH_GATE_M = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surfaces:
+    """What the tracks covered in one frame: points_m (K, 3) in the camera axes of pose, track id (K,)."""
+
+    points_m: FloatGrid
+    track_id: NDArray[np.int64]
+    pose: Pose
+
+
+NO_SURFACES = Surfaces(np.empty((0, 3), np.float32), np.empty(0, np.int64), Pose(np.eye(3), np.zeros(3)))
+
+
+def surfaces(grid: DepthGrid, labels: IntGrid, ids: NDArray[np.int64], pose: Pose) -> Surfaces:
+    """The surfaces of tracks with ids (T,), where labels (h, w) holds index + 1, 0 for none."""
+    cells = np.flatnonzero(labels)
+    return Surfaces(grid.points(cells), ids[labels.ravel()[cells] - 1], pose)
+
+
+def predict(
+    before: Surfaces, index: NDArray[np.intp], shift_m: FloatArray, grid: DepthGrid, pose: Pose
+) -> IntGrid:
+    """(h, w) track index + 1 that is expected, and found at the depth expected, in each cell; 0: none.
+
+    index (K,): track of each point of before, -1: gone. shift_m (T, 3): way of each track since then, in
+    the fixed frame that before.pose and pose are given in.
+    """
+    result = np.zeros(grid.depth_m.shape, np.int32)
+    alive = index >= 0
+    if not alive.any():
+        return result
+    points, track = before.points_m[alive], index[alive]
+    relative = pose.inverse() @ before.pose
+    there = points @ relative.rotation.T.astype(np.float32) + relative.translation_m.astype(np.float32)
+    there += (shift_m @ pose.rotation).astype(np.float32)[track]
+    cell, inside = grid.project(there)
+    measured = grid.inverse_depth.ravel()[cell]
+    expected = np.float32(1.0) / np.maximum(there[:, 2], np.float32(0.1))
+    gate = np.float32(_DEPTH_GATE_INVERSE) + np.float32(_DEPTH_GATE_M) * expected * expected
+    agrees = inside & (measured > 0) & (np.abs(measured - expected) <= gate)
+    chosen = np.flatnonzero(agrees)
+    # The nearer surface is written last and wins the cell.
+    chosen = chosen[np.argsort(expected[chosen], kind="stable")]
+    result.ravel()[cell[chosen]] = track[chosen] + 1
+    return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assignment:
+    """labels (h, w): track index + 1, 0 for none. new_parts: numbers of parts that no track claims."""
+
+    labels: IntGrid
+    new_parts: NDArray[np.intp]
+
+
+def assign(
+    parts: IntGrid, count: int, predicted: IntGrid, tracks: int, mover: NDArray[np.bool_]
+) -> Assignment:
+    """Give the connected parts 1..count of parts (h, w) to tracks, by the votes of predicted (h, w).
+
+    mover (T,): tracks that move, or may: only these divide a part; among static ones the most votes win.
+    """
+    new = np.arange(1, count + 1)
+    if tracks == 0 or count == 0:
+        return Assignment(np.zeros_like(parts), new)
+    ballots = (parts > 0) & (predicted > 0)
+    cast = (parts[ballots] - 1) * tracks + predicted[ballots] - 1
+    votes = np.bincount(cast, minlength=count * tracks).reshape(count, tracks)
+    total = votes.sum(axis=1, keepdims=True)
+    own = votes.sum(axis=0, keepdims=True)
+    present = (votes >= _LEAST_VOTES) & ((votes >= _SHARE_OF_PART * total) | (votes >= _SHARE_OF_TRACK * own))
+    # Of the static tracks in a part only the strongest stays.
+    static_votes = np.where(mover[None, :], 0, votes) * present
+    strongest = static_votes.argmax(axis=1)
+    keep_static = np.zeros_like(present)
+    keep_static[np.arange(count), strongest] = static_votes.max(axis=1) > 0
+    present &= mover[None, :] | keep_static
+    claims = present.sum(axis=1)
+    winner = np.where(claims > 0, np.where(present, votes, -1).argmax(axis=1) + 1, 0).astype(np.int32)
+    labels = np.concatenate(([np.int32(0)], winner))[parts]
+    divided = np.concatenate(([False], claims > 1))
+    if divided.any():
+        allowed = np.zeros((count + 1, tracks + 1), np.bool_)
+        allowed[1:, 1:] = present
+        inside = divided[parts]
+        seeds = np.where(inside & allowed[parts, predicted], predicted, 0).astype(np.int32)
+        filled = spread_labels(seeds, inside)
+        labels = np.where(inside & allowed[parts, filled], filled, labels)
+    return Assignment(labels.astype(np.int32), new[claims == 0])

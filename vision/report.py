@@ -1,0 +1,72 @@
+"""What tracking knows, put into the Scene and the Fragments that others read."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray
+from vision.detector import Detection
+from vision.scene import Fragments, Obstacle
+from vision.tracks import Tracks
+
+MIN_SIGHTINGS = 3
+_STATIC_SCORE = 0.5
+
+
+def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
+    """The tracks seen often enough, in the camera axes of the detection."""
+    pose = detection.pose
+    local = (tracks.state[:, :3] - pose.translation_m) @ pose.rotation
+    velocity = tracks.state[:, 3:] @ pose.rotation
+    covariance = pose.rotation.T @ tracks.covariance[:, 3:, 3:] @ pose.rotation
+    listed = (tracks.sightings >= MIN_SIGHTINGS) & (local[:, 2] > 0.0)
+    result = []
+    for t in np.flatnonzero(listed).tolist():
+        moving = bool(tracks.moving[t])
+        u0, v0, u1, v1 = tracks.bbox_px[t].tolist()
+        result.append(
+            Obstacle(
+                id=int(tracks.ids[t]),
+                bbox_px=(u0, v0, u1, v1),
+                position_m=local[t],
+                extent_m=tracks.extent_m[t].copy(),
+                velocity_mps=velocity[t],
+                velocity_cov=covariance[t],
+                moving=moving,
+                score=float(tracks.confidence[t]) if moving else _STATIC_SCORE,
+                fragments=int(tracks.fragments[t]),
+                age_s=(detection.captured_ns - int(tracks.born_ns[t])) * 1e-9,
+                unseen_s=(detection.captured_ns - int(tracks.seen_ns[t])) * 1e-9,
+            )
+        )
+    return tuple(result)
+
+
+def fragments(
+    detection: Detection,
+    owner: NDArray[np.int64],
+    moving: NDArray[np.bool_],
+    velocity: FloatArray,
+    covariance: FloatArray,
+) -> Fragments:
+    """The fragments with their owners (N,) and whether these move (N,)."""
+    camera = detection.camera
+    depth = detection.near_m.mean(axis=1).astype(float)
+    middle = detection.ends_px.mean(axis=1).astype(float)
+    position = np.empty((len(depth), 3))
+    position[:, 0] = (middle[:, 0] - camera.cx) / camera.fx * depth
+    position[:, 1] = (middle[:, 1] - camera.cy) / camera.fy * depth
+    position[:, 2] = depth
+    measured = detection.motion.usable.reshape(-1, 2).any(axis=1)[:, None]
+    sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    return Fragments(
+        ids=detection.ids,
+        ends_px=detection.ends_px,
+        depth_m=depth,
+        position_m=position,
+        velocity_mps=np.where(measured, velocity, np.nan),
+        velocity_sigma_mps=np.where(measured, sigma, np.nan),
+        moving=moving,
+        obstacle_id=owner,
+    )
