@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -25,28 +26,26 @@ from config.scenario import (
 from hal.types import FloatArray, Pose
 from sim.mesh import Faces, box, join, prism
 from sim.motion import MotionState
-from sim.person import build_person
+from sim.person import build_person, person_footprint, pose_person
 from sim.rack import build_rack
-from sim.vehicle import build_robot
+from sim.vehicle import SENSOR_HEIGHT_M, build_robot
 
 Articulation = Callable[[MotionState], tuple[Pose, ...]]
-
-
-def _rigid(_: MotionState) -> tuple[Pose, ...]:
-    return (Pose(np.eye(3), np.zeros(3)),)
+Outline = Callable[[MotionState], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyModel:
-    """parts: faces, each in the part's own frame. pose_parts gives every part's place in the body frame.
+    """parts: faces, each in the part's own frame. z_m: lowest and highest point.
 
-    footprint_m (K, 2): convex, counter-clockwise, in the body frame. z_m: lowest and highest point.
+    pose_parts: every part's place in the body frame. footprint: what can be touched, a convex polygon
+    (K, 2), counter-clockwise, in the body frame. Both follow the state of motion.
     """
 
     parts: tuple[Faces, ...]
-    footprint_m: FloatArray
     z_m: tuple[float, float]
-    pose_parts: Articulation = field(default=_rigid)
+    pose_parts: Articulation
+    footprint: Outline
 
 
 def rectangle(length_m: float, width_m: float) -> FloatArray:
@@ -90,17 +89,22 @@ def build_body(spec: BodySpec, seed: int) -> BodyModel:
             faces = box(size, _beam_texture(spec.texture), (0.0, 0.0, spec.z_m))
             return _solid(faces, rectangle(spec.length_m, spec.width_m), spec.z_m, spec.height_m)
         case Person():
-            parts, footprint, articulation = build_person(spec, generator)
-            return BodyModel(parts, footprint, (spec.z_m, spec.z_m + spec.height_m), articulation)
+            return BodyModel(
+                parts=build_person(spec, generator),
+                z_m=(spec.z_m, spec.z_m + spec.height_m),
+                pose_parts=partial(pose_person, spec),
+                footprint=partial(person_footprint, spec),
+            )
         case RobotBody():
             parts, articulation = build_robot(spec, pick)
-            height = spec.z_m + spec.height_m + spec.load_height_m
-            footprint = rectangle(spec.length_m, spec.width_m)
-            return BodyModel(parts, footprint, (spec.z_m, height), articulation)
+            top = spec.z_m + spec.height_m + max(spec.load_height_m, SENSOR_HEIGHT_M)
+            outline = rectangle(spec.length_m, spec.width_m)
+            return BodyModel(parts, (spec.z_m, top), articulation, lambda _: outline)
 
 
 def _solid(faces: Faces, footprint_m: FloatArray, z_m: float, height_m: float) -> BodyModel:
-    return BodyModel((faces,), footprint_m, (z_m, z_m + height_m))
+    still = (Pose(np.eye(3), np.zeros(3)),)
+    return BodyModel((faces,), (z_m, z_m + height_m), lambda _: still, lambda _: footprint_m)
 
 
 def _tube(spec: Column | Pole, sides: int, texture: str) -> BodyModel:

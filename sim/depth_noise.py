@@ -87,7 +87,9 @@ class DepthSensor:
         return field[top : top + self._shape[0], left : left + self._shape[1]]
 
 
-def _field(generator: np.random.Generator, shape: tuple[int, int], blob_px: tuple[float, float]) -> Float32Image:
+def _field(
+    generator: np.random.Generator, shape: tuple[int, int], blob_px: tuple[float, float]
+) -> Float32Image:
     """Gaussian noise of unit standard deviation, smooth over blob_px."""
     white = generator.standard_normal(shape).astype(np.float32)
     smooth = np.asarray(cv2.GaussianBlur(white, (0, 0), blob_px[0], sigmaY=blob_px[1]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -14,23 +13,64 @@ from sim.motion import MotionState
 
 _SIDES = 8
 # Shares of the body height, after common anthropometric tables.
-_HIP, _KNEE, _SHOULDER, _CHIN, _ELBOW = 0.52, 0.27, 0.81, 0.86, 0.63
+_HIP, _KNEE, _ANKLE, _SHOULDER, _CHIN, _ELBOW = 0.52, 0.27, 0.03, 0.81, 0.86, 0.63
 _STEP_M = 0.42  # share of the height
+# Heel and toe seen from the ankle, shares of the height; a foot tips by this share of its shank's angle.
+_SOLE: FloatArray = np.array([[-0.035, 0.0, -_ANKLE], [0.104, 0.0, -_ANKLE]])
+_FOOT_TIPS = 0.4
 _THIGH_SWING_RAD, _ARM_SWING_RAD, _KNEE_BEND_RAD = 0.42, 0.38, 0.75
 
 
-def build_person(
-    spec: Person, generator: np.random.Generator
-) -> tuple[tuple[Faces, ...], FloatArray, Callable[[MotionState], tuple[Pose, ...]]]:
-    """Parts in their own frames (joint at the origin), a convex footprint, and the gait."""
+def build_person(spec: Person, generator: np.random.Generator) -> tuple[Faces, ...]:
+    """Trunk; thigh, shank and foot, left then right; the arms' two parts. Joints at the origins."""
     h = spec.height_m
     clothes = _clothes(spec, generator)
     thigh = _limb(0.047 * h, 0.72, (_HIP - _KNEE) * h, clothes["legs"])
-    shank = join([_limb(0.034 * h, 0.72, (_KNEE - 0.03) * h, clothes["legs"]), _shoe(h)])
+    shank = _limb(0.034 * h, 0.72, (_KNEE - _ANKLE) * h, clothes["legs"])
+    leg = (thigh, shank, _shoe(h))
     upper_arm = _limb(0.029 * h, 0.85, (_SHOULDER - _ELBOW) * h, clothes["arms"])
     forearm = join([_limb(0.024 * h, 0.8, 0.15 * h, clothes["arms"]), _hand(h)])
-    parts = (_trunk(h, clothes), thigh, shank, thigh, shank, upper_arm, forearm, upper_arm, forearm)
-    return parts, _footprint(h), lambda state: _gait(h, spec.z_m, state)
+    return _trunk(h, clothes), *leg, *leg, upper_arm, forearm, upper_arm, forearm
+
+
+def person_footprint(spec: Person, state: MotionState) -> FloatArray:
+    """An octagon (8, 2) in the body frame around feet and arms, as wide as they swing at this speed."""
+    h, swing = spec.height_m, _swing(state)
+    front, rear, side = (0.11 + 0.20 * swing) * h, (0.075 + 0.20 * swing) * h, 0.166 * h
+    return np.array(
+        [
+            [front, -0.11 * h], [front, 0.11 * h], [0.85 * front, side], [-0.85 * rear, side],
+            [-rear, 0.11 * h], [-rear, -0.11 * h], [-0.85 * rear, -side], [0.85 * front, -side],
+        ]
+    )  # fmt: skip
+
+
+def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
+    """Where the parts are in the body frame; the lower foot stands on the floor."""
+    h, swing = spec.height_m, _swing(state)
+    phase = math.pi * state.distance_m / (_STEP_M * h)
+    legs: list[Pose] = []
+    arms: list[Pose] = []
+    for side, offset in ((1.0, 0.0), (-1.0, math.pi)):
+        hip = np.array([0.0, side * 0.052 * h, _HIP * h])
+        thigh_rad = -_THIGH_SWING_RAD * swing * math.sin(phase + offset)
+        knee_rad = _KNEE_BEND_RAD * swing * max(0.0, math.cos(phase + offset)) ** 2
+        legs.extend(_chain(hip, thigh_rad, (_HIP - _KNEE) * h, knee_rad))
+        ankle = legs[-1].apply(np.array([[0.0, 0.0, (_ANKLE - _KNEE) * h]]))[0]
+        legs.append(Pose(axis_rotation("y", _FOOT_TIPS * (thigh_rad + knee_rad)), ankle))
+    for side, offset in ((1.0, math.pi), (-1.0, 0.0)):
+        shoulder = np.array([0.0, side * 0.137 * h, (_SHOULDER - 0.01) * h])
+        arm_rad = -_ARM_SWING_RAD * swing * math.sin(phase + offset)
+        arms.extend(_chain(shoulder, arm_rad, (_SHOULDER - _ELBOW) * h, -0.15 - 0.3 * swing))
+    soles = np.concatenate([foot.apply(_SOLE * h)[:, 2] for foot in (legs[2], legs[5])])
+    lift = np.array([0.0, 0.0, spec.z_m - float(soles.min())])
+    poses = (Pose(np.eye(3), np.zeros(3)), *legs, *arms)
+    return tuple(Pose(pose.rotation, pose.translation_m + lift) for pose in poses)
+
+
+def _swing(state: MotionState) -> float:
+    """0..1: slow or standing, the limbs come to rest."""
+    return min(1.0, state.speed_mps / 0.7)
 
 
 def _clothes(spec: Person, generator: np.random.Generator) -> dict[str, str]:
@@ -44,17 +84,15 @@ def _clothes(spec: Person, generator: np.random.Generator) -> dict[str, str]:
 
 
 def _limb(radius_m: float, taper: float, length_m: float, texture: str) -> Faces:
-    """A tapered tube that hangs down from its joint at the origin."""
-    return prism(
-        _SIDES, (radius_m * taper, radius_m * taper), (-length_m, 0.0), texture, taper=1.0 / taper, cap=None
-    )
+    """A tapered tube that hangs down from its joint at the origin, and reaches into its neighbours."""
+    low, overlap = radius_m * taper, 0.6 * radius_m
+    return prism(_SIDES, (low, low), (-length_m - overlap, overlap), texture, taper=1.0 / taper)
 
 
 def _shoe(h: float) -> Faces:
-    z = -(_KNEE - 0.03) * h
-    return prism(
-        6, (0.08 * h, 0.03 * h), (z - 0.03 * h, z + 0.02 * h), "plain/black", 0.75, "plain/black"
-    ).moved(np.eye(3), np.array([0.035 * h, 0.0, 0.0]))
+    """Its ankle at the origin."""
+    sole = prism(6, (0.08 * h, 0.03 * h), (-_ANKLE * h, 0.02 * h), "plain/black", 0.75, "plain/black")
+    return sole.moved(np.eye(3), np.array([0.035 * h, 0.0, 0.0]))
 
 
 def _hand(h: float) -> Faces:
@@ -77,37 +115,6 @@ def _trunk(h: float, clothes: dict[str, str]) -> Faces:
             prism(_SIDES, (0.0508 * h, 0.0432 * h), (0.96 * h, 1.0 * h), "plain/black", 0.6, "plain/black"),
         ]
     )
-
-
-def _footprint(h: float) -> FloatArray:
-    """An octagon around feet and arms as they swing."""
-    x, y = 0.19 * h, 0.145 * h
-    cut = 0.4
-    return np.array(
-        [
-            [x, -cut * y], [x, cut * y], [cut * x, y], [-cut * x, y],
-            [-x, cut * y], [-x, -cut * y], [-cut * x, -y], [cut * x, -y],
-        ]
-    )  # fmt: skip
-
-
-def _gait(h: float, z_m: float, state: MotionState) -> tuple[Pose, ...]:
-    """Poses of trunk, left thigh and shank, right ones, left arm's two parts, right ones."""
-    phase = math.pi * state.distance_m / (_STEP_M * h)
-    # Slow or standing: the limbs come to rest.
-    swing = min(1.0, state.speed_mps / 0.7)
-    bob = -0.012 * h * swing * (1.0 - math.cos(2.0 * phase)) * 0.5
-    poses = [Pose(np.eye(3), np.array([0.0, 0.0, z_m + bob]))]
-    for side, offset in ((1.0, 0.0), (-1.0, math.pi)):
-        hip = np.array([0.0, side * 0.052 * h, _HIP * h + z_m + bob])
-        thigh_rad = -_THIGH_SWING_RAD * swing * math.sin(phase + offset)
-        knee_rad = _KNEE_BEND_RAD * swing * max(0.0, math.cos(phase + offset)) ** 2
-        poses.extend(_chain(hip, thigh_rad, (_HIP - _KNEE) * h, knee_rad))
-    for side, offset in ((1.0, math.pi), (-1.0, 0.0)):
-        shoulder = np.array([0.0, side * 0.137 * h, (_SHOULDER - 0.01) * h + z_m + bob])
-        arm_rad = -_ARM_SWING_RAD * swing * math.sin(phase + offset)
-        poses.extend(_chain(shoulder, arm_rad, (_SHOULDER - _ELBOW) * h, -0.15 - 0.3 * swing))
-    return tuple(poses)
 
 
 def _chain(joint: FloatArray, upper_rad: float, length_m: float, lower_rad: float) -> list[Pose]:

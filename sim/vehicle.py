@@ -11,6 +11,7 @@ from hal.types import Pose
 from sim.mesh import Faces, axis_rotation, box, join, prism
 from sim.motion import MotionState
 
+SENSOR_HEIGHT_M = 0.08  # its lidar stands on the hull
 _WHEEL_SIDES = 12
 
 
@@ -43,10 +44,19 @@ def _hull(spec: RobotBody, radius: float, pick: int) -> Faces:
         box(
             (spec.length_m - 0.04, spec.width_m, spec.height_m - 2.2 * radius), skin, (0.0, 0.0, 2.2 * radius)
         ),
-        prism(8, (0.05, 0.05), (spec.height_m, spec.height_m + 0.08), "plain/black", cap="plain/black").moved(
-            np.eye(3), np.array([0.42 * spec.length_m, 0.0, 0.0])
+        prism(
+            8,
+            (0.05, 0.05),
+            (spec.height_m, spec.height_m + SENSOR_HEIGHT_M),
+            "plain/black",
+            cap="plain/black",
+        ).moved(np.eye(3), np.array([0.42 * spec.length_m, 0.0, 0.0])),
+        box(
+            (0.02, 0.5 * spec.width_m, 0.06),
+            "stripes",
+            (0.5 * spec.length_m - 0.008, 0.0, 1.2 * radius),
+            skip="b",
         ),
-        box((0.02, 0.5 * spec.width_m, 0.06), "stripes", (0.5 * spec.length_m, 0.0, 1.2 * radius), skip="b"),
     ]
     if spec.load_height_m > 0.0:
         size = (0.68 * spec.length_m, 0.85 * spec.width_m, spec.load_height_m)

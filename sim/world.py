@@ -155,7 +155,7 @@ def _state(body: _Body, t_s: float) -> BodyState:
         pose=PlanarPose(state.x_m, state.y_m, state.heading_rad),
         velocity_mps=np.array([state.vx_mps, state.vy_mps]),
         yaw_rate_radps=state.yaw_rate_radps,
-        footprint_m=body.model.footprint_m @ turn.T + np.array([state.x_m, state.y_m]),
+        footprint_m=body.model.footprint(state) @ turn.T + np.array([state.x_m, state.y_m]),
         z_m=body.model.z_m,
         moves=body.spec.motion is not None,
     )
