@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,18 +42,19 @@ def nearest_body(world: World, body: Body, pose: PlanarPose, t_s: float) -> Clea
     """
     robot = robot_footprint(body, pose)
     best = Clearance(BUILDING, _room_clearance(world, robot))
-    centre = robot.mean(axis=0)
-    reach = _radius(robot, centre)
-    for state in world.bodies(t_s):
-        if not overlaps_height(body, state):
-            continue
-        middle = state.footprint_m.mean(axis=0)
-        # No two circles around them are nearer than that: skip the exact test.
-        gap = float(np.hypot(*(middle - centre))) - reach - _radius(state.footprint_m, middle)
-        if gap < best.distance_m:
-            distance = polygon_distance(robot, state.footprint_m)
-            if distance < best.distance_m:
-                best = Clearance(state.name, distance)
+    reach = math.hypot(max(body.front_m, body.rear_m), 0.5 * body.width_m)
+    in_height = [state for state in world.bodies(t_s) if overlaps_height(body, state)]
+    # Between circles around both: no two points of theirs are nearer than that.
+    gaps = [
+        math.hypot(state.pose.x_m - pose.x_m, state.pose.y_m - pose.y_m) - state.reach_m - reach
+        for state in in_height
+    ]
+    for index in sorted(range(len(gaps)), key=gaps.__getitem__):
+        if gaps[index] >= best.distance_m:
+            break
+        distance = polygon_distance(robot, in_height[index].footprint_m)
+        if distance < best.distance_m:
+            best = Clearance(in_height[index].name, distance)
     return best
 
 
@@ -88,10 +90,6 @@ def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
     share = np.clip((to_corner * edge).sum(axis=2) / (edge * edge).sum(axis=1), 0.0, 1.0)
     away = to_corner - share[:, :, None] * edge
     return float(np.sqrt((away * away).sum(axis=2).min()))
-
-
-def _radius(polygon: FloatArray, centre: FloatArray) -> float:
-    return float(np.sqrt(((polygon - centre) ** 2).sum(axis=1).max()))
 
 
 def _room_clearance(world: World, robot: FloatArray) -> float:

@@ -39,8 +39,9 @@ class Geometry:
 class BodyState:
     """One body at one time, on the floor's axes.
 
-    id: its value in instance masks. velocity_mps (2,). footprint_m (K, 2): convex, counter-clockwise.
-    z_m: lowest and highest point. moves: whether it has a plan of motion at all.
+    id: its value in instance masks. velocity_mps (2,). footprint_m (K, 2): convex, counter-clockwise;
+    no part of it is further than reach_m from pose. z_m: lowest and highest point. moves: whether it has a
+    plan of motion at all.
     """
 
     id: int
@@ -50,6 +51,7 @@ class BodyState:
     velocity_mps: FloatArray
     yaw_rate_radps: float
     footprint_m: FloatArray
+    reach_m: float
     z_m: tuple[float, float]
     moves: bool
 
@@ -148,6 +150,7 @@ def _state(body: _Body, t_s: float) -> BodyState:
     state: MotionState = body.trajectory.at(t_s)
     c, s = math.cos(state.heading_rad), math.sin(state.heading_rad)
     turn = np.array([[c, -s], [s, c]])
+    outline = body.model.footprint(state)
     return BodyState(
         id=body.id,
         name=body.spec.name,
@@ -155,7 +158,8 @@ def _state(body: _Body, t_s: float) -> BodyState:
         pose=PlanarPose(state.x_m, state.y_m, state.heading_rad),
         velocity_mps=np.array([state.vx_mps, state.vy_mps]),
         yaw_rate_radps=state.yaw_rate_radps,
-        footprint_m=body.model.footprint(state) @ turn.T + np.array([state.x_m, state.y_m]),
+        footprint_m=outline @ turn.T + np.array([state.x_m, state.y_m]),
+        reach_m=math.sqrt(float((outline * outline).sum(axis=1).max())),
         z_m=body.model.z_m,
         moves=body.spec.motion is not None,
     )
