@@ -35,9 +35,9 @@ class Prediction(Section):
     """What obstacles may do next."""
 
     horizon_s: float = Field(default=8.0, ge=2, le=30)
-    sigmas: float = Field(default=2.0, ge=0, le=5, description="how many sigmas of the velocity are covered")
+    sigmas: float = Field(default=1.0, ge=0, le=5, description="how many sigmas of the velocity are covered")
     manoeuvre_mps2: float = Field(
-        default=0.5, ge=0, le=5, description="by how much a moving obstacle may change its velocity"
+        default=0.25, ge=0, le=5, description="by how much a moving obstacle may change its velocity"
     )
     leader_decel_mps2: float = Field(
         default=1.0, gt=0, le=10, description="how hard an obstacle driving ahead may brake"
@@ -54,6 +54,9 @@ class Sight(Section):
     """What the camera is trusted with."""
 
     range_m: float = Field(default=10.0, gt=0.5, le=100, description="beyond it nothing is seen for certain")
+    near_m: float = Field(
+        default=1.3, ge=0, le=10, description="ahead of the camera, nearer than this the floor is not seen"
+    )
     stale_s: float = Field(default=0.3, gt=0, le=5, description="an older scene leads to a stop")
     degraded_mps: float = Field(default=0.5, ge=0, le=5, description="top speed with a degraded camera")
     memory_s: float = Field(

@@ -1,0 +1,72 @@
+"""The worst case: whatever moving obstacles may do within their means, can the robot still stand before it?
+
+An obstacle that moves may change its velocity by a bounded acceleration, up to V_omax, and its velocity is
+only known with a spread. Standing when something touches it is all that a robot which cannot leave its path
+can promise; so for each speed the emergency stop is followed, latency included, against all that each
+obstacle could reach by then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.corridor import Placed
+from controller.profile import SpeedRamps
+from hal.types import FloatArray
+
+_STANDING_MPS = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """What N obstacles could block at K times: inside (N, K) whether, lo_m, hi_m (N, K) which positions."""
+
+    inside: NDArray[np.bool_]
+    lo_m: FloatArray
+    hi_m: FloatArray
+
+
+def reach(
+    placed: Placed,
+    times_s: FloatArray,
+    since_s: float,
+    sigma_mps: FloatArray,
+    speed_mps: FloatArray,
+    manoeuvre_mps2: FloatArray,
+    most_mps: float,
+    margin_m: float,
+) -> Reach:
+    """Grow the bodies by what they could do in times_s (K,) from now; they were seen since_s ago.
+
+    sigma_mps (N,) spread of the velocity as far as it is to be covered, speed_mps (N,) measured speed,
+    manoeuvre_mps2 (N,), most_mps the top speed of any obstacle.
+    """
+    t = times_s + since_s
+    could = sigma_mps[:, None] * t + 0.5 * manoeuvre_mps2[:, None] * t * t
+    grown = np.minimum(could, (most_mps + speed_mps)[:, None] * t)
+    return Reach(
+        placed.clear_m - grown <= 0.0,
+        placed.lo_m - grown - margin_m,
+        placed.hi_m + grown,
+    )
+
+
+def stops_in_time(ramps: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> FloatArray:
+    """(R,) for each ramp to a stop: the least distance by which it stays short of everything while it still
+    moves; negative where something could be touched, inf where nothing is in the way."""
+    count = len(ramps.duration_s)
+    distance, speed, _ = ramps.state(np.broadcast_to(times_s, (count, len(times_s))))
+    at = (s_m + distance)[:, None, :]
+    matters = reached.inside & (at < reached.hi_m) & (speed > _STANDING_MPS)[:, None, :]
+    room = np.where(matters, reached.lo_m - at, np.inf)
+    least: FloatArray = room.min(axis=(1, 2), initial=np.inf)
+    return least
+
+
+def gets_through(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:
+    """Whether a single ramp to a speed stays clear of everything at all times."""
+    at = s_m + ramp.distance(times_s[None, :])
+    return not bool((reached.inside & (at > reached.lo_m) & (at < reached.hi_m)).any())

@@ -1,0 +1,143 @@
+"""Obstacles that cross: pass before them, slow a little, or wait - one choice each, kept unless it must go.
+
+A conflict is the time between an obstacle's entering the swept corridor and its leaving it, with the stretch
+of the robot's way that it blocks meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.corridor import Placed
+from controller.profile import SpeedRamps
+from hal.types import FloatArray
+
+# Uncertainty of the place grows with time, but an obstacle that is watched is not lost altogether.
+_MOST_SPREAD_M = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """row: of the body. in_s, out_s: from now; out_s is inf where it does not leave within the horizon.
+    lo_*, hi_*: positions of the robot that it blocks then."""
+
+    row: int
+    in_s: float
+    out_s: float
+    lo_in_m: float
+    lo_out_m: float
+    hi_in_m: float
+    hi_out_m: float
+
+
+def find_conflicts(
+    placed: Placed,
+    times_s: FloatArray,
+    sigma_side_mps: FloatArray,
+    margin_m: FloatArray,
+    rows: NDArray[np.intp],
+) -> list[Conflict]:
+    """For the bodies rows: when they are within margin_m (N,) of the corridor.
+
+    times_s (K,) begins at 0 = now. Entering must be likely (the spread of the sideways velocity taken off),
+    leaving must be certain (the spread added): the first avoids braking for noise, the second for hope; what
+    an unlikely entry could do is watched by controller/contingency.py.
+    """
+    clear = placed.clear_m[rows] - margin_m[rows, None]
+    spread = np.minimum(sigma_side_mps[rows, None] * times_s, _MOST_SPREAD_M)
+    found = []
+    for k, row in enumerate(rows):
+        entry = -1.0 if clear[k, 0] <= 0.0 else _first_below(clear[k] + spread[k], times_s)
+        if math.isinf(entry):
+            continue
+        exit_s = _first_above(clear[k] - spread[k], times_s, max(entry, 0.0))
+        found.append(_conflict(placed, times_s, int(row), max(entry, 0.0), exit_s))
+    return found
+
+
+def _first_below(values: FloatArray, times_s: FloatArray) -> float:
+    """When values first fall to 0, between the samples; inf: never."""
+    below = values <= 0.0
+    if not below.any():
+        return math.inf
+    k = int(below.argmax())
+    if k == 0:
+        return float(times_s[0])
+    share = values[k - 1] / (values[k - 1] - values[k])
+    return float(times_s[k - 1] + share * (times_s[k] - times_s[k - 1]))
+
+
+def _first_above(values: FloatArray, times_s: FloatArray, after_s: float) -> float:
+    above = (values > 0.0) & (times_s > after_s)
+    if not above.any():
+        return math.inf
+    k = int(above.argmax())
+    if k == 0 or values[k - 1] > 0.0:
+        return float(times_s[k])
+    share = -values[k - 1] / (values[k] - values[k - 1])
+    return float(times_s[k - 1] + share * (times_s[k] - times_s[k - 1]))
+
+
+def _conflict(placed: Placed, times_s: FloatArray, row: int, in_s: float, out_s: float) -> Conflict:
+    end_s = min(out_s, float(times_s[-1]))
+    lo, hi = placed.lo_m[row], placed.hi_m[row]
+    return Conflict(
+        row,
+        in_s,
+        out_s,
+        float(np.interp(in_s, times_s, lo)),
+        float(np.interp(end_s, times_s, lo)),
+        float(np.interp(in_s, times_s, hi)),
+        float(np.interp(end_s, times_s, hi)),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """For one conflict: speeds up to yield_mps let it pass first, speeds from first_mps on pass before it
+    (inf: none does)."""
+
+    yield_mps: float
+    first_mps: float
+
+
+def choices(
+    conflict: Conflict,
+    ramps: SpeedRamps,
+    speeds_mps: FloatArray,
+    s_m: float,
+    margin_m: float,
+    leave_s: float,
+    enter_s: float,
+) -> Choice:
+    """Both bounds, for the robot at s_m whose ramps lead to speeds_mps (N,), growing, from 0 on.
+
+    leave_s: how long after the obstacle has left, enter_s: how long before it enters, the robot may come.
+    """
+    n = len(speeds_mps)
+    times = np.array([conflict.in_s, max(conflict.in_s - enter_s, 0.0), conflict.out_s + leave_s])
+    leaves = math.isfinite(conflict.out_s)
+    if not leaves:
+        times[2] = times[0]
+    at_in, at_first, at_out = ramps.distance(np.broadcast_to(times, (n, 3))).T + s_m
+    room = np.minimum(conflict.lo_in_m - at_in, conflict.lo_out_m - at_out) - margin_m
+    yield_mps = _greatest_with_room(room, speeds_mps) if leaves else 0.0
+    passes = at_first > conflict.hi_in_m
+    first_mps = float(speeds_mps[int(passes.argmax())]) if passes.any() else math.inf
+    return Choice(yield_mps, first_mps)
+
+
+def _greatest_with_room(room: FloatArray, speeds_mps: FloatArray) -> float:
+    """Where the falling room becomes 0, between two speeds; 0 where even standing is too near."""
+    short = room < 0.0
+    if not short.any():
+        return math.inf
+    k = int(short.argmax())
+    if k == 0:
+        return 0.0
+    share = room[k - 1] / (room[k - 1] - room[k])
+    return float(speeds_mps[k - 1] + share * (speeds_mps[k] - speeds_mps[k - 1]))

@@ -1,0 +1,165 @@
+"""What depth alone says of the corridor: the nearest surface in it, and how far it was seen to be free.
+
+Edges are blind to a plain wall and no camera sees through glass: a surface that no obstacle explains counts
+as an obstacle, and floor that was not seen is not free.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.decision import DecisionConfig
+from controller.bodies import Bodies
+from controller.corridor import Corridor
+from hal.clocks import NS_PER_S
+from hal.geometry import body_in_floor
+from hal.types import CameraMount, FloatArray, PlanarPose
+from vision.scene import FreeSpace
+
+_CELL_M = 0.2
+_NEVER_NS = -(2**62)
+_LANES = 5
+# One frame's outlier must not brake; three frames of five are a tenth of a second.
+_FRAMES = 5
+# A point this near to an obstacle's box is part of it: swinging limbs, a box that lags a little.
+_AROUND_M = 0.3
+_DEPTH_SIGMA_1PM = 0.0075
+_DEPTH_SIGMAS = 3.5
+
+
+class Sight:
+    """Remembers along one path what was seen of it; look() once a scene.
+
+    surface_s_m: where the nearest unexplained surface stands in the corridor (path coordinate of its nearest
+    point, inf: none), steady against single frames; newest_surface_s_m: the same of the newest frame alone.
+    known_s_m: the corridor was seen free up to here.
+    """
+
+    def __init__(
+        self, corridor: Corridor, mount: CameraMount, config: DecisionConfig, start_s_m: float
+    ) -> None:
+        self._corridor, self._mount = corridor, mount
+        self._sight, self._lateral_m = config.sight, config.margins.lateral_m
+        length = corridor.path.length_m + corridor.front_m + _CELL_M
+        self._cells = np.arange(0.5 * _CELL_M, length, _CELL_M)
+        self._seen_ns = np.full(len(self._cells), _NEVER_NS, np.int64)
+        # Under the nose and beside it nothing can be seen: what the robot stands before is free by consent.
+        self._consent_s_m = start_s_m + mount.forward_m + self._sight.near_m + _CELL_M
+        self._nearest: deque[float] = deque(maxlen=_FRAMES)
+        self._held_s_m = math.inf
+        self.surface_s_m = self.newest_surface_s_m = math.inf
+        self.known_s_m = self._consent_s_m
+
+    def look(
+        self,
+        free: FreeSpace,
+        pose: PlanarPose,
+        s_m: float,
+        captured_ns: int,
+        explained_by: Bodies,
+        standing: bool,
+    ) -> None:
+        """Take in one scene. pose, s_m: of the robot when it was captured. standing: it was at rest then."""
+        points, lanes = self._surface_points(free, pose)
+        inside_s, inside = self._in_corridor(points, lanes, s_m)
+        explained = explained_by.covers(points, self._tolerance_m(free), _AROUND_M).any(axis=1)
+        self._note_surface(inside_s[inside & ~explained], s_m, standing)
+        self._note_floor(free, pose, s_m, captured_ns, inside)
+
+    def _surface_points(self, free: FreeSpace, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
+        """Floor points (B, 2) of each band's nearest surface (far away where there is none), and half the
+        width (B,) of its band there."""
+        known = np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan)
+        forward = np.where(known, free.nearest_m, 1e3)
+        body = np.stack(
+            (
+                forward + self._mount.forward_m,
+                self._mount.left_m - forward * np.where(known, free.bearing_tan, 0.0),
+                np.zeros_like(forward),
+            ),
+            axis=1,
+        )
+        return body_in_floor(pose).apply(body)[:, :2], forward * free.half_width_tan
+
+    def _tolerance_m(self, free: FreeSpace) -> FloatArray:
+        """How far from its body a surface point may be for the noise of depth."""
+        nearest = np.where(np.isfinite(free.nearest_m), free.nearest_m, 0.0)
+        return _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * nearest**2
+
+    def _in_corridor(
+        self, points: FloatArray, half_band_m: FloatArray, s_m: float
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        s, d = self._corridor.path.project_points(points, s_m, s_m + self._sight.range_m + 2.0)
+        side = np.abs(d) - half_band_m
+        return s, (side <= self._corridor.half_width(s) + self._lateral_m) & (s > s_m)
+
+    def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
+        nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
+        self._nearest.append(nearest)
+        self.newest_surface_s_m = nearest
+        before = self.surface_s_m
+        steady = float(np.median(np.array(self._nearest)))
+        # What goes out of sight below the camera because the robot drives on is still there; what goes while
+        # the robot stands has gone away.
+        blind_s_m = s_m + self._mount.forward_m + self._sight.near_m
+        if standing or self._held_s_m < s_m:
+            self._held_s_m = math.inf
+        elif steady > before + _CELL_M and before < blind_s_m:
+            self._held_s_m = min(self._held_s_m, before)
+        self.surface_s_m = min(steady, self._held_s_m)
+
+    def _note_floor(
+        self,
+        free: FreeSpace,
+        pose: PlanarPose,
+        s_m: float,
+        captured_ns: int,
+        surface_in_corridor: NDArray[np.bool_],
+    ) -> None:
+        """Mark the cells whose width was seen; then find the first one ahead that is not known."""
+        first = int(np.searchsorted(self._cells, s_m))
+        last = int(np.searchsorted(self._cells, s_m + self._sight.range_m + self._mount.forward_m))
+        cells = self._cells[first:last]
+        if len(cells) and len(free.bearing_tan):
+            seen = self._lanes_seen(free, pose, cells, surface_in_corridor)
+            self._seen_ns[first:last][seen >= self._sight.known_share] = captured_ns
+        memory_ns = round(self._sight.memory_s * NS_PER_S)
+        fresh = self._seen_ns >= captured_ns - memory_ns
+        # Too near to be seen again: what was once seen free stays so, others' bodies are watched elsewhere.
+        near = self._cells <= s_m + self._mount.forward_m + self._sight.near_m + _CELL_M
+        known = fresh | (near & (self._seen_ns > _NEVER_NS)) | (self._cells <= self._consent_s_m)
+        unknown = np.flatnonzero(~known[first:])
+        self.known_s_m = float(self._cells[first + unknown[0]]) - 0.5 * _CELL_M if len(unknown) else math.inf
+
+    def _lanes_seen(
+        self,
+        free: FreeSpace,
+        pose: PlanarPose,
+        cells: FloatArray,
+        surface_in_corridor: NDArray[np.bool_],
+    ) -> FloatArray:
+        """(C,) share of each cell's width that was seen as free, or lies behind a surface in the corridor:
+        that surface limits the speed itself."""
+        x, y, heading = self._corridor.path.poses(cells)
+        half = self._corridor.half_width(cells)
+        lanes = np.linspace(-1.0, 1.0, _LANES)
+        px = x[:, None] - np.sin(heading)[:, None] * half[:, None] * lanes
+        py = y[:, None] + np.cos(heading)[:, None] * half[:, None] * lanes
+        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+        dx, dy = px - pose.x_m, py - pose.y_m
+        forward = dx * cos + dy * sin - self._mount.forward_m
+        right = self._mount.left_m + dx * sin - dy * cos
+        bearing = right / np.maximum(forward, 1e-3)
+        left_edge = free.bearing_tan[0] - free.half_width_tan
+        band = np.floor((bearing - left_edge) / (2.0 * free.half_width_tan)).astype(np.intp)
+        in_view = (forward > 0.0) & (band >= 0) & (band < len(free.bearing_tan))
+        band = np.clip(band, 0, len(free.bearing_tan) - 1)
+        behind = surface_in_corridor[band] & (forward >= free.nearest_m[band])
+        # The far edge of a cell, so that a cell is not known for the sake of its beginning.
+        seen = in_view & ((forward + 0.5 * _CELL_M <= free.known_m[band]) | behind)
+        share: FloatArray = seen.mean(axis=1)
+        return share
