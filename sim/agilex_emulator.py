@@ -189,8 +189,8 @@ class AgilexEmulator:
             if self.mode != _REMOTE and message.mode in (_STANDBY, _CAN, _SERIAL):
                 if message.mode != self.mode:
                     self._plant.command(0.0, 0.0)
+                    self._command_ns = None
                 self.mode = message.mode
-                self._command_ns = None
         elif isinstance(message, MotionCommand) and self.mode == _CAN and self.vehicle_state == _NORMAL:
             self._command_ns = self._now_ns
             self._plant.command(message.v_mps, message.w_radps)

@@ -107,9 +107,7 @@ class ChassisDriver(ABC):
         """See hal.api.Chassis."""
         self._now_ns = now_ns
         self._arming = arming.release(self._arming, now_ns)
-        if self._link_error:
-            return
-        try:
+        try:  # Also on a link that was lost: it may be back.
             self._speak_stop(now_ns)
         except LinkLost as error:
             self._lose(error, now_ns)

@@ -86,7 +86,7 @@ class RoboclawChassis(ChassisDriver):
         if not self._port.idle(now_ns):
             return None
         stops = self._moving and is_zero(command)
-        if self._setup and not stops:
+        if self._setup:
             self._port.start(self._setup.popleft(), now_ns)
             return None
         self._queries_turn = not self._queries_turn and not stops
@@ -98,7 +98,6 @@ class RoboclawChassis(ChassisDriver):
     def _speak_stop(self, now_ns: int) -> None:
         # Zero does not wait for the answer that is under way; the controller takes packets in order.
         self._port.abandon(now_ns)
-        self._setup.clear()
         self._feedback.forget_setup()
         self._port.start(packets.speeds(0, 0), now_ns)
         self._port.abandon(now_ns)

@@ -265,6 +265,19 @@ def test_stop_on_a_lost_link_raises_nothing(rig: Rig) -> None:
     rig.chassis.__exit__(None, None, None)
 
 
+def test_stop_on_a_link_that_has_come_back_is_heard(rig: Rig) -> None:
+    """The driver has not tried the link again yet, but stop() does."""
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.5)
+    rig.plug.out = True
+    rig.step(0.5)
+    rig.plug.plug()
+    rig.chassis.stop(rig.now_ns)
+    rig.coast(0.1)
+    assert rig.plant.twist[0] < 0.35
+
+
 def test_a_host_that_dies_leaves_a_base_that_stops(rig: Rig) -> None:
     rig.run(0.2)
     rig.arm()

@@ -84,6 +84,18 @@ class TestPort:
         port.start(packets.speeds(2, 2), 48 * MS)
         assert port.poll(50 * MS) is None
 
+    def test_an_abandoned_request_leaves_room_for_its_answer(self) -> None:
+        link = ScriptedSerialLink()
+        port = RoboclawPort(link, ADDRESS)
+        port.start(packets.speeds(1, 1), 0)
+        port.abandon(5 * MS)
+        link.deliver(b"\xff")
+        assert port.poll(20 * MS) is None
+        assert not port.idle(34 * MS)
+        assert port.idle(35 * MS)
+        port.abandon(50 * MS)
+        assert port.idle(50 * MS), "nothing to abandon"
+
     def test_the_short_status_is_whole_when_silence_follows(self) -> None:
         link = ScriptedSerialLink()
         port = RoboclawPort(link, ADDRESS)
@@ -220,6 +232,21 @@ def test_stop_writes_the_explicit_zero_even_while_an_answer_is_awaited() -> None
     bench.near.written.clear()
     bench.chassis.stop(bench.now_ns)
     assert bench.near.written == [bytes.fromhex("80 25 00 00 00 00 00 00 00 00 34 04")]
+
+
+@pytest.mark.parametrize("steps", range(40, 46))
+def test_a_zero_that_replaces_motion_takes_the_next_turn(steps: int) -> None:
+    """Whosever turn it is: the first packet after the zero was asked for says zero."""
+    bench = Bench()
+    bench.arm()
+    bench.run(steps, 0.5)
+    for _ in range(4):
+        state = bench.step(0.0)
+        if bench.near.written:
+            break
+    assert [packet[1] for packet in bench.near.written] == [packets.RAMPED_SPEEDS]
+    assert state.sent is not None
+    assert (state.sent.v_mps, state.sent.w_radps) == (0.0, 0.0)
 
 
 def test_wrong_checksums_on_the_line_are_survived() -> None:

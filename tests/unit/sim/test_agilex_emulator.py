@@ -127,6 +127,13 @@ def test_stops_half_a_second_after_the_last_command() -> None:
     assert bench.plant.twist[0] > 0.2, "like the real one, it follows again at once: the host must not let it"
 
 
+def test_only_motion_commands_keep_it_going() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.run(1500, ControlModeCommand(CAN))
+    assert bench.plant.twist[0] == pytest.approx(0.0, abs=1e-3)
+
+
 def test_system_state_counts() -> None:
     bench = Bench()
     states = [message for message in bench.run(30_000) if isinstance(message, SystemState)]
