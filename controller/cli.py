@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
+from typing import Literal
 
 import click
 
+from config.camera import OdometryChoice
 from config.loader import CONFIG_DIR, ConfigError
 from controller.errors import UserError
 from hal.errors import HalError
@@ -62,7 +65,7 @@ def run(
 @click.option("--quiet", is_flag=True, help="Only the summary.")
 def replay(
     recording: Path,
-    odometry: str,
+    odometry: OdometryChoice,
     config_path: Path,
     observations: Path | None,
     video: Path | None,
@@ -95,6 +98,47 @@ def bench(json_path: Path | None, frames: int) -> None:
     from controller.bench.command import run_bench
 
     run_bench(frames, json_path)
+
+
+@cli.command()
+@click.argument("recordings", type=_FOLDER_OR_FILE, nargs=-1)
+@click.option("--sim", "simulated", is_flag=True, help="The simulated set, with truth.")
+@click.option(
+    "--report", type=click.Path(path_type=Path, file_okay=False), required=True,
+    help="Folder for report.md, summary.json and the figures.",
+)  # fmt: skip
+@click.option(
+    "--odometry", type=click.Choice(["file", "none", "groundtruth"]), default="file", show_default=True,
+    help="Recordings: prior of the camera's motion. The simulated set is run with and without.",
+)  # fmt: skip
+@click.option("--static", is_flag=True, help="Recordings: nothing moves but the camera, so all is false.")
+@click.option(
+    "--baselines", type=click.Choice(["none", "some", "all"]), default="some", show_default=True,
+    help="Simulated set: the methods of the paper's Table 1 on no, some or all sequences.",
+)  # fmt: skip
+@click.option("--only", multiple=True, metavar="NAME", help="Simulated set: this sequence; may be repeated.")
+@click.option(
+    "--workers", type=click.IntRange(1, 64), default=min(os.cpu_count() or 1, 8), show_default=True,
+    help="Processes that share the simulated set.",
+)  # fmt: skip
+@click.option("--quiet", is_flag=True, help="No progress bar.")
+def evaluate(
+    recordings: tuple[Path, ...],
+    simulated: bool,
+    report: Path,
+    odometry: OdometryChoice,
+    static: bool,
+    baselines: Literal["none", "some", "all"],
+    only: tuple[str, ...],
+    workers: int,
+    quiet: bool,
+) -> None:
+    """Measure detection: against the truth of the simulated set, and on recordings. Writes a report."""
+    from controller.evaluation.evaluate import EvaluationOptions, run_evaluation
+
+    run_evaluation(
+        EvaluationOptions(recordings, simulated, report, odometry, static, baselines, only, workers, quiet)
+    )
 
 
 def main() -> None:

@@ -9,12 +9,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Literal
 
 import cv2
 
 from controller.evaluation.contestants import ALWAYS, BASELINES
 from controller.evaluation.run_sequence import SequenceRecord, run_sequence
 from controller.evaluation.sequences import Sequence
+
+Baselines = Literal["none", "some", "all"]
 
 # The slow baselines look at these by default: every kind of drive, both noises, movers and none.
 BASELINE_SEQUENCES = frozenset(
@@ -45,15 +48,15 @@ class Task:
     methods: tuple[str, ...]
 
 
-def plan(sequences: tuple[Sequence, ...], baselines: str) -> tuple[Task, ...]:
-    """baselines: "none", "some" (on BASELINE_SEQUENCES) or "all". The longest tasks first."""
+def plan(sequences: tuple[Sequence, ...], baselines: Baselines) -> tuple[Task, ...]:
+    """baselines: "some" looks at BASELINE_SEQUENCES alone. The longest tasks first."""
     tasks = [
         Task(one, ALWAYS + (BASELINES if _with_baselines(one.name, baselines) else ())) for one in sequences
     ]
     return tuple(sorted(tasks, key=lambda task: -len(task.methods)))
 
 
-def _with_baselines(name: str, baselines: str) -> bool:
+def _with_baselines(name: str, baselines: Baselines) -> bool:
     return baselines == "all" or (baselines == "some" and name in BASELINE_SEQUENCES)
 
 

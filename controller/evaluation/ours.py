@@ -29,10 +29,11 @@ class Treadwatch:
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
         percept = self._perception.perceive(frame, odometry, None)
         self.scene, self.fragments = percept.scene, percept.fragments
-        return Answer(tuple(_detection(obstacle) for obstacle in percept.scene.obstacles))
+        return Answer(tuple(detection_of(obstacle) for obstacle in percept.scene.obstacles))
 
 
-def _detection(obstacle: Obstacle) -> Detection:
+def detection_of(obstacle: Obstacle) -> Detection:
+    """An obstacle as the scores take it."""
     return Detection(
         obstacle.id,
         obstacle.bbox_px,

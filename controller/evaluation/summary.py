@@ -40,6 +40,11 @@ class MethodSummary:
     pixels: PixelCounts
     sequences: int
 
+    @property
+    def pixel_counts(self) -> Counts:
+        """At the level from which a pixel counts as called moving."""
+        return self.pixels.at(PIXEL_LEVEL)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Summary:
@@ -145,7 +150,7 @@ def _method(one: MethodSummary) -> dict[str, Any]:
         "object": _counts(figures.objects),
         "frame": _counts(figures.settled),
         "frame_with_first_half_second": _counts(figures.frames),
-        "pixel": _counts(one.pixels.at(PIXEL_LEVEL)),
+        "pixel": _counts(one.pixel_counts),
         "false_moving_per_minute": number(figures.wrong_per_minute, 3),
         "speed_error_mps": {
             "median": number(figures.speed_error_median_mps),

@@ -1,0 +1,255 @@
+"""Charts for a report, drawn with OpenCV: axes with round ticks, lines, markers, bars, a legend.
+
+One Chart owns a rectangle of a picture. Data coordinates go in, anti-aliased strokes come out; what is not
+finite is left out. Colours are those of Okabe and Ito (2008) on white.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.video import draw, text
+from controller.video.style import Colour, Image, Rect, bgr
+from hal.types import FloatArray
+
+PAPER = (255, 255, 255)
+INK = bgr("1B1F24")
+SOFT_INK = bgr("5B6570")
+GRID = bgr("E4E8EC")
+FRAME = bgr("8C959F")
+
+BLUE = bgr("0072B2")
+ORANGE = bgr("D55E00")
+GREEN = bgr("009E73")
+PURPLE = bgr("B65C95")
+SKY = bgr("56B4E9")
+AMBER = bgr("E69F00")
+GREY = bgr("7F8891")
+
+_LEFT, _RIGHT, _TOP, _BOTTOM = 78, 22, 50, 62
+_TITLE, _LABEL, _TICK, _LEGEND = 21, 17, 15, 15
+
+Marker = Literal["circle", "square", "diamond", "cross"]
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """From low to high; log: to base ten, both ends above zero. ticks: own places instead of round ones."""
+
+    label: str
+    low: float
+    high: float
+    log: bool = False
+    ticks: tuple[tuple[float, str], ...] | None = None
+
+    def share(self, values: FloatArray) -> FloatArray:
+        """Where values stand between low (0) and high (1)."""
+        if not self.log:
+            return (values - self.low) / (self.high - self.low)
+        safe = np.where(values > 0.0, values, np.nan)
+        span: FloatArray = (np.log10(safe) - math.log10(self.low)) / math.log10(self.high / self.low)
+        return span
+
+    def places(self) -> list[tuple[float, str]]:
+        """Ticks and their labels."""
+        if self.ticks is not None:
+            return list(self.ticks)
+        if self.log:
+            powers = range(math.ceil(math.log10(self.low)), math.floor(math.log10(self.high)) + 1)
+            return [(10.0**power, f"{10.0**power:g}") for power in powers]
+        return [(value, f"{value:g}") for value in round_ticks(self.low, self.high)]
+
+
+def round_ticks(low: float, high: float, about: int = 6) -> list[float]:
+    """Multiples of 1, 2 or 5 times a power of ten between low and high, about so many."""
+    raw = (high - low) / about
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw * (1.0 - 1e-9))
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
+    return [round(index * step, 12) for index in range(first, last + 1)]
+
+
+@dataclass(frozen=True, slots=True)
+class LegendEntry:
+    """A line, a marker, or both, and what they stand for."""
+
+    label: str
+    colour: Colour
+    line: bool = True
+    marker: Marker | None = None
+    dashed: bool = False
+
+
+class Chart:
+    """Draws one diagram into area of image."""
+
+    def __init__(self, image: Image, area: Rect, title: str, x: Axis, y: Axis) -> None:
+        self._image = image
+        self._x, self._y = x, y
+        self.plot = Rect(
+            area.x + _LEFT, area.y + _TOP, area.width - _LEFT - _RIGHT, area.height - _TOP - _BOTTOM
+        )
+        self._legend: list[LegendEntry] = []
+        self._draw_axes(area, title)
+
+    def to_px(self, x: Sequence[float] | FloatArray, y: Sequence[float] | FloatArray) -> FloatArray:
+        """Data (N,), (N,) to pixels (N, 2)."""
+        u = self.plot.x + self._x.share(np.asarray(x, np.float64)) * (self.plot.width - 1)
+        v = self.plot.bottom - 1 - self._y.share(np.asarray(y, np.float64)) * (self.plot.height - 1)
+        return np.stack([u, v], axis=1)
+
+    def line(
+        self,
+        x: Sequence[float] | FloatArray,
+        y: Sequence[float] | FloatArray,
+        colour: Colour,
+        label: str | None = None,
+        marker: Marker | None = None,
+        dashed: bool = False,
+    ) -> None:
+        """A line through the points; what leaves the axes is cut off."""
+        points = self._inside(self.to_px(x, y))
+        if dashed:
+            finite = points[np.isfinite(points).all(axis=1)]
+            if len(finite) > 1:
+                draw.dashed(self._image, finite, colour, 2, 8.0)
+        else:
+            draw.line_with_gaps(self._image, points, colour, 3)
+        if marker is not None:
+            self._markers(points, colour, marker)
+        self._remember(label, colour, True, marker, dashed)
+
+    def points(
+        self,
+        x: Sequence[float] | FloatArray,
+        y: Sequence[float] | FloatArray,
+        colour: Colour,
+        marker: Marker,
+        label: str | None = None,
+    ) -> None:
+        """Markers alone."""
+        self._markers(self.to_px(x, y), colour, marker)
+        self._remember(label, colour, False, marker, False)
+
+    def bars(
+        self,
+        left: Sequence[float] | FloatArray,
+        right: Sequence[float] | FloatArray,
+        height: Sequence[float] | FloatArray,
+        colour: Colour,
+        label: str | None = None,
+    ) -> None:
+        """Upright bars from the lower end of the axis."""
+        base = np.full(len(height), self._y.low)
+        tops, feet = self.to_px(left, height), self.to_px(right, base)
+        for (u0, v0), (u1, v1) in zip(self._inside(tops), feet, strict=True):
+            if np.isfinite([u0, v0, u1, v1]).all() and v1 - v0 >= 0.5:
+                draw.area(self._image, draw.box((u0, v0, u1, v1)), colour)
+        self._remember(label, colour, True, None, False)
+
+    def level(self, value: float, colour: Colour, label: str) -> None:
+        """A dashed line across, for a target."""
+        self.line([self._x.low, self._x.high], [value, value], colour, label, dashed=True)
+
+    def note(self, x: float, y: float, words: str, colour: Colour = SOFT_INK, size: int = 14) -> None:
+        """Words centred above a point."""
+        u, v = self.to_px([x], [y])[0]
+        if np.isfinite([u, v]).all():
+            text.put(self._image, words, round(u) - text.width(words, size) // 2, round(v) - 7, colour, size)
+
+    def legend(self, where: Literal["upper right", "lower right", "lower left", "upper left"]) -> None:
+        """A box with all that has a label, in the order in which it was drawn."""
+        if not self._legend:
+            return
+        row = 24
+        width = max(text.width(entry.label, _LEGEND) for entry in self._legend) + 58
+        height = row * len(self._legend) + 12
+        vertical, horizontal = where.split()
+        x = self.plot.right - width - 12 if horizontal == "right" else self.plot.x + 12
+        y = self.plot.bottom - height - 12 if vertical == "lower" else self.plot.y + 12
+        box = draw.box((x, y, x + width, y + height))
+        draw.tint(self._image, box, PAPER, 0.9)
+        draw.line(self._image, box, GRID, 1, closed=True)
+        for index, entry in enumerate(self._legend):
+            middle = y + 6 + row * index + row // 2
+            ends = np.array([[x + 10.0, middle], [x + 40.0, middle]])
+            if entry.dashed:
+                draw.dashed(self._image, ends, entry.colour, 2, 6.0)
+            elif entry.line:
+                draw.line(self._image, ends, entry.colour, 3)
+            if entry.marker is not None:
+                self._markers(np.array([[x + 25.0, middle]]), entry.colour, entry.marker)
+            text.put(self._image, entry.label, x + 48, middle + 5, INK, _LEGEND)
+
+    def _remember(
+        self, label: str | None, colour: Colour, line: bool, marker: Marker | None, dashed: bool
+    ) -> None:
+        if label is not None:
+            self._legend.append(LegendEntry(label, colour, line, marker, dashed))
+
+    def _inside(self, points: FloatArray) -> FloatArray:
+        """Held at the frame; NaN stays."""
+        low = (self.plot.x, self.plot.y)
+        high = (self.plot.right - 1, self.plot.bottom - 1)
+        held: FloatArray = np.clip(points, low, high)
+        return held
+
+    def _markers(self, points: FloatArray, colour: Colour, marker: Marker) -> None:
+        for point in points[np.isfinite(points).all(axis=1)]:
+            outline = point + _MARKERS[marker]
+            if marker == "cross":
+                draw.lines(self._image, outline.reshape(2, 2, 2), colour, 3)
+            else:
+                draw.area(self._image, outline, colour)
+                draw.line(self._image, outline, PAPER, 1, closed=True)
+
+    def _draw_axes(self, area: Rect, title: str) -> None:
+        image, plot = self._image, self.plot
+        text.put(image, title, plot.x, area.y + 32, INK, _TITLE, text.BOLD)
+        for value, label in self._x.places():
+            u = float(self.to_px([value], [self._y.low])[0, 0])
+            draw.line(image, np.array([[u, plot.y], [u, plot.bottom - 1]]), GRID)
+            x = round(u) - text.width(label, _TICK) // 2
+            text.put(image, label, x, plot.bottom + 21, SOFT_INK, _TICK)
+        for value, label in self._y.places():
+            v = float(self.to_px([self._x.low], [value])[0, 1])
+            draw.line(image, np.array([[plot.x, v], [plot.right - 1, v]]), GRID)
+            text.put_right(image, label, plot.x - 9, round(v) + 5, SOFT_INK, _TICK)
+        frame = np.array([[plot.x, plot.y], [plot.x, plot.bottom - 1], [plot.right - 1, plot.bottom - 1]])
+        draw.line(image, frame, FRAME, 1)
+        centre = plot.x + (plot.width - text.width(self._x.label, _LABEL)) // 2
+        text.put(image, self._x.label, centre, plot.bottom + 48, INK, _LABEL)
+        _put_upright(image, self._y.label, area.x + 8, plot.y + plot.height // 2)
+
+
+_ANGLES = np.linspace(0.0, 2.0 * math.pi, 25)[:-1]
+_MARKERS: dict[Marker, NDArray[np.float64]] = {
+    "circle": 6.0 * np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1),
+    "square": 5.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
+    "diamond": 8.0 * np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]),
+    "cross": 6.0 * np.array([[-1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]]),
+}
+
+
+def blank(width: int, height: int) -> Image:
+    """A white picture."""
+    return np.full((height, width, 3), 255, np.uint8)
+
+
+def _put_upright(image: Image, words: str, x: int, middle: int) -> None:
+    """Text that reads from below to above, its middle at the given row."""
+    length = text.width(words, _LABEL)
+    strip = blank(length + 4, _LABEL + 10)
+    text.put(strip, words, 2, _LABEL + 1, INK, _LABEL)
+    turned = np.asarray(cv2.rotate(strip, cv2.ROTATE_90_COUNTERCLOCKWISE), np.uint8)
+    top = max(middle - turned.shape[0] // 2, 0)
+    part = image[top : top + turned.shape[0], x : x + turned.shape[1]]
+    np.minimum(part, turned[: part.shape[0], : part.shape[1]], out=part)

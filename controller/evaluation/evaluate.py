@@ -1,0 +1,141 @@
+"""`treadwatch evaluate`: the simulated set, recordings, or both, into one report folder."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence as ReadOnly
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from config.app import ReplayConfig
+from config.camera import OdometryChoice
+from controller.build import open_replay
+from controller.errors import UserError
+from controller.evaluation.campaign import Baselines, plan, run_campaign
+from controller.evaluation.contestants import OURS, OURS_ALONE
+from controller.evaluation.markdown import fixed
+from controller.evaluation.recording_report import (
+    recording_lines,
+    recordings_json,
+    write_recording_pictures,
+)
+from controller.evaluation.recordings import RecordingRecord, evaluate_recording
+from controller.evaluation.report import prepare_folder, write_failures, write_figures, write_texts
+from controller.evaluation.report_text import simulated_lines
+from controller.evaluation.run_sequence import SequenceRecord
+from controller.evaluation.sequences import Sequence, sequences
+from controller.evaluation.summary import Summary, as_json, summarise
+from controller.evaluation.targets import TARGETS
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluationOptions:
+    """The command line of `treadwatch evaluate`. only: names of sequences, all of them where empty."""
+
+    recordings: tuple[Path, ...]
+    simulated: bool
+    report: Path
+    odometry: OdometryChoice = "file"
+    static: bool = False
+    baselines: Baselines = "some"
+    only: tuple[str, ...] = ()
+    workers: int = 2
+    quiet: bool = False
+
+
+def run_evaluation(options: EvaluationOptions) -> None:
+    """Raises UserError, HalError: nothing to evaluate, an unknown sequence, a bad recording, no folder."""
+    if not options.recordings and not options.simulated:
+        raise UserError("there is nothing to evaluate; give recordings, or --sim for the simulated set")
+    if options.only and not options.simulated:
+        raise UserError("--only chooses among the simulated sequences; give --sim with it")
+    chosen = choose(options.only)
+    for folder in options.recordings:
+        open_replay(folder, options.odometry)  # a mistake is told now, not after minutes
+    prepare_folder(options.report)
+    result: dict[str, Any] = {}
+    lines: list[str] = []
+    if options.simulated:
+        records = _simulated(options, chosen)
+        summary = summarise(records)
+        write_figures(options.report, summary, records)
+        failures = write_failures(options.report, records)
+        result.update(as_json(summary))
+        lines.extend(simulated_lines(summary, records, failures, _command(options)))
+        _say_figures(summary)
+    if options.recordings:
+        looked = [_recording(options, folder) for folder in options.recordings]
+        write_recording_pictures(options.report, looked)
+        result["recordings"] = recordings_json(looked)
+        lines.extend(recording_lines(looked))
+        _say_recordings(looked)
+    write_texts(options.report, result, lines)
+    click.echo(f"report        {options.report / 'report.md'}")
+
+
+def choose(names: tuple[str, ...]) -> tuple[Sequence, ...]:
+    """The named sequences, or all. Raises UserError."""
+    every = sequences()
+    unknown = sorted(set(names) - {one.name for one in every})
+    if unknown:
+        known = ", ".join(one.name for one in every)
+        raise UserError(f"--only {unknown[0]}: there is no such sequence; choose among {known}")
+    return tuple(one for one in every if not names or one.name in names)
+
+
+def _simulated(options: EvaluationOptions, chosen: tuple[Sequence, ...]) -> tuple[SequenceRecord, ...]:
+    tasks = plan(chosen, options.baselines)
+    with click.progressbar(
+        length=len(tasks), label="simulated sequences", file=sys.stderr, hidden=_hidden(options)
+    ) as bar:
+        return run_campaign(tasks, options.workers, lambda _: bar.update(1))
+
+
+def _recording(options: EvaluationOptions, folder: Path) -> RecordingRecord:
+    source, _ = open_replay(folder, options.odometry)
+    with click.progressbar(
+        length=source.frame_count, label=folder.name, file=sys.stderr, hidden=_hidden(options)
+    ) as bar:
+        return evaluate_recording(
+            folder, options.odometry, options.static, ReplayConfig(), lambda: bar.update(1)
+        )
+
+
+def _hidden(options: EvaluationOptions) -> bool:
+    return options.quiet or not sys.stderr.isatty()
+
+
+def _command(options: EvaluationOptions) -> str:
+    parts = ["treadwatch evaluate --sim"]
+    if options.baselines != "some":
+        parts.append(f"--baselines {options.baselines}")
+    parts.extend(f"--only {name}" for name in options.only)
+    return " ".join(parts)
+
+
+def _say_figures(summary: Summary) -> None:
+    """The figures that have targets, on one screen."""
+    for split in ("reporting", "tuning"):
+        methods = summary.splits[split]
+        for name, alone in ((OURS, False), (OURS_ALONE, True)):
+            if name not in methods:
+                continue
+            figures = methods[name].figures
+            objects = figures.objects
+            found = f"{objects.correct} of {objects.correct + objects.missed} found, {objects.wrong} wrong"
+            click.echo(f"{split:<13} {name}: {found}")
+            for target in TARGETS:
+                value = target.value(figures)
+                mark = "" if target.reached(value, alone) else "  missed"
+                bound = target.bound(alone)
+                click.echo(f"{'':13} {target.name:<32} {fixed(value):>7} {target.unit:<8} {bound}{mark}")
+
+
+def _say_recordings(records: ReadOnly[RecordingRecord]) -> None:
+    for record in records:
+        moving = f"{len(record.moving_objects)} of {record.objects} objects called moving"
+        false = f", {fixed(record.false_per_minute, 2)} false a minute" if record.static else ""
+        click.echo(f"recording     {record.folder.name}: {record.frames} frames, {moving}{false}")

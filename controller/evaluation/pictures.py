@@ -1,0 +1,128 @@
+"""Pictures with images in them: Fig. 6 (scene, depth, result), and frames in which something went wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.evaluation.chart import BLUE, GREEN, INK, ORANGE, SOFT_INK, blank
+from controller.evaluation.run_sequence import Snapshot
+from controller.evaluation.types import CALLED_MOVING, Box, Detection
+from controller.video import draw, text
+from controller.video.depth_view import colour_table
+from controller.video.labels import Label, draw_labels
+from controller.video.style import MOVING, STATIC, Colour, Image, bgr
+from hal.types import ColourImage, FloatArray
+from vision.scene import Fragments
+
+_MISSED = bgr("E02424")
+_FOUND = GREEN
+_CLAIMED = ORANGE
+_DEPTH_RANGE_M = 10.0
+_GAP, _HEAD = 12, 40
+_CELL = (480, 360)
+_BRIGHTNESS = 0.8
+
+
+def scene_depth_result(snapshots: Sequence[Snapshot]) -> Image:
+    """Fig. 6: one row a snapshot; what the camera saw, its depth, what was made of it."""
+    width, height = _CELL
+    image = blank(3 * width + 4 * _GAP, _HEAD + len(snapshots) * (height + _GAP))
+    for column, title in enumerate(("Scene", "Depth as a picture", "Result")):
+        text.put(image, title, _GAP + column * (width + _GAP), 27, INK, 19, text.BOLD)
+    for row, snapshot in enumerate(snapshots):
+        cells = (snapshot.colour, depth_picture(snapshot.depth_m), result_picture(snapshot))
+        for column, cell in enumerate(cells):
+            x, y = _GAP + column * (width + _GAP), _HEAD + row * (height + _GAP)
+            image[y : y + height, x : x + width] = cv2.resize(
+                cell, (width, height), interpolation=cv2.INTER_AREA
+            )
+    return image
+
+
+def depth_picture(depth_m: NDArray[np.float32]) -> Image:
+    """Near is bright, far is dark, no data is black."""
+    levels = cv2.convertScaleAbs(depth_m, alpha=255.0 / _DEPTH_RANGE_M)
+    return np.asarray(colour_table()[levels], np.uint8)
+
+
+def result_picture(snapshot: Snapshot) -> Image:
+    """Fragments and moving obstacles over the darkened image."""
+    image = np.asarray(cv2.convertScaleAbs(snapshot.colour, alpha=_BRIGHTNESS), np.uint8)
+    if snapshot.fragments is not None:
+        _draw_fragments(image, snapshot.fragments)
+    moving = [one for one in snapshot.detections if one.confidence >= CALLED_MOVING and _has_box(one.box)]
+    for one in moving:
+        draw.line(image, draw.box(one.box), MOVING, 3, closed=True)
+    draw_labels(image, [_label(one, MOVING) for one in moving], size=17)
+    return image
+
+
+def failure_picture(snapshot: Snapshot) -> Image:
+    """A frame with what is true and what was claimed, and a sentence beneath."""
+    image = snapshot.colour.copy()
+    missed = set(snapshot.score.missed)
+    labels = []
+    for true in snapshot.truth.objects:
+        if _has_box(true.box):
+            colour = _MISSED if true.id in missed else _FOUND
+            draw.dashed(image, _closed(true.box), colour, 2, 7.0)
+            words = f"{true.kind} {true.distance_m:.1f} m, {true.speed_mps:.1f} m/s"
+            labels.append(_box_label(words, true.box, colour))
+    for one in snapshot.detections:
+        if one.confidence >= CALLED_MOVING and _has_box(one.box):
+            draw.line(image, draw.box(one.box), _CLAIMED, 2, closed=True)
+            labels.append(_label(one, _CLAIMED))
+    draw_labels(image, labels, size=14)
+    return _with_caption(image, f"{snapshot.sequence}, frame {snapshot.index}", describe_faults(snapshot))
+
+
+def describe_faults(snapshot: Snapshot) -> str:
+    """What is wrong with the frame, in words."""
+    by_id = {true.id: true for true in snapshot.truth.objects}
+    parts = [
+        f"missed: {by_id[one].kind} at {by_id[one].distance_m:.1f} m" for one in snapshot.score.missed_settled
+    ]
+    parts.extend(f"false: #{one}" for one in snapshot.score.wrong)
+    parts.extend(f"second box for one object: #{one}" for one in snapshot.score.duplicates)
+    return "; ".join(parts)
+
+
+def _with_caption(image: ColourImage, title: str, words: str) -> Image:
+    height, width = image.shape[:2]
+    picture = blank(width, height + 58)
+    picture[:height] = image
+    x = text.put(picture, title, 10, height + 23, INK, 16, text.BOLD)
+    text.put(picture, "dashed green: true, found", x + 18, height + 23, _FOUND, 14)
+    text.put(picture, "dashed red: missed", x + 206, height + 23, _MISSED, 14)
+    text.put(picture, "orange: called moving", x + 348, height + 23, _CLAIMED, 14)
+    text.put(picture, text.fit(words, width - 20, 15), 10, height + 47, SOFT_INK, 15)
+    return picture
+
+
+def _draw_fragments(image: Image, fragments: Fragments) -> None:
+    ends = fragments.ends_px
+    draw.lines(image, ends[~fragments.moving], STATIC, 2)
+    draw.lines(image, ends[fragments.moving], MOVING, 3)
+
+
+def _label(one: Detection, colour: Colour) -> Label:
+    speed_mps = float(np.linalg.norm(one.velocity_mps))
+    words = f"#{one.id}  {speed_mps:.1f} m/s" if np.isfinite(speed_mps) else f"#{one.id}"
+    return _box_label(words, one.box, colour)
+
+
+def _box_label(words: str, box: Box, colour: Colour) -> Label:
+    return Label(words, colour, np.reshape(np.array(box), (2, 2)), filled=colour not in (BLUE, GREEN))
+
+
+def _has_box(box: Box) -> bool:
+    return bool(np.isfinite(box).all())
+
+
+def _closed(box: Box) -> FloatArray:
+    corners = draw.box(box)
+    return np.concatenate([corners, corners[:1]])

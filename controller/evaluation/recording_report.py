@@ -1,0 +1,88 @@
+"""The report's part about recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller.evaluation import pictures
+from controller.evaluation.markdown import fixed, picture, section, table
+from controller.evaluation.recordings import RecordingRecord
+from controller.evaluation.report import write_picture
+from controller.evaluation.summary import number
+
+_WHAT = """Nobody has written down what moves in them. Where nothing but the camera does (--static), every
+    object that is called moving in three frames or more is false."""
+
+
+def recordings_json(records: Sequence[RecordingRecord]) -> list[dict[str, Any]]:
+    """Plain JSON values, one entry a recording."""
+    return [
+        {
+            "recording": record.folder.name,
+            "odometry": record.odometry,
+            "assumed_static": record.static,
+            "frames": record.frames,
+            "skipped": record.skipped,
+            "seconds": number(record.seconds, 3),
+            "objects": record.objects,
+            "moving_objects": len(record.moving_objects),
+            "frames_with_moving": record.frames_with_moving,
+            "false_moving_per_minute": number(record.false_per_minute, 3),
+            "ms_per_frame": {
+                "median": number(_percentile(record, 50), 2),
+                "p99": number(_percentile(record, 99), 2),
+            },
+            "camera": record.conditions,
+            "ego_motion": record.ego_sources,
+        }
+        for record in records
+    ]
+
+
+def write_recording_pictures(folder: Path, records: Sequence[RecordingRecord]) -> None:
+    """One picture a recording: scene, depth, result. Raises UserError."""
+    for record in records:
+        if record.pictures:
+            image = pictures.scene_depth_result(record.pictures)
+            write_picture(folder / _file(record), image)
+
+
+def recording_lines(records: Sequence[RecordingRecord]) -> list[str]:
+    """report.md about recordings."""
+    rows = [
+        (
+            record.folder.name,
+            record.odometry,
+            str(record.frames),
+            fixed(record.seconds, 1),
+            str(record.objects),
+            str(len(record.moving_objects)),
+            str(record.frames_with_moving),
+            fixed(record.false_per_minute, 2),
+            fixed(_percentile(record, 50), 1),
+            fixed(_percentile(record, 99), 1),
+        )
+        for record in records
+    ]
+    head = (
+        "recording", "odometry", "frames", "seconds", "objects", "called moving", "frames with a moving one",
+        "false a minute", "ms a frame, median", "p99",
+    )  # fmt: skip
+    lines = section("Recordings", _WHAT) + table(head, rows)
+    for record in records:
+        if record.pictures:
+            lines += [f"{record.folder.name}: the second frame, and frames with something called moving.", ""]
+            lines += picture(record.folder.name, _file(record))
+    return lines
+
+
+def _file(record: RecordingRecord) -> str:
+    return f"recording-{record.folder.name}-{record.odometry}.png"
+
+
+def _percentile(record: RecordingRecord, percent: float) -> float:
+    return float(np.percentile(record.ms, percent)) if record.ms else float("nan")

@@ -1,0 +1,146 @@
+"""Recordings before our detector. Nobody knows what moves in them: counts, times, pictures, no recall.
+
+When told that nothing but the camera moves (--static), everything that is called moving is false.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from config.app import ReplayConfig
+from config.camera import OdometryChoice
+from controller.build import build_replay_perceiver, open_replay
+from controller.evaluation.ours import detection_of
+from controller.evaluation.run_sequence import Snapshot
+from controller.evaluation.scoring import WRONG_FRAMES, FrameScore
+from controller.evaluation.totals import ratio
+from controller.evaluation.types import FrameTruth
+from controller.perceive import Look
+from hal.clocks import NS_PER_S
+from hal.errors import EndOfStream
+from vision.scene import CameraCondition
+
+MOST_PICTURES = 6
+_APART_FRAMES = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordingRecord:
+    """One recording. moving_objects: identities that were called moving in three frames or more.
+
+    seconds: of recording. ms: of detect and track together, per frame. pictures: the first frame, and
+    frames in which something was called moving.
+    """
+
+    folder: Path
+    odometry: OdometryChoice
+    static: bool
+    frames: int
+    skipped: int
+    seconds: float
+    objects: int
+    moving_objects: tuple[int, ...]
+    frames_with_moving: int
+    ms: tuple[float, ...]
+    conditions: dict[str, int]
+    ego_sources: dict[str, int]
+    pictures: tuple[Snapshot, ...]
+
+    @property
+    def false_per_minute(self) -> float:
+        """NaN where it is not known what moves, or nothing was seen."""
+        return ratio(len(self.moving_objects), self.seconds / 60.0) if self.static else math.nan
+
+
+@dataclass
+class _Tally:
+    """Collects while the frames go by."""
+
+    seen: set[int] = field(default_factory=set)
+    moving: Counter[int] = field(default_factory=Counter)
+    frames_with_moving: int = 0
+    stamps_ns: list[int] = field(default_factory=list)
+    ms: list[float] = field(default_factory=list)
+    conditions: Counter[CameraCondition] = field(default_factory=Counter)
+    ego_sources: Counter[str] = field(default_factory=Counter)
+    pictures: list[Snapshot] = field(default_factory=list)
+
+    def add(self, name: str, look: Look) -> None:
+        """One frame."""
+        moving = [obstacle.id for obstacle in look.scene.obstacles if obstacle.moving]
+        self.seen.update(obstacle.id for obstacle in look.scene.obstacles)
+        self.moving.update(moving)
+        self.frames_with_moving += bool(moving)
+        self.stamps_ns.append(look.scene.captured_ns)
+        self.ms.append(sum(look.timing_ms.values()))
+        self.conditions[look.scene.health.condition] += 1
+        self.ego_sources[look.scene.ego_motion.source] += 1
+        index = len(self.stamps_ns) - 1
+        fresh = not self.pictures or index - self.pictures[-1].index >= _APART_FRAMES
+        if index == 1 or (moving and fresh and len(self.pictures) < MOST_PICTURES):
+            self.pictures.append(_snapshot(name, index, look))
+
+    @property
+    def seconds(self) -> float:
+        """From the first frame to the end of the last one."""
+        if len(self.stamps_ns) < 2:
+            return 0.0
+        span_s = (max(self.stamps_ns) - min(self.stamps_ns)) / NS_PER_S
+        return span_s * len(self.stamps_ns) / (len(self.stamps_ns) - 1)
+
+
+def evaluate_recording(
+    folder: Path,
+    odometry: OdometryChoice,
+    static: bool,
+    config: ReplayConfig,
+    on_frame: Callable[[], None] = lambda: None,
+) -> RecordingRecord:
+    """Every usable frame through detect and track. Raises HalError."""
+    source, poses = open_replay(folder, odometry)
+    perceiver = build_replay_perceiver(config, source.mount, poses, time.perf_counter_ns)
+    tally = _Tally()
+    with source:
+        while True:
+            try:
+                frame = source.read(timeout_s=0.0)
+            except EndOfStream:
+                break
+            tally.add(folder.name, perceiver.look(frame))
+            on_frame()
+    return RecordingRecord(
+        folder,
+        odometry,
+        static,
+        len(tally.stamps_ns),
+        len(source.skipped),
+        tally.seconds,
+        len(tally.seen),
+        tuple(sorted(identity for identity, count in tally.moving.items() if count >= WRONG_FRAMES)),
+        tally.frames_with_moving,
+        tuple(tally.ms),
+        {condition.value: count for condition, count in tally.conditions.items()},
+        dict(tally.ego_sources),
+        tuple(tally.pictures),
+    )
+
+
+def _snapshot(name: str, index: int, look: Look) -> Snapshot:
+    stamp_s = look.scene.captured_ns / NS_PER_S
+    return Snapshot(
+        name,
+        index,
+        look.frame.colour,
+        look.frame.depth.astype(np.float32) * np.float32(look.frame.depth_scale_m),
+        FrameTruth(stamp_s, ()),
+        tuple(detection_of(obstacle) for obstacle in look.scene.obstacles),
+        look.fragments,
+        FrameScore(stamp_s, (), (), (), (), ()),
+    )
