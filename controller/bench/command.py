@@ -23,7 +23,7 @@ from controller.bench.driving import (
     measure_exchange,
     roboclaw_in_memory,
 )
-from controller.bench.figures import Durations
+from controller.bench.figures import Durations, Stopwatches
 from controller.bench.machine import describe_machine, one_opencv_thread
 from controller.bench.mission_speed import LockstepFigures, measure_lockstep
 from controller.bench.perception import PerceptionFigures, measure_perception
@@ -67,7 +67,7 @@ class Plan:
     stretch_s: float = 10.0
 
 
-_stopwatch_ns = time.perf_counter_ns
+_stopwatches = Stopwatches(processor_ns=time.process_time_ns, elapsed_ns=time.perf_counter_ns)
 
 
 def run_bench(frames: int, json_path: FilePath | None) -> None:
@@ -156,7 +156,7 @@ def _reel_figures(
         return Perception(config, reel.mount, body.height_m, body.clearance_m)
 
     with progress(label, 2 * passes * len(reel.frames)) as tick:
-        return measure_perception(reel, make, passes, _stopwatch_ns, tick)
+        return measure_perception(reel, make, passes, _stopwatches, tick)
 
 
 def _renderer_figures(config: AppConfig, plan: Plan) -> RendererFigures:
@@ -165,7 +165,7 @@ def _renderer_figures(config: AppConfig, plan: Plan) -> RendererFigures:
     world = World(scenario_of(config.simulation, plan.mission), config.simulation.seed)
     renderer = Renderer(world, camera.intrinsics)
     with progress("renderer", plan.pictures + 1) as tick:
-        return measure_renderer(camera, renderer, plan.pictures, _stopwatch_ns, tick)
+        return measure_renderer(camera, renderer, plan.pictures, _stopwatches.processor_ns, tick)
 
 
 def _driving_figures(config: AppConfig, plan: Plan) -> tuple[ControlFigures, Durations]:
@@ -174,7 +174,7 @@ def _driving_figures(config: AppConfig, plan: Plan) -> tuple[ControlFigures, Dur
     timed, emulator = _base(config, plan)
     loop = build_control(config, plan.mission, timed)
     with progress("control step", steps) as tick:
-        control = measure_control(loop, timed, emulator, steps, _stopwatch_ns, tick)
+        control = measure_control(loop, timed, emulator, steps, _stopwatches.processor_ns, tick)
     timed, emulator = _base(config, plan)
     with progress("driver, AgileX over virtual CAN", steps) as tick:
         return control, measure_exchange(timed, emulator, steps, tick)
@@ -183,7 +183,7 @@ def _driving_figures(config: AppConfig, plan: Plan) -> tuple[ControlFigures, Dur
 def _base(config: AppConfig, plan: Plan) -> tuple[TimedChassis, Emulator]:
     chassis, emulator = build_base(config, build_path(config, plan.mission).start, 0)
     assert emulator is not None, "the mission's base is emulated"
-    return TimedChassis(chassis, _stopwatch_ns), emulator
+    return TimedChassis(chassis, _stopwatches.processor_ns), emulator
 
 
 def _roboclaw_figures(config: AppConfig, plan: Plan) -> Durations:
@@ -192,10 +192,12 @@ def _roboclaw_figures(config: AppConfig, plan: Plan) -> Durations:
     assert config.simulation is not None, "the mission is simulated"
     chassis, emulator = roboclaw_in_memory(roboclaw, config.simulation.plant)
     with progress("driver, RoboClaw in memory", plan.control_steps) as tick:
-        return measure_exchange(TimedChassis(chassis, _stopwatch_ns), emulator, plan.control_steps, tick)
+        return measure_exchange(
+            TimedChassis(chassis, _stopwatches.processor_ns), emulator, plan.control_steps, tick
+        )
 
 
 def _lockstep_figures(config: AppConfig, plan: Plan) -> LockstepFigures:
     steps = round(plan.stretch_s * config.runner.control_rate_hz)
     with progress("lock-step mission", steps) as tick:
-        return measure_lockstep(config, plan.mission, plan.stretch_s, _stopwatch_ns, tick)
+        return measure_lockstep(config, plan.mission, plan.stretch_s, _stopwatches, tick)

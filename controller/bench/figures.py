@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 NS_PER_MS = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Stopwatches:
+    """processor_ns: time on cores, of all threads of this program, whatever else the machine does meanwhile.
+    elapsed_ns: by a clock on the wall. On an idle machine both say the same of work on one core."""
+
+    processor_ns: Callable[[], int]
+    elapsed_ns: Callable[[], int]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 from config.app import AppConfig, LockstepRunner
+from controller.bench.figures import Stopwatches
 from controller.bench.reel import Tick
 from controller.build import (
     build_base,
@@ -22,10 +22,12 @@ from hal.clocks import NS_PER_S, SimulatedClock
 
 @dataclass(frozen=True, slots=True)
 class LockstepFigures:
-    """A stretch of a mission from its start: how long it is, and how long it took."""
+    """A stretch of a mission from its start: how long it is, and how long it took, by a clock on the wall
+    and in processor time."""
 
     simulated_s: float
     wall_s: float
+    processor_s: float
     frames: int
 
     @property
@@ -33,18 +35,25 @@ class LockstepFigures:
         """Simulated seconds a second."""
         return self.simulated_s / self.wall_s
 
+    @property
+    def speed_on_own_core(self) -> float:
+        """Simulated seconds a second of processor time: the speed on a machine with nothing else to do."""
+        return self.simulated_s / self.processor_s
+
     def as_json(self) -> dict[str, object]:
         """Plain values."""
         return {
             "simulated_s": round(self.simulated_s, 3),
             "wall_s": round(self.wall_s, 3),
+            "processor_s": round(self.processor_s, 3),
             "frames": self.frames,
             "speed": round(self.speed, 4),
+            "speed_on_own_core": round(self.speed_on_own_core, 4),
         }
 
 
 def measure_lockstep(
-    config: AppConfig, config_path: FilePath, stretch_s: float, stopwatch_ns: Callable[[], int], tick: Tick
+    config: AppConfig, config_path: FilePath, stretch_s: float, stopwatches: Stopwatches, tick: Tick
 ) -> LockstepFigures:
     """Drive the first stretch_s of config's mission, without recording it; building it is not counted."""
     clock = SimulatedClock()
@@ -59,11 +68,12 @@ def measure_lockstep(
     )
     with simulation, chassis, camera:
         loop = build_control(config, config_path, chassis)
-        perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, stopwatch_ns)
+        perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, stopwatches.elapsed_ns)
         frames = 0
-        started_ns = stopwatch_ns()
+        started_ns, started_cpu_ns = stopwatches.elapsed_ns(), stopwatches.processor_ns()
         for moment in run_lockstep(runner, clock, simulation, camera, perceiver, loop):
             frames += len(moment.looks)
             tick()
-        wall_ns = stopwatch_ns() - started_ns
-    return LockstepFigures(clock.now_ns() / NS_PER_S, wall_ns / NS_PER_S, frames)
+        wall_s = (stopwatches.elapsed_ns() - started_ns) / NS_PER_S
+        processor_s = (stopwatches.processor_ns() - started_cpu_ns) / NS_PER_S
+    return LockstepFigures(clock.now_ns() / NS_PER_S, wall_s, processor_s, frames)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from types import ModuleType
 
 import vision
-from controller.bench.figures import Durations, median_ratio
+from controller.bench.figures import Durations, Stopwatches, median_ratio
 from controller.bench.opencv_calls import recorded_calls, time_bare
 from controller.bench.reel import Reel, Tick
 from controller.bench.stages import Spent, StageFigures, StageWatch, modules_of, summarise, watched
@@ -18,15 +18,26 @@ from vision.perception import Perception
 MakePerception = Callable[[], Perception]
 
 
+@dataclass(frozen=True, slots=True)
+class FrameTime:
+    """Of one frame: processor time of detect and of track, elapsed time of both."""
+
+    detect_ns: int
+    track_ns: int
+    elapsed_ns: int
+
+
 @dataclass
 class SideBySide:
     """Nanoseconds of each frame, the same index for the same frame: perception, and OpenCV alone.
 
-    opencv_ns: by function name. first_ns: the first frame of each pass, which is in none of the other lists.
+    Processor time, but for elapsed_ns of detect and track together. opencv_ns: by function name. first_ns:
+    the first frame of each pass, which is in none of the other lists.
     """
 
     detect_ns: list[int] = field(default_factory=list)
     track_ns: list[int] = field(default_factory=list)
+    elapsed_ns: list[int] = field(default_factory=list)
     bare_ns: list[int] = field(default_factory=list)
     opencv_ns: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
     first_ns: list[int] = field(default_factory=list)
@@ -36,11 +47,12 @@ class SideBySide:
         """detect and track together."""
         return [detect + track for detect, track in zip(self.detect_ns, self.track_ns, strict=True)]
 
-    def add(self, detect_ns: int, track_ns: int, opencv_ns: dict[str, int]) -> None:
+    def add(self, spent: FrameTime, opencv_ns: dict[str, int]) -> None:
         """One frame; a function that it does not call takes no time in it."""
         known = len(self.detect_ns)
-        self.detect_ns.append(detect_ns)
-        self.track_ns.append(track_ns)
+        self.detect_ns.append(spent.detect_ns)
+        self.track_ns.append(spent.track_ns)
+        self.elapsed_ns.append(spent.elapsed_ns)
         self.bare_ns.append(sum(opencv_ns.values()))
         for name in opencv_ns.keys() | self.opencv_ns.keys():
             samples = self.opencv_ns[name]
@@ -50,10 +62,12 @@ class SideBySide:
 
 @dataclass(frozen=True, slots=True)
 class PerceptionFigures:
-    """Of one reel. ratio_of_medians and median_ratio: perception over bare OpenCV, once of the two medians
-    and once frame by frame. functions and modules: names as in the code."""
+    """Of one reel. total: detect and track, in processor time; elapsed: the same by a clock on the wall.
+    ratio_of_medians and median_ratio: perception over bare OpenCV, once of the two medians and once frame by
+    frame. functions and modules: names as in the code."""
 
     total: Durations
+    elapsed: Durations
     detect: Durations
     track: Durations
     bare: Durations
@@ -68,6 +82,7 @@ class PerceptionFigures:
         """Plain values."""
         return {
             "total": self.total.as_json(),
+            "elapsed": self.elapsed.as_json(),
             "detect": self.detect.as_json(),
             "track": self.track.as_json(),
             "bare_opencv": self.bare.as_json(),
@@ -81,7 +96,7 @@ class PerceptionFigures:
 
 
 def measure_perception(
-    reel: Reel, make: MakePerception, passes: int, stopwatch_ns: Callable[[], int], tick: Tick
+    reel: Reel, make: MakePerception, passes: int, stopwatches: Stopwatches, tick: Tick
 ) -> PerceptionFigures:
     """Side by side first, then once more with a stopwatch on every function. Two ticks a frame and pass.
 
@@ -90,13 +105,14 @@ def measure_perception(
     modules = modules_of(vision)
     side = SideBySide()
     for _ in range(passes):
-        run_side_by_side(reel, make, modules, stopwatch_ns, side, tick)
+        run_side_by_side(reel, make, modules, stopwatches, side, tick)
     spent: list[dict[str, Spent]] = []
     for _ in range(passes):
-        spent.extend(run_watched(reel, make, modules, stopwatch_ns, tick))
+        spent.extend(run_watched(reel, make, modules, stopwatches.processor_ns, tick))
     total, bare = Durations.of(side.total_ns), Durations.of(side.bare_ns)
     return PerceptionFigures(
         total=total,
+        elapsed=Durations.of(side.elapsed_ns),
         detect=Durations.of(side.detect_ns),
         track=Durations.of(side.track_ns),
         bare=bare,
@@ -113,7 +129,7 @@ def run_side_by_side(
     reel: Reel,
     make: MakePerception,
     modules: Sequence[ModuleType],
-    stopwatch_ns: Callable[[], int],
+    stopwatches: Stopwatches,
     result: SideBySide,
     tick: Tick,
 ) -> None:
@@ -128,14 +144,14 @@ def run_side_by_side(
         with recorded_calls(modules) as calls:
             recorded.perceive(frame, odometry, None)
         if index % 2 == 0:
-            opencv_ns = time_bare(calls, stopwatch_ns)
-        detect_ns, track_ns = _time(timed, frame, odometry, stopwatch_ns)
+            opencv_ns = time_bare(calls, stopwatches.processor_ns)
+        spent = _time(timed, frame, odometry, stopwatches)
         if index % 2 == 1:
-            opencv_ns = time_bare(calls, stopwatch_ns)
+            opencv_ns = time_bare(calls, stopwatches.processor_ns)
         if index == 0:
-            result.first_ns.append(detect_ns + track_ns)
+            result.first_ns.append(spent.detect_ns + spent.track_ns)
         else:
-            result.add(detect_ns, track_ns, opencv_ns)
+            result.add(spent, opencv_ns)
         tick()
 
 
@@ -159,13 +175,16 @@ def run_watched(
 
 
 def _time(
-    perception: Perception, frame: RgbdFrame, odometry: Pose | None, stopwatch_ns: Callable[[], int]
-) -> tuple[int, int]:
-    started_ns = stopwatch_ns()
+    perception: Perception, frame: RgbdFrame, odometry: Pose | None, stopwatches: Stopwatches
+) -> FrameTime:
+    began_ns = stopwatches.elapsed_ns()
+    started_ns = stopwatches.processor_ns()
     detection = perception.detect(frame, odometry)
-    detected_ns = stopwatch_ns()
+    detected_ns = stopwatches.processor_ns()
     perception.track(detection, None)
-    return detected_ns - started_ns, stopwatch_ns() - detected_ns
+    tracked_ns = stopwatches.processor_ns()
+    elapsed_ns = stopwatches.elapsed_ns() - began_ns
+    return FrameTime(detected_ns - started_ns, tracked_ns - detected_ns, elapsed_ns)
 
 
 def _module_of(function: str) -> str:

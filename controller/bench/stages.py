@@ -1,6 +1,6 @@
 """Where the time goes inside a package: every function's own time, and that of the OpenCV calls in it.
 
-For a while every function of the package is wrapped by a stopwatch. That costs about a microsecond a
+For a while every function of the package is wrapped by a stopwatch. That costs a few microseconds a
 call, so it is done in a pass of its own and never falsifies a total.
 """
 
