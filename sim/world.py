@@ -71,7 +71,7 @@ class World:
         self.scenario = scenario
         self.seed = seed
         self._bodies = tuple(
-            _Body(index + 1, spec, build_body(spec, seed), _trajectory(spec, seed))
+            _Body(index + 1, spec, build_body(spec, seed), trajectory_of(spec, seed))
             for index, spec in enumerate(scenario.bodies)
         )
         still = [body for body in self._bodies if body.spec.motion is None]
@@ -127,7 +127,8 @@ class World:
         return np.array(rotations), np.array(translations)
 
 
-def _trajectory(spec: BodySpec, seed: int) -> Trajectory:
+def trajectory_of(spec: BodySpec, seed: int) -> Trajectory:
+    """How a body moves in a world of this seed, which shifts its start."""
     start = PlanarPose(spec.x_m, spec.y_m, math.radians(spec.heading_deg))
     jitter_s = 0.0
     if spec.motion is not None and spec.motion.start_jitter_s > 0.0:
