@@ -9,6 +9,8 @@ import click
 from controller.decision import Decision
 
 BAR = 24
+# A reason that holds for less than this is not worth a line of its own.
+SETTLED_S = 0.5
 # The line is renewed this often in steps of progress, not at every control step.
 STEPS_SHOWN = 10
 
@@ -20,7 +22,9 @@ class Console:
         self._quiet = quiet
         self._live = sys.stderr.isatty() and not quiet
         self._calls = 0
-        self._last_said: tuple[str, int | None] | None = None
+        self._said: tuple[str, int | None] | None = None
+        self._heard: tuple[str, int | None] | None = None
+        self._heard_at_s = 0.0
 
     def progress(self, share: float, text: str) -> None:
         """share: 0..1 of the whole."""
@@ -31,14 +35,14 @@ class Console:
             click.echo(f"\r\033[K[{bar}] {text[:90]}", nl=False, err=True)
 
     def decision(self, stamp_s: float, decision: Decision, speed_mps: float) -> None:
-        """One line whenever another rule or another obstacle decides."""
-        said = (decision.reason.rule, decision.reason.obstacle_id)
-        if said == self._last_said:
-            return
-        self._last_said = said
-        self.event(
-            f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  {decision.action.value:8}  {decision.reason.sentence}"
-        )
+        """One line whenever another rule or another obstacle has decided for half a second."""
+        reason = decision.reason
+        now = (reason.rule, reason.obstacle_id)
+        if now != self._heard:
+            self._heard, self._heard_at_s = now, stamp_s
+        if now != self._said and stamp_s - self._heard_at_s >= SETTLED_S:
+            self._said = now
+            self.event(f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  {decision.action.value:8}  {reason.sentence}")
 
     def event(self, line: str) -> None:
         """A line that stays."""

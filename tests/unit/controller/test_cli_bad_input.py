@@ -1,0 +1,152 @@
+"""A user's mistake is one line on standard error that names what, where and why; exit code 2; no traceback."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from config.loader import CONFIG_DIR
+
+DESK = Path(__file__).resolve().parents[2] / "recordings" / "desk_rpy"
+
+
+def treadwatch(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """The installed command, as a user's shell runs it."""
+    command = [sys.executable, "-m", "controller", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def refusal(*arguments: str | Path) -> str:
+    done = treadwatch(*arguments)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1, done.stderr
+    return lines[0]
+
+
+def changed_config(tmp_path: Path, **changes: object) -> Path:
+    """sim.yaml with sections replaced; None takes one out."""
+    content = yaml.safe_load((CONFIG_DIR / "sim.yaml").read_text())
+    for key, value in changes.items():
+        if value is None:
+            del content[key]
+        else:
+            content[key] = value
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(DESK, tmp_path / "rec"))
+
+
+def test_a_config_that_is_not_there() -> None:
+    assert "nowhere.yaml: cannot be read (No such file" in refusal("run", "--config", "nowhere.yaml")
+
+
+def test_an_unknown_key(tmp_path: Path) -> None:
+    config = changed_config(tmp_path, robot={"limits": {"max_sped_mps": 1.0}})
+    message = refusal("run", "--config", config)
+    assert "mine.yaml: robot.limits.max_sped_mps: unknown key" in message
+
+
+def test_a_wrong_value_and_a_missing_section_are_told_together(tmp_path: Path) -> None:
+    config = changed_config(tmp_path, robot={"limits": {"max_accel_mps2": -0.3}}, chassis=None)
+    message = refusal("run", "--config", config)
+    assert "robot.limits.max_accel_mps2: Input should be greater than 0, found -0.3" in message
+    assert "chassis: missing key" in message
+
+
+def test_parts_that_do_not_fit_together(tmp_path: Path) -> None:
+    assert "needs a 'simulation' section" in refusal("run", "--config", changed_config(tmp_path, simulation=None))
+
+
+def test_a_path_that_the_robot_cannot_drive(tmp_path: Path) -> None:
+    scenario = yaml.safe_load((CONFIG_DIR / "scenarios" / "empty.yaml").read_text())
+    scenario["path"]["segments"] = [{"kind": "arc", "radius_m": 0.05, "angle_deg": 90.0}]
+    (tmp_path / "tight.yaml").write_text(yaml.safe_dump(scenario))
+    message = refusal("run", "--scenario", tmp_path / "tight.yaml")
+    assert "radius" in message
+
+
+def test_an_unknown_scenario() -> None:
+    message = refusal("run", "--scenario", "warehous")
+    assert "warehous: there is no such scenario" in message
+    assert "warehouse" in message
+
+
+def test_a_can_interface_that_is_not_there(tmp_path: Path) -> None:
+    link = {"interface": "socketcan", "channel": "can7"}
+    config = changed_config(tmp_path, chassis={"kind": "agilex", "model": "bunker", "link": link})
+    message = refusal("run", "--config", config)
+    assert "can7" in message
+
+
+def test_a_scenario_where_nothing_is_simulated() -> None:
+    message = refusal("run", "--config", CONFIG_DIR / "robot-bunker.yaml", "--seed", "3")
+    assert "--seed" in message
+    assert "simulates nothing" in message
+
+
+def test_an_unknown_option() -> None:
+    done = treadwatch("run", "--sed", "3")
+    assert done.returncode == 2
+    assert "No such option" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", ["run", "replay"])
+def test_a_video_of_an_unknown_kind(command: str) -> None:
+    extra = [DESK] if command == "replay" else []
+    assert "use one of .mp4" in refusal(command, *extra, "--video", "film.gif")
+
+
+def test_observations_in_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    assert "observations cannot be written" in refusal("replay", DESK, "--observations", tmp_path / "no" / "o.jsonl")
+
+
+def test_a_recording_that_is_not_there() -> None:
+    assert "nowhere" in refusal("replay", "nowhere")
+
+
+def test_a_recording_without_its_calibration(recording: Path) -> None:
+    (recording / "camera.yaml").unlink()
+    assert "camera.yaml" in refusal("replay", recording)
+
+
+def test_a_recording_with_a_bad_calibration(recording: Path) -> None:
+    text = (recording / "camera.yaml").read_text()
+    (recording / "camera.yaml").write_text(text.replace("fx: 517.3", "fx: -517.3"))
+    message = refusal("replay", recording)
+    assert "camera.yaml: fx:" in message
+    assert "-517.3" in message
+
+
+def test_true_poses_that_the_recording_does_not_have(recording: Path) -> None:
+    (recording / "groundtruth.txt").unlink()
+    assert "groundtruth.txt: there is no such file" in refusal("replay", recording, "--odometry", "groundtruth")
+
+
+def test_a_recording_whose_images_all_have_another_size(recording: Path) -> None:
+    text = (recording / "camera.yaml").read_text()
+    (recording / "camera.yaml").write_text(text.replace("width: 640", "width: 848"))
+    message = refusal("replay", recording)
+    assert "none of the" in message
+
+
+def test_bad_frames_are_skipped_counted_and_named(recording: Path) -> None:
+    colour = sorted((recording / "rgb").iterdir())
+    colour[2].write_bytes(colour[2].read_bytes()[:20_000])
+    depth = sorted((recording / "depth").iterdir())
+    shutil.copy(colour[5], depth[5])
+    done = treadwatch("replay", recording, "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert "2 skipped" in done.stdout
+    assert colour[2].name in done.stdout
+    assert depth[5].name in done.stdout
