@@ -16,6 +16,10 @@ from config.perception import PerceptionConfig
 from config.robot import Robot
 
 
+# Slower, and encoders, status and voltages would grow stale between their turns.
+ROBOCLAW_RATE_HZ = 40.0
+
+
 class SimulationConfig(Section):
     """The simulated outside: a world with moving things, and the plant that the emulator drives."""
 
@@ -79,6 +83,11 @@ class AppConfig(Section):
         if self.runner.kind == "lockstep" and not simulated:
             raise ValueError(
                 "runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'"
+            )
+        if self.chassis.kind == "roboclaw" and self.runner.control_rate_hz < ROBOCLAW_RATE_HZ:
+            raise ValueError(
+                f"runner.control_rate_hz must be at least {ROBOCLAW_RATE_HZ:g} with a RoboClaw, which answers "
+                "one request an exchange"
             )
         return self
 

@@ -14,7 +14,7 @@ import cv2
 
 from config.app import AppConfig, ReplayConfig, SimulationConfig
 from config.camera import OdometryChoice, RealsenseCameraConfig, ReplayCameraConfig, SimulatedCameraConfig
-from config.chassis import AgilexChassisConfig, RoboclawChassisConfig, SerialLinkConfig
+from config.chassis import AgilexChassisConfig, RoboclawChassisConfig
 from config.loader import resolve
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
@@ -33,9 +33,9 @@ from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
 from hal.chassis.agilex import AgilexChassis
 from hal.chassis.roboclaw import RoboclawChassis
-from hal.links.can_bus import open_can_link
-from hal.links.pseudo_terminal import PseudoTerminal
-from hal.links.serial_port import open_serial_link
+from hal.links.can_bus import CanBusLink
+from hal.links.scripted import serial_pair
+from hal.links.serial_port import SerialPortLink
 from hal.types import CameraMount, PlanarPose
 from sim.agilex_emulator import AgilexEmulator
 from sim.camera import SimulatedCamera
@@ -176,16 +176,15 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
         plant = TrackedPlant(simulation.plant, start, start_ns)
     match config.chassis:
         case AgilexChassisConfig() as chassis:
-            driver = AgilexChassis(open_can_link(chassis.link), chassis)
-            emulator = None if plant is None else AgilexEmulator(open_can_link(chassis.link), plant)
-            return driver, emulator
+            driver = AgilexChassis(CanBusLink(chassis.link), chassis)
+            return driver, None if plant is None else AgilexEmulator(CanBusLink(chassis.link), plant)
         case RoboclawChassisConfig() as chassis:
             if plant is None:
-                return RoboclawChassis(open_serial_link(chassis.link), chassis), None
-            port = PseudoTerminal()
-            link = SerialLinkConfig(url=port.path, baud=chassis.link.baud)
-            base = RoboclawEmulator(port, plant, counts_per_m=chassis.counts_per_m, address=chassis.address)
-            return RoboclawChassis(open_serial_link(link), chassis), base
+                return RoboclawChassis(SerialPortLink(chassis.link), chassis), None
+            # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
+            here, there = serial_pair()
+            base = RoboclawEmulator(there, plant, counts_per_m=chassis.counts_per_m, address=chassis.address)
+            return RoboclawChassis(here, chassis), base
         case unknown:
             assert_never(unknown)
 

@@ -44,7 +44,8 @@ def run(
     quiet: bool,
 ) -> None:
     """Drive the path. Exit code 1 if anything was touched or the target was missed."""
-    from controller.mission import MissionOptions, run_mission
+    from controller.mission import run_mission
+    from controller.result import MissionOptions
 
     options = MissionOptions(config_path, scenario, seed, observations, video, quiet)
     sys.exit(run_mission(options))

@@ -79,7 +79,12 @@ def drive_lockstep(
         recorder = devices.enter_context(open_recorder(recording, surroundings(config)))
         stop = devices.enter_context(stop_on_signals())
         loop = build_control(config, options.config_path, chassis)
-        result = MissionResult(loop, SetpointTally(config.robot.limits), TimingTally(), simulation=simulation)
+        result = MissionResult(
+            loop,
+            SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz),
+            TimingTally(),
+            simulation=simulation,
+        )
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         run_recorder = RunRecorder(recorder, path)
         began_s = time.perf_counter()
@@ -90,7 +95,7 @@ def drive_lockstep(
                 result.timing.add(look.timing_ms)
                 run_recorder.saw(look)
             run_recorder.decided(step)
-            report(console, path.length_m, step)
+            report(console, path.length_m, step, result.started_ns)
             if stop:
                 loop.request_stop(f"{stop.reason} received")
         run_recorder.finish()

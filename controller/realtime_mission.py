@@ -51,7 +51,7 @@ def drive_realtime(
         stop = devices.enter_context(stop_on_signals())
         result = MissionResult(
             loop,
-            SetpointTally(config.robot.limits),
+            SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz),
             TimingTally(),
             simulation=simulation,
             punctuality=punctuality,
@@ -71,7 +71,7 @@ def drive_realtime(
             if loop.stop_reason is not None and not told_stopping:
                 told_stopping = True
                 service.stopping(loop.stop_reason)
-            report(console, path.length_m, moment.control)
+            report(console, path.length_m, moment.control, result.started_ns)
     return result
 
 

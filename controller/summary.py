@@ -16,14 +16,14 @@ from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
 
-def report(console: Console, length_m: float, step: ControlStep) -> None:
+def report(console: Console, length_m: float, step: ControlStep, started_ns: int) -> None:
     """Progress, and the decision if it is a new one."""
     console.progress(
         step.progress_m / length_m,
         f"{step.progress_m:5.1f}/{length_m:.1f} m  {step.setpoint.v_mps:4.2f} m/s  "
         f"{step.decision.action.value}: {step.decision.reason.sentence}",
     )
-    console.decision(step.now_ns / NS_PER_S, step.decision, step.setpoint.v_mps)
+    console.decision((step.now_ns - started_ns) / NS_PER_S, step.decision, step.setpoint.v_mps)
 
 
 def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, str]]:

@@ -24,6 +24,7 @@ class SetpointTally:
     """
 
     limits: Limits
+    period_s: float
     count: int = 0
     max_speed_mps: float = 0.0
     max_accel_mps2: float = 0.0
@@ -56,7 +57,8 @@ class SetpointTally:
     def _differences(self, sent: Setpoint) -> tuple[float, float]:
         if self._last is None:
             return 0.0, 0.0
-        dt_s = (sent.stamp_ns - self._last.stamp_ns) / NS_PER_S
+        # Two steps closer than a period are one late and one on time: the clock's jitter, not the command's.
+        dt_s = max((sent.stamp_ns - self._last.stamp_ns) / NS_PER_S, self.period_s)
         return (sent.v_mps - self._last.v_mps) / dt_s, (sent.a_mps2 - self._last.a_mps2) / dt_s
 
 

@@ -70,7 +70,13 @@ class SimulatedCamera:
         return self._picture
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """Wait for the next exposure and draw it. Raises FrameTimeout if it is not due in time."""
+        """Wait for the next exposure and draw it. Raises FrameTimeout if it is not due in time.
+
+        Exposures that were missed meanwhile are lost, as with a real camera; sequence shows the gap.
+        """
+        missed_ns = self._clock.now_ns() - self.next_capture_ns
+        if missed_ns > 0:
+            self._index += int(missed_ns * self._config.fps / NS_PER_S)
         due_ns = self.next_capture_ns
         deadline_ns = self._clock.now_ns() + round(timeout_s * NS_PER_S)
         if due_ns > deadline_ns:

@@ -12,7 +12,7 @@ LIMITS = Limits()
 
 def tally_of(*points: tuple[float, float]) -> SetpointTally:
     """Setpoints (v, a), 20 ms apart."""
-    tally = SetpointTally(LIMITS)
+    tally = SetpointTally(LIMITS, period_s=0.02)
     for index, (v_mps, a_mps2) in enumerate(points):
         tally.add(Setpoint(index * 20 * MS, v_mps, a_mps2, 0.0))
     return tally
@@ -38,8 +38,15 @@ def test_each_broken_limit_is_counted(points: tuple[tuple[float, float], ...], w
     assert tally_of(*points).violations == 1, what
 
 
+def test_a_late_step_followed_by_one_on_time_is_no_jerk() -> None:
+    tally = SetpointTally(LIMITS, period_s=0.02)
+    tally.add(Setpoint(15 * MS, 0.5, 0.0, 0.0))
+    tally.add(Setpoint(20 * MS, 0.50012, 0.012, 0.0))
+    assert tally.violations == 0
+
+
 def test_what_was_not_sent_and_what_was_sent_before_count_nothing() -> None:
-    tally = SetpointTally(LIMITS)
+    tally = SetpointTally(LIMITS, period_s=0.02)
     point = Setpoint(0, 0.1, 0.0, 0.0)
     for sent in (None, point, point):
         tally.add(sent)
