@@ -18,7 +18,7 @@ _STEP_M = 0.42  # share of the height
 # Heel and toe seen from the ankle, shares of the height; a foot tips by this share of its shank's angle.
 _SOLE: FloatArray = np.array([[-0.035, 0.0, -_ANKLE], [0.104, 0.0, -_ANKLE]])
 _FOOT_TIPS = 0.4
-_THIGH_SWING_RAD, _ARM_SWING_RAD, _KNEE_BEND_RAD = 0.42, 0.38, 0.75
+_ARM_SWING_RAD, _KNEE_BEND_RAD = 0.38, 0.85
 
 
 def build_person(spec: Person, generator: np.random.Generator) -> tuple[Faces, ...]:
@@ -35,8 +35,8 @@ def build_person(spec: Person, generator: np.random.Generator) -> tuple[Faces, .
 
 def person_footprint(spec: Person, state: MotionState) -> FloatArray:
     """An octagon (8, 2) in the body frame around feet and arms, as wide as they swing at this speed."""
-    h, swing = spec.height_m, _swing(state)
-    front, rear, side = (0.11 + 0.20 * swing) * h, (0.075 + 0.20 * swing) * h, 0.166 * h
+    h, swing = spec.height_m, _swing(state.speed_mps)
+    front, rear, side = (0.11 + 0.23 * swing) * h, (0.075 + 0.20 * swing) * h, 0.166 * h
     return np.array(
         [
             [front, -0.11 * h], [front, 0.11 * h], [0.85 * front, side], [-0.85 * rear, side],
@@ -47,20 +47,22 @@ def person_footprint(spec: Person, state: MotionState) -> FloatArray:
 
 def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
     """Where the parts are in the body frame; the lower foot stands on the floor."""
-    h, swing = spec.height_m, _swing(state)
-    phase = math.pi * state.distance_m / (_STEP_M * h)
+    h, swing = spec.height_m, _swing(state.speed_mps)
+    cycle = state.distance_m / (2.0 * _STEP_M * h)
     legs: list[Pose] = []
     arms: list[Pose] = []
-    for side, offset in ((1.0, 0.0), (-1.0, math.pi)):
+    for side, offset in ((1.0, 0.0), (-1.0, 0.5)):
         hip = np.array([0.0, side * 0.052 * h, _HIP * h])
-        thigh_rad = -_THIGH_SWING_RAD * swing * math.sin(phase + offset)
-        knee_rad = _KNEE_BEND_RAD * swing * max(0.0, math.cos(phase + offset)) ** 2
+        reach, lifted = _stride((cycle + offset) % 1.0)
+        knee_rad = _KNEE_BEND_RAD * swing * lifted
+        # Bending the knee would draw the foot back: the thigh makes up for it.
+        thigh_rad = -math.asin(swing * reach * _STEP_M / (_HIP - _ANKLE)) - 0.5 * knee_rad
         legs.extend(_chain(hip, thigh_rad, (_HIP - _KNEE) * h, knee_rad))
         ankle = legs[-1].apply(np.array([[0.0, 0.0, (_ANKLE - _KNEE) * h]]))[0]
         legs.append(Pose(axis_rotation("y", _FOOT_TIPS * (thigh_rad + knee_rad)), ankle))
-    for side, offset in ((1.0, math.pi), (-1.0, 0.0)):
+    for side, offset in ((1.0, 0.5), (-1.0, 0.0)):
         shoulder = np.array([0.0, side * 0.137 * h, (_SHOULDER - 0.01) * h])
-        arm_rad = -_ARM_SWING_RAD * swing * math.sin(phase + offset)
+        arm_rad = -_ARM_SWING_RAD * swing * math.cos(2.0 * math.pi * (cycle + offset))
         arms.extend(_chain(shoulder, arm_rad, (_SHOULDER - _ELBOW) * h, -0.15 - 0.3 * swing))
     soles = np.concatenate([foot.apply(_SOLE * h)[:, 2] for foot in (legs[2], legs[5])])
     lift = np.array([0.0, 0.0, spec.z_m - float(soles.min())])
@@ -68,9 +70,22 @@ def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
     return tuple(Pose(pose.rotation, pose.translation_m + lift) for pose in poses)
 
 
-def _swing(state: MotionState) -> float:
+def _stride(cycle: float) -> tuple[float, float]:
+    """Where a foot is ahead of the hip, in steps, and how far it is lifted (0..1), over two steps (0..1).
+
+    It stands still on the floor for the first half; for the second it swings forward without a jerk.
+    """
+    if cycle < 0.5:
+        return 0.5 - 2.0 * cycle, 0.0
+    q = 2.0 * cycle - 1.0
+    # Hermite cubic from -1/2 to 1/2 that begins and ends as fast as standing: -1.
+    forward = -0.5 + q * (-1.0 + q * (6.0 - 4.0 * q))
+    return forward, math.sin(math.pi * q) ** 2
+
+
+def _swing(speed_mps: float) -> float:
     """0..1: slow or standing, the limbs come to rest."""
-    return min(1.0, state.speed_mps / 0.7)
+    return min(1.0, speed_mps / 0.5)
 
 
 def _clothes(spec: Person, generator: np.random.Generator) -> dict[str, str]:

@@ -8,16 +8,39 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from functools import lru_cache, partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import ColourImage, FloatArray
-from sim import paint
+from sim import paint_building, paint_goods, paint_movers
+from sim.paint import Painter
+from sim.paint_rack import facade
 
 # Two steps of the pyramid halve a side: fine enough that a change of step is not seen.
 STEPS_PER_OCTAVE = 2
+
+
+_PAINTERS: dict[str, Painter] = {
+    **paint_goods.PAINTERS,
+    **paint_building.PAINTERS,
+    **paint_movers.PAINTERS,
+}
+
+
+@lru_cache(maxsize=256)
+def draw(seed: int, key: str) -> ColourImage:
+    """The texture of a key, (H, W, 3) uint8, BGR, read-only. Raises KeyError for an unknown kind."""
+    kind, *variant = key.split("/")
+    generator = np.random.default_rng((seed, zlib.crc32(key.encode())))
+    if kind == "facade":
+        image = facade(generator, tuple(variant), partial(draw, seed))
+    else:
+        image = _PAINTERS[kind](generator, tuple(variant))
+    image.setflags(write=False)
+    return image
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,17 +62,11 @@ class TextureStore:
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._base: dict[str, ColourImage] = {}
         self._sheets: dict[tuple[str, int, int, int, int], Sheet] = {}
 
     def base(self, key: str) -> ColourImage:
-        """The texture itself, (H, W, 3) uint8, BGR. Raises KeyError for a kind that nobody paints."""
-        image = self._base.get(key)
-        if image is None:
-            kind, *variant = key.split("/")
-            generator = np.random.default_rng((self._seed, zlib.crc32(key.encode())))
-            image = self._base[key] = paint.PAINTERS[kind](generator, tuple(variant))
-        return image
+        """The texture itself, (H, W, 3) uint8, BGR, read-only. Raises KeyError for an unknown kind."""
+        return draw(self._seed, key)
 
     def size(self, key: str) -> tuple[int, int]:
         """Width and height of the texture itself."""
