@@ -66,7 +66,8 @@ def _blend(
     crossing = (at_inside + slope < 0.0) & (slope < 0.0)
     reaches = np.where(crossing, at_inside / np.where(crossing, -slope, 1.0), 2.0)
     reach = np.minimum(np.minimum(reaches[0], reaches[1]), np.minimum(reaches[2], reaches[3]))
-    found = np.flatnonzero((reach >= 0.0) & (reach <= 1.0))
+    # In float32 a centre right on the edge may come out a little outside.
+    found = np.flatnonzero((reach >= -0.01) & (reach <= 1.0))
     inside, reach = inside[found], reach[found]
     outside = inside + np.where(behind[found], -stride, stride)
     # The edge lies reach pixels beyond the inner pixel's centre: it cuts that pixel or the next one.
