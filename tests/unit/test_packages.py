@@ -1,0 +1,38 @@
+"""The package names at the top level are common words: make sure that ours are the ones that load."""
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ["controller", "hal", "vision", "sim", "config"]
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_each_package_loads_from_this_project(name: str) -> None:
+    module = importlib.import_module(name)
+    assert module.__file__ is not None
+    assert Path(module.__file__).resolve().is_relative_to(ROOT)
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_no_package_imports_the_tests(name: str) -> None:
+    importing = re.compile(r"^\s*(from|import)\s+tests\b", re.MULTILINE)
+    assert [str(path) for path in (ROOT / name).rglob("*.py") if importing.search(path.read_text())] == []
+
+
+def test_only_build_names_concrete_devices() -> None:
+    concrete = re.compile(
+        r"^\s*from (hal\.(cameras\.(tum_replay|realsense)|chassis\.(agilex|roboclaw)|links\.\w+)"
+        r"|sim\.(camera|agilex_emulator|roboclaw_emulator)) import",
+        re.MULTILINE,
+    )
+    naming = {
+        str(path.relative_to(ROOT / "controller"))
+        for path in (ROOT / "controller").rglob("*.py")
+        if concrete.search(path.read_text())
+    }
+    # The bench and the evaluation measure devices and renderers one by one, outside of any program.
+    assert {name for name in naming if not name.startswith(("bench/", "evaluation/", "campaign/"))} == {"build.py"}
