@@ -1,7 +1,7 @@
-"""The lidar baseline: clusters tracked by Kalman filters in the odometry frame, moving by chi-square.
+"""The lidar baseline: clusters tracked by Kalman filters, moving by chi-square.
 
 Background-free as reference [20] of the paper is understood: no map and no model of the background, only
-consecutive scans. It is given the same odometry as the camera, with its slip.
+consecutive scans. It is given the same odometry as the camera, and corrects its slip by matching scans.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ import numpy as np
 
 from controller.evaluation.assignment import assign
 from controller.evaluation.lidar_clusters import find_clusters
+from controller.evaluation.lidar_matching import refine
 from controller.evaluation.lidar_scan import LidarModel, Scan
 from controller.evaluation.types import CALLED_MOVING, NO_BOX, Answer, Detection
-from hal.geometry import camera_in_floor
-from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose
+from hal.geometry import body_in_floor, camera_in_body
+from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose, Pose
 
 _GATE_M = 0.6
 _POSITION_SIGMA_M = 0.06  # of a cluster's middle: noise, and the shape's change with the view
@@ -31,7 +32,7 @@ _FORGET_S = 0.5
 
 @dataclass(slots=True, eq=False)
 class _Track:
-    """state: x, y, vx, vy in the odometry frame. streak: scans in a row that speak for moving."""
+    """state: x, y, vx, vy on the floor of the first scan. streak: scans in a row that speak for moving."""
 
     id: int
     state: FloatArray
@@ -87,15 +88,17 @@ class LidarTracker:
         self._tracks: list[_Track] = []
         self._next_id = 0
         self._now_s: float | None = None
+        self._last: tuple[Scan, PlanarPose] | None = None
+        self._pose = Pose(np.eye(3), np.zeros(3))
 
     def update(self, scan: Scan, odometry: PlanarPose) -> None:
         """One scan, taken with the robot at odometry."""
         clusters = find_clusters(scan)
         self._predict_to(scan.stamp_s)
-        c, s = math.cos(odometry.heading_rad), math.sin(odometry.heading_rad)
-        turn = np.array([[c, -s], [s, c]])
-        offset = np.array([self._model.forward_m, 0.0])
-        seen_m = (clusters.middle_m + offset) @ turn.T + np.array([odometry.x_m, odometry.y_m])
+        self._move(scan, odometry)
+        seen_m = self._pose.apply(_on_floor(clusters.middle_m + np.array([self._model.forward_m, 0.0])))[
+            :, :2
+        ]
         sigma_m = np.where(clusters.whole, _POSITION_SIGMA_M, _CUT_SIGMA_M)
         expected = np.array([track.state[:2] for track in self._tracks]).reshape(-1, 2)
         apart_m = np.linalg.norm(seen_m[:, None] - expected[None], axis=2)
@@ -111,7 +114,8 @@ class LidarTracker:
     def answer(self, t_s: float, odometry: PlanarPose) -> Answer:
         """The tracks in the camera's field of view at t_s, on the optical axes; height is not measured."""
         self._predict_to(t_s)
-        camera = camera_in_floor(odometry, self._mount)
+        since = self._since_last_scan(odometry)
+        camera = self._pose @ body_in_floor(since) @ camera_in_body(self._mount)
         detections = []
         for track in self._tracks:
             on_floor = np.array([[track.state[0], track.state[1], self._mount.height_m]])
@@ -127,6 +131,22 @@ class LidarTracker:
             )  # fmt: skip
         return Answer(tuple(detections))
 
+    def _move(self, scan: Scan, odometry: PlanarPose) -> None:
+        """The robot's own way since the last scan, by odometry and scan matching."""
+        if self._last is not None:
+            before, _ = self._last
+            sensor = Pose(np.eye(3), np.array([self._model.forward_m, 0.0, 0.0]))
+            told = sensor.inverse() @ body_in_floor(self._since_last_scan(odometry)) @ sensor
+            matched = body_in_floor(refine(before, scan, _planar(told)))
+            self._pose = self._pose @ sensor @ matched @ sensor.inverse()
+        self._last = (scan, odometry)
+
+    def _since_last_scan(self, odometry: PlanarPose) -> PlanarPose:
+        """The robot now in the robot at the last scan, by odometry."""
+        if self._last is None:
+            return PlanarPose(0.0, 0.0, 0.0)
+        return _planar(body_in_floor(self._last[1]).inverse() @ body_in_floor(odometry))
+
     def _begin(self, where_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
         covariance = np.diag([sigma_m**2, sigma_m**2, 1.0, 1.0])
         state = np.array([*where_m, 0.0, 0.0])
@@ -138,6 +158,15 @@ class LidarTracker:
             for track in self._tracks:
                 track.predict(t_s - self._now_s)
         self._now_s = t_s if self._now_s is None else max(t_s, self._now_s)
+
+
+def _planar(pose: Pose) -> PlanarPose:
+    heading_rad = math.atan2(pose.rotation[1, 0], pose.rotation[0, 0])
+    return PlanarPose(float(pose.translation_m[0]), float(pose.translation_m[1]), heading_rad)
+
+
+def _on_floor(points_m: FloatArray) -> FloatArray:
+    return np.column_stack([points_m, np.zeros(len(points_m))])
 
 
 def _confidence(track: _Track) -> float:

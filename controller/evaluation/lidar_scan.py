@@ -12,6 +12,8 @@ from config.scenario import Room
 from hal.types import FloatArray, PlanarPose
 from sim.world import BodyState
 
+_LEGS = 0.6
+
 
 @dataclass(frozen=True, slots=True)
 class LidarModel:
@@ -43,8 +45,8 @@ class Scan:
 
 
 class Lidar:
-    """Scans the world. A person is the convex footprint of the body: the legs do not hide each other,
-    which is kinder to the lidar than real legs are."""
+    """Scans the world. A person is one convex outline, _LEGS of the room that swinging limbs take: two legs
+    that hide each other in turn would be harder."""
 
     def __init__(self, model: LidarModel, room: Room, seed: int) -> None:
         self._model = model
@@ -63,8 +65,8 @@ class Lidar:
         """From where the robot truly stands."""
         model = self._model
         outlines = [
-            np.stack([body.footprint_m, np.roll(body.footprint_m, -1, axis=0)], axis=1)
-            for body in bodies
+            np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
+            for body, outline in ((body, _outline(body)) for body in bodies)
             if body.z_m[0] <= model.height_m <= body.z_m[1]
         ]
         c, s = math.cos(robot.heading_rad), math.sin(robot.heading_rad)
@@ -73,6 +75,13 @@ class Lidar:
         exact = cast(origin, bearings + robot.heading_rad, np.concatenate([self._walls, *outlines]))
         noisy = exact + self._generator.normal(0.0, model.noise_m, len(exact))
         return Scan(t_s, bearings, np.where(noisy <= model.range_m, noisy, np.inf))
+
+
+def _outline(body: BodyState) -> FloatArray:
+    if body.kind != "person":
+        return body.footprint_m
+    middle = body.footprint_m.mean(axis=0)
+    return middle + _LEGS * (body.footprint_m - middle)
 
 
 def cast(origin: FloatArray, angles_rad: FloatArray, segments: FloatArray) -> FloatArray:

@@ -96,9 +96,9 @@ def _with_caption(image: ColourImage, title: str, words: str) -> Image:
     picture = blank(width, height + 58)
     picture[:height] = image
     x = text.put(picture, title, 10, height + 23, INK, 16, text.BOLD)
-    text.put(picture, "dashed green: true, found", x + 18, height + 23, _FOUND, 14)
-    text.put(picture, "dashed red: missed", x + 206, height + 23, _MISSED, 14)
-    text.put(picture, "orange: called moving", x + 348, height + 23, _CLAIMED, 14)
+    for meaning, colour in (("true, found", _FOUND), ("missed", _MISSED), ("called moving", _CLAIMED)):
+        picture[height + 12 : height + 24, x + 18 : x + 30] = colour
+        x = text.put(picture, meaning, x + 36, height + 23, SOFT_INK, 14)
     text.put(picture, text.fit(words, width - 20, 15), 10, height + 47, SOFT_INK, 15)
     return picture
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from controller.evaluation import pictures
-from controller.evaluation.markdown import fixed, picture, section, table
+from controller.evaluation.markdown import fixed, picture, table
 from controller.evaluation.recordings import RecordingRecord
 from controller.evaluation.report import write_picture
 from controller.evaluation.summary import number
@@ -72,7 +72,7 @@ def recording_lines(records: Sequence[RecordingRecord]) -> list[str]:
         "recording", "odometry", "frames", "seconds", "objects", "called moving", "frames with a moving one",
         "false a minute", "ms a frame, median", "p99",
     )  # fmt: skip
-    lines = section("Recordings", _WHAT) + table(head, rows)
+    lines = ["# Recordings", "", " ".join(_WHAT.split()), "", *table(head, rows)]
     for record in records:
         if record.pictures:
             lines += [f"{record.folder.name}: the second frame, and frames with something called moving.", ""]

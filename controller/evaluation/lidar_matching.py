@@ -1,0 +1,90 @@
+"""Scan matching: how the sensor moved between two scans, with the odometry as the first guess.
+
+Point to line (Chen and Medioni 1992), robust: what moved by itself does not fit and does not count. It
+corrects what slipping tracks tell about the yaw; without it everything static would turn.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.evaluation.lidar_scan import Scan
+from hal.types import FloatArray, PlanarPose
+
+_ITERATIONS = 8
+_WINDOW = 4  # beams to either side in which the partner is looked for
+_GATE_M = 0.25
+_ROBUST_M = 0.05
+_MIN_POINTS = 30
+# How far the odometry may be off within one scan: it decides where the scene says nothing.
+_GUESS_SIGMA = np.array([0.01, 0.01, 0.01])  # m, m, rad
+
+
+def refine(before: Scan, now: Scan, guess: PlanarPose) -> PlanarPose:
+    """The sensor now in the sensor before; the guess itself where too little can be matched."""
+    reference = _points(before)
+    normals = _normals(reference)
+    valid = np.isfinite(now.range_m)
+    points = _points(now)[valid]
+    pose = np.array([guess.x_m, guess.y_m, guess.heading_rad])
+    prior = np.diag(1.0 / np.square(_GUESS_SIGMA))
+    start = pose.copy()
+    for _ in range(_ITERATIONS):
+        moved = _transform(points, pose)
+        partner, apart_m = _partners(moved, reference, before)
+        usable = (apart_m <= _GATE_M) & np.isfinite(normals[partner]).all(axis=1)
+        if np.count_nonzero(usable) < _MIN_POINTS:
+            return guess
+        normal, at = normals[partner[usable]], moved[usable]
+        residual = ((reference[partner[usable]] - at) * normal).sum(axis=1)
+        lever = at - pose[:2]
+        turn = normal[:, 1] * lever[:, 0] - normal[:, 0] * lever[:, 1]
+        jacobian = np.column_stack([normal, turn])
+        weight = 1.0 / (_ROBUST_M**2 + np.square(residual))
+        information = (jacobian * weight[:, None]).T @ jacobian + prior
+        gradient = jacobian.T @ (weight * residual) + prior @ (start - pose)
+        step = np.linalg.solve(information, gradient)
+        pose = pose + step
+        if np.abs(step).max() < 1e-5:
+            break
+    return PlanarPose(float(pose[0]), float(pose[1]), float(pose[2]))
+
+
+def _points(scan: Scan) -> FloatArray:
+    """(N, 2) on the sensor's axes; NaN where nothing came back."""
+    range_m = np.where(np.isfinite(scan.range_m), scan.range_m, np.nan)
+    return np.stack([range_m * np.cos(scan.bearings_rad), range_m * np.sin(scan.bearings_rad)], axis=1)
+
+
+def _normals(points: FloatArray) -> FloatArray:
+    """(N, 2) unit normals from the neighbours two beams away; NaN at ends, edges and gaps."""
+    along = np.full_like(points, np.nan)
+    along[2:-2] = points[4:] - points[:-4]
+    length = np.hypot(along[:, 0], along[:, 1])
+    reach = np.hypot(points[:, 0], points[:, 1])
+    smooth = length < 0.15 + 0.08 * reach
+    unit = along / np.where(smooth & (length > 0.0), length, np.nan)[:, None]
+    return np.stack([-unit[:, 1], unit[:, 0]], axis=1)
+
+
+def _transform(points: FloatArray, pose: FloatArray) -> FloatArray:
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    moved: FloatArray = points @ np.array([[c, s], [-s, c]]) + pose[:2]
+    return moved
+
+
+def _partners(
+    points: FloatArray, reference: FloatArray, scan: Scan
+) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.intp]], FloatArray]:
+    """The nearest reference point in a window of beams around each point (N,), and how far away it is."""
+    step_rad = float(scan.bearings_rad[1] - scan.bearings_rad[0])
+    bearing = np.arctan2(points[:, 1], points[:, 0])
+    middle = np.rint((bearing - scan.bearings_rad[0]) / step_rad).astype(np.intp)
+    around = np.clip(middle[:, None] + np.arange(-_WINDOW, _WINDOW + 1), 0, len(reference) - 1)
+    apart = np.linalg.norm(reference[around] - points[:, None], axis=2)
+    apart = np.where(np.isfinite(apart), apart, np.inf)
+    nearest = np.argmin(apart, axis=1)
+    rows = np.arange(len(points))
+    return around[rows, nearest], apart[rows, nearest]
