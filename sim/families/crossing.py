@@ -1,0 +1,146 @@
+"""Who crosses the path: from either side at every angle, from behind a shelf, in crowds, in bends."""
+
+from __future__ import annotations
+
+import math
+
+from config.path import ArcSpec, LineSpec, PathSpec
+from config.scenario import BodySpec, Column, Crate, Room, Scenario, Shelf
+from sim.families.layout import (
+    RACK_DEPTH_M,
+    Random,
+    drive,
+    earliest_s,
+    go,
+    person,
+    racks,
+    robot,
+    scenario,
+    side_of,
+    walk,
+)
+
+_OUT_M = 3.6
+
+
+def crossing_left(random: Random) -> Scenario:
+    """From the left, at 30 to 150 degrees to the path."""
+    return _crossing(random, "crossing_left", 1.0)
+
+
+def crossing_right(random: Random) -> Scenario:
+    """From the right, at 30 to 150 degrees to the path."""
+    return _crossing(random, "crossing_right", -1.0)
+
+
+def _crossing(random: Random, name: str, side: float) -> Scenario:
+    length = float(random.uniform(12.0, 15.0))
+    x, angle = float(random.uniform(5.0, 9.0)), math.radians(float(random.uniform(30.0, 150.0)))
+    body, gap = _crosser(random, "crosser", x, side, angle, float(random.uniform(-3.0, 4.0)))
+    return scenario(name, length, (*racks(random, length, (gap,)), body))
+
+
+def _crosser(
+    random: Random, name: str, x_m: float, side: float, angle_rad: float, late_s: float
+) -> tuple[BodySpec, tuple[float, float]]:
+    """Somebody who is on the path at x_m late_s after the robot could be there at the soonest; and from where
+    to where along the aisle the way there must be free of racks. angle_rad: of the way to the path."""
+    by_robot = bool(random.integers(3) == 0)
+    speed = float(random.uniform(0.5, 1.0) if by_robot else random.uniform(0.6, 1.5))
+    shift = _OUT_M / math.tan(angle_rad)
+    start, end = (x_m - shift, side * _OUT_M), (x_m + shift, -side * _OUT_M)
+    way_s = _OUT_M / math.sin(angle_rad) / speed
+    start_s = earliest_s(x_m) + late_s - way_s
+    if start_s < 0.0:
+        # It would have to start before time: begin on the way.
+        share = min(-start_s / way_s, 0.45)
+        start = (x_m - shift * (1.0 - share), side * _OUT_M * (1.0 - share))
+    margin = 1.3
+    gap = (x_m - abs(shift) - margin, x_m + abs(shift) + margin)
+    if by_robot:
+        return robot(random, name, start, drive(start_s, go(*end, speed))), gap
+    return person(random, name, start, walk(start_s, go(*end, speed))), gap
+
+
+def behind_shelf(random: Random) -> Scenario:
+    """Somebody steps out from behind the end of a shelf that stands close to the path."""
+    length = float(random.uniform(12.0, 15.0))
+    side = side_of(random)
+    corner_x = float(random.uniform(5.0, 8.0))
+    inner = float(random.uniform(0.85, 1.4))
+    speed = float(random.uniform(0.6, 1.4))
+    x = corner_x + float(random.uniform(0.5, 0.9))
+    long_m = corner_x + 4.0
+    shelf = Shelf(
+        kind="shelf",
+        name="blind corner",
+        x_m=corner_x - 0.5 * long_m,
+        y_m=side * (inner + 0.5 * RACK_DEPTH_M),
+        length_m=long_m,
+        width_m=RACK_DEPTH_M,
+    )
+    start_y = inner + RACK_DEPTH_M + 0.8
+    on_path_s = earliest_s(x - 2.0) + float(random.uniform(-1.0, 3.0))
+    way = walk(on_path_s - start_y / speed, go(x, -side * _OUT_M, speed))
+    who = person(random, "person", (x, side * start_y), way)
+    far = Column(kind="column", name="pillar", x_m=corner_x + 3.0, y_m=-side * 2.2)
+    return scenario("behind_shelf", length, (shelf, far, who))
+
+
+def crowd_junction(random: Random) -> Scenario:
+    """Four to seven who cross a junction of two aisles, from both sides, one after the other."""
+    length = float(random.uniform(13.0, 16.0))
+    bodies: list[BodySpec] = []
+    for number in range(int(random.integers(4, 8))):
+        side = side_of(random)
+        x, angle = float(random.uniform(6.0, 9.0)), math.radians(float(random.uniform(75.0, 105.0)))
+        late_s = 1.6 * number - 3.0 + float(random.uniform(-0.8, 0.8))
+        body, _ = _crosser(random, f"crosser {number + 1}", x, side, angle, late_s)
+        bodies.append(body)
+    return scenario("crowd_junction", length, (*racks(random, length, ((3.8, 11.2),)), *bodies))
+
+
+def curved_path(random: Random) -> Scenario:
+    """A bend, crates on both its sides, and for most seeds somebody who crosses behind it."""
+    radius, turn = float(random.uniform(3.0, 7.0)), side_of(random) * float(random.uniform(40.0, 90.0))
+    before, after = float(random.uniform(3.0, 5.0)), float(random.uniform(4.0, 6.0))
+    path = PathSpec(
+        segments=(
+            LineSpec(kind="line", length_m=before),
+            ArcSpec(kind="arc", radius_m=radius, angle_deg=turn, blend_m=0.8),
+            LineSpec(kind="line", length_m=after),
+        )
+    )
+    left = math.copysign(1.0, turn)
+    bend = math.radians(abs(turn))
+    # The circle's own geometry, without the blends: near enough to put things beside it.
+    exit_x, exit_y = before + 0.4 + radius * math.sin(bend), left * radius * (1.0 - math.cos(bend))
+    out_x, out_y = math.cos(bend), left * math.sin(bend)
+    bodies: list[BodySpec] = [
+        Crate(
+            kind="crate",
+            name="crate inside",
+            x_m=before + 0.4 + radius * math.sin(0.5 * bend) - 1.5 * math.sin(0.5 * bend),
+            y_m=left * (radius - (radius - 1.6) * math.cos(0.5 * bend)),
+            heading_deg=math.degrees(left * 0.5 * bend),
+        ),
+        Crate(
+            kind="crate",
+            name="crate outside",
+            x_m=before + 0.4 + (radius + 1.7) * math.sin(0.6 * bend),
+            y_m=left * (radius - (radius + 1.7) * math.cos(0.6 * bend)),
+            heading_deg=math.degrees(left * 0.6 * bend),
+        ),
+    ]
+    if random.random() < 0.7:
+        along = float(random.uniform(1.0, after - 1.5))
+        x, y = exit_x + along * out_x, exit_y + along * out_y
+        side = side_of(random)
+        away_x, away_y = -out_y * side * _OUT_M, out_x * side * _OUT_M
+        speed = float(random.uniform(0.6, 1.4))
+        on_path_s = earliest_s(before + radius * bend + along) + float(random.uniform(-2.0, 3.0))
+        way = walk(on_path_s - _OUT_M / speed, go(x - away_x, y - away_y, speed))
+        bodies.append(person(random, "person", (x + away_x, y + away_y), way))
+    reach = before + radius + after + 6.0
+    room = Room(x_min_m=-6.0, x_max_m=reach, y_min_m=-reach, y_max_m=reach)
+    return scenario("curved_path", 0.0, tuple(bodies), path=path, room=room)

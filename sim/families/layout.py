@@ -1,0 +1,171 @@
+"""What all families are furnished with: an aisle along x, racks on both sides, people and robots.
+
+The robot starts at the origin and drives along x; sizes and speeds of it that matter here are those of
+config/robot.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from config.path import LineSpec, PathSpec
+from config.scenario import (
+    BodySpec,
+    Go,
+    Motion,
+    Person,
+    RobotBody,
+    Room,
+    Scenario,
+    Shelf,
+    Step,
+    Texture,
+    Wait,
+)
+
+Random = np.random.Generator
+
+FRONT_M = 0.51
+HALF_WIDTH_M = 0.39
+# The fastest that the robot gets anywhere: no delay, no jerk limit, the speed that the camera's range admits.
+_TOP_MPS, _ACCEL_MPS2 = 1.25, 0.3
+RACK_DEPTH_M = 1.1
+_BAY_M = 2.7
+
+
+def furthest_m(t_s: float) -> float:
+    """No robot has come further than this by t_s."""
+    rising_s = min(max(t_s, 0.0), _TOP_MPS / _ACCEL_MPS2)
+    return 0.5 * _ACCEL_MPS2 * rising_s**2 + _TOP_MPS * max(t_s - _TOP_MPS / _ACCEL_MPS2, 0.0)
+
+
+def earliest_s(x_m: float) -> float:
+    """No robot's turning centre is at x_m sooner than this."""
+    rising_m = 0.5 * _TOP_MPS**2 / _ACCEL_MPS2
+    if x_m <= rising_m:
+        return math.sqrt(2.0 * max(x_m, 0.0) / _ACCEL_MPS2)
+    return _TOP_MPS / _ACCEL_MPS2 + (x_m - rising_m) / _TOP_MPS
+
+
+def straight(length_m: float) -> PathSpec:
+    """Along x from the origin."""
+    return PathSpec(segments=(LineSpec(kind="line", length_m=length_m),))
+
+
+def hall(length_m: float, half_width_m: float = 5.0) -> Room:
+    """A building around an aisle."""
+    return Room(x_min_m=-6.0, x_max_m=length_m + 8.0, y_min_m=-half_width_m, y_max_m=half_width_m)
+
+
+def racks(random: Random, length_m: float, gaps_m: tuple[tuple[float, float], ...] = ()) -> tuple[Shelf, ...]:
+    """Racks along both sides of the aisle except where gaps_m (from, to) leave room for who crosses."""
+    shelves = []
+    for side in (1.0, -1.0):
+        inner_m = float(random.uniform(1.5, 2.2))
+        x = float(random.uniform(-4.0, -2.0))
+        number = 0
+        while x < length_m + 3.0:
+            length = _BAY_M * int(random.integers(1, 4))
+            hit = [gap for gap in gaps_m if gap[0] < x + length and gap[1] > x]
+            if hit:
+                length = hit[0][0] - x
+            if length > 0.8:
+                number += 1
+                shelves.append(
+                    Shelf(
+                        kind="shelf",
+                        name=f"rack {'left' if side > 0 else 'right'} {number}",
+                        x_m=x + 0.5 * length,
+                        y_m=side * (inner_m + 0.5 * RACK_DEPTH_M),
+                        length_m=length,
+                        width_m=RACK_DEPTH_M,
+                    )
+                )
+            x = hit[0][1] if hit else x + length + float(random.choice([0.0, 0.0, 1.2]))
+    return tuple(shelves)
+
+
+def person(random: Random, name: str, start: tuple[float, float], motion: Motion | None) -> Person:
+    """Somebody of some height who stands at start and looks where he will go."""
+    return Person(
+        kind="person",
+        name=name,
+        x_m=start[0],
+        y_m=start[1],
+        heading_deg=_first_heading_deg(start, motion),
+        height_m=float(random.uniform(1.55, 1.95)),
+        motion=motion,
+    )
+
+
+def robot(random: Random, name: str, start: tuple[float, float], motion: Motion | None) -> RobotBody:
+    """Another transport robot, half of them loaded."""
+    return RobotBody(
+        kind="robot",
+        name=name,
+        x_m=start[0],
+        y_m=start[1],
+        heading_deg=_first_heading_deg(start, motion),
+        load_height_m=float(random.choice([0.0, 0.5])),
+        motion=motion,
+    )
+
+
+def _first_heading_deg(start: tuple[float, float], motion: Motion | None) -> float:
+    first = None if motion is None else next((one for one in motion.steps if isinstance(one, Go)), None)
+    if first is None:
+        return 180.0
+    return math.degrees(math.atan2(first.y_m - start[1], first.x_m - start[0]))
+
+
+def walk(start_s: float, *steps: Step) -> Motion:
+    """As people start and turn."""
+    return Motion(start_s=max(start_s, 0.0), steps=steps)
+
+
+def drive(start_s: float, *steps: Step, accel_mps2: float = 0.8) -> Motion:
+    """As transport robots start and turn."""
+    return Motion(start_s=max(start_s, 0.0), accel_mps2=accel_mps2, turn_rate_degps=60.0, steps=steps)
+
+
+def go(x_m: float, y_m: float, speed_mps: float) -> Go:
+    """Straight to a point."""
+    return Go(kind="go", x_m=x_m, y_m=y_m, speed_mps=speed_mps)
+
+
+def wait(duration_s: float) -> Wait:
+    """Stand still."""
+    return Wait(kind="wait", duration_s=duration_s)
+
+
+def side_of(random: Random) -> float:
+    """1 for the left, -1 for the right."""
+    return float(random.choice([1.0, -1.0]))
+
+
+def texture_of(random: Random, *among: Texture) -> Texture:
+    """One of them."""
+    return among[int(random.integers(len(among)))]
+
+
+def scenario(
+    name: str,
+    length_m: float,
+    bodies: tuple[BodySpec, ...],
+    *,
+    duration_s: float = 70.0,
+    blocked: bool = False,
+    path: PathSpec | None = None,
+    room: Room | None = None,
+) -> Scenario:
+    """A world; blocked: something never leaves the path."""
+    return Scenario(
+        name=name,
+        duration_s=duration_s,
+        outcome="blocked" if blocked else "target",
+        path=path or straight(length_m),
+        room=room or hall(length_m),
+        bodies=bodies,
+    )

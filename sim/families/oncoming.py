@@ -1,0 +1,121 @@
+"""Who comes towards the robot, along its path or close beside it."""
+
+from __future__ import annotations
+
+from config.scenario import Motion, Scenario, Step
+from sim.families.layout import (
+    Random,
+    drive,
+    furthest_m,
+    go,
+    person,
+    racks,
+    robot,
+    scenario,
+    side_of,
+    wait,
+    walk,
+)
+
+_SIDE_M = 1.15
+
+
+def head_on_person(random: Random) -> Scenario:
+    """A person walks towards the robot in the middle of its path and steps aside before they meet."""
+    length = float(random.uniform(12.0, 15.0))
+    speed = float(random.uniform(0.7, 1.4))
+    aside_x, start_s = _where_to_step_aside(random, length + 1.0, speed, 1.0)
+    side = side_of(random)
+    way = walk(
+        start_s,
+        go(aside_x, float(random.uniform(-0.2, 0.2)), speed),
+        go(aside_x - 1.2, side * _SIDE_M, speed),
+        go(-4.5, side * _SIDE_M, speed),
+    )
+    who = person(random, "person", (length + 1.0, float(random.uniform(-0.3, 0.3))), way)
+    return scenario("head_on_person", length, (*racks(random, length), who))
+
+
+def head_on_robot(random: Random) -> Scenario:
+    """Another robot comes on the same path and turns off into a gap between the racks."""
+    length = float(random.uniform(13.0, 16.0))
+    speed = float(random.uniform(0.5, 1.0))
+    # Turning on the spot takes its time: 90 degrees at 60 degrees a second, and stopping before.
+    turn_x, start_s = _where_to_step_aside(random, length + 1.0, speed, 4.5)
+    way = drive(start_s, go(turn_x, 0.0, speed), go(turn_x, side_of(random) * 4.0, speed))
+    other = robot(random, "robot", (length + 1.0, 0.0), way)
+    return scenario("head_on_robot", length, (*racks(random, length, ((turn_x - 1.2, turn_x + 1.2),)), other))
+
+
+def _where_to_step_aside(
+    random: Random, from_x_m: float, speed_mps: float, clears_s: float
+) -> tuple[float, float]:
+    """(x, start time) so that the way is left clears_s after x is reached, and no robot was there before."""
+    start_s = float(random.uniform(0.0, 2.0))
+    x = from_x_m - 2.0
+    while x > 4.5 and furthest_m(start_s + (from_x_m - (x - 0.5)) / speed_mps + 0.5) + 1.6 < x - 0.5:
+        x -= 0.5
+    x += float(random.uniform(0.0, 1.0))
+    # Not slower than the robot at this place: else it would have to stand long, which is another family.
+    return x, max(start_s - 0.2 * clears_s, 0.0)
+
+
+def group(random: Random) -> Scenario:
+    """Three to five people together, some of them on the path, who part before the robot."""
+    length = float(random.uniform(12.0, 15.0))
+    speed = float(random.uniform(0.7, 1.2))
+    aside_x, start_s = _where_to_step_aside(random, length + 1.0, speed, 1.0)
+    people = []
+    for number in range(int(random.integers(3, 6))):
+        side = 1.0 if number % 2 else -1.0
+        rank = number // 2
+        y = side * (0.35 + 0.1 * float(random.random()))
+        x = length + 1.0 + 0.9 * rank
+        lane = side * (_SIDE_M + 0.05)
+        people.append(
+            person(
+                random,
+                f"person {number + 1}",
+                (x, y),
+                walk(
+                    start_s,
+                    go(aside_x + 0.9 * rank, y, speed),
+                    go(aside_x + 0.9 * rank - 1.0, lane, speed),
+                    go(-4.0 + 0.9 * rank, lane, speed),
+                ),
+            )
+        )
+    return scenario("group", length, (*racks(random, length), *people))
+
+
+def turns_back(random: Random) -> Scenario:
+    """Somebody walks into the way, stops, turns back, and for half of the seeds comes a second time."""
+    length = float(random.uniform(12.0, 15.0))
+    x = float(random.uniform(6.0, 9.0))
+    speed = float(random.uniform(0.6, 1.3))
+    side = side_of(random)
+    away, in_way = side * float(random.uniform(1.8, 2.6)), side * float(random.uniform(-0.2, 0.35))
+    steps: list[Step] = [
+        go(x, in_way, speed),
+        wait(float(random.uniform(0.3, 2.5))),
+        go(x + 0.3, away, speed),
+    ]
+    if random.integers(2):
+        steps += [wait(float(random.uniform(0.5, 2.0))), go(x + 0.3, in_way, speed), wait(1.0)]
+        steps += [go(x + 0.6, side * 3.5, speed)]
+    who = person(
+        random, "person", (x, side * 2.6), Motion(start_s=float(random.uniform(0.5, 4.0)), steps=tuple(steps))
+    )
+    return scenario("turns_back", length, (*racks(random, length, ((x - 1.3, x + 1.8),)), who))
+
+
+def grazing(random: Random) -> Scenario:
+    """Somebody comes along the robot's side, so close that only a hand's breadth stays between them."""
+    length = float(random.uniform(12.0, 15.0))
+    side = side_of(random)
+    speed = float(random.uniform(0.5, 1.4))
+    # Half the robot's width, half a walking person's (0.33 m at most), and what stays between.
+    y = side * (0.39 + 0.33 + float(random.uniform(0.03, 0.35)))
+    way = walk(float(random.uniform(0.0, 3.0)), go(-5.0, y, speed))
+    who = person(random, "person", (length + 1.5, y), way)
+    return scenario("grazing", length, (*racks(random, length), who))

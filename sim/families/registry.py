@@ -1,0 +1,100 @@
+"""Every scenario family by name: a seeded generator of worlds, and of what goes wrong in them."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.scenario import Scenario
+from sim.families import crossing, oncoming, same_way, standing
+from sim.families.layout import Random
+from sim.faults import NO_FAULTS, Faults, Window
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One mission's world. faults: what goes wrong in it. halts: the robot must give up before its target."""
+
+    family: str
+    seed: int
+    scenario: Scenario
+    faults: Faults
+    halts: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Family:
+    world: Callable[[Random], Scenario]
+    faults: Callable[[Random], Faults] = lambda _: NO_FAULTS
+    halts: bool = False
+
+
+def _silent(random: Random) -> Faults:
+    start_s = float(random.uniform(2.0, 8.0))
+    return Faults(silent=Window(start_s, start_s + float(random.uniform(0.5, 3.0))))
+
+
+def _frozen(random: Random) -> Faults:
+    start_s = float(random.uniform(2.0, 8.0))
+    return Faults(frozen=Window(start_s, start_s + float(random.uniform(0.5, 3.0))))
+
+
+def _late(random: Random) -> Faults:
+    start_s = float(random.uniform(1.0, 6.0))
+    window = Window(start_s, start_s + float(random.uniform(2.0, 8.0)))
+    return Faults(late=window, late_by_s=float(random.uniform(0.05, 0.3)))
+
+
+def _slip(random: Random) -> Faults:
+    return Faults(yaw_slip=float(random.uniform(0.05, 0.2)), distance_slip=float(random.uniform(-0.01, 0.03)))
+
+
+def _feedback(random: Random) -> Faults:
+    return Faults(feedback_lost_s=float(random.uniform(2.0, 8.0)))
+
+
+def _glass(_: Random) -> Faults:
+    return Faults(glass=(standing.GLASS,))
+
+
+_FAMILIES: dict[str, _Family] = {
+    "head_on_person": _Family(oncoming.head_on_person),
+    "head_on_robot": _Family(oncoming.head_on_robot),
+    "crossing_left": _Family(crossing.crossing_left),
+    "crossing_right": _Family(crossing.crossing_right),
+    "behind_shelf": _Family(crossing.behind_shelf),
+    "cut_in": _Family(same_way.cut_in),
+    "overtaking": _Family(same_way.overtaking),
+    "lead_brakes": _Family(same_way.lead_brakes),
+    "static_crate": _Family(standing.static_crate),
+    "crate_beside": _Family(standing.crate_beside),
+    "low_pallet": _Family(standing.low_pallet),
+    "thin_pole": _Family(standing.thin_pole),
+    "plain_wall": _Family(standing.plain_wall),
+    "hanging_beam": _Family(standing.hanging_beam),
+    "group": _Family(oncoming.group),
+    "turns_back": _Family(oncoming.turns_back),
+    "grazing": _Family(oncoming.grazing),
+    "crowd_junction": _Family(crossing.crowd_junction),
+    "curved_path": _Family(crossing.curved_path),
+    "empty_aisle": _Family(standing.empty_aisle),
+    "glass_front": _Family(standing.glass_front, _glass),
+    "camera_dropout": _Family(crossing.crossing_left, _silent),
+    "camera_frozen": _Family(crossing.crossing_right, _frozen),
+    "odometry_slip": _Family(crossing.curved_path, _slip),
+    "late_frames": _Family(crossing.crossing_left, _late),
+    "feedback_lost": _Family(crossing.crossing_right, _feedback, halts=True),
+}
+
+FAMILY_NAMES: tuple[str, ...] = tuple(_FAMILIES)
+
+
+def generate(family: str, seed: int) -> Case:
+    """The mission of a family for a seed; the same one every time. Raises KeyError for an unknown family."""
+    made = _FAMILIES[family]
+    random = np.random.default_rng((zlib.crc32(family.encode()), seed))
+    world = made.world(random).model_copy(update={"name": f"{family}-{seed}"})
+    return Case(family, seed, world, made.faults(random), made.halts)

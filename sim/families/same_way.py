@@ -1,0 +1,65 @@
+"""Who goes the same way as the robot: ahead of it, past it, or into its way."""
+
+from __future__ import annotations
+
+from config.scenario import BodySpec, Motion, Scenario
+from sim.families.layout import Random, drive, go, person, racks, robot, scenario, side_of, wait, walk
+
+_BESIDE_M = 1.2
+
+
+def cut_in(random: Random) -> Scenario:
+    """Somebody who goes beside the path turns into it just ahead of the robot, and leaves it again."""
+    length = float(random.uniform(14.0, 18.0))
+    side = side_of(random)
+    speed = float(random.uniform(0.5, 1.1))
+    start_x, cut_x = float(random.uniform(1.0, 3.5)), float(random.uniform(4.5, 6.5))
+    steps = (
+        go(cut_x, side * _BESIDE_M, speed),
+        go(cut_x + 1.2, 0.0, speed),
+        go(cut_x + float(random.uniform(3.0, 5.0)), 0.0, speed),
+        go(cut_x + 6.5, -side * _BESIDE_M, speed),
+        go(length + 5.0, -side * _BESIDE_M, speed),
+    )
+    start = (start_x, side * _BESIDE_M)
+    who: BodySpec
+    if random.integers(2):
+        who = robot(random, "robot", start, drive(0.0, *steps))
+    else:
+        who = person(random, "person", start, walk(0.0, *steps))
+    return scenario("cut_in", length, (*racks(random, length), who))
+
+
+def overtaking(random: Random) -> Scenario:
+    """Somebody faster passes on the side and, for half of the seeds, goes on ahead in the robot's lane."""
+    length = float(random.uniform(14.0, 18.0))
+    side = side_of(random)
+    speed = float(random.uniform(1.6, 2.0))
+    lane = float(random.choice([side * _BESIDE_M, 0.0]))
+    way = walk(
+        float(random.uniform(0.5, 3.0)),
+        go(8.0, side * _BESIDE_M, speed),
+        go(10.0, lane, speed),
+        go(length + 6.0, lane, speed),
+    )
+    who = person(random, "person", (-3.0, side * _BESIDE_M), way)
+    return scenario("overtaking", length, (*racks(random, length), who))
+
+
+def lead_brakes(random: Random) -> Scenario:
+    """A robot drives ahead on the same path, brakes, stands for a while and goes on."""
+    length = float(random.uniform(14.0, 18.0))
+    speed = float(random.uniform(0.5, 1.1))
+    stop_x = float(random.uniform(6.0, 9.0))
+    way = Motion(
+        start_s=float(random.uniform(0.0, 1.0)),
+        accel_mps2=float(random.uniform(0.5, 1.0)),
+        turn_rate_degps=60.0,
+        steps=(
+            go(stop_x, 0.0, speed),
+            wait(float(random.uniform(1.0, 5.0))),
+            go(length + 6.0, 0.0, speed),
+        ),
+    )
+    lead = robot(random, "lead", (float(random.uniform(2.2, 3.5)), float(random.uniform(-0.1, 0.1))), way)
+    return scenario("lead_brakes", length, (*racks(random, length), lead))

@@ -1,0 +1,44 @@
+"""What may go wrong in a mission, as data: the mission's mode decides how it brings it about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """From start_s to end_s, in seconds of the mission."""
+
+    start_s: float
+    end_s: float
+
+    def holds(self, t_s: float) -> bool:
+        """Whether t_s lies in it."""
+        return self.start_s <= t_s < self.end_s
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """silent: no frames. frozen: the same picture again and again, with new stamps. late, late_by_s: scenes
+    arrive that much later. yaw_slip: share of every turn that the tracks lose, distance_slip: share of the
+    way that the odometry counts too much. feedback_lost_s: from then on the chassis answers no more. glass:
+    names of bodies that depth does not see."""
+
+    silent: Window | None = None
+    frozen: Window | None = None
+    late: Window | None = None
+    late_by_s: float = 0.0
+    yaw_slip: float = 0.1
+    distance_slip: float = 0.0
+    feedback_lost_s: float | None = None
+    glass: tuple[str, ...] = ()
+
+    def strikes(self, t_s: float, after_s: float) -> bool:
+        """Whether something that must lead to a stop holds at t_s, or did within after_s before it."""
+        windows = [one for one in (self.silent, self.frozen, self.late) if one is not None]
+        if any(one.start_s <= t_s < one.end_s + after_s for one in windows):
+            return True
+        return self.feedback_lost_s is not None and t_s >= self.feedback_lost_s
+
+
+NO_FAULTS = Faults()

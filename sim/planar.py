@@ -1,0 +1,169 @@
+"""The simulated world seen from above: footprints and heights only, without a single face.
+
+A mission in the plane asks for where everything stands thousands of times a second; faces and textures would
+only cost time. The numbers are those of sim.world.World (a test holds them together).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.scenario import (
+    Beam,
+    BodySpec,
+    Column,
+    Crate,
+    Pallet,
+    Person,
+    Pole,
+    RobotBody,
+    Scenario,
+    Shelf,
+    Wall,
+)
+from hal.types import FloatArray
+from sim.bodies import rectangle, regular_polygon
+from sim.motion import MotionState
+from sim.person import person_footprint
+from sim.vehicle import SENSOR_HEIGHT_M
+from sim.world import trajectory_of
+
+_POLE_SIDES = 8
+
+
+class PlanarWorld:
+    """N bodies of a scenario on the floor.
+
+    names, z_m (N, 2) lowest and highest point, moves (N,) bool. Footprints have the same number K of corners
+    for all: shorter ones repeat their last corner.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int = 0) -> None:
+        self.scenario = scenario
+        specs = scenario.bodies
+        self.names = tuple(spec.name for spec in specs)
+        self.moves: NDArray[np.bool_] = np.array([spec.motion is not None for spec in specs], np.bool_)
+        self._specs = specs
+        self._corners = max((len(footprint(spec, 0.0)) for spec in specs), default=4)
+        self._shapes: list[dict[float, FloatArray]] = [{} for _ in specs]
+        self.z_m = np.array([heights(spec) for spec in specs]).reshape(-1, 2)
+        self._trajectories = [trajectory_of(spec, seed) for spec in specs]
+        self._movers: list[int] = np.flatnonzero(self.moves).tolist()
+        still = np.array([self._state(k, 0.0) for k in range(len(specs))]).reshape(-1, 5)
+        self._still_states = still
+        self._still_polygons = self._place(still, list(range(len(specs))))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def end_s(self) -> float:
+        """When the last mover has finished its plan; 0 if none moves."""
+        return max((self._trajectories[k].end_s for k in self._movers), default=0.0)
+
+    def look(self, t_s: float) -> tuple[FloatArray, FloatArray]:
+        """Polygons (N, K, 2) and velocities (N, 2) of all bodies at t_s."""
+        polygons, velocity = self._still_polygons.copy(), np.zeros((len(self), 2))
+        if len(self._movers):
+            states = np.array([self._state(k, t_s) for k in self._movers])
+            polygons[self._movers] = self._place(states, self._movers)
+            velocity[self._movers] = states[:, 3:]
+        return polygons, velocity
+
+    def over(self, times_s: FloatArray, body: int) -> FloatArray:
+        """Polygons (T, K, 2) of one body at times_s (T,)."""
+        if not self.moves[body]:
+            return np.broadcast_to(self._still_polygons[body], (len(times_s), self._corners, 2))
+        states = np.array([self._state(body, float(t)) for t in times_s])
+        return self._place(states, [body] * len(states))
+
+    def room_polygon(self) -> FloatArray:
+        """The building's walls from the inside (4, 2)."""
+        room = self.scenario.room
+        x0, x1, y0, y1 = room.x_min_m, room.x_max_m, room.y_min_m, room.y_max_m
+        return np.array([[x1, y0], [x1, y1], [x0, y1], [x0, y0]])
+
+    def _state(self, body: int, t_s: float) -> tuple[float, float, float, float, float]:
+        state = self._trajectories[body].at(t_s)
+        return state.x_m, state.y_m, state.heading_rad, state.vx_mps, state.vy_mps
+
+    def _place(self, states: FloatArray, bodies: list[int]) -> FloatArray:
+        speeds = np.hypot(states[:, 3], states[:, 4]).tolist()
+        shapes = np.array([self._shape(k, v) for k, v in zip(bodies, speeds, strict=True)])
+        shapes = shapes.reshape(-1, self._corners, 2)
+        cos, sin = np.cos(states[:, 2:3]), np.sin(states[:, 2:3])
+        x = states[:, 0:1] + cos * shapes[..., 0] - sin * shapes[..., 1]
+        y = states[:, 1:2] + sin * shapes[..., 0] + cos * shapes[..., 1]
+        return np.stack((x, y), axis=2)
+
+    def _shape(self, body: int, speed_mps: float) -> FloatArray:
+        """The outline (K, 2) at a speed; most of the time that is the speed of the instant before."""
+        known = self._shapes[body]
+        speed_mps = round(speed_mps, 3)
+        if speed_mps not in known:
+            known[speed_mps] = _padded(footprint(self._specs[body], speed_mps), self._corners)
+        return known[speed_mps]
+
+
+def footprint(spec: BodySpec, speed_mps: float) -> FloatArray:
+    """Corners (K, 2) in the body frame, convex, counter-clockwise, of a body that goes at speed_mps."""
+    match spec:
+        case Person():
+            return person_footprint(spec, MotionState(0.0, 0.0, 0.0, speed_mps, 0.0, 0.0, 0.0))
+        case Column():
+            return regular_polygon(spec.sides, 0.5 * spec.diameter_m)
+        case Pole():
+            return regular_polygon(_POLE_SIDES, 0.5 * spec.diameter_m)
+        case Crate() | Shelf() | Pallet() | Wall() | Beam() | RobotBody():
+            return rectangle(spec.length_m, spec.width_m)
+
+
+def heights(spec: BodySpec) -> tuple[float, float]:
+    """Lowest and highest point over the floor."""
+    on_top_m = 0.0
+    if isinstance(spec, Pallet):
+        on_top_m = spec.load_height_m
+    elif isinstance(spec, RobotBody):
+        on_top_m = max(spec.load_height_m, SENSOR_HEIGHT_M)
+    return spec.z_m, spec.z_m + spec.height_m + on_top_m
+
+
+def _padded(shape: FloatArray, corners: int) -> FloatArray:
+    return np.concatenate((shape, np.repeat(shape[-1:], corners - len(shape), axis=0)))
+
+
+def separation(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(P,) distance of convex polygons a (P, K, 2) and b (P, L, 2), counter-clockwise, pair by pair.
+
+    As sim.contact.polygon_distance, for many pairs at once: where they overlap, minus the shortest way that
+    separates them. A repeated corner does not matter.
+    """
+    gap = np.maximum(_widest_gap(a, b), _widest_gap(b, a))
+    apart = np.flatnonzero(gap > 0.0)
+    if len(apart):
+        one, other = a[apart], b[apart]
+        gap[apart] = np.minimum(_corner_distance(one, other), _corner_distance(other, one))
+    return gap
+
+
+def _widest_gap(a: FloatArray, b: FloatArray) -> FloatArray:
+    edges = np.roll(a, -1, axis=1) - a
+    length = np.hypot(edges[..., 0], edges[..., 1])
+    real = length > 1e-12
+    normals = np.stack((edges[..., 1], -edges[..., 0]), axis=2) / np.where(real, length, 1.0)[..., None]
+    gaps = np.einsum("plx,pkx->pkl", b, normals).min(axis=2) - (a * normals).sum(axis=2)
+    widest: FloatArray = np.where(real, gaps, -math.inf).max(axis=1)
+    return widest
+
+
+def _corner_distance(corners: FloatArray, polygon: FloatArray) -> FloatArray:
+    edge = np.roll(polygon, -1, axis=1) - polygon
+    square = np.maximum((edge * edge).sum(axis=2), 1e-24)[:, None]
+    to_corner = corners[:, :, None] - polygon[:, None]
+    share = np.clip((to_corner * edge[:, None]).sum(axis=3) / square, 0.0, 1.0)
+    away = to_corner - share[..., None] * edge[:, None]
+    nearest: FloatArray = np.sqrt((away * away).sum(axis=3).min(axis=(1, 2)))
+    return nearest
