@@ -11,7 +11,7 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.bodies import Bodies
-from controller.contingency import Reach, gets_through, reach, stops_in_time
+from controller.contingency import Reach, Stops, gets_through, reach, room, stops
 from controller.corridor import Placed, place, velocity_on_path
 from controller.crossing import Choice, Conflict, choices, find_conflicts
 from controller.decision import Reason
@@ -20,7 +20,7 @@ from controller.limits import Gap, Limit, Motion, allowed, stop_before
 from controller.profile import SpeedRamps
 from hal.types import FloatArray
 
-_FINE_S, _COARSE_S = 0.15, 0.4
+_FINE_S, _COARSE_S = 0.2, 0.5
 _SPEEDS = 31
 _ALONGSIDE_M = 0.1
 _INSIDE_BODY_M = 0.05
@@ -43,6 +43,7 @@ class Appraiser:
         coarse = np.arange(self._worst_s[-1] + _COARSE_S, config.prediction.horizon_s + _COARSE_S, _COARSE_S)
         self._times_s = np.concatenate((self._worst_s, coarse))
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
+        self._foreseen: Stops | None = None
         self._inside: set[int] = set()
         self._goes_first: set[int] = set()
 
@@ -160,7 +161,9 @@ class Appraiser:
         in_conflict = {int(bodies.ids[one.row]) for one in conflicts}
         self._inside |= in_conflict
         self._goes_first &= in_conflict
-        ramps = self._ramps(motion)
+        if not conflicts:
+            return [], base_mps
+        ramps = self._ramps(motion, self._speeds)
         offers = []
         for one in conflicts:
             leader_mps = float(along[one.row] - sigma_s[one.row])
@@ -168,11 +171,12 @@ class Appraiser:
             offers.append((one, *self._offer(one, int(bodies.ids[one.row]), ramps, s_m, limit)))
         return self._settle(offers, bodies, base_mps)
 
-    def _ramps(self, motion: Motion) -> SpeedRamps:
+    def _ramps(self, motion: Motion, targets_mps: FloatArray) -> SpeedRamps:
+        """Comfortable, from now."""
         return SpeedRamps(
             motion.v_mps,
             motion.a_mps2,
-            self._speeds,
+            targets_mps,
             accel_mps2=self._limits.max_accel_mps2,
             decel_mps2=self._limits.max_accel_mps2,
             jerk_mps3=self._limits.max_jerk_mps3,
@@ -265,26 +269,16 @@ class Appraiser:
         reached = self._reach(known, placed, chosen)
         if not reached.inside.any():
             return None
-        now = self._stop_ramps(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
-        go = SpeedRamps(
-            motion.v_mps,
-            motion.a_mps2,
-            np.array([chosen_mps]),
-            accel_mps2=self._limits.max_accel_mps2,
-            decel_mps2=self._limits.max_accel_mps2,
-            jerk_mps3=self._limits.max_jerk_mps3,
-            latency_s=motion.latency_s,
-        )
-        if gets_through(go, s_m, self._worst_s, reached):
-            return None
-        room = stops_in_time(
-            self._stop_ramps(self._speeds, 0.0, motion.latency_s + _FORESIGHT_S), s_m, self._worst_s, reached
-        )
-        fails = np.flatnonzero(room < 0.0)
-        if not len(fails):
+        if self._foreseen is None:
+            self._foreseen = self._stops(self._speeds, 0.0, motion.latency_s + _FORESIGHT_S)
+        fails = np.flatnonzero(room(self._foreseen, s_m, reached) < 0.0)
+        if not len(fails) or gets_through(
+            self._ramps(motion, np.array([chosen_mps])), s_m, self._worst_s, reached
+        ):
             return None
         speed = float(self._speeds[max(int(fails[0]) - 1, 0)])
-        urgent = bool(stops_in_time(now, s_m, self._worst_s, reached)[0] < 0.0)
+        now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
+        urgent = bool(room(now, s_m, reached)[0] < 0.0)
         row = int(np.flatnonzero(chosen)[int(np.argmin(placed.lo_m[chosen, 0]))])
         number = int(bodies.ids[row])
         gap_m = float(placed.lo_m[row, 0]) - s_m
@@ -310,8 +304,8 @@ class Appraiser:
             self._config.margins.least_m,
         )
 
-    def _stop_ramps(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> SpeedRamps:
-        return SpeedRamps(
+    def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:
+        ramps = SpeedRamps(
             speeds,
             a_mps2,
             np.zeros(len(speeds)),
@@ -320,6 +314,7 @@ class Appraiser:
             jerk_mps3=self._limits.emergency_jerk_mps3,
             latency_s=latency_s,
         )
+        return stops(ramps, self._worst_s)
 
 
 def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:

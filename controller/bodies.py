@@ -93,20 +93,23 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     """
     if not scene.obstacles:
         return no_bodies(scene.captured_ns)
-    for obstacle in scene.obstacles:
-        _check(obstacle)
+    optical = np.array([one.position_m for one in scene.obstacles], np.float64)
+    extent = np.array([one.extent_m for one in scene.obstacles], np.float64)
+    speed = np.array([one.velocity_mps for one in scene.obstacles], np.float64)
+    spread = np.array([one.velocity_cov for one in scene.obstacles], np.float64)
+    age = np.array([one.age_s for one in scene.obstacles], np.float64)
+    _check(scene.obstacles, optical, extent, speed, spread, age)
     camera = camera_in_floor(pose, mount)
     floor = camera.rotation[:2]
-    position = camera.apply(np.array([obstacle.position_m for obstacle in scene.obstacles]))
-    extent = np.array([obstacle.extent_m for obstacle in scene.obstacles])
-    covariance = floor @ np.array([obstacle.velocity_cov for obstacle in scene.obstacles]) @ floor.T
-    moving = np.array([obstacle.moving for obstacle in scene.obstacles], np.bool_)
-    velocity = np.array([obstacle.velocity_mps for obstacle in scene.obstacles]) @ floor.T
+    position = camera.apply(optical)
+    covariance = floor @ spread @ floor.T
+    moving = np.array([one.moving for one in scene.obstacles], np.bool_)
+    velocity = speed @ floor.T
     half_view = np.maximum(extent[:, 2], depth_m) / 2.0
     forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
     return Bodies(
         captured_ns=scene.captured_ns,
-        ids=np.array([obstacle.id for obstacle in scene.obstacles], np.int64),
+        ids=np.array([one.id for one in scene.obstacles], np.int64),
         xy_m=position[:, :2] + (half_view - extent[:, 2] / 2.0)[:, None] * forward,
         velocity_mps=np.where(moving[:, None], velocity, 0.0),
         covariance=covariance,
@@ -115,25 +118,35 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
         view_rad=np.full(len(moving), pose.heading_rad),
         top_m=position[:, 2] + extent[:, 1] / 2.0,
         moving=moving,
-        age_s=np.array([obstacle.age_s for obstacle in scene.obstacles], np.float64),
+        age_s=age,
     )
 
 
-def _check(obstacle: Obstacle) -> None:
+def _check(
+    obstacles: tuple[Obstacle, ...],
+    position: FloatArray,
+    extent: FloatArray,
+    velocity: FloatArray,
+    covariance: FloatArray,
+    age: FloatArray,
+) -> None:
     """Written so that NaN fails every comparison."""
-    variance = np.diagonal(obstacle.velocity_cov)
+    flat = covariance.reshape(len(obstacles), -1)
     reasonable = (
-        bool(np.all(np.abs(obstacle.position_m) <= _FARTHEST_M))
-        and bool(np.all((obstacle.extent_m >= 0.0) & (obstacle.extent_m <= _LARGEST_M)))
-        and bool(np.all(np.abs(obstacle.velocity_mps) <= _FASTEST_MPS))
-        and bool(np.all((variance >= 0.0) & np.isfinite(obstacle.velocity_cov).all()))
-        and obstacle.age_s >= 0.0
+        (np.abs(position) <= _FARTHEST_M).all(axis=1)
+        & ((extent >= 0.0) & (extent <= _LARGEST_M)).all(axis=1)
+        & (np.abs(velocity) <= _FASTEST_MPS).all(axis=1)
+        & np.isfinite(flat).all(axis=1)
+        & (np.diagonal(covariance, axis1=1, axis2=2) >= 0.0).all(axis=1)
+        & (age >= 0.0)
     )
-    if not reasonable:
-        raise SceneError(
-            f"obstacle {obstacle.id} is impossible: position {_list(obstacle.position_m)} m, "
-            f"size {_list(obstacle.extent_m)} m, velocity {_list(obstacle.velocity_mps)} m/s"
-        )
+    if reasonable.all():
+        return
+    k = int(reasonable.argmin())
+    raise SceneError(
+        f"obstacle {obstacles[k].id} is impossible: position {_list(position[k])} m, "
+        f"size {_list(extent[k])} m, velocity {_list(velocity[k])} m/s"
+    )
 
 
 def _list(values: FloatArray) -> str:

@@ -54,15 +54,28 @@ def reach(
     )
 
 
-def stops_in_time(ramps: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> FloatArray:
-    """(R,) for each ramp to a stop: the least distance by which it stays short of everything while it still
-    moves; negative where something could be touched, inf where nothing is in the way."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Stops:
+    """R emergency stops at K times: distance_m, speed_mps (R, K)."""
+
+    distance_m: FloatArray
+    speed_mps: FloatArray
+
+
+def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
+    """Sampled at times_s (K,)."""
     count = len(ramps.duration_s)
     distance, speed, _ = ramps.state(np.broadcast_to(times_s, (count, len(times_s))))
-    at = (s_m + distance)[:, None, :]
-    matters = reached.inside & (at < reached.hi_m) & (speed > _STANDING_MPS)[:, None, :]
-    room = np.where(matters, reached.lo_m - at, np.inf)
-    least: FloatArray = room.min(axis=(1, 2), initial=np.inf)
+    return Stops(distance, speed)
+
+
+def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
+    """(R,) for each stop of a robot at s_m: the least distance by which it stays short of everything while it
+    still moves; negative where something could be touched, inf where nothing is in the way."""
+    at = (s_m + stopping.distance_m)[:, None, :]
+    moves = (stopping.speed_mps > _STANDING_MPS)[:, None, :]
+    matters = reached.inside & (at < reached.hi_m) & moves
+    least: FloatArray = np.where(matters, reached.lo_m - at, np.inf).min(axis=(1, 2), initial=np.inf)
     return least
 
 

@@ -19,6 +19,8 @@ from vision.scene import CameraCondition, CameraHealth, Scene
 # surface in the corridor is what depth sees (controller/sight.py).
 _SPRAWLING_M = 0.8
 _STANDING_MPS = 0.01
+# The height of what is seen only in part is known no better.
+_UNCERTAIN_M = 0.1
 _FUTURE_S = 0.005
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
@@ -97,16 +99,16 @@ class Knowledge:
 
     def _out_of_sight(self, seen: Bodies, pose: PlanarPose, s_m: float) -> Bodies:
         """Standing bodies that were known and have sunk below the camera's view, until they are passed."""
-        before = self.bodies
-        if not len(before):
-            return before
+        gone = ~self.bodies.moving & ~np.isin(self.bodies.ids, seen.ids)
+        if not gone.any():
+            return no_bodies(seen.captured_ns)
+        before = self.bodies.select(gone)
         ahead_m = (before.xy_m[:, 0] - pose.x_m) * np.cos(pose.heading_rad)
         ahead_m += (before.xy_m[:, 1] - pose.y_m) * np.sin(pose.heading_rad)
         ahead_m -= self._mount.forward_m + before.half_view_m
         near_m = self._config.sight.near_m
         lowest_seen_m = self._mount.height_m * (1.0 - ahead_m / near_m)
-        below = (ahead_m < near_m) & (before.top_m < lowest_seen_m + 0.1)
+        below = (ahead_m < near_m) & (before.top_m < lowest_seen_m + _UNCERTAIN_M)
         body_s, _ = self.corridor.path.project_points(before.xy_m, s_m - 1.0, s_m + near_m + 2.0)
         not_passed = body_s + before.half_view_m > s_m - self.corridor.rear_m
-        gone = ~np.isin(before.ids, seen.ids)
-        return before.select(~before.moving & below & not_passed & gone)
+        return before.select(below & not_passed)

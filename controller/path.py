@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.loader import ConfigError
 from config.path import ArcSpec, PathSpec
@@ -21,8 +22,15 @@ from controller.braking import comfort, slowing_distance, speed_before_section
 from hal.geometry import wrap_angle_rad
 from hal.types import FloatArray, PlanarPose
 
+IntArray = NDArray[np.intp]
+
 _BLEND_PIECES = 16
 _EXTENSION_M = 20.0
+_SAMPLE_M = 0.25
+_ROUNDS = 2
+_STRAIGHT_1PM = 1e-7
+# Near the centre of a bend "along the path" loses its sense; such a point is beside it, far inside.
+_INNERMOST = 0.05
 _LOOK_BACK_M = 0.25
 _LOOK_AHEAD_M = 2.0
 _SPEED_STEP_M = 0.05
@@ -68,11 +76,12 @@ class Path:
         # The body overhangs both ends, so what stands beyond them is measured along straight extensions.
         pieces = [_extension_back(pieces[0]), *pieces, _extension_ahead(pieces[-1])]
         self._s = np.array([piece.s_m for piece in pieces])
-        self._length = np.array([piece.length_m for piece in pieces])
         self._x = np.array([piece.x_m for piece in pieces])
         self._y = np.array([piece.y_m for piece in pieces])
         self._heading = np.array([piece.heading_rad for piece in pieces])
         self._curvature = np.array([piece.curvature_1pm for piece in pieces])
+        samples = np.arange(-_EXTENSION_M, self.length_m + _EXTENSION_M + _SAMPLE_M, _SAMPLE_M)
+        self._sample_x, self._sample_y, _ = self.poses(samples)
         self._check_doubling_back(robot.body.width_m)
         self._speed_s, self._speed = _section_speeds(spec, robot, self._curvature[1:-1], self._s[1:-1])
 
@@ -88,10 +97,12 @@ class Path:
 
     def poses(self, s_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """x_m, y_m and heading_rad (not wrapped) of the path at s_m, each of the shape of s_m."""
-        k = self._piece_at(s_m)
+        return self._poses_on(self._piece_at(s_m), s_m)
+
+    def _poses_on(self, k: IntArray, s_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         along = s_m - self._s[k]
         half_turn = 0.5 * self._curvature[k] * along
-        chord = along * np.sinc(half_turn / math.pi)
+        chord = along * _sinc(half_turn)
         middle = self._heading[k] + half_turn
         return (
             self._x[k] + chord * np.cos(middle),
@@ -110,45 +121,74 @@ class Path:
     def project(self, pose: PlanarPose, hint_s_m: float) -> OnPath:
         """The pose in path coordinates, searched near hint_s_m only, so that it cannot jump to another turn
         of the path: at most 0.25 m behind the hint and 2 m ahead of it."""
-        point = np.array([[pose.x_m, pose.y_m]])
-        s, d = self.project_points(point, hint_s_m - _LOOK_BACK_M, hint_s_m + _LOOK_AHEAD_M)
-        s_m = min(max(float(s[0]), hint_s_m - _LOOK_BACK_M), hint_s_m + _LOOK_AHEAD_M)
-        turned = wrap_angle_rad(pose.heading_rad - self.pose(s_m).heading_rad)
-        return OnPath(s_m, float(d[0]), turned)
+        low, high = hint_s_m - _LOOK_BACK_M, hint_s_m + _LOOK_AHEAD_M
+        first = max(math.ceil((low + _EXTENSION_M) / _SAMPLE_M), 0)
+        last = max(int((high + _EXTENSION_M) / _SAMPLE_M), first) + 1
+        dx, dy = pose.x_m - self._sample_x[first:last], pose.y_m - self._sample_y[first:last]
+        s = (first + int((dx * dx + dy * dy).argmin())) * _SAMPLE_M - _EXTENSION_M
+        for _ in range(_ROUNDS):
+            ahead, left, _, bend = self._one_seen_from(s, pose)
+            if abs(bend) < _STRAIGHT_1PM:
+                step = ahead
+            else:
+                step = math.atan2(bend * ahead, max(1.0 - bend * left, _INNERMOST)) / bend
+            s = min(max(s + step, low), high)
+        ahead, left, turned, _ = self._one_seen_from(s, pose)
+        return OnPath(s, math.copysign(math.hypot(ahead, left), left), turned)
+
+    def _one_seen_from(self, s_m: float, pose: PlanarPose) -> tuple[float, float, float, float]:
+        """The pose ahead, to the left of and turned against the path at s_m, and the curvature there. The
+        same as _seen_from in plain floats, ten times as fast for a single one."""
+        k = max(int(self._s.searchsorted(s_m, side="right")) - 1, 0)
+        along = s_m - self._s.item(k)
+        bend = self._curvature.item(k)
+        half_turn = 0.5 * bend * along
+        chord = along * (math.sin(half_turn) / half_turn if abs(half_turn) > _STRAIGHT_1PM else 1.0)
+        middle = self._heading.item(k) + half_turn
+        dx = pose.x_m - self._x.item(k) - chord * math.cos(middle)
+        dy = pose.y_m - self._y.item(k) - chord * math.sin(middle)
+        heading = middle + half_turn
+        cos, sin = math.cos(heading), math.sin(heading)
+        turned = wrap_angle_rad(pose.heading_rad - heading)
+        return dx * cos + dy * sin, dy * cos - dx * sin, turned, bend
 
     def project_points(
         self, points_m: FloatArray, from_s_m: float = -math.inf, to_s_m: float = math.inf
     ) -> tuple[FloatArray, FloatArray]:
-        """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m."""
-        near = (self._s + self._length >= from_s_m) & (self._s <= to_s_m)
-        if not near.any():
-            near[np.argmin(np.abs(self._s + self._length / 2.0 - from_s_m))] = True
-        s0, length = self._s[near], self._length[near]
-        curvature, heading = self._curvature[near], self._heading[near]
-        dx = points_m[:, :1] - self._x[near]
-        dy = points_m[:, 1:2] - self._y[near]
+        """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m.
+
+        From the nearest of samples 0.25 m apart, on the circle that the path is there: exact but for the
+        steps of a blend, and those take a second round.
+        """
+        low = min(max(from_s_m, -_EXTENSION_M), self.length_m + _EXTENSION_M - _SAMPLE_M)
+        high = min(max(to_s_m, low + _SAMPLE_M), self.length_m + _EXTENSION_M)
+        first = math.ceil((low + _EXTENSION_M) / _SAMPLE_M)
+        last = max(int((high + _EXTENSION_M) / _SAMPLE_M), first) + 1
+        dx = points_m[:, :1] - self._sample_x[first:last]
+        dy = points_m[:, 1:2] - self._sample_y[first:last]
+        s = (first + np.argmin(dx * dx + dy * dy, axis=1)) * _SAMPLE_M - _EXTENSION_M
+        for _ in range(_ROUNDS):
+            ahead, left, bend = self._seen_from(s, points_m)
+            inward = np.maximum(1.0 - bend * left, _INNERMOST)
+            curved = np.where(np.abs(bend) < _STRAIGHT_1PM, _STRAIGHT_1PM, bend)
+            s = np.minimum(np.maximum(s + np.arctan2(curved * ahead, inward) / curved, low), high)
+        ahead, left, _ = self._seen_from(s, points_m)
+        return s, np.copysign(np.hypot(ahead, left), left)
+
+    def _seen_from(self, s_m: FloatArray, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Each point ahead and to the left of the path's pose at its s_m, and the curvature there."""
+        k = self._piece_at(s_m)
+        x, y, heading = self._poses_on(k, s_m)
         cos, sin = np.cos(heading), np.sin(heading)
-        ahead = dx * cos + dy * sin
-        left = dy * cos - dx * sin
-        along, lateral = _project_on_arcs(ahead, left, curvature)
-        first, last = np.maximum(from_s_m - s0, 0.0), np.minimum(to_s_m - s0, length)
-        clamped = np.clip(along, first, np.maximum(first, last))
-        turn = curvature * clamped
-        half_chord = clamped * np.sinc(turn / (2.0 * math.pi))
-        off_x = ahead - half_chord * np.cos(turn / 2.0)
-        off_y = left - half_chord * np.sin(turn / 2.0)
-        distance = np.where(along == clamped, np.abs(lateral), np.hypot(off_x, off_y))
-        best = np.argmin(distance, axis=1)
-        rows = np.arange(len(points_m))
-        side = np.where(off_y * np.cos(turn) - off_x * np.sin(turn) < 0.0, -1.0, 1.0)
-        return (s0 + clamped)[rows, best], (side * distance)[rows, best]
+        dx, dy = points_m[:, 0] - x, points_m[:, 1] - y
+        return dx * cos + dy * sin, dy * cos - dx * sin, self._curvature[k]
 
     def speed_limit(self, s_m: float) -> float:
         """The greatest speed at s_m so that every section and bend ahead is entered slowly enough, m/s."""
         return float(np.interp(s_m, self._speed_s, self._speed))
 
-    def _piece_at(self, s_m: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
-        return np.clip(np.searchsorted(self._s, s_m, side="right") - 1, 0, len(self._s) - 1)
+    def _piece_at(self, s_m: FloatArray) -> IntArray:
+        return np.maximum(self._s.searchsorted(s_m, side="right") - 1, 0)
 
     def _check_doubling_back(self, width_m: float) -> None:
         s = np.append(np.arange(0.0, self.length_m, width_m / 4.0), self.length_m)
@@ -179,18 +219,13 @@ def compose(outer: PlanarPose, inner: PlanarPose) -> PlanarPose:
     )
 
 
-def _project_on_arcs(
-    ahead: FloatArray, left: FloatArray, curvature: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Along and left of circles (lines for 0) that start at the origin towards +ahead; (N, M) each."""
-    straight = np.abs(curvature) < 1e-9
-    safe = np.where(straight, 1.0, curvature)
-    radius = 1.0 / safe
-    # Angle travelled about the centre (0, radius), counted in the sense of the turn, in [-pi, pi).
-    angle = np.arctan2(ahead, (radius - left) * np.sign(safe))
-    along = np.where(straight, ahead, angle / np.abs(safe))
-    lateral = np.where(straight, left, radius - np.sign(safe) * np.hypot(ahead, radius - left))
-    return along, lateral
+def _sinc(angle_rad: FloatArray) -> FloatArray:
+    """sin(x) / x for |x| <= pi / 4 (no piece turns by more than 90 degrees), to 1e-11."""
+    square = angle_rad * angle_rad
+    series: FloatArray = 1.0 - square / 6.0 * (
+        1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0 * (1.0 - square / 110.0)))
+    )
+    return series
 
 
 def _chain(spec: PathSpec) -> Iterator[_Piece]:
@@ -203,7 +238,7 @@ def _chain(spec: PathSpec) -> Iterator[_Piece]:
         for length, curvature in steps:
             yield _Piece(s, length, x, y, heading, curvature)
             half_turn = 0.5 * curvature * length
-            chord = length * float(np.sinc(half_turn / math.pi))
+            chord = length * float(_sinc(np.array(half_turn)))
             x += chord * math.cos(heading + half_turn)
             y += chord * math.sin(heading + half_turn)
             heading += 2.0 * half_turn
@@ -237,7 +272,7 @@ def _extension_back(piece: _Piece) -> _Piece:
 
 def _extension_ahead(piece: _Piece) -> _Piece:
     turn = piece.curvature_1pm * piece.length_m
-    chord = piece.length_m * float(np.sinc(turn / (2.0 * math.pi)))
+    chord = piece.length_m * float(_sinc(np.array(turn / 2.0)))
     return _Piece(
         piece.s_m + piece.length_m,
         _EXTENSION_M,

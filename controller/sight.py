@@ -16,7 +16,6 @@ from config.decision import DecisionConfig
 from controller.bodies import Bodies
 from controller.corridor import Corridor
 from hal.clocks import NS_PER_S
-from hal.geometry import body_in_floor
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
@@ -64,31 +63,23 @@ class Sight:
         standing: bool,
     ) -> None:
         """Take in one scene. pose, s_m: of the robot when it was captured. standing: it was at rest then."""
-        points, lanes = self._surface_points(free, pose)
-        inside_s, inside = self._in_corridor(points, lanes, s_m)
-        explained = explained_by.covers(points, self._tolerance_m(free), _AROUND_M).any(axis=1)
-        self._note_surface(inside_s[inside & ~explained], s_m, standing)
-        self._note_floor(free, pose, s_m, captured_ns, inside)
+        bands = np.flatnonzero(np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan))
+        forward = free.nearest_m[bands]
+        points = self._surface_points(forward, free.bearing_tan[bands], pose)
+        surface_s, inside = self._in_corridor(points, forward * free.half_width_tan, s_m)
+        reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
+        explained = explained_by.covers(points, reach_m, _AROUND_M).any(axis=1)
+        self._note_surface(surface_s[inside & ~explained], s_m, standing)
+        in_corridor = np.zeros(len(free.bearing_tan), np.bool_)
+        in_corridor[bands] = inside
+        self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
-    def _surface_points(self, free: FreeSpace, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
-        """Floor points (B, 2) of each band's nearest surface (far away where there is none), and half the
-        width (B,) of its band there."""
-        known = np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan)
-        forward = np.where(known, free.nearest_m, 1e3)
-        body = np.stack(
-            (
-                forward + self._mount.forward_m,
-                self._mount.left_m - forward * np.where(known, free.bearing_tan, 0.0),
-                np.zeros_like(forward),
-            ),
-            axis=1,
-        )
-        return body_in_floor(pose).apply(body)[:, :2], forward * free.half_width_tan
-
-    def _tolerance_m(self, free: FreeSpace) -> FloatArray:
-        """How far from its body a surface point may be for the noise of depth."""
-        nearest = np.where(np.isfinite(free.nearest_m), free.nearest_m, 0.0)
-        return _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * nearest**2
+    def _surface_points(self, forward: FloatArray, bearing: FloatArray, pose: PlanarPose) -> FloatArray:
+        """Floor points (B, 2) of surfaces seen at these forward distances from the camera."""
+        ahead = forward + self._mount.forward_m
+        left = self._mount.left_m - forward * bearing
+        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+        return np.stack((pose.x_m + ahead * cos - left * sin, pose.y_m + ahead * sin + left * cos), axis=1)
 
     def _in_corridor(
         self, points: FloatArray, half_band_m: FloatArray, s_m: float
@@ -102,7 +93,7 @@ class Sight:
         self._nearest.append(nearest)
         self.newest_surface_s_m = nearest
         before = self.surface_s_m
-        steady = float(np.median(np.array(self._nearest)))
+        steady = sorted(self._nearest)[len(self._nearest) // 2]
         # What goes out of sight below the camera because the robot drives on is still there; what goes while
         # the robot stands has gone away.
         blind_s_m = s_m + self._mount.forward_m + self._sight.near_m
