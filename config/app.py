@@ -15,7 +15,6 @@ from config.path import PathSpec
 from config.perception import PerceptionConfig
 from config.robot import Robot
 
-
 # Slower, and encoders, status and voltages would grow stale between their turns.
 ROBOCLAW_RATE_HZ = 40.0
 
@@ -86,8 +85,8 @@ class AppConfig(Section):
             )
         if self.chassis.kind == "roboclaw" and self.runner.control_rate_hz < ROBOCLAW_RATE_HZ:
             raise ValueError(
-                f"runner.control_rate_hz must be at least {ROBOCLAW_RATE_HZ:g} with a RoboClaw, which answers "
-                "one request an exchange"
+                f"runner.control_rate_hz must be at least {ROBOCLAW_RATE_HZ:g} with a RoboClaw, "
+                "which answers one request an exchange"
             )
         return self
 

@@ -42,7 +42,9 @@ class Console:
             self._heard, self._heard_at_s = now, stamp_s
         if now != self._said and stamp_s - self._heard_at_s >= SETTLED_S:
             self._said = now
-            self.event(f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  {decision.action.value:8}  {reason.sentence}")
+            self.event(
+                f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  {decision.action.value:8}  {reason.sentence}"
+            )
 
     def event(self, line: str) -> None:
         """A line that stays."""

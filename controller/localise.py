@@ -2,9 +2,10 @@
 
 Tracks slip when they turn: the odometry of a skid-steered base is wrong in yaw by 10 % and more,
 while its distance is good. The camera's own rotation, measured against the static scene, is not
-fooled by slip. So distance comes from the tracks and yaw from both: the share of the commanded
-turn that really happens (the slip) is estimated from the pairs (odometry yaw, visual yaw) of all
-frames, and what slip does not explain is corrected frame by frame.
+fooled by slip. So distance comes from the tracks and yaw from both: the share of each turn that
+really happens is estimated from the pairs (odometry yaw, visual yaw) of all frames (least squares,
+weighted by how sure the camera was). The slip belongs to the base and its floor, so every better
+estimate holds for the way that lies behind too: it is dead-reckoned anew from its legs.
 """
 
 from __future__ import annotations
@@ -21,6 +22,10 @@ from hal.types import CameraMount, PlanarPose, Pose
 from vision.scene import EgoMotion
 
 HISTORY_S = 2.0
+# The way behind is kept as legs so short that each is straight; beyond this many the oldest are settled.
+LEG_M = 0.05
+LEG_RAD = 0.02
+MOST_LEGS = 2000
 # Prior of the yaw ratio (true / odometry): 1 +/- 0.15, a skid-steered base on a hard floor.
 PRIOR_RATIO_SIGMA = 0.15
 
@@ -85,6 +90,8 @@ class Localiser:
         self._odometry = PoseHistory()
         self._fused = PoseHistory()
         self._last_odometry: PlanarPose | None = None
+        self._settled = start
+        self._legs: list[tuple[float, float]] = [(0.0, 0.0)]
         self._sum_odometry_visual = 1.0 / PRIOR_RATIO_SIGMA**2
         self._sum_odometry_odometry = 1.0 / PRIOR_RATIO_SIGMA**2
 
@@ -96,7 +103,9 @@ class Localiser:
     def add_odometry(self, stamp_ns: int, odometry: PlanarPose) -> PlanarPose:
         """Dead reckoning of the chassis at stamp_ns, in its own frame; returns the fused pose."""
         if self._last_odometry is not None:
-            self.pose = _move(self.pose, self._last_odometry, odometry, self.yaw_ratio)
+            distance_m, turn_rad = _increment(self._last_odometry, odometry)
+            self.pose = _move(self.pose, distance_m, turn_rad * self.yaw_ratio)
+            self._remember(distance_m, turn_rad)
         self._last_odometry = odometry
         self._odometry.append(stamp_ns, odometry)
         self._fused.append(stamp_ns, self.pose)
@@ -114,6 +123,28 @@ class Localiser:
         weight = 1.0 / ego.sigma_rotation_rad**2
         self._sum_odometry_visual += weight * odometry_rad * visual_rad
         self._sum_odometry_odometry += weight * odometry_rad**2
+        self._reckon_anew()
+
+    def _remember(self, distance_m: float, turn_rad: float) -> None:
+        leg_m, leg_rad = self._legs[-1]
+        self._legs[-1] = (leg_m + distance_m, leg_rad + turn_rad)
+        if abs(leg_m) > LEG_M or abs(leg_rad) > LEG_RAD:
+            self._legs.append((0.0, 0.0))
+        if len(self._legs) > MOST_LEGS:
+            distance_m, turn_rad = self._legs.pop(0)
+            self._settled = _move(self._settled, distance_m, turn_rad * self.yaw_ratio)
+
+    def _reckon_anew(self) -> None:
+        """The pose from the settled one over all legs, each turned by the present ratio."""
+        legs = np.array(self._legs)
+        turns = self.yaw_ratio * legs[:, 1]
+        ends = self._settled.heading_rad + np.cumsum(turns)
+        middles = ends - 0.5 * turns
+        self.pose = PlanarPose(
+            self._settled.x_m + float(legs[:, 0] @ np.cos(middles)),
+            self._settled.y_m + float(legs[:, 0] @ np.sin(middles)),
+            wrap_angle_rad(float(ends[-1])),
+        )
 
     def body_pose(self, stamp_ns: int) -> PlanarPose | None:
         """The body in the path's frame at stamp_ns, as known now."""
@@ -128,16 +159,19 @@ class Localiser:
         return None if odometry is None else camera_in_floor(odometry, self._mount)
 
 
-def _move(pose: PlanarPose, before: PlanarPose, after: PlanarPose, yaw_ratio: float) -> PlanarPose:
-    """pose, moved as odometry moved from before to after, with only yaw_ratio of its yaw."""
+def _increment(before: PlanarPose, after: PlanarPose) -> tuple[float, float]:
+    """Distance driven (negative: backwards) and turn between two poses."""
     step = body_in_floor(before).inverse() @ body_in_floor(after)
+    ahead_m, aside_m = float(step.translation_m[0]), float(step.translation_m[1])
     turn_rad = wrap_angle_rad(after.heading_rad - before.heading_rad)
-    distance_m = math.copysign(
-        float(np.hypot(step.translation_m[0], step.translation_m[1])), step.translation_m[0]
-    )
-    heading_rad = pose.heading_rad + 0.5 * yaw_ratio * turn_rad
+    return math.copysign(math.hypot(ahead_m, aside_m), ahead_m), turn_rad
+
+
+def _move(pose: PlanarPose, distance_m: float, turn_rad: float) -> PlanarPose:
+    """pose after a short leg, driven in the direction of its middle."""
+    middle_rad = pose.heading_rad + 0.5 * turn_rad
     return PlanarPose(
-        pose.x_m + distance_m * math.cos(heading_rad),
-        pose.y_m + distance_m * math.sin(heading_rad),
-        wrap_angle_rad(pose.heading_rad + yaw_ratio * turn_rad),
+        pose.x_m + distance_m * math.cos(middle_rad),
+        pose.y_m + distance_m * math.sin(middle_rad),
+        wrap_angle_rad(pose.heading_rad + turn_rad),
     )

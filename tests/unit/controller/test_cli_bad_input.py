@@ -1,4 +1,4 @@
-"""A user's mistake is one line on standard error that names what, where and why; exit code 2; no traceback."""
+"""A user's mistake is one line on standard error: what, where and why; exit code 2; no traceback."""
 
 import shutil
 import subprocess
@@ -64,7 +64,9 @@ def test_a_wrong_value_and_a_missing_section_are_told_together(tmp_path: Path) -
 
 
 def test_parts_that_do_not_fit_together(tmp_path: Path) -> None:
-    assert "needs a 'simulation' section" in refusal("run", "--config", changed_config(tmp_path, simulation=None))
+    assert "needs a 'simulation' section" in refusal(
+        "run", "--config", changed_config(tmp_path, simulation=None)
+    )
 
 
 def test_a_path_that_the_robot_cannot_drive(tmp_path: Path) -> None:
@@ -108,7 +110,9 @@ def test_a_video_of_an_unknown_kind(command: str) -> None:
 
 
 def test_observations_in_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    assert "observations cannot be written" in refusal("replay", DESK, "--observations", tmp_path / "no" / "o.jsonl")
+    assert "observations cannot be written" in refusal(
+        "replay", DESK, "--observations", tmp_path / "no" / "o.jsonl"
+    )
 
 
 def test_a_recording_that_is_not_there() -> None:
@@ -130,7 +134,9 @@ def test_a_recording_with_a_bad_calibration(recording: Path) -> None:
 
 def test_true_poses_that_the_recording_does_not_have(recording: Path) -> None:
     (recording / "groundtruth.txt").unlink()
-    assert "groundtruth.txt: there is no such file" in refusal("replay", recording, "--odometry", "groundtruth")
+    assert "groundtruth.txt: there is no such file" in refusal(
+        "replay", recording, "--odometry", "groundtruth"
+    )
 
 
 def test_a_recording_whose_images_all_have_another_size(recording: Path) -> None:

@@ -75,9 +75,20 @@ def drive_with_slip(true_ratio: float, source: str) -> tuple[Localiser, PlanarPo
 def test_the_slip_that_the_camera_sees_is_learnt() -> None:
     localiser, truth = drive_with_slip(0.8, "visual")
     assert localiser.yaw_ratio == pytest.approx(0.8, abs=0.01)
-    error_rad = abs(localiser.pose.heading_rad - truth.heading_rad)
-    # Uncorrected it would be 0.2 * 3 rad = 0.6 rad.
-    assert error_rad < 0.05
+    # Uncorrected it would be 0.2 * 3 rad and metres; what was driven before it was learnt counts too.
+    assert abs(localiser.pose.heading_rad - truth.heading_rad) < 0.02
+    assert math.hypot(localiser.pose.x_m - truth.x_m, localiser.pose.y_m - truth.y_m) < 0.08
+
+
+def test_the_oldest_legs_are_settled_so_that_a_long_way_costs_no_more() -> None:
+    localiser = Localiser(ORIGIN, MOUNT)
+    odometry = ORIGIN
+    for step in range(6000):
+        localiser.add_odometry(step * 20 * MS, odometry)
+        odometry = advance_pose(odometry, 1.5, 0.0, 0.04)
+    localiser.add_ego_motion(5998 * 20 * MS, ego(0.0, 0.04))
+    assert localiser.pose.x_m == pytest.approx(5999 * 0.06, abs=1e-6)
+    assert len(localiser._legs) <= 2001
 
 
 def test_a_camera_that_saw_nothing_teaches_nothing() -> None:
