@@ -32,6 +32,7 @@ class Outcome(Enum):
 
     REACHED = "target reached"
     STOPPED = "stopped on request"
+    BROKEN_OFF = "broken off"
     CHASSIS_FAULT = "the chassis stopped the drive"
     NOT_ARMED = "the chassis did not arm"
 
@@ -60,7 +61,7 @@ class Drive(Protocol):
     @property
     def finished(self) -> bool: ...
 
-    def request_stop(self, reason: str) -> None: ...
+    def request_stop(self, reason: str, ending: Outcome = Outcome.STOPPED) -> None: ...
 
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep: ...
 
@@ -90,6 +91,7 @@ class ControlLoop:
         self._resting_since_ns: int | None = None
         self._was_armed = False
         self.stop_reason: str | None = None
+        self._ending = Outcome.STOPPED
         self.outcome: Outcome | None = None
 
     @property
@@ -97,10 +99,11 @@ class ControlLoop:
         """The drive has ended, one way or the other; the chassis has been told to stop."""
         return self.outcome is not None
 
-    def request_stop(self, reason: str) -> None:
-        """Come to rest by the comfort profile, then end. The first reason stays."""
+    def request_stop(self, reason: str, ending: Outcome = Outcome.STOPPED) -> None:
+        """Come to rest by the comfort profile, then end with this outcome. The first reason stays."""
         if self.stop_reason is None:
             self.stop_reason = reason
+            self._ending = ending
 
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep:
         """Decide on what is known, shape, send, and take in what the chassis answers."""
@@ -164,7 +167,7 @@ class ControlLoop:
         if self._resting_since_ns is None:
             self._resting_since_ns = now_ns
         if now_ns - self._resting_since_ns >= SETTLE_S * NS_PER_S:
-            self._end(Outcome.REACHED if arrived else Outcome.STOPPED, now_ns, self.stop_reason)
+            self._end(Outcome.REACHED if arrived else self._ending, now_ns, self.stop_reason)
 
     def _end(self, outcome: Outcome, now_ns: int, reason: str | None) -> None:
         self.outcome = outcome

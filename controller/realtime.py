@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from config.app import RealtimeRunner
 from controller.channel import Channel, PeerGone
-from controller.control import ControlStep, Drive
+from controller.control import ControlStep, Drive, Outcome
 from controller.lockstep import Outside
 from controller.service import ServiceManager, StopRequest
 from hal.api import Clock
@@ -111,9 +111,9 @@ def run_realtime(
         if stop:
             loop.request_stop(f"{stop.reason} received")
         elif perception.lost_reason is not None:
-            loop.request_stop(f"perception is lost: {perception.lost_reason}")
+            loop.request_stop(f"perception is lost: {perception.lost_reason}", Outcome.BROKEN_OFF)
         elif config.max_duration_s is not None and now_ns - started_ns > config.max_duration_s * NS_PER_S:
-            loop.request_stop(f"max_duration_s of {config.max_duration_s:g} s is over")
+            loop.request_stop(f"max_duration_s of {config.max_duration_s:g} s is over", Outcome.BROKEN_OFF)
         if outside is not None:
             outside.advance_to(now_ns)
         step = loop.step(None if perception.newest is None else perception.newest.scene, now_ns)

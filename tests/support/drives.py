@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.control import ControlStep
+from controller.control import ControlStep, Outcome
 from controller.decision import Action, Decision, Reason
 from controller.perceive import Look
 from hal.types import RgbdFrame, Setpoint
@@ -29,14 +29,16 @@ class NotingDrive:
         self._left = steps
         self.seen: list[tuple[int, int | None]] = []
         self.stop_reasons: list[str] = []
+        self.endings: list[Outcome] = []
 
     @property
     def finished(self) -> bool:
         """No steps left."""
         return self._left <= 0
 
-    def request_stop(self, reason: str) -> None:
+    def request_stop(self, reason: str, ending: Outcome = Outcome.STOPPED) -> None:
         """Note the reason; one more step."""
+        self.endings.append(ending)
         self.stop_reasons.append(reason)
         self._left = min(self._left, 1)
 

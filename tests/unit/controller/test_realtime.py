@@ -4,6 +4,7 @@ import pytest
 
 from config.app import RealtimeRunner
 from controller.channel import Channel, channel_sockets
+from controller.control import Outcome
 from controller.realtime import Farewell, PerceptionLink, Punctuality, SceneMessage, run_realtime
 from controller.service import ServiceManager, StopRequest
 from tests.support.drives import NotingDrive, control_step
@@ -80,6 +81,7 @@ def test_perception_that_ends_says_why_and_the_robot_stops(ends: Ends) -> None:
     loop = NotingDrive(steps=100)
     steps_of(loop, link, LateClock({}))
     assert loop.stop_reasons == ["perception is lost: camera: unplugged"]
+    assert loop.endings == [Outcome.BROKEN_OFF]
 
 
 def test_perception_that_dies_without_a_word_stops_the_robot_too(ends: Ends) -> None:
@@ -100,6 +102,7 @@ def test_a_stop_signal_becomes_a_stop_request(ends: Ends) -> None:
     )
     assert len(list(moments)) == 1
     assert loop.stop_reasons == ["SIGTERM received"]
+    assert loop.endings == [Outcome.STOPPED]
 
 
 def test_a_drive_in_real_time_may_be_limited(ends: Ends) -> None:
