@@ -61,7 +61,7 @@ def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
         ankle = legs[-1].apply(np.array([[0.0, 0.0, (_ANKLE - _KNEE) * h]]))[0]
         legs.append(Pose(axis_rotation("y", _FOOT_TIPS * (thigh_rad + knee_rad)), ankle))
     for side, offset in ((1.0, 0.5), (-1.0, 0.0)):
-        shoulder = np.array([0.0, side * 0.137 * h, (_SHOULDER - 0.01) * h])
+        shoulder = np.array([0.0, side * 0.13 * h, (_SHOULDER - 0.01) * h])
         arm_rad = -_ARM_SWING_RAD * swing * math.cos(2.0 * math.pi * (cycle + offset))
         arms.extend(_chain(shoulder, arm_rad, (_SHOULDER - _ELBOW) * h, -0.15 - 0.3 * swing))
     soles = np.concatenate([foot.apply(_SOLE * h)[:, 2] for foot in (legs[2], legs[5])])

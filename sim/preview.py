@@ -29,7 +29,9 @@ _MAP_PX = (640, 480)
 
 @click.command()
 @click.argument("scenario")
-@click.option("--time", "t_s", type=float, default=0.0, help="Time of the world in seconds.")
+@click.option(
+    "--time", "t_s", type=click.FloatRange(min=0), default=0.0, help="Time of the world in seconds."
+)
 @click.option("--along", "along_m", type=float, default=0.0, help="Where the robot is on its path, in m.")
 @click.option("--seed", type=int, default=1, help="Picks textures and jitter.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="PNG to write.")
@@ -47,12 +49,11 @@ def main(scenario: str, t_s: float, along_m: float, seed: int, out: Path) -> Non
         robot.camera_mount.pitch_rad,
     )
     pose = pose_along(spec.path, along_m)
-    # The world began t_s ago, so that the first frame is due now.
+    # The world began t_s ago: the camera gives its newest frame.
     clock = SimulatedClock(round(t_s * NS_PER_S))
-    config = SimulatedCameraConfig(fps=1.0 / t_s if t_s > 0.004 else 30.0)
-    camera = SimulatedCamera(world, config, mount, clock, lambda _: pose, start_ns=0)
-    if t_s > 0.004:
-        camera.read(timeout_s=0.0)
+    camera = SimulatedCamera(
+        world, SimulatedCameraConfig(), mount, clock, body_pose=lambda _: pose, start_ns=0
+    )
     frame = camera.read(timeout_s=1.0)
     picture = camera.last_picture
     if picture is None or not cv2.imwrite(str(out), sheet(frame, picture, world, robot, pose)):

@@ -11,6 +11,7 @@ from hal.types import ColourImage, FloatArray, Intrinsics, Pose
 from sim.antialias import smooth_edges
 from sim.raster import Drawn, Float32Image, LabelImage, Rasteriser
 from sim.shade import Painter
+from sim.shadow import ShadowCaster
 from sim.textures import TextureStore
 from sim.world import Geometry, World
 
@@ -52,6 +53,7 @@ class Renderer:
         shape = (intrinsics.height, intrinsics.width)
         self._raster = Rasteriser(intrinsics)
         self._painter = Painter(shape, TextureStore(world.seed), world.textures)
+        self._shadows = ShadowCaster(intrinsics, world.scenario.light)
         self._colour: ColourImage = np.zeros((*shape, 3), np.uint8)
 
     def render(self, t_s: float, camera: Pose) -> Picture:
@@ -60,6 +62,8 @@ class Renderer:
         drawn = self._raster.draw(geometry, camera)
         labels, inverse_depth = self._raster.labels, self._raster.inverse_depth
         self._painter.paint(labels, drawn, geometry, self.world.scenario.light)
+        bodies = self.world.bodies(t_s)
+        self._shadows.cast(self._painter.colour, labels, drawn, geometry, bodies, camera)
         smooth_edges(self._painter.colour, labels, inverse_depth, drawn)
         cv2.cvtColor(self._painter.colour, cv2.COLOR_BGRA2BGR, dst=self._colour)
         return Picture(t_s, camera, self._colour, inverse_depth, labels, drawn, geometry)

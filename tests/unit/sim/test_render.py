@@ -138,3 +138,21 @@ def test_the_mask_names_the_bodies_of_the_scenario() -> None:
     ahead = picture.camera.inverse().apply(np.array([[walker.pose.x_m, walker.pose.y_m, 0.9]]))[0]
     assert z == pytest.approx(ahead[2], abs=0.3)
     assert columns.mean() == pytest.approx(K.fx * ahead[0] / ahead[2] + K.cx, abs=8)
+
+
+def test_what_stands_on_the_floor_casts_a_shadow_on_the_floor_alone() -> None:
+    crate = Crate(kind="crate", name="c", x_m=3.0, y_m=0.0, texture="plain")
+    high = crate.model_copy(update={"name": "hangs", "z_m": 1.5})
+    bare, with_crate, with_high = (Renderer(scene(*b), K).render(0.0, eye()) for b in ((), (crate,), (high,)))
+    change = bare.colour.astype(int) - with_crate.colour
+    building = with_crate.instance_mask() == 0
+    foot = np.flatnonzero(with_crate.instance_mask()[:, 160] == 1).max()
+    # Right before its foot the floor is darker, two metres nearer it is as it was.
+    assert change[foot + 3, 160].min() > 10
+    assert (np.abs(change[230]) <= 1).all()
+    walls = building & (with_crate.geometry.normals[with_crate.drawn.face[with_crate.labels - 1], 2] < 0.5)
+    beside = np.zeros_like(walls)
+    beside[:80] = True  # above the crate: no edge is shared with it
+    assert (np.abs(change[walls & beside]) <= 1).all()
+    untouched = with_high.instance_mask()[150:] == 0
+    assert np.array_equal(with_high.colour[150:][untouched], bare.colour[150:][untouched])

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from config.path import ArcSpec, LineSpec, PathSpec
+from sim.preview import main, pose_along
+
+BEND = PathSpec(
+    segments=(
+        LineSpec(kind="line", length_m=2.0),
+        ArcSpec(kind="arc", radius_m=3.0, angle_deg=-90.0),
+        LineSpec(kind="line", length_m=1.0),
+    )
+)
+
+
+def test_it_writes_four_pictures_in_one(tmp_path: Path) -> None:
+    out = tmp_path / "look.png"
+    done = CliRunner().invoke(main, ["crossing", "--time", "4.0", "--along", "3.0", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    sheet = cv2.imread(str(out))
+    assert sheet is not None
+    assert sheet.shape == (960, 1280, 3)
+    quarters = [sheet[v : v + 480, u : u + 640] for v in (0, 480) for u in (0, 640)]
+    assert all(float(np.std(quarter)) > 10 for quarter in quarters)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "file", "says"),
+    [("moon", "look.png", "no such scenario"), ("empty", "no/such/folder/look.png", "cannot be written")],
+)
+def test_what_is_wrong_is_told_in_one_line(scenario: str, file: str, says: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(main, [scenario, "--out", str(tmp_path / file)])
+    assert done.exit_code != 0
+    assert says in done.output
+    assert len(done.output.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("along_m", "x_m", "y_m", "heading_deg"),
+    [
+        (-1.0, 0.0, 0.0, 0.0),
+        (1.5, 1.5, 0.0, 0.0),
+        (2.0 + 1.5 * math.pi, 5.0, -3.0, -90.0),
+        (99.0, 5.0, -4.0, -90.0),
+    ],
+)
+def test_pose_along_a_path_by_hand(along_m: float, x_m: float, y_m: float, heading_deg: float) -> None:
+    pose = pose_along(BEND, along_m)
+    assert (pose.x_m, pose.y_m) == pytest.approx((x_m, y_m))
+    assert math.degrees(pose.heading_rad) == pytest.approx(heading_deg)
