@@ -1,0 +1,155 @@
+import itertools
+import math
+
+import pytest
+
+from config.decision import DecisionConfig
+from config.path import LineSpec, PathSpec
+from config.robot import Robot
+from controller.control import ControlLoop, ControlStep, Outcome
+from controller.decide import DecisionMaker
+from controller.follow import PathFollower
+from controller.localise import Localiser
+from controller.path import Path
+from controller.shape import SpeedShaper
+from hal.geometry import advance_pose
+from hal.types import CameraMount, ChassisMode, ChassisState, Setpoint
+from tests.support.scenes import ORIGIN, chassis_state, scene
+
+PERIOD_NS = 20_000_000
+ROBOT = Robot()
+MOUNT = CameraMount(0.45, 0.0, 0.6, 0.07)
+
+
+class ObedientChassis:
+    """Does at once what it is told; arms after a few exchanges; notes what it was told."""
+
+    def __init__(self, arms_after: int = 3) -> None:
+        self._arms_after = arms_after
+        self._pose = ORIGIN
+        self._exchanges = 0
+        self.fault: ChassisMode | None = None
+        self.armed_calls = 0
+        self.stopped_at_ns: int | None = None
+        self.sent: list[Setpoint] = []
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        assert setpoint is not None
+        self._exchanges += 1
+        self.sent.append(setpoint)
+        mode = ChassisMode.ARMED if self._exchanges > self._arms_after else ChassisMode.ARMING
+        if self.fault is not None:
+            mode = self.fault
+        if mode is ChassisMode.ARMED:
+            self._pose = advance_pose(self._pose, setpoint.v_mps, setpoint.w_radps, 0.02)
+        reason = "e-stop pressed" if self.fault else ""
+        return chassis_state(now_ns, mode, setpoint.v_mps, self._pose, reason, setpoint)
+
+    def arm(self, now_ns: int) -> None:
+        self.armed_calls += 1
+
+    def stop(self, now_ns: int) -> None:
+        self.stopped_at_ns = now_ns
+
+    def __enter__(self) -> "ObedientChassis":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+
+def loop_on(chassis: ObedientChassis, length_m: float = 3.0) -> ControlLoop:
+    path = Path(PathSpec(segments=(LineSpec(kind="line", length_m=length_m),)), ROBOT)
+    return ControlLoop(
+        path=path,
+        decide=DecisionMaker(DecisionConfig(), ROBOT, MOUNT, 0.02),
+        shape=SpeedShaper(ROBOT.limits, 0.02),
+        follow=PathFollower(path, ROBOT.limits),
+        localiser=Localiser(path.start, MOUNT),
+        chassis=chassis,
+    )
+
+
+def drive(loop: ControlLoop, steps: int, first: int = 0) -> list[ControlStep]:
+    """Steps with a fresh scene of a free way each, until the loop has finished."""
+    taken = []
+    for index in range(first, first + steps):
+        if loop.finished:
+            break
+        now_ns = index * PERIOD_NS
+        taken.append(loop.step(scene(now_ns, index, pose=loop.localiser.pose), now_ns))
+    return taken
+
+
+def test_a_free_way_is_driven_to_its_end_and_the_chassis_is_stopped_there() -> None:
+    chassis = ObedientChassis()
+    loop = loop_on(chassis)
+    taken = drive(loop, 2000)
+    assert loop.outcome is Outcome.REACHED
+    assert taken[-1].progress_m == pytest.approx(3.0, abs=0.02)
+    assert chassis.stopped_at_ns == taken[-1].now_ns
+    assert chassis.armed_calls == 1
+
+
+def test_nothing_moves_before_the_chassis_is_armed() -> None:
+    chassis = ObedientChassis(arms_after=20)
+    taken = drive(loop_on(chassis), 60)
+    moving = [index for index, step in enumerate(taken) if step.setpoint.v_mps > 0.0]
+    # The exchange that reports ARMED is the 21st, so the first setpoint that may move is the 22nd.
+    assert moving[0] >= 21
+
+
+def test_nothing_moves_before_there_is_a_scene() -> None:
+    chassis = ObedientChassis()
+    loop = loop_on(chassis)
+    for index in range(100):
+        step = loop.step(None, index * PERIOD_NS)
+        assert step.setpoint.v_mps == 0.0
+        assert step.scene_sequence is None
+
+
+def test_a_latched_chassis_ends_the_drive_with_its_reason() -> None:
+    chassis = ObedientChassis()
+    loop = loop_on(chassis, length_m=10.0)
+    taken = drive(loop, 200)
+    assert taken[-1].setpoint.v_mps > 0.2
+    chassis.fault = ChassisMode.ESTOP
+    drive(loop, 5, first=200)
+    assert loop.outcome is Outcome.CHASSIS_FAULT
+    assert loop.stop_reason == "e-stop pressed"
+    assert chassis.stopped_at_ns is not None
+
+
+def test_a_chassis_that_never_arms_is_given_up() -> None:
+    loop = loop_on(ObedientChassis(arms_after=10**9))
+    taken = drive(loop, 1000)
+    assert loop.outcome is Outcome.NOT_ARMED
+    assert taken[-1].now_ns == pytest.approx(5.02e9, abs=0.05e9)
+
+
+def test_a_requested_stop_is_jerk_limited_and_ends_at_rest() -> None:
+    chassis = ObedientChassis()
+    loop = loop_on(chassis, length_m=20.0)
+    drive(loop, 250)
+    loop.request_stop("SIGTERM received")
+    loop.request_stop("something later")
+    taken = drive(loop, 1000, first=250)
+    assert loop.outcome is Outcome.STOPPED
+    assert loop.stop_reason == "SIGTERM received"
+    speeds = [step.setpoint.v_mps for step in taken]
+    accelerations = [step.setpoint.a_mps2 for step in taken]
+    assert speeds[0] > 0.5
+    assert speeds[-1] == 0.0
+    assert min(accelerations) >= -ROBOT.limits.max_accel_mps2 - 1e-6
+    jerks = [(b - a) / 0.02 for a, b in itertools.pairwise(accelerations)]
+    assert max(map(abs, jerks)) <= ROBOT.limits.max_jerk_mps3 + 1e-6
+
+
+def test_scenes_that_stop_coming_stop_the_robot() -> None:
+    loop = loop_on(ObedientChassis(), length_m=20.0)
+    taken = drive(loop, 250)
+    last = scene(taken[-1].now_ns, 249, pose=taken[-1].pose)
+    speeds = [loop.step(last, (250 + index) * PERIOD_NS).setpoint.v_mps for index in range(500)]
+    assert speeds[0] > 0.5
+    assert speeds[-1] == 0.0
+    assert all(math.isfinite(speed) for speed in speeds)
