@@ -30,7 +30,7 @@ Random = np.random.Generator
 FRONT_M = 0.51
 HALF_WIDTH_M = 0.39
 # The fastest that the robot gets anywhere: no delay, no jerk limit, the speed that the camera's range admits.
-_TOP_MPS, _ACCEL_MPS2 = 1.25, 0.3
+_TOP_MPS, _ACCEL_MPS2 = 1.5, 0.3
 RACK_DEPTH_M = 1.1
 _BAY_M = 2.7
 

@@ -1,0 +1,59 @@
+"""What every drive of a campaign leaves behind, whichever mode and policy it was: one row a control step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from controller.decision import Action, Decision
+from controller.path import OnPath, Path
+from controller.tally import SetpointTally
+from hal.types import FloatArray, PlanarPose
+from vision.scene import Scene
+
+
+class Policy(Protocol):
+    """Scene, path and state -> Decision; controller.decide.DecisionMaker is ours."""
+
+    def step(
+        self,
+        scene: Scene | None,
+        path: Path,
+        pose: PlanarPose,
+        on_path: OnPath,
+        v_mps: float,
+        a_mps2: float,
+        now_ns: int,
+    ) -> Decision: ...
+
+
+@dataclass
+class DriveLog:
+    """Appended to once a control step. pose and speed: the truth. reached_s: when it came to rest on the
+    target, None: never. decisions: only where they are kept."""
+
+    setpoints: SetpointTally
+    times_s: list[float] = field(default_factory=list)
+    poses: list[tuple[float, float, float]] = field(default_factory=list)
+    s_m: list[float] = field(default_factory=list)
+    v_mps: list[float] = field(default_factory=list)
+    actions: list[Action] = field(default_factory=list)
+    rules: list[str] = field(default_factory=list)
+    sentences: list[str] = field(default_factory=list)
+    reached_s: float | None = None
+
+    def add(self, t_s: float, pose: PlanarPose, s_m: float, v_mps: float, decision: Decision) -> None:
+        """One control step."""
+        self.times_s.append(t_s)
+        self.poses.append((pose.x_m, pose.y_m, pose.heading_rad))
+        self.s_m.append(s_m)
+        self.v_mps.append(v_mps)
+        self.actions.append(decision.action)
+        self.rules.append(decision.reason.rule)
+        self.sentences.append(decision.reason.sentence)
+
+    def pose_array(self) -> FloatArray:
+        """(T, 3)."""
+        return np.array(self.poses).reshape(-1, 3)

@@ -1,0 +1,270 @@
+"""What a drive was like, measured against the truth."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.campaign.drive import DriveLog
+from controller.campaign.oracle import OracleTime
+from controller.campaign.stage import Stage
+from controller.campaign.view import PlanarEye
+from controller.decision import Action
+from hal.types import FloatArray, PlanarPose
+from sim.planar import separation
+
+AT_FAULT_MPS = 0.02
+FLAP_REVERSALS, FLAP_S = 3, 2.0
+# Between two control steps two bodies come no closer to each other than this.
+_BETWEEN_STEPS_M = 0.15
+_SUBSTEPS = 4
+_STOPPED_MPS, _MOVING_AGAIN_MPS = 0.02, 0.1
+_BEFORE_STOP_S, _AFTER_STOP_S = 4.0, 2.0
+_AFTER_FAULT_S = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """When and with whom it began, and how fast the robot was."""
+
+    t_s: float
+    body: int
+    v_mps: float
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of missions.jsonl. time_s: until rest on the target, None if it was not reached.
+    oracle_time_s: None if not even the oracle reaches it. expected: whether it should be reached at all."""
+
+    family: str
+    seed: int
+    policy: str
+    mode: str
+    reached: bool
+    expected: bool
+    contacts: int
+    contacts_at_fault: int
+    touched: tuple[str, ...]
+    time_s: float | None
+    oracle_time_s: float | None
+    min_clearance_m: float
+    max_jerk_mps3: float
+    max_accel_mps2: float
+    reversals: int
+    limit_violations: int
+    false_stops: int
+    flaps: int
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON."""
+        return asdict(self)
+
+
+def judge(stage: Stage, log: DriveLog, policy: str, mode: str, oracle: OracleTime, eye: PlanarEye) -> Row:
+    """Everything that missions.jsonl says of a drive."""
+    clearance = _Clearance(stage, log)
+    contacts = clearance.contacts()
+    case, tally = stage.case, log.setpoints
+    at_fault = [one for one in contacts if _at_fault(one, stage, log, eye)]
+    return Row(
+        family=case.family,
+        seed=case.seed,
+        policy=policy,
+        mode=mode,
+        reached=log.reached_s is not None,
+        expected=case.scenario.outcome == "target" and not case.halts,
+        contacts=len(contacts),
+        contacts_at_fault=len(at_fault),
+        touched=tuple(stage.world.names[one.body] for one in at_fault),
+        time_s=None if log.reached_s is None else round(log.reached_s, 4),
+        oracle_time_s=round(oracle.total_s, 4) if math.isfinite(oracle.total_s) else None,
+        min_clearance_m=round(clearance.least_m, 4),
+        max_jerk_mps3=tally.max_jerk_mps3,
+        max_accel_mps2=tally.max_accel_mps2,
+        reversals=tally.reversals,
+        limit_violations=tally.violations,
+        false_stops=len(false_stops(stage, log)),
+        flaps=flaps(log),
+    )
+
+
+class _Clearance:
+    """Distances between the robot and all bodies at its height, over the whole drive."""
+
+    def __init__(self, stage: Stage, log: DriveLog) -> None:
+        self._stage, self._log = stage, log
+        self._times = np.array(log.times_s)
+        self._poses = log.pose_array()
+        self.least_m = math.inf
+        self._contacts: list[Contact] = []
+        for body in np.flatnonzero(stage.in_height).tolist():
+            self._look_at(body)
+
+    def contacts(self) -> list[Contact]:
+        """In the order of time."""
+        return sorted(self._contacts, key=lambda one: one.t_s)
+
+    def _look_at(self, body: int) -> None:
+        times, poses = self._times, self._poses
+        gap = self._gap(body, times, poses, _BETWEEN_STEPS_M)
+        close = gap < _BETWEEN_STEPS_M
+        if close.any():
+            # Look between the steps as well where something could happen there.
+            times, poses = self._between(close)
+            gap = np.append(gap, self._gap(body, times, poses, math.inf))
+            self._note(body, times, gap[-len(times) :])
+        self.least_m = min(self.least_m, float(gap.min(initial=math.inf)))
+
+    def _gap(self, body: int, times: FloatArray, poses: FloatArray, exact_below_m: float) -> FloatArray:
+        """(T,) distance; where circles are further apart than exact_below_m and than the least so far, theirs."""
+        robot = self._stage.robot.body
+        polygons = self._stage.world.over(times, body)
+        middle = polygons.mean(axis=1)
+        radius = np.sqrt(((polygons - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
+        reach = math.hypot(max(robot.front_m, robot.rear_m), 0.5 * robot.width_m)
+        gap = np.hypot(middle[:, 0] - poses[:, 0], middle[:, 1] - poses[:, 1]) - radius - reach
+        exact = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
+        if len(exact):
+            gap[exact] = separation(self._stage.robots(poses[exact]), polygons[exact])
+        return gap
+
+    def _between(self, close: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+        wide = close.copy()
+        wide[:-1] |= close[1:]
+        wide[1:] |= close[:-1]
+        index = np.flatnonzero(wide[:-1] & wide[1:])
+        share = np.arange(_SUBSTEPS) / _SUBSTEPS
+        dt = self._times[index + 1] - self._times[index]
+        times = (self._times[index, None] + share * dt[:, None]).ravel()
+        step = self._poses[index + 1] - self._poses[index]
+        poses = (self._poses[index, None] + share[:, None] * step[:, None]).reshape(-1, 3)
+        return times, poses
+
+    def _note(self, body: int, times: FloatArray, gap: FloatArray) -> None:
+        """A contact counts when it begins; it is another one after half a second apart."""
+        speeds = np.interp(times, self._times, np.array(self._log.v_mps))
+        touching = np.flatnonzero(gap <= 0.0)
+        last_s = -math.inf
+        for k in touching.tolist():
+            fresh = times[k] > last_s + 0.5
+            last_s = float(times[k])
+            if fresh:
+                self._contacts.append(Contact(last_s, body, float(speeds[k])))
+            elif speeds[k] > self._contacts[-1].v_mps and self._contacts[-1].v_mps <= AT_FAULT_MPS:
+                # It stood when it was touched, and then drove on into it.
+                self._contacts[-1] = Contact(last_s, body, float(speeds[k]))
+
+
+def _at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> bool:
+    """Whether the robot moved, and a driver with the same field of view that knows the motion of whatever it
+    has seen once avoids it: by braking as hard as allowed, or by speeding up, from the first sight on."""
+    if contact.v_mps <= AT_FAULT_MPS:
+        return False
+    seen = _first_seen(contact, stage, log, eye)
+    if seen is None:
+        return False
+    limits = stage.robot.limits
+    for accel, bound in (
+        (-limits.emergency_decel_mps2, 0.0),
+        (-limits.max_accel_mps2, 0.0),
+        (0.0, log.v_mps[seen]),
+        (limits.max_accel_mps2, limits.max_speed_mps),
+    ):
+        if not _touches(contact.body, stage, log, seen, accel, bound):
+            return True
+    return False
+
+
+def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
+    """The step at which the body that was touched could first be seen; None: never before the contact."""
+    for k in range(0, len(log.times_s), 5):
+        if log.times_s[k] >= contact.t_s:
+            return None
+        polygons, _ = stage.world.look(log.times_s[k])
+        view = eye.look(polygons, PlanarPose(*log.poses[k]))
+        column = np.flatnonzero(view.bodies == contact.body)
+        if len(column) and np.isfinite(view.forward_m[:, column[0]]).any():
+            return k
+    return None
+
+
+def _touches(body: int, stage: Stage, log: DriveLog, start: int, accel_mps2: float, bound_mps: float) -> bool:
+    """Whether a robot that changes to bound_mps with accel_mps2 from step start on touches the body."""
+    v0, s0 = log.v_mps[start], log.s_m[start]
+    t = np.arange(0.0, 15.0, 0.02)
+    ramp_s = (bound_mps - v0) / accel_mps2 if accel_mps2 != 0.0 else 0.0
+    ramped = np.minimum(t, max(ramp_s, 0.0))
+    v = v0 + accel_mps2 * ramped
+    s = s0 + v0 * ramped + 0.5 * accel_mps2 * ramped**2 + v * (t - ramped)
+    moving = (v > AT_FAULT_MPS) & (s <= stage.path.length_m)
+    if not moving.any():
+        return False
+    poses = stage.path_poses(s[moving])
+    polygons = stage.world.over(log.times_s[start] + t[moving], body)
+    return bool((separation(stage.robots(poses), polygons) <= 0.0).any())
+
+
+def flaps(log: DriveLog) -> int:
+    """How often the decision turned round between faster and slower three times within 2 s."""
+    turns: list[float] = []
+    last: Action | None = None
+    for t_s, action in zip(log.times_s, log.actions, strict=True):
+        if action is Action.KEEP:
+            continue
+        if last is not None and action is not last:
+            turns.append(t_s)
+        last = action
+    count, k = 0, 0
+    while k + FLAP_REVERSALS <= len(turns):
+        if turns[k + FLAP_REVERSALS - 1] - turns[k] <= FLAP_S:
+            count += 1
+            k += FLAP_REVERSALS
+        else:
+            k += 1
+    return count
+
+
+def false_stops(stage: Stage, log: DriveLog) -> list[float]:
+    """When it came to rest before its target though nothing was on the floor that it was about to sweep,
+    from some seconds before until it went on; stops for a fault of camera or chassis are right."""
+    v = np.array(log.v_mps)
+    found = []
+    for start, end in _stops(v):
+        if log.reached_s is not None and end >= len(v) - 1:
+            continue
+        t0, t1 = log.times_s[start] - _BEFORE_STOP_S, log.times_s[end] + _AFTER_STOP_S
+        if stage.case.faults.strikes(log.times_s[start], _AFTER_FAULT_S):
+            continue
+        if stage.case.faults.glass and stage.case.scenario.outcome == "blocked":
+            continue
+        times = np.arange(max(t0, 0.0), t1, 0.2)
+        s_m = log.s_m[start]
+        ahead = any(high >= s_m for stretches in stage.blocked(times) for _, high in stretches)
+        if not ahead:
+            found.append(log.times_s[start])
+    return found
+
+
+def _stops(v: FloatArray) -> list[tuple[int, int]]:
+    """(from, to) steps of standing between driving, or at the end; standing at the start is none."""
+    stops, driving, start = [], False, 0
+    for k, speed in enumerate(v.tolist()):
+        if driving and speed < _STOPPED_MPS:
+            driving, start = False, k
+            stops.append((start, len(v) - 1))
+        elif not driving and speed > _MOVING_AGAIN_MPS:
+            driving = True
+            if stops:
+                stops[-1] = (start, k)
+    return stops
+
+
+def turning_points(values: list[float]) -> int:
+    """How often a series turns round; for figures."""
+    steps = [b - a for a, b in itertools.pairwise(values) if b != a]
+    return sum(1 for a, b in itertools.pairwise(steps) if (a > 0) != (b > 0))

@@ -1,0 +1,157 @@
+"""A mission without renderer, buses or processes: noisy scenes, the real decision and shaper, a base with lag.
+
+The robot keeps its path to a centimetre or two (the path tracking is proven elsewhere); along it, the base
+follows the commanded speed with the lag of sim.plant, and odometry is a little wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from config.app import AppConfig, LockstepRunner, SimulationConfig
+from config.camera import SimulatedCameraConfig
+from controller.campaign.drive import DriveLog, Policy
+from controller.campaign.noisy_camera import NoisyCamera
+from controller.campaign.stage import Stage
+from controller.control import ARRIVED_M
+from controller.path import OnPath
+from controller.shape import SpeedShaper
+from controller.tally import SetpointTally
+from hal.clocks import NS_PER_S
+from hal.types import Setpoint
+from vision.scene import CameraCondition, CameraHealth, Scene
+
+# A robot that still stands so long after everything else has come to rest will stand for ever.
+GIVE_UP_S = 6.0
+_STANDING_MPS = 1e-3
+_OFF_PATH_SIGMA_M = 0.01
+_OFF_PATH_S = 2.0
+_ODOMETRY_SIGMA = 0.003
+_FEEDBACK_TIMEOUT_S = 0.2
+_FROZEN_FRAMES = 2
+
+
+@dataclass(slots=True)
+class _Base:
+    """The robot on its path: what the tracks do, and how far off the odometry is."""
+
+    lag_s: float
+    max_accel_mps2: float
+    s_m: float = 0.0
+    v_mps: float = 0.0
+
+    def advance(self, command_mps: float, dt_s: float) -> None:
+        change = (command_mps - self.v_mps) * -math.expm1(-dt_s / self.lag_s)
+        limit = self.max_accel_mps2 * dt_s
+        change = min(max(change, -limit), limit)
+        self.s_m += (self.v_mps + 0.5 * change) * dt_s
+        self.v_mps += change
+
+
+class _Eyes:
+    """Frames at their times, with what goes wrong with them, and their way to the decision."""
+
+    def __init__(self, camera: NoisyCamera, stage: Stage, fps: float, latency_s: float) -> None:
+        self._camera, self._faults = camera, stage.case.faults
+        self._fps, self._latency_s = fps, latency_s
+        self._frame = 0
+        self._same = 0
+        self._last: Scene | None = None
+        self._on_way: deque[tuple[float, Scene]] = deque()
+        self.known: Scene | None = None
+
+    @property
+    def next_s(self) -> float:
+        return self._frame / self._fps
+
+    def look(self, t_s: float, stage: Stage, s_m: float, d_m: float, known_s_m: float) -> None:
+        """One frame."""
+        faults = self._faults
+        self._frame += 1
+        if faults.silent is not None and faults.silent.holds(t_s):
+            return
+        if faults.frozen is not None and faults.frozen.holds(t_s) and self._last is not None:
+            scene = self._frozen(self._last, t_s)
+        else:
+            self._same = 0
+            scene = self._camera.look(t_s, self._frame, stage.pose(s_m, d_m), stage.pose(known_s_m, d_m))
+        self._last = scene
+        late_s = faults.late_by_s if faults.late is not None and faults.late.holds(t_s) else 0.0
+        self._on_way.append((t_s + self._latency_s + late_s, scene))
+
+    def _frozen(self, last: Scene, t_s: float) -> Scene:
+        """The same picture with a new stamp, as vision/health.py sees it."""
+        self._same += 1
+        health = last.health
+        if self._same >= _FROZEN_FRAMES:
+            reason = f"image has not changed by a single grey level for {self._same} frames"
+            health = CameraHealth(CameraCondition.UNTRUSTWORTHY, reason, health.valid_depth_ratio)
+        return replace(last, captured_ns=round(t_s * NS_PER_S), sequence=self._frame, health=health)
+
+    def arrived(self, t_s: float) -> Scene | None:
+        while self._on_way and self._on_way[0][0] <= t_s + 1e-9:
+            self.known = self._on_way.popleft()[1]
+        return self.known
+
+
+def drive_noise(stage: Stage, config: AppConfig, policy: Policy) -> DriveLog:
+    """One drive from rest at the start until rest at the target, or until nothing more will happen."""
+    assert isinstance(config.camera, SimulatedCameraConfig)
+    assert isinstance(config.runner, LockstepRunner)
+    simulation = config.simulation or SimulationConfig(scenario=stage.case.family)
+    faults, scenario, seed = stage.case.faults, stage.case.scenario, stage.case.seed
+    dt_s = 1.0 / config.runner.control_rate_hz
+    random = np.random.default_rng((seed, 0xB0))
+    odometry = 1.0 + faults.distance_slip + _ODOMETRY_SIGMA * float(random.standard_normal())
+    wander = random.standard_normal(math.ceil(scenario.duration_s / dt_s) + 1).tolist()
+    keep = math.exp(-dt_s / _OFF_PATH_S)
+    shake_m = _OFF_PATH_SIGMA_M * math.sqrt(1.0 - keep * keep)
+    camera = NoisyCamera(stage, config.camera, seed)
+    eyes = _Eyes(camera, stage, config.camera.fps, config.runner.perception_latency_s)
+    base = _Base(simulation.plant.lag_s, simulation.plant.max_accel_mps2)
+    shaper = SpeedShaper(config.robot.limits, dt_s, config.decision.chassis_delay_s)
+    log = DriveLog(SetpointTally(config.robot.limits, dt_s))
+    length_m, end_s = stage.path.length_m, max(stage.world.end_s, 0.0)
+    off_m, standing_s, lost = 0.0, 0.0, False
+    for k in range(len(wander) - 1):
+        t_s = k * dt_s
+        off_m = keep * off_m + shake_m * wander[k]
+        known_s_m = base.s_m * odometry
+        if eyes.next_s <= t_s + 1e-9:
+            eyes.look(t_s, stage, base.s_m, off_m, known_s_m)
+        now_ns = round(t_s * NS_PER_S)
+        decision = policy.step(
+            eyes.arrived(t_s),
+            stage.path,
+            stage.pose(known_s_m, off_m),
+            OnPath(known_s_m, off_m, 0.0),
+            max(shaper.v_mps, base.v_mps),
+            shaper.a_mps2,
+            now_ns,
+        )
+        log.add(t_s, stage.pose(base.s_m, off_m), base.s_m, base.v_mps, decision)
+        if faults.feedback_lost_s is not None and t_s >= faults.feedback_lost_s + _FEEDBACK_TIMEOUT_S:
+            # The driver has stopped the base (hal/chassis/arming.py); only consent would lead on.
+            base.advance(0.0, dt_s)
+            lost = True
+        else:
+            shaped = shaper.step(
+                decision.target_speed_mps,
+                emergency=decision.emergency,
+                distance_to_end_m=length_m - known_s_m,
+            )
+            log.setpoints.add(Setpoint(now_ns, shaped.v_mps, shaped.a_mps2, 0.0))
+            base.advance(shaped.v_mps, dt_s)
+        standing_s = standing_s + dt_s if base.v_mps < _STANDING_MPS else 0.0
+        if standing_s == 0.0:
+            continue
+        if not lost and shaper.v_mps == 0.0 and length_m - base.s_m * odometry <= ARRIVED_M:
+            log.reached_s = t_s + dt_s
+            return log
+        if lost or (standing_s >= GIVE_UP_S and t_s > end_s + GIVE_UP_S):
+            return log
+    return log

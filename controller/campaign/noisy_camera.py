@@ -1,0 +1,238 @@
+"""Scenes made from the truth, with the errors of a real perception: fast, in place of camera and vision.
+
+What is modelled, and from where the numbers are:
+* the field of view, the depth range, what stands before what (controller/campaign/view.py);
+* depth noise sigma = 0.0075 z^2 per pixel (measured on a real RealSense), of which a tracked body keeps a
+  quarter as a wandering error, and of which the nearest surface of a band, being the third smallest of some
+  twenty cells, shows its near tail;
+* a body is reported from its third sighting on, is missed in some frames (more of them far away), is predicted
+  while it is not seen, and forgotten after half a second, as vision/tracker.py does;
+* velocity follows the truth with a lag of the measuring window, with an error that wanders, and with a spread
+  that is as wide as V_omax at first sight.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.camera import SimulatedCameraConfig
+from config.robot import Robot
+from controller.campaign.stage import Stage
+from controller.campaign.view import PlanarEye, View
+from hal.clocks import NS_PER_S
+from hal.geometry import camera_in_body
+from hal.types import CameraMount, FloatArray, PlanarPose, Pose
+from vision.scene import CameraCondition, CameraHealth, EgoMotion, FreeSpace, Obstacle, Scene
+
+_GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)
+_BOX_PX = (0.0, 0.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseModel:
+    """Standard deviations, times and shares; z is the distance in metres."""
+
+    depth_sigma_1pm: float = 0.0075
+    kept_by_tracker: float = 0.25
+    side_sigma_m: float = 0.01
+    side_velocity_mps: float = 0.05
+    side_velocity_per_m: float = 0.010
+    radial_velocity_mps: float = 0.07
+    radial_velocity_per_m: float = 0.025
+    first_velocity_mps: float = 1.5
+    first_velocity_fades_s: float = 0.12
+    velocity_lag_s: float = 0.15
+    wander_s: float = 0.25
+    sightings: int = 3
+    missed_share: float = 0.03
+    missed_share_at_range: float = 0.4
+    forget_s: float = 0.5
+    moving_mps: float = 0.15
+    moving_per_m: float = 0.02
+    rise_s: float = 0.1
+    fall_s: float = 0.3
+    surface_bias_sigmas: float = 1.0
+    surface_sigmas: float = 0.5
+
+
+class NoisyCamera:
+    """One camera's perception. look() once a frame; all randomness is the seed's."""
+
+    def __init__(
+        self, stage: Stage, camera: SimulatedCameraConfig, seed: int, noise: NoiseModel | None = None
+    ) -> None:
+        self._stage, self._noise = stage, noise or NoiseModel()
+        self._period_s = 1.0 / camera.fps
+        mount = stage.robot.camera_mount
+        self._mount = mount
+        self.eye = PlanarEye(stage.world, camera, mount)
+        self._body = stage.robot.body
+        self._random = np.random.default_rng((seed, 0xCA))
+        self._glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
+        self._to_optical = camera_in_body(
+            CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
+        ).rotation.T
+        n = len(stage.world)
+        self._ids = np.zeros(n, np.int64)
+        self._next_id = 1
+        self._first_s, self._seen_s = np.full(n, np.nan), np.full(n, -np.inf)
+        self._sightings = np.zeros(n, np.int64)
+        self._velocity = np.zeros((n, 2))
+        self._evidence_s, self._moving = np.zeros(n), np.zeros(n, np.bool_)
+        self._wander = np.zeros((n, 4))
+        self._centre, self._extent = np.zeros((n, 2)), np.zeros((n, 2))
+        self._started = False
+
+    def look(self, t_s: float, sequence: int, true_pose: PlanarPose, known_pose: PlanarPose) -> Scene:
+        """The scene of an exposure at t_s. known_pose: where the robot believes to be."""
+        polygons, velocity = self._stage.world.look(t_s)
+        view = self.eye.look(polygons, true_pose)
+        self._advance(velocity)
+        self._sight(view, t_s, true_pose)
+        return Scene(
+            captured_ns=round(t_s * NS_PER_S),
+            sequence=sequence,
+            obstacles=self._obstacles(t_s, true_pose),
+            free_space=self._free_space(view),
+            ego_motion=EgoMotion(
+                Pose(np.eye(3), np.zeros(3)), self._period_s, "none", math.nan, math.nan, math.nan
+            ),
+            health=_GOOD,
+            robot_pose=known_pose,
+        )
+
+    def _advance(self, velocity: FloatArray) -> None:
+        """Errors wander, measured velocities follow the true ones, what is not seen goes on as it did."""
+        noise, dt_s = self._noise, self._period_s
+        keep = math.exp(-dt_s / noise.wander_s) if self._started else 0.0
+        self._started = True
+        fresh = self._random.standard_normal(self._wander.shape)
+        self._wander = keep * self._wander + math.sqrt(1.0 - keep * keep) * fresh
+        self._velocity += (velocity - self._velocity) * -math.expm1(-dt_s / noise.velocity_lag_s)
+        self._centre += self._velocity * dt_s
+
+    def _sight(self, view: View, t_s: float, pose: PlanarPose) -> None:
+        """Take in what this frame shows."""
+        noise = self._noise
+        missed = self._random.random(len(self._ids))
+        for column, body in enumerate(view.bodies.tolist()):
+            if self._glass[body]:
+                continue
+            hits = view.forward_m[:, column]
+            bands = np.flatnonzero(np.isfinite(hits))
+            if not len(bands):
+                continue
+            z = hits[bands]
+            far = float(z.min()) / self.eye.range_m
+            if missed[body] < max(noise.missed_share, noise.missed_share_at_range * (2.0 * far - 1.0)):
+                continue
+            x = z * self.eye.bearing_tan[bands]
+            side = float(z.min()) * self.eye.half_width_tan
+            low_x, high_x, low_z, high_z = x.min() - side, x.max() + side, z.min(), z.max()
+            self._see(body, 0.5 * (low_x + high_x), 0.5 * (low_z + high_z), t_s, pose)
+            self._extent[body] = high_x - low_x, high_z - low_z
+        gone = self._seen_s < t_s - noise.forget_s
+        self._sightings[gone] = 0
+        self._moving[gone] = False
+        self._evidence_s[gone] = 0.0
+
+    def _see(self, body: int, right_m: float, forward_m: float, t_s: float, pose: PlanarPose) -> None:
+        if self._sightings[body] == 0:
+            self._ids[body], self._next_id = self._next_id, self._next_id + 1
+            self._first_s[body] = t_s
+            self._velocity[body] = 0.0
+        self._sightings[body] += 1
+        self._seen_s[body] = t_s
+        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+        ahead, left = forward_m + self._mount.forward_m, self._mount.left_m - right_m
+        self._centre[body] = pose.x_m + ahead * cos - left * sin, pose.y_m + ahead * sin + left * cos
+        self._judge(body, forward_m)
+
+    def _judge(self, body: int, z_m: float) -> None:
+        noise = self._noise
+        fast = math.hypot(*self._velocity[body]) > noise.moving_mps + noise.moving_per_m * z_m
+        step_s = self._period_s
+        if fast:
+            self._evidence_s[body] = min(self._evidence_s[body] + step_s, noise.rise_s + step_s)
+            self._moving[body] |= self._evidence_s[body] >= noise.rise_s
+        else:
+            self._evidence_s[body] -= step_s * noise.rise_s / noise.fall_s
+            if self._evidence_s[body] <= 0.0:
+                self._evidence_s[body], self._moving[body] = 0.0, False
+
+    def _obstacles(self, t_s: float, pose: PlanarPose) -> tuple[Obstacle, ...]:
+        noise = self._noise
+        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+        found = []
+        for body in np.flatnonzero(self._sightings >= noise.sightings).tolist():
+            dx, dy = self._centre[body, 0] - pose.x_m, self._centre[body, 1] - pose.y_m
+            ahead, left = dx * cos + dy * sin - self._mount.forward_m, dy * cos - dx * sin
+            if ahead <= 0.0:
+                continue
+            wander = self._wander[body]
+            sigma_m = noise.kept_by_tracker * noise.depth_sigma_1pm * ahead * ahead
+            low_m, high_m = self._stage.world.z_m[body].tolist()
+            in_camera = np.array(
+                [
+                    ahead + sigma_m * wander[0],
+                    left - self._mount.left_m + noise.side_sigma_m * wander[1],
+                    0.5 * (low_m + high_m) - self._mount.height_m,
+                ]
+            )
+            age_s = t_s - float(self._first_s[body])
+            young_mps = noise.first_velocity_mps * math.exp(-age_s / noise.first_velocity_fades_s)
+            radial = noise.radial_velocity_mps + noise.radial_velocity_per_m * ahead
+            side = noise.side_velocity_mps + noise.side_velocity_per_m * ahead
+            vx, vy = self._velocity[body].tolist()
+            velocity = np.array(
+                [
+                    vx * cos + vy * sin + radial * wander[2],
+                    vy * cos - vx * sin + side * wander[3],
+                    0.0,
+                ]
+            )
+            spread = np.diag([radial + young_mps, side + young_mps, 0.1 + young_mps]) ** 2
+            moving = bool(self._moving[body])
+            found.append(
+                Obstacle(
+                    id=int(self._ids[body]),
+                    bbox_px=_BOX_PX,
+                    position_m=self._to_optical @ in_camera,
+                    extent_m=np.array([self._extent[body, 0], high_m - low_m, self._extent[body, 1]]),
+                    velocity_mps=self._to_optical @ velocity,
+                    velocity_cov=self._to_optical @ spread @ self._to_optical.T,
+                    moving=moving,
+                    score=0.9 if moving else 0.5,
+                    fragments=8,
+                    age_s=age_s,
+                    unseen_s=t_s - float(self._seen_s[body]),
+                )
+            )
+        return tuple(found)
+
+    def _free_space(self, view: View) -> FreeSpace:
+        """What the bands show: the nearest thing in the robot's height, and how far the floor is free."""
+        noise, eye = self._noise, self.eye
+        wanted = self._stage.in_height[view.bodies] & ~self._glass[view.bodies]
+        hits = np.where(wanted, view.forward_m, np.inf)
+        nearest = hits.min(axis=1, initial=np.inf)
+        building = view.free_m <= np.minimum(nearest, eye.range_m)
+        glass = self._glass[view.bodies]
+        hidden = np.where(glass, view.forward_m, np.inf).min(axis=1, initial=np.inf)
+        nearest = np.where(building & (hidden > view.free_m), view.free_m, nearest)
+        nearest = np.where(hidden < nearest, np.inf, nearest)
+        z = np.where(np.isfinite(nearest), nearest, 0.0)
+        errors = noise.surface_sigmas * self._random.standard_normal(len(z)) - noise.surface_bias_sigmas
+        nearest = np.maximum(nearest + noise.depth_sigma_1pm * z * z * errors, 0.1)
+        nearest = np.where(nearest < eye.range_m, nearest, np.inf)
+        known = np.minimum(np.minimum(np.minimum(view.free_m, hidden), eye.range_m), nearest)
+        return FreeSpace(eye.bearing_tan, eye.half_width_tan, nearest, known)
+
+
+def mount_of(robot: Robot) -> CameraMount:
+    """Where the camera sits."""
+    mount = robot.camera_mount
+    return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)

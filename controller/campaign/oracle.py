@@ -1,0 +1,133 @@
+"""The shortest possible time of a robot that knows all motions in advance.
+
+Dynamic programming over (time, position, speed). The acceleration is one of -A, 0, +A for a step dt, so speeds
+are multiples of A dt and positions of A dt^2 / 2: a lattice on which every step is exact,
+
+    v' = v + a dt,    s' = s + v dt + a dt^2 / 2    ->    k' = k + i,    n' = n + 2 k + i,    i in {-1, 0, 1}
+
+and all positions of one speed are the bits of one integer: a step is a few shifts. The top speed is a multiple
+of A dt by the choice of dt. A standing robot that something walks into is not at fault, so only moving states
+are taken out where something stands.
+
+The time of the free way is computed exactly instead (s-curve, controller/braking.py); the lattice tells by how
+much what is in the way delays the arrival.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import braking
+from controller.campaign.stage import Stage
+from hal.types import FloatArray
+
+_LEVELS = 24
+_GRID_M = 0.01
+_NEVER = -1
+
+
+@dataclass(frozen=True, slots=True)
+class OracleTime:
+    """total_s: the shortest time to the target (inf: it cannot be reached within the horizon), of which
+    delay_s are for the sake of what is in the way."""
+
+    total_s: float
+    delay_s: float
+
+
+class Lattice:
+    """Steps of one top speed and acceleration. length_m is rounded to the lattice (about 5 mm)."""
+
+    def __init__(self, top_mps: float, accel_mps2: float, length_m: float) -> None:
+        self.dt_s = top_mps / (_LEVELS * accel_mps2)
+        self.speeds_mps = accel_mps2 * self.dt_s * np.arange(_LEVELS + 1)
+        self.step_m = 0.5 * accel_mps2 * self.dt_s**2
+        # From rest to rest the lattice makes even numbers of steps only.
+        self.end = 2 * round(0.5 * length_m / self.step_m)
+        self._whole = (1 << (self.end + 1)) - 1
+        self._allowed = [self._whole] * (_LEVELS + 1)
+
+    def limit(self, s_m: FloatArray, speed_mps: FloatArray) -> None:
+        """Take out states faster than speed_mps (N,) at s_m (N,), ascending."""
+        at = np.interp(np.arange(self.end + 1) * self.step_m, s_m, speed_mps)
+        for k, speed in enumerate(self.speeds_mps.tolist()):
+            self._allowed[k] = _bits(at >= speed - 1e-9)
+
+    def steps_to_end(self, blocked: list[list[tuple[float, float]]]) -> int:
+        """How many steps until it stands on the end; blocked: for each step. -1: not within them."""
+        states = [1] + [0] * _LEVELS
+        for number, stretches in enumerate(blocked):
+            if number:
+                states = self._step(states)
+            free = self._whole
+            for low_m, high_m in stretches:
+                low = max(math.ceil(low_m / self.step_m), 0)
+                high = min(math.floor(high_m / self.step_m), self.end)
+                if high >= low:
+                    free &= ~(((1 << (high - low + 1)) - 1) << low)
+            if free != self._whole:
+                states[1:] = [bits & free for bits in states[1:]]
+            if states[0] >> self.end & 1:
+                return number
+        return _NEVER
+
+    def _step(self, states: list[int]) -> list[int]:
+        following = []
+        for k, allowed in enumerate(self._allowed):
+            bits = states[k] << (2 * k)
+            if k > 0:
+                bits |= states[k - 1] << (2 * k - 1)
+            if k < _LEVELS:
+                bits |= states[k + 1] << (2 * k + 1)
+            following.append(bits & allowed)
+        return following
+
+
+def _bits(flags: NDArray[np.bool_]) -> int:
+    return int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")
+
+
+def free_time_s(s_m: FloatArray, speed_mps: FloatArray, accel_mps2: float, jerk_mps3: float) -> float:
+    """From rest at the first s to rest at the last one, nowhere faster than speed_mps.
+
+    Exact for the acceleration limit; the jerk limit adds A / J wherever the profile has one start, one
+    stop and reaches A, and the s-curve's own time where it does not.
+    """
+    v2 = np.minimum(speed_mps, math.inf) ** 2
+    v2[0] = v2[-1] = 0.0
+    rise = 2.0 * accel_mps2 * np.diff(s_m)
+    for k, step in enumerate(rise.tolist()):
+        v2[k + 1] = min(v2[k + 1], v2[k] + step)
+    for k in range(len(rise) - 1, -1, -1):
+        v2[k] = min(v2[k], v2[k + 1] + rise[k])
+    v = np.sqrt(v2)
+    trapezoid_s = float((2.0 * np.diff(s_m) / np.maximum(v[:-1] + v[1:], 1e-9)).sum())
+    peak = float(v.max())
+    jerk_s = braking.stop(peak, 0.0, braking.BrakeLimits(accel_mps2, jerk_mps3)).time_s - peak / accel_mps2
+    return trapezoid_s + jerk_s
+
+
+def solve(stage: Stage, top_mps: float, horizon_s: float) -> OracleTime:
+    """The oracle's time for a mission. top_mps: what the range of the camera admits."""
+    limits = stage.robot.limits
+    length = stage.path.length_m
+    s_m = np.linspace(0.0, length, max(2, math.ceil(length / _GRID_M) + 1))
+    speed = np.minimum(np.array([stage.path.speed_limit(s) for s in s_m[::10]]), top_mps)
+    speed = np.interp(s_m, s_m[::10], speed)
+    free_s = free_time_s(s_m, speed.copy(), limits.max_accel_mps2, limits.max_jerk_mps3)
+    lattice = Lattice(top_mps, limits.max_accel_mps2, length)
+    lattice.limit(s_m, speed)
+    times_s = np.arange(0.0, horizon_s, lattice.dt_s)
+    blocked = stage.blocked(times_s)
+    if not any(blocked):
+        return OracleTime(free_s, 0.0)
+    steps = lattice.steps_to_end(blocked)
+    if steps == _NEVER:
+        return OracleTime(math.inf, math.inf)
+    unhindered = lattice.steps_to_end([[] for _ in blocked])
+    delay_s = (steps - unhindered) * lattice.dt_s
+    return OracleTime(free_s + delay_s, delay_s)

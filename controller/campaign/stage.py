@@ -1,0 +1,114 @@
+"""One mission's world as the plane sees it, for everybody who needs the truth: camera model, judge, oracle."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.app import AppConfig, LockstepRunner
+from config.robot import Body, Robot
+from controller import braking
+from controller.path import Path
+from hal.types import FloatArray, PlanarPose
+from sim.families import Case
+from sim.planar import PlanarWorld, separation
+
+_TABLE_STEP_M = 0.02
+_SWEEP_STEP_M = 0.05
+
+
+class Stage:
+    """A case with its path and its robot. in_height (N,): bodies that the robot could touch."""
+
+    def __init__(self, case: Case, robot: Robot) -> None:
+        self.case, self.robot = case, robot
+        self.world = PlanarWorld(case.scenario, case.seed)
+        self.path = Path(case.scenario.path, robot)
+        low_m, high_m = self.world.z_m[:, 0], self.world.z_m[:, 1]
+        self.in_height: NDArray[np.bool_] = (low_m < robot.body.height_m) & (high_m > robot.body.clearance_m)
+        s_m = np.arange(0.0, self.path.length_m + 1.0, _TABLE_STEP_M)
+        self._table = [values.tolist() for values in self.path.poses(s_m)]
+
+    def pose(self, s_m: float, d_m: float = 0.0) -> PlanarPose:
+        """The path's pose at s_m, d_m to its left; from a table, 1 mm exact on a radius of 0.1 m."""
+        x, y, heading = self._table
+        place = min(max(s_m / _TABLE_STEP_M, 0.0), len(x) - 1.001)
+        k = int(place)
+        share = place - k
+        h = heading[k] + share * (heading[k + 1] - heading[k])
+        return PlanarPose(
+            x[k] + share * (x[k + 1] - x[k]) - d_m * float(np.sin(h)),
+            y[k] + share * (y[k + 1] - y[k]) + d_m * float(np.cos(h)),
+            h,
+        )
+
+    def robots(self, poses: FloatArray) -> FloatArray:
+        """The robot's rectangles (T, 4, 2) at poses (T, 3): x, y, heading."""
+        return rectangles(self.robot.body, poses)
+
+    def path_poses(self, s_m: FloatArray) -> FloatArray:
+        """(T, 3) poses of the path."""
+        return np.stack(self.path.poses(s_m), axis=1)
+
+    def blocked(self, times_s: FloatArray) -> list[list[tuple[float, float]]]:
+        """For each time, the stretches (from, to) of s at which the robot would touch something."""
+        stretches: list[list[tuple[float, float]]] = [[] for _ in times_s]
+        s_m = np.arange(0.0, self.path.length_m + _SWEEP_STEP_M, _SWEEP_STEP_M)
+        poses = self.path_poses(s_m)
+        robots = self.robots(poses)
+        body = self.robot.body
+        reach_m = float(np.hypot(max(body.front_m, body.rear_m), 0.5 * body.width_m))
+        for k in np.flatnonzero(self.in_height).tolist():
+            moves = bool(self.world.moves[k])
+            polygons = self.world.over(times_s if moves else times_s[:1], k)
+            middle = polygons.mean(axis=1)
+            radius = np.sqrt(((polygons - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
+            away = np.hypot(middle[:, None, 0] - poses[:, 0], middle[:, None, 1] - poses[:, 1])
+            when, where = np.nonzero(away < reach_m + radius[:, None])
+            if not len(when):
+                continue
+            touch = separation(robots[where], polygons[when]) <= 0.0
+            for t, (low, high) in _runs(when[touch], where[touch]):
+                stretch = (s_m[low] - 0.5 * _SWEEP_STEP_M, s_m[high] + 0.5 * _SWEEP_STEP_M)
+                for one in [stretches[t]] if moves else stretches:
+                    one.append(stretch)
+        return stretches
+
+
+def _runs(when: NDArray[np.intp], where: NDArray[np.intp]) -> list[tuple[int, tuple[int, int]]]:
+    """Runs of consecutive places for each time; both sorted by time, then place."""
+    if not len(when):
+        return []
+    breaks = np.flatnonzero((np.diff(when) != 0) | (np.diff(where) != 1)) + 1
+    firsts, lasts = np.append(0, breaks), np.append(breaks, len(when)) - 1
+    return [(int(when[a]), (int(where[a]), int(where[b]))) for a, b in zip(firsts, lasts, strict=True)]
+
+
+def rectangles(body: Body, poses: FloatArray) -> FloatArray:
+    """(T, 4, 2) counter-clockwise corners of a robot whose turning centre is at poses (T, 3)."""
+    x = np.array([body.front_m, body.front_m, -body.rear_m, -body.rear_m])
+    y = 0.5 * body.width_m * np.array([-1.0, 1.0, 1.0, -1.0])
+    cos, sin = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
+    return np.stack(
+        (poses[:, 0:1] + cos * x - sin * y, poses[:, 1:2] + sin * x + cos * y),
+        axis=2,
+    )
+
+
+def envelope_speed_mps(config: AppConfig) -> float:
+    """The top speed that the camera's range admits: what comes from beyond it at V_omax must find the robot
+    standing, with the hardest braking and the least latency that there is."""
+    robot, decision = config.robot, config.decision
+    sees_m = decision.sight.range_m + robot.camera_mount.forward_m - robot.body.front_m
+    limits = (
+        braking.emergency(robot.limits) if decision.emergency_caps_range else braking.comfort(robot.limits)
+    )
+    seen_s = config.runner.perception_latency_s if isinstance(config.runner, LockstepRunner) else 0.0
+    speed = braking.speed_for_distance(
+        sees_m,
+        limits,
+        latency_s=1.0 / config.runner.control_rate_hz + decision.chassis_delay_s + seen_s,
+        closing_mps=robot.limits.max_obstacle_speed_mps,
+        margin_m=decision.margins.least_m,
+    )
+    return min(speed, robot.limits.max_speed_mps)
