@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from sim.raster import Drawn, Float32Image, LabelImage
 
-# The bits of a difference of 8 or more grey levels in one of three channels.
-_VISIBLE_STEP = np.uint32(0x00F8F8F8)
+# The bits of a difference of 16 or more grey levels in one of three channels.
+_VISIBLE_STEP = np.uint32(0x00F0F0F0)
+_ON_EDGE = np.float32(1e-9)
+_NOT_APPROACHED = np.float32(1e-12)
 
 
 def smooth_edges(
@@ -53,23 +55,22 @@ def _blend(
     stride: int,
 ) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
     """New colours for the pixels that an edge cuts between here and the pixel stride further on."""
-    there = here + stride
-    flat_depth = inverse_depth.ravel()
-    behind = flat_depth[there] > flat_depth[here]
-    inside = np.where(behind, there, here)
-    label = labels.ravel()[inside]
-    v, u = np.divmod(inside.astype(np.int32), np.int32(labels.shape[1]))
-    slope = slopes[:, label] * np.where(behind, np.float32(-1.0), np.float32(1.0))
-    at_inside = lines[0][:, label] * u.astype(np.float32)
-    at_inside += lines[1][:, label] * v.astype(np.float32)
-    at_inside += lines[2][:, label]
-    crossing = (at_inside + slope < 0.0) & (slope < 0.0)
-    reaches = np.where(crossing, at_inside / np.where(crossing, -slope, 1.0), 2.0)
+    depth = inverse_depth.reshape(-1)
+    behind = depth[here + stride] > depth[here]
+    inside = here + stride * behind
+    label = labels.reshape(-1)[inside]
+    row, column = np.divmod(inside.astype(np.int32), np.int32(labels.shape[1]))
+    towards = np.take(slopes, label, axis=1) * (np.float32(1.0) - 2.0 * behind.astype(np.float32))
+    at_inside = np.take(lines[0], label, axis=1) * column.astype(np.float32)
+    at_inside += np.take(lines[1], label, axis=1) * row.astype(np.float32)
+    at_inside += np.take(lines[2], label, axis=1)
+    # In float32 a centre right on an edge may come out a little outside: it is kept inside. An edge that is
+    # not approached at all is met infinitely far away.
+    reaches = np.maximum(at_inside, _ON_EDGE) / np.maximum(-towards, _NOT_APPROACHED)
     reach = np.minimum(np.minimum(reaches[0], reaches[1]), np.minimum(reaches[2], reaches[3]))
-    # In float32 a centre right on the edge may come out a little outside.
-    found = np.flatnonzero((reach >= -0.01) & (reach <= 1.0))
+    found = np.flatnonzero(reach <= 1.0)
     inside, reach = inside[found], reach[found]
-    outside = inside + np.where(behind[found], -stride, stride)
+    outside = inside + (stride - 2 * stride * behind[found])
     # The edge lies reach pixels beyond the inner pixel's centre: it cuts that pixel or the next one.
     cuts_inner = reach < 0.5
     pixel = np.where(cuts_inner, inside, outside)

@@ -18,7 +18,7 @@ from sim.spans import NEAR_M, Spans, convert, edge_planes
 from sim.world import Geometry
 
 # Faces whose rectangle has fewer pixels than this are drawn all at once.
-SMALL_PX = 700
+SMALL_PX = 1000
 
 Float32Image = NDArray[np.float32]
 LabelImage = NDArray[np.uint16]

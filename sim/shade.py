@@ -103,7 +103,7 @@ class Painter:
         u, v = _place_at(to_uv, bounds, pixel, index, labels.shape[1])
         texels = _interpolate(self._pool.texels, places, index, u, v)
         values = np.minimum(texels * gains[numbers].astype(np.float32)[index, None] + 0.5, 255.0)
-        self.colour.reshape(-1, 4)[pixel] = values.astype(np.uint8)
+        self.colour.reshape(-1).view(np.uint32)[pixel] = values.astype(np.uint8).view(np.uint32)[:, 0]
 
     def _visible(self, labels: LabelImage, drawn: Drawn) -> tuple[list[int], list[Rectangle]]:
         """The faces that show, and rectangles around what shows of them."""
@@ -165,7 +165,8 @@ def _place_at(
     row, column = np.divmod(pixel.astype(np.int32), np.int32(width))
     du = (column - bounds[:, 0].astype(np.int32)[index]).astype(np.float32)
     dv = (row - bounds[:, 1].astype(np.int32)[index]).astype(np.float32)
-    x, y, w = (table[k][index] * du + table[k + 1][index] * dv + table[k + 2][index] for k in (0, 3, 6))
+    terms = np.take(table, index, axis=1)
+    x, y, w = (terms[k] * du + terms[k + 1] * dv + terms[k + 2] for k in (0, 3, 6))
     u, v = x / w, y / w
     u -= np.floor(u)
     v -= np.floor(v)
@@ -173,7 +174,7 @@ def _place_at(
 
 
 def _interpolate(
-    texels: NDArray[np.uint8],
+    texels: NDArray[np.uint32],
     places: NDArray[np.intp],
     index: NDArray[np.intp],
     u: NDArray[np.float32],
@@ -187,15 +188,17 @@ def _interpolate(
     right_share, lower_share = (x - left)[:, None], (y - top)[:, None]
     stride = width[index]
     at = begin[index] + top * stride + left
-    upper = _mix(texels[at], texels[at + 1], right_share)
-    lower = _mix(texels[at + stride], texels[at + stride + 1], right_share)
+    upper = _mix(texels, at, right_share)
+    lower = _mix(texels, at + stride, right_share)
     samples: NDArray[np.float32] = upper + (lower - upper) * lower_share
     return samples
 
 
-def _mix(a: NDArray[np.uint8], b: NDArray[np.uint8], share: NDArray[np.float32]) -> NDArray[np.float32]:
-    first = a.astype(np.float32)
-    mixed: NDArray[np.float32] = first + (b.astype(np.float32) - first) * share
+def _mix(texels: NDArray[np.uint32], at: NDArray[np.intp], share: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Between the texels at and at + 1, channel by channel (P, 4)."""
+    here = texels[at].view(np.uint8).reshape(-1, 4).astype(np.float32)
+    after = texels[at + 1].view(np.uint8).reshape(-1, 4).astype(np.float32)
+    mixed: NDArray[np.float32] = here + (after - here) * share
     return mixed
 
 

@@ -110,7 +110,8 @@ class TexelPool:
         self._textures = textures
         self._places: dict[tuple[str, int, int], tuple[int, int, int]] = {}
         self._used = 0
-        self.texels: NDArray[np.uint8] = np.zeros((1 << 16, 4), np.uint8)
+        # Four channels in one number: gathering those is many times faster than gathering rows of four.
+        self.texels: NDArray[np.uint32] = np.zeros(1 << 16, np.uint32)
 
     def place(self, key: str, step_u: int, step_v: int) -> tuple[int, int, int]:
         """Where a sheet begins in texels, and its width and height with the rim."""
@@ -124,8 +125,8 @@ class TexelPool:
         height, width = image.shape[:2]
         begin, self._used = self._used, self._used + height * width
         if self._used > len(self.texels):
-            grown = np.zeros((2 * self._used, 4), np.uint8)
+            grown = np.zeros(2 * self._used, np.uint32)
             grown[:begin] = self.texels[:begin]
             self.texels = grown
-        self.texels[begin : self._used] = image.reshape(-1, 4)
+        self.texels[begin : self._used] = np.ascontiguousarray(image).view(np.uint32).reshape(-1)
         return begin, width, height
