@@ -1,0 +1,83 @@
+import dataclasses
+import math
+from collections.abc import Iterator
+
+import pytest
+
+from controller.channel import Channel, PeerGone, channel_sockets
+from controller.control import ControlStep
+from controller.perception_process import RemoteBody
+from hal.types import CameraMount, PlanarPose
+from tests.support.drives import control_step
+from tests.support.scenes import chassis_state
+
+MS = 1_000_000
+MOUNT = CameraMount(0.45, 0.0, 0.6, 0.0)
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[RemoteBody, Channel]]:
+    here, there = channel_sockets()
+    with here, there:
+        yield RemoteBody(Channel(here), MOUNT), Channel(there)
+
+
+def step_at(now_ms: int, x_m: float, v_mps: float) -> ControlStep:
+    """The robot at x_m on the path, 10 m further by its odometry."""
+    state = chassis_state(now_ms * MS, v_mps=v_mps, pose=PlanarPose(x_m + 10.0, 0.0, 0.0))
+    step = control_step(now_ms * MS, None)
+    return dataclasses.replace(step, pose=PlanarPose(x_m, 0.0, 0.0), chassis=state)
+
+
+def test_before_the_first_step_nothing_is_known(ends: tuple[RemoteBody, Channel]) -> None:
+    body, _ = ends
+    assert body.body_pose(0) is None
+    assert body.camera_pose(0) is None
+
+
+def test_between_two_steps_the_pose_is_interpolated(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, 1.0))
+    control.send(step_at(20, 1.02, 1.0))
+    pose = body.body_pose(10 * MS)
+    assert pose is not None
+    assert pose.x_m == pytest.approx(1.01)
+
+
+def test_after_the_newest_step_it_is_carried_on_with_the_twist(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, 1.5))
+    pose = body.body_pose(100 * MS)
+    assert pose is not None
+    assert pose.x_m == pytest.approx(1.15)
+    camera = body.camera_pose(100 * MS)
+    assert camera is not None
+    assert camera.translation_m == pytest.approx([11.0 + 0.15 + 0.45, 0.0, 0.6])
+
+
+def test_but_not_for_ever(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, 1.5))
+    assert body.body_pose(251 * MS) is None
+    assert body.camera_pose(251 * MS) is None
+
+
+def test_a_twist_that_is_not_known_is_not_taken_as_standing(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, math.nan))
+    assert body.body_pose(10 * MS) is None
+
+
+def test_every_step_is_handed_on_once(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, 1.0))
+    control.send(step_at(20, 1.0, 1.0))
+    assert [step.now_ns // MS for step in body.take_steps()] == [0, 20]
+    assert body.take_steps() == []
+
+
+def test_a_control_process_that_is_gone_is_noticed(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.close()
+    with pytest.raises(PeerGone):
+        body.listen()
