@@ -40,6 +40,7 @@ class DepthSensor:
         shape = (intrinsics.height, intrinsics.width)
         self._shape = shape
         self._disparity_px_m = intrinsics.fx * _BASELINE_M
+        self._widest_px = min(self._disparity_px_m / config.depth_min_m, shape[1] - 1)
         generator = np.random.default_rng((seed, 101))
         padded = (shape[0] + _MARGIN_PX, shape[1] + _MARGIN_PX)
         # Two independent halves per frame, one shared with the next: neighbours in time correlate by 1/2.
@@ -49,6 +50,7 @@ class DepthSensor:
         self._holes = _hole_field(generator, padded, config.hole_ratio)
         self._columns = np.arange(shape[1], dtype=np.float32)[None, :]
         self._noisy: Float32Image = np.empty(shape, np.float32)
+        self._windows = np.empty(shape, np.float32), np.empty(shape, np.float32)
 
     def measure(self, inverse_depth: Float32Image, frame: int) -> DepthImage:
         """The depth image (H, W) uint16 in millimetres, 0 where nothing was measured.
@@ -77,8 +79,14 @@ class DepthSensor:
         """What the left infrared camera sees and the right one does not (H, W): the band of background
         to the left of every nearer thing, as wide as the difference of their disparities."""
         seen_at = self._columns - np.float32(self._disparity_px_m) * inverse_depth
-        nearest_right = np.minimum.accumulate(seen_at[:, ::-1], axis=1)[:, ::-1]
-        return seen_at > nearest_right + _TOLERATED_SHIFT_PX
+        # The smallest of all to the right, as far as a shadow can reach: windows that double.
+        nearest, reach = seen_at, 1
+        wider, spare = self._windows
+        while reach <= self._widest_px:
+            cv2.min(nearest[:, :-reach], nearest[:, reach:], dst=wider[:, :-reach])
+            wider[:, -reach:] = nearest[:, -reach:]
+            nearest, wider, spare, reach = wider, spare, wider, 2 * reach
+        return seen_at > nearest + np.float32(_TOLERATED_SHIFT_PX)
 
     def _cut(self, field: NDArray[np.generic], frame: int, stream: int) -> NDArray[np.generic]:
         """The field at a shift drawn for this frame."""

@@ -107,3 +107,15 @@ def test_same_seed_and_frame_give_the_same_bytes() -> None:
     assert one.measure(wall(2.0), 7).tobytes() == two.measure(wall(2.0), 7).tobytes()
     assert one.measure(wall(2.0), 7).tobytes() != other.measure(wall(2.0), 7).tobytes()
     assert one.measure(wall(2.0), 7).tobytes() != one.measure(wall(2.0), 8).tobytes()
+
+
+def test_shadows_are_those_of_the_nearest_thing_anywhere_to_the_right() -> None:
+    generator = np.random.default_rng(4)
+    inverse = np.full((K.height, K.width), 0.15, np.float32)
+    for _ in range(30):
+        u, v, wide, tall = generator.integers(0, (300, 220, 60, 60)).tolist()
+        inverse[v : v + tall, u : u + wide] = generator.uniform(0.2, 3.2)
+    seen_at = np.arange(K.width) - np.float32(305.0 * 0.05) * inverse
+    right_of = np.minimum.accumulate(seen_at[:, ::-1], axis=1)[:, ::-1]
+    config = CLEAN.model_copy(update={"depth_edges": True})
+    assert np.array_equal(DepthSensor(config, K, seed=3).shadows(inverse), seen_at > right_of + 1.0)

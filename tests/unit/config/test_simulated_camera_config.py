@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from config.camera import SimulatedCameraConfig
+
+
+def test_the_default_is_like_a_d435i() -> None:
+    config = SimulatedCameraConfig()
+    assert (config.width, config.height, config.fps) == (640, 480, 30.0)
+    assert (config.depth_min_m, config.depth_max_m) == (0.3, 10.0)
+    assert config.depth_noise == "realsense"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("depth_max_m", 0.2, "smaller than depth_max_m"),
+        ("depth_noise", "laser", "depth_noise"),
+        ("fps", 0.0, "greater than 0"),
+        ("hole_ratio", 0.9, "less than or equal"),
+        ("zoom", 2.0, "extra"),
+    ],
+)
+def test_what_cannot_be_is_refused(key: str, value: object, says: str) -> None:
+    with pytest.raises(ValidationError, match=says):
+        SimulatedCameraConfig.model_validate({key: value})
