@@ -198,6 +198,5 @@ def _measures_speed(one: MethodSummary) -> bool:
 def _round_up(value: float) -> float:
     """To a number that leaves some room above."""
     power = 10.0 ** math.floor(math.log10(value))
-    return next(
-        step * power for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0, 15.0) if step * power >= 1.05 * value
-    )
+    steps = (1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0, 15.0)
+    return next(step * power for step in steps if step * power >= 1.05 * value)

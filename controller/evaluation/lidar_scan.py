@@ -81,7 +81,7 @@ def _outline(body: BodyState) -> FloatArray:
     if body.kind != "person":
         return body.footprint_m
     middle = body.footprint_m.mean(axis=0)
-    return middle + _LEGS * (body.footprint_m - middle)
+    return np.asarray(middle + _LEGS * (body.footprint_m - middle))
 
 
 def cast(origin: FloatArray, angles_rad: FloatArray, segments: FloatArray) -> FloatArray:
