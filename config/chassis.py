@@ -119,7 +119,44 @@ class RoboclawChassisConfig(Section):
         return -1 if self.invert_right else 1
 
 
-ChassisConfig = Annotated[AgilexChassisConfig | RoboclawChassisConfig, Field(discriminator="kind")]
+class RoboteqChassisConfig(Section):
+    """A base with one two-channel Roboteq controller in closed-loop speed mode, channel 1 left, 2 right.
+
+    full_speed_mps: what a track makes at command 1000, which is MXRPM through gear and sprocket. encoder:
+    what the controller counts, a quadrature encoder (?C) or the motor's hall sensors (?CB). counts_per_m,
+    slip_factor: as for RoboClaw. watchdog_ms: after so long without a command the controller itself stops
+    the motors (RWD); set and read back before arming.
+    """
+
+    kind: Literal["roboteq"]
+    link: SerialLinkConfig
+    full_speed_mps: float = Field(gt=0, le=10)
+    counts_per_m: float = Field(gt=0, le=1e7)
+    encoder: Literal["quadrature", "hall"] = "quadrature"
+    track_width_m: float = Field(gt=0.05, le=5)
+    slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
+    watchdog_ms: int = Field(default=300, ge=100, le=2000)
+    invert_left: bool = False
+    invert_right: bool = False
+    command_period_ms: int = Field(default=20, ge=10, le=100)
+    command_timeout_ms: int = Field(default=200, ge=40, le=1000)
+    feedback_timeout_ms: int = Field(default=300, ge=100, le=2000)
+    status_timeout_ms: int = Field(default=1000, ge=200, le=5000)
+    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
+
+    @property
+    def left_sign(self) -> int:
+        """Direction of channel 1 that means ahead."""
+        return -1 if self.invert_left else 1
+
+    @property
+    def right_sign(self) -> int:
+        """Direction of channel 2 that means ahead."""
+        return -1 if self.invert_right else 1
+
+
+SerialChassisConfig = RoboclawChassisConfig | RoboteqChassisConfig
+ChassisConfig = Annotated[AgilexChassisConfig | SerialChassisConfig, Field(discriminator="kind")]
 
 
 class PlantConfig(Section):

@@ -14,7 +14,12 @@ import cv2
 
 from config.app import AppConfig, ReplayConfig, SimulationConfig
 from config.camera import OdometryChoice, RealsenseCameraConfig, ReplayCameraConfig, SimulatedCameraConfig
-from config.chassis import AgilexChassisConfig, RoboclawChassisConfig
+from config.chassis import (
+    AgilexChassisConfig,
+    RoboclawChassisConfig,
+    RoboteqChassisConfig,
+    SerialChassisConfig,
+)
 from config.loader import resolve
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
@@ -27,12 +32,13 @@ from controller.path import Path
 from controller.perceive import Perceiver
 from controller.recorder import Surroundings
 from controller.shape import SpeedShaper
-from hal.api import Chassis, Clock, FrameSource, OdometrySource
+from hal.api import Chassis, Clock, FrameSource, OdometrySource, SerialLink
 from hal.cameras.pose_file import PoseFile, open_odometry
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
 from hal.chassis.agilex import AgilexChassis
 from hal.chassis.roboclaw import RoboclawChassis
+from hal.chassis.roboteq import RoboteqChassis
 from hal.links.can_bus import CanBusLink
 from hal.links.scripted import serial_pair
 from hal.links.serial_port import SerialPortLink
@@ -41,6 +47,7 @@ from sim.agilex_emulator import AgilexEmulator
 from sim.camera import SimulatedCamera
 from sim.plant import TrackedPlant
 from sim.roboclaw_emulator import RoboclawEmulator
+from sim.roboteq_emulator import RoboteqEmulator
 from sim.simulation import Emulator, Referee, Simulation
 from sim.world import World
 from vision.perception import Perception
@@ -174,17 +181,36 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
     plant = None
     if simulation is not None and emulated:
         plant = TrackedPlant(simulation.plant, start, start_ns)
-    match config.chassis:
-        case AgilexChassisConfig() as chassis:
-            driver = AgilexChassis(CanBusLink(chassis.link), chassis)
-            return driver, None if plant is None else AgilexEmulator(CanBusLink(chassis.link), plant)
-        case RoboclawChassisConfig() as chassis:
-            if plant is None:
-                return RoboclawChassis(SerialPortLink(chassis.link), chassis), None
-            # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
-            here, there = serial_pair()
-            base = RoboclawEmulator(there, plant, counts_per_m=chassis.counts_per_m, address=chassis.address)
-            return RoboclawChassis(here, chassis), base
+    if isinstance(config.chassis, AgilexChassisConfig):
+        link = config.chassis.link
+        driver = AgilexChassis(CanBusLink(link), config.chassis)
+        return driver, None if plant is None else AgilexEmulator(CanBusLink(link), plant)
+    if plant is None:
+        return _serial_driver(config.chassis, SerialPortLink(config.chassis.link)), None
+    # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
+    here, there = serial_pair()
+    return _serial_driver(config.chassis, here), build_serial_emulator(config.chassis, there, plant)
+
+
+def _serial_driver(config: SerialChassisConfig, link: SerialLink) -> Chassis:
+    match config:
+        case RoboclawChassisConfig():
+            return RoboclawChassis(link, config)
+        case RoboteqChassisConfig():
+            return RoboteqChassis(link, config)
+        case unknown:
+            assert_never(unknown)
+
+
+def build_serial_emulator(config: SerialChassisConfig, link: SerialLink, plant: TrackedPlant) -> Emulator:
+    """The base that this driver's configuration expects, at the other end of a serial line."""
+    match config:
+        case RoboclawChassisConfig():
+            return RoboclawEmulator(link, plant, counts_per_m=config.counts_per_m, address=config.address)
+        case RoboteqChassisConfig():
+            return RoboteqEmulator(
+                link, plant, full_speed_mps=config.full_speed_mps, counts_per_m=config.counts_per_m
+            )
         case unknown:
             assert_never(unknown)
 

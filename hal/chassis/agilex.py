@@ -19,7 +19,7 @@ from hal.chassis.agilex_messages import (
 )
 from hal.chassis.agilex_models import model_of
 from hal.chassis.arming import NS_PER_MS, ArmingLimits
-from hal.chassis.command import CommandLimits, is_zero, zero
+from hal.chassis.command import CommandLimits, due, is_zero, zero
 from hal.chassis.driver import ChassisDriver
 from hal.types import ChassisMode, Setpoint
 
@@ -28,9 +28,6 @@ _MAX_FRAMES = 256
 
 # Motor speeds and currents, 100 frames a second: nothing here depends on them.
 _NOT_NEEDED = frozenset(range(0x251, 0x251 + ACTUATORS))
-
-# A due time may be early by a quarter of the period: a loop with jitter would else miss every other one.
-_EARLY = 0.75
 
 # How often 0x421 is repeated while the base has not followed it.
 _MODE_RETRY_NS = 40 * NS_PER_MS
@@ -80,14 +77,13 @@ class AgilexChassis(ChassisDriver):
             self._feedback.update(messages, now_ns)
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
-        due = _due(self._motion_sent_ns, self._period_ns, now_ns)
-        stops = self._moving and is_zero(command)
-        if due or stops:
+        goes_out = due(self._motion_sent_ns, self._period_ns, now_ns) or (self._moving and is_zero(command))
+        if goes_out:
             self._send_motion(command, now_ns)
         mode = self._mode_to_send(now_ns)
         if mode is not None:
             self._send_mode(mode, now_ns)
-        return command if due or stops else None
+        return command if goes_out else None
 
     def _speak_stop(self, now_ns: int) -> None:
         self._send_motion(zero(now_ns), now_ns)
@@ -102,10 +98,10 @@ class AgilexChassis(ChassisDriver):
         mode = self._arming.mode
         if mode is ChassisMode.ARMED:
             period_ms = self._model.mode_period_ms
-            if period_ms is not None and _due(self._mode_sent_ns, period_ms * NS_PER_MS, now_ns):
+            if period_ms is not None and due(self._mode_sent_ns, period_ms * NS_PER_MS, now_ns):
                 return self._model.mode_can
             return None
-        if not _due(self._mode_sent_ns, _MODE_RETRY_NS, now_ns):
+        if not due(self._mode_sent_ns, _MODE_RETRY_NS, now_ns):
             return None
         if mode is ChassisMode.ARMING:
             return self._model.mode_can
@@ -121,7 +117,3 @@ class AgilexChassis(ChassisDriver):
     def _send_mode(self, mode: int, now_ns: int) -> None:
         self._link.send(encode(ControlModeCommand(mode)))
         self._mode_sent_ns = now_ns
-
-
-def _due(last_ns: int | None, period_ns: int, now_ns: int) -> bool:
-    return last_ns is None or not 0 <= now_ns - last_ns < _EARLY * period_ns

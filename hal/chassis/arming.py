@@ -37,7 +37,8 @@ class Evidence:
     newest status arrived (None: never). disobeys: why the base does not take our commands, as that
     status tells ("" when it takes them). stop_cause: why the robot must not move ("" for none).
     standing: measured speed is zero; False when unknown. command_is_zero: what is asked at this step.
-    silence: while no status was ever heard, what came instead and what to check.
+    silence: while no status was ever heard, what came instead and what to check. resettable: stop_cause is
+    one that the base keeps until arming resets it, so it stands in the way of being armed, not of arming.
     """
 
     now_ns: int
@@ -49,6 +50,7 @@ class Evidence:
     standing: bool
     command_is_zero: bool
     silence: str = ""
+    resettable: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,7 @@ def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
         return replace(state, cleared=not loss and not seen.stop_cause)
     if loss:
         return Arming(ChassisMode.LOST, loss, seen.now_ns)
-    if seen.stop_cause:
+    if seen.stop_cause and not (state.mode is ChassisMode.ARMING and seen.resettable):
         return Arming(ChassisMode.ESTOP, seen.stop_cause, seen.now_ns)
     if state.mode is ChassisMode.ARMING:
         return _arming(state, seen, limits)
@@ -128,6 +130,8 @@ def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
         waiting = "no status heard from the base"
     elif seen.feedback_ns is None or seen.feedback_ns <= state.since_ns:
         waiting = "no motion feedback heard from the base"
+    elif seen.stop_cause:
+        waiting = seen.stop_cause
     elif seen.disobeys:
         waiting = f"the base does not take commands: {seen.disobeys}"
     elif not seen.command_is_zero:
@@ -155,7 +159,7 @@ def _armed(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
 def _refusal(state: Arming, seen: Evidence, limits: ArmingLimits) -> str:
     if state.mode is ChassisMode.STOPPING:
         return "still stopping"
-    if problem := _loss(seen, limits) or seen.stop_cause:
+    if problem := _loss(seen, limits) or ("" if seen.resettable else seen.stop_cause):
         return problem
     if not seen.command_is_zero:
         return "the command is not zero"

@@ -10,6 +10,9 @@ from hal.types import Setpoint
 
 NS_PER_MS = 1_000_000
 
+# A due time may be early by a quarter of the period: a loop with jitter would else miss every other one.
+_EARLY = 0.75
+
 
 def is_zero(setpoint: Setpoint | None) -> bool:
     """True where no motion is asked for. NaN is not zero."""
@@ -19,6 +22,11 @@ def is_zero(setpoint: Setpoint | None) -> bool:
 def zero(now_ns: int) -> Setpoint:
     """The explicit zero."""
     return Setpoint(now_ns, 0.0, 0.0, 0.0)
+
+
+def due(last_ns: int | None, period_ns: int, now_ns: int) -> bool:
+    """What is sent every period_ns, last at last_ns (None: never), is to be sent now."""
+    return last_ns is None or not 0 <= now_ns - last_ns < _EARLY * period_ns
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,6 +132,10 @@ class ChassisDriver(ABC):
     def _begin_arming(self) -> None:
         """arm() was followed: forget what the base said about obeying before."""
 
+    def _resettable(self) -> bool:
+        """The base keeps its stop cause until arming resets it."""
+        return False
+
     def _hear(self, now_ns: int) -> None:
         if self._link_error and now_ns < self._retry_ns:
             return
@@ -169,6 +173,7 @@ class ChassisDriver(ABC):
             standing=told.standing,
             command_is_zero=is_zero(self._asked),
             silence="" if told.status_ns is not None else told.silence,
+            resettable=self._resettable(),
         )
 
     def _state(self, now_ns: int, sent: Setpoint | None) -> ChassisState:

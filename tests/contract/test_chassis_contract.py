@@ -12,7 +12,15 @@ import pytest
 from hal.errors import HalError
 from hal.links.can_bus import open_can_link
 from hal.types import ChassisMode, ChassisState
-from tests.support.chassis_rig import MS, Rig, agilex_rig, can_link_config, roboclaw_rig, udp_link_config
+from tests.support.chassis_rig import (
+    MS,
+    Rig,
+    agilex_rig,
+    can_link_config,
+    roboclaw_rig,
+    roboteq_rig,
+    udp_link_config,
+)
 
 
 def _open(name: str) -> AbstractContextManager[Rig]:
@@ -34,6 +42,10 @@ def _open(name: str) -> AbstractContextManager[Rig]:
             return roboclaw_rig("scripted", status_bytes=2)
         case "roboclaw-pty":
             return roboclaw_rig("pty")
+        case "roboteq-scripted":
+            return roboteq_rig("scripted")
+        case "roboteq-pty":
+            return roboteq_rig("pty")
     raise ValueError(name)
 
 
@@ -45,6 +57,8 @@ def _open(name: str) -> AbstractContextManager[Rig]:
         "roboclaw-scripted",
         "roboclaw-old-firmware",
         "roboclaw-pty",
+        "roboteq-scripted",
+        "roboteq-pty",
     ]
 )
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:

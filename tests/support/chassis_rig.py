@@ -18,11 +18,13 @@ from config.chassis import (
     CanLinkConfig,
     PlantConfig,
     RoboclawChassisConfig,
+    RoboteqChassisConfig,
     SerialLinkConfig,
 )
 from hal.api import CanLink, Chassis, SerialLink
 from hal.chassis.agilex import AgilexChassis
 from hal.chassis.roboclaw import RoboclawChassis
+from hal.chassis.roboteq import RoboteqChassis
 from hal.errors import LinkLost
 from hal.links.can_bus import CanBusLink
 from hal.links.pseudo_terminal import PseudoTerminal
@@ -32,6 +34,7 @@ from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
 from sim.agilex_emulator import AgilexEmulator
 from sim.plant import TrackedPlant
 from sim.roboclaw_emulator import RoboclawEmulator
+from sim.roboteq_emulator import RoboteqEmulator
 
 MS = 1_000_000
 PERIOD_NS = 20 * MS
@@ -253,6 +256,19 @@ def roboclaw_config(**changes: object) -> RoboclawChassisConfig:
     return RoboclawChassisConfig.model_validate(values | changes)
 
 
+def roboteq_config(**changes: object) -> RoboteqChassisConfig:
+    """A base with the plant's tracks."""
+    values: dict[str, object] = {
+        "kind": "roboteq",
+        "link": SerialLinkConfig(url="loop://"),
+        "full_speed_mps": 1.0,
+        "counts_per_m": COUNTS_PER_M,
+        "track_width_m": PLANT.track_width_m,
+        "slip_factor": SLIP_FACTOR,
+    }
+    return RoboteqChassisConfig.model_validate(values | changes)
+
+
 @contextmanager
 def agilex_rig(kind: str, link: CanLinkConfig | None = None) -> Iterator[Rig]:
     """kind: "scripted", or "bus" for two python-can buses on link."""
@@ -267,15 +283,20 @@ def agilex_rig(kind: str, link: CanLinkConfig | None = None) -> Iterator[Rig]:
         yield Rig(chassis, emulator, plug, own_timeout_s=0.5)
 
 
+def serial_ends(kind: str) -> tuple[SerialLink, SerialLink]:
+    """Driver's end, emulator's end; kind: "scripted", or "pty" for pyserial on a pseudo-terminal."""
+    if kind == "scripted":
+        return serial_pair()
+    terminal = SettledTerminal()
+    return SettledPort(SerialLinkConfig(url=terminal.path, baud=38_400), terminal), terminal
+
+
 @contextmanager
 def roboclaw_rig(kind: str, status_bytes: int = 4) -> Iterator[Rig]:
-    """kind: "scripted", or "pty" for pyserial on a pseudo-terminal."""
+    """kind: as of serial_ends."""
     config = roboclaw_config()
     with ExitStack() as stack:
-        ends: tuple[SerialLink, SerialLink] = serial_pair()
-        if kind == "pty":
-            terminal = SettledTerminal()
-            ends = SettledPort(SerialLinkConfig(url=terminal.path, baud=38_400), terminal), terminal
+        ends = serial_ends(kind)
         plug = PluggedSerial(ends[0])
         plant = TrackedPlant(PLANT)
         emulator = stack.enter_context(
@@ -283,3 +304,22 @@ def roboclaw_rig(kind: str, status_bytes: int = 4) -> Iterator[Rig]:
         )
         chassis = stack.enter_context(RoboclawChassis(plug, config))
         yield Rig(chassis, emulator, plug, own_timeout_s=config.timeout_ms / 1000)
+
+
+@contextmanager
+def roboteq_rig(kind: str) -> Iterator[Rig]:
+    """kind: as of serial_ends."""
+    config = roboteq_config()
+    with ExitStack() as stack:
+        ends = serial_ends(kind)
+        plug = PluggedSerial(ends[0])
+        emulator = stack.enter_context(
+            RoboteqEmulator(
+                ends[1],
+                TrackedPlant(PLANT),
+                full_speed_mps=config.full_speed_mps,
+                counts_per_m=COUNTS_PER_M,
+            )
+        )
+        chassis = stack.enter_context(RoboteqChassis(plug, config))
+        yield Rig(chassis, emulator, plug, own_timeout_s=config.watchdog_ms / 1000)

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from config.chassis import AgilexChassisConfig, ChassisConfig, RoboclawChassisConfig
-from config.loader import ConfigError, Section, load
+from config.app import load_app
+from config.chassis import AgilexChassisConfig, ChassisConfig, RoboclawChassisConfig, RoboteqChassisConfig
+from config.loader import CONFIG_DIR, ConfigError, Section, load
 
 
 class Holder(Section):
@@ -20,8 +21,13 @@ ROBOCLAW = (
     "max_qpps: 20000, accel_qpps2: 20000}"
 )
 
+ROBOTEQ = (
+    "chassis: {kind: roboteq, link: {url: /dev/ttyACM0}, full_speed_mps: 1.5, counts_per_m: 9000.0, "
+    "track_width_m: 0.5}"
+)
 
-def read(tmp_path: Path, text: str) -> AgilexChassisConfig | RoboclawChassisConfig:
+
+def read(tmp_path: Path, text: str) -> ChassisConfig:
     path = tmp_path / "robot.yaml"
     path.write_text(text)
     return load(path, Holder).chassis
@@ -34,6 +40,9 @@ def test_kind_chooses_the_driver(tmp_path: Path) -> None:
     roboclaw = read(tmp_path, ROBOCLAW)
     assert isinstance(roboclaw, RoboclawChassisConfig)
     assert (roboclaw.address, roboclaw.timeout_ms, roboclaw.link.baud) == (0x80, 300, 115_200)
+    roboteq = read(tmp_path, ROBOTEQ)
+    assert isinstance(roboteq, RoboteqChassisConfig)
+    assert (roboteq.encoder, roboteq.watchdog_ms, roboteq.left_sign) == ("quadrature", 300, 1)
 
 
 @pytest.mark.parametrize(
@@ -65,6 +74,9 @@ def test_kind_chooses_the_driver(tmp_path: Path) -> None:
         (ROBOCLAW.replace("accel_qpps2: 20000", "accel_qpps2: 1, timeout_ms: 250"), "multiple of 100"),
         (ROBOCLAW.replace("accel_qpps2: 20000", "accel_qpps2: 1, address: 1"), "address"),
         (ROBOCLAW.replace(", max_qpps: 20000", ""), "max_qpps: missing key"),
+        (ROBOTEQ.replace("1.5", "0.0"), "full_speed_mps"),
+        (ROBOTEQ.replace("0.5}", "0.5, watchdog_ms: 0}"), "watchdog_ms"),
+        (ROBOTEQ.replace("0.5}", "0.5, encoder: halls}"), "encoder"),
     ],
 )
 def test_mistakes_are_named_in_one_line(tmp_path: Path, text: str, words: str) -> None:
@@ -86,3 +98,8 @@ def test_mirrored_motors(tmp_path: Path) -> None:
     chassis = read(tmp_path, text)
     assert isinstance(chassis, RoboclawChassisConfig)
     assert (chassis.left_sign, chassis.right_sign) == (1, -1)
+
+
+@pytest.mark.parametrize("path", sorted(CONFIG_DIR.glob("robot-*.yaml")), ids=lambda path: path.stem)
+def test_the_files_to_start_from_are_right(path: Path) -> None:
+    assert load_app(path).simulation is None

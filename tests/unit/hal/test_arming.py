@@ -40,6 +40,21 @@ def armed() -> Arming:
     return step(state, at(40), LIMITS)
 
 
+def test_a_stop_that_arming_resets_stands_in_the_way_of_being_armed_not_of_arming() -> None:
+    state = step(armed(), at(60, stop_cause="button"), LIMITS)
+    assert (state.mode, state.cleared) == (ChassisMode.ESTOP, False)
+    assert consent(state, at(80, stop_cause="button"), LIMITS).mode is ChassisMode.ESTOP
+    held = {"stop_cause": "button", "resettable": True}
+    state = consent(state, at(80, **held), LIMITS)
+    assert state.mode is ChassisMode.ARMING
+    state = step(state, at(100, **held), LIMITS)
+    assert (state.mode, state.reason) == (ChassisMode.ARMING, "arming: button")
+    assert step(state, at(120), LIMITS).mode is ChassisMode.ARMED
+    state = step(state, at(2200, **held), LIMITS)
+    assert (state.mode, state.reason) == (ChassisMode.STANDBY, "arming gave up after 2.1 s: button")
+    assert step(state, at(2220, **held), LIMITS).mode is ChassisMode.ESTOP
+
+
 def test_starts_in_standby_and_stays_there_whatever_the_base_says() -> None:
     state = Arming()
     for now_ms in range(0, 1000, 20):

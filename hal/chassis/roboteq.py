@@ -1,0 +1,162 @@
+"""A tracked base on one Roboteq controller, ASCII over a serial line, stepped by the control loop.
+
+Every command period one motion command !M goes out, with one query behind it. The controller's watchdog
+has a trap (manual V1.8 p. 286): after it has stopped the motors, any valid command makes them run on at the
+speed from before. So the first thing said after any gap is !M 0 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import cycle
+
+from config.chassis import RoboteqChassisConfig
+from hal.api import SerialLink
+from hal.chassis import roboteq_lines as lines
+from hal.chassis.arming import NS_PER_MS, ArmingLimits
+from hal.chassis.command import CommandLimits, due, is_zero
+from hal.chassis.driver import ChassisDriver
+from hal.chassis.roboteq_feedback import RoboteqFeedback
+from hal.chassis.roboteq_lines import LineReader, Query, Reply
+from hal.chassis.tracks import TrackGeometry, scale_to_fit
+from hal.errors import LinkLost
+from hal.types import ChassisMode, Setpoint
+
+# The counters every other turn. The watchdog is asked for again and again because a restart forgets it.
+_BETWEEN = (
+    lines.FAULT_FLAGS,
+    lines.MOTOR_FLAGS,
+    lines.WATCHDOG,
+    lines.FAULT_FLAGS,
+    lines.VOLTAGES,
+    lines.MOTOR_FLAGS,
+    lines.FAULT_FLAGS,
+    lines.CURRENTS,
+)
+
+# USB adapters keep bytes back for up to 16 ms; the controller answers within some milliseconds.
+_REPLY_TIMEOUT_NS = 40 * NS_PER_MS
+
+# After a lost answer this much silence, so that it is not taken for the answer to the next question.
+_SILENCE_NS = 10 * NS_PER_MS
+
+# A base that still moves after so long of zero commands does not follow them: !EX cuts the motors.
+_DEFIANCE_NS = 3_000 * NS_PER_MS
+
+
+class RoboteqChassis(ChassisDriver):
+    """hal.api.Chassis for Roboteq. Channel 1 drives the left track, channel 2 the right one."""
+
+    def __init__(self, link: SerialLink, config: RoboteqChassisConfig) -> None:
+        geometry = TrackGeometry(config.track_width_m, config.slip_factor)
+        feedback = RoboteqFeedback(config, geometry)
+        commands = CommandLimits(
+            max_speed_mps=config.full_speed_mps,
+            max_yaw_rate_radps=2.0 * config.full_speed_mps / geometry.effective_width_m,
+            timeout_ns=config.command_timeout_ms * NS_PER_MS,
+        )
+        limits = ArmingLimits(
+            feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
+            status_timeout_ns=config.status_timeout_ms * NS_PER_MS,
+            arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
+            stall_ns=config.watchdog_ms * NS_PER_MS,
+        )
+        super().__init__(link, feedback, commands, limits)
+        self._link = link
+        self._config = config
+        self._geometry = geometry
+        self._feedback = feedback
+        self._period_ns = config.command_period_ms * NS_PER_MS
+        # Half of it: how long the line takes is not known, and a zero too many costs nothing.
+        self._gap_ns = config.watchdog_ms * NS_PER_MS // 2
+        self._reader = LineReader()
+        counters = lines.ENCODERS if config.encoder == "quadrature" else lines.HALL_COUNTERS
+        self._queries = cycle([lines.QUERIES[name] for other in _BETWEEN for name in (counters, other)])
+        self._asked_query: Query | None = None
+        self._asked_ns = 0
+        self._quiet_until_ns = 0
+        self._setup = b""
+        self._motion_sent_ns: int | None = None
+        self._moving = False
+
+    def _listen(self, now_ns: int) -> None:
+        arrived = self._link.read()
+        self._feedback.bytes_heard += len(arrived)
+        for line in self._reader.feed(arrived):
+            if isinstance(line, Reply):
+                if line is not Reply.ECHO:
+                    self._feedback.note_reply(line is Reply.ACCEPTED)
+            elif self._asked_query is not None and line.name == self._asked_query.name:
+                self._asked_query = None
+                self._feedback.take(line.name, line.values, self._asked_ns, now_ns)
+            else:  # An answer that comes too late, or that nobody asked for.
+                self._quiet_until_ns = max(self._quiet_until_ns, now_ns + _SILENCE_NS)
+        if self._asked_query is not None and now_ns - self._asked_ns >= _REPLY_TIMEOUT_NS:
+            self._asked_query = None
+            self._reader.forget()
+            self._quiet_until_ns = now_ns + _SILENCE_NS
+
+    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        stops = self._moving and is_zero(command)
+        if not (stops or self._setup or due(self._motion_sent_ns, self._period_ns, now_ns)):
+            return None
+        motion, sent = self._motion(command)
+        said = self._first_after_a_gap(now_ns) + self._setup + motion
+        if self._defies(now_ns):
+            said += lines.EMERGENCY_STOP
+        query = None
+        if self._asked_query is None and now_ns >= self._quiet_until_ns:
+            query = lines.QUERIES[lines.WATCHDOG] if self._setup else next(self._queries)
+            said += query.line
+        self._write(said, now_ns)
+        self._setup = b""
+        self._moving = not is_zero(command)
+        if query is not None:
+            self._asked_query, self._asked_ns = query, now_ns
+        return sent
+
+    def _speak_stop(self, now_ns: int) -> None:
+        self._feedback.forget_setup()
+        self._setup = b""
+        self._write(lines.STOP, now_ns)
+        self._moving = False
+
+    def _begin_arming(self) -> None:
+        # !MG here and nowhere else: only a person's consent may end the controller's own emergency stop.
+        self._feedback.await_setup()
+        watchdog = lines.set_watchdog(self._config.watchdog_ms)
+        self._setup = lines.STOP + lines.ECHO_OFF + watchdog + lines.RELEASE
+
+    def _resettable(self) -> bool:
+        # An emergency stop alone; a fault beside it has to go by itself.
+        return self._feedback.estop and not self._feedback.errors
+
+    def _first_after_a_gap(self, now_ns: int) -> bytes:
+        last_ns = self._motion_sent_ns
+        return b"" if last_ns is not None and 0 <= now_ns - last_ns < self._gap_ns else lines.STOP
+
+    def _write(self, said: bytes, now_ns: int) -> None:
+        try:
+            self._link.write(said)
+        except LinkLost:
+            # Who knows what of it arrived: the next thing said must be zero.
+            self._motion_sent_ns = None
+            raise
+        self._motion_sent_ns = now_ns
+
+    def _defies(self, now_ns: int) -> bool:
+        """Latched long ago, zero commanded ever since, and it moves."""
+        latched = self._arming.mode is ChassisMode.ESTOP
+        return latched and now_ns - self._arming.since_ns > _DEFIANCE_NS and not self._feedback.standing
+
+    def _motion(self, command: Setpoint) -> tuple[bytes, Setpoint]:
+        """The line for this command, and the command slowed until no track is too fast."""
+        config, limit = self._config, self._config.full_speed_mps
+        wanted = self._geometry.to_tracks(command.v_mps, command.w_radps)
+        left_mps, right_mps = fitted = scale_to_fit(*wanted, limit, limit)
+        scale = lines.FULL_SCALE / limit
+        line = lines.motors(config.left_sign * left_mps * scale, config.right_sign * right_mps * scale)
+        if fitted == wanted:
+            return line, command
+        v_mps, w_radps = self._geometry.to_twist(left_mps, right_mps)
+        return line, replace(command, v_mps=v_mps, w_radps=w_radps)

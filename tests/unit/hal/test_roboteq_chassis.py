@@ -1,0 +1,357 @@
+"""The Roboteq driver by the bytes it writes and reads, with a line and a controller that misbehave."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from hal.chassis.roboteq import RoboteqChassis
+from hal.links.scripted import ScriptedSerialLink, serial_pair
+from hal.types import ChassisMode, ChassisState, Setpoint
+from sim.plant import TrackedPlant
+from sim.roboteq_emulator import RoboteqEmulator
+from tests.support.chassis_rig import COUNTS_PER_M, MS, PLANT, roboteq_config
+
+
+class Bench:
+    """The driver with the emulator, and the line between them."""
+
+    def __init__(self, **changes: object) -> None:
+        self.near, self.far = serial_pair()
+        self.plant = TrackedPlant(PLANT)
+        self.emulator = RoboteqEmulator(
+            self.far, self.plant, full_speed_mps=1.0, counts_per_m=COUNTS_PER_M, boot_ms=0
+        )
+        self.chassis = RoboteqChassis(self.near, roboteq_config(**changes))
+        self.now_ns = 0
+
+    def step(self, v_mps: float | None = None, w_radps: float = 0.0, after_ms: int = 20) -> ChassisState:
+        self.now_ns += after_ms * MS
+        self.emulator.advance_to(self.now_ns)
+        self.near.written.clear()
+        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
+        return self.chassis.exchange(command, self.now_ns)
+
+    def run(self, steps: int, v_mps: float | None = None) -> ChassisState:
+        for _ in range(steps):
+            state = self.step(v_mps)
+        return state
+
+    def arm(self) -> None:
+        self.run(10)
+        self.chassis.arm(self.now_ns)
+        state = self.run(40)
+        assert state.mode is ChassisMode.ARMED, state.reason
+
+    def written(self) -> list[bytes]:
+        """The lines of the last exchange."""
+        return b"".join(self.near.written).split(b"\r")[:-1]
+
+
+def test_echo_off_watchdog_and_release_are_sent_with_consent_and_read_back() -> None:
+    bench = Bench()
+    bench.run(10)
+    assert (bench.emulator.echo, bench.emulator.watchdog_ms) == (True, 1000), "left alone without consent"
+    bench.chassis.arm(bench.now_ns)
+    bench.step()
+    assert bench.written()[:6] == [b"!M 0 0", b"^ECHOF 1", b"^RWD 300", b"!MG", b"!M 0 0", b"~RWD"]
+    bench.arm()
+    assert (bench.emulator.echo, bench.emulator.watchdog_ms) == (False, 300)
+
+
+def test_one_motion_line_and_one_question_each_period() -> None:
+    """0.5 m/s and 0.4 rad/s: tracks of 0.555 m * 1.1, full speed 1 m/s."""
+    bench = Bench()
+    bench.arm()
+    half_mps = 0.5 * 0.4 * 0.555 * 1.1
+    motion = f"!M {round(500 - 1000 * half_mps)} {round(500 + 1000 * half_mps)}".encode()
+    assert motion == b"!M 378 622"
+    asked = set()
+    for _ in range(16):
+        state = bench.step(0.5, 0.4)
+        assert bench.written()[0] == motion
+        assert len(bench.written()) == 2
+        asked.add(bench.written()[1])
+        assert state.sent is not None
+        assert (state.sent.v_mps, state.sent.w_radps) == (0.5, 0.4)
+    assert asked == {b"?C", b"?FF", b"?FM", b"~RWD", b"?V", b"?A"}
+
+
+def test_hall_sensors_are_asked_for_by_their_own_name() -> None:
+    bench = Bench(encoder="hall")
+    bench.arm()
+    lines: list[bytes] = []
+    for _ in range(16):
+        bench.step(0.3)
+        lines += bench.written()
+    assert b"?CB" in lines
+    assert b"?C" not in lines
+    assert bench.step(0.3).v_mps > 0.1
+
+
+def test_a_faster_loop_does_not_flood_the_line() -> None:
+    bench = Bench()
+    bench.arm()
+    count = 0
+    for _ in range(200):
+        bench.step(0.1, after_ms=5)
+        count += len(bench.near.written)
+    assert count == pytest.approx(50, abs=17)
+    assert bench.step(0.1, after_ms=5).mode is ChassisMode.ARMED
+
+
+def test_a_zero_that_replaces_motion_does_not_wait_for_the_period() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.step(0.5)
+    assert bench.step(0.6, after_ms=1).sent is None
+    assert bench.step(0.0, after_ms=1).sent is not None
+    assert bench.written()[0] == b"!M 0 0"
+
+
+def test_after_a_gap_zero_is_said_first() -> None:
+    """The motors that the watchdog stopped would run on with whatever comes first."""
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.5)
+    bench.step(0.5, after_ms=160)
+    assert bench.written()[:2] == [b"!M 0 0", b"!M 500 500"], "no gap for the watchdog, but nearly"
+    bench.step(0.5, after_ms=700)
+    assert bench.written()[:2] == [b"!M 0 0", b"!M 0 0"], "the loop hung: latched"
+
+
+def test_after_a_failed_write_zero_is_said_first() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.5)
+    bench.near.fail_writes(1)
+    assert bench.step(0.5).mode is ChassisMode.LOST
+    bench.run(40)
+    bench.chassis.arm(bench.now_ns)
+    bench.step()
+    assert bench.written()[0] == b"!M 0 0"
+
+
+def test_stop_says_zero_even_on_a_line_that_fails() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(20, 0.5)
+    bench.near.written.clear()
+    bench.chassis.stop(bench.now_ns)
+    assert bench.near.written == [b"!M 0 0\r"]
+    bench.near.fail_writes(1)
+    bench.chassis.stop(bench.now_ns)
+    bench.chassis.stop(bench.now_ns)
+    assert bench.near.written == [b"!M 0 0\r"] * 2, "one was lost"
+
+
+def test_a_watchdog_that_does_not_hold_is_told() -> None:
+    bench = Bench()
+    bench.emulator.settable_watchdog = False
+    bench.chassis.arm(0)
+    reasons = [bench.step().reason for _ in range(160)]
+    waiting = "the base does not take commands: its watchdog reads 1000 ms, not 300 ms"
+    assert f"arming: {waiting}" in reasons
+    assert reasons[-1] == f"arming gave up after 3.0 s: {waiting}"
+
+
+def test_the_emergency_stop_stays_in_the_controller_until_consent() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.5)
+    bench.emulator.press_estop()
+    state = bench.run(20, 0.5)
+    assert (state.mode, state.reason) == (
+        ChassisMode.ESTOP,
+        "emergency stop is active; release the button, then arm",
+    )
+    bench.emulator.release_estop()
+    bench.run(100)
+    assert bench.emulator.fault_flags == 0x10, "nobody but a person ends it"
+    bench.chassis.arm(bench.now_ns)
+    assert bench.run(30).mode is ChassisMode.ARMED
+    assert bench.emulator.fault_flags == 0
+
+
+def test_consent_while_the_button_is_pressed_leads_nowhere() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.emulator.press_estop()
+    bench.run(20)
+    bench.chassis.arm(bench.now_ns)
+    states = [bench.step() for _ in range(160)]
+    assert ChassisMode.ARMED not in {state.mode for state in states}
+    assert states[-1].mode is ChassisMode.ESTOP
+    bench.emulator.release_estop()
+    assert bench.run(100).mode is ChassisMode.ESTOP, "!MG was said once, with the consent, and never again"
+
+
+def test_a_fault_beside_the_emergency_stop_is_not_reset() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.emulator.fault_flags = 0x18
+    bench.run(20)
+    bench.chassis.arm(bench.now_ns)
+    state = bench.step()
+    assert state.mode is ChassisMode.ESTOP
+    assert "arming refused: error: short circuit" in state.reason
+    assert state.faults == ("error: short circuit",)
+
+
+@pytest.mark.parametrize(
+    ("flags", "mode", "faults"),
+    [
+        ([1, 0], ChassisMode.ARMED, ("warning: motor 1 at its current limit",)),
+        ([0, 2], ChassisMode.ESTOP, ("error: motor 2 stalled",)),
+    ],
+)
+def test_motor_flags_latch_or_are_told(flags: list[int], mode: ChassisMode, faults: tuple[str, ...]) -> None:
+    bench = Bench()
+    bench.arm()
+    bench.emulator.motor_flags = flags
+    state = bench.run(20, 0.3)
+    assert (state.mode, state.faults) == (mode, faults)
+
+
+def test_a_base_that_moves_against_zero_is_shut_down() -> None:
+    """A script or a stick may drive the motors; after three seconds of zeros unheeded comes !EX."""
+    bench = Bench()
+    bench.arm()
+    bench.run(20, 0.3)
+    bench.far.hear_through(lambda data: data.replace(b"!M 0 0\r", b"!M 300 300\r"))
+    bench.step(math.nan)
+    lines: list[bytes] = []
+    for _ in range(145):
+        bench.step()
+        lines += bench.written()
+    assert b"!EX" not in lines
+    bench.run(10)
+    assert b"!EX" in bench.written()
+    bench.run(50)
+    assert bench.plant.twist[0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_controller_that_refuses_commands_is_told() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(20, 0.3)
+    bench.far.hear_through(lambda data: data.replace(b"!M", b"!Q"))
+    state = bench.run(10, 0.3)
+    assert (state.mode, state.reason.split(";")[0]) == (
+        ChassisMode.ESTOP,
+        "the base no longer obeys: it refuses commands",
+    )
+
+
+def test_single_refusals_are_survived() -> None:
+    bench = Bench()
+    bench.arm()
+    count = 0
+
+    def spoil(data: bytes) -> bytes:
+        nonlocal count
+        count += 1
+        return data.replace(b"!M", b"!N") if count % 3 == 0 else data
+
+    bench.far.hear_through(spoil)
+    assert bench.run(100, 0.3).mode is ChassisMode.ARMED
+    assert bench.emulator.refused > 20
+
+
+def test_lost_answers_are_survived() -> None:
+    """Every fifth answer loses its name: the drive goes on, and nothing wrong is believed."""
+    bench = Bench()
+    bench.arm()
+    count = 0
+
+    def spoil(data: bytes) -> bytes:
+        nonlocal count
+        count += 1
+        return data.replace(b"=", b"?") if count % 5 == 0 else data
+
+    bench.near.hear_through(spoil)
+    states = [bench.step(0.5) for _ in range(400)]
+    assert {state.mode for state in states} == {ChassisMode.ARMED}
+    assert states[-1].v_mps == pytest.approx(0.5, abs=0.005)
+    assert states[-1].pose.x_m == pytest.approx(bench.plant.pose.x_m, abs=0.02)
+
+
+def test_echo_is_no_answer() -> None:
+    """A controller that goes on echoing is understood all the same."""
+    bench = Bench()
+    bench.far.hear_through(lambda data: data.replace(b"^ECHOF 1\r", b""))
+    bench.arm()
+    assert bench.emulator.echo
+    assert bench.run(100, 0.5).v_mps == pytest.approx(0.5, abs=0.005)
+
+
+def test_a_restart_shows_in_the_counters_or_in_the_watchdog() -> None:
+    driving, standing = Bench(), Bench()
+    driving.arm()
+    driving.run(100, 0.5)
+    driving.emulator.restart()
+    assert driving.run(20, 0.5).reason.startswith("the base no longer obeys: its counters jumped: restarted")
+    standing.arm()
+    standing.emulator.restart()
+    state = standing.run(40)
+    assert state.mode is ChassisMode.ESTOP
+    assert state.reason.startswith("the base no longer obeys: its watchdog reads 1000 ms, not 300 ms")
+
+
+def test_a_counter_that_noise_made_is_not_believed() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.5)
+    bench.near.hear_through(lambda data: data.replace(b"C=", b"C=9"))
+    state = bench.run(4, 0.5)
+    assert state.mode is ChassisMode.ESTOP
+    assert state.pose.x_m < 1.0
+
+
+def test_mirrored_motors_drive_and_count_the_other_way() -> None:
+    bench = Bench(invert_right=True)
+    bench.arm()
+    bench.step(0.5)
+    assert bench.written()[0] == b"!M 500 -500"
+    state = bench.run(60, 0.5)
+    assert abs(bench.plant.track_twist[0]) < 0.01, "in the emulator channel 2 is not mirrored: it turns"
+    assert state.v_mps == pytest.approx(0.5, abs=0.01), "but the driver believes in its mirror"
+
+
+def test_the_fastest_speed_holds_for_each_track() -> None:
+    bench = Bench()
+    bench.arm()
+    state = bench.step(0.9, 1.8)
+    assert state.sent is not None
+    assert state.sent.v_mps + 0.5 * state.sent.w_radps * 0.555 * 1.1 == pytest.approx(1.0)
+    assert state.sent.w_radps == pytest.approx(2.0 * state.sent.v_mps)
+    assert bench.written()[0].endswith(b" 1000")
+
+
+def test_nothing_is_known_before_the_second_counter_answer() -> None:
+    bench = Bench()
+    seen = [bench.step() for _ in range(20)]
+    first_known = next(k for k, state in enumerate(seen) if state.feedback_ns is not None)
+    assert first_known >= 3
+    assert all(math.isnan(state.v_mps) for state in seen[:first_known])
+    assert seen[first_known].v_mps == 0.0
+
+
+@pytest.mark.parametrize(
+    ("babble", "hint"),
+    [
+        (b"", "not one byte came; check port, power and the crossed lines"),
+        (b"\xff\x00\x12", "bytes came, none an answer to ?FF; check baud and that it is a Roboteq"),
+    ],
+)
+def test_a_device_that_is_no_roboteq_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
+    link = ScriptedSerialLink()
+    chassis = RoboteqChassis(link, roboteq_config())
+    chassis.arm(0)
+    for k in range(1, 160):
+        link.deliver(babble)
+        state = chassis.exchange(None, k * 20 * MS)
+    assert state.mode is ChassisMode.STANDBY
+    assert state.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
+    assert hint in state.reason
