@@ -1,7 +1,7 @@
 """The worst case: whatever moving obstacles may do within their means, can the robot still stand before it?
 
-An obstacle that moves may change its velocity by a bounded acceleration, up to V_omax, and its velocity is
-only known with a spread. Standing when something touches it is all that a robot which cannot leave its path
+An obstacle that moves may stop dead wherever its way leads it, may change its velocity by a bounded
+acceleration up to V_omax, and its velocity is only known with a spread. Standing when something touches it is all that a robot which cannot leave its path
 can promise; so for each speed the emergency stop is followed, latency included, against all that each
 obstacle could reach by then.
 """
@@ -47,10 +47,14 @@ def reach(
     t = times_s + since_s
     could = sigma_mps[:, None] * t + 0.5 * manoeuvre_mps2[:, None] * t * t
     grown = np.minimum(could, (most_mps + speed_mps)[:, None] * t)
+    inside = placed.clear_m - grown <= 0.0
+    # Once in the way it may stay there: what it could block only grows.
+    lo = np.where(inside, placed.lo_m - grown - margin_m, np.inf)
+    hi = np.where(inside, placed.hi_m + grown, -np.inf)
     return Reach(
-        placed.clear_m - grown <= 0.0,
-        placed.lo_m - grown - margin_m,
-        placed.hi_m + grown,
+        np.logical_or.accumulate(inside, axis=1),
+        np.minimum.accumulate(lo, axis=1),
+        np.maximum.accumulate(hi, axis=1),
     )
 
 

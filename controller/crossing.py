@@ -16,7 +16,7 @@ from controller.corridor import Placed
 from controller.profile import SpeedRamps
 from hal.types import FloatArray
 
-# Uncertainty of the place grows with time, but an obstacle that is watched is not lost altogether.
+# So unlikely that it will not come into the way, an obstacle that heads for it cannot become.
 _MOST_SPREAD_M = 0.5
 
 
@@ -48,10 +48,11 @@ def find_conflicts(
     an unlikely entry could do is watched by controller/contingency.py.
     """
     clear = placed.clear_m[rows] - margin_m[rows, None]
-    spread = np.minimum(sigma_side_mps[rows, None] * times_s, _MOST_SPREAD_M)
+    spread = sigma_side_mps[rows, None] * times_s
+    likely = np.minimum(spread, _MOST_SPREAD_M)
     found = []
     for k, row in enumerate(rows):
-        entry = -1.0 if clear[k, 0] <= 0.0 else _first_below(clear[k] + spread[k], times_s)
+        entry = -1.0 if clear[k, 0] <= 0.0 else _first_below(clear[k] + likely[k], times_s)
         if math.isinf(entry):
             continue
         exit_s = _first_above(clear[k] - spread[k], times_s, max(entry, 0.0))
