@@ -7,12 +7,14 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
 import cv2
 
+from controller.errors import UserError
 from controller.evaluation.contestants import ALWAYS, BASELINES
 from controller.evaluation.run_sequence import SequenceRecord, run_sequence
 from controller.evaluation.sequences import Sequence
@@ -78,6 +80,10 @@ def _records(tasks: tuple[Task, ...], workers: int) -> Iterator[SequenceRecord]:
         try:
             for future in as_completed(futures):
                 yield future.result()
+        except BrokenProcessPool as error:
+            raise UserError(
+                "a worker process died, most likely for want of memory; try again with --workers 1"
+            ) from error
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 

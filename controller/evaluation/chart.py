@@ -180,14 +180,26 @@ class Chart:
         draw.line(self._image, box, GRID, 1, closed=True)
         for index, entry in enumerate(self._legend):
             middle = y + 6 + row * index + row // 2
-            ends = np.array([[x + 10.0, middle], [x + 40.0, middle]])
-            if entry.dashed:
-                draw.dashed(self._image, ends, entry.colour, 2, 6.0)
-            elif entry.line:
-                draw.line(self._image, ends, entry.colour, 3)
-            if entry.marker is not None:
-                self._markers(np.array([[x + 25.0, middle]]), entry.colour, entry.marker)
+            self._sample(entry, x + 10, middle)
             text.put(self._image, entry.label, x + 48, middle + 5, INK, _LEGEND)
+
+    def key(self) -> None:
+        """All that has a label in one row, at the right end of the title's line."""
+        room = [text.width(entry.label, _LEGEND) + 46 for entry in self._legend]
+        x, middle = self.plot.right - sum(room), self.plot.y - 24
+        for entry, width in zip(self._legend, room, strict=True):
+            self._sample(entry, x, middle)
+            text.put(self._image, entry.label, x + 36, middle + 5, INK, _LEGEND)
+            x += width
+
+    def _sample(self, entry: LegendEntry, x: int, middle: int) -> None:
+        ends = np.array([[x, middle], [x + 30.0, middle]])
+        if entry.dashed:
+            draw.dashed(self._image, ends, entry.colour, 2, 6.0)
+        elif entry.line:
+            draw.line(self._image, ends, entry.colour, 3)
+        if entry.marker is not None:
+            self._markers(np.array([[x + 15.0, middle]]), entry.colour, entry.marker)
 
     def _remember(
         self, label: str | None, colour: Colour, line: bool, marker: Marker | None, dashed: bool

@@ -158,7 +158,7 @@ def table_one(methods: dict[str, MethodSummary]) -> Image:
             chart.points([value], [middle + offset], colour, "circle")
     chart.points([], [], BLUE, "circle", "precision")
     chart.points([], [], AMBER, "circle", "recall")
-    chart.legend("lower right")
+    chart.key()
     empty = Axis("", 0.0, float(len(names)), ticks=tuple((place, "") for place, _ in ticks))
     cost = Axis("median ms a frame", 0.5, 1000.0, log=True)
     times = Chart(image, Rect(left.right, 0, width - left.right, height), "Time", cost, empty)

@@ -45,7 +45,8 @@ def simulated_lines(
     lines.append(
         f"Made by `{command}`. {len(records)} sequences with fixed seeds, 640x480 at 30 frames a second: "
         f"{count['tuning']} that the detector may be tuned on, {count['reporting']} to report on. "
-        "Every figure is of the reporting split unless it says otherwise."
+        "Every figure is of the reporting split unless it says otherwise. Times are medians on one core of "
+        "the machine that made this page."
     )
     lines.extend(("", " ".join(_RULES.split()), ""))
     if OURS in reporting:

@@ -69,15 +69,18 @@ class _Way:
     heading_deg: float
 
 
-def side_by_side(leader: Mover, count: int, spacing_m: float = 0.75) -> tuple[Mover, ...]:
-    """A group that walks abreast, across its course; heights and clothes differ."""
+def side_by_side(
+    leader: Mover, count: int, spacing_m: float = 0.75, stagger_m: float = 0.0
+) -> tuple[Mover, ...]:
+    """A group that walks abreast, each stagger_m behind the one before; heights and clothes differ."""
     course = math.radians(leader.course_deg)
+    c, s = math.cos(course), math.sin(course)
     textures: tuple[Texture, ...] = ("fine", "coarse", "fine")
     return tuple(
         replace(
             leader,
-            ahead_m=leader.ahead_m + index * spacing_m * abs(math.sin(course)),
-            left_m=leader.left_m + index * spacing_m * abs(math.cos(course)),
+            ahead_m=leader.ahead_m + index * (spacing_m * abs(s) - stagger_m * c),
+            left_m=leader.left_m + index * (spacing_m * abs(c) - stagger_m * s),
             height_m=leader.height_m - 0.08 * index,
             texture=textures[index % len(textures)],
         )

@@ -84,7 +84,7 @@ def _crossing(
 _SEQUENCES = (
     Sequence("still-crossing", "tuning", _STILL, (_crossing(4.5),), "hall", "realsense", 11),
     Sequence("still-group", "reporting", _STILL,
-             side_by_side(Mover("person", 5.0, 0.4, -90.0, 1.1), 3), "hall", "paper", 12),
+             side_by_side(Mover("person", 5.0, 0.4, -90.0, 1.1), 3, stagger_m=0.45), "hall", "paper", 12),
     Sequence("still-two-cross", "reporting", _STILL,
              (_crossing(4.0, speed_mps=1.1), Mover("person", 6.0, 0.3, -90.0, 1.3, texture="coarse")),
              "workshop", "realsense", 13),

@@ -42,8 +42,9 @@ class MethodSummary:
 
     @property
     def pixel_counts(self) -> Counts:
-        """At the level from which a pixel counts as called moving."""
-        return self.pixels.at(PIXEL_LEVEL)
+        """At the level from which a pixel counts as called moving; zeros where nothing is claimed."""
+        claimed = self.pixels.moving[1:].sum() + self.pixels.rest[1:].sum()
+        return self.pixels.at(PIXEL_LEVEL) if claimed else Counts(0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

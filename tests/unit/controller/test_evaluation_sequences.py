@@ -92,6 +92,8 @@ def test_a_group_walks_abreast() -> None:
     assert [one.left_m for one in ahead] == pytest.approx([0.0, 0.75, 1.5])
     across = side_by_side(Mover("person", 5.0, 0.0, 90.0, 1.0), 2)
     assert [one.ahead_m for one in across] == pytest.approx([5.0, 5.75])
+    staggered = side_by_side(Mover("person", 5.0, 0.0, -90.0, 1.0), 2, stagger_m=0.4)
+    assert [one.left_m for one in staggered] == pytest.approx([0.0, 0.4])
 
 
 @pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
