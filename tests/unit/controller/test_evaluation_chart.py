@@ -101,3 +101,13 @@ def test_the_legend_names_what_was_drawn() -> None:
     untouched = image.copy()
     drawn.legend("upper right")
     assert np.array_equal(image, untouched)
+
+
+def test_the_key_stands_above_the_plot() -> None:
+    image, drawn = chart()
+    drawn.points([], [], BLUE, "square", "one")
+    drawn.key()
+    rows, columns = np.nonzero(painted(image, BLUE))
+    assert len(rows) > 0
+    assert rows.max() < drawn.plot.y
+    assert columns.min() > drawn.plot.x

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -184,3 +186,30 @@ def test_numbers_of_tables() -> None:
     assert section("T", "two\n   lines") == ["## T", "", "two lines", ""]
     with pytest.raises(ValueError, match="row of 1"):
         table(("a", "b"), [("1",)])
+
+
+class DyingPool:
+    """Stands for a pool whose worker was killed."""
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def __enter__(self) -> DyingPool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def submit(self, *_: object) -> Future[SequenceRecord]:
+        future: Future[SequenceRecord] = Future()
+        future.set_exception(BrokenProcessPool("killed"))
+        return future
+
+    def shutdown(self, **_: object) -> None:
+        pass
+
+
+def test_a_worker_that_died_is_told_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("controller.evaluation.campaign.ProcessPoolExecutor", DyingPool)
+    with pytest.raises(UserError, match="--workers 1"):
+        run_campaign((Task(STILL, (LIDAR,)),), 2, lambda _: None)
