@@ -155,7 +155,26 @@ class RoboteqChassisConfig(Section):
         return -1 if self.invert_right else 1
 
 
-SerialChassisConfig = RoboclawChassisConfig | RoboteqChassisConfig
+class KobukiChassisConfig(Section):
+    """A Kobuki, the base of Turtlebot 2. Its geometry is fixed: the base itself makes wheel speeds of a twist.
+
+    slip_factor: as for AgileX. base_timeout_ms: after so long without a command the base is taken to have
+    stopped by itself. The firmware's time is not documented: measure it with the wheels off the floor.
+    """
+
+    kind: Literal["kobuki"]
+    link: SerialLinkConfig
+    slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
+    max_speed_mps: float = Field(default=0.7, gt=0, le=0.7)
+    max_yaw_rate_radps: float = Field(default=1.9, gt=0, le=3.1, description="faster, and the gyro is off")
+    base_timeout_ms: int = Field(default=600, ge=100, le=5000)
+    command_period_ms: int = Field(default=20, ge=10, le=100)
+    command_timeout_ms: int = Field(default=200, ge=40, le=1000)
+    feedback_timeout_ms: int = Field(default=200, ge=60, le=2000, description="of its stream, 50 a second")
+    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
+
+
+SerialChassisConfig = RoboclawChassisConfig | RoboteqChassisConfig | KobukiChassisConfig
 ChassisConfig = Annotated[AgilexChassisConfig | SerialChassisConfig, Field(discriminator="kind")]
 
 

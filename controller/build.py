@@ -16,6 +16,7 @@ from config.app import AppConfig, ReplayConfig, SimulationConfig
 from config.camera import OdometryChoice, RealsenseCameraConfig, ReplayCameraConfig, SimulatedCameraConfig
 from config.chassis import (
     AgilexChassisConfig,
+    KobukiChassisConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
     SerialChassisConfig,
@@ -37,6 +38,7 @@ from hal.cameras.pose_file import PoseFile, open_odometry
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
 from hal.chassis.agilex import AgilexChassis
+from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
 from hal.links.can_bus import CanBusLink
@@ -45,6 +47,7 @@ from hal.links.serial_port import SerialPortLink
 from hal.types import CameraMount, PlanarPose
 from sim.agilex_emulator import AgilexEmulator
 from sim.camera import SimulatedCamera
+from sim.kobuki_emulator import KobukiEmulator
 from sim.plant import TrackedPlant
 from sim.roboclaw_emulator import RoboclawEmulator
 from sim.roboteq_emulator import RoboteqEmulator
@@ -198,6 +201,8 @@ def _serial_driver(config: SerialChassisConfig, link: SerialLink) -> Chassis:
             return RoboclawChassis(link, config)
         case RoboteqChassisConfig():
             return RoboteqChassis(link, config)
+        case KobukiChassisConfig():
+            return KobukiChassis(link, config)
         case unknown:
             assert_never(unknown)
 
@@ -211,6 +216,8 @@ def build_serial_emulator(config: SerialChassisConfig, link: SerialLink, plant: 
             return RoboteqEmulator(
                 link, plant, full_speed_mps=config.full_speed_mps, counts_per_m=config.counts_per_m
             )
+        case KobukiChassisConfig():
+            return KobukiEmulator(link, plant)
         case unknown:
             assert_never(unknown)
 

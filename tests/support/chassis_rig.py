@@ -16,6 +16,7 @@ from uuid import uuid4
 from config.chassis import (
     AgilexChassisConfig,
     CanLinkConfig,
+    KobukiChassisConfig,
     PlantConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
@@ -23,6 +24,8 @@ from config.chassis import (
 )
 from hal.api import CanLink, Chassis, SerialLink
 from hal.chassis.agilex import AgilexChassis
+from hal.chassis.kobuki import KobukiChassis
+from hal.chassis.kobuki_packets import WHEEL_BASE_M
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
 from hal.errors import LinkLost
@@ -32,6 +35,7 @@ from hal.links.scripted import can_pair, serial_pair
 from hal.links.serial_port import SerialPortLink
 from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
 from sim.agilex_emulator import AgilexEmulator
+from sim.kobuki_emulator import KobukiEmulator
 from sim.plant import TrackedPlant
 from sim.roboclaw_emulator import RoboclawEmulator
 from sim.roboteq_emulator import RoboteqEmulator
@@ -40,6 +44,7 @@ MS = 1_000_000
 PERIOD_NS = 20 * MS
 SLIP_FACTOR = 1.1
 PLANT = PlantConfig(slip_factor=SLIP_FACTOR)
+KOBUKI_PLANT = PlantConfig(track_width_m=WHEEL_BASE_M, slip_factor=SLIP_FACTOR)
 COUNTS_PER_M = 20_000.0
 
 
@@ -173,12 +178,17 @@ def _await(descriptor: int, count: int) -> None:
 
 @dataclass
 class Rig:
-    """Emulator first, then the driver, every 20 ms: the order of the lock-step runner."""
+    """Emulator first, then the driver, every 20 ms: the order of the lock-step runner.
+
+    wire_step_radps: how coarse a yaw rate the protocol can say.
+    """
 
     chassis: Chassis
     emulator: Emulator
     plug: PluggedCan | PluggedSerial
     own_timeout_s: float
+    battery_v: float
+    wire_step_radps: float = 0.001
     now_ns: int = 0
     state: ChassisState = field(init=False)
 
@@ -269,6 +279,16 @@ def roboteq_config(**changes: object) -> RoboteqChassisConfig:
     return RoboteqChassisConfig.model_validate(values | changes)
 
 
+def kobuki_config(**changes: object) -> KobukiChassisConfig:
+    """A Kobuki on a floor as slippery as the plant's."""
+    values: dict[str, object] = {
+        "kind": "kobuki",
+        "link": SerialLinkConfig(url="loop://"),
+        "slip_factor": SLIP_FACTOR,
+    }
+    return KobukiChassisConfig.model_validate(values | changes)
+
+
 @contextmanager
 def agilex_rig(kind: str, link: CanLinkConfig | None = None) -> Iterator[Rig]:
     """kind: "scripted", or "bus" for two python-can buses on link."""
@@ -280,7 +300,7 @@ def agilex_rig(kind: str, link: CanLinkConfig | None = None) -> Iterator[Rig]:
         plug = PluggedCan(ends[0])
         emulator = stack.enter_context(AgilexEmulator(ends[1], TrackedPlant(PLANT)))
         chassis = stack.enter_context(AgilexChassis(plug, config))
-        yield Rig(chassis, emulator, plug, own_timeout_s=0.5)
+        yield Rig(chassis, emulator, plug, own_timeout_s=0.5, battery_v=50.0)
 
 
 def serial_ends(kind: str) -> tuple[SerialLink, SerialLink]:
@@ -303,7 +323,7 @@ def roboclaw_rig(kind: str, status_bytes: int = 4) -> Iterator[Rig]:
             RoboclawEmulator(ends[1], plant, counts_per_m=COUNTS_PER_M, status_bytes=status_bytes)
         )
         chassis = stack.enter_context(RoboclawChassis(plug, config))
-        yield Rig(chassis, emulator, plug, own_timeout_s=config.timeout_ms / 1000)
+        yield Rig(chassis, emulator, plug, own_timeout_s=config.timeout_ms / 1000, battery_v=25.2)
 
 
 @contextmanager
@@ -322,4 +342,17 @@ def roboteq_rig(kind: str) -> Iterator[Rig]:
             )
         )
         chassis = stack.enter_context(RoboteqChassis(plug, config))
-        yield Rig(chassis, emulator, plug, own_timeout_s=config.watchdog_ms / 1000)
+        yield Rig(chassis, emulator, plug, own_timeout_s=config.watchdog_ms / 1000, battery_v=24.6)
+
+
+@contextmanager
+def kobuki_rig(kind: str) -> Iterator[Rig]:
+    """kind: as of serial_ends."""
+    with ExitStack() as stack:
+        ends = serial_ends(kind)
+        plug = PluggedSerial(ends[0])
+        emulator = stack.enter_context(KobukiEmulator(ends[1], TrackedPlant(KOBUKI_PLANT)))
+        chassis = stack.enter_context(KobukiChassis(plug, kobuki_config()))
+        # A spin is said as the speed of a wheel, in mm/s.
+        step_radps = 0.001 / (0.5 * WHEEL_BASE_M)
+        yield Rig(chassis, emulator, plug, own_timeout_s=0.6, battery_v=16.2, wire_step_radps=step_radps)

@@ -5,7 +5,13 @@ from pathlib import Path
 import pytest
 
 from config.app import load_app
-from config.chassis import AgilexChassisConfig, ChassisConfig, RoboclawChassisConfig, RoboteqChassisConfig
+from config.chassis import (
+    AgilexChassisConfig,
+    ChassisConfig,
+    KobukiChassisConfig,
+    RoboclawChassisConfig,
+    RoboteqChassisConfig,
+)
 from config.loader import CONFIG_DIR, ConfigError, Section, load
 
 
@@ -26,6 +32,8 @@ ROBOTEQ = (
     "track_width_m: 0.5}"
 )
 
+KOBUKI = "chassis: {kind: kobuki, link: {url: /dev/kobuki}}"
+
 
 def read(tmp_path: Path, text: str) -> ChassisConfig:
     path = tmp_path / "robot.yaml"
@@ -42,6 +50,9 @@ def test_kind_chooses_the_driver(tmp_path: Path) -> None:
     assert (roboclaw.address, roboclaw.timeout_ms, roboclaw.link.baud) == (0x80, 300, 115_200)
     roboteq = read(tmp_path, ROBOTEQ)
     assert isinstance(roboteq, RoboteqChassisConfig)
+    kobuki = read(tmp_path, KOBUKI)
+    assert isinstance(kobuki, KobukiChassisConfig)
+    assert (kobuki.max_speed_mps, kobuki.link.baud) == (0.7, 115_200)
     assert (roboteq.encoder, roboteq.watchdog_ms, roboteq.left_sign) == ("quadrature", 300, 1)
 
 
@@ -74,6 +85,7 @@ def test_kind_chooses_the_driver(tmp_path: Path) -> None:
         (ROBOCLAW.replace("accel_qpps2: 20000", "accel_qpps2: 1, timeout_ms: 250"), "multiple of 100"),
         (ROBOCLAW.replace("accel_qpps2: 20000", "accel_qpps2: 1, address: 1"), "address"),
         (ROBOCLAW.replace(", max_qpps: 20000", ""), "max_qpps: missing key"),
+        (KOBUKI.replace("}}", "}, max_speed_mps: 0.8}"), "max_speed_mps"),
         (ROBOTEQ.replace("1.5", "0.0"), "full_speed_mps"),
         (ROBOTEQ.replace("0.5}", "0.5, watchdog_ms: 0}"), "watchdog_ms"),
         (ROBOTEQ.replace("0.5}", "0.5, encoder: halls}"), "encoder"),

@@ -1,0 +1,67 @@
+"""A Kobuki (the base of Turtlebot 2) over its serial line, stepped by the control loop.
+
+The vendor's driver answers each feedback frame with one command, so that it says nothing when the frames
+stop. Here a command goes out every period whatever comes back: a zero above all.
+"""
+
+from __future__ import annotations
+
+from config.chassis import KobukiChassisConfig
+from hal.api import SerialLink
+from hal.chassis.arming import NS_PER_MS, ArmingLimits
+from hal.chassis.command import CommandLimits, due, is_zero
+from hal.chassis.driver import ChassisDriver
+from hal.chassis.kobuki_feedback import KobukiFeedback
+from hal.chassis.kobuki_packets import FrameReader, base_control, parse
+from hal.types import Setpoint
+
+
+class KobukiChassis(ChassisDriver):
+    """hal.api.Chassis for Kobuki."""
+
+    def __init__(self, link: SerialLink, config: KobukiChassisConfig) -> None:
+        feedback = KobukiFeedback(config)
+        commands = CommandLimits(
+            config.max_speed_mps, config.max_yaw_rate_radps, config.command_timeout_ms * NS_PER_MS
+        )
+        limits = ArmingLimits(
+            feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
+            status_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
+            arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
+            stall_ns=config.base_timeout_ms * NS_PER_MS,
+        )
+        super().__init__(link, feedback, commands, limits)
+        self._link = link
+        self._feedback = feedback
+        self._slip_factor = config.slip_factor
+        self._period_ns = config.command_period_ms * NS_PER_MS
+        self._reader = FrameReader()
+        self._motion_sent_ns: int | None = None
+        self._moving = False
+
+    def _listen(self, now_ns: int) -> None:
+        arrived = self._link.read()
+        self._feedback.bytes_heard += len(arrived)
+        for payload in self._reader.feed(arrived):
+            told = parse(payload)
+            if told is not None:
+                self._feedback.take(told, now_ns)
+
+    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        stops = self._moving and is_zero(command)
+        if not (stops or due(self._motion_sent_ns, self._period_ns, now_ns)):
+            return None
+        # The base turns slip_factor times less than its wheels say, so ask for that much more.
+        self._link.write(base_control(command.v_mps, command.w_radps * self._slip_factor))
+        self._motion_sent_ns = now_ns
+        self._moving = not is_zero(command)
+        return command
+
+    def _speak_stop(self, now_ns: int) -> None:
+        self._feedback.forget_setup()
+        self._link.write(base_control(0.0, 0.0))
+        self._motion_sent_ns = now_ns
+        self._moving = False
+
+    def _begin_arming(self) -> None:
+        self._feedback.await_setup()

@@ -1,0 +1,181 @@
+"""What a Kobuki has told: wheel speeds, pose, its bumper, cliff and wheel-drop switches. Pure bookkeeping."""
+
+from __future__ import annotations
+
+import math
+
+from config.chassis import KobukiChassisConfig
+from hal.chassis.arming import NS_PER_MS
+from hal.chassis.kobuki_packets import (
+    CLOCK_BITS,
+    ENCODER_BITS,
+    STANDING_ON_CABLE,
+    TICK_M,
+    WHEEL_BASE_M,
+    Core,
+    Feedback,
+    Inertia,
+)
+from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry, wrapped_difference
+from hal.geometry import wrap_angle_rad
+from hal.types import PlanarPose
+
+_SIDES = ("right", "centre", "left")
+_WHEELS = ("right", "left")
+_MOTORS = ("left", "right")
+
+_STANDING_MPS = 0.01
+_STANDING_RADPS = 0.03
+
+# A step larger than this times what the wheels can do is a restart, not travel.
+_JUMP_RATIO = 1.5
+_JUMP_SLACK_M = 0.02
+
+# The base's clock and ours may disagree by what a frame waits in buffers, not by this.
+_CLOCKS_APART_MS = 500
+
+
+class KobukiFeedback:
+    """The newest of everything the base says.
+
+    Distance is wheel ticks; yaw is the gyro's, which no slip fools, where a frame has one. Time between
+    two frames is the base's own clock: frames wait in buffers, ticks do not.
+    """
+
+    def __init__(self, config: KobukiChassisConfig) -> None:
+        self._config = config
+        self._geometry = TrackGeometry(WHEEL_BASE_M, config.slip_factor)
+        self._reckoning = DeadReckoning()
+        self._counter = TrackCounter(ENCODER_BITS)
+        self._core: Core | None = None
+        self._angle_rad: float | None = None
+        self._restarted = False
+        self._wanted = False
+        self.bytes_heard = 0
+        self.frames_heard = 0
+        self.pose_ns: int | None = None
+        self.feedback_ns: int | None = None
+        self.v_mps = math.nan
+        self.w_radps = math.nan
+        self.currents_a = (math.nan, math.nan)
+
+    @property
+    def pose(self) -> PlanarPose:
+        """Dead reckoning since the driver was made."""
+        return self._reckoning.pose
+
+    @property
+    def status_ns(self) -> int | None:
+        """Ticks and switches come in the same frame."""
+        return self.pose_ns
+
+    @property
+    def standing(self) -> bool:
+        """Measured speed is zero but for a tick or two of jitter; False while unknown."""
+        return abs(self.v_mps) <= _STANDING_MPS and abs(self.w_radps) <= _STANDING_RADPS
+
+    @property
+    def battery_v(self) -> float:
+        """NaN while unknown."""
+        return math.nan if self._core is None else self._core.battery_v
+
+    @property
+    def disobeys(self) -> str:
+        """A Kobuki always takes commands, so this is about whether it is the one that was armed."""
+        if not self._wanted:
+            return "nobody asked it to"
+        return "its clock or its ticks jumped: restarted" if self._restarted else ""
+
+    @property
+    def silence(self) -> str:
+        """What came instead of a frame with the basic sensors, and what to check."""
+        if self.bytes_heard == 0:
+            return "not one byte came; check port, power and the switch on the base"
+        return f"{self.bytes_heard} bytes came, no frame of a Kobuki; check port and baud (115200)"
+
+    @property
+    def stop_cause(self) -> str:
+        """The base's own sensors; "" for none. Bits that are not known count too."""
+        core = self._core
+        if core is None:
+            return ""
+        causes = [
+            *_named("bumper pressed", core.bumper, _SIDES),
+            *_named("cliff", core.cliff, _SIDES),
+            *_named("wheel dropped", core.wheel_drop, _WHEELS),
+        ]
+        if core.charger in STANDING_ON_CABLE:
+            causes.append("the charging cable is plugged in")
+        return f"emergency stop by the base's own sensors: {', '.join(causes)}" if causes else ""
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What the base complains about without being a reason to stop at once."""
+        return (
+            ()
+            if self._core is None
+            else _named("error: motor over-current", self._core.over_current, _MOTORS)
+        )
+
+    def await_setup(self) -> None:
+        """Arming begins."""
+        self._wanted = True
+        self._restarted = False
+
+    def forget_setup(self) -> None:
+        """The base is no longer asked to obey."""
+        self._wanted = False
+
+    def take(self, told: Feedback, now_ns: int) -> None:
+        """Take in one frame that arrived at now_ns."""
+        if told.currents_a is not None:
+            self.currents_a = told.currents_a
+        if told.core is not None:
+            self.frames_heard += 1
+            self._count(told.core, told.inertia, now_ns)
+
+    def _count(self, core: Core, inertia: Inertia | None, now_ns: int) -> None:
+        last, self._core = self._core, core
+        last_ns, self.pose_ns = self.pose_ns, now_ns
+        last_rad, self._angle_rad = self._angle_rad, None if inertia is None else inertia.angle_rad
+        elapsed_ms = 0
+        if last is not None and last_ns is not None:
+            elapsed_ms = wrapped_difference(core.clock_ms, last.clock_ms, CLOCK_BITS)
+            if abs(elapsed_ms - (now_ns - last_ns) / NS_PER_MS) > _CLOCKS_APART_MS:
+                self._jumped(core)
+                return
+        limit_m = _JUMP_RATIO * self._fastest_mps() * abs(elapsed_ms) / 1000.0 + _JUMP_SLACK_M
+        steps = self._counter.increments(core.left_ticks, core.right_ticks, limit_m / TICK_M)
+        if steps is None:
+            self._jumped(core)
+            return
+        if elapsed_ms <= 0:
+            return
+        distance_m, turn_rad = self._geometry.to_twist(steps[0] * TICK_M, steps[1] * TICK_M)
+        elapsed_s = elapsed_ms / 1000.0
+        self.w_radps = turn_rad / elapsed_s
+        if inertia is not None:
+            self.w_radps = inertia.rate_radps
+            turn_rad = turn_rad if last_rad is None else wrap_angle_rad(inertia.angle_rad - last_rad)
+        self._reckoning.advance(distance_m, turn_rad)
+        self.v_mps = distance_m / elapsed_s
+        self.feedback_ns = now_ns
+
+    def _jumped(self, core: Core) -> None:
+        """What happened meanwhile is not known; counting begins anew."""
+        self._restarted = True
+        self._counter = TrackCounter(ENCODER_BITS)
+        self._counter.increments(core.left_ticks, core.right_ticks, math.inf)
+        self.v_mps = self.w_radps = math.nan
+
+    def _fastest_mps(self) -> float:
+        config = self._config
+        return config.max_speed_mps + self._geometry.to_tracks(0.0, config.max_yaw_rate_radps)[1]
+
+
+def _named(what: str, bits: int, names: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(
+        f"{what} ({names[bit] if bit < len(names) else f'unknown bit {bit}'})"
+        for bit in range(8)
+        if bits >> bit & 1
+    )

@@ -1,0 +1,239 @@
+"""The Kobuki driver by the frames it writes and hears, with switches, wraps and noise."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from hal.chassis.kobuki import KobukiChassis
+from hal.chassis.kobuki_packets import TICK_M, base_control
+from hal.links.scripted import ScriptedSerialLink, serial_pair
+from hal.types import ChassisMode, ChassisState, Setpoint
+from sim.kobuki_emulator import KobukiEmulator
+from sim.plant import TrackedPlant
+from tests.support.chassis_rig import KOBUKI_PLANT, MS, kobuki_config
+
+STOP = bytes.fromhex("AA 55 06 01 04 00 00 00 00 03")
+
+
+class Bench:
+    """The driver with the emulator, and the line between them."""
+
+    def __init__(self, **changes: object) -> None:
+        self.near, self.far = serial_pair()
+        self.plant = TrackedPlant(KOBUKI_PLANT)
+        self.emulator = KobukiEmulator(self.far, self.plant, boot_ms=0)
+        self.chassis = KobukiChassis(self.near, kobuki_config(**changes))
+        self.now_ns = 0
+
+    def step(self, v_mps: float | None = None, w_radps: float = 0.0, after_ms: int = 20) -> ChassisState:
+        self.now_ns += after_ms * MS
+        self.emulator.advance_to(self.now_ns)
+        self.near.written.clear()
+        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
+        return self.chassis.exchange(command, self.now_ns)
+
+    def run(self, steps: int, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
+        for _ in range(steps):
+            state = self.step(v_mps, w_radps)
+        return state
+
+    def arm(self) -> None:
+        self.run(5)
+        self.chassis.arm(self.now_ns)
+        state = self.run(5)
+        assert state.mode is ChassisMode.ARMED, state.reason
+
+
+def test_standby_says_zero_every_period() -> None:
+    bench = Bench()
+    for _ in range(5):
+        bench.step(0.5)
+        assert bench.near.written == [STOP]
+
+
+def test_the_frames_of_a_drive_byte_for_byte() -> None:
+    bench = Bench(slip_factor=1.25)
+    bench.arm()
+    bench.step(0.3, 0.4)
+    assert bench.near.written == [bytes.fromhex("AA 55 06 01 04 65 01 58 02 3D")], "0.5 rad/s for 0.4 true"
+    bench.near.written.clear()
+    bench.chassis.stop(bench.now_ns)
+    assert bench.near.written == [STOP]
+
+
+def test_the_stop_goes_out_when_nothing_comes_back() -> None:
+    """The vendor's driver writes only in answer to a frame."""
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.4)
+    bench.near.hear_nothing()
+    state = bench.run(15, 0.4)
+    assert (state.mode, bench.near.written) == (ChassisMode.LOST, [STOP])
+    bench.emulator.advance_to(bench.now_ns + 100 * MS)
+    assert bench.plant.twist[0] < 0.3
+
+
+def test_a_zero_that_replaces_motion_does_not_wait_for_the_period() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.step(0.5)
+    assert bench.step(0.6, after_ms=1).sent is None
+    assert bench.step(0.0, after_ms=1).sent is not None
+    assert bench.near.written == [STOP]
+
+
+@pytest.mark.parametrize(
+    ("switch", "bits", "words"),
+    [
+        ("bumper", 1, "bumper pressed (right)"),
+        ("bumper", 6, "bumper pressed (centre), bumper pressed (left)"),
+        ("cliff", 4, "cliff (left)"),
+        ("wheel_drop", 1, "wheel dropped (right)"),
+        ("wheel_drop", 8, "wheel dropped (unknown bit 3)"),
+        ("charger", 22, "the charging cable is plugged in"),
+    ],
+)
+def test_its_own_sensors_stop_and_latch(switch: str, bits: int, words: str) -> None:
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.4)
+    setattr(bench.emulator, switch, bits)
+    state = bench.run(2, 0.4)
+    assert (state.mode, state.reason) == (
+        ChassisMode.ESTOP,
+        f"emergency stop by the base's own sensors: {words}",
+    )
+    assert bench.near.written == [STOP]
+    setattr(bench.emulator, switch, 0)
+    assert bench.run(100, 0.4).mode is ChassisMode.ESTOP, "only consent leads out"
+    assert bench.plant.twist[0] == pytest.approx(0.0, abs=1e-3)
+    bench.arm()
+
+
+def test_docked_it_may_drive_off() -> None:
+    bench = Bench()
+    bench.emulator.charger = 2
+    bench.arm()
+
+
+def test_over_current_is_told() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.emulator.over_current = 1
+    state = bench.run(2, 0.3)
+    assert (state.mode, state.faults) == (ChassisMode.ARMED, ("error: motor over-current (left)",))
+
+
+def test_ticks_and_clock_wrap() -> None:
+    """65 536 ticks are 5.59 m, the clock wraps after 65.5 s: 80 s at 0.3 m/s pass both."""
+    bench = Bench()
+    bench.arm()
+    states = [bench.step(0.3) for _ in range(4000)]
+    assert {state.mode for state in states} == {ChassisMode.ARMED}
+    assert pytest.approx(5.59, abs=0.01) == 65_536 * TICK_M
+    assert states[-1].pose.x_m > 4 * 5.59
+    assert states[-1].pose.x_m == pytest.approx(bench.plant.pose.x_m, abs=0.01)
+
+
+def test_speed_is_by_the_base_s_own_clock() -> None:
+    """Frames that waited in a buffer and come together do not make it faster."""
+    bench = Bench()
+    bench.arm()
+    bench.run(60, 0.4)
+    for after_ms in (20, 60, 10, 30, 20, 90, 20):
+        assert bench.step(0.4, after_ms=after_ms).v_mps == pytest.approx(0.4, abs=0.006)
+
+
+@pytest.mark.parametrize("gyro", [True, False])
+def test_yaw_is_the_gyro_s_or_the_wheels(gyro: bool) -> None:
+    """With the wrong slip factor only the gyro knows how far it really turned."""
+    bench = Bench(slip_factor=1.0)
+    bench.emulator.gyro = gyro
+    bench.arm()
+    bench.run(100, 0.2, 0.5)
+    state = bench.run(50)
+    believed = 1.0 if gyro else KOBUKI_PLANT.slip_factor
+    assert state.pose.heading_rad == pytest.approx(believed * bench.plant.pose.heading_rad, abs=0.005)
+    assert bench.plant.pose.heading_rad > 0.8
+
+
+def test_the_gyro_s_angle_wraps() -> None:
+    bench = Bench()
+    bench.arm()
+    turned = 0.0
+    last = 0.0
+    for _ in range(500):
+        heading = bench.step(0.0, 1.0).pose.heading_rad
+        turned += math.remainder(heading - last, math.tau)
+        last = heading
+    assert turned > 1.4 * math.tau
+    # The pose is brought forward to the exchange by up to one period.
+    assert math.remainder(last - bench.plant.pose.heading_rad, math.tau) == pytest.approx(0.0, abs=0.03)
+
+
+def test_a_restart_shows_in_clock_or_ticks() -> None:
+    driving, standing = Bench(), Bench()
+    driving.arm()
+    driving.run(100, 0.4)
+    driving.emulator.restart()
+    assert driving.run(3, 0.4).reason.startswith("the base no longer obeys: its clock or its ticks jumped")
+    standing.arm()
+    standing.run(50)
+    standing.emulator.restart()
+    state = standing.run(3)
+    assert (state.mode, state.reason.split(";")[0]) == (
+        ChassisMode.ESTOP,
+        "the base no longer obeys: its clock or its ticks jumped: restarted",
+    )
+    standing.arm()
+
+
+def test_wrong_checksums_on_the_line_are_survived() -> None:
+    bench = Bench()
+    bench.arm()
+    count = 0
+
+    def spoil(data: bytes) -> bytes:
+        nonlocal count
+        count += 1
+        return data[:9] + bytes((data[9] ^ 0x40,)) + data[10:] if count % 4 == 0 else data
+
+    bench.near.hear_through(spoil)
+    states = [bench.step(0.4) for _ in range(300)]
+    assert {state.mode for state in states} == {ChassisMode.ARMED}
+    assert states[-1].pose.x_m == pytest.approx(bench.plant.pose.x_m, abs=0.01)
+
+
+def test_nothing_is_known_before_the_second_frame() -> None:
+    bench = Bench()
+    first, second = bench.step(after_ms=0), bench.step()
+    assert (first.feedback_ns, math.isnan(first.v_mps), first.battery_v) == (None, True, 16.2)
+    assert (second.feedback_ns, second.v_mps) == (20 * MS, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("babble", "hint"),
+    [
+        (b"", "not one byte came; check port, power and the switch on the base"),
+        (b"FF=0\r", "bytes came, no frame of a Kobuki; check port and baud (115200)"),
+    ],
+)
+def test_a_device_that_is_no_kobuki_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
+    link = ScriptedSerialLink()
+    chassis = KobukiChassis(link, kobuki_config())
+    chassis.arm(0)
+    for k in range(1, 160):
+        link.deliver(babble)
+        state = chassis.exchange(None, k * 20 * MS)
+    assert state.mode is ChassisMode.STANDBY
+    assert state.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
+    assert hint in state.reason
+
+
+def test_the_fastest_is_the_wire_s_too() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.step(9.0)
+    assert bench.near.written == [base_control(0.7, 0.0)]
