@@ -1,4 +1,4 @@
-"""A Kobuki at the other end of a serial line: streams its sensors, follows base control, stops when left alone.
+"""A Kobuki at the other end of a serial line: streams its sensors, follows base control, stops if left alone.
 
 As on the real base its bumper, cliff and wheel-drop switches only report: stopping is the host's work.
 """

@@ -111,11 +111,8 @@ class KobukiFeedback:
     @property
     def faults(self) -> tuple[str, ...]:
         """What the base complains about without being a reason to stop at once."""
-        return (
-            ()
-            if self._core is None
-            else _named("error: motor over-current", self._core.over_current, _MOTORS)
-        )
+        over_current = 0 if self._core is None else self._core.over_current
+        return _named("error: motor over-current", over_current, _MOTORS)
 
     def await_setup(self) -> None:
         """Arming begins."""

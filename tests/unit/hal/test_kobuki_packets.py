@@ -65,7 +65,7 @@ def test_values_of_a_frame() -> None:
     told = packets.parse(CORE + INERTIA + bytes.fromhex("06 02 64 0A"))
     assert told is not None
     assert told.core == Core(1000, 2, 2, 1, 65_535, 1, 0, 16.2, 2)
-    assert told.inertia == Inertia(pytest.approx(math.pi / 2), pytest.approx(-math.radians(10)))
+    assert told.inertia == Inertia(math.radians(90.0), math.radians(-10.0))
     assert told.currents_a == (1.0, 0.1)
 
 

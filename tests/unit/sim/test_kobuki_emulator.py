@@ -150,6 +150,7 @@ def test_commands_may_come_in_pieces_and_merged() -> None:
 
 def test_versions_on_request() -> None:
     bench = Bench()
+    bench.after(10)
     bench.host.write(bytes.fromhex("AA 55 04 09 02 0B 00 04"))
     parts = bench.frame()
     assert (len(parts[10]), len(parts[11]), len(parts[19])) == (4, 4, 12)
