@@ -28,6 +28,7 @@ from config.scenario import Scenario, load_scenario
 from controller.control import ControlLoop
 from controller.decide import DecisionMaker
 from controller.follow import PathFollower
+from controller.guard import GuardedCanLink, GuardedChassis, GuardLimits
 from controller.localise import Localiser
 from controller.path import Path
 from controller.perceive import Perceiver
@@ -37,6 +38,7 @@ from hal.api import Chassis, Clock, FrameSource, OdometrySource, SerialLink
 from hal.cameras.pose_file import PoseFile, open_odometry
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
+from hal.chassis.agilex import COMMANDS as AGILEX_COMMANDS
 from hal.chassis.agilex import AgilexChassis
 from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.roboclaw import RoboclawChassis
@@ -179,6 +181,12 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
 
     Neither is opened yet; enter the emulator first. Raises DeviceNotFound, DeviceRefused when entered.
     """
+    driver, emulator = _bare_base(config, start, start_ns)
+    limits = GuardLimits.of(config.robot.limits, 1.0 / config.runner.control_rate_hz)
+    return GuardedChassis(driver, limits), emulator
+
+
+def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Chassis, Emulator | None]:
     simulation = config.simulation
     emulated = simulation is not None and simulation.base == "emulated"
     plant = None
@@ -186,7 +194,7 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
         plant = TrackedPlant(simulation.plant, start, start_ns)
     if isinstance(config.chassis, AgilexChassisConfig):
         link = config.chassis.link
-        driver = AgilexChassis(CanBusLink(link), config.chassis)
+        driver = AgilexChassis(GuardedCanLink(CanBusLink(link), AGILEX_COMMANDS), config.chassis)
         return driver, None if plant is None else AgilexEmulator(CanBusLink(link), plant)
     if plant is None:
         return _serial_driver(config.chassis, SerialPortLink(config.chassis.link)), None

@@ -115,8 +115,9 @@ def measure_exchange(chassis: TimedChassis, emulator: Emulator, exchanges: int, 
         for index in range(exchanges + _ARM_STEPS):
             now_ns = index * PERIOD_NS
             emulator.advance_to(now_ns)
-            armed = bool(spent_ns)
-            setpoint = Setpoint(now_ns, 0.5, 0.0, 0.2) if armed else Setpoint(now_ns, 0.0, 0.0, 0.0)
+            # A quarter of a m/s2: the output guard lets no jump pass.
+            v_mps = min(0.005 * len(spent_ns), 0.5)
+            setpoint = Setpoint(now_ns, v_mps, 0.0, 0.4 * v_mps)
             state = chassis.exchange(setpoint, now_ns)
             if state.mode is ChassisMode.ARMED:
                 spent_ns.append(chassis.spent_ns)

@@ -6,6 +6,9 @@ base out of standby while arming and puts it back afterwards.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from config.chassis import AgilexChassisConfig
 from hal.api import CanLink
 from hal.chassis.agilex_feedback import AgilexFeedback
@@ -22,6 +25,9 @@ from hal.chassis.arming import NS_PER_MS, ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero, zero
 from hal.chassis.driver import ChassisDriver
 from hal.types import ChassisMode, Setpoint
+
+# All that this driver ever sends: identifiers, and how many bytes at most.
+COMMANDS: Mapping[int, int] = MappingProxyType({0x111: 8, 0x421: 1})
 
 # A bus at 500 kbit/s carries about 90 frames in 20 ms; more than this in one exchange is a flood.
 _MAX_FRAMES = 256
