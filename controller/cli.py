@@ -142,6 +142,60 @@ def evaluate(
     )
 
 
+@cli.command()
+@click.option(
+    "--config", "config_path", type=_FILE, default=DEFAULT_CONFIG, show_default="the simulated warehouse",
+    help="YAML of robot, camera, chassis, perception and decision.",
+)  # fmt: skip
+@click.option("--missions", type=click.IntRange(min=1), default=260, show_default=True)
+@click.option("--families", metavar="A,B,...", help="Scenario families; all of them by default.")
+@click.option("--policies", metavar="A,B,...", help="ours, paper, zones, field; all of them by default.")
+@click.option(
+    "--mode", type=click.Choice(["noise", "camera"]), default="noise", show_default=True,
+    help="A noise model in place of the camera, or rendered and perceived frames.",
+)  # fmt: skip
+@click.option(
+    "--workers", type=click.IntRange(1, 256), default=min(os.cpu_count() or 1, 8), show_default=True
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The first seed.")
+@click.option(
+    "--report", type=click.Path(path_type=Path, file_okay=False),
+    help="Folder for missions.jsonl, summary.json, report.md and the figures.",
+)  # fmt: skip
+@click.option("--resume", is_flag=True, help="Go on with a campaign that was broken off.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, for example tcp://10.0.0.5:8786.")
+@click.option("--only", metavar="FAMILY:SEED", help="One mission alone.")
+@click.option("--video", is_flag=True, help="Camera mode: keep recordings and videos of what fails.")
+@click.option("--quiet", is_flag=True, help="No progress bar.")
+def campaign(
+    config_path: Path,
+    missions: int,
+    families: str | None,
+    policies: str | None,
+    mode: Literal["noise", "camera"],
+    workers: int,
+    seed: int,
+    report: Path | None,
+    resume: bool,
+    scheduler: str | None,
+    only: str | None,
+    video: bool,
+    quiet: bool,
+) -> None:
+    """Drive missions of all scenario families, several policies side by side. Exit code 1 if ours failed."""
+    from controller.campaign.command import CampaignOptions, run_campaign
+
+    options = CampaignOptions(
+        config_path, missions, _names(families), _names(policies), mode, workers, seed, report, resume,
+        scheduler, only, video, quiet,
+    )  # fmt: skip
+    sys.exit(run_campaign(options))
+
+
+def _names(text: str | None) -> tuple[str, ...]:
+    return tuple(name.strip() for name in (text or "").split(",") if name.strip())
+
+
 def main() -> None:
     """Entry point: turns every error that a user can mend into one line and exit code 2."""
     try:

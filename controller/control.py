@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from controller.decide import DecisionMaker
 from controller.decision import Decision
 from controller.follow import PathFollower
 from controller.localise import Localiser
@@ -66,13 +65,28 @@ class Drive(Protocol):
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep: ...
 
 
+class Decides(Protocol):
+    """What a drive is decided by; DecisionMaker is ours, a campaign compares it with others."""
+
+    def step(
+        self,
+        scene: Scene | None,
+        path: Path,
+        pose: PlanarPose,
+        on_path: OnPath,
+        v_mps: float,
+        a_mps2: float,
+        now_ns: int,
+    ) -> Decision: ...
+
+
 class ControlLoop:
     """Owns the order of things within a control period; every part in it is stepped, none runs by itself."""
 
     def __init__(
         self,
         path: Path,
-        decide: DecisionMaker,
+        decide: Decides,
         shape: SpeedShaper,
         follow: PathFollower,
         localiser: Localiser,

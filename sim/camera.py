@@ -87,6 +87,10 @@ class SimulatedCamera:
         self._index += 1
         return frame
 
+    def lose_frame(self) -> None:
+        """The next frame gets lost on its way; its sequence number shows it."""
+        self._index += 1
+
     def camera_pose(self, stamp_ns: int) -> Pose:
         """The true optical frame in the floor's frame, with vibration."""
         amplitude = math.radians(self._config.vibration_deg)

@@ -3,30 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 from controller.decision import Action, Decision
-from controller.path import OnPath, Path
 from controller.tally import SetpointTally
 from hal.types import FloatArray, PlanarPose
-from vision.scene import Scene
-
-
-class Policy(Protocol):
-    """Scene, path and state -> Decision; controller.decide.DecisionMaker is ours."""
-
-    def step(
-        self,
-        scene: Scene | None,
-        path: Path,
-        pose: PlanarPose,
-        on_path: OnPath,
-        v_mps: float,
-        a_mps2: float,
-        now_ns: int,
-    ) -> Decision: ...
 
 
 @dataclass

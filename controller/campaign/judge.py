@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import asdict, dataclass
 
@@ -25,6 +24,8 @@ _SUBSTEPS = 4
 _STOPPED_MPS, _MOVING_AGAIN_MPS = 0.02, 0.1
 _BEFORE_STOP_S, _AFTER_STOP_S = 4.0, 2.0
 _AFTER_FAULT_S = 1.5
+_SIGHT_STEPS = 5
+_SEEN_MOVING_MPS = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,7 @@ class _Clearance:
         self.least_m = min(self.least_m, float(gap.min(initial=math.inf)))
 
     def _gap(self, body: int, times: FloatArray, poses: FloatArray, exact_below_m: float) -> FloatArray:
-        """(T,) distance; where circles are further apart than exact_below_m and than the least so far, theirs."""
+        """(T,) distance; that of circles where they are further apart than what matters."""
         robot = self._stage.robot.body
         polygons = self._stage.world.over(times, body)
         middle = polygons.mean(axis=1)
@@ -131,7 +132,8 @@ class _Clearance:
         exact = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
         if len(exact):
             gap[exact] = separation(self._stage.robots(poses[exact]), polygons[exact])
-        return gap
+        distance: FloatArray = gap
+        return distance
 
     def _between(self, close: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
         wide = close.copy()
@@ -155,37 +157,35 @@ class _Clearance:
             last_s = float(times[k])
             if fresh:
                 self._contacts.append(Contact(last_s, body, float(speeds[k])))
-            elif speeds[k] > self._contacts[-1].v_mps and self._contacts[-1].v_mps <= AT_FAULT_MPS:
-                # It stood when it was touched, and then drove on into it.
-                self._contacts[-1] = Contact(last_s, body, float(speeds[k]))
 
 
 def _at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> bool:
-    """Whether the robot moved, and a driver with the same field of view that knows the motion of whatever it
-    has seen once avoids it: by braking as hard as allowed, or by speeding up, from the first sight on."""
+    """Whether the robot moved, and a driver with the same field of view who knows the whole motion of what it
+    has once seen moving (or standing, if it never moves) avoids it: by braking as hard as is allowed, by
+    braking comfortably, by going on, or by speeding up, from that sight on."""
     if contact.v_mps <= AT_FAULT_MPS:
         return False
     seen = _first_seen(contact, stage, log, eye)
     if seen is None:
         return False
     limits = stage.robot.limits
-    for accel, bound in (
+    choices = (
         (-limits.emergency_decel_mps2, 0.0),
         (-limits.max_accel_mps2, 0.0),
         (0.0, log.v_mps[seen]),
         (limits.max_accel_mps2, limits.max_speed_mps),
-    ):
-        if not _touches(contact.body, stage, log, seen, accel, bound):
-            return True
-    return False
+    )
+    return not all(_touches(contact.body, stage, log, seen, accel, bound) for accel, bound in choices)
 
 
 def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
-    """The step at which the body that was touched could first be seen; None: never before the contact."""
-    for k in range(0, len(log.times_s), 5):
+    """The step at which what was touched could first be seen as what it is; None: not before the contact."""
+    for k in range(0, len(log.times_s), _SIGHT_STEPS):
         if log.times_s[k] >= contact.t_s:
             return None
-        polygons, _ = stage.world.look(log.times_s[k])
+        polygons, velocity = stage.world.look(log.times_s[k])
+        if stage.world.moves[contact.body] and math.hypot(*velocity[contact.body]) < _SEEN_MOVING_MPS:
+            continue
         view = eye.look(polygons, PlanarPose(*log.poses[k]))
         column = np.flatnonzero(view.bodies == contact.body)
         if len(column) and np.isfinite(view.forward_m[:, column[0]]).any():
@@ -262,9 +262,3 @@ def _stops(v: FloatArray) -> list[tuple[int, int]]:
             if stops:
                 stops[-1] = (start, k)
     return stops
-
-
-def turning_points(values: list[float]) -> int:
-    """How often a series turns round; for figures."""
-    steps = [b - a for a, b in itertools.pairwise(values) if b != a]
-    return sum(1 for a, b in itertools.pairwise(steps) if (a > 0) != (b > 0))

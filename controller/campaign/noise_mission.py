@@ -1,4 +1,4 @@
-"""A mission without renderer, buses or processes: noisy scenes, the real decision and shaper, a base with lag.
+"""A mission without renderer and buses: noisy scenes, the real decision and shaper, a base with lag.
 
 The robot keeps its path to a centimetre or two (the path tracking is proven elsewhere); along it, the base
 follows the commanded speed with the lag of sim.plant, and odometry is a little wrong.
@@ -14,10 +14,10 @@ import numpy as np
 
 from config.app import AppConfig, LockstepRunner, SimulationConfig
 from config.camera import SimulatedCameraConfig
-from controller.campaign.drive import DriveLog, Policy
+from controller.campaign.drive import DriveLog
 from controller.campaign.noisy_camera import NoisyCamera
 from controller.campaign.stage import Stage
-from controller.control import ARRIVED_M
+from controller.control import ARRIVED_M, Decides
 from controller.path import OnPath
 from controller.shape import SpeedShaper
 from controller.tally import SetpointTally
@@ -98,7 +98,7 @@ class _Eyes:
         return self.known
 
 
-def drive_noise(stage: Stage, config: AppConfig, policy: Policy) -> DriveLog:
+def drive_noise(stage: Stage, config: AppConfig, policy: Decides) -> DriveLog:
     """One drive from rest at the start until rest at the target, or until nothing more will happen."""
     assert isinstance(config.camera, SimulatedCameraConfig)
     assert isinstance(config.runner, LockstepRunner)

@@ -5,10 +5,10 @@ What is modelled, and from where the numbers are:
 * depth noise sigma = 0.0075 z^2 per pixel (measured on a real RealSense), of which a tracked body keeps a
   quarter as a wandering error, and of which the nearest surface of a band, being the third smallest of some
   twenty cells, shows its near tail;
-* a body is reported from its third sighting on, is missed in some frames (more of them far away), is predicted
-  while it is not seen, and forgotten after half a second, as vision/tracker.py does;
-* velocity follows the truth with a lag of the measuring window, with an error that wanders, and with a spread
-  that is as wide as V_omax at first sight.
+* a body is reported from its third sighting on, is missed in some frames (more of them far away), is
+  predicted while it is not seen, and forgotten after half a second, as vision/tracker.py does;
+* velocity follows the truth with a lag of the measuring window, with an error that wanders, and with a
+  spread that is as wide as V_omax at first sight.
 """
 
 from __future__ import annotations

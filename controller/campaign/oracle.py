@@ -1,16 +1,16 @@
 """The shortest possible time of a robot that knows all motions in advance.
 
-Dynamic programming over (time, position, speed). The acceleration is one of -A, 0, +A for a step dt, so speeds
-are multiples of A dt and positions of A dt^2 / 2: a lattice on which every step is exact,
+Dynamic programming over (time, position, speed). The acceleration is one of -A, 0, +A for a step dt, so
+speeds are multiples of A dt and positions of A dt^2 / 2: a lattice on which every step is exact,
 
-    v' = v + a dt,    s' = s + v dt + a dt^2 / 2    ->    k' = k + i,    n' = n + 2 k + i,    i in {-1, 0, 1}
+    v' = v + a dt,   s' = s + v dt + a dt^2 / 2    ->    k' = k + i,   n' = n + 2 k + i,   i in {-1, 0, 1}
 
-and all positions of one speed are the bits of one integer: a step is a few shifts. The top speed is a multiple
-of A dt by the choice of dt. A standing robot that something walks into is not at fault, so only moving states
-are taken out where something stands.
+and all positions of one speed are the bits of one integer: a step is a few shifts. The top speed is a
+multiple of A dt by the choice of dt. A standing robot that something walks into is not at fault, so only
+moving states are taken out where something stands.
 
-The time of the free way is computed exactly instead (s-curve, controller/braking.py); the lattice tells by how
-much what is in the way delays the arrival.
+The time of the free way is computed exactly instead (s-curve, controller/braking.py); the lattice tells by
+how much what is in the way delays the arrival.
 """
 
 from __future__ import annotations

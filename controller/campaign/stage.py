@@ -1,4 +1,4 @@
-"""One mission's world as the plane sees it, for everybody who needs the truth: camera model, judge, oracle."""
+"""One mission's world in the plane, for everybody who needs the truth: camera model, judge, oracle."""
 
 from __future__ import annotations
 

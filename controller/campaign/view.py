@@ -87,7 +87,8 @@ class PlanarEye:
         tangent = right / np.maximum(forward, _NEAR_M)
         low, high = tangent.min(axis=1) - self.half_width_tan, tangent.max(axis=1) + self.half_width_tan
         bearing = self.bearing_tan[:, None]
-        missed = ahead & (bearing > low) & (bearing < high) & ~np.isfinite(hits).any(axis=0)
+        thin = ahead & (high - low <= 4.0 * self.half_width_tan) & ~np.isfinite(hits).any(axis=0)
+        missed = thin & (bearing > low) & (bearing < high)
         return np.where(missed, forward.min(axis=1), hits)
 
     def _in_frame(self, bodies: NDArray[np.intp], hits: FloatArray) -> NDArray[np.bool_]:

@@ -3,7 +3,20 @@
 from __future__ import annotations
 
 from config.scenario import BodySpec, Motion, Scenario
-from sim.families.layout import Random, drive, go, person, racks, robot, scenario, side_of, wait, walk
+from sim.families.layout import (
+    FRONT_M,
+    Random,
+    drive,
+    furthest_m,
+    go,
+    person,
+    racks,
+    robot,
+    scenario,
+    side_of,
+    wait,
+    walk,
+)
 
 _BESIDE_M = 1.2
 
@@ -35,14 +48,18 @@ def overtaking(random: Random) -> Scenario:
     length = float(random.uniform(14.0, 18.0))
     side = side_of(random)
     speed = float(random.uniform(1.6, 2.0))
-    lane = float(random.choice([side * _BESIDE_M, 0.0]))
+    from_x, start_s = -2.5, float(random.uniform(0.0, 3.0))
+    merge_x = float(random.uniform(4.0, 10.0))
+    # Nobody turns into a lane right before whoever they have just passed.
+    passed = furthest_m(start_s + (merge_x - from_x) / speed + 0.6) + FRONT_M + 1.5 < merge_x
+    lane = 0.0 if passed and random.integers(4) else side * _BESIDE_M
     way = walk(
-        float(random.uniform(0.5, 3.0)),
-        go(8.0, side * _BESIDE_M, speed),
-        go(10.0, lane, speed),
+        start_s,
+        go(merge_x, side * _BESIDE_M, speed),
+        go(merge_x + 1.5, lane, speed),
         go(length + 6.0, lane, speed),
     )
-    who = person(random, "person", (-3.0, side * _BESIDE_M), way)
+    who = person(random, "person", (from_x, side * _BESIDE_M), way)
     return scenario("overtaking", length, (*racks(random, length), who))
 
 

@@ -1,0 +1,218 @@
+"""A mission with everything real but the world: rendered frames, perception, driver, bus, emulated base.
+
+The parts are those that `treadwatch run` drives in lock-step; what goes wrong is brought about where it would
+happen: frames are lost, repeated or blinded before perception sees them, the base stops to answer.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import yaml
+
+from config.app import AppConfig, LockstepRunner, SimulationConfig
+from controller.build import (
+    build_base,
+    build_path,
+    build_perceiver,
+    build_simulation,
+    mount_of,
+    open_simulated_camera,
+    surroundings,
+)
+from controller.campaign.drive import DriveLog
+from controller.campaign.noise_mission import GIVE_UP_S
+from controller.campaign.policies import build_policy
+from controller.campaign.stage import Stage
+from controller.control import SETTLE_S, ControlLoop, Outcome
+from controller.follow import PathFollower
+from controller.localise import Localiser
+from controller.lockstep import run_lockstep
+from controller.recorder import RecordingOptions, RunRecorder, open_recorder
+from controller.shape import SpeedShaper
+from controller.tally import SetpointTally
+from hal.cameras.tum_writer import TumWriter
+from hal.clocks import NS_PER_S, SimulatedClock
+from hal.types import ChassisMode, PlanarPose, RgbdFrame
+from sim.camera import SimulatedCamera
+from sim.faults import Faults
+from sim.simulation import Simulation
+
+_STANDING_MPS = 1e-3
+_NO_RECORDING = RecordingOptions(timed=False)
+
+
+@runtime_checkable
+class _Freezes(Protocol):
+    def freeze(self) -> None: ...
+
+
+class SpoiledCamera:
+    """A simulated camera behind whatever goes wrong with it; a FrameSource for the lock-step runner."""
+
+    def __init__(self, camera: SimulatedCamera, faults: Faults, glass_ids: tuple[int, ...]) -> None:
+        self._camera, self._faults, self._glass_ids = camera, faults, glass_ids
+        self._last: RgbdFrame | None = None
+        self.writer: TumWriter | None = None
+
+    @property
+    def next_capture_ns(self) -> int:
+        """When the next frame will arrive that is not lost."""
+        silent = self._faults.silent
+        while silent is not None and silent.holds(self._camera.next_capture_ns / NS_PER_S):
+            self._camera.lose_frame()
+        return self._camera.next_capture_ns
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """The next frame, as it reaches perception. Raises FrameTimeout."""
+        frame = self._camera.read(timeout_s)
+        frozen = self._faults.frozen
+        if frozen is not None and self._last is not None and frozen.holds(frame.captured_ns / NS_PER_S):
+            frame = replace(frame, colour=self._last.colour, depth=self._last.depth)
+        elif self._glass_ids:
+            frame = self._blinded(frame)
+        self._last = frame
+        if self.writer is not None:
+            self.writer.write(frame)
+        return frame
+
+    def _blinded(self, frame: RgbdFrame) -> RgbdFrame:
+        """Depth returns nothing of glass."""
+        picture = self._camera.last_picture
+        assert picture is not None, "a frame that was read has a picture behind it"
+        glass = np.isin(picture.instance_mask(), self._glass_ids)
+        return replace(frame, depth=np.where(glass, np.uint16(0), frame.depth))
+
+
+def drive_camera(stage: Stage, config: AppConfig, policy: str, keep: FilePath | None = None) -> DriveLog:
+    """One drive. keep: a folder for the recording, the observations and the video of it."""
+    with TemporaryDirectory(prefix="treadwatch-") as folder:
+        scenario = FilePath(folder) / "scenario.yaml"
+        scenario.write_text(scenario_yaml(stage), encoding="utf-8")
+        return _drive(stage, _with_world(config, stage, scenario), scenario, policy, keep)
+
+
+def scenario_yaml(stage: Stage) -> str:
+    """The mission's world as `treadwatch run --scenario` reads it."""
+    content = stage.case.scenario.model_dump(mode="json", exclude_none=True)
+    return yaml.safe_dump(content, sort_keys=False)
+
+
+def _with_world(config: AppConfig, stage: Stage, scenario: FilePath) -> AppConfig:
+    """The configuration in this world, with this mission's slip and lateness."""
+    assert isinstance(config.runner, LockstepRunner), "checked by controller/campaign/command.py"
+    faults = stage.case.faults
+    simulation = config.simulation or SimulationConfig(scenario=str(scenario))
+    plant = simulation.plant.model_copy(update={"slip_factor": 1.0 / (1.0 - faults.yaw_slip)})
+    changed = {"scenario": str(scenario), "seed": stage.case.seed, "plant": plant}
+    late_s = faults.late_by_s if faults.late is not None else 0.0
+    runner = {
+        "perception_latency_s": config.runner.perception_latency_s + late_s,
+        "max_duration_s": stage.case.scenario.duration_s,
+    }
+    return config.model_copy(
+        update={
+            "simulation": simulation.model_copy(update=changed),
+            "runner": config.runner.model_copy(update=runner),
+        }
+    )
+
+
+def _drive(
+    stage: Stage, config: AppConfig, scenario: FilePath, policy: str, keep: FilePath | None
+) -> DriveLog:
+    assert isinstance(config.runner, LockstepRunner)
+    clock = SimulatedClock()
+    path = build_path(config, scenario)
+    chassis, emulator = build_base(config, path.start, clock.now_ns())
+    assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
+    simulation = build_simulation(config, scenario, emulator, clock.now_ns())
+    true_camera = open_simulated_camera(
+        config, scenario, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
+    )
+    camera = SpoiledCamera(true_camera, stage.case.faults, _glass_ids(stage))
+    mount, period_s = mount_of(config), 1.0 / config.runner.control_rate_hz
+    loop = ControlLoop(
+        path=path,
+        decide=build_policy(policy, config, stage),
+        shape=SpeedShaper(config.robot.limits, period_s, config.decision.chassis_delay_s),
+        follow=PathFollower(path, config.robot.limits, config.decision.chassis_delay_s),
+        localiser=Localiser(path.start, mount),
+        chassis=chassis,
+    )
+    options = _NO_RECORDING
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
+        (keep / "scenario.yaml").write_text(scenario_yaml(stage), encoding="utf-8")
+        options = RecordingOptions(keep / "observations.jsonl", keep / "video.mp4", timed=False)
+    log = DriveLog(SetpointTally(config.robot.limits, period_s))
+    with ExitStack() as devices:
+        devices.enter_context(simulation)
+        devices.enter_context(chassis)
+        devices.enter_context(true_camera)
+        recorder = RunRecorder(devices.enter_context(open_recorder(options, surroundings(config))), path)
+        if keep is not None:
+            camera.writer = devices.enter_context(TumWriter(keep / "recording", mount))
+        perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
+        watch = _Watch(stage, simulation, log)
+        for moment in run_lockstep(config.runner, clock, simulation, camera, perceiver, loop):
+            for look in moment.looks:
+                recorder.saw(look)
+            recorder.decided(moment.control)
+            t_s = moment.control.now_ns / NS_PER_S
+            lost_s = stage.case.faults.feedback_lost_s
+            if lost_s is not None and t_s >= lost_s and isinstance(emulator, _Freezes):
+                emulator.freeze()
+            armed = moment.control.chassis.mode is ChassisMode.ARMED
+            watch.step(t_s, armed)
+            log.add(t_s, simulation.body_pose, watch.s_m, watch.v_mps, moment.control.decision)
+            log.setpoints.add(moment.control.chassis.sent)
+            if watch.given_up:
+                break
+        recorder.finish()
+    if loop.outcome is Outcome.REACHED:
+        log.reached_s = log.times_s[-1] - SETTLE_S - watch.armed_s
+    return log
+
+
+def _glass_ids(stage: Stage) -> tuple[int, ...]:
+    """Their values in instance masks: the scenario's k-th body is k + 1."""
+    names = stage.world.names
+    return tuple(k + 1 for k, name in enumerate(names) if name in stage.case.faults.glass)
+
+
+class _Watch:
+    """Where the robot truly is along its path, and whether anything will still happen."""
+
+    def __init__(self, stage: Stage, simulation: Simulation, log: DriveLog) -> None:
+        self._stage, self._simulation, self._log = stage, simulation, log
+        self.s_m, self.v_mps, self.armed_s = 0.0, 0.0, math.nan
+        self._before: tuple[float, PlanarPose] | None = None
+        self._standing_s = 0.0
+
+    @property
+    def given_up(self) -> bool:
+        """It has stood for long, and nothing else moves any more."""
+        if not self._log.times_s or self._log.times_s[-1] < self._stage.world.end_s + GIVE_UP_S:
+            return False
+        return self._standing_s >= GIVE_UP_S
+
+    def step(self, t_s: float, armed: bool) -> None:
+        """Once a control step."""
+        pose = self._simulation.body_pose
+        self.s_m = self._stage.path.project(pose, self.s_m).s_m
+        if armed and math.isnan(self.armed_s):
+            self.armed_s = t_s
+        if self._before is not None:
+            dt_s = t_s - self._before[0]
+            way_m = math.hypot(pose.x_m - self._before[1].x_m, pose.y_m - self._before[1].y_m)
+            self.v_mps = way_m / dt_s
+            self._standing_s = self._standing_s + dt_s if self.v_mps < _STANDING_MPS else 0.0
+        self._before = (t_s, pose)

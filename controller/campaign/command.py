@@ -1,0 +1,165 @@
+"""`treadwatch campaign`: missions by the thousand, and one of them alone."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from config.app import AppConfig, LockstepRunner, load_app
+from controller.campaign.judge import Row
+from controller.campaign.plan import Mission, missions, run_here, run_there
+from controller.campaign.policies import OURS, POLICY_NAMES
+from controller.campaign.report import write_report
+from controller.campaign.store import MissionStore
+from controller.campaign.summary import Summary, why_failed
+from controller.campaign.task import Mode, Task, failed, run_task, time_ratio
+from controller.errors import UserError
+from sim.families import FAMILY_NAMES
+
+FAILING = "failing"
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignOptions:
+    """The command line of `treadwatch campaign`. Empty families or policies mean all of them; only:
+    FAMILY:SEED, one mission alone."""
+
+    config_path: Path
+    missions: int
+    families: tuple[str, ...]
+    policies: tuple[str, ...]
+    mode: Mode
+    workers: int
+    seed: int
+    report: Path | None
+    resume: bool = False
+    scheduler: str | None = None
+    only: str | None = None
+    video: bool = False
+    quiet: bool = False
+
+
+def run_campaign(options: CampaignOptions) -> int:
+    """The exit code: 1 if ours failed in any mission. Raises ConfigError, UserError."""
+    config = load_app(options.config_path)
+    _check(options, config)
+    if options.only is not None:
+        return _run_one(options, config, _mission_of(options.only))
+    assert options.report is not None
+    families = options.families or FAMILY_NAMES
+    policies = options.policies or POLICY_NAMES
+    store = MissionStore(options.report)
+    store.begin(options.resume)
+    keep = options.report / FAILING if options.video else None
+    tasks = []
+    for one in missions(options.missions, families, options.seed):
+        left = tuple(name for name in policies if (one.family, one.seed, name) not in store.rows)
+        if left:
+            tasks.append(Task(one.family, one.seed, left, options.mode, config, keep))
+    began_s = time.perf_counter()
+    _run_all(options, tasks, store)
+    store.rewrite()
+    summary = write_report(options.report, store.rows.values(), command_line(options))
+    _say(summary, len(tasks), time.perf_counter() - began_s, options.report)
+    return int(any(failed(row) for row in store.rows.values() if row.policy == OURS))
+
+
+def _run_all(options: CampaignOptions, tasks: list[Task], store: MissionStore) -> None:
+    hidden = options.quiet or not sys.stderr.isatty()
+    with click.progressbar(length=len(tasks), label="missions", file=sys.stderr, hidden=hidden) as bar:
+        for rows in _execute(options, tasks):
+            store.add(rows)
+            bar.update(1)
+
+
+def _execute(options: CampaignOptions, tasks: list[Task]) -> Iterator[list[Row]]:
+    if options.scheduler is not None:
+        return run_there(tasks, options.scheduler)
+    return run_here(tasks, options.workers)
+
+
+def _check(options: CampaignOptions, config: AppConfig) -> None:
+    if config.camera.kind != "simulated" or not isinstance(config.runner, LockstepRunner):
+        raise UserError(
+            f"{options.config_path}: a campaign needs camera.kind 'simulated' and runner.kind 'lockstep'"
+        )
+    for option, names, known in (
+        ("--families", options.families, FAMILY_NAMES),
+        ("--policies", options.policies, POLICY_NAMES),
+    ):
+        unknown = [name for name in names if name not in known]
+        if unknown:
+            raise UserError(f"{option} {unknown[0]}: there is no such name; choose among {', '.join(known)}")
+    if options.only is None and options.report is None:
+        raise UserError("--report: give a folder for missions.jsonl and the report (or --only FAMILY:SEED)")
+    if options.video and options.mode != "camera":
+        raise UserError("--video needs --mode camera: without a camera there is nothing to film")
+
+
+def _mission_of(text: str) -> Mission:
+    family, _, seed = text.partition(":")
+    if family not in FAMILY_NAMES or not seed.isdecimal():
+        raise UserError(
+            f"--only {text}: give FAMILY:SEED, for example crossing_left:7; families are: "
+            f"{', '.join(FAMILY_NAMES)}"
+        )
+    return Mission(family, int(seed))
+
+
+def _run_one(options: CampaignOptions, config: AppConfig, mission: Mission) -> int:
+    """One mission in this process; a line for each policy."""
+    policies = options.policies or (OURS,)
+    keep = None
+    if options.video:
+        keep = (options.report or Path("out")) / f"{mission.family}-{mission.seed}"
+    task = Task(mission.family, mission.seed, policies, options.mode, config, keep, keep_all=True)
+    rows = run_task(task)
+    for row in rows:
+        click.echo(line_of(row))
+    if keep is not None:
+        click.echo(f"recording     {keep}")
+    return int(any(failed(row) for row in rows))
+
+
+def line_of(row: Row) -> str:
+    """A row for people."""
+    took = (
+        "not reached" if row.time_s is None else f"{row.time_s:.2f} s, {time_ratio(row):.2f} x the oracle's"
+    )
+    if row.time_s is None and not row.expected:
+        took = "not reached, as it should be"
+    verdict = f"FAILED: {why_failed(row)}" if failed(row) else "ok"
+    return (
+        f"{row.policy:<8} {took}; contacts {row.contacts} ({row.contacts_at_fault} at fault), "
+        f"clearance {row.min_clearance_m:.2f} m, false stops {row.false_stops}, flaps {row.flaps}: {verdict}"
+    )
+
+
+def command_line(options: CampaignOptions) -> str:
+    """What repeats the campaign."""
+    parts = [f"treadwatch campaign --missions {options.missions} --mode {options.mode} --seed {options.seed}"]
+    if options.families:
+        parts.append(f"--families {','.join(options.families)}")
+    if options.policies:
+        parts.append(f"--policies {','.join(options.policies)}")
+    parts.append(f"--workers {options.workers} --report {options.report}")
+    return " ".join(parts)
+
+
+def _say(summary: Summary, count: int, took_s: float, folder: Path) -> None:
+    for name, one in summary.policies.items():
+        median = "-" if one.ratio_median is None else f"{one.ratio_median:.2f}"
+        p90 = "-" if one.ratio_p90 is None else f"{one.ratio_p90:.2f}"
+        click.echo(
+            f"{name:<8} {one.missions} missions, reached {one.reached}/{one.expected}, "
+            f"contacts {one.contacts} ({one.contacts_at_fault} at fault), time x{median} (p90 x{p90}), "
+            f"false stops {one.false_stops}, flaps {one.flaps}, outside limits {one.limit_violations}"
+        )
+    if count:
+        click.echo(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.1f} a second")
+    click.echo(f"report   {folder / 'report.md'}")

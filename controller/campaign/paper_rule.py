@@ -1,0 +1,72 @@
+"""The paper's rule on the same scenes: brake while anything is within S_n = S_r + V_o T_t of the way ahead.
+
+Daeef 2020, problem statement: S_r = V^2 / 2A, T_t = V / A, V_o the speed of an obstacle that comes towards
+the robot (0 for what stands or goes away). No latency, no jerk, no prediction and no hysteresis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from config.robot import Robot
+from controller import braking
+from controller.bodies import Bodies, bodies_of
+from controller.campaign.rivals import decision, free_speed
+from controller.corridor import Corridor, place, velocity_on_path
+from controller.decision import Decision
+from controller.path import OnPath, Path
+from hal.types import CameraMount, PlanarPose
+from vision.scene import Scene
+
+_LOOK_M = 14.0
+_STOP_SHORT_M = 0.1
+
+
+class PaperRule:
+    """Policy (b)."""
+
+    def __init__(self, robot: Robot, mount: CameraMount) -> None:
+        self._robot, self._mount = robot, mount
+        self._corridor: Corridor | None = None
+        self._scene: Scene | None = None
+        self._bodies: Bodies | None = None
+
+    def step(
+        self,
+        scene: Scene | None,
+        path: Path,
+        pose: PlanarPose,
+        on_path: OnPath,
+        v_mps: float,
+        a_mps2: float,
+        now_ns: int,
+    ) -> Decision:
+        if scene is None:
+            return decision("paper", "nothing seen yet", 0.0, v_mps)
+        if self._corridor is None:
+            self._corridor = Corridor(path, self._robot.body)
+        if scene is not self._scene:
+            self._scene = scene
+            self._bodies = bodies_of(scene, scene.robot_pose or pose, self._mount, 0.0)
+        assert self._bodies is not None
+        for distance_m, closing_mps in self._inside(self._bodies, self._corridor, on_path.s_m):
+            needed_m = self.detection_distance(v_mps, closing_mps)
+            if distance_m <= needed_m:
+                sentence = f"something is {distance_m:.1f} m ahead, S_n is {needed_m:.1f} m"
+                return decision("paper", sentence, 0.0, v_mps)
+        return decision("paper", "nothing within S_n", free_speed(path, on_path, self._robot.limits), v_mps)
+
+    def detection_distance(self, v_mps: float, closing_mps: float) -> float:
+        """S_n, and a hand's breadth without which a robot at rest would touch what it stands before."""
+        limits = self._robot.limits
+        towards_mps = min(max(closing_mps, 0.0), limits.max_obstacle_speed_mps)
+        return _STOP_SHORT_M + braking.paper_detection_distance(v_mps, towards_mps, limits.max_accel_mps2)
+
+    def _inside(self, bodies: Bodies, corridor: Corridor, s_m: float) -> list[tuple[float, float]]:
+        """(free way of the front, closing speed) of everything in the swept corridor ahead."""
+        if not len(bodies):
+            return []
+        placed = place(bodies, corridor, np.zeros(1), s_m, _LOOK_M)
+        along = velocity_on_path(bodies, corridor, placed.s_m[:, 0])[0]
+        rows = np.flatnonzero((placed.clear_m[:, 0] <= 0.0) & (placed.hi_m[:, 0] > s_m))
+        return [(float(placed.lo_m[k, 0]) - s_m, -float(along[k]) if bodies.moving[k] else 0.0) for k in rows]

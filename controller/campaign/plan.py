@@ -1,0 +1,93 @@
+"""Which missions a campaign is made of, and on what they run."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from controller.campaign.judge import Row
+from controller.campaign.task import Task, run_task
+from controller.errors import UserError
+
+_ONE_CORE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+# As many tasks are on their way as keep every worker busy; the rest waits here and can still be dropped.
+_AHEAD = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """One of a campaign; a family and a seed say everything."""
+
+    family: str
+    seed: int
+
+
+def missions(count: int, families: tuple[str, ...], seed: int) -> list[Mission]:
+    """count missions in turn over the families; each family counts its seeds up from seed."""
+    return [Mission(families[k % len(families)], seed + k // len(families)) for k in range(count)]
+
+
+def run_here(tasks: list[Task], workers: int) -> Iterator[list[Row]]:
+    """On this machine's processes; in this one if workers is 1. Rows come as they are done."""
+    if workers == 1:
+        for task in tasks:
+            yield run_task(task)
+        return
+    with _one_core_each():
+        pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+        yield from _run(pool, tasks, workers)
+
+
+def run_there(tasks: list[Task], scheduler: str) -> Iterator[list[Row]]:
+    """On a cluster, through Dask distributed's executor. Raises UserError."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise UserError(
+            "--scheduler needs Dask distributed, which is not installed: pip install 'treadwatch[campaign]'"
+        ) from error
+    try:
+        client = Client(scheduler, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise UserError(
+            f"--scheduler {scheduler}: no scheduler answers ({error}); is `dask scheduler` running?"
+        ) from error
+    with client:
+        workers = max(len(client.scheduler_info()["workers"]), 1)
+        yield from _run(client.get_executor(pure=False), tasks, workers)
+
+
+def _run(pool: Executor, tasks: list[Task], workers: int) -> Iterator[list[Row]]:
+    waiting = iter(tasks)
+    try:
+        running = {
+            pool.submit(run_task, task) for _, task in zip(range(workers * _AHEAD), waiting, strict=False)
+        }
+        while running:
+            done = next(as_completed(running))
+            running.remove(done)
+            following = next(waiting, None)
+            if following is not None:
+                running.add(pool.submit(run_task, following))
+            yield done.result()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _one_core_each() -> Iterator[None]:
+    """NumPy's linear algebra reads these when it is imported, which a spawned worker has yet to do."""
+    before = {name: os.environ.get(name) for name in _ONE_CORE}
+    os.environ.update(dict.fromkeys(_ONE_CORE, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

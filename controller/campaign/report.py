@@ -1,0 +1,92 @@
+"""summary.json, report.md and the figures of a campaign."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+
+from controller.campaign.figures import clearance_figure, family_figure, ratio_figure
+from controller.campaign.judge import Row
+from controller.campaign.summary import Summary, Totals, summarise
+from controller.errors import UserError
+from controller.evaluation import markdown
+
+_WORST = 40
+
+
+def write_report(folder: Path, rows: Iterable[Row], command: str) -> Summary:
+    """Everything but missions.jsonl. command: what repeats it. Raises UserError."""
+    rows = list(rows)
+    summary = summarise(rows)
+    content = {"command": command, "missions": len({(row.family, row.seed) for row in rows})}
+    try:
+        (folder / "summary.json").write_text(
+            json.dumps({**content, **summary.as_dict()}, indent=2) + "\n", encoding="utf-8"
+        )
+        (folder / "report.md").write_text("\n".join(report_lines(summary, command)), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{folder}: the report cannot be written ({error.strerror})") from error
+    for name, image in (
+        ("ratio.png", ratio_figure(rows)),
+        ("families.png", family_figure(summary)),
+        ("clearance.png", clearance_figure(rows)),
+    ):
+        if not cv2.imwrite(str(folder / name), image):
+            raise UserError(f"{folder / name}: cannot be written; is the disk full?")
+    return summary
+
+
+def report_lines(summary: Summary, command: str) -> list[str]:
+    """The report as Markdown."""
+    lines = ["# Campaign", "", f"    {command}", ""]
+    lines += markdown.section(
+        "Policies",
+        """Time is that of the drive over that of the oracle, which knows all motions in advance, for missions
+        that both finish. A contact is at fault when the robot moved faster than 0.02 m/s and a driver with
+        the same field of view avoids it.""",
+    )
+    lines += markdown.table(_HEAD, [[name, *_cells(one)] for name, one in summary.policies.items()])
+    lines += markdown.picture("Time over the oracle's", "ratio.png")
+    lines += markdown.picture("Smallest clearance", "clearance.png")
+    lines += markdown.section("Families")
+    lines += markdown.picture("Median time by family", "families.png")
+    for family, by_policy in summary.families.items():
+        lines += [f"### {family}", ""]
+        lines += markdown.table(_HEAD, [[name, *_cells(one)] for name, one in by_policy.items()])
+    lines += markdown.section(
+        "What failed", "Each can be driven again alone: `treadwatch campaign --only FAMILY:SEED`."
+    )
+    shown = [[family, str(seed), policy, why] for family, seed, policy, why in summary.failing[:_WORST]]
+    lines += markdown.table(["family", "seed", "policy", "why"], shown)
+    if len(summary.failing) > _WORST:
+        lines += [f"... and {len(summary.failing) - _WORST} more: see summary.json.", ""]
+    return lines
+
+
+_HEAD = (
+    "policy", "missions", "reached", "contacts", "at fault", "median x", "p90 x", "clearance m",
+    "false stops", "flaps", "reversals", "outside limits",
+)  # fmt: skip
+
+
+def _cells(one: Totals) -> list[str]:
+    return [
+        str(one.missions),
+        f"{one.reached}/{one.expected}",
+        str(one.contacts),
+        str(one.contacts_at_fault),
+        _number(one.ratio_median),
+        _number(one.ratio_p90),
+        _number(one.min_clearance_m),
+        str(one.false_stops),
+        str(one.flaps),
+        str(one.reversals),
+        str(one.limit_violations),
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"

@@ -1,0 +1,29 @@
+"""What the policies that ours is compared with have in common."""
+
+from __future__ import annotations
+
+from config.robot import Limits
+from controller import braking
+from controller.decision import Action, Decision, Reason
+from controller.path import OnPath, Path
+
+_DEAD_BAND_MPS = 0.03
+
+
+def decision(rule: str, sentence: str, target_mps: float, v_mps: float, *, hard: bool = False) -> Decision:
+    """The target with the action that follows from it. hard: braking beyond comfort is allowed for it."""
+    if target_mps > v_mps + _DEAD_BAND_MPS:
+        action = Action.INCREASE
+    elif target_mps < v_mps - _DEAD_BAND_MPS:
+        action = Action.DECREASE
+    else:
+        action = Action.KEEP
+    emergency = hard and action is Action.DECREASE
+    return Decision(action, target_mps, Reason(rule, sentence), emergency)
+
+
+def free_speed(path: Path, on_path: OnPath, limits: Limits) -> float:
+    """What path and target allow, everything else away: the same for all policies."""
+    left_m = max(path.length_m - on_path.s_m, 0.0) + 0.02
+    end_mps = braking.speed_for_distance(left_m, braking.comfort(limits))
+    return min(path.speed_limit(on_path.s_m), limits.max_speed_mps, end_mps)

@@ -1,0 +1,79 @@
+"""missions.jsonl: one row a mission and policy, appended as they are done, so that it can be resumed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from controller.campaign.judge import Row
+from controller.errors import UserError
+
+MISSIONS = "missions.jsonl"
+Key = tuple[str, int, str]
+
+
+def key_of(row: Row) -> Key:
+    """What makes a row unique within a report."""
+    return row.family, row.seed, row.policy
+
+
+class MissionStore:
+    """The rows of a report folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / MISSIONS
+        self.rows: dict[Key, Row] = {}
+
+    def begin(self, resume: bool) -> None:
+        """Create the folder; rows of an earlier campaign are kept if it is resumed. Raises UserError."""
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            if self._path.exists() and not resume:
+                raise UserError(
+                    f"{self._path} exists: add --resume to go on with it, or give another --report folder"
+                )
+            if resume and self._path.exists():
+                self._read()
+                self.rewrite()
+        except OSError as error:
+            raise UserError(f"{self._path}: {error.strerror}; choose a folder that can be written") from error
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Append; each line is whole or, if the machine stops in the middle of it, dropped on resuming."""
+        with self._path.open("a", encoding="utf-8") as file:
+            for row in rows:
+                self.rows[key_of(row)] = row
+                file.write(json.dumps(row.as_dict()) + "\n")
+
+    def rewrite(self) -> None:
+        """All rows in one order, whichever worker was first."""
+        self.rows = dict(sorted(self.rows.items()))
+        text = "".join(json.dumps(row.as_dict()) + "\n" for row in self.rows.values())
+        part = self._path.with_suffix(".part")
+        part.write_text(text, encoding="utf-8")
+        part.replace(self._path)
+
+    def _read(self) -> None:
+        lines = self._path.read_text(encoding="utf-8").splitlines()
+        for number, line in enumerate(lines, start=1):
+            try:
+                row = row_of(json.loads(line))
+            except (ValueError, TypeError, KeyError) as error:
+                if number == len(lines):
+                    return
+                raise UserError(
+                    f"{self._path}: line {number} is not a row of this program ({error}); "
+                    "mend it or give another --report folder"
+                ) from error
+            self.rows[key_of(row)] = row
+
+
+def row_of(values: dict[str, object]) -> Row:
+    """A row as it was written. Raises TypeError for what is none."""
+    if not isinstance(values, dict):
+        raise TypeError("no object")
+    touched = values.get("touched", [])
+    if not isinstance(touched, list):
+        raise TypeError("touched is no list")
+    return Row(**{**values, "touched": tuple(touched)})  # type: ignore[arg-type]  # Row has the last word

@@ -1,0 +1,119 @@
+"""All rows of a campaign in figures: by policy, and by family and policy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from controller.campaign.judge import Row
+from controller.campaign.task import failed, time_ratio
+
+
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """Of some missions of one policy. ratio_*: time over the oracle's, of those that both finished; None if
+    there are none."""
+
+    missions: int
+    expected: int
+    reached: int
+    contacts: int
+    contacts_at_fault: int
+    ratio_median: float | None
+    ratio_p90: float | None
+    time_median_s: float | None
+    min_clearance_m: float | None
+    false_stops: int
+    missions_with_false_stop: int
+    flaps: int
+    reversals: int
+    limit_violations: int
+    max_jerk_mps3: float
+    max_accel_mps2: float
+
+
+def totals(rows: list[Row]) -> Totals:
+    """Add up; rows of one policy."""
+    ratios = [ratio for ratio in map(time_ratio, rows) if math.isfinite(ratio)]
+    times = [row.time_s for row in rows if row.time_s is not None]
+    clearances = [row.min_clearance_m for row in rows if math.isfinite(row.min_clearance_m)]
+    return Totals(
+        missions=len(rows),
+        expected=sum(row.expected for row in rows),
+        reached=sum(row.reached and row.expected for row in rows),
+        contacts=sum(row.contacts for row in rows),
+        contacts_at_fault=sum(row.contacts_at_fault for row in rows),
+        ratio_median=_percentile(ratios, 50),
+        ratio_p90=_percentile(ratios, 90),
+        time_median_s=_percentile(times, 50),
+        min_clearance_m=round(min(clearances), 4) if clearances else None,
+        false_stops=sum(row.false_stops for row in rows),
+        missions_with_false_stop=sum(row.false_stops > 0 for row in rows),
+        flaps=sum(row.flaps for row in rows),
+        reversals=sum(row.reversals for row in rows),
+        limit_violations=sum(row.limit_violations for row in rows),
+        max_jerk_mps3=max((row.max_jerk_mps3 for row in rows), default=0.0),
+        max_accel_mps2=max((row.max_accel_mps2 for row in rows), default=0.0),
+    )
+
+
+def _percentile(values: list[float], share: float) -> float | None:
+    return round(float(np.percentile(values, share)), 4) if values else None
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """policies: by name. families: by family, then policy. failing: (family, seed, policy, what happened)."""
+
+    policies: dict[str, Totals]
+    families: dict[str, dict[str, Totals]]
+    failing: list[tuple[str, int, str, str]]
+
+    def as_dict(self) -> dict[str, object]:
+        """For summary.json."""
+        return {
+            "policies": {name: asdict(one) for name, one in self.policies.items()},
+            "families": {
+                family: {name: asdict(one) for name, one in by_policy.items()}
+                for family, by_policy in self.families.items()
+            },
+            "failing": [
+                {"family": family, "seed": seed, "policy": policy, "why": why}
+                for family, seed, policy, why in self.failing
+            ],
+        }
+
+
+def summarise(rows: Iterable[Row]) -> Summary:
+    """In the order in which policies and families first come."""
+    rows = list(rows)
+    policies = list(dict.fromkeys(row.policy for row in rows))
+    families = list(dict.fromkeys(row.family for row in rows))
+    return Summary(
+        {name: totals([row for row in rows if row.policy == name]) for name in policies},
+        {
+            family: {
+                name: totals([row for row in rows if row.policy == name and row.family == family])
+                for name in policies
+            }
+            for family in families
+        },
+        [(row.family, row.seed, row.policy, why_failed(row)) for row in rows if failed(row)],
+    )
+
+
+def why_failed(row: Row) -> str:
+    """In words."""
+    reasons = []
+    if row.contacts_at_fault:
+        reasons.append(f"touched {', '.join(row.touched)} while driving")
+    if row.expected and not row.reached:
+        reasons.append("did not reach its target")
+    if row.limit_violations:
+        reasons.append(f"{row.limit_violations} setpoints outside the limits")
+    if row.reversals:
+        reasons.append(f"{row.reversals} reversals")
+    return "; ".join(reasons)

@@ -1,0 +1,72 @@
+"""One mission with all its policies: what a worker does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Literal
+
+from config.app import AppConfig
+from config.camera import SimulatedCameraConfig
+from controller.campaign import oracle
+from controller.campaign.camera_mission import drive_camera
+from controller.campaign.judge import Row, judge
+from controller.campaign.noise_mission import drive_noise
+from controller.campaign.oracle import OracleTime
+from controller.campaign.policies import build_policy
+from controller.campaign.stage import Stage, envelope_speed_mps
+from controller.campaign.view import PlanarEye
+from sim.families import generate
+
+Mode = Literal["noise", "camera"]
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A mission and who drives it. keep: where to write recording and video of drives in camera mode that
+    fail (keep_all: of all drives); None: nowhere."""
+
+    family: str
+    seed: int
+    policies: tuple[str, ...]
+    mode: Mode
+    config: AppConfig
+    keep: FilePath | None = None
+    keep_all: bool = False
+
+
+def run_task(task: Task) -> list[Row]:
+    """A row for each policy, in their order. The same for the same task, on whichever machine."""
+    stage = Stage(generate(task.family, task.seed), task.config.robot)
+    best = oracle.solve(stage, envelope_speed_mps(task.config), stage.case.scenario.duration_s)
+    return [_run(task, stage, policy, best) for policy in task.policies]
+
+
+def _run(task: Task, stage: Stage, policy: str, best: OracleTime) -> Row:
+    config = task.config
+    assert isinstance(config.camera, SimulatedCameraConfig), "checked by controller/campaign/command.py"
+    eye = PlanarEye(stage.world, config.camera, config.robot.camera_mount)
+    if task.mode == "noise":
+        log = drive_noise(stage, config, build_policy(policy, config, stage))
+        return judge(stage, log, policy, task.mode, best, eye)
+    keep = None if task.keep is None else task.keep / f"{task.family}-{task.seed}-{policy}"
+    log = drive_camera(stage, config, policy, keep if task.keep_all else None)
+    row = judge(stage, log, policy, task.mode, best, eye)
+    if keep is not None and not task.keep_all and failed(row):
+        # The same drive again, this time filmed: writing every mission would cost more than this.
+        drive_camera(stage, config, policy, keep)
+    return row
+
+
+def failed(row: Row) -> bool:
+    """Whether a mission went otherwise than it should have."""
+    missed = row.expected and not row.reached
+    return bool(row.contacts_at_fault or missed or row.limit_violations or row.reversals)
+
+
+def time_ratio(row: Row) -> float:
+    """Time over the oracle's; NaN where either did not arrive."""
+    if row.time_s is None or row.oracle_time_s is None:
+        return math.nan
+    return row.time_s / row.oracle_time_s

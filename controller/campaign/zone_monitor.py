@@ -1,0 +1,89 @@
+"""A zone monitor in the manner of Nav2's collision monitor, with its shipped parameters.
+
+nav2_collision_monitor/params/collision_monitor_params.yaml: a stop polygon that reaches 0.08 m beyond a robot
+of 0.22 m radius, a slowdown polygon (ratio 0.3) that reaches 0.18 m beyond it, both on 4 points, and
+"approach" with time_before_collision 2.0 s in steps of 0.1 s on 6 points: v = v_in t_c / T (motion-formulas
+4.4). The zones are laid around this robot's own footprint; it may brake as hard as an emergency does.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from config.robot import Robot
+from controller.campaign.planar_scan import PlanarScanner
+from controller.campaign.rivals import decision, free_speed
+from controller.campaign.stage import Stage
+from controller.decision import Decision
+from controller.path import OnPath, Path
+from hal.clocks import NS_PER_S
+from hal.types import FloatArray, PlanarPose
+from vision.scene import Scene
+
+_STOP_BEYOND_M, _SLOW_BEYOND_M = 0.08, 0.18
+_SLOWDOWN_RATIO = 0.3
+_ZONE_POINTS, _APPROACH_POINTS = 4, 6
+_BEFORE_COLLISION_S, _STEP_S = 2.0, 0.1
+
+
+class ZoneMonitor:
+    """Policy (c)."""
+
+    def __init__(self, robot: Robot, stage: Stage) -> None:
+        self._robot = robot
+        self._scanner = PlanarScanner(stage)
+
+    def step(
+        self,
+        scene: Scene | None,
+        path: Path,
+        pose: PlanarPose,
+        on_path: OnPath,
+        v_mps: float,
+        a_mps2: float,
+        now_ns: int,
+    ) -> Decision:
+        points = self._scanner.points(pose, now_ns / NS_PER_S)
+        wanted = free_speed(path, on_path, self._robot.limits)
+        curvature = path.curvature(on_path.s_m)
+        target, rule = self.limit(points, wanted, curvature)
+        return decision("zones", rule, target, v_mps, hard=target < wanted)
+
+    def limit(self, points: FloatArray, wanted_mps: float, curvature_1pm: float) -> tuple[float, str]:
+        """The speed that the three polygons leave of wanted_mps, and which of them it is."""
+        body = self._robot.body
+        half = 0.5 * body.width_m
+        if self._count(points, 0.0, body.front_m + _STOP_BEYOND_M, half + _STOP_BEYOND_M) >= _ZONE_POINTS:
+            return 0.0, "stop polygon"
+        target, rule = wanted_mps, "free"
+        rear, front = -body.rear_m - _SLOW_BEYOND_M, body.front_m + _SLOW_BEYOND_M
+        if self._count(points, rear, front, half + _SLOW_BEYOND_M) >= _ZONE_POINTS:
+            target, rule = _SLOWDOWN_RATIO * wanted_mps, "slowdown polygon"
+        collision_s = self.collision_time(points, wanted_mps, curvature_1pm)
+        approach = wanted_mps * collision_s / _BEFORE_COLLISION_S
+        return (approach, "approach") if approach < target else (target, rule)
+
+    def collision_time(self, points: FloatArray, v_mps: float, curvature_1pm: float) -> float:
+        """Time until six points are in the footprint if it goes on at v_mps on its arc, at most 2.0 s."""
+        body = self._robot.body
+        half = 0.5 * body.width_m
+        if self._count(points, -body.rear_m, body.front_m, half) >= _APPROACH_POINTS:
+            return 0.0
+        for k in range(round(_BEFORE_COLLISION_S / _STEP_S)):
+            turn = curvature_1pm * v_mps * (k + 1) * _STEP_S
+            way = v_mps * (k + 1) * _STEP_S * float(np.sinc(0.5 * turn / math.pi))
+            x, y = way * math.cos(0.5 * turn), way * math.sin(0.5 * turn)
+            cos, sin = math.cos(turn), math.sin(turn)
+            dx, dy = points[:, 0] - x, points[:, 1] - y
+            ahead = np.stack((dx * cos + dy * sin, dy * cos - dx * sin), axis=1)
+            if self._count(ahead, -body.rear_m, body.front_m, half) >= _APPROACH_POINTS:
+                # The pose that was tested is one step further on: that is how Nav2 counts.
+                return k * _STEP_S
+        return _BEFORE_COLLISION_S
+
+    @staticmethod
+    def _count(points: FloatArray, rear_m: float, front_m: float, half_m: float) -> int:
+        inside = (points[:, 0] >= rear_m) & (points[:, 0] <= front_m) & (np.abs(points[:, 1]) <= half_m)
+        return int(np.count_nonzero(inside))
