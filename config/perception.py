@@ -23,8 +23,11 @@ class DepthNoise(Section):
 class FragmentSettings(Section):
     """Edges, contours, segments and their tracking."""
 
-    canny_low: float = Field(default=40.0, gt=0, description="gradient, grey levels (Sobel, L1)")
-    canny_high: float = Field(default=110.0, gt=0, description="gradient, grey levels (Sobel, L1)")
+    canny_least: float = Field(
+        default=36.0, gt=0, description="upper threshold of Canny where little is to be seen, Sobel L1"
+    )
+    canny_most: float = Field(default=160.0, gt=0, description="the same where much is to be seen")
+    edge_share: float = Field(default=0.05, gt=0, le=0.5, description="edge pixels that are enough")
     min_length_px: float = Field(default=32.0, ge=8, le=400, description="the paper's 32 px")
     max_fragments: int = Field(default=200, ge=20, le=2000)
     tile_px: int = Field(default=40, ge=16, le=160, description="cell in which fragments are counted")
@@ -37,8 +40,8 @@ class FragmentSettings(Section):
 
     @model_validator(mode="after")
     def _thresholds_in_order(self) -> Self:
-        if self.canny_low >= self.canny_high:
-            raise ValueError("canny_low must be smaller than canny_high")
+        if self.canny_least > self.canny_most:
+            raise ValueError("canny_least must not be greater than canny_most")
         return self
 
 
@@ -48,8 +51,8 @@ class EgoMotionSettings(Section):
     odometry_yaw_ratio: float = Field(default=0.20, ge=0, le=1, description="slip: share of the yaw rate")
     odometry_rotation_radps: float = Field(default=0.04, gt=0, description="yaw, besides the share")
     vibration_radps: float = Field(default=0.25, gt=0, description="pitch and roll that odometry cannot see")
-    odometry_speed_ratio: float = Field(default=0.10, ge=0, le=1)
-    odometry_speed_mps: float = Field(default=0.05, gt=0)
+    odometry_speed_ratio: float = Field(default=0.06, ge=0, le=1)
+    odometry_speed_mps: float = Field(default=0.03, gt=0)
     gyro_radps: float = Field(default=0.02, gt=0, description="bias and noise of a gyro, where there is one")
     steady_rotation_radps: float = Field(
         default=0.6, gt=0, description="without odometry: change of the turn rate between two frames"

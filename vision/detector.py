@@ -23,12 +23,17 @@ from vision.ego_motion import (
     steady_prior,
     with_gyro,
 )
+from vision.evidence import average_depth, averaged_sigma_m, gather
 from vision.fragments import AnchorEnds, FragmentStore
 from vision.health import Continuity, HealthMonitor, worsened
 from vision.lens import project, rays
 from vision.renewal import Renewal
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
-from vision.velocities import PointMotion, chi2_2d, static_miss
+from vision.velocities import PointMotion
+
+# Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
+_UNKNOWN_DEPTH_M = 12.0
+_UNKNOWN_DEPTH_SIGMA_M = 10.0
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
 
@@ -134,7 +139,8 @@ class Detector:
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
         anchor = store.anchors(frame.captured_ns, config.motion.window_s)
         result = self._camera(anchor, moving, prior, camera)
-        motion = self._evidence(anchor, result, camera)
+        motion = gather(store, anchor, result, camera, config.depth_noise)
+        average_depth(store, result.pose, camera, config.depth_noise)
         step = self._pose.inverse() @ result.pose
         ego = _ego(step, dt_s, result, prior)
         health = _judge(health, ego, len(store))
@@ -148,7 +154,8 @@ class Detector:
         return detection
 
     def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
-        new = self._renewal.find(frame, grey, self._store.ends_px)
+        without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
+        new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
     def _commit(self, frame: RgbdFrame, grey: GreyImage, odometry: Pose | None) -> None:
@@ -239,75 +246,20 @@ class Detector:
         rotation, translation = self._store.poses(np.repeat(anchor.slot, 2))
         ray = rays(anchor.pixels.reshape(-1, 2), camera)
         direction = (rotation @ ray[:, :, None])[:, :, 0]
-        near_m = anchor.near_m.ravel().astype(float)
+        near_m = anchor.depth_m.ravel().astype(float)
         known = np.isfinite(near_m)
-        near_m = np.where(known, near_m, 1.0)
+        near_m = np.where(known, near_m, _UNKNOWN_DEPTH_M)
         spread = np.nan_to_num(anchor.far_m.ravel() - near_m, nan=0.0)
-        sigma = depth_sigma_m(near_m, self._config.depth_noise)
+        noise = self._config.depth_noise
+        sigma = averaged_sigma_m(near_m, anchor.looks.ravel(), noise)
         covariance = self._store.pixel_cov.reshape(-1, 3)
         variance = 0.5 * (covariance[:, 0] + covariance[:, 2]).astype(float)
-        usable = known & (spread <= 3.0 * sigma) & np.repeat(~moving, 2)
+        sigma[~known] = _UNKNOWN_DEPTH_SIGMA_M
+        usable = (spread <= 0.1 + 3.0 * depth_sigma_m(near_m, noise)) & np.repeat(~moving, 2)
         points = direction * near_m[:, None] + translation
         anchors = Anchors(points, direction, sigma, variance, usable)
         pixels = self._store.ends_px.reshape(-1, 2).astype(float)
         return estimate(anchors, pixels, self._pose, prior, camera)
-
-    def _evidence(self, anchor: AnchorEnds, now: CameraEstimate, camera: Intrinsics) -> PointMotion:
-        """Where every end would be if it were static, and how far from there it is."""
-        store, noise = self._store, self._config.depth_noise
-        rotation, translation = store.poses(np.repeat(anchor.slot, 2))
-        ray_before = rays(anchor.pixels.reshape(-1, 2), camera)
-        direction = (rotation @ ray_before[:, :, None])[:, :, 0] @ now.pose.rotation
-        origin = (translation - now.pose.translation_m) @ now.pose.rotation
-        near_m = anchor.near_m.ravel().astype(float)
-        far_m = anchor.far_m.ravel().astype(float)
-        known = np.isfinite(near_m)
-        near_m, far_m = np.where(known, near_m, 1.0), np.where(known, far_m, 1.0)
-        ray = rays(store.ends_px.reshape(-1, 2), camera)[:, :2]
-        static = direction * near_m[:, None] + origin
-        in_front = static[:, 2] > 0.1
-        sigma = depth_sigma_m(near_m, noise)
-        effect_per_m = ray * direction[:, 2:3] - direction[:, :2]
-        steps = np.maximum(1.0, 0.5 * np.repeat(anchor.lag_frames, 2))
-        pixel_cov = store.pixel_cov.reshape(-1, 3) * steps[:, None]
-        metres = static[:, 2:3] / np.array([camera.fx, np.sqrt(camera.fx * camera.fy), camera.fy])
-        covariance = pixel_cov * metres**2
-        covariance[:, [0, 2]] += _pose_variance(now.covariance, static[:, 2])[:, None]
-        miss = static_miss(static, ray)
-        effect = effect_per_m * sigma[:, None]
-        static_far = direction * far_m[:, None] + origin
-        sigma_far = depth_sigma_m(far_m, noise)
-        chi2 = np.minimum(
-            chi2_2d(miss, covariance, effect),
-            chi2_2d(
-                static_miss(static_far, ray),
-                covariance * np.square(static_far[:, 2:3] / np.where(in_front, static[:, 2], 1.0)[:, None]),
-                effect_per_m * sigma_far[:, None],
-            ),
-        )
-        depth_now = store.near_m.ravel().astype(float)
-        depth_step = depth_now - static[:, 2]
-        step_sigma = np.hypot(sigma, depth_sigma_m(np.nan_to_num(depth_now, nan=1.0), noise))
-        usable = known & in_front & np.isfinite(miss).all(axis=1)
-        return PointMotion(
-            static,
-            ray,
-            np.repeat(anchor.lag_s, 2),
-            miss,
-            covariance,
-            effect,
-            depth_step,
-            step_sigma,
-            chi2,
-            usable,
-        )
-
-
-def _pose_variance(covariance: FloatArray, depth_m: FloatArray) -> FloatArray:
-    """(N,) variance in metres across the view that the camera's own uncertainty makes at depth_m (N,)."""
-    turn = float(np.max(np.diag(covariance)[:3]))
-    way = float(np.max(np.diag(covariance)[3:]))
-    return way + turn * np.square(depth_m)
 
 
 def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:

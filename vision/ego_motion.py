@@ -23,6 +23,10 @@ _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
 _ANNEAL = (64.0, 16.0, 4.0)  # robust scale of the first iterations, falling to 1
 _MIN_POINTS = 8
 _MIN_INLIER_RATIO = 0.25
+_MIN_BACKGROUND_RATIO = 0.10
+_CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
+_TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2])  # of the prior's sigma, where it decides
+_CONVERGED = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,70 +108,100 @@ def estimate(
     before: the camera of the frame before, in the fixed frame.
     """
     start = before @ prior.motion
-    prior_information = np.diag(1.0 / np.square(prior.sigma))
+    unseen = CameraEstimate(start, np.diag(np.square(prior.sigma)), float("nan"), False)
     use = np.flatnonzero(anchors.usable)
-    fallback = CameraEstimate(start, np.diag(np.square(prior.sigma)), float("nan"), False)
     if len(use) < _MIN_POINTS:
-        return fallback
-    points, towards = anchors.points_m[use], anchors.range_m[use]
-    sigma_z, variance = anchors.depth_sigma_m[use], anchors.pixel_variance[use]
-    seen = pixels[use]
-    pose = start
-    information = prior_information
-    allowed = np.ones(len(use), np.bool_)
-    chi2 = np.zeros(len(use))
+        return unseen
+    view = _View(
+        anchors.points_m[use],
+        anchors.range_m[use],
+        np.square(anchors.depth_sigma_m[use]),
+        anchors.pixel_variance[use],
+        pixels[use],
+        camera,
+    )
+    found = _solve(view, start, prior.sigma)
+    least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
+    if prior.source == "odometry" and _conflict(found.pose, start, prior.sigma):
+        # Something large moves, and the data follow it. What agrees with the odometry is the ground.
+        found = _solve(view, start, prior.sigma * _TRUSTED_SHARE)
+        least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
+    ratio = found.inliers / len(use)
+    if found.inliers < least:
+        return CameraEstimate(start, unseen.covariance, ratio, False)
+    return CameraEstimate(found.pose, np.linalg.inv(found.information), ratio, True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    points: FloatArray
+    towards: FloatArray
+    depth_variance: FloatArray
+    pixel_variance: FloatArray
+    seen: FloatArray
+    camera: Intrinsics
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solution:
+    pose: Pose
+    information: FloatArray
+    inliers: int
+
+
+def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
+    """Iteratively reweighted Gauss-Newton from start, which is known to sigma (6,)."""
+    prior_information = np.diag(1.0 / np.square(sigma))
+    information, inliers = prior_information, 0
+    pose = _shift(view, start, sigma)
+    allowed = np.ones(len(view.seen), np.bool_)
     for iteration in range(_ITERATIONS):
-        jacobian, residual, depth_derivative, in_front = _linearise(points, towards, seen, pose, camera)
+        jacobian, residual, derivative, in_front = _linearise(view, pose)
         # Depth's share of the covariance, by Sherman and Morrison: only along the epipolar line.
-        squared = np.square(depth_derivative).sum(axis=1)
-        shrink = sigma_z**2 / (variance + sigma_z**2 * squared)
-        along = (depth_derivative * residual).sum(axis=1)
-        chi2 = (np.square(residual).sum(axis=1) - shrink * along**2) / variance
+        squared = np.square(derivative).sum(axis=1)
+        shrink = view.depth_variance / (view.pixel_variance + view.depth_variance * squared)
+        along = (derivative * residual).sum(axis=1)
+        chi2 = (np.square(residual).sum(axis=1) - shrink * along**2) / view.pixel_variance
         if iteration == 0:
-            pose = _shift(pose, residual, prior, camera)
-            jacobian, residual, depth_derivative, in_front = _linearise(points, towards, seen, pose, camera)
-            squared = np.square(depth_derivative).sum(axis=1)
-            shrink = sigma_z**2 / (variance + sigma_z**2 * squared)
-            along = (depth_derivative * residual).sum(axis=1)
-            chi2 = (np.square(residual).sum(axis=1) - shrink * along**2) / variance
-            allowed = in_front & (chi2 <= _prior_gate(jacobian, depth_derivative, shrink, variance, prior))
-            if allowed.sum() < _MIN_POINTS:
-                return fallback
+            doubt = np.square(jacobian * sigma).sum(axis=(1, 2))
+            allowed = in_front & (chi2 <= _GATE_CHI2 * (1.0 + doubt / view.pixel_variance))
+        inliers = int(np.count_nonzero(allowed & (chi2 <= _GATE_CHI2)))
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
         weight = np.where(allowed & in_front, np.square(1.0 / (1.0 + chi2 / (_GATE_CHI2 * scale))), 0.0)
-        weight = weight / (variance * scale)
-        projected = (jacobian * depth_derivative[:, :, None]).sum(axis=1)
+        weight = weight / (view.pixel_variance * scale)
+        projected = (jacobian * derivative[:, :, None]).sum(axis=1)
         flat = jacobian.reshape(-1, 6)
         weighted = flat * np.repeat(weight, 2)[:, None]
         normal = weighted.T @ flat - (projected * (weight * shrink)[:, None]).T @ projected
         rhs = weighted.T @ residual.ravel() - projected.T @ (weight * shrink * along)
         information = normal + prior_information
-        rhs += prior_information @ _difference(pose, start)
-        step = np.linalg.solve(information, rhs)
+        step = np.linalg.solve(information, rhs + prior_information @ _difference(pose, start))
         pose = pose @ Pose(rotation_from_vector(step[:3]), step[3:])
-        if iteration >= len(_ANNEAL) and float(np.abs(step).max()) < 1e-6:
+        if iteration >= len(_ANNEAL) and float(np.abs(step).max()) < _CONVERGED:
             break
-    ratio = float(np.count_nonzero(allowed & (chi2 <= _GATE_CHI2))) / len(use)
-    if ratio < _MIN_INLIER_RATIO:
-        return CameraEstimate(start, fallback.covariance, ratio, False)
-    return CameraEstimate(pose, np.linalg.inv(information), ratio, True)
+    return _Solution(pose, information, inliers)
 
 
-def _linearise(
-    points: FloatArray, towards: FloatArray, seen: FloatArray, pose: Pose, camera: Intrinsics
-) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+def _conflict(pose: Pose, start: Pose, sigma: FloatArray) -> bool:
+    """Whether yaw and translation of pose are farther from start than sigma (6,) admits."""
+    off = (_difference(pose, start) / sigma)[[1, 3, 4, 5]]
+    return float(off @ off) > _CONFLICT_CHI2
+
+
+def _linearise(view: _View, pose: Pose) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """Jacobian (N, 2, 6) of the pixel by a small motion of the camera, residual (N, 2) seen minus
     predicted, derivative (N, 2) of the pixel by depth, and which points lie in front."""
-    local = (points - pose.translation_m) @ pose.rotation
-    direction = towards @ pose.rotation
+    camera = view.camera
+    local = (view.points - pose.translation_m) @ pose.rotation
+    direction = view.towards @ pose.rotation
     in_front = local[:, 2] > 0.1
     inverse = 1.0 / np.where(in_front, local[:, 2], 1.0)
     x, y = local[:, 0] * inverse, local[:, 1] * inverse
-    residual = np.empty((len(points), 2))
-    residual[:, 0] = seen[:, 0] - (x * camera.fx + camera.cx)
-    residual[:, 1] = seen[:, 1] - (y * camera.fy + camera.cy)
-    jacobian = np.zeros((len(points), 2, 6))
+    residual = np.empty((len(x), 2))
+    residual[:, 0] = view.seen[:, 0] - (x * camera.fx + camera.cx)
+    residual[:, 1] = view.seen[:, 1] - (y * camera.fy + camera.cy)
     # The camera turns by w and goes by v: a point goes by -(w x p) - v in its frame.
+    jacobian = np.zeros((len(x), 2, 6))
     jacobian[:, 0, 0] = camera.fx * x * y
     jacobian[:, 0, 1] = -camera.fx * (1.0 + x * x)
     jacobian[:, 0, 2] = camera.fx * y
@@ -178,30 +212,19 @@ def _linearise(
     jacobian[:, 1, 2] = -camera.fy * x
     jacobian[:, 1, 4] = -camera.fy * inverse
     jacobian[:, 1, 5] = camera.fy * y * inverse
-    derivative = np.empty((len(points), 2))
+    derivative = np.empty((len(x), 2))
     derivative[:, 0] = camera.fx * inverse * (direction[:, 0] - x * direction[:, 2])
     derivative[:, 1] = camera.fy * inverse * (direction[:, 1] - y * direction[:, 2])
     return jacobian, residual, derivative, in_front
 
 
-def _shift(pose: Pose, residual: FloatArray, prior: MotionPrior, camera: Intrinsics) -> Pose:
-    """A better start: turn by the median miss of all points, as far as the prior admits."""
+def _shift(view: _View, start: Pose, sigma: FloatArray) -> Pose:
+    """A better start: turn by the median miss of all points, as far as sigma (6,) admits."""
+    _, residual, _, _ = _linearise(view, start)
     miss = np.median(residual, axis=0)
-    turn = np.array([miss[1] / camera.fy, -miss[0] / camera.fx, 0.0])
-    limit = 3.0 * prior.sigma[:3]
-    return pose @ Pose(rotation_from_vector(np.clip(turn, -limit, limit)), np.zeros(3))
-
-
-def _prior_gate(
-    jacobian: FloatArray,
-    derivative: FloatArray,
-    shrink: FloatArray,
-    variance: FloatArray,
-    prior: MotionPrior,
-) -> FloatArray:
-    """(N,) chi-square that a static point may reach at the prior: its own noise and the prior's doubt."""
-    doubt = np.square(jacobian * prior.sigma).sum(axis=(1, 2))
-    return _GATE_CHI2 * (1.0 + doubt / variance)
+    turn = np.array([miss[1] / view.camera.fy, -miss[0] / view.camera.fx, 0.0])
+    limit = 3.0 * sigma[:3]
+    return start @ Pose(rotation_from_vector(np.clip(turn, -limit, limit)), np.zeros(3))
 
 
 def _difference(pose: Pose, start: Pose) -> FloatArray:

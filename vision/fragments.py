@@ -18,19 +18,24 @@ HISTORY = 24
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnchorEnds:
-    """Where the ends of each fragment were lag frames ago: pixels (N, 2, 2), near_m and far_m (N, 2),
-    lag_frames (N,), lag_s (N,), slot (N,) of the camera pose."""
+    """Where the ends of each fragment were lag frames ago: pixels (N, 2, 2), depth_m, far_m (N, 2) and
+    looks (N, 2) as in the store, lag_frames (N,), lag_s (N,), slot (N,) of the camera pose."""
 
     pixels: NDArray[np.float32]
-    near_m: NDArray[np.float32]
+    depth_m: NDArray[np.float32]
     far_m: NDArray[np.float32]
+    looks: NDArray[np.float32]
     lag_frames: NDArray[np.intp]
     lag_s: FloatArray
     slot: NDArray[np.intp]
 
 
 class FragmentStore:
-    """Holds the fragments and their history. Changed only by the detector."""
+    """Holds the fragments and their history. Changed only by the detector.
+
+    near_m, far_m (N, 2): depth measured in this frame. depth_m (N, 2): of the near surface, averaged over
+    looks (N, 2) frames as for a static point.
+    """
 
     def __init__(self) -> None:
         self.clear()
@@ -42,9 +47,11 @@ class FragmentStore:
         self.ends_px = np.empty((0, 2, 2), np.float32)
         self.near_m = np.empty((0, 2), np.float32)
         self.far_m = np.empty((0, 2), np.float32)
+        self.depth_m = np.empty((0, 2), np.float32)
+        self.looks = np.empty((0, 2), np.float32)
         self.age_frames = np.empty(0, np.intp)
         self.pixel_cov = np.empty((0, 2, 3), np.float32)
-        self._history = np.empty((HISTORY, 0, 2, 4), np.float32)
+        self._history = np.empty((HISTORY, 0, 2, 5), np.float32)
         self._stamps_ns = np.zeros(HISTORY, np.int64)
         self._rotations = np.tile(np.eye(3), (HISTORY, 1, 1))
         self._translations = np.zeros((HISTORY, 3))
@@ -62,6 +69,8 @@ class FragmentStore:
         self.ends_px = self.ends_px[chosen]
         self.near_m = self.near_m[chosen]
         self.far_m = self.far_m[chosen]
+        self.depth_m = self.depth_m[chosen]
+        self.looks = self.looks[chosen]
         self.age_frames = self.age_frames[chosen]
         self.pixel_cov = self.pixel_cov[chosen]
         self._history = self._history[:, chosen]
@@ -82,9 +91,11 @@ class FragmentStore:
         self.ends_px = np.concatenate((self.ends_px, ends_px))
         self.near_m = np.concatenate((self.near_m, near_m))
         self.far_m = np.concatenate((self.far_m, far_m))
+        self.depth_m = np.concatenate((self.depth_m, near_m))
+        self.looks = np.concatenate((self.looks, np.ones((count, 2), np.float32)))
         self.age_frames = np.concatenate((self.age_frames, np.zeros(count, np.intp)))
         self.pixel_cov = np.concatenate((self.pixel_cov, pixel_cov))
-        room = np.full((HISTORY, count, 2, 4), np.nan, np.float32)
+        room = np.full((HISTORY, count, 2, 5), np.nan, np.float32)
         self._history = np.concatenate((self._history, room), axis=1)
 
     def commit(self, stamp_ns: int, pose: Pose) -> None:
@@ -93,8 +104,9 @@ class FragmentStore:
         self._comparable = min(self._comparable + 1, HISTORY)
         slot = self._history[self._head]
         slot[:, :, :2] = self.ends_px
-        slot[:, :, 2] = self.near_m
+        slot[:, :, 2] = self.depth_m
         slot[:, :, 3] = self.far_m
+        slot[:, :, 4] = self.looks
         self._stamps_ns[self._head] = stamp_ns
         self._rotations[self._head] = pose.rotation
         self._translations[self._head] = pose.translation_m
@@ -116,7 +128,18 @@ class FragmentStore:
         lag = np.clip(self.age_frames, 1, reach)
         slot = slots[lag - 1]
         rows = self._history[slot, np.arange(len(self.ids))]
-        return AnchorEnds(rows[:, :, :2], rows[:, :, 2], rows[:, :, 3], lag, ages_s[lag - 1], slot)
+        return AnchorEnds(
+            rows[:, :, :2], rows[:, :, 2], rows[:, :, 3], rows[:, :, 4], lag, ages_s[lag - 1], slot
+        )
+
+    def before(self) -> tuple[NDArray[np.float32], NDArray[np.float32], Pose]:
+        """Pixels (N, 2, 2) and depth_m (N, 2) in the frame before, and its camera pose."""
+        rows = self._history[self._head]
+        return (
+            rows[:, :, :2],
+            rows[:, :, 2],
+            Pose(self._rotations[self._head], self._translations[self._head]),
+        )
 
     def poses(self, slot: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
         """Camera rotation (N, 3, 3) and translation (N, 3) of history slots (N,)."""

@@ -1,7 +1,9 @@
-"""Moving or static, with hysteresis: a verdict needs consistent evidence over time, of two kinds.
+"""Moving or static, with hysteresis: a verdict needs consistent evidence over time, of several kinds.
 
 Fragments: the body's velocity over ground differs from zero by many sigmas, and most of its fragments
-agree with it. Arrivals: the body stands where free space was seen, and its surface has moved.
+agree with it. Across the line of sight that is enough; along it, where a few sliding ends can feign a
+change of length, the body's own depth must not contradict. Arrivals: the body stands where free space
+was seen.
 """
 
 from __future__ import annotations
@@ -17,31 +19,45 @@ from hal.types import FloatArray
 _RISE_S = 0.10
 _FALL_S = 0.30
 _MAX_EVIDENCE = 1.5
-_MIN_ENDS = 4
-_MIN_AGREEMENT = 0.5
+_ENDS_ACROSS = 4
+_ENDS_ALONG = 8
+_MIN_AGREEMENT = 0.25
+_CONTRADICTION_SIGMAS = 2.5
+_CONFIRMING_SIGMAS = 2.5
 _SPEED_PER_METRE = 0.02
 _FLOOR_SIGMA_MPS = 0.03
 _ARRIVED_CELLS = 8
 _ARRIVED_SHARE = 0.05
 _MUCH_CELLS = 20
 _MUCH_SHARE = 0.2
+_IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
+_LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them is carved out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionEvidence:
-    """Of T tracks: velocity (T, 3) and covariance (T, 3, 3) as filtered; the same of this frame's fragments
-    alone (own_velocity, own_covariance) from ends (T,) points of which agreement (T,) agree; distance_m
-    (T,); arrived (T,) and cells (T,) of their surface. trusted: the camera's motion is known."""
+    """Of T tracks, along the axes of the fixed frame.
 
+    sight (T, 3): unit vector from the camera; distance_m (T,). velocity (T, 3), covariance (T, 3, 3): as
+    filtered. own_velocity, own_covariance: of this frame's fragments alone, from ends (T,) points of
+    which agreement (T,) agree. surface_velocity, surface_covariance: from the surface's centre alone.
+    arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent. trusted: the camera's
+    motion is known.
+    """
+
+    sight: FloatArray
+    distance_m: FloatArray
     velocity: FloatArray
     covariance: FloatArray
     own_velocity: FloatArray
     own_covariance: FloatArray
+    surface_velocity: FloatArray
+    surface_covariance: FloatArray
     ends: NDArray[np.intp]
     agreement: FloatArray
-    distance_m: FloatArray
     arrived: NDArray[np.intp]
     cells: NDArray[np.intp]
+    size_m: FloatArray
     trusted: bool
 
 
@@ -62,27 +78,59 @@ def judge(
     settings: MotionSettings,
 ) -> Verdict:
     """Raise or lower the evidence of each track, and decide."""
-    significance = squared_sigmas(seen.velocity, seen.covariance)
-    own = squared_sigmas(seen.own_velocity, seen.own_covariance)
+    threshold = settings.sigmas**2
     speed = np.sqrt(np.square(seen.velocity).sum(axis=1))
     least = settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m
-    threshold = settings.sigmas**2
-    by_fragments = (
-        (significance > threshold)
-        & (own > 0.5 * threshold)
-        & (seen.ends >= _MIN_ENDS)
-        & (seen.agreement >= _MIN_AGREEMENT)
-    )
+    significance = squared_sigmas(seen.velocity, seen.covariance)
+    along, across = split_squared_sigmas(seen.velocity, seen.covariance, seen.sight)
+    own_along, own_across = split_squared_sigmas(seen.own_velocity, seen.own_covariance, seen.sight)
+    agreeing = np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0)
+    by_fragments_across = (across > threshold) & (own_across > 0.5 * threshold) & (agreeing >= _ENDS_ACROSS)
+    confirmed, contradicted = _second_opinion(seen)
+    many = (own_along > 0.5 * threshold) & (agreeing >= _ENDS_ALONG) & ~contradicted
+    by_fragments_along = (along > threshold) & (many | confirmed)
     has_arrived = (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells)
     by_arrival = has_arrived & (significance > 0.5 * threshold)
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
-    rising = (((by_fragments | by_arrival) & (speed > least)) | much) & seen.trusted
+    possible = (speed <= _IMPLAUSIBLE * settings.max_speed_mps) & (seen.size_m <= _LARGEST_M)
+    evident = by_fragments_across | by_fragments_along | by_arrival
+    rising = possible & ((evident & (speed > least)) | much) & seen.trusted
     holding = moving & (speed > 0.6 * least) & ((significance > 4.0) | has_arrived)
     change = np.where(rising, dt_s / _RISE_S, np.where(holding, 0.0, -dt_s / _FALL_S))
     new_evidence = np.clip(evidence + change, 0.0, _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
     confidence = 1.0 - np.exp(-significance / 60.0)
     return Verdict(new_evidence, new_moving, confidence)
+
+
+def _second_opinion(seen: MotionEvidence) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(T,) each: whether the depth of the surface confirms the speed along the line of sight, or denies it."""
+    by_fragments, variance = _along(seen.velocity, seen.covariance, seen.sight)
+    by_surface, surface_variance = _along(seen.surface_velocity, seen.surface_covariance, seen.sight)
+    limit = _CONTRADICTION_SIGMAS**2 * (variance + surface_variance)
+    denies = np.square(by_fragments - by_surface) > limit
+    confirms = (by_surface**2 > _CONFIRMING_SIGMAS**2 * surface_variance) & (by_surface * by_fragments > 0)
+    return confirms & ~denies, denies
+
+
+def _along(velocity: FloatArray, covariance: FloatArray, sight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(T,) component along sight (T, 3), and its variance (T,)."""
+    value = (velocity * sight).sum(axis=1)
+    variance = (sight[:, None, :] @ covariance @ sight[:, :, None])[:, 0, 0]
+    return value, variance
+
+
+def split_squared_sigmas(
+    velocity: FloatArray, covariance: FloatArray, sight: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(T,) squared distance from zero in sigmas, of the part of velocity along sight and of that across."""
+    value, variance = _along(velocity, covariance, sight)
+    along = value * value / (variance + _FLOOR_SIGMA_MPS**2)
+    onto = np.eye(3) - sight[:, :, None] * sight[:, None, :]
+    rest = velocity - value[:, None] * sight
+    doubt = onto @ covariance @ onto + sight[:, :, None] * sight[:, None, :] + np.eye(3) * _FLOOR_SIGMA_MPS**2
+    across: FloatArray = (rest[:, None, :] @ np.linalg.solve(doubt, rest[:, :, None]))[:, 0, 0]
+    return along, across
 
 
 def squared_sigmas(velocity: FloatArray, covariance: FloatArray) -> FloatArray:

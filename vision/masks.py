@@ -71,44 +71,52 @@ def predict(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Assignment:
-    """labels (h, w): track index + 1, 0 for none. new_parts: numbers of parts that no track claims."""
+class Ballot:
+    """present (P, T): the tracks that a part may belong to. winner (P,): track index + 1 with the most
+    votes, 0 for none. votes (P,): the winner's."""
 
-    labels: IntGrid
-    new_parts: NDArray[np.intp]
+    present: NDArray[np.bool_]
+    winner: NDArray[np.int32]
+    votes: NDArray[np.intp]
 
 
-def assign(
+def count_votes(
     parts: IntGrid, count: int, predicted: IntGrid, tracks: int, mover: NDArray[np.bool_]
-) -> Assignment:
-    """Give the connected parts 1..count of parts (h, w) to tracks, by the votes of predicted (h, w).
+) -> Ballot:
+    """How the cells predicted (h, w), track index + 1, vote in the connected parts 1..count of parts.
 
-    mover (T,): tracks that move, or may: only these divide a part; among static ones the most votes win.
+    mover (T,): tracks that move, or may: only these divide a part; of the static ones the strongest stays.
     """
-    new = np.arange(1, count + 1)
     if tracks == 0 or count == 0:
-        return Assignment(np.zeros_like(parts), new)
+        nobody = np.zeros(count, np.int32)
+        return Ballot(np.zeros((count, tracks), np.bool_), nobody, nobody.astype(np.intp))
     ballots = (parts > 0) & (predicted > 0)
     cast = (parts[ballots] - 1) * tracks + predicted[ballots] - 1
     votes = np.bincount(cast, minlength=count * tracks).reshape(count, tracks)
     total = votes.sum(axis=1, keepdims=True)
     own = votes.sum(axis=0, keepdims=True)
     present = (votes >= _LEAST_VOTES) & ((votes >= _SHARE_OF_PART * total) | (votes >= _SHARE_OF_TRACK * own))
-    # Of the static tracks in a part only the strongest stays.
     static_votes = np.where(mover[None, :], 0, votes) * present
     strongest = static_votes.argmax(axis=1)
     keep_static = np.zeros_like(present)
     keep_static[np.arange(count), strongest] = static_votes.max(axis=1) > 0
     present &= mover[None, :] | keep_static
-    claims = present.sum(axis=1)
-    winner = np.where(claims > 0, np.where(present, votes, -1).argmax(axis=1) + 1, 0).astype(np.int32)
+    best = np.where(present, votes, -1).argmax(axis=1)
+    claimed = present.any(axis=1)
+    winner = np.where(claimed, best + 1, 0).astype(np.int32)
+    return Ballot(present, winner, np.where(claimed, votes[np.arange(count), best], 0))
+
+
+def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:
+    """(h, w) track index + 1: whole parts to their winner (P,), shared ones by the nearest vote."""
     labels = np.concatenate(([np.int32(0)], winner))[parts]
-    divided = np.concatenate(([False], claims > 1))
-    if divided.any():
-        allowed = np.zeros((count + 1, tracks + 1), np.bool_)
-        allowed[1:, 1:] = present
-        inside = divided[parts]
-        seeds = np.where(inside & allowed[parts, predicted], predicted, 0).astype(np.int32)
-        filled = spread_labels(seeds, inside)
-        labels = np.where(inside & allowed[parts, filled], filled, labels)
-    return Assignment(labels.astype(np.int32), new[claims == 0])
+    shared = np.concatenate(([False], (ballot.present.sum(axis=1) > 1) & (winner > 0)))
+    if not shared.any():
+        return labels
+    count, tracks = ballot.present.shape
+    allowed = np.zeros((count + 1, tracks + 1), np.bool_)
+    allowed[1:, 1:] = ballot.present
+    inside = shared[parts]
+    seeds = np.where(inside & allowed[parts, predicted], predicted, 0).astype(np.int32)
+    filled = spread_labels(seeds, inside)
+    return np.where(inside & allowed[parts, filled], filled, labels).astype(np.int32)

@@ -52,7 +52,9 @@ def track(
     there, there_ok, _ = cv2.calcOpticalFlowPyrLK(
         before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=settings.lk_levels, **options
     )
-    back_guess = there - (guess - pixels).reshape(-1, 1, 2)
+    # What all ends have in common was the guess's own error: a turn of the camera it did not know of.
+    common = np.median(there[:, 0, :] - guess, axis=0)
+    back_guess = there - (guess + common - pixels).reshape(-1, 1, 2)
     back, back_ok, _ = cv2.calcOpticalFlowPyrLK(
         now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1), **options
     )

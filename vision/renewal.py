@@ -12,12 +12,15 @@ from hal.types import RgbdFrame
 from vision.contours import find_contours
 from vision.depth_mask import depth_sigma_m, surface_depth
 from vision.edges import GreyImage, find_edges
-from vision.segments import hough_segments, lengths_px, snap_to_corners
+from vision.segments import hough_segments, lengths_px, smaller_eigenvalue, snap_to_corners
 
 BAND_PX = 160
 _MARGIN_PX = 8
 _MIN_END_DISTANCE_PX = 12.0
 _TAKEN_PX = 6
+_LOW_SHARE = 0.4
+_CANDIDATES_PER_TILE = 4
+_SHARE_WITHOUT_DEPTH = 0.15
 _NOISE_STRUCTURE = 220.0  # what image noise of 3 grey levels adds to both eigenvalues over 7x7 px
 _LEAST_STRUCTURE = 30.0
 _MATCH_SIGMA = 6.0  # grey levels by which two sights of the same patch differ
@@ -34,49 +37,71 @@ class NewFragments:
 
 
 class Renewal:
-    """Decides where to look and finds segments there. Keeps only when each band was last visited."""
+    """Decides where to look and finds segments there. Keeps when each band was last visited, and how much
+    contrast makes an edge in each block of it."""
 
     def __init__(self, config: PerceptionConfig) -> None:
         self._config = config
         self._last_visit = np.empty(0, np.intp)
+        self._threshold = np.empty((0, 0))
         self._visits = 0
 
-    def find(self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32]) -> NewFragments:
-        """Fragments for the tiles of one band that hold too few of ends_px (N, 2, 2); all bands at first."""
+    def find(
+        self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], without_depth: int
+    ) -> NewFragments:
+        """Fragments for the tiles of one band that hold too few of ends_px (N, 2, 2); all bands at first.
+
+        without_depth: how many of the present ones have no depth; only a small share of all may.
+        """
         settings = self._config.fragments
         height, width = grey.shape
-        bands = max(1, round(width / BAND_PX))
-        if len(self._last_visit) != bands:
+        blocks, bands = max(1, round(height / BAND_PX)), max(1, round(width / BAND_PX))
+        if self._threshold.shape != (blocks, bands):
             self._last_visit = np.full(bands, -1, np.intp)
+            self._threshold = np.full((blocks, bands), 0.5 * (settings.canny_least + settings.canny_most))
         self._visits += 1
         counts = _tile_counts(ends_px, settings.tile_px, height, width)
         chosen = range(bands) if len(ends_px) == 0 else [int(self._last_visit.argmin())]
         found = [np.empty((0, 2, 2), np.float32)]
         for band in chosen:
             self._last_visit[band] = self._visits
-            left = band * width // bands
-            right = (band + 1) * width // bands
-            found.append(self._segments(grey, counts, left, right))
-        candidates = np.concatenate(found)
+            found.append(self._segments(grey, counts, band, bands))
         room = settings.max_fragments - len(ends_px)
-        return self._select(frame, grey, candidates, ends_px, counts, room)
+        far_room = max(0, int(_SHARE_WITHOUT_DEPTH * settings.max_fragments) - without_depth)
+        return self._select(frame, grey, np.concatenate(found), ends_px, counts, (room, far_room))
 
     def _segments(
-        self, grey: GreyImage, counts: NDArray[np.intp], left: int, right: int
+        self, grey: GreyImage, counts: NDArray[np.intp], band: int, bands: int
     ) -> NDArray[np.float32]:
+        """Segments of one band, by Hough and by contours, outside of tiles that are full."""
         settings = self._config.fragments
-        start = max(0, left - _MARGIN_PX)
-        stop = min(grey.shape[1], right + _MARGIN_PX)
-        edges = find_edges(grey[:, start:stop], settings.canny_low, settings.canny_high)
+        height, width = grey.shape
+        start = max(0, band * width // bands - _MARGIN_PX)
+        stop = min(width, (band + 1) * width // bands + _MARGIN_PX)
+        edges = np.empty((height, stop - start), np.uint8)
+        blocks = len(self._threshold)
+        for block in range(blocks):
+            top, bottom = block * height // blocks, (block + 1) * height // blocks
+            edges[top:bottom] = self._edges(grey[top:bottom, start:stop], block, band)
         full = counts >= 2 * settings.fragments_per_tile
         tile = settings.tile_px
-        mask = np.repeat(np.repeat(full, tile, axis=0), tile, axis=1)[: grey.shape[0], start:stop]
+        mask = np.repeat(np.repeat(full, tile, axis=0), tile, axis=1)[:height, start:stop]
         edges[mask] = 0
         contours = find_contours(edges, settings.min_length_px)
         lines = hough_segments(contours.edges, settings.min_length_px)
         segments = np.concatenate((lines, contours.ends_px))
         segments[:, :, 0] += start
         return segments
+
+    def _edges(self, grey: GreyImage, block: int, band: int) -> GreyImage:
+        """Edges of one block. The next visit looks closer where little was seen, and less close where much."""
+        settings = self._config.fragments
+        high = float(self._threshold[block, band])
+        edges = find_edges(grey, _LOW_SHARE * high, high)
+        share = max(float(np.count_nonzero(edges)) / edges.size, 1e-3)
+        wanted = high * min(max(float(np.sqrt(share / settings.edge_share)), 0.6), 1.6)
+        self._threshold[block, band] = min(max(wanted, settings.canny_least), settings.canny_most)
+        return edges
 
     def _select(
         self,
@@ -85,23 +110,20 @@ class Renewal:
         candidates: NDArray[np.float32],
         ends_px: NDArray[np.float32],
         counts: NDArray[np.intp],
-        room: int,
+        room: tuple[int, int],
     ) -> NewFragments:
-        """Snap, thin out to what the tiles lack, and drop what has no depth or crosses a depth edge."""
+        """Thin out to what the tiles lack; drop what has no depth, crosses a depth edge or cannot be tracked."""
         settings, config = self._config.fragments, self._config
+        missing = settings.fragments_per_tile - counts.ravel() // 2
+        candidates = candidates[np.argsort(-lengths_px(candidates), kind="stable")]
+        tile = _tiles(candidates, settings.tile_px, counts.shape[1])
+        candidates = candidates[_rank_within(tile) < np.minimum(4 * missing, _CANDIDATES_PER_TILE)[tile]]
         snapped, tensor = snap_to_corners(grey, candidates)
-        order = np.argsort(-lengths_px(snapped), kind="stable")
+        held = smaller_eigenvalue(*np.moveaxis(tensor, -1, 0)).min(axis=1)
+        order = np.argsort(-held, kind="stable")
         snapped, tensor = snapped[order], tensor[order]
-        free = _not_taken(snapped, ends_px, grey.shape)
-        wanted = free & (lengths_px(snapped) >= _MIN_END_DISTANCE_PX)
+        wanted = (lengths_px(snapped) >= _MIN_END_DISTANCE_PX) & _not_taken(snapped, ends_px, grey.shape)
         snapped, tensor = snapped[wanted], tensor[wanted]
-        middle = snapped.mean(axis=1)
-        tile = (middle[:, 1] // settings.tile_px).astype(np.intp) * counts.shape[1]
-        tile += (middle[:, 0] // settings.tile_px).astype(np.intp)
-        allowed = settings.fragments_per_tile - counts.ravel()[tile] // 2
-        rank = _rank_within(tile)
-        picked = np.flatnonzero(rank < allowed)[: max(0, room)]
-        snapped, tensor = snapped[picked], tensor[picked]
         shares = np.array([0.0, 0.25, 0.5, 0.75, 1.0], np.float32)
         along = snapped[:, :1] + (snapped[:, 1:] - snapped[:, :1]) * shares[:, None]
         surface = surface_depth(
@@ -112,15 +134,18 @@ class Renewal:
             config.max_depth_m,
             config.depth_noise,
         )
-        near = surface.near_m.reshape(-1, 5)
-        far = surface.far_m.reshape(-1, 5)
-        whole = _on_one_surface(near, shares, self._config)
-        covariance = _flow_covariance(tensor[whole], settings.pixel_sigma_px)
+        near, far = surface.near_m.reshape(-1, 5), surface.far_m.reshape(-1, 5)
+        # Where nothing is measured at all, it is far away most of the time: good to know the camera's turn by.
+        beyond = np.isnan(near).all(axis=1)
+        beyond &= np.cumsum(beyond) <= room[1]
+        whole = np.flatnonzero(_on_one_surface(near, shares, config) | beyond)
+        tile = _tiles(snapped[whole], settings.tile_px, counts.shape[1])
+        picked = whole[_rank_within(tile) < missing[tile]][: max(0, room[0])]
         return NewFragments(
-            snapped[whole],
-            near[whole][:, [0, 4]].astype(np.float32),
-            far[whole][:, [0, 4]].astype(np.float32),
-            covariance,
+            snapped[picked],
+            near[picked][:, [0, 4]].astype(np.float32),
+            far[picked][:, [0, 4]].astype(np.float32),
+            _flow_covariance(tensor[picked], settings.pixel_sigma_px),
         )
 
 
@@ -132,10 +157,17 @@ def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width:
     return np.bincount(index, minlength=rows * columns).reshape(rows, columns)
 
 
+def _tiles(ends_px: NDArray[np.float32], tile_px: int, columns: int) -> NDArray[np.intp]:
+    """(N,) flat tile index of the middle of each segment."""
+    middle = (ends_px.mean(axis=1) // tile_px).astype(np.intp)
+    result: NDArray[np.intp] = middle[:, 1] * columns + middle[:, 0]
+    return result
+
+
 def _not_taken(
     candidates: NDArray[np.float32], ends_px: NDArray[np.float32], shape: tuple[int, ...]
 ) -> NDArray[np.bool_]:
-    """Which candidates have at least one end where no other fragment, old or earlier in the list, has one."""
+    """Which candidates have both ends where no other fragment, old or earlier in the list, has one."""
     columns = shape[1] // _TAKEN_PX + 1
     taken = np.zeros((shape[0] // _TAKEN_PX + 1) * columns, np.bool_)
     taken[_cells(ends_px, columns).ravel()] = True
@@ -144,7 +176,7 @@ def _not_taken(
     _, first = np.unique(cells.ravel(), return_index=True)
     is_first = np.zeros(cells.size, np.bool_)
     is_first[first] = True
-    result: NDArray[np.bool_] = (fresh & is_first.reshape(cells.shape)).any(axis=1)
+    result: NDArray[np.bool_] = (fresh & is_first.reshape(cells.shape)).all(axis=1)
     return result
 
 
@@ -156,10 +188,12 @@ def _cells(ends_px: NDArray[np.float32], columns: int) -> NDArray[np.intp]:
 
 def _rank_within(groups: NDArray[np.intp]) -> NDArray[np.intp]:
     """(N,) how many earlier entries have the same group."""
+    if len(groups) == 0:
+        return np.empty(0, np.intp)
     order = np.argsort(groups, kind="stable")
     ordered = groups[order]
-    first = np.concatenate(([True], ordered[1:] != ordered[:-1])) if len(groups) else np.empty(0, np.bool_)
-    starts = np.maximum.accumulate(np.where(first, np.arange(len(groups)), 0))
+    is_first = np.concatenate(([True], ordered[1:] != ordered[:-1]))
+    starts = np.maximum.accumulate(np.where(is_first, np.arange(len(groups)), 0))
     rank = np.empty(len(groups), np.intp)
     rank[order] = np.arange(len(groups)) - starts
     return rank
@@ -193,11 +227,10 @@ def _flow_covariance(tensor: NDArray[np.float32], floor_px: float) -> NDArray[np
     radius = np.sqrt(half * half + uv * uv)
     larger = np.maximum(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
     smaller = np.maximum(middle - radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
-    # inverse = p (I / 2) + q (direction of the larger eigenvalue), from the two inverse eigenvalues.
+    # The inverse has the same axes and the inverse eigenvalues.
     across, along = _MATCH_SIGMA**2 / larger, _MATCH_SIGMA**2 / smaller
     mean, spread = 0.5 * (across + along), 0.5 * (across - along)
     scale = spread / np.maximum(radius, 1e-6)
     floor = floor_px**2
-    return np.stack((mean + scale * half + floor, scale * uv, mean - scale * half + floor), axis=-1).astype(
-        np.float32
-    )
+    parts = (mean + scale * half + floor, scale * uv, mean - scale * half + floor)
+    return np.stack(parts, axis=-1).astype(np.float32)

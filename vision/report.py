@@ -11,6 +11,7 @@ from vision.scene import Fragments, Obstacle
 from vision.tracks import Tracks
 
 MIN_SIGHTINGS = 3
+_LISTED_UNSEEN_S = 0.15  # a track is remembered for longer, but no longer shown as seen
 _STATIC_SCORE = 0.5
 
 
@@ -20,7 +21,12 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
     local = (tracks.state[:, :3] - pose.translation_m) @ pose.rotation
     velocity = tracks.state[:, 3:] @ pose.rotation
     covariance = pose.rotation.T @ tracks.covariance[:, 3:, 3:] @ pose.rotation
-    listed = (tracks.sightings >= MIN_SIGHTINGS) & (local[:, 2] > 0.0)
+    unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
+    listed = (
+        (tracks.sightings >= MIN_SIGHTINGS)
+        & (local[:, 2] > 0.0)
+        & ((unseen_s == 0.0) | ((unseen_s <= _LISTED_UNSEEN_S) & _in_view(local, detection)))
+    )
     result = []
     for t in np.flatnonzero(listed).tolist():
         moving = bool(tracks.moving[t])
@@ -37,10 +43,20 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
                 score=float(tracks.confidence[t]) if moving else _STATIC_SCORE,
                 fragments=int(tracks.fragments[t]),
                 age_s=(detection.captured_ns - int(tracks.born_ns[t])) * 1e-9,
-                unseen_s=(detection.captured_ns - int(tracks.seen_ns[t])) * 1e-9,
+                unseen_s=float(unseen_s[t]),
             )
         )
     return tuple(result)
+
+
+def _in_view(local_m: FloatArray, detection: Detection) -> NDArray[np.bool_]:
+    """(T,) whether points (T, 3) of the camera frame project into the image."""
+    camera = detection.camera
+    depth = np.maximum(local_m[:, 2], 0.1)
+    u = local_m[:, 0] / depth * camera.fx + camera.cx
+    v = local_m[:, 1] / depth * camera.fy + camera.cy
+    result: NDArray[np.bool_] = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+    return result
 
 
 def fragments(

@@ -50,7 +50,7 @@ def snap_to_corners(
     side = 2 * _SNAP_PX + 1
     products = (du * du, du * dv, dv * dv)
     tensor = np.stack([_box_sum(p).reshape(-1, side * side) for p in products], axis=-1)
-    best = _smaller_eigenvalue(*np.moveaxis(tensor, -1, 0)).argmax(axis=1)
+    best = smaller_eigenvalue(*np.moveaxis(tensor, -1, 0)).argmax(axis=1)
     snapped = np.stack((column + best % side - _SNAP_PX, row + best // side - _SNAP_PX), axis=1)
     at_best = tensor[np.arange(len(best)), best]
     return snapped.astype(np.float32).reshape(-1, 2, 2), at_best.reshape(-1, 2, 3)
@@ -70,9 +70,10 @@ def _box_sum(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return values
 
 
-def _smaller_eigenvalue(
+def smaller_eigenvalue(
     uu: NDArray[np.float32], uv: NDArray[np.float32], vv: NDArray[np.float32]
 ) -> NDArray[np.float32]:
+    """Of the symmetric 2x2 matrices with these entries."""
     half_difference = 0.5 * (uu - vv)
     smaller: NDArray[np.float32] = 0.5 * (uu + vv) - np.sqrt(half_difference * half_difference + uv * uv)
     return smaller

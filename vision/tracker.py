@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import FloatArray, PlanarPose
-from vision import carving, kalman, masks, obstacles, regions, report
+from vision import carving, grouping, kalman, masks, obstacles, regions, report
 from vision.arrivals import FreeMemory
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
@@ -25,7 +25,10 @@ _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
 _SUSPECT = 0.3  # evidence that a carved body starts with
-_CENTRE_SIGMA_M = 0.06
+_CENTRE_SIGMA_M = 0.03
+_CENTRE_SHARE = 0.05
+_CENTRE_DEPTH_SHARE = 0.15
+_CENTRE_NOISE = 0.2
 _SMALL_SHARE = 0.3
 _ATTACH_M = 0.25
 
@@ -114,45 +117,63 @@ class Tracker:
         index = tracks.index_of(self._surfaces.track_id)
         predicted = masks.predict(self._surfaces, index, shift, grid, pose)
         count, parts = regions.components(grid, standing)
-        assigned = masks.assign(parts, count, predicted, len(tracks), mover)
-        labels = assigned.labels
-        labels = self._births(detection, parts, count, assigned.new_parts, labels)
-        return carving.carve(self._tracks, detection, labels, arrived, self._config)
+        measured = regions.measure(grid, parts, count)
+        ballot = masks.count_votes(parts, count, predicted, len(tracks), mover)
+        winner = grouping.detach(ballot.winner, measured, ballot.votes)
+        winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, mover)
+        labels = masks.divide(parts, predicted, ballot, winner)
+        labels = self._births(detection, parts, measured, winner, labels)
+        labels = carving.carve(tracks, detection, labels, arrived, self._config)
+        return self._regroup(detection, labels)
+
+    def _regroup(self, detection: Detection, labels: IntGrid) -> IntGrid:
+        """Merge what is one body and split what is two."""
+        tracks, grid = self._tracks, detection.grid
+        if not tracks.moving.any():
+            return labels
+        measured = regions.measure(grid, labels, len(tracks))
+        sigma = np.sqrt(np.trace(tracks.covariance[:, 3:, 3:], axis1=1, axis2=2))
+        mover = tracks.moving | (tracks.evidence > 0.0)
+        pairs = grouping.merges(measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
+        for small, large in pairs:
+            labels = np.where(labels == small + 1, np.int32(large + 1), labels)
+            tracks.seen_ns[small] = 0
+        for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
+            second = grouping.split(grid, labels, track)
+            if second is not None:
+                tracks.twin(track, detection.captured_ns)
+                labels = labels.copy()
+                labels.ravel()[second] = len(tracks)
+        return labels
 
     def _births(
         self,
         detection: Detection,
         parts: IntGrid,
-        count: int,
-        new_parts: NDArray[np.intp],
+        measured: Regions,
+        winner: NDArray[np.int32],
         labels: IntGrid,
     ) -> IntGrid:
         """Parts that nobody claims become tracks if they are large enough and reach down to the robot."""
-        if len(new_parts) == 0:
-            return labels
         grid, tracks = detection.grid, self._tracks
-        cells = np.bincount(parts.ravel(), minlength=count + 1)
-        low = (
-            cells
-            if grid.height_m is None
-            else np.bincount(parts[grid.height_m < self._body_height_m], minlength=count + 1)
-        )
-        born = new_parts[(cells[new_parts] >= _MIN_CELLS) & (low[new_parts] >= _MIN_CELLS // 2)]
+        large = (winner == 0) & (measured.cells >= _MIN_CELLS)
+        if grid.height_m is not None:
+            low = np.bincount(parts[grid.height_m < self._body_height_m], minlength=len(winner) + 1)[1:]
+            large &= low >= _MIN_CELLS // 2
+        born = np.flatnonzero(large)
         if len(born) == 0:
             return labels
-        number = np.zeros(count + 1, np.int32)
-        number[born] = np.arange(1, len(born) + 1)
-        own = number[parts]
-        measured = regions.measure(grid, own, len(born))
-        first = len(tracks)
+        number = np.zeros(len(winner) + 1, np.int32)
+        number[born + 1] = np.arange(1, len(born) + 1) + len(tracks)
         tracks.start(
-            detection.pose.apply(measured.position_m),
+            detection.pose.apply(measured.position_m[born]),
             0.2,
             self._config.motion.max_speed_mps,
             0.0,
             detection.captured_ns,
         )
-        return np.where(own > 0, own + first, labels).astype(np.int32)
+        own = number[parts]
+        return np.where(own > 0, own, labels).astype(np.int32)
 
     def _see(self, detection: Detection, measured: Regions) -> None:
         """The surfaces' centres update the filters; those that are cut or hidden only the position."""
@@ -163,17 +184,18 @@ class Tracker:
         position = detection.pose.apply(measured.position_m[seen])
         depth = measured.position_m[seen, 2]
         sigma = depth_sigma_m(depth, self._config.depth_noise)
-        across = _CENTRE_SIGMA_M + 0.1 * measured.extent_m[seen, :2].max(axis=1)
+        across = _CENTRE_SIGMA_M + _CENTRE_SHARE * measured.extent_m[seen, :2].max(axis=1)
+        depth_part = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * measured.extent_m[seen, 2]
         noise = np.zeros((len(seen), 3, 3))
         noise[:, 0, 0] = noise[:, 1, 1] = np.square(across)
-        noise[:, 2, 2] = np.square(across) + np.square(0.3 * sigma)
+        noise[:, 2, 2] = np.square(depth_part) + np.square(_CENTRE_NOISE * sigma)
+        noise = rotation @ noise @ rotation.T
+        whole = measured.whole[seen]
         tracks.state[seen], tracks.covariance[seen] = kalman.update(
-            tracks.state[seen],
-            tracks.covariance[seen],
-            position,
-            rotation @ noise @ rotation.T,
-            0,
-            coupled=measured.whole[seen],
+            tracks.state[seen], tracks.covariance[seen], position, noise, 0, coupled=whole
+        )
+        tracks.surface_state[seen], tracks.surface_covariance[seen] = kalman.update(
+            tracks.surface_state[seen], tracks.surface_covariance[seen], position, noise, 0, coupled=whole
         )
         tracks.seen_ns[seen] = detection.captured_ns
         tracks.sightings[seen] += 1
@@ -218,7 +240,8 @@ class Tracker:
             tracks.state[:, 3:] @ rotation,
             settings.max_speed_mps,
         )
-        use = (body.ends >= 2) & (body.agreement >= 0.3)
+        agreeing = body.agreement * body.ends
+        use = (agreeing >= 2) & ((body.agreement >= 0.3) | (agreeing >= 6))
         if use.any():
             # Windows overlap: each frame brings dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
@@ -230,17 +253,23 @@ class Tracker:
                 rotation @ noise @ rotation.T,
                 3,
             )
+        sight = tracks.state[:, :3] - detection.pose.translation_m
+        distance = np.sqrt(np.square(sight).sum(axis=1))
         seen = MotionEvidence(
-            tracks.state[:, 3:],
-            tracks.covariance[:, 3:, 3:],
-            body.velocity_mps,
-            body.covariance,
-            np.where(use, body.ends, 0),
-            body.agreement,
-            np.linalg.norm(tracks.state[:, :3] - detection.pose.translation_m, axis=1),
-            arrivals,
-            cells,
-            detection.ego_motion.source != "none",
+            sight=sight / np.maximum(distance, 0.1)[:, None],
+            distance_m=distance,
+            velocity=tracks.state[:, 3:],
+            covariance=tracks.covariance[:, 3:, 3:],
+            own_velocity=body.velocity_mps @ rotation.T,
+            own_covariance=rotation @ body.covariance @ rotation.T,
+            surface_velocity=tracks.surface_state[:, 3:],
+            surface_covariance=tracks.surface_covariance[:, 3:, 3:],
+            ends=np.where(use, body.ends, 0),
+            agreement=body.agreement,
+            arrived=arrivals,
+            cells=cells,
+            size_m=tracks.extent_m.max(axis=1),
+            trusted=detection.ego_motion.source != "none",
         )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving

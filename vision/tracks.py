@@ -12,6 +12,8 @@ _FIELDS = (
     "ids",
     "state",
     "covariance",
+    "surface_state",
+    "surface_covariance",
     "born_ns",
     "seen_ns",
     "sightings",
@@ -26,13 +28,16 @@ _FIELDS = (
 
 
 class Tracks:
-    """state (T, 6): position and velocity; covariance (T, 6, 6); evidence (T,) of motion; moving (T,);
+    """state (T, 6): position and velocity; covariance (T, 6, 6); surface_state and surface_covariance: the
+    same from the centres of the visible surface alone, without the fragments, as a second opinion; evidence (T,) of motion; moving (T,);
     confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); cells (T,) of the grid covered when last seen."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
         self.state = np.empty((0, 6))
         self.covariance = np.empty((0, 6, 6))
+        self.surface_state = np.empty((0, 6))
+        self.surface_covariance = np.empty((0, 6, 6))
         self.born_ns = np.empty(0, np.int64)
         self.seen_ns = np.empty(0, np.int64)
         self.sightings = np.empty(0, np.intp)
@@ -76,6 +81,8 @@ class Tracks:
             "ids": np.arange(self._next_id, self._next_id + count),
             "state": np.concatenate((position_m, np.zeros((count, 3))), axis=1),
             "covariance": np.tile(spread, (count, 1, 1)),
+            "surface_state": np.concatenate((position_m, np.zeros((count, 3))), axis=1),
+            "surface_covariance": np.tile(spread, (count, 1, 1)),
             "born_ns": np.full(count, now_ns),
             "seen_ns": np.full(count, now_ns),
             "sightings": np.zeros(count),
@@ -92,7 +99,21 @@ class Tracks:
             old = getattr(self, name)
             setattr(self, name, np.concatenate((old, np.asarray(new[name], old.dtype))))
 
+    def twin(self, track: int, now_ns: int) -> None:
+        """Begin a track that moves as another one does: its companion, so far taken for a part of it."""
+        moving, evidence = self.moving[track], float(self.evidence[track])
+        state, covariance = self.state[track], self.covariance[track]
+        sightings = self.sightings[track]
+        self.start(state[None, :3], 0.3, 1.0, evidence, now_ns)
+        self.state[-1, 3:] = state[3:]
+        self.covariance[-1, 3:, 3:] = covariance[3:, 3:]
+        self.moving[-1] = moving
+        self.sightings[-1] = sightings
+
     def predict(self, dt_s: float, accel_density: float) -> None:
         """Move every track on."""
         if len(self) and dt_s > 0:
             self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_density)
+            self.surface_state, self.surface_covariance = kalman.predict(
+                self.surface_state, self.surface_covariance, dt_s, accel_density
+            )
