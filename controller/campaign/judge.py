@@ -13,6 +13,7 @@ from controller.campaign.oracle import OracleTime
 from controller.campaign.stage import Stage
 from controller.campaign.view import PlanarEye
 from controller.decision import Action
+from controller.profile import SpeedRamps
 from hal.types import FloatArray, PlanarPose
 from sim.planar import separation
 
@@ -26,6 +27,7 @@ _BEFORE_STOP_S, _AFTER_STOP_S = 4.0, 2.0
 _AFTER_FAULT_S = 1.5
 _SIGHT_STEPS = 5
 _SEEN_MOVING_MPS = 0.1
+_AVOIDING_S = 15.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +68,22 @@ class Row:
         return asdict(self)
 
 
-def judge(stage: Stage, log: DriveLog, policy: str, mode: str, oracle: OracleTime, eye: PlanarEye) -> Row:
+@dataclass(frozen=True, slots=True)
+class Yardstick:
+    """What a drive is measured by: the oracle's time, the field of view, and how long the fastest reaction to
+    something new takes (sightings, latency of perception, control period, lag of the chassis)."""
+
+    oracle: OracleTime
+    eye: PlanarEye
+    reaction_s: float
+
+
+def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) -> Row:
     """Everything that missions.jsonl says of a drive."""
     clearance = _Clearance(stage, log)
     contacts = clearance.contacts()
     case, tally = stage.case, log.setpoints
-    at_fault = [one for one in contacts if _at_fault(one, stage, log, eye)]
+    at_fault = [one for one in contacts if _at_fault(one, stage, log, by.eye, by.reaction_s)]
     return Row(
         family=case.family,
         seed=case.seed,
@@ -83,7 +95,7 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, oracle: OracleTim
         contacts_at_fault=len(at_fault),
         touched=tuple(stage.world.names[one.body] for one in at_fault),
         time_s=None if log.reached_s is None else round(log.reached_s, 4),
-        oracle_time_s=round(oracle.total_s, 4) if math.isfinite(oracle.total_s) else None,
+        oracle_time_s=round(by.oracle.total_s, 4) if math.isfinite(by.oracle.total_s) else None,
         min_clearance_m=round(clearance.least_m, 4),
         max_jerk_mps3=tally.max_jerk_mps3,
         max_accel_mps2=tally.max_accel_mps2,
@@ -159,23 +171,23 @@ class _Clearance:
                 self._contacts.append(Contact(last_s, body, float(speeds[k])))
 
 
-def _at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> bool:
-    """Whether the robot moved, and a driver with the same field of view who knows the whole motion of what it
-    has once seen moving (or standing, if it never moves) avoids it: by braking as hard as is allowed, by
-    braking comfortably, by going on, or by speeding up, from that sight on."""
+def _at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reaction_s: float) -> bool:
+    """Whether the robot moved, and a driver who knows the whole motion of what it has once seen moving (or
+    standing, if it never moves) avoids it: with the same field of view, reaction_s and limits, by braking
+    hard, by braking comfortably, by going on, or by speeding up."""
     if contact.v_mps <= AT_FAULT_MPS:
         return False
     seen = _first_seen(contact, stage, log, eye)
     if seen is None:
         return False
     limits = stage.robot.limits
-    choices = (
-        (-limits.emergency_decel_mps2, 0.0),
-        (-limits.max_accel_mps2, 0.0),
-        (0.0, log.v_mps[seen]),
-        (limits.max_accel_mps2, limits.max_speed_mps),
+    soft = (limits.max_accel_mps2, limits.max_jerk_mps3)
+    hard = (limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
+    choices = ((0.0, *hard), (0.0, *soft), (log.v_mps[seen], *soft), (limits.max_speed_mps, *soft))
+    return not all(
+        _touches(contact.body, stage, log, seen, reaction_s, target, accel, jerk)
+        for target, accel, jerk in choices
     )
-    return not all(_touches(contact.body, stage, log, seen, accel, bound) for accel, bound in choices)
 
 
 def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
@@ -193,15 +205,30 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -
     return None
 
 
-def _touches(body: int, stage: Stage, log: DriveLog, start: int, accel_mps2: float, bound_mps: float) -> bool:
-    """Whether a robot that changes to bound_mps with accel_mps2 from step start on touches the body."""
-    v0, s0 = log.v_mps[start], log.s_m[start]
-    t = np.arange(0.0, 15.0, 0.02)
-    ramp_s = (bound_mps - v0) / accel_mps2 if accel_mps2 != 0.0 else 0.0
-    ramped = np.minimum(t, max(ramp_s, 0.0))
-    v = v0 + accel_mps2 * ramped
-    s = s0 + v0 * ramped + 0.5 * accel_mps2 * ramped**2 + v * (t - ramped)
-    moving = (v > AT_FAULT_MPS) & (s <= stage.path.length_m)
+def _touches(
+    body: int,
+    stage: Stage,
+    log: DriveLog,
+    start: int,
+    reaction_s: float,
+    target_mps: float,
+    accel_mps2: float,
+    jerk_mps3: float,
+) -> bool:
+    """Whether a robot that goes over to target_mps reaction_s after step start touches the body."""
+    t = np.arange(0.0, _AVOIDING_S, 0.02)
+    ramp = SpeedRamps(
+        log.v_mps[start],
+        0.0,
+        np.array([target_mps]),
+        accel_mps2=accel_mps2,
+        decel_mps2=accel_mps2,
+        jerk_mps3=jerk_mps3,
+        latency_s=reaction_s,
+    )
+    way, speed, _ = ramp.state(t[None])
+    s = log.s_m[start] + way[0]
+    moving = (speed[0] > AT_FAULT_MPS) & (s <= stage.path.length_m)
     if not moving.any():
         return False
     poses = stage.path_poses(s[moving])

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Literal
 
-from config.app import AppConfig
+from config.app import AppConfig, LockstepRunner
 from config.camera import SimulatedCameraConfig
 from controller.campaign import oracle
 from controller.campaign.camera_mission import drive_camera
-from controller.campaign.judge import Row, judge
+from controller.campaign.judge import Row, Yardstick, judge
 from controller.campaign.noise_mission import drive_noise
-from controller.campaign.oracle import OracleTime
+from controller.campaign.noisy_camera import NoiseModel
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage, envelope_speed_mps
 from controller.campaign.view import PlanarEye
@@ -39,20 +39,32 @@ class Task:
 def run_task(task: Task) -> list[Row]:
     """A row for each policy, in their order. The same for the same task, on whichever machine."""
     stage = Stage(generate(task.family, task.seed), task.config.robot)
-    best = oracle.solve(stage, envelope_speed_mps(task.config), stage.case.scenario.duration_s)
-    return [_run(task, stage, policy, best) for policy in task.policies]
+    by = yardstick(stage, task.config)
+    return [_run(task, stage, policy, by) for policy in task.policies]
 
 
-def _run(task: Task, stage: Stage, policy: str, best: OracleTime) -> Row:
-    config = task.config
+def yardstick(stage: Stage, config: AppConfig) -> Yardstick:
+    """What drives of this mission are measured by."""
     assert isinstance(config.camera, SimulatedCameraConfig), "checked by controller/campaign/command.py"
-    eye = PlanarEye(stage.world, config.camera, config.robot.camera_mount)
+    assert isinstance(config.runner, LockstepRunner), "checked by controller/campaign/command.py"
+    best = oracle.solve(stage, envelope_speed_mps(config), stage.case.scenario.duration_s)
+    reaction_s = (
+        NoiseModel().sightings / config.camera.fps
+        + config.runner.perception_latency_s
+        + 1.0 / config.runner.control_rate_hz
+        + config.decision.chassis_delay_s
+    )
+    return Yardstick(best, PlanarEye(stage.world, config.camera, config.robot.camera_mount), reaction_s)
+
+
+def _run(task: Task, stage: Stage, policy: str, by: Yardstick) -> Row:
+    config = task.config
     if task.mode == "noise":
         log = drive_noise(stage, config, build_policy(policy, config, stage))
-        return judge(stage, log, policy, task.mode, best, eye)
+        return judge(stage, log, policy, task.mode, by)
     keep = None if task.keep is None else task.keep / f"{task.family}-{task.seed}-{policy}"
     log = drive_camera(stage, config, policy, keep if task.keep_all else None)
-    row = judge(stage, log, policy, task.mode, best, eye)
+    row = judge(stage, log, policy, task.mode, by)
     if keep is not None and not task.keep_all and failed(row):
         # The same drive again, this time filmed: writing every mission would cost more than this.
         drive_camera(stage, config, policy, keep)
