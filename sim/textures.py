@@ -82,25 +82,39 @@ class TextureStore:
         return sheet
 
     def _make(self, key: str, step_u: int, step_v: int, tiles_u: int, tiles_v: int) -> Sheet:
-        image = self._shrink(self.base(key), step_u, step_v)
-        height, width = image.shape[:2]
-        tiled = np.tile(image, (tiles_v, tiles_u, 1))
-        # A single tile ends at its face's edge; several are a cut-out of a pattern that goes on.
-        border = cv2.BORDER_REPLICATE if tiles_u == tiles_v == 1 else cv2.BORDER_WRAP
-        rimmed = cv2.copyMakeBorder(cv2.cvtColor(tiled, cv2.COLOR_BGR2BGRA), 1, 1, 1, 1, border)
-        from_tiles = np.array([[width, 0.0, 0.5], [0.0, height, 0.5], [0.0, 0.0, 1.0]])
-        return Sheet(np.asarray(rimmed, dtype=np.uint8), from_tiles)
-
-    def _shrink(self, image: ColourImage, step_u: int, step_v: int) -> ColourImage:
+        if tiles_u > 1 or tiles_v > 1:
+            tile = self.sheet(key, step_u, step_v, 1, 1).image[1:-1, 1:-1]
+            # Several tiles are a cut-out of a pattern that goes on; a single one ends at its face's edge.
+            return _sheet(np.tile(tile, (tiles_v, tiles_u, 1)), cv2.BORDER_WRAP, tile.shape)
         if step_u == step_v == 0:
-            return image
-        height, width = image.shape[:2]
+            tile = np.asarray(cv2.cvtColor(self.base(key), cv2.COLOR_BGR2BGRA), dtype=np.uint8)
+        else:
+            tile = self._shrunk(key, step_u, step_v)
+        return _sheet(tile, cv2.BORDER_REPLICATE, tile.shape)
+
+    def _shrunk(self, key: str, step_u: int, step_v: int) -> NDArray[np.uint8]:
+        """From the nearest larger sheet of whole octaves: what is to be shrunk is small already."""
+        octave = STEPS_PER_OCTAVE
+        whole_u, whole_v = step_u - step_u % octave, step_v - step_v % octave
+        if (whole_u, whole_v) == (step_u, step_v):
+            if step_v > 0:
+                whole_v -= octave
+            else:
+                whole_u -= octave
+        width, height = self.size(key)
         size = (
-            max(1, round(width / 2.0 ** (step_u / STEPS_PER_OCTAVE))),
-            max(1, round(height / 2.0 ** (step_v / STEPS_PER_OCTAVE))),
+            max(1, round(width / 2.0 ** (step_u / octave))),
+            max(1, round(height / 2.0 ** (step_v / octave))),
         )
         # An area mean needs no anti-aliasing filter in front of it.
-        return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        larger = self.sheet(key, whole_u, whole_v, 1, 1).image[1:-1, 1:-1]
+        return np.asarray(cv2.resize(larger, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _sheet(image: NDArray[np.uint8], border: int, tile_shape: tuple[int, ...]) -> Sheet:
+    rimmed = np.asarray(cv2.copyMakeBorder(image, 1, 1, 1, 1, border), dtype=np.uint8)
+    height, width = tile_shape[:2]
+    return Sheet(rimmed, np.array([[width, 0.0, 0.5], [0.0, height, 0.5], [0.0, 0.0, 1.0]]))
 
 
 class TexelPool:
