@@ -17,8 +17,9 @@ from controller.crossing import Choice, Conflict, choices, find_conflicts
 from controller.decision import Reason
 from controller.knowledge import Knowledge
 from controller.limits import Gap, Limit, Motion, allowed, stop_before
+from controller.memory import visible_from_m
 from controller.profile import SpeedRamps
-from hal.types import FloatArray
+from hal.types import CameraMount, FloatArray
 
 _FINE_S, _COARSE_S = 0.2, 0.5
 _SPEEDS = 31
@@ -35,8 +36,8 @@ _STICKY_S = 0.5
 class Appraiser:
     """Keeps what hysteresis needs from step to step: who is in the corridor, who was let pass first."""
 
-    def __init__(self, config: DecisionConfig, limits: Limits) -> None:
-        self._config, self._limits = config, limits
+    def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount) -> None:
+        self._config, self._limits, self._mount = config, limits, mount
         self._comfort, self._emergency = braking.comfort(limits), braking.emergency(limits)
         longest_s = braking.stop(limits.max_speed_mps, 0.0, self._emergency).time_s + 1.0
         self._worst_s = np.arange(0.0, longest_s + _FINE_S, _FINE_S)
@@ -58,7 +59,7 @@ class Appraiser:
             return found
         since = known.age_s + self._times_s
         placed = place(bodies, known.corridor, since, s_m, self._config.sight.range_m + 2.0)
-        found += self._standing(bodies, placed, s_m, motion)
+        found += self._standing(known, placed, s_m, motion)
         base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
         crossing, chosen_mps = self._moving(known, placed, s_m, motion, base_mps)
         found += crossing
@@ -95,8 +96,9 @@ class Appraiser:
             found.append(Limit(limit.speed_mps, reason))
         return found
 
-    def _standing(self, bodies: Bodies, placed: Placed, s_m: float, motion: Motion) -> list[Limit]:
-        margins = self._config.margins
+    def _standing(self, known: Knowledge, placed: Placed, s_m: float, motion: Motion) -> list[Limit]:
+        bodies, margins = known.bodies, self._config.margins
+        stop_m = self._stop_m(known, placed)
         found = []
         gaps = placed.lo_m[:, 0] - s_m
         for row in np.flatnonzero(~bodies.moving & (placed.hi_m[:, 0] > s_m)):
@@ -112,18 +114,20 @@ class Appraiser:
             if self._may_wait(gap, motion, float(bodies.age_s[row])):
                 continue
             self._inside.add(number)
+            what = "stands on the path"
             found.append(
-                stop_before(
-                    gap,
-                    motion,
-                    self._comfort,
-                    margins.stop_m,
-                    margins.least_m,
-                    "static",
-                    "stands on the path",
-                )
+                stop_before(gap, motion, self._comfort, float(stop_m[row]), margins.least_m, "static", what)
             )
         return found
+
+    def _stop_m(self, known: Knowledge, placed: Placed) -> FloatArray:
+        """(N,) where to stand before a body: so that it is still seen, and seen to leave."""
+        sight = self._config.sight
+        visible_m = visible_from_m(
+            known.bodies, placed.d_m[:, 0], known.edge_tan, sight.near_m, self._mount.height_m
+        )
+        front_m = known.corridor.front_m - self._mount.forward_m
+        return np.clip(visible_m - front_m, self._config.margins.stop_m, sight.near_m)
 
     def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:
         """A young obstacle may be confirmed first while an emergency stop fits even if it came at V_o."""

@@ -45,7 +45,7 @@ class DecisionMaker:
         self._latency_s = period_s + config.chassis_delay_s
         self._path: Path | None = None
         self._known: Knowledge | None = None
-        self._appraiser = Appraiser(config, robot.limits)
+        self._appraiser = Appraiser(config, robot.limits, mount)
         self._gate = ReleaseGate(config.release)
         self._now_ns: int | None = None
         self._emergency = False

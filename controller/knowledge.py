@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import replace
+
 import numpy as np
 
 from config.decision import DecisionConfig
@@ -9,18 +12,20 @@ from config.robot import Body
 from controller.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.corridor import Corridor
 from controller.localise import PoseHistory
+from controller.memory import OutOfView
 from controller.path import OnPath, Path
 from controller.sight import Sight
 from hal.clocks import NS_PER_S
-from hal.types import CameraMount, PlanarPose
+from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import CameraCondition, CameraHealth, Scene
 
 # A wall or a rack is not a box: as a box it would reach into the corridor wherever the path bends. Its
 # surface in the corridor is what depth sees (controller/sight.py).
 _SPRAWLING_M = 0.8
 _STANDING_MPS = 0.01
-# The height of what is seen only in part is known no better.
-_UNCERTAIN_M = 0.1
+_BEFORE_NS = 200_000_000
+_SAME_PLACE_M = 0.25
+_SETTLED_S = 0.5
 _FUTURE_S = 0.005
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
@@ -29,7 +34,7 @@ class Knowledge:
     """Takes in scenes along one path.
 
     bodies: boxes to reckon with, sprawling: those that are not boxes. fault: why the camera cannot be relied
-    on now, "" if it can. age_s: of the newest scene (inf: none yet).
+    on now, "" if it can. age_s: of the newest scene (inf: none yet). edge_tan: how wide the camera looks.
     """
 
     def __init__(
@@ -43,6 +48,10 @@ class Knowledge:
         self.age_s = float("inf")
         self._mount, self._config = mount, config
         self._poses = PoseHistory()
+        self._boxes = no_bodies(0)
+        self._memory = OutOfView(mount, config.sight.near_m)
+        self.edge_tan = 0.5
+        self._places: deque[tuple[int, FloatArray]] = deque()
         self._captured_ns: int | None = None
         self._scene_fault = ""
 
@@ -87,28 +96,28 @@ class Knowledge:
             return str(error)
         s_m = self.corridor.path.project(pose, on_path.s_m).s_m
         sprawling = ~seen.moving & (np.maximum(seen.half_view_m, seen.half_across_m) > _SPRAWLING_M)
-        boxes = seen.select(~sprawling)
-        self.bodies = boxes.joined(self._out_of_sight(seen, pose, s_m))
-        self.sprawling = seen.select(sprawling)
-        self.sight.look(
-            scene.free_space, pose, s_m, scene.captured_ns, boxes, standing=v_mps <= _STANDING_MPS
-        )
+        boxes = self._recognise(seen.select(~sprawling))
+        standing = v_mps <= _STANDING_MPS
+        if len(scene.free_space.bearing_tan):
+            self.edge_tan = (
+                float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
+            )
+        self.bodies = boxes.joined(self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing))
+        self._boxes, self.sprawling = boxes, seen.select(sprawling)
+        self.sight.look(scene.free_space, pose, s_m, scene.captured_ns, boxes, standing)
+        self._places.append((scene.captured_ns, np.concatenate((self.sight.points_m, seen.xy_m))))
         self.health = scene.health
         self._captured_ns = scene.captured_ns
         return ""
 
-    def _out_of_sight(self, seen: Bodies, pose: PlanarPose, s_m: float) -> Bodies:
-        """Standing bodies that were known and have sunk below the camera's view, until they are passed."""
-        gone = ~self.bodies.moving & ~np.isin(self.bodies.ids, seen.ids)
-        if not gone.any():
-            return no_bodies(seen.captured_ns)
-        before = self.bodies.select(gone)
-        ahead_m = (before.xy_m[:, 0] - pose.x_m) * np.cos(pose.heading_rad)
-        ahead_m += (before.xy_m[:, 1] - pose.y_m) * np.sin(pose.heading_rad)
-        ahead_m -= self._mount.forward_m + before.half_view_m
-        near_m = self._config.sight.near_m
-        lowest_seen_m = self._mount.height_m * (1.0 - ahead_m / near_m)
-        below = (ahead_m < near_m) & (before.top_m < lowest_seen_m + _UNCERTAIN_M)
-        body_s, _ = self.corridor.path.project_points(before.xy_m, s_m - 1.0, s_m + near_m + 2.0)
-        not_passed = body_s + before.half_view_m > s_m - self.corridor.rear_m
-        return before.select(below & not_passed)
+    def _recognise(self, bodies: Bodies) -> Bodies:
+        """What stands where something stood before is no newcomer, whatever number it has now."""
+        while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
+            self._places.popleft()
+        if not len(bodies) or not self._places:
+            return bodies
+        captured_ns, points = self._places[0]
+        if captured_ns > bodies.captured_ns - _BEFORE_NS:
+            return bodies
+        there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
+        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, _SETTLED_S), bodies.age_s))

@@ -35,7 +35,7 @@ class Sight:
 
     surface_s_m: where the nearest unexplained surface stands in the corridor (path coordinate of its nearest
     point, inf: none), steady against single frames; newest_surface_s_m: the same of the newest frame alone.
-    known_s_m: the corridor was seen free up to here.
+    known_s_m: the corridor was seen free up to here. points_m (P, 2): every surface of the newest scene.
     """
 
     def __init__(
@@ -52,6 +52,7 @@ class Sight:
         self._held_s_m = math.inf
         self.surface_s_m = self.newest_surface_s_m = math.inf
         self.known_s_m = self._consent_s_m
+        self.points_m: FloatArray = np.zeros((0, 2))
 
     def look(
         self,
@@ -65,7 +66,7 @@ class Sight:
         """Take in one scene. pose, s_m: of the robot when it was captured. standing: it was at rest then."""
         bands = np.flatnonzero(np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan))
         forward = free.nearest_m[bands]
-        points = self._surface_points(forward, free.bearing_tan[bands], pose)
+        self.points_m = points = self._surface_points(forward, free.bearing_tan[bands], pose)
         surface_s, inside = self._in_corridor(points, forward * free.half_width_tan, s_m)
         reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
         explained = explained_by.covers(points, reach_m, _AROUND_M).any(axis=1)
