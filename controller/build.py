@@ -16,6 +16,7 @@ from config.app import AppConfig, ReplayConfig, SimulationConfig
 from config.camera import OdometryChoice, RealsenseCameraConfig, ReplayCameraConfig, SimulatedCameraConfig
 from config.chassis import (
     AgilexChassisConfig,
+    CanLinkConfig,
     KobukiChassisConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
@@ -44,6 +45,7 @@ from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
 from hal.links.can_bus import CanBusLink
+from hal.links.pseudo_terminal import PseudoTerminal
 from hal.links.scripted import serial_pair
 from hal.links.serial_port import SerialPortLink
 from hal.types import CameraMount, PlanarPose
@@ -195,7 +197,7 @@ def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
     if isinstance(config.chassis, AgilexChassisConfig):
         link = config.chassis.link
         driver = AgilexChassis(GuardedCanLink(CanBusLink(link), AGILEX_COMMANDS), config.chassis)
-        return driver, None if plant is None else AgilexEmulator(CanBusLink(link), plant)
+        return driver, None if plant is None else build_can_emulator(link, plant)
     if plant is None:
         return _serial_driver(config.chassis, SerialPortLink(config.chassis.link)), None
     # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
@@ -213,6 +215,16 @@ def _serial_driver(config: SerialChassisConfig, link: SerialLink) -> Chassis:
             return KobukiChassis(link, config)
         case unknown:
             assert_never(unknown)
+
+
+def build_can_emulator(link: CanLinkConfig, plant: TrackedPlant) -> Emulator:
+    """The base at the other end of a CAN bus. Raises DeviceNotFound, DeviceRefused when entered."""
+    return AgilexEmulator(CanBusLink(link), plant)
+
+
+def build_pseudo_terminal() -> PseudoTerminal:
+    """A serial port of which this process is the device."""
+    return PseudoTerminal()
 
 
 def build_serial_emulator(config: SerialChassisConfig, link: SerialLink, plant: TrackedPlant) -> Emulator:

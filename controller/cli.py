@@ -163,7 +163,9 @@ def evaluate(
     help="Folder for missions.jsonl, summary.json, report.md and the figures.",
 )  # fmt: skip
 @click.option("--resume", is_flag=True, help="Go on with a campaign that was broken off.")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, for example tcp://10.0.0.5:8786.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, for example tcp://10.0.0.5:8786."
+)
 @click.option("--only", metavar="FAMILY:SEED", help="One mission alone.")
 @click.option("--video", is_flag=True, help="Camera mode: keep recordings and videos of what fails.")
 @click.option("--quiet", is_flag=True, help="No progress bar.")
@@ -194,6 +196,36 @@ def campaign(
 
 def _names(text: str | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())
+
+
+@cli.command()
+@click.argument("kind", type=click.Choice(["agilex", "roboclaw", "roboteq", "kobuki"]))
+@click.option(
+    "--channel",
+    help="CAN: can0, vcan0, a multicast group. Serial: a path that becomes the port. Default: as in FILE.",
+)
+@click.option("--interface", help="CAN: another python-can interface than the channel suggests.")
+@click.option("--port", type=click.IntRange(1024, 65535), help="CAN over multicast: the UDP port.")
+@click.option(
+    "--config", "config_path", type=_FILE, show_default="the hil-KIND.yaml that ships",
+    help="YAML whose chassis and simulation.plant it plays.",
+)  # fmt: skip
+@click.option("--tell", is_flag=True, help="Say twice a second how the base moves.")
+def emulate(
+    kind: str,
+    channel: str | None,
+    interface: str | None,
+    port: int | None,
+    config_path: Path | None,
+    tell: bool,
+) -> None:
+    """Be a tracked base, in real time, until SIGTERM; drive it with `treadwatch run --config hil-KIND.yaml`.
+
+    Type estop, release, restart, freeze or thaw and Enter to see what the driver makes of it.
+    """
+    from controller.emulate import EmulateOptions, run_emulator
+
+    run_emulator(EmulateOptions(kind, channel, interface, port, config_path, tell), sys.stdin)
 
 
 def main() -> None:

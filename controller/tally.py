@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from config.robot import Limits
-from hal.clocks import NS_PER_S
 from hal.types import Setpoint
 
 TOLERANCE = 1e-6
@@ -18,8 +17,9 @@ TOLERANCE = 1e-6
 class SetpointTally:
     """Watches every setpoint that went out: speed, acceleration, jerk, direction.
 
-    Acceleration and jerk are the differences of consecutive sent speeds and accelerations over their time, so
-    they judge the commands themselves, not what the profile claims. The emergency limits are the
+    Acceleration and jerk are the differences of consecutive sent speeds and accelerations over the control
+    steps between them, a period each, so they judge the commands themselves: neither what the profile claims
+    nor how late the clock let a step begin. Drivers do not send at every step. The emergency limits are the
     outer bounds; how often braking went beyond comfort is counted on its own.
     """
 
@@ -33,9 +33,11 @@ class SetpointTally:
     emergency_count: int = 0
     violations: int = 0
     _last: Setpoint | None = None
+    _steps: int = 0
 
     def add(self, sent: Setpoint | None) -> None:
-        """A setpoint as the driver reports it sent; None and repeats of the same one count nothing."""
+        """What one control step sent, as the driver reports it; None and repeats of the last count nothing."""
+        self._steps += 1
         if sent is None or (self._last is not None and sent.stamp_ns == self._last.stamp_ns):
             return
         self.count += 1
@@ -52,13 +54,12 @@ class SetpointTally:
             or accel_mps2 < -self.limits.emergency_decel_mps2 - TOLERANCE
             or abs(jerk_mps3) > self.limits.emergency_jerk_mps3 + TOLERANCE
         )
-        self._last = sent
+        self._last, self._steps = sent, 0
 
     def _differences(self, sent: Setpoint) -> tuple[float, float]:
         if self._last is None:
             return 0.0, 0.0
-        # Two steps closer than a period are one late and one on time: the clock's jitter, not the command's.
-        dt_s = max((sent.stamp_ns - self._last.stamp_ns) / NS_PER_S, self.period_s)
+        dt_s = self._steps * self.period_s
         return (sent.v_mps - self._last.v_mps) / dt_s, (sent.a_mps2 - self._last.a_mps2) / dt_s
 
 

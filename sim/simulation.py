@@ -29,6 +29,26 @@ class Emulator(Closing, Protocol):
         """Obey, move and answer up to now_ns."""
         ...
 
+    def press_estop(self) -> None:
+        """Whatever this base has for an emergency stop is triggered."""
+        ...
+
+    def release_estop(self) -> None:
+        """It is no longer."""
+        ...
+
+    def restart(self) -> None:
+        """Power interrupted for a moment."""
+        ...
+
+    def freeze(self) -> None:
+        """Hears and says nothing; its own time-out runs."""
+        ...
+
+    def thaw(self) -> None:
+        """Goes on."""
+        ...
+
 
 class Referee:
     """Watches the true clearance between the robot and everything at its height."""

@@ -45,6 +45,18 @@ def test_a_late_step_followed_by_one_on_time_is_no_jerk() -> None:
     assert tally.violations == 0
 
 
+def test_a_driver_that_sends_every_second_setpoint_has_the_same_jitter() -> None:
+    tally = SetpointTally(LIMITS, period_s=0.02)
+    tally.add(Setpoint(4 * MS, 0.5, 0.3, 0.0))
+    tally.add(None)
+    tally.add(Setpoint(40 * MS, 0.512, 0.3, 0.0))
+    tally.add(None)  # the driver's period had not passed: a step late, the next one on time
+    tally.add(Setpoint(63 * MS, 0.524, 0.3, 0.0))
+    assert tally.violations == 0
+    tally.add(Setpoint(100 * MS, 0.536, 0.3, 0.0))
+    assert tally.violations == 1, "two steps in one period are one too many"
+
+
 def test_what_was_not_sent_and_what_was_sent_before_count_nothing() -> None:
     tally = SetpointTally(LIMITS, period_s=0.02)
     point = Setpoint(0, 0.1, 0.0, 0.0)

@@ -1,0 +1,193 @@
+"""`treadwatch emulate`: a chassis emulator as its own process, in real time, for whoever speaks its protocol.
+
+On its standard input it takes the faults of a real base, one word a line: see FAULTS.
+"""
+
+from __future__ import annotations
+
+import os
+import selectors
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+import click
+from pydantic import ValidationError
+
+from config.app import AppConfig, load_app
+from config.chassis import AgilexChassisConfig, CanLinkConfig, PlantConfig
+from config.loader import CONFIG_DIR, describe
+from controller.build import build_can_emulator, build_pseudo_terminal, build_serial_emulator
+from controller.errors import UserError
+from controller.service import StopRequest, stop_on_signals
+from hal.api import Clock
+from hal.clocks import MonotonicClock
+from sim.plant import TrackedPlant
+from sim.simulation import Emulator
+
+_NS_PER_MS = 1_000_000
+
+# How soon an answer leaves after the question came; a real controller takes a millisecond or two.
+_TICK_NS = 2 * _NS_PER_MS
+
+# A process that did not run for so long was frozen, and so is the base that it plays.
+_FROZEN_NS = 200 * _NS_PER_MS
+
+_TOLD_EVERY_NS = 500 * _NS_PER_MS
+
+FAULTS: dict[str, Callable[[Emulator], None]] = {
+    "estop": lambda base: base.press_estop(),
+    "release": lambda base: base.release_estop(),
+    "restart": lambda base: base.restart(),
+    "freeze": lambda base: base.freeze(),
+    "thaw": lambda base: base.thaw(),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class EmulateOptions:
+    """The command line. config_path None: the hil-*.yaml of that kind; channel None: as that file says."""
+
+    kind: str
+    channel: str | None = None
+    interface: str | None = None
+    port: int | None = None
+    config_path: Path | None = None
+    telling: bool = False
+
+
+def run_emulator(options: EmulateOptions, commands: TextIO | None) -> None:
+    """Until SIGTERM or SIGINT. Raises ConfigError, HalError, UserError before it begins."""
+    config_path = options.config_path or CONFIG_DIR / f"hil-{options.kind}.yaml"
+    config = load_app(config_path)
+    if config.chassis.kind != options.kind:
+        raise UserError(f"{config_path}: its chassis is {config.chassis.kind!r}, not {options.kind!r}")
+    clock = MonotonicClock()
+    with ExitStack() as stack:
+        stop = stack.enter_context(stop_on_signals())
+        emulator = stack.enter_context(_emulator(config, options, clock.now_ns()))
+        hearer = stack.enter_context(_Commands(commands))
+        for line in run_in_real_time(emulator, clock, stop, hearer.read):
+            if options.telling or not line.startswith("v "):
+                click.echo(line)
+
+
+@contextmanager
+def _emulator(config: AppConfig, options: EmulateOptions, now_ns: int) -> Iterator[Emulator]:
+    plant_config = PlantConfig() if config.simulation is None else config.simulation.plant
+    plant = TrackedPlant(plant_config, None, now_ns)
+    if isinstance(config.chassis, AgilexChassisConfig):
+        link = can_link(config.chassis.link, options)
+        with build_can_emulator(link, plant) as can_emulator:
+            click.echo(f"emulating {options.kind} on CAN {link.interface} {link.channel!r}", err=True)
+            yield can_emulator
+        return
+    if options.interface is not None or options.port is not None:
+        raise UserError(f"--interface, --port: {options.kind} is serial; only --channel PATH says where")
+    terminal = build_pseudo_terminal()
+    wanted = options.channel or config.chassis.link.url
+    with build_serial_emulator(config.chassis, terminal, plant) as emulator, _linked(wanted, terminal.path):
+        click.echo(f"emulating {options.kind} on {wanted} -> {terminal.path}", err=True)
+        yield emulator
+
+
+def can_link(link: CanLinkConfig, options: EmulateOptions) -> CanLinkConfig:
+    """The file's link with what the command line changes. Raises UserError."""
+    values = {key: getattr(link, key) for key in link.model_fields_set}
+    if options.channel is not None and options.interface is None and options.channel != link.channel:
+        # can0, vcan0: the system's; a group address: multicast.
+        options_interface = "udp_multicast" if "." in options.channel else "socketcan"
+        values = {"interface": options_interface} | ({"port": link.port} if "." in options.channel else {})
+    elif options.interface is not None:
+        values = {"interface": options.interface, "channel": link.channel}
+    values |= {} if options.channel is None else {"channel": options.channel}
+    values |= {} if options.port is None else {"port": options.port}
+    try:
+        return CanLinkConfig.model_validate(values)
+    except ValidationError as error:
+        raise UserError(f"--channel, --interface, --port: {describe(error)}") from error
+
+
+@contextmanager
+def _linked(path: str, target: str) -> Iterator[None]:
+    """A symbolic link to the pseudo-terminal, for as long as the block runs. Raises UserError."""
+    link = Path(path)
+    if link.is_symlink() and os.readlink(link).startswith("/dev/pts/"):
+        link.unlink()  # left behind by an emulator that was killed
+    try:
+        link.symlink_to(target)
+    except OSError as error:
+        raise UserError(
+            f"--channel {path}: no link can be made there ({error.strerror}); choose a path that is free"
+        ) from error
+    try:
+        yield
+    finally:
+        if link.is_symlink() and os.readlink(link) == target:
+            link.unlink()
+
+
+def run_in_real_time(
+    emulator: Emulator, clock: Clock, stop: StopRequest, read_commands: Callable[[], list[str]]
+) -> Iterator[str]:
+    """Step the base until stop; yields what there is to tell, twice a second how it moves."""
+    told_ns = deadline_ns = last_ns = clock.now_ns()
+    while not stop:
+        clock.sleep_until_ns(deadline_ns)
+        now_ns = clock.now_ns()
+        deadline_ns = max(deadline_ns + _TICK_NS, now_ns)
+        if now_ns - last_ns > _FROZEN_NS:
+            # What was due meanwhile is not sent now in one burst: nobody sent it.
+            emulator.freeze()
+            emulator.advance_to(now_ns)
+            emulator.thaw()
+            yield f"was frozen for {(now_ns - last_ns) / 1e9:.1f} s"
+        last_ns = now_ns
+        for command in read_commands():
+            fault = FAULTS.get(command)
+            if fault is None:
+                yield f"{command!r}? one of {', '.join(FAULTS)}"
+            else:
+                fault(emulator)
+                yield f"did {command}"
+        emulator.advance_to(now_ns)
+        if now_ns - told_ns >= _TOLD_EVERY_NS:
+            told_ns = now_ns
+            v_mps, w_radps = emulator.plant.twist
+            pose = emulator.plant.pose
+            yield f"v {v_mps:.3f} m/s, w {w_radps:.3f} rad/s, x {pose.x_m:.2f} m, y {pose.y_m:.2f} m"
+    yield f"{stop.reason}: ended"
+
+
+class _Commands:
+    """Lines from a stream, without waiting for them."""
+
+    def __init__(self, stream: TextIO | None) -> None:
+        self._selector = selectors.DefaultSelector()
+        self._stream = stream
+        self._partial = ""
+
+    def __enter__(self) -> _Commands:
+        if self._stream is not None:
+            try:
+                self._selector.register(self._stream, selectors.EVENT_READ)
+            except (OSError, ValueError):  # a file or /dev/null, which nobody types into
+                self._stream = None
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._selector.close()
+
+    def read(self) -> list[str]:
+        """The whole lines that have come."""
+        if self._stream is None or not self._selector.select(timeout=0):
+            return []
+        data = os.read(self._stream.fileno(), 4096)
+        if not data:  # closed
+            self._selector.unregister(self._stream)
+            self._stream = None
+            return []
+        *lines, self._partial = (self._partial + data.decode("utf-8", "replace")).split("\n")
+        return [line.strip() for line in lines if line.strip()]

@@ -1,0 +1,10 @@
+"""Options of the test run."""
+
+from __future__ import annotations
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """--hil: every hardware-in-the-loop test; without it one of each kind, the quick one."""
+    parser.addoption("--hil", action="store_true", help="run every hardware-in-the-loop test, not one alone")

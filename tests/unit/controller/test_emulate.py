@@ -1,0 +1,153 @@
+"""`treadwatch emulate`: its loop under a fake clock, its link, and what it refuses."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from itertools import islice
+from pathlib import Path
+
+import pytest
+import yaml
+
+from config.app import load_app
+from config.chassis import CanLinkConfig
+from config.loader import CONFIG_DIR
+from controller.emulate import EmulateOptions, _linked, can_link, run_in_real_time
+from controller.errors import UserError
+from controller.service import StopRequest
+from hal.chassis.agilex_messages import ControlModeCommand, MotionCommand, encode
+from hal.clocks import SimulatedClock
+from hal.links.scripted import can_pair
+from sim.agilex_emulator import AgilexEmulator
+from sim.plant import TrackedPlant
+from tests.support.chassis_rig import MS, PLANT
+
+LINK = CanLinkConfig(interface="udp_multicast", channel="239.74.163.2", port=43113)
+
+
+class LateClock(SimulatedClock):
+    """Sleeps once for as long as it is told, whatever was asked."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.late_ns = 0
+
+    def sleep_until_ns(self, deadline_ns: int) -> None:
+        super().sleep_until_ns(deadline_ns + self.late_ns)
+        self.late_ns = 0
+
+
+def test_the_base_lives_in_real_time_and_ends_when_asked() -> None:
+    host, base = can_pair()
+    clock, stop = SimulatedClock(), StopRequest()
+    emulator = AgilexEmulator(base, TrackedPlant(PLANT))
+    lines = run_in_real_time(emulator, clock, stop, list)
+    host.send(encode(ControlModeCommand(1)))
+    host.send(encode(MotionCommand(0.5, 0.0)))
+    first = next(lines)
+    assert first.startswith("v 0.4"), "it obeyed 2 ms after the start"
+    assert clock.now_ns() == 500 * MS
+    stop.handle(signal.SIGTERM, None)
+    assert list(lines) == ["SIGTERM: ended"]
+    # From 0 to 500 ms: 26 times motion, odometer and two motors; state and two drivers every 100 ms, battery.
+    assert len(base.sent) == 26 * 4 + 6 * 3 + 2
+
+
+def test_a_process_that_was_frozen_does_not_send_what_it_missed() -> None:
+    host, base = can_pair()
+    clock, stop = LateClock(), StopRequest()
+    emulator = AgilexEmulator(base, TrackedPlant(PLANT))
+    lines = run_in_real_time(emulator, clock, stop, list)
+    host.send(encode(ControlModeCommand(1)))
+    host.send(encode(MotionCommand(0.5, 0.0)))
+    next(lines)
+    before = len(base.sent)
+    clock.late_ns = 5_000 * MS
+    assert next(lines) == "was frozen for 5.0 s"
+    next(lines)
+    assert len(base.sent) - before < 30
+    assert emulator.plant.twist[0] == pytest.approx(0.0, abs=1e-3), "its own time-out ran meanwhile"
+
+
+def test_faults_by_word() -> None:
+    _, base = can_pair()
+    emulator = AgilexEmulator(base, TrackedPlant(PLANT))
+    words = iter([["estop"], [], ["release", "boom"], *[[]] * 1000])
+    lines = run_in_real_time(emulator, SimulatedClock(), StopRequest(), lambda: next(words))
+    assert list(islice(lines, 3)) == [
+        "did estop",
+        "did release",
+        "'boom'? one of estop, release, restart, freeze, thaw",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("options", "link"),
+    [
+        (EmulateOptions("agilex"), LINK),
+        (EmulateOptions("agilex", port=5000), LINK.model_copy(update={"port": 5000})),
+        (EmulateOptions("agilex", channel="can0"), CanLinkConfig(interface="socketcan", channel="can0")),
+        (
+            EmulateOptions("agilex", channel="239.1.2.3"),
+            CanLinkConfig(interface="udp_multicast", channel="239.1.2.3", port=43113),
+        ),
+        (
+            EmulateOptions("agilex", channel="bus", interface="virtual"),
+            CanLinkConfig(interface="virtual", channel="bus"),
+        ),
+    ],
+)
+def test_the_channel_suggests_the_interface(options: EmulateOptions, link: CanLinkConfig) -> None:
+    assert can_link(LINK, options) == link
+
+
+def test_a_link_that_cannot_be_is_refused() -> None:
+    with pytest.raises(UserError, match="only udp_multicast has this, not socketcan"):
+        can_link(LINK, EmulateOptions("agilex", channel="can0", port=5000))
+
+
+def test_the_path_is_a_link_while_it_runs(tmp_path: Path) -> None:
+    path = tmp_path / "port"
+    path.symlink_to("/dev/pts/999999")  # of an emulator that was killed
+    with _linked(str(path), "/dev/pts/7"):
+        assert os.readlink(path) == "/dev/pts/7"
+    assert not path.is_symlink()
+    path.write_text("mine")
+    with pytest.raises(UserError, match="File exists"), _linked(str(path), "/dev/pts/7"):
+        pass
+    assert path.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["roboteq", "--channel", "/nowhere/at/all"], "no link can be made there"),
+        (["kobuki", "--port", "5000"], "kobuki is serial"),
+        (["roboclaw", "--config", str(CONFIG_DIR / "hil-agilex.yaml")], "its chassis is 'agilex'"),
+        (["agilex", "--channel", "can7"], "can7"),
+    ],
+)
+def test_mistakes_are_one_line(arguments: list[str], words: str) -> None:
+    command = [sys.executable, "-m", "controller", "emulate", *arguments]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=60, check=False, stdin=subprocess.DEVNULL
+    )
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert words in done.stderr
+
+
+@pytest.mark.parametrize("kind", ["agilex", "roboclaw", "roboteq", "kobuki"])
+def test_the_files_that_ship_fit_their_emulator(kind: str) -> None:
+    """The emulated base is driven with its own geometry: what the driver believes is what the plant is."""
+    config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")
+    assert config.simulation is not None
+    assert config.simulation.base == "external"
+    assert config.chassis.kind == kind
+    content = yaml.safe_load((CONFIG_DIR / f"hil-{kind}.yaml").read_text())
+    plant, chassis = content["simulation"]["plant"], content["chassis"]
+    assert plant["slip_factor"] == chassis.get("slip_factor", 1.0)
+    assert plant["track_width_m"] == chassis.get("track_width_m", 0.23)
