@@ -33,7 +33,7 @@ from controller.evaluation.contestants import (
 )
 from controller.evaluation.paper import PAPER_LIDAR, PAPER_OURS
 from controller.evaluation.summary import MethodSummary, Summary
-from controller.evaluation.totals import ByDistance, Curve
+from controller.evaluation.totals import DISTANCE_BINS_M, ByDistance, Curve
 from controller.video.style import Colour, Image, Rect
 
 COLOURS: dict[str, Colour] = {
@@ -136,6 +136,23 @@ def latency(methods: dict[str, MethodSummary]) -> Image:
         y = np.concatenate([[0.0, 0.0], np.repeat(shares[known], 2)])[: len(x) - 1]
         chart.line(x, np.concatenate([y, [last]]), COLOURS[name], name)
     chart.legend("lower right")
+    return image
+
+
+def found_by_distance(one: MethodSummary) -> Image:
+    """How many objects there were at each distance, and how many of them were found."""
+    width, height = _PANEL
+    image = blank(width + 200, height)
+    counts = one.figures.found_by_distance
+    there = [count.correct + count.missed for count in counts]
+    edges = np.array(DISTANCE_BINS_M)
+    chart = Chart(
+        image, Rect(0, 0, width + 200, height), "Moving objects by distance",
+        Axis("median distance in m", 0.0, float(edges[-1])), Axis("objects", 0.0, _round_up(max(*there, 4))),
+    )  # fmt: skip
+    chart.bars(edges[:-1] + 0.06, edges[1:] - 0.06, there, GREY, "there were")
+    chart.bars(edges[:-1] + 0.06, edges[1:] - 0.06, [count.correct for count in counts], BLUE, "found")
+    chart.legend("upper right")
     return image
 
 

@@ -24,6 +24,7 @@ _FIGURES = (
     "fig6-scene-depth-result.png",
     "speed-error.png",
     "latency.png",
+    "found-by-distance.png",
     "table1-measured.png",
 )
 
@@ -55,6 +56,7 @@ def write_figures(folder: Path, summary: Summary, records: Sequence[SequenceReco
         write_picture(folder / "fig4-precision-recall.png", figures.precision_recall(summary))
         write_picture(folder / "speed-error.png", figures.speed_error(reporting))
         write_picture(folder / "latency.png", figures.latency(reporting))
+        write_picture(folder / "found-by-distance.png", figures.found_by_distance(reporting[OURS]))
     if any(summary.endpoint.count):
         write_picture(folder / "fig5-endpoint-error.png", figures.endpoint_error(summary.endpoint))
     shown = [snapshot for record in records for snapshot in record.shown]

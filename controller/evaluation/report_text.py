@@ -134,8 +134,9 @@ def _figures(summary: Summary, shown: bool) -> list[str]:
         lines += section("Fig. 6: scene, depth as a picture, result")
         lines += picture("Scene, depth, result", "fig6-scene-depth-result.png")
     if ours:
-        lines += section("Velocity error and latency", _SPEED)
+        lines += section("Velocity error, latency, distance", _SPEED)
         lines += picture("Velocity error", "speed-error.png") + picture("Latency", "latency.png")
+        lines += picture("Found by distance", "found-by-distance.png")
     return lines
 
 

@@ -15,6 +15,7 @@ from controller.evaluation.endpoint_error import EndpointErrors
 from controller.evaluation.run_sequence import SequenceRecord
 from controller.evaluation.scoring import SequenceScore, score
 from controller.evaluation.totals import (
+    DISTANCE_BINS_M,
     PIXEL_LEVEL,
     ByDistance,
     Counts,
@@ -157,6 +158,11 @@ def _method(one: MethodSummary) -> dict[str, Any]:
             "median": number(figures.speed_error_median_mps),
             "p90": number(figures.speed_error_p90_mps),
             **_by_distance(figures.speed_error),
+        },
+        "objects_by_distance": {
+            "edges_m": list(DISTANCE_BINS_M),
+            "correct": [count.correct for count in figures.found_by_distance],
+            "missed": [count.missed for count in figures.found_by_distance],
         },
         "first_detection_s": {
             "median": number(figures.latency_median_s),

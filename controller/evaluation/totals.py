@@ -65,7 +65,7 @@ class Figures:
     speed_error: ByDistance
     speed_error_median_mps: float
     speed_error_p90_mps: float
-    recall_by_distance: tuple[Counts, ...]
+    found_by_distance: tuple[Counts, ...]
     ms_per_frame: float
 
     @property

@@ -113,8 +113,8 @@ def test_summary_has_stable_keys(records: tuple[SequenceRecord, ...]) -> None:
     assert set(result["splits"]["baselines"]) == set(ALWAYS + BASELINES)
     ours = result["splits"]["reporting"][OURS]
     assert set(ours) == {
-        "sequences", "minutes", "object", "frame", "frame_with_first_half_second", "pixel",
-        "false_moving_per_minute", "speed_error_mps", "first_detection_s", "ms_per_frame",
+        "sequences", "minutes", "object", "frame", "frame_with_first_half_second", "pixel", "ms_per_frame",
+        "false_moving_per_minute", "speed_error_mps", "objects_by_distance", "first_detection_s",
     }  # fmt: skip
     assert known(ours["minutes"]) == pytest.approx((0.8 + 0.3) / 60.0, abs=1e-4)
     walker = result["sequences"]["slow-crossing"]["methods"][OURS]["objects"]
