@@ -36,7 +36,7 @@ class SetpointTally:
     _steps: int = 0
 
     def add(self, sent: Setpoint | None) -> None:
-        """What one control step sent, as the driver reports it; None and repeats of the last count nothing."""
+        """What one control step sent, as the driver reports it; None and repeats of the last are nothing."""
         self._steps += 1
         if sent is None or (self._last is not None and sent.stamp_ns == self._last.stamp_ns):
             return

@@ -1,0 +1,97 @@
+"""docs/add-a-chassis.md: what it names is there, and every chassis that ships has gone all of its steps."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from typing import get_args
+
+import pytest
+
+from config.chassis import ChassisConfig, SerialChassisConfig
+from config.loader import CONFIG_DIR
+from controller.cli import emulate
+from controller.emulate import FAULTS
+
+ROOT = CONFIG_DIR.parent
+PAGE = (ROOT / "docs" / "add-a-chassis.md").read_text()
+QUOTED = re.findall(r"`([^`\n]+)`", PAGE)
+CONFIGS = get_args(get_args(ChassisConfig)[0])
+KINDS = {get_args(config.model_fields["kind"].annotation)[0]: config for config in CONFIGS}
+
+
+def read(path: str) -> str:
+    return (ROOT / path).read_text()
+
+
+def test_the_page_was_read() -> None:
+    assert len(QUOTED) > 30
+    assert set(KINDS) >= {"agilex", "roboclaw", "roboteq", "kobuki"}
+    assert set(get_args(SerialChassisConfig)) < set(CONFIGS)
+
+
+@pytest.mark.parametrize(
+    "path", sorted({word for word in QUOTED if re.fullmatch(r"[\w./-]+\.(py|yaml)", word)})
+)
+def test_every_file_it_names_is_there(path: str) -> None:
+    assert (ROOT / path).is_file()
+
+
+@pytest.mark.parametrize("name", sorted({word for word in QUOTED if re.fullmatch(r"[a-z]+(\.\w+)+", word)}))
+def test_every_name_it_names_can_be_imported(name: str) -> None:
+    if name.endswith((".py", ".yaml")):
+        pytest.skip("a file")
+    module, _, attribute = name.rpartition(".")
+    assert hasattr(importlib.import_module(module), attribute)
+
+
+@pytest.mark.parametrize("method", sorted({word for word in QUOTED if re.fullmatch(r"_\w+", word)}))
+def test_every_method_it_names_is_the_driver_s(method: str) -> None:
+    from hal.chassis.driver import ChassisDriver
+
+    assert hasattr(ChassisDriver, method)
+
+
+@pytest.mark.parametrize("word", ["disobeys", "stop_cause", "silence"])
+def test_what_told_asks_for(word: str) -> None:
+    from hal.chassis.driver import Told
+
+    assert word in QUOTED
+    assert hasattr(Told, word)
+
+
+def test_the_faults_to_type() -> None:
+    assert set(FAULTS) <= set(QUOTED)
+
+
+def test_the_commands_it_gives() -> None:
+    assert "treadwatch emulate roboteq" in QUOTED
+    assert "treadwatch run --config config/hil-roboteq.yaml" in QUOTED
+    assert 'addoption("--hil"' in read("tests/conftest.py")
+
+
+STEPS = {
+    "config/robot-*.yaml": lambda kind: any(
+        f"kind: {kind}" in path.read_text() for path in CONFIG_DIR.glob("robot-*.yaml")
+    ),
+    "config/hil-*.yaml": lambda kind: f"kind: {kind}" in read(f"config/hil-{kind}.yaml"),
+    "build.py": lambda kind: KINDS[kind].__name__ in read("controller/build.py"),
+    "emulator": lambda kind: (ROOT / "sim" / f"{kind}_emulator.py").is_file(),
+    "emulator by its bytes": lambda kind: (ROOT / f"tests/unit/sim/test_{kind}_emulator.py").is_file(),
+    "driver by its bytes": lambda kind: (ROOT / f"tests/unit/hal/test_{kind}_chassis.py").is_file(),
+    "rig": lambda kind: f"def {kind}_rig(" in read("tests/support/chassis_rig.py"),
+    "contract": lambda kind: read("tests/contract/test_chassis_contract.py").count(f'"{kind}-') >= 4,
+    "property": lambda kind: (
+        f"def test_{kind}_driver_survives_any_" in read("tests/property/test_chassis_codec_properties.py")
+    ),
+    "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/test_guard.py"),
+    "emulate": lambda kind: kind in emulate.params[0].type.choices,
+    "mission": lambda kind: f'"{kind}"' in read("tests/hil/test_hil_missions.py"),
+    "README": lambda kind: kind.lower() in read("README.md").lower(),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("step", STEPS)
+def test_every_chassis_has_gone_every_step(kind: str, step: str) -> None:
+    assert STEPS[step](kind)
