@@ -150,8 +150,9 @@ class Sight:
         band = np.floor((bearing - left_edge) / (2.0 * free.half_width_tan)).astype(np.intp)
         in_view = (forward > 0.0) & (band >= 0) & (band < len(free.bearing_tan))
         band = np.clip(band, 0, len(free.bearing_tan) - 1)
-        behind = surface_in_corridor[band] & (forward >= free.nearest_m[band])
         # The far edge of a cell, so that a cell is not known for the sake of its beginning.
-        seen = in_view & ((forward + 0.5 * _CELL_M <= free.known_m[band]) | behind)
+        far_edge = forward + 0.5 * _CELL_M
+        behind = surface_in_corridor[band] & (far_edge >= free.nearest_m[band])
+        seen = in_view & ((far_edge <= free.known_m[band]) | behind)
         share: FloatArray = seen.mean(axis=1)
         return share

@@ -1,0 +1,122 @@
+"""Bodies out of view: kept while they are hidden, dropped when their place is seen again or was left."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.bodies import Bodies, no_bodies
+from controller.memory import OutOfView, visible_from_m
+from hal.types import CameraMount, PlanarPose
+from tests.support.bodies import box
+
+MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
+NEAR_M = 1.3
+EDGE = 0.5
+FRAME_NS = 100_000_000
+
+
+class Recall:
+    def __init__(self) -> None:
+        self.memory = OutOfView(MOUNT, NEAR_M)
+        self.before = no_bodies(0)
+        self.now_ns = 0
+
+    def see(self, bodies: Bodies | None, x_m: float, standing: bool = False) -> list[int]:
+        """One scene from a robot at x_m; returns the ids of what is remembered besides it."""
+        self.now_ns += FRAME_NS
+        seen = replace(bodies if bodies is not None else no_bodies(0), captured_ns=self.now_ns)
+        kept = self.memory.update(self.before, seen, PlanarPose(x_m, 0.0, 0.0), EDGE, standing)
+        self.before = seen
+        return [int(one) for one in kept.ids]
+
+
+PALLET = box(5.0, 0.0, top_m=0.15)
+
+
+def test_a_low_pallet_sinks_below_the_view() -> None:
+    recall = Recall()
+    assert recall.see(PALLET, 3.2) == []
+    assert recall.see(None, 3.6) == [1]
+    assert recall.see(None, 3.8, standing=True) == [1]
+
+
+def test_what_is_tall_does_not_sink() -> None:
+    recall = Recall()
+    recall.see(box(5.0, 0.0, top_m=1.7), 3.2)
+    assert recall.see(None, 3.6) == []
+
+
+def test_what_vanishes_far_away_has_gone() -> None:
+    recall = Recall()
+    recall.see(PALLET, 1.0)
+    assert recall.see(None, 1.1) == []
+
+
+def test_what_vanishes_while_the_robot_stands_has_gone() -> None:
+    recall = Recall()
+    recall.see(PALLET, 3.6)
+    assert recall.see(None, 3.6, standing=True) == []
+
+
+def test_what_was_seen_too_shortly_is_not_believed() -> None:
+    recall = Recall()
+    recall.see(replace(PALLET, age_s=np.array([0.2])), 3.2)
+    assert recall.see(None, 3.6) == []
+
+
+def test_it_is_forgotten_when_it_has_been_passed() -> None:
+    recall = Recall()
+    recall.see(PALLET, 3.2)
+    recall.see(None, 3.6)
+    assert recall.see(None, 6.0) == [1]
+    assert recall.see(None, 6.9) == []
+
+
+def test_it_is_forgotten_when_its_place_is_seen_again() -> None:
+    recall = Recall()
+    recall.see(PALLET, 3.2)
+    assert recall.see(None, 3.6) == [1]
+    assert recall.see(None, 2.0) == []
+
+
+def test_it_is_not_counted_twice_when_it_is_seen_again() -> None:
+    recall = Recall()
+    recall.see(PALLET, 3.2)
+    recall.see(None, 3.6)
+    assert recall.see(PALLET, 3.4) == []
+
+
+def test_feet_of_a_person_who_is_still_seen_are_no_body_of_their_own() -> None:
+    person = box(5.0, 0.0, number=2, top_m=1.7)
+    recall = Recall()
+    recall.see(PALLET.joined(person), 3.2)
+    assert recall.see(person, 3.6) == []
+
+
+def test_what_stands_beside_the_edge_of_the_view_is_still_there() -> None:
+    beside = box(5.0, 0.5, top_m=1.7)
+    recall = Recall()
+    recall.see(beside, 3.5)
+    assert recall.see(None, 3.8) == [1]
+
+
+def test_what_moves_out_of_view_goes_on_for_two_seconds() -> None:
+    recall = Recall()
+    recall.see(box(5.0, 0.9, 0.0, -0.5), 3.5)
+    assert recall.see(None, 3.7) == [1]
+    assert recall.memory.update(
+        recall.before, replace(no_bodies(0), captured_ns=recall.now_ns), PlanarPose(3.7, 0, 0), EDGE, False
+    ).xy_m[0].tolist() == pytest.approx([5.0, 0.85])
+    # By dead reckoning it walks back into view after a while, and is not there.
+    remembered = [recall.see(None, 4.4) for _ in range(25)]
+    assert remembered[0] == [1]
+    assert remembered[-1] == []
+
+
+def test_where_a_body_can_be_seen_from() -> None:
+    bodies = box(5.0, 0.6, top_m=1.7).joined(box(5.0, 0.0, top_m=0.15)).joined(box(5.0, 0.0, top_m=0.7))
+    seen_from = visible_from_m(bodies, np.array([0.6, 0.0, 0.0]), 0.5, NEAR_M, 0.6)
+    assert seen_from.tolist() == pytest.approx([1.2, NEAR_M * (1 - 0.05 / 0.6), 0.0])

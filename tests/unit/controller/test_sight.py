@@ -1,0 +1,163 @@
+"""Depth in the corridor: surfaces nobody tracks, floor that was seen free, and what sinks out of view."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from config.decision import DecisionConfig
+from config.decision import Sight as SightConfig
+from config.robot import Body
+from controller.bodies import Bodies, no_bodies
+from controller.corridor import Corridor
+from controller.sight import Sight
+from hal.types import CameraMount, FloatArray, PlanarPose
+from tests.support.bodies import arc_path, box, line_path
+from vision.scene import FreeSpace
+
+BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)
+MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
+FRAME_NS = 33_000_000
+BANDS = 61
+BEARING = np.linspace(-0.6, 0.6, BANDS)
+
+
+def free(nearest_m: FloatArray | float = math.inf, known_m: FloatArray | float = 10.0) -> FreeSpace:
+    return FreeSpace(
+        BEARING, 0.01, np.full(BANDS, nearest_m) * np.ones(BANDS), np.full(BANDS, known_m) * np.ones(BANDS)
+    )
+
+
+class Watch:
+    """A sight of a straight path of 20 m, looked at once a frame from wherever the robot is."""
+
+    def __init__(self, config: DecisionConfig | None = None) -> None:
+        self.sight = Sight(Corridor(line_path(), BODY), MOUNT, config or DecisionConfig(), 0.0)
+        self.frame = 0
+
+    def look(
+        self,
+        seen: FreeSpace,
+        s_m: float = 0.0,
+        times: int = 1,
+        explained: Bodies | None = None,
+        standing: bool = False,
+    ) -> Sight:
+        for _ in range(times):
+            self.frame += 1
+            self.sight.look(
+                seen,
+                PlanarPose(s_m, 0.0, 0.0),
+                s_m,
+                self.frame * FRAME_NS,
+                explained or no_bodies(0),
+                standing,
+            )
+        return self.sight
+
+
+def test_a_plain_wall_stands_in_the_corridor() -> None:
+    """Seen 5 m ahead of a camera 0.4 m ahead of the turning centre."""
+    sight = Watch().look(free(nearest_m=5.0), times=5)
+    assert sight.surface_s_m == pytest.approx(5.4)
+
+
+def test_a_surface_beside_the_corridor_does_not_count() -> None:
+    """Corridor 0.4 m and margin 0.15 m to either side: at 3 m that is a bearing of 0.183."""
+    beside = np.where(np.abs(BEARING) > 0.21, 3.0, math.inf)
+    assert Watch().look(free(beside), times=5).surface_s_m == math.inf
+    inside = np.where(np.abs(BEARING) > 0.17, 3.0, math.inf)
+    assert Watch().look(free(inside), times=5).surface_s_m == pytest.approx(3.4)
+
+
+def test_one_frame_does_not_brake_and_three_do() -> None:
+    watch = Watch()
+    watch.look(free(), times=5)
+    assert watch.look(free(nearest_m=2.0)).surface_s_m == math.inf
+    assert watch.sight.newest_surface_s_m == pytest.approx(2.4)
+    assert watch.look(free(nearest_m=2.0)).surface_s_m == math.inf
+    assert watch.look(free(nearest_m=2.0)).surface_s_m == pytest.approx(2.4)
+
+
+def test_what_a_tracked_obstacle_explains_is_not_counted_twice() -> None:
+    person = np.where(np.abs(BEARING) < 0.1, 4.0, math.inf)
+    assert Watch().look(free(person), times=5, explained=box(4.6, 0.0)).surface_s_m == math.inf
+    assert Watch().look(free(person), times=5, explained=box(6.5, 0.0)).surface_s_m == pytest.approx(4.4)
+
+
+def test_a_surface_that_sinks_below_the_view_while_driving_is_still_there() -> None:
+    watch = Watch()
+    watch.look(free(nearest_m=1.2), s_m=3.0, times=5)
+    assert watch.look(free(), s_m=3.2, times=5).surface_s_m == pytest.approx(4.6)
+    # It is forgotten once it has been passed.
+    assert watch.look(free(), s_m=4.7, times=5).surface_s_m == math.inf
+
+
+def test_a_surface_that_goes_while_the_robot_stands_has_gone() -> None:
+    watch = Watch()
+    watch.look(free(nearest_m=1.2), s_m=3.0, times=5, standing=True)
+    assert watch.look(free(), s_m=3.0, times=5, standing=True).surface_s_m == math.inf
+
+
+def test_floor_is_known_as_far_as_it_was_seen() -> None:
+    sight = Watch().look(free(known_m=6.0))
+    # 6.4 m ahead of the turning centre; cells of 0.2 m count when all of them was seen.
+    assert sight.known_s_m == pytest.approx(6.4, abs=0.21)
+    assert sight.known_s_m <= 6.4 + 1e-9
+
+
+def test_glass_ahead_leaves_only_what_the_robot_stands_before() -> None:
+    sight = Watch().look(free(known_m=0.0), times=5)
+    assert sight.known_s_m <= MOUNT.forward_m + 1.3 + 0.4
+
+
+def test_floor_stays_known_for_a_while_when_depth_drops_out() -> None:
+    watch = Watch()
+    watch.look(free(known_m=8.0))
+    assert watch.look(free(known_m=2.0), times=20).known_s_m > 8.0
+    assert watch.look(free(known_m=2.0), times=20).known_s_m < 2.5
+
+
+def test_memory_of_floor_can_be_switched_off() -> None:
+    watch = Watch(DecisionConfig(sight=SightConfig(memory_s=0.0)))
+    watch.look(free(known_m=8.0))
+    assert watch.look(free(known_m=4.0)).known_s_m <= 4.4
+
+
+def test_a_narrow_gap_in_depth_does_not_make_the_floor_unknown() -> None:
+    """A fifth of the width unseen is tolerated (known_share 0.6), half of it is not."""
+    thin = np.where(np.abs(BEARING) < 0.015, 0.0, 10.0)
+    assert Watch().look(free(known_m=thin)).known_s_m > 9.0
+    half = np.where(BEARING < 0.03, 0.0, 10.0)
+    assert Watch().look(free(known_m=half)).known_s_m < 3.0
+
+
+def test_behind_a_surface_in_the_corridor_the_surface_itself_is_the_limit() -> None:
+    leader = np.where(np.abs(BEARING) < 0.2, 4.0, math.inf)
+    known = np.where(np.abs(BEARING) < 0.2, 4.0, 10.0)
+    assert Watch().look(free(leader, known)).known_s_m > 9.0
+
+
+def test_behind_a_corner_beside_the_path_the_floor_is_unknown() -> None:
+    """A left turn of 3 m radius; a shelf stands on its inner side, outside the corridor."""
+    path = arc_path(3.0, 90.0)
+    sight = Sight(Corridor(path, BODY), MOUNT, DecisionConfig(), 0.0)
+    shelf = np.where(BEARING < -0.32, 2.0, math.inf)
+    blocked = np.where(BEARING < -0.32, 2.0, 10.0)
+    sight.look(free(shelf, blocked), path.start, 0.0, FRAME_NS, no_bodies(0), False)
+    hidden = sight.known_s_m
+    sight = Sight(Corridor(path, BODY), MOUNT, DecisionConfig(), 0.0)
+    sight.look(free(), path.start, 0.0, FRAME_NS, no_bodies(0), False)
+    assert hidden < sight.known_s_m - 0.3
+
+
+def test_unknown_numbers_are_not_free() -> None:
+    sight = Watch().look(free(math.nan, math.nan), times=5)
+    assert sight.known_s_m < 2.2
+
+
+def test_no_bands_at_all_are_not_free() -> None:
+    empty = FreeSpace(np.zeros(0), 0.01, np.zeros(0), np.zeros(0))
+    assert Watch().look(empty, times=5).known_s_m < 2.2
