@@ -141,11 +141,11 @@ def test_behind_a_surface_in_the_corridor_the_surface_itself_is_the_limit() -> N
 
 
 def test_behind_a_corner_beside_the_path_the_floor_is_unknown() -> None:
-    """A left turn of 3 m radius; a shelf stands on its inner side, outside the corridor."""
-    path = arc_path(3.0, 90.0)
+    """A left turn of 8 m radius; 3 m ahead a shelf stands on its inner side, outside the corridor."""
+    path = arc_path(8.0, 70.0)
     sight = Sight(Corridor(path, BODY), MOUNT, DecisionConfig(), 0.0)
-    shelf = np.where(BEARING < -0.32, 2.0, math.inf)
-    blocked = np.where(BEARING < -0.32, 2.0, 10.0)
+    shelf = np.where(BEARING < -0.5, 3.0, math.inf)
+    blocked = np.where(BEARING < -0.5, 3.0, 10.0)
     sight.look(free(shelf, blocked), path.start, 0.0, FRAME_NS, no_bodies(0), False)
     hidden = sight.known_s_m
     sight = Sight(Corridor(path, BODY), MOUNT, DecisionConfig(), 0.0)
