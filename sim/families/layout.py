@@ -63,7 +63,7 @@ def racks(random: Random, length_m: float, gaps_m: tuple[tuple[float, float], ..
     """Racks along both sides of the aisle except where gaps_m (from, to) leave room for who crosses."""
     shelves = []
     for side in (1.0, -1.0):
-        inner_m = float(random.uniform(1.5, 2.2))
+        inner_m = float(random.uniform(1.75, 2.4))
         x = float(random.uniform(-4.0, -2.0))
         number = 0
         while x < length_m + 3.0:

@@ -1,0 +1,186 @@
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from controller.campaign.plan import Mission, missions, run_here
+from controller.campaign.store import MISSIONS, MissionStore
+from controller.campaign.summary import summarise, totals
+from controller.campaign.task import Task, run_task
+from controller.cli import cli
+from controller.errors import UserError
+from tests.support.campaign import CONFIG
+
+KEYS = {
+    "family", "seed", "policy", "reached", "contacts", "contacts_at_fault", "time_s", "oracle_time_s",
+    "min_clearance_m", "max_jerk_mps3", "max_accel_mps2", "reversals", "false_stops", "flaps",
+}  # fmt: skip
+
+
+def campaign(*arguments: str | Path) -> tuple[int, str]:
+    """Exit code and output. A UserError is raised, as the entry point would catch it."""
+    result = CliRunner().invoke(cli, ["campaign", *map(str, arguments)], standalone_mode=False)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.output
+
+
+def rows(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / MISSIONS).read_text().splitlines()]
+
+
+SMALL = ("--families", "plain_wall,feedback_lost", "--policies", "field,zones", "--workers", "1", "--quiet")
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("campaign") / "small"
+    campaign("--missions", "4", "--seed", "3", "--report", folder, *SMALL)
+    return folder
+
+
+def test_a_row_for_each_mission_and_policy_with_every_key(small: Path) -> None:
+    found = rows(small)
+    assert len(found) == 8
+    assert all(set(row) >= KEYS for row in found)
+    assert {(row["family"], row["seed"]) for row in found} == {
+        (family, seed) for family in ("plain_wall", "feedback_lost") for seed in (3, 4)
+    }
+
+
+def test_the_report_has_its_files(small: Path) -> None:
+    names = {path.name for path in small.iterdir()}
+    assert names == {MISSIONS, "summary.json", "report.md", "ratio.png", "families.png", "clearance.png"}
+    summary = json.loads((small / "summary.json").read_text())
+    assert summary["policies"]["field"]["missions"] == 4
+    assert summary["missions"] == 4
+    text = (small / "report.md").read_text()
+    assert "--missions 4 --mode noise --seed 3" in text
+    assert "### plain_wall" in text
+
+
+def test_a_campaign_broken_off_is_resumed_without_repeating_or_losing_a_row(
+    small: Path, tmp_path: Path
+) -> None:
+    whole = (small / MISSIONS).read_text()
+    lines = whole.splitlines(keepends=True)
+    # The last line was cut by the power going out.
+    (tmp_path / MISSIONS).write_text("".join(lines[:5]) + lines[5][:40])
+    with pytest.raises(UserError, match="--resume"):
+        campaign("--missions", "4", "--seed", "3", "--report", tmp_path, *SMALL)
+    marked = json.loads(lines[0]) | {"flaps": 77}
+    content = (tmp_path / MISSIONS).read_text().replace(lines[0], json.dumps(marked) + "\n")
+    (tmp_path / MISSIONS).write_text(content)
+    campaign("--missions", "4", "--seed", "3", "--report", tmp_path, "--resume", *SMALL)
+    again = rows(tmp_path)
+    assert again[0]["flaps"] == 77
+    assert [json.dumps(row) for row in again[1:]] == [line.strip() for line in lines[1:]]
+
+
+def test_two_workers_find_what_one_finds(small: Path) -> None:
+    tasks = [
+        Task(one.family, one.seed, ("field", "zones"), "noise", CONFIG)
+        for one in missions(4, ("plain_wall", "feedback_lost"), 3)
+    ]
+    found = {(row.family, row.seed, row.policy): row.as_dict() for done in run_here(tasks, 2) for row in done}
+    expected = {(row["family"], row["seed"], row["policy"]): row for row in rows(small)}
+    assert {key: json.loads(json.dumps(row)) for key, row in found.items()} == expected
+
+
+def test_ours_drives_a_mission_the_same_way_twice() -> None:
+    task = Task("crossing_right", 2, ("ours",), "noise", CONFIG)
+    first, again = run_task(task), run_task(task)
+    assert first == again
+    assert first[0].reached
+    assert first[0].limit_violations == 0
+
+
+def test_missions_take_turns_over_the_families() -> None:
+    assert missions(5, ("a", "b"), 7) == [
+        Mission("a", 7), Mission("b", 7), Mission("a", 8), Mission("b", 8), Mission("a", 9),
+    ]  # fmt: skip
+
+
+def test_every_mission_is_run_once_however_many_there_are() -> None:
+    """More than wait in front of the workers at a time."""
+    tasks = [Task("plain_wall", seed, (), "noise", CONFIG) for seed in range(30)]
+    assert len(list(run_here(tasks, 2))) == 30
+
+
+def test_one_mission_alone_says_how_it_went(tmp_path: Path) -> None:
+    code, output = campaign("--only", "plain_wall:3", "--policies", "field")
+    assert code in (0, 1)
+    assert output.startswith("field")
+    assert "the oracle's" in output or "not reached" in output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--report", "x", "--families", "crossing_lft"), "--families crossing_lft"),
+        (("--report", "x", "--policies", "theirs"), "--policies theirs"),
+        ((), "--report"),
+        (("--only", "plain_wall"), "FAMILY:SEED"),
+        (("--only", "nothing:3"), "FAMILY:SEED"),
+        (("--report", "x", "--video"), "--mode camera"),
+        (("--report", "x", "--config", "config/robot-bunker.yaml"), "camera.kind 'simulated'"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(arguments: tuple[str, ...], message: str) -> None:
+    with pytest.raises(UserError, match=message) as caught:
+        campaign(*arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_row_that_is_none_is_told_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / MISSIONS).write_text('{"family": 3}\n{}\n')
+    with pytest.raises(UserError, match="line 1 is not a row"):
+        MissionStore(tmp_path).begin(resume=True)
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="choose a folder"):
+        MissionStore(tmp_path / "file" / "report").begin(resume=False)
+
+
+def test_ratios_count_where_both_arrived(small: Path) -> None:
+    store = MissionStore(small)
+    store.begin(resume=True)
+    field = [row for row in store.rows.values() if row.policy == "field"]
+    one = totals(field)
+    arrived = [row.time_s / row.oracle_time_s for row in field if row.time_s and row.oracle_time_s]
+    assert (
+        one.ratio_median is None
+        if not arrived
+        else one.ratio_median == pytest.approx(sorted(arrived)[len(arrived) // 2], rel=0.2)
+    )
+    assert one.expected == sum(row.expected for row in field)
+    assert set(summarise(store.rows.values()).families) == {"feedback_lost", "plain_wall"}
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is not None, reason="Dask distributed is installed here"
+)
+def test_without_dask_a_scheduler_is_refused_with_what_to_install(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"pip install 'treadwatch\[campaign\]'"):
+        campaign("--missions", "1", "--report", tmp_path, "--scheduler", "tcp://127.0.0.1:8786", *SMALL)
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is None,
+    reason="Dask distributed is not installed: pip install 'treadwatch[campaign]'",
+)
+@pytest.mark.filterwarnings("default")
+def test_a_local_cluster_finds_what_this_machine_finds(small: Path, tmp_path: Path) -> None:
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        address = cluster.scheduler_address
+        campaign("--missions", "4", "--seed", "3", "--report", tmp_path, "--scheduler", address, *SMALL)
+    assert rows(tmp_path) == rows(small)

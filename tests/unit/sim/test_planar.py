@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from config.path import LineSpec, PathSpec
+from config.scenario import (
+    Beam,
+    BodySpec,
+    Column,
+    Crate,
+    Go,
+    Motion,
+    Pallet,
+    Person,
+    Pole,
+    RobotBody,
+    Scenario,
+    Shelf,
+    Wall,
+)
+from sim.contact import polygon_distance
+from sim.planar import PlanarWorld, separation
+from sim.world import World
+
+MOTION = Motion(
+    start_s=1.0,
+    start_jitter_s=0.5,
+    steps=(
+        Go(kind="go", x_m=4.0, y_m=1.0, speed_mps=1.2),
+        Go(kind="go", x_m=4.0, y_m=4.0, speed_mps=0.4),
+    ),
+)
+BODIES: tuple[BodySpec, ...] = (
+    Crate(kind="crate", name="crate", x_m=1.0, y_m=2.0, heading_deg=20.0),
+    Shelf(kind="shelf", name="shelf", x_m=5.0, y_m=-2.0),
+    Column(kind="column", name="column", x_m=7.0, y_m=1.0),
+    Pole(kind="pole", name="pole", x_m=8.0, y_m=1.0),
+    Pallet(kind="pallet", name="pallet", x_m=9.0, y_m=1.0, load_height_m=0.5),
+    Wall(kind="wall", name="wall", x_m=12.0, y_m=0.0, heading_deg=90.0),
+    Beam(kind="beam", name="beam", x_m=10.0, y_m=0.0),
+    Person(kind="person", name="walker", x_m=0.0, y_m=1.0, motion=MOTION),
+    RobotBody(kind="robot", name="robot", x_m=0.5, y_m=-1.0, load_height_m=0.5, motion=MOTION),
+    RobotBody(kind="robot", name="parked", x_m=14.0, y_m=-1.0),
+)
+SCENARIO = Scenario(
+    name="all kinds",
+    path=PathSpec(segments=(LineSpec(kind="line", length_m=10.0),)),
+    bodies=BODIES,
+)
+
+
+@pytest.mark.parametrize("t_s", [0.0, 1.3, 2.7, 6.0, 30.0])
+def test_is_the_world_seen_from_above(t_s: float) -> None:
+    polygons, velocity = PlanarWorld(SCENARIO, seed=5).look(t_s)
+    plane = PlanarWorld(SCENARIO, seed=5)
+    for k, state in enumerate(World(SCENARIO, seed=5).bodies(t_s)):
+        corners = len(state.footprint_m)
+        assert plane.names[k] == state.name
+        assert polygons[k, :corners] == pytest.approx(state.footprint_m, abs=1e-3)
+        assert polygons[k, corners:] == pytest.approx(
+            np.tile(polygons[k, corners - 1], (len(polygons[k]) - corners, 1))
+        )
+        assert velocity[k] == pytest.approx(state.velocity_mps)
+        assert tuple(plane.z_m[k]) == pytest.approx(state.z_m)
+        assert plane.moves[k] == state.moves
+
+
+def test_over_times_is_the_look_at_each() -> None:
+    plane = PlanarWorld(SCENARIO, seed=5)
+    times = np.array([0.0, 1.7, 3.3])
+    for body in range(len(plane)):
+        series = plane.over(times, body)
+        for k, t_s in enumerate(times.tolist()):
+            assert series[k] == pytest.approx(plane.look(t_s)[0][body])
+
+
+def test_end_is_when_the_last_mover_has_arrived() -> None:
+    plane = PlanarWorld(SCENARIO, seed=5)
+    before, after = plane.look(plane.end_s - 0.2)[1], plane.look(plane.end_s + 0.01)[1]
+    assert np.abs(before).max() > 0.05
+    assert np.abs(after).max() == 0.0
+    assert PlanarWorld(SCENARIO.model_copy(update={"bodies": ()})).end_s == 0.0
+
+
+def test_separation_is_the_exact_distance_of_every_pair() -> None:
+    random = np.random.default_rng(3)
+
+    def box(count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        angle = random.uniform(0.0, math.tau, count)
+        half = random.uniform(0.1, 1.0, (count, 2))
+        corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * half[:, None]
+        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        turned = np.stack(
+            (cos * corners[..., 0] - sin * corners[..., 1], sin * corners[..., 0] + cos * corners[..., 1]), 2
+        )
+        return turned + random.uniform(-1.5, 1.5, (count, 1, 2))
+
+    a, b = box(200), box(200)
+    padded = np.concatenate((b, np.repeat(b[:, -1:], 3, axis=1)), axis=1)
+    exact = [polygon_distance(one, other) for one, other in zip(a, b, strict=True)]
+    assert min(exact) < -0.1
+    assert max(exact) > 0.5
+    assert separation(a, padded) == pytest.approx(np.array(exact), abs=1e-9)
