@@ -2,12 +2,15 @@ from __future__ import annotations
 
 import importlib.util
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
+from config.loader import CONFIG_DIR
+from controller.campaign.judge import Row
 from controller.campaign.plan import Mission, missions, run_here
 from controller.campaign.store import MISSIONS, MissionStore
 from controller.campaign.summary import summarise, totals
@@ -64,9 +67,7 @@ def test_the_report_has_its_files(small: Path) -> None:
     assert "### plain_wall" in text
 
 
-def test_a_campaign_broken_off_is_resumed_without_repeating_or_losing_a_row(
-    small: Path, tmp_path: Path
-) -> None:
+def test_a_campaign_broken_off_is_resumed_without_losing_a_row(small: Path, tmp_path: Path) -> None:
     whole = (small / MISSIONS).read_text()
     lines = whole.splitlines(keepends=True)
     # The last line was cut by the power going out.
@@ -112,7 +113,7 @@ def test_every_mission_is_run_once_however_many_there_are() -> None:
     assert len(list(run_here(tasks, 2))) == 30
 
 
-def test_one_mission_alone_says_how_it_went(tmp_path: Path) -> None:
+def test_one_mission_alone_says_how_it_went() -> None:
     code, output = campaign("--only", "plain_wall:3", "--policies", "field")
     assert code in (0, 1)
     assert output.startswith("field")
@@ -128,7 +129,7 @@ def test_one_mission_alone_says_how_it_went(tmp_path: Path) -> None:
         (("--only", "plain_wall"), "FAMILY:SEED"),
         (("--only", "nothing:3"), "FAMILY:SEED"),
         (("--report", "x", "--video"), "--mode camera"),
-        (("--report", "x", "--config", "config/robot-bunker.yaml"), "camera.kind 'simulated'"),
+        (("--report", "x", "--config", str(CONFIG_DIR / "robot-bunker.yaml")), "camera.kind 'simulated'"),
     ],
 )
 def test_mistakes_are_told_in_one_line(arguments: tuple[str, ...], message: str) -> None:
@@ -149,19 +150,47 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
         MissionStore(tmp_path / "file" / "report").begin(resume=False)
 
 
-def test_ratios_count_where_both_arrived(small: Path) -> None:
-    store = MissionStore(small)
-    store.begin(resume=True)
-    field = [row for row in store.rows.values() if row.policy == "field"]
-    one = totals(field)
-    arrived = [row.time_s / row.oracle_time_s for row in field if row.time_s and row.oracle_time_s]
-    assert (
-        one.ratio_median is None
-        if not arrived
-        else one.ratio_median == pytest.approx(sorted(arrived)[len(arrived) // 2], rel=0.2)
+def made_row(seed: int, **changes: Any) -> Row:
+    made = Row(
+        "crossing_left", seed, "ours", "noise", reached=True, expected=True, contacts=0, contacts_at_fault=0,
+        touched=(), time_s=11.0, oracle_time_s=10.0, min_clearance_m=0.5, max_jerk_mps3=0.6, max_accel_mps2=0.3,
+        reversals=0, limit_violations=0, false_stops=0, flaps=0,
+    )  # fmt: skip
+    return replace(made, **changes)
+
+
+def test_totals_add_up_and_ratios_count_where_both_arrived() -> None:
+    one = totals(
+        [
+            made_row(1),
+            made_row(2, time_s=13.0, contacts=2, contacts_at_fault=1, min_clearance_m=-0.1),
+            made_row(3, time_s=15.0, false_stops=2, flaps=1, max_jerk_mps3=2.0),
+            made_row(4, reached=False, time_s=None),
+            made_row(5, reached=False, expected=False, time_s=None, oracle_time_s=None),
+        ]
     )
-    assert one.expected == sum(row.expected for row in field)
-    assert set(summarise(store.rows.values()).families) == {"feedback_lost", "plain_wall"}
+    assert (one.missions, one.reached, one.expected) == (5, 3, 4)
+    assert (one.contacts, one.contacts_at_fault, one.min_clearance_m) == (2, 1, -0.1)
+    assert one.ratio_median == pytest.approx(1.3)
+    assert one.ratio_p90 == pytest.approx(1.46)
+    assert (one.false_stops, one.missions_with_false_stop, one.flaps, one.max_jerk_mps3) == (2, 1, 1, 2.0)
+
+
+def test_what_failed_is_named_with_its_reason() -> None:
+    summary = summarise(
+        [
+            made_row(1),
+            made_row(2, contacts=1, contacts_at_fault=1, touched=("pallet",)),
+            made_row(3, reached=False, time_s=None),
+            made_row(4, reached=False, expected=False, time_s=None),
+            made_row(5, limit_violations=3, reversals=1),
+        ]
+    )
+    assert summary.failing == [
+        ("crossing_left", 2, "ours", "touched pallet while driving"),
+        ("crossing_left", 3, "ours", "did not reach its target"),
+        ("crossing_left", 5, "ours", "3 setpoints outside the limits; 1 reversals"),
+    ]
 
 
 @pytest.mark.skipif(

@@ -1,15 +1,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from controller.campaign.drive import DriveLog
-from controller.campaign.judge import Row, Yardstick, false_stops, flaps, judge
+from controller.campaign.judge import Row, false_stops, flaps, judge
 from controller.campaign.oracle import OracleTime
 from controller.campaign.stage import Stage
 from controller.campaign.task import yardstick
-from controller.campaign.view import PlanarEye
 from controller.decision import Action
 from sim.faults import Faults, Window
 from tests.support.campaign import CONFIG, crate, log_of, mover, stage
@@ -81,11 +81,7 @@ def test_time_and_limits_come_from_the_drive() -> None:
 
 def test_what_even_the_oracle_does_not_reach_has_no_time() -> None:
     made = stage(crate(4.0), blocked=True)
-    by = Yardstick(
-        OracleTime(math.inf, math.inf),
-        PlanarEye(made.world, CONFIG.camera, CONFIG.robot.camera_mount),
-        0.4,  # type: ignore[arg-type]  # sim.yaml has a simulated camera
-    )
+    by = replace(yardstick(made, CONFIG), oracle=OracleTime(math.inf, math.inf))
     row = judge(made, cruise(0.0, 1.0), "ours", "noise", by)
     assert (row.oracle_time_s, row.time_s, row.expected) == (None, None, False)
 
