@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: run test check bench clean
+.PHONY: run test check bench hil faults clean
 
 run: $(VENV)/ready
 	$(BIN)/treadwatch run
@@ -20,6 +20,12 @@ check: $(VENV)/ready-dev
 
 bench: $(VENV)/ready
 	$(BIN)/treadwatch bench --json out/bench.json
+
+hil: $(VENV)/ready-dev
+	$(BIN)/python -m pytest --hil tests/hil
+
+faults: $(VENV)/ready
+	$(BIN)/treadwatch faults --processes agilex --into docs/results.md
 
 $(VENV)/ready: requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "treadwatch needs Python 3.11 or newer")'

@@ -18,6 +18,7 @@ from config.chassis import (
     AgilexChassisConfig,
     CanLinkConfig,
     KobukiChassisConfig,
+    PlantConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
     SerialChassisConfig,
@@ -46,7 +47,7 @@ from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
 from hal.links.can_bus import CanBusLink
 from hal.links.pseudo_terminal import PseudoTerminal
-from hal.links.scripted import serial_pair
+from hal.links.scripted import ScriptedCanLink, ScriptedSerialLink, can_pair, serial_pair
 from hal.links.serial_port import SerialPortLink
 from hal.types import CameraMount, PlanarPose
 from sim.agilex_emulator import AgilexEmulator
@@ -203,6 +204,23 @@ def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
     # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
     here, there = serial_pair()
     return _serial_driver(config.chassis, here), build_serial_emulator(config.chassis, there, plant)
+
+
+def build_base_in_memory(
+    config: AppConfig, start: PlanarPose, start_ns: int
+) -> tuple[Chassis, Emulator, ScriptedCanLink | ScriptedSerialLink]:
+    """Guarded driver and emulator on a wire in memory, and the driver's end of it, to be pulled out."""
+    plant = TrackedPlant(
+        PlantConfig() if config.simulation is None else config.simulation.plant, start, start_ns
+    )
+    limits = GuardLimits.of(config.robot.limits, 1.0 / config.runner.control_rate_hz)
+    if isinstance(config.chassis, AgilexChassisConfig):
+        near, far = can_pair()
+        driver = AgilexChassis(GuardedCanLink(near, AGILEX_COMMANDS), config.chassis)
+        return GuardedChassis(driver, limits), AgilexEmulator(far, plant), near
+    here, there = serial_pair()
+    guarded = GuardedChassis(_serial_driver(config.chassis, here), limits)
+    return guarded, build_serial_emulator(config.chassis, there, plant), here
 
 
 def _serial_driver(config: SerialChassisConfig, link: SerialLink) -> Chassis:

@@ -210,7 +210,7 @@ def _names(text: str | None) -> tuple[str, ...]:
     "--config", "config_path", type=_FILE, show_default="the hil-KIND.yaml that ships",
     help="YAML whose chassis and simulation.plant it plays.",
 )  # fmt: skip
-@click.option("--tell", is_flag=True, help="Say twice a second how the base moves.")
+@click.option("--tell", is_flag=True, help="Say ten times a second how the base moves.")
 def emulate(
     kind: str,
     channel: str | None,
@@ -226,6 +226,19 @@ def emulate(
     from controller.emulate import EmulateOptions, run_emulator
 
     run_emulator(EmulateOptions(kind, channel, interface, port, config_path, tell), sys.stdin)
+
+
+@cli.command()
+@click.option(
+    "--processes", "kind", type=click.Choice(["agilex", "roboclaw", "roboteq", "kobuki"]),
+    help="Also kill and freeze the processes of this chassis' mission, in real time (two minutes).",
+)  # fmt: skip
+@click.option("--into", type=_FILE, help="Put the tables into this page, in place of the old ones.")
+def faults(kind: str | None, into: Path | None) -> None:
+    """Break things and tell what happened: e-stop, restart, unplugging, freezing, kill -9."""
+    from controller.faults.command import FaultsOptions, run_faults
+
+    run_faults(FaultsOptions(kind, into))
 
 
 def main() -> None:

@@ -35,7 +35,7 @@ _TICK_NS = 2 * _NS_PER_MS
 # A process that did not run for so long was frozen, and so is the base that it plays.
 _FROZEN_NS = 200 * _NS_PER_MS
 
-_TOLD_EVERY_NS = 500 * _NS_PER_MS
+_TOLD_EVERY_NS = 100 * _NS_PER_MS
 
 FAULTS: dict[str, Callable[[Emulator], None]] = {
     "estop": lambda base: base.press_estop(),
@@ -132,7 +132,7 @@ def _linked(path: str, target: str) -> Iterator[None]:
 def run_in_real_time(
     emulator: Emulator, clock: Clock, stop: StopRequest, read_commands: Callable[[], list[str]]
 ) -> Iterator[str]:
-    """Step the base until stop; yields what there is to tell, twice a second how it moves."""
+    """Step the base until stop; yields what there is to tell, ten times a second how it moves."""
     told_ns = deadline_ns = last_ns = clock.now_ns()
     while not stop:
         clock.sleep_until_ns(deadline_ns)

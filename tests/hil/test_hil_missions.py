@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from config.loader import CONFIG_DIR
+from controller.faults.kills import KILLS, run_kill
 from hal.errors import HalError
 from hal.links.can_bus import open_can_link
 from tests.support.chassis_rig import udp_link_config
@@ -21,11 +22,11 @@ from tests.support.chassis_rig import udp_link_config
 QUICK = "agilex"
 
 
-def short_mission(kind: str, folder: Path) -> Path:
-    """The file that ships, on a metre and a half of path, with a link of its own and a small camera."""
+def short_mission(kind: str, folder: Path, length_m: float = 1.5) -> Path:
+    """The file that ships, on a short straight path, with a link of its own and a small camera."""
     config = yaml.safe_load((CONFIG_DIR / f"hil-{kind}.yaml").read_text())
     scenario = yaml.safe_load((CONFIG_DIR / "scenarios" / "empty.yaml").read_text())
-    scenario["path"] = {"segments": [{"kind": "line", "length_m": 1.5}]}
+    scenario["path"] = {"segments": [{"kind": "line", "length_m": length_m}]}
     (folder / "short.yaml").write_text(yaml.safe_dump(scenario))
     config["simulation"]["scenario"] = str(folder / "short.yaml")
     config["camera"] |= {"width": 320, "height": 240, "fps": 15.0}
@@ -76,3 +77,19 @@ def test_the_mission_is_reached(kind: str, tmp_path: Path, request: pytest.Fixtu
         assert (process.returncode, complaints) == (0, ""), complaints
         assert told.endswith("SIGTERM: ended\n")
     assert not list(tmp_path.glob(f"{kind}-*")), "the link to the port is gone"
+
+
+@pytest.mark.parametrize("fault", KILLS)
+def test_a_process_that_dies_or_hangs_leaves_a_base_that_stands(
+    fault: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    if not request.config.getoption("--hil"):
+        pytest.skip("a quarter of a minute each; with --hil")
+    result = run_kill("agilex", short_mission("agilex", tmp_path, 12.0), fault)
+    if fault.startswith("kill -9 of the emulator"):
+        assert result.stood_after_s is None
+    else:
+        assert result.stood_after_s is not None
+        assert result.stood_after_s < 6.0
+    asked = fault in ("SIGTERM to control", "perception frozen (SIGSTOP)")
+    assert result.exit_code == (None if fault == "kill -9 of control" else 0 if asked else 1)

@@ -1,0 +1,1 @@
+"""`treadwatch faults`: what happens when something breaks, measured, for every chassis."""

@@ -1,0 +1,97 @@
+"""`treadwatch faults`: run every fault, print the tables, and put them into a page of results."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from config.loader import CONFIG_DIR
+from controller.errors import UserError
+from controller.faults.kills import KILLS, KillResult, run_kill
+from controller.faults.trials import FAULTS, KINDS, TrialResult, run_trial
+
+HEADING = "## Faults"
+
+
+@dataclass(frozen=True, slots=True)
+class FaultsOptions:
+    """The command line. kind: whose processes are killed; None: none are."""
+
+    kind: str | None
+    into: Path | None
+
+
+def run_faults(options: FaultsOptions) -> None:
+    """Raises ConfigError, HalError, UserError."""
+    trials = []
+    for kind in KINDS:
+        for fault in FAULTS:
+            click.echo(f"{kind}: {fault.name}", err=True)
+            trials.append(run_trial(kind, fault))
+    kills = []
+    for name in KILLS if options.kind is not None else ():
+        assert options.kind is not None
+        click.echo(f"{options.kind}, processes: {name}", err=True)
+        kills.append(run_kill(options.kind, CONFIG_DIR / f"hil-{options.kind}.yaml", name))
+    section = describe(trials, kills, options.kind)
+    click.echo(section)
+    if options.into is not None:
+        write_section(options.into, section)
+
+
+def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | None) -> str:
+    """The section, in Markdown."""
+    lines = [
+        HEADING,
+        "",
+        f"Made by `treadwatch faults{f' --processes {kind}' if kind else ''}`.",
+        "",
+        "In simulated time, from 0.5 m/s; guard, driver, wire and emulated base. Stood: until the true base",
+        "stood still. By itself: how far it went in 3 s after the cause had gone and 0.5 m/s was still asked",
+        "for. Again: it drove after a zero command and consent.",
+        "",
+        "| chassis | fault | mode | reason | stood | way | by itself | again |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for trial in trials:
+        reason = trial.reason.removesuffix("; gone now, arm again to go on")
+        stood = "never" if math.isnan(trial.stood_after_s) else f"{trial.stood_after_s:.2f} s"
+        again = "yes" if trial.again else "**no**"
+        lines.append(
+            f"| {trial.kind} | {trial.fault} | {trial.mode.value} | {reason} | {stood} | {trial.way_m:.2f} m "
+            f"| {trial.moved_after_m:.3f} m | {again} |"
+        )
+    if kills:
+        lines += [
+            "",
+            f"In real time, three processes ({kind} emulator, control, perception), from 0.3 m/s or more.",
+            "The base tells its speed ten times a second; while it is frozen it tells nothing.",
+            "",
+            "| fault | base stood | the mission ended with | exit code |",
+            "|---|---|---|---|",
+        ]
+    for kill in kills:
+        stood = "-" if kill.stood_after_s is None else f"{kill.stood_after_s:.1f} s"
+        code = "-" if kill.exit_code is None else str(kill.exit_code)
+        lines.append(f"| {kill.fault} | {stood} | {kill.ended or 'nothing: it was killed'} | {code} |")
+    return "\n".join(lines) + "\n"
+
+
+def write_section(path: Path, section: str) -> None:
+    """Put the section into a page, in place of the one that is there. Raises UserError."""
+    try:
+        page = path.read_text(encoding="utf-8") if path.exists() else "# Measured results\n"
+        before, found, after = page.partition(f"{HEADING}\n")
+        if found:
+            following = re.search(r"^## ", after, re.MULTILINE)
+            rest = after[following.start() :] if following else ""
+            page = before + section + ("\n" + rest if rest else "")
+        else:
+            page = page.rstrip("\n") + "\n\n" + section
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"--into {path}: cannot be written ({error.strerror})") from error

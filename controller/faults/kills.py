@@ -1,0 +1,155 @@
+"""Faults of whole processes, in real time: emulator, control and perception, killed or frozen."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from controller.errors import UserError
+
+_STANDING_MPS = 1e-3
+_DRIVING_MPS = 0.3
+_START_S = 40.0
+_STOP_S = 15.0
+_FROZEN_S = 2.0
+
+_TOLD = re.compile(r"v (-?[\d.]+) m/s, w (-?[\d.]+) rad/s, x (-?[\d.]+) m, y (-?[\d.]+) m")
+_ENDED = re.compile(r"^mission +[^:]*: (.*); [\d.]+ m in", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class KillResult:
+    """stood_after_s: until the emulated base stood still; None where it is what was killed. ended: the
+    mission's own words; None where that process was killed."""
+
+    fault: str
+    stood_after_s: float | None
+    ended: str | None
+    exit_code: int | None
+
+
+class Trio:
+    """The emulator's and the drive's processes; perception is a child of the drive."""
+
+    def __init__(self, kind: str, config_path: Path) -> None:
+        python = [sys.executable, "-m", "controller"]
+        emulate = [*python, "emulate", kind, "--config", str(config_path), "--tell"]
+        drive = [*python, "run", "--config", str(config_path), "--quiet"]
+        pipe = subprocess.PIPE
+        self.base = subprocess.Popen(emulate, stdin=pipe, stdout=pipe, stderr=pipe, text=True, bufsize=1)
+        assert self.base.stderr is not None
+        ready = self.base.stderr.readline()
+        if not ready.startswith("emulating"):
+            raise UserError(f"the emulator did not start: {ready.strip()}")
+        self.drive = subprocess.Popen(drive, stdout=pipe, stderr=pipe, text=True)
+
+    def close(self) -> None:
+        """End what is left of them."""
+        for process in (self.drive, self.base):
+            process.kill()
+            process.communicate()
+
+    @property
+    def perception(self) -> int:
+        """Its process id. Raises UserError when there is none."""
+        children = Path(f"/proc/{self.drive.pid}/task/{self.drive.pid}/children").read_text().split()
+        for child in children:
+            if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                return int(child)
+        raise UserError("the drive has no perception process")
+
+    def await_speed(self, reached: Callable[[float], bool], within_s: float) -> float:
+        """Read what the base tells until its speed is so; how long that took. Raises UserError."""
+        began_s = time.monotonic()
+        assert self.base.stdout is not None
+        for line in self.base.stdout:
+            match = _TOLD.match(line)
+            if match is not None and reached(abs(float(match[1]))):
+                return time.monotonic() - began_s
+            if time.monotonic() - began_s > within_s:
+                break
+        raise UserError(f"the emulated base was not so within {within_s:g} s")
+
+
+@contextmanager
+def _trio(kind: str, config_path: Path) -> Iterator[Trio]:
+    trio = Trio(kind, config_path)
+    try:
+        yield trio
+    finally:
+        trio.close()
+
+
+def _kill_control(trio: Trio) -> None:
+    trio.drive.kill()
+
+
+def _kill_perception(trio: Trio) -> None:
+    os.kill(trio.perception, signal.SIGKILL)
+
+
+def _freeze_perception(trio: Trio) -> None:
+    os.kill(trio.perception, signal.SIGSTOP)
+
+
+def _kill_base(trio: Trio) -> None:
+    trio.base.kill()
+
+
+def _freeze_base(trio: Trio) -> None:
+    trio.base.send_signal(signal.SIGSTOP)
+    time.sleep(_FROZEN_S)
+    trio.base.send_signal(signal.SIGCONT)
+
+
+def _press_estop(trio: Trio) -> None:
+    assert trio.base.stdin is not None
+    trio.base.stdin.write("estop\n")
+
+
+def _ask_to_stop(trio: Trio) -> None:
+    trio.drive.terminate()
+
+
+KILLS: dict[str, Callable[[Trio], None]] = {
+    "SIGTERM to control": _ask_to_stop,
+    "kill -9 of control": _kill_control,
+    "kill -9 of perception": _kill_perception,
+    "perception frozen (SIGSTOP)": _freeze_perception,
+    "kill -9 of the emulator (base gone)": _kill_base,
+    f"emulator frozen for {_FROZEN_S:g} s (SIGSTOP)": _freeze_base,
+    "e-stop": _press_estop,
+}
+
+
+def run_kill(kind: str, config_path: Path, fault: str) -> KillResult:
+    """Drive until the base makes 0.3 m/s, break it, and see. Raises UserError when it does not drive."""
+    with _trio(kind, config_path) as trio:
+        trio.await_speed(lambda v_mps: v_mps > _DRIVING_MPS, _START_S)
+        began_s = time.monotonic()
+        frozen = None
+        if fault == "perception frozen (SIGSTOP)":
+            frozen = trio.perception
+        KILLS[fault](trio)
+        stood_s = None
+        if trio.base.poll() is None and KILLS[fault] is not _kill_base:
+            trio.await_speed(lambda v_mps: v_mps < _STANDING_MPS, _STOP_S)
+            stood_s = time.monotonic() - began_s
+        if KILLS[fault] is _kill_control:
+            return KillResult(fault, stood_s, None, None)
+        if frozen is not None:
+            # A mission whose scenes are stale waits for better ones; this one has shown what it does.
+            trio.drive.terminate()
+            time.sleep(1.0)
+            os.kill(frozen, signal.SIGCONT)
+        out, _ = trio.drive.communicate(timeout=_STOP_S)
+        ended = _ENDED.search(out)
+        return KillResult(fault, stood_s, ended[1] if ended else out.strip(), trio.drive.returncode)

@@ -1,0 +1,151 @@
+"""Faults in simulated time: guard, driver, wire and emulated base of every kind; no process, no port."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from config.app import load_app
+from config.loader import CONFIG_DIR
+from controller.build import build_base_in_memory
+from controller.shape import SpeedShaper
+from hal.clocks import NS_PER_S
+from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
+
+KINDS = ("agilex", "roboclaw", "roboteq", "kobuki")
+
+_PERIOD_NS = NS_PER_S // 50
+_SPEED_MPS = 0.5
+_STANDING = 1e-3
+_GIVE_UP_S = 6.0
+_AFTERWARDS_S = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class TrialResult:
+    """What one fault led to. stood_after_s, way_m: until the true base stood still, NaN if it did not.
+
+    moved_after_m: how far it moved by itself when the cause had gone and a speed was still asked for.
+    again: it drove again after a zero command and consent.
+    """
+
+    kind: str
+    fault: str
+    mode: ChassisMode
+    reason: str
+    stood_after_s: float
+    way_m: float
+    moved_after_m: float
+    again: bool
+
+
+class Bench:
+    """A guarded driver and its base, driven as the control loop does it: speed by the shaper while armed."""
+
+    def __init__(self, kind: str) -> None:
+        config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")
+        self.chassis, self.emulator, self.link = build_base_in_memory(config, PlanarPose(0.0, 0.0, 0.0), 0)
+        self._shaper = SpeedShaper(config.robot.limits, _PERIOD_NS / NS_PER_S)
+        self.now_ns = 0
+        self.state: ChassisState | None = None
+
+    @property
+    def stands(self) -> bool:
+        """The true body does."""
+        v_mps, w_radps = self.emulator.plant.twist
+        return abs(v_mps) < _STANDING and abs(w_radps) < _STANDING
+
+    @property
+    def way_m(self) -> float:
+        """Travelled by the tracks since the start, the mean of both."""
+        left_m, right_m = self.emulator.plant.track_travel_m
+        return 0.5 * (abs(left_m) + abs(right_m))
+
+    def coast(self) -> None:
+        """A period in which nobody drives."""
+        self.now_ns += _PERIOD_NS
+        self.emulator.advance_to(self.now_ns)
+
+    def step(self, wanted_mps: float) -> None:
+        """A period of the control loop."""
+        self.coast()
+        if self.state is None or self.state.mode is not ChassisMode.ARMED:
+            self._shaper.reset()
+            # A loop that goes on asking: only the driver stands between it and the tracks.
+            setpoint = Setpoint(self.now_ns, wanted_mps, 0.0, 0.0)
+        else:
+            shaped = self._shaper.step(wanted_mps)
+            v_mps = shaped.v_mps if math.isfinite(wanted_mps) else wanted_mps
+            setpoint = Setpoint(self.now_ns, v_mps, shaped.a_mps2, 0.0)
+        self.state = self.chassis.exchange(setpoint, self.now_ns)
+
+    def run(self, seconds: float, wanted_mps: float) -> None:
+        """Many periods."""
+        for _ in range(round(seconds * NS_PER_S / _PERIOD_NS)):
+            self.step(wanted_mps)
+
+    def arm(self) -> bool:
+        """Zero command, consent, and a second to follow it."""
+        self.run(0.2, 0.0)
+        self.chassis.arm(self.now_ns)
+        self.run(1.0, 0.0)
+        return self.state is not None and self.state.mode is ChassisMode.ARMED
+
+
+def _ask_on(bench: Bench) -> None:
+    bench.step(_SPEED_MPS)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """begin it, live through its periods, end it."""
+
+    name: str
+    begin: Callable[[Bench], None] = lambda _: None
+    end: Callable[[Bench], None] = lambda _: None
+    live: Callable[[Bench], None] = _ask_on
+
+
+FAULTS = (
+    Fault("stop is asked for", live=lambda bench: bench.step(0.0)),
+    Fault("e-stop", lambda bench: bench.emulator.press_estop(), lambda bench: bench.emulator.release_estop()),
+    Fault("base restarts", lambda bench: bench.emulator.restart()),
+    Fault("base frozen", lambda bench: bench.emulator.freeze(), lambda bench: bench.emulator.thaw()),
+    Fault("unplugged", lambda bench: bench.link.unplug(), lambda bench: bench.link.plug()),
+    Fault("nothing comes back", lambda bench: bench.link.hear_nothing(), lambda bench: bench.link.hear_all()),
+    Fault("control hangs or is killed", live=lambda bench: bench.coast()),
+    Fault("command is no number", live=lambda bench: bench.step(math.nan)),
+)
+
+
+def run_trial(kind: str, fault: Fault) -> TrialResult:
+    """Drive at 0.5 m/s, break it, wait until it stands, mend it, go on asking, then consent.
+
+    Raises RuntimeError if the emulated base does not drive before the fault: that is a fault of the program.
+    """
+    bench = Bench(kind)
+    with bench.emulator, bench.chassis:
+        if not bench.arm():
+            raise RuntimeError(f"{kind} did not arm")
+        bench.run(4.0, _SPEED_MPS)
+        if bench.emulator.plant.twist[0] < 0.9 * _SPEED_MPS:
+            raise RuntimeError(f"{kind} did not drive")
+        began_ns, began_m = bench.now_ns, bench.way_m
+        fault.begin(bench)
+        while not bench.stands and bench.now_ns - began_ns < _GIVE_UP_S * NS_PER_S:
+            fault.live(bench)
+        stood_s = (bench.now_ns - began_ns) / NS_PER_S if bench.stands else math.nan
+        way_m = bench.way_m - began_m
+        fault.live(bench)
+        fault.end(bench)
+        stood_m = bench.way_m
+        # A stop that was asked for is no fault: there nothing goes on asking.
+        bench.run(_AFTERWARDS_S, 0.0 if fault is FAULTS[0] else _SPEED_MPS)
+        state = bench.state
+        assert state is not None
+        moved_m = bench.way_m - stood_m
+        again = bench.arm()
+        bench.run(2.0, _SPEED_MPS)
+        again = again and bench.emulator.plant.twist[0] > 0.2
+    return TrialResult(kind, fault.name, state.mode, state.reason, stood_s, way_m, moved_m, again)

@@ -1,0 +1,63 @@
+"""The table of faults: what each must lead to, and how it gets into the page."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from controller.errors import UserError
+from controller.faults.command import describe, write_section
+from controller.faults.kills import KillResult
+from controller.faults.trials import FAULTS, KINDS, Fault, TrialResult, run_trial
+from hal.types import ChassisMode
+
+# The bases' own time-outs, and what 0.5 m/s needs to go at 2 m/s2 with a lag of 0.08 s, to 1 mm/s.
+OWN_TIMEOUT_S = {"agilex": 0.5, "roboclaw": 0.3, "roboteq": 0.3, "kobuki": 0.6}
+STOPPING_S = 0.7
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_every_fault_of_every_chassis_ends_in_a_base_that_stands_until_consent(
+    kind: str, fault: Fault
+) -> None:
+    result = run_trial(kind, fault)
+    assert result.moved_after_m < 1e-3
+    assert result.again
+    if fault.name == "stop is asked for":
+        assert (result.mode, result.reason) == (ChassisMode.ARMED, "armed")
+        assert result.stood_after_s > 1.5, "jerk-limited"
+    else:
+        assert result.mode in (ChassisMode.ESTOP, ChassisMode.LOST)
+        assert result.stood_after_s < OWN_TIMEOUT_S[kind] + STOPPING_S + 0.1
+
+
+TRIAL = TrialResult(
+    "kobuki", "e-stop", ChassisMode.ESTOP, "bumper; gone now, arm again to go on", 0.6, 0.08, 0.0, True
+)
+
+
+def test_the_tables() -> None:
+    lost = TrialResult("agilex", "unplugged", ChassisMode.LOST, "unplugged", math.nan, 1.0, 0.5, False)
+    text = describe([TRIAL, lost], [KillResult("kill -9 of control", 1.04, None, None)], "agilex")
+    assert "Made by `treadwatch faults --processes agilex`." in text
+    assert "| kobuki | e-stop | e-stop | bumper | 0.60 s | 0.08 m | 0.000 m | yes |" in text
+    assert "| agilex | unplugged | lost | unplugged | never | 1.00 m | 0.500 m | **no** |" in text
+    assert "| kill -9 of control | 1.0 s | nothing: it was killed | - |" in text
+    assert "In real time" not in describe([TRIAL], [], None)
+
+
+def test_the_section_takes_the_place_of_the_old_one_and_of_nothing_else(tmp_path: Path) -> None:
+    page = tmp_path / "results.md"
+    write_section(page, "## Faults\n\nfirst\n")
+    assert page.read_text() == "# Measured results\n\n## Faults\n\nfirst\n"
+    page.write_text("# Mine\n\n## Speed\n\n1\n\n## Faults\n\nold\n### part\n\n## Detection\n\n2\n")
+    write_section(page, "## Faults\n\nnew\n")
+    expected = "# Mine\n\n## Speed\n\n1\n\n## Faults\n\nnew\n\n## Detection\n\n2\n"
+    assert page.read_text() == expected
+    write_section(page, "## Faults\n\nnew\n")
+    assert page.read_text() == expected
+    with pytest.raises(UserError, match="cannot be written"):
+        write_section(tmp_path, "## Faults\n")
