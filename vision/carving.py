@@ -19,7 +19,7 @@ from vision.detector import Detection
 from vision.regions import IntGrid
 from vision.tracks import Tracks
 
-_SUSPECT_EVIDENCE = 0.3
+SUSPECT_EVIDENCE = 0.3
 _COMPACT_M = 1.6
 _MIN_CELLS = 12
 _AROUND_M = 0.2
@@ -62,7 +62,7 @@ def carve(
         detection.pose.apply(suspects.position_m),
         0.2,
         config.motion.max_speed_mps,
-        _SUSPECT_EVIDENCE,
+        SUSPECT_EVIDENCE,
         detection.captured_ns,
     )
     return np.where(own > 0, own + first, labels).astype(np.int32)

@@ -23,7 +23,7 @@ from vision.ego_motion import (
     steady_prior,
     with_gyro,
 )
-from vision.evidence import average_depth, averaged_sigma_m, gather
+from vision.evidence import average_depth, averaged_sigma_m, gather, observed_variance_scale
 from vision.fragments import AnchorEnds, FragmentStore
 from vision.health import Continuity, HealthMonitor, worsened
 from vision.lens import project, rays
@@ -79,6 +79,7 @@ class Detector:
         self._odometry: Pose | None = None
         self._motion = _IDENTITY
         self._motion_dt_s = 0.0
+        self._variance_scale = 1.0
 
     def step(self, frame: RgbdFrame, odometry: Pose | None, previous: Fragments | None = None) -> Detection:
         """One frame. odometry: the camera by dead reckoning at captured_ns, None where not known.
@@ -139,7 +140,11 @@ class Detector:
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
         anchor = store.anchors(frame.captured_ns, config.motion.window_s)
         result = self._camera(anchor, moving, prior, camera)
-        motion = gather(store, anchor, result, camera, config.depth_noise)
+        motion = gather(store, anchor, result, camera, config.depth_noise, self._variance_scale)
+        if result.visual:
+            self._variance_scale = observed_variance_scale(
+                motion, store.age_frames, moving, self._variance_scale
+            )
         average_depth(store, result.pose, camera, config.depth_noise)
         step = self._pose.inverse() @ result.pose
         ego = _ego(step, dt_s, result, prior)

@@ -13,6 +13,12 @@ from vision.fragments import AnchorEnds, FragmentStore
 from vision.lens import rays
 from vision.velocities import PointMotion, chi2_2d, static_miss
 
+_SETTLED_FRAMES = 3
+_LEAST_ENDS = 16
+_CHI2_THIRD = 0.811  # a third of static ends, 2 degrees of freedom, lies below
+_SCALE_GAIN = 0.15
+_LEAST_SCALE = 0.3
+_MOST_SCALE = 8.0
 _STEPS_SHARE = 0.5  # flow errors of successive frames cancel in part
 _MOST_LOOKS = 6.0
 _COMMON_NOISE = 0.5
@@ -27,8 +33,12 @@ def gather(
     now: CameraEstimate,
     camera: Intrinsics,
     noise: DepthNoise,
+    variance_scale: float,
 ) -> PointMotion:
-    """The evidence of the 2N ends in store, from their anchors and the camera's pose now."""
+    """The evidence of the 2N ends in store, from their anchors and the camera's pose now.
+
+    variance_scale: how much larger the variance of static ends has been found than it was assumed.
+    """
     rotation, translation = store.poses(np.repeat(anchor.slot, 2))
     ray_before = rays(anchor.pixels.reshape(-1, 2), camera)
     direction = (rotation @ ray_before[:, :, None])[:, :, 0] @ now.pose.rotation
@@ -44,11 +54,12 @@ def gather(
     mixed = far_m - near_m > 0.1 + _MIXED_SIGMAS * depth_sigma_m(near_m, noise)
     pixel_cov = _pixel_covariance(store, anchor, mixed)
     metres = static[:, 2:3] / np.array([camera.fx, np.sqrt(camera.fx * camera.fy), camera.fy])
-    covariance = pixel_cov * metres**2
+    covariance = variance_scale * pixel_cov * metres**2
     covariance[:, [0, 2]] += _pose_variance(now.covariance, static[:, 2])[:, None]
     miss = static_miss(static, ray)
     effect_per_m = ray * direction[:, 2:3] - direction[:, :2]
-    effect = effect_per_m * sigma[:, None]
+    depth_scale = np.sqrt(variance_scale)
+    effect = effect_per_m * (depth_scale * sigma[:, None])
     static_far = direction * far_m[:, None] + origin
     scale = np.square(static_far[:, 2] / np.where(in_front, static[:, 2], 1.0))[:, None]
     chi2 = np.minimum(
@@ -56,7 +67,7 @@ def gather(
         chi2_2d(
             static_miss(static_far, ray),
             covariance * scale,
-            effect_per_m * depth_sigma_m(far_m, noise)[:, None],
+            effect_per_m * (depth_scale * depth_sigma_m(far_m, noise)[:, None]),
         ),
     )
     depth_now = store.near_m.ravel().astype(float)
@@ -73,6 +84,22 @@ def gather(
         static_chi2=chi2,
         usable=known & in_front & np.isfinite(miss).all(axis=1),
     )
+
+
+def observed_variance_scale(
+    motion: PointMotion, age_frames: NDArray[np.intp], moving: NDArray[np.bool_], before: float
+) -> float:
+    """The scale for the next frame, after one in which before was used: what static ends really scatter.
+
+    Blur, a rolling shutter, depth beside its colour: no table knows them, the background shows them. The
+    lower third of the ends decides, so that movers not yet known as such have no say.
+    """
+    settled = motion.usable & np.repeat((age_frames >= _SETTLED_FRAMES) & ~moving, 2)
+    if np.count_nonzero(settled) < _LEAST_ENDS:
+        return before
+    third = float(np.quantile(motion.static_chi2[settled], 1.0 / 3.0))
+    seen = before * third / _CHI2_THIRD
+    return float(np.clip(before + _SCALE_GAIN * (seen - before), _LEAST_SCALE, _MOST_SCALE))
 
 
 def averaged_sigma_m(depth_m: FloatArray, looks: NDArray[np.float32], noise: DepthNoise) -> FloatArray:

@@ -18,12 +18,16 @@ from hal.types import FloatArray
 
 _RISE_S = 0.10
 _FALL_S = 0.30
+_HOLD_S = 2.0  # without new proof
+_STOP_S = 0.12  # with proof of standing still
 _MAX_EVIDENCE = 1.5
 _ENDS_ACROSS = 4
 _ENDS_ALONG = 8
 _MIN_AGREEMENT = 0.25
 _CONTRADICTION_SIGMAS = 2.5
 _CONFIRMING_SIGMAS = 2.5
+_OWN_PROOF = 3.0
+_SHARED_PROOF = 0.55  # of the threshold, where fragments and surface say the same
 _SPEED_PER_METRE = 0.02
 _FLOOR_SIGMA_MPS = 0.03
 _ARRIVED_CELLS = 8
@@ -88,7 +92,8 @@ def judge(
     by_fragments_across = (across > threshold) & (own_across > 0.5 * threshold) & (agreeing >= _ENDS_ACROSS)
     confirmed, contradicted = _second_opinion(seen)
     many = (own_along > 0.5 * threshold) & (agreeing >= _ENDS_ALONG) & ~contradicted
-    by_fragments_along = (along > threshold) & (many | confirmed)
+    shared = confirmed & (own_along > _OWN_PROOF) & (agreeing >= 2)
+    by_fragments_along = ((along > threshold) & many) | ((along > _SHARED_PROOF * threshold) & shared)
     has_arrived = (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells)
     by_arrival = has_arrived & (significance > 0.5 * threshold)
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
@@ -96,7 +101,11 @@ def judge(
     evident = by_fragments_across | by_fragments_along | by_arrival
     rising = possible & ((evident & (speed > least)) | much) & seen.trusted
     holding = moving & (speed > 0.6 * least) & ((significance > 4.0) | has_arrived)
-    change = np.where(rising, dt_s / _RISE_S, np.where(holding, 0.0, -dt_s / _FALL_S))
+    own_speed = np.sqrt(np.square(seen.own_velocity).sum(axis=1))
+    own_sigma = np.sqrt(np.trace(seen.own_covariance, axis1=1, axis2=2))
+    stands = (own_speed < 0.6 * least) & (own_sigma < 0.5 * least) & (agreeing >= _ENDS_ACROSS)
+    falling = np.where(stands, dt_s / _STOP_S, np.where(holding, dt_s / _HOLD_S, dt_s / _FALL_S))
+    change = np.where(rising & ~stands, dt_s / _RISE_S, -falling)
     new_evidence = np.clip(evidence + change, 0.0, _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
     confidence = 1.0 - np.exp(-significance / 60.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hal.types import FloatArray
 
@@ -29,23 +28,29 @@ def update(
     measured: FloatArray,
     noise: FloatArray,
     first: int,
-    coupled: NDArray[np.bool_] | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """After measuring three entries from index first (0: position, 3: velocity): (T, 3) with (T, 3, 3).
-
-    coupled (T,): whether the other three may learn from it; a centre that moves because the image's
-    border cuts the surface elsewhere says nothing about the velocity. Default: all.
-    """
+    """After measuring three entries from index first (0: position, 3: velocity): (T, 3) with (T, 3, 3)."""
     part = slice(first, first + 3)
     innovation = measured - state[:, part]
     gain = covariance[:, :, part] @ np.linalg.inv(covariance[:, part, part] + noise)
-    if coupled is not None:
-        other = slice(3 - first, 6 - first)
-        gain[:, other] *= coupled[:, None, None]
     new_state = state + (gain @ innovation[:, :, None])[:, :, 0]
     keep = np.eye(6) - _pad(gain, first)
     # Joseph's form: stays symmetric and positive whatever the rounding.
     new_covariance = keep @ covariance @ keep.transpose(0, 2, 1) + gain @ noise @ gain.transpose(0, 2, 1)
+    return new_state, new_covariance
+
+
+def place(
+    state: FloatArray, covariance: FloatArray, position: FloatArray, noise: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Put the states (T, 6) at position (T, 3), known to noise (T, 3, 3), and learn nothing of the velocity.
+
+    For a centre that jumps because the surface was cut elsewhere, by the image's border or by a neighbour.
+    """
+    new_state, new_covariance = state.copy(), covariance.copy()
+    new_state[:, :3] = position
+    new_covariance[:, :3, :3] = noise
+    new_covariance[:, :3, 3:] = new_covariance[:, 3:, :3] = 0.0
     return new_state, new_covariance
 
 

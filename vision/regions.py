@@ -16,6 +16,8 @@ IntGrid = NDArray[np.int32]
 _LEAST_JUMP = 0.006  # 1/m
 _MOST_JUMP = 0.03
 _SPECKLE_CELLS = 6
+_NOISE_INVERSE = 0.003  # 1/m: what noise alone spreads the inverse depth of cells
+_UNIFORM = 3.46  # a uniform spread is this many standard deviations long
 _OCCLUDED_SHARE = 0.15
 
 
@@ -110,7 +112,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
         (
             (grid.x[right] - grid.x[left]) * depth,
             (grid.y[bottom] - grid.y[top]) * depth,
-            2.0 * spread * depth * depth,
+            _UNIFORM * spread * depth * depth,
         ),
         axis=1,
     )

@@ -24,11 +24,13 @@ _ACCEL_DENSITY = 0.3  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
-_SUSPECT = 0.3  # evidence that a carved body starts with
 _CENTRE_SIGMA_M = 0.03
 _CENTRE_SHARE = 0.05
 _CENTRE_DEPTH_SHARE = 0.15
 _CENTRE_NOISE = 0.2
+_SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
+_AREA_GAIN = 0.2
+_JUMP_M = 0.3
 _SMALL_SHARE = 0.3
 _ATTACH_M = 0.25
 
@@ -141,7 +143,7 @@ class Tracker:
         for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
             second = grouping.split(grid, labels, track)
             if second is not None:
-                tracks.twin(track, detection.captured_ns)
+                tracks.twin(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
                 labels = labels.copy()
                 labels.ravel()[second] = len(tracks)
         return labels
@@ -190,13 +192,14 @@ class Tracker:
         noise[:, 0, 0] = noise[:, 1, 1] = np.square(across)
         noise[:, 2, 2] = np.square(depth_part) + np.square(_CENTRE_NOISE * sigma)
         noise = rotation @ noise @ rotation.T
-        whole = measured.whole[seen]
-        tracks.state[seen], tracks.covariance[seen] = kalman.update(
-            tracks.state[seen], tracks.covariance[seen], position, noise, 0, coupled=whole
-        )
-        tracks.surface_state[seen], tracks.surface_covariance[seen] = kalman.update(
-            tracks.surface_state[seen], tracks.surface_covariance[seen], position, noise, 0, coupled=whole
-        )
+        area_m2 = measured.cells[seen] * np.square(depth)
+        same = np.abs(area_m2 - tracks.area_m2[seen]) <= _SAME_AREA * tracks.area_m2[seen]
+        jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
+        smooth = measured.whole[seen] & same & (jump <= _JUMP_M + 2.0 * sigma)
+        tracks.locate(seen[smooth], position[smooth], noise[smooth])
+        tracks.relocate(seen[~smooth], position[~smooth], noise[~smooth])
+        tracks.area_m2[seen] += _AREA_GAIN * (area_m2 - tracks.area_m2[seen])
+        tracks.area_m2[seen[tracks.sightings[seen] == 0]] = area_m2[tracks.sightings[seen] == 0]
         tracks.seen_ns[seen] = detection.captured_ns
         tracks.sightings[seen] += 1
         tracks.bbox_px[seen] = measured.bbox_px[seen]

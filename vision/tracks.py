@@ -22,6 +22,7 @@ _FIELDS = (
     "confidence",
     "bbox_px",
     "extent_m",
+    "area_m2",
     "cells",
     "fragments",
 )
@@ -30,7 +31,8 @@ _FIELDS = (
 class Tracks:
     """state (T, 6): position and velocity; covariance (T, 6, 6); surface_state and surface_covariance: the
     same from the centres of the visible surface alone, without the fragments, as a second opinion; evidence (T,) of motion; moving (T,);
-    confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); cells (T,) of the grid covered when last seen."""
+    confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); area_m2 (T,): averaged, up to a common factor;
+    cells (T,) of the grid covered when last seen."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -46,6 +48,7 @@ class Tracks:
         self.confidence = np.empty(0)
         self.bbox_px = np.empty((0, 4))
         self.extent_m = np.empty((0, 3))
+        self.area_m2 = np.empty(0)
         self.cells = np.empty(0, np.intp)
         self.fragments = np.empty(0, np.intp)
         self._next_id = 1
@@ -91,6 +94,7 @@ class Tracks:
             "confidence": np.zeros(count),
             "bbox_px": np.zeros((count, 4)),
             "extent_m": np.zeros((count, 3)),
+            "area_m2": np.zeros(count),
             "cells": np.zeros(count),
             "fragments": np.zeros(count),
         }
@@ -99,16 +103,11 @@ class Tracks:
             old = getattr(self, name)
             setattr(self, name, np.concatenate((old, np.asarray(new[name], old.dtype))))
 
-    def twin(self, track: int, now_ns: int) -> None:
-        """Begin a track that moves as another one does: its companion, so far taken for a part of it."""
-        moving, evidence = self.moving[track], float(self.evidence[track])
-        state, covariance = self.state[track], self.covariance[track]
-        sightings = self.sightings[track]
-        self.start(state[None, :3], 0.3, 1.0, evidence, now_ns)
-        self.state[-1, 3:] = state[3:]
-        self.covariance[-1, 3:, 3:] = covariance[3:, 3:]
-        self.moving[-1] = moving
-        self.sightings[-1] = sightings
+    def twin(self, track: int, evidence: float, now_ns: int) -> None:
+        """Begin a track with the velocity of another one that it was taken for a part of. It has to prove
+        its motion itself: it may be what the mover passes by."""
+        self.start(self.state[track : track + 1, :3], 0.3, 1.0, evidence, now_ns)
+        self.state[-1, 3:] = self.state[track, 3:]
 
     def predict(self, dt_s: float, accel_density: float) -> None:
         """Move every track on."""
@@ -117,3 +116,25 @@ class Tracks:
             self.surface_state, self.surface_covariance = kalman.predict(
                 self.surface_state, self.surface_covariance, dt_s, accel_density
             )
+
+    def locate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
+        """The centres of tracks index (K,) were seen at position_m (K, 3) with covariance noise (K, 3, 3)."""
+        if len(index) == 0:
+            return
+        self.state[index], self.covariance[index] = kalman.update(
+            self.state[index], self.covariance[index], position_m, noise, 0
+        )
+        self.surface_state[index], self.surface_covariance[index] = kalman.update(
+            self.surface_state[index], self.surface_covariance[index], position_m, noise, 0
+        )
+
+    def relocate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
+        """As locate, where the centre says nothing of the velocity."""
+        if len(index) == 0:
+            return
+        self.state[index], self.covariance[index] = kalman.place(
+            self.state[index], self.covariance[index], position_m, noise
+        )
+        self.surface_state[index], self.surface_covariance[index] = kalman.place(
+            self.surface_state[index], self.surface_covariance[index], position_m, noise
+        )
