@@ -72,9 +72,7 @@ class NoisyCamera:
         self._body = stage.robot.body
         self._random = np.random.default_rng((seed, 0xCA))
         self._glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
-        self._to_optical = camera_in_body(
-            CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
-        ).rotation.T
+        self._to_optical = camera_in_body(mount_of(stage.robot)).rotation.T
         n = len(stage.world)
         self._ids = np.zeros(n, np.int64)
         self._next_id = 1
@@ -194,7 +192,7 @@ class NoisyCamera:
                     0.0,
                 ]
             )
-            spread = np.diag([radial + young_mps, side + young_mps, 0.1 + young_mps]) ** 2
+            variance = np.array([radial + young_mps, side + young_mps, 0.1 + young_mps]) ** 2
             moving = bool(self._moving[body])
             found.append(
                 Obstacle(
@@ -203,7 +201,7 @@ class NoisyCamera:
                     position_m=self._to_optical @ in_camera,
                     extent_m=np.array([self._extent[body, 0], high_m - low_m, self._extent[body, 1]]),
                     velocity_mps=self._to_optical @ velocity,
-                    velocity_cov=self._to_optical @ spread @ self._to_optical.T,
+                    velocity_cov=(self._to_optical * variance) @ self._to_optical.T,
                     moving=moving,
                     score=0.9 if moving else 0.5,
                     fragments=8,

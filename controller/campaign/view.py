@@ -45,40 +45,49 @@ class PlanarEye:
         self._down_tan, self._up_tan = math.tan(down), math.tan(up)
         z_m = world.z_m
         self._hides = (z_m[:, 0] < mount.height_m) & (z_m[:, 1] > mount.height_m)
-        self._room = world.room_polygon()[None]
+        corners = world.look(0.0)[0].shape[1]
+        room = world.room_polygon()
+        self._room = np.concatenate((room, np.repeat(room[-1:], max(corners - 4, 0), axis=0)))[None]
+        self._next = np.roll(np.arange(max(corners, 4)), -1)
+        self._bearing = self.bearing_tan[:, None, None]
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> View:
         """polygons (N, K, 2) of all bodies now; pose of the robot."""
-        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        forward, right = self._in_camera(polygons, pose, cos, sin)
+        forward, right = self._in_camera(np.concatenate((polygons, self._room)), pose)
         reach = self._edge_tan * forward
         near = (forward.max(axis=1) > _NEAR_M) & (forward.min(axis=1) < self.range_m)
         inside = ((right - reach).min(axis=1) < 0.0) & ((right + reach).max(axis=1) > 0.0)
-        bodies = np.flatnonzero(near & inside)
-        hits = self._hits(forward[bodies], right[bodies])
+        near &= inside
+        near[-1] = True  # the building, which is not a body
+        chosen = np.flatnonzero(near)
+        hits = self._hits(forward[chosen], right[chosen])
+        bodies, room, hits = chosen[:-1], hits[:, -1], hits[:, :-1]
         hits = self._with_thin_ones(hits, forward[bodies], right[bodies])
-        room = self._hits(*self._in_camera(self._room, pose, cos, sin))[:, 0]
         hiding = np.where(self._hides[bodies], hits, np.inf)
         free = np.minimum(hiding.min(axis=1, initial=np.inf), room)
         covered = hits > free[:, None] + _TOUCHING_M
         return View(bodies, np.where(covered | ~self._in_frame(bodies, hits), np.inf, hits), free)
 
-    def _in_camera(
-        self, polygons: FloatArray, pose: PlanarPose, cos: float, sin: float
-    ) -> tuple[FloatArray, FloatArray]:
+    def _in_camera(self, polygons: FloatArray, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
         """Forward and right (N, K) of the camera, on the level."""
+        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         dx, dy = polygons[..., 0] - pose.x_m, polygons[..., 1] - pose.y_m
         return dx * cos + dy * sin - self._mount.forward_m, self._mount.left_m + dx * sin - dy * cos
 
     def _hits(self, forward: FloatArray, right: FloatArray) -> FloatArray:
         """(B, M) forward distance at which each ray first meets an edge of each polygon (M, K)."""
-        off = right - self.bearing_tan[:, None, None] * forward
-        after, ahead = np.roll(off, -1, axis=2), np.roll(forward, -1, axis=1)
-        drop = off - after
-        crosses = off * after <= 0.0
-        share = off / np.where(np.abs(drop) < 1e-12, np.inf, drop)
-        z = forward + share * (ahead - forward)
-        nearest: FloatArray = np.where(crosses & (z > _NEAR_M), z, np.inf).min(axis=2)
+        off = right - self._bearing * forward
+        after, ahead = off[..., self._next], forward[..., self._next]
+        # Of all the pairs of a ray and an edge only a few meet: the rest is never divided.
+        band, body, corner = np.nonzero(off * after <= 0.0)
+        here, there = off[band, body, corner], after[band, body, corner]
+        drop = here - there
+        share = here / np.where(np.abs(drop) < 1e-12, np.inf, drop)
+        start = forward[body, corner]
+        z = start + share * (ahead[body, corner] - start)
+        nearest = np.full(off.shape[:2], np.inf)
+        met = z > _NEAR_M
+        np.minimum.at(nearest, (band[met], body[met]), z[met])
         return nearest
 
     def _with_thin_ones(self, hits: FloatArray, forward: FloatArray, right: FloatArray) -> FloatArray:
