@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: run test check bench hil faults clean
+.PHONY: run test check bench hil faults campaign-quick clean
 
 run: $(VENV)/ready
 	$(BIN)/treadwatch run
@@ -26,6 +26,10 @@ hil: $(VENV)/ready-dev
 
 faults: $(VENV)/ready
 	$(BIN)/treadwatch faults --processes agilex --into docs/results.md
+
+campaign-quick: $(VENV)/ready
+	rm -rf out/campaign-quick
+	$(BIN)/treadwatch campaign --missions 78 --seed 1 --report out/campaign-quick
 
 $(VENV)/ready: requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "treadwatch needs Python 3.11 or newer")'

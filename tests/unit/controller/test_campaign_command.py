@@ -37,22 +37,23 @@ def rows(folder: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in (folder / MISSIONS).read_text().splitlines()]
 
 
-SMALL = ("--families", "plain_wall,feedback_lost", "--policies", "field,zones", "--workers", "1", "--quiet")
+SMALL = ("--families", "plain_wall,feedback_lost", "--policies", "field,paper", "--workers", "1", "--quiet")
 
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("campaign") / "small"
-    campaign("--missions", "4", "--seed", "3", "--report", folder, *SMALL)
+    campaign("--missions", "2", "--seed", "3", "--report", folder, *SMALL)
     return folder
 
 
 def test_a_row_for_each_mission_and_policy_with_every_key(small: Path) -> None:
     found = rows(small)
-    assert len(found) == 8
+    assert len(found) == 4
     assert all(set(row) >= KEYS for row in found)
     assert {(row["family"], row["seed"]) for row in found} == {
-        (family, seed) for family in ("plain_wall", "feedback_lost") for seed in (3, 4)
+        ("plain_wall", 3),
+        ("feedback_lost", 3),
     }
 
 
@@ -60,10 +61,10 @@ def test_the_report_has_its_files(small: Path) -> None:
     names = {path.name for path in small.iterdir()}
     assert names == {MISSIONS, "summary.json", "report.md", "ratio.png", "families.png", "clearance.png"}
     summary = json.loads((small / "summary.json").read_text())
-    assert summary["policies"]["field"]["missions"] == 4
-    assert summary["missions"] == 4
+    assert summary["policies"]["field"]["missions"] == 2
+    assert summary["missions"] == 2
     text = (small / "report.md").read_text()
-    assert "--missions 4 --mode noise --seed 3" in text
+    assert "--missions 2 --mode noise --seed 3" in text
     assert "### plain_wall" in text
 
 
@@ -71,13 +72,13 @@ def test_a_campaign_broken_off_is_resumed_without_losing_a_row(small: Path, tmp_
     whole = (small / MISSIONS).read_text()
     lines = whole.splitlines(keepends=True)
     # The last line was cut by the power going out.
-    (tmp_path / MISSIONS).write_text("".join(lines[:5]) + lines[5][:40])
+    (tmp_path / MISSIONS).write_text("".join(lines[:2]) + lines[2][:40])
     with pytest.raises(UserError, match="--resume"):
-        campaign("--missions", "4", "--seed", "3", "--report", tmp_path, *SMALL)
+        campaign("--missions", "2", "--seed", "3", "--report", tmp_path, *SMALL)
     marked = json.loads(lines[0]) | {"flaps": 77}
     content = (tmp_path / MISSIONS).read_text().replace(lines[0], json.dumps(marked) + "\n")
     (tmp_path / MISSIONS).write_text(content)
-    campaign("--missions", "4", "--seed", "3", "--report", tmp_path, "--resume", *SMALL)
+    campaign("--missions", "2", "--seed", "3", "--report", tmp_path, "--resume", *SMALL)
     again = rows(tmp_path)
     assert again[0]["flaps"] == 77
     assert [json.dumps(row) for row in again[1:]] == [line.strip() for line in lines[1:]]
@@ -85,8 +86,8 @@ def test_a_campaign_broken_off_is_resumed_without_losing_a_row(small: Path, tmp_
 
 def test_two_workers_find_what_one_finds(small: Path) -> None:
     tasks = [
-        Task(one.family, one.seed, ("field", "zones"), "noise", CONFIG)
-        for one in missions(4, ("plain_wall", "feedback_lost"), 3)
+        Task(one.family, one.seed, ("field", "paper"), "noise", CONFIG)
+        for one in missions(2, ("plain_wall", "feedback_lost"), 3)
     ]
     found = {(row.family, row.seed, row.policy): row.as_dict() for done in run_here(tasks, 2) for row in done}
     expected = {(row["family"], row["seed"], row["policy"]): row for row in rows(small)}
@@ -94,7 +95,7 @@ def test_two_workers_find_what_one_finds(small: Path) -> None:
 
 
 def test_ours_drives_a_mission_the_same_way_twice() -> None:
-    task = Task("crossing_right", 2, ("ours",), "noise", CONFIG)
+    task = Task("camera_frozen", 1, ("ours",), "noise", CONFIG)
     first, again = run_task(task), run_task(task)
     assert first == again
     assert first[0].reached
@@ -109,8 +110,8 @@ def test_missions_take_turns_over_the_families() -> None:
 
 def test_every_mission_is_run_once_however_many_there_are() -> None:
     """More than wait in front of the workers at a time."""
-    tasks = [Task("plain_wall", seed, (), "noise", CONFIG) for seed in range(30)]
-    assert len(list(run_here(tasks, 2))) == 30
+    tasks = [Task("plain_wall", seed, (), "noise", CONFIG) for seed in range(12)]
+    assert len(list(run_here(tasks, 2))) == 12
 
 
 def test_one_mission_alone_says_how_it_went() -> None:
@@ -153,8 +154,8 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
 def made_row(seed: int, **changes: Any) -> Row:
     made = Row(
         "crossing_left", seed, "ours", "noise", reached=True, expected=True, contacts=0, contacts_at_fault=0,
-        touched=(), time_s=11.0, oracle_time_s=10.0, min_clearance_m=0.5, max_jerk_mps3=0.6, max_accel_mps2=0.3,
-        reversals=0, limit_violations=0, false_stops=0, flaps=0,
+        touched=(), time_s=11.0, oracle_time_s=10.0, min_clearance_m=0.5, max_jerk_mps3=0.6,
+        max_accel_mps2=0.3, reversals=0, limit_violations=0, false_stops=0, flaps=0,
     )  # fmt: skip
     return replace(made, **changes)
 
@@ -211,5 +212,5 @@ def test_a_local_cluster_finds_what_this_machine_finds(small: Path, tmp_path: Pa
 
     with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
         address = cluster.scheduler_address
-        campaign("--missions", "4", "--seed", "3", "--report", tmp_path, "--scheduler", address, *SMALL)
+        campaign("--missions", "2", "--seed", "3", "--report", tmp_path, "--scheduler", address, *SMALL)
     assert rows(tmp_path) == rows(small)
