@@ -1,0 +1,200 @@
+"""Free space as the decision reads it, from single painted frames of plain things."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from config.perception import PerceptionConfig
+from hal.geometry import camera_in_floor
+from hal.types import CameraMount, PlanarPose, RgbdFrame
+from tests.support.painted import MOUNT, VGA, Quad, box, drive, floor, paint, plain, record, vector, wall
+from vision.perception import Perception
+from vision.scene import FreeSpace, Scene
+
+HERE = PlanarPose(0.0, 0.0, 0.0)
+CENTRE = slice(220, 420)  # image columns that are tampered with
+ROBOT_HEIGHT_M = 0.8
+
+
+def bare(quads: Sequence[Quad]) -> list[Quad]:
+    return [replace(one, texture=plain()) for one in quads]
+
+
+def frame_of(quads: Sequence[Quad], mount: CameraMount = MOUNT, noise: float = 0.0) -> RgbdFrame:
+    return paint(bare(quads), camera_in_floor(HERE, mount), VGA, depth_sigma_per_m=noise)
+
+
+def eyes_on(mount: CameraMount) -> Perception:
+    return Perception(PerceptionConfig(), mount, ROBOT_HEIGHT_M, clearance_m=0.05)
+
+
+def space_of(frame: RgbdFrame, mount: CameraMount = MOUNT) -> FreeSpace:
+    return eyes_on(mount).perceive(frame, None, None).scene.free_space
+
+
+def scene_after_a_while(quads: Sequence[Quad]) -> Scene:
+    """The fourth frame: from the third on obstacles are listed."""
+    eyes = eyes_on(MOUNT)
+    for frame in record(quads, drive(), 4).frames:
+        scene = eyes.perceive(frame, None, None).scene
+    return scene
+
+
+def with_depth(frame: RgbdFrame, depth: NDArray[np.uint16]) -> RgbdFrame:
+    return replace(frame, depth=depth)
+
+
+def inside(space: FreeSpace, columns: slice = CENTRE) -> NDArray[np.bool_]:
+    """Bands that lie within the tampered columns as a whole."""
+    left, right = ((c - VGA.cx) / VGA.fx for c in (columns.start, columns.stop))
+    half = space.half_width_tan
+    result: NDArray[np.bool_] = (space.bearing_tan - half >= left) & (space.bearing_tan + half <= right)
+    return result
+
+
+def outside(space: FreeSpace, columns: slice = CENTRE) -> NDArray[np.bool_]:
+    left, right = ((c - VGA.cx) / VGA.fx for c in (columns.start, columns.stop))
+    half = space.half_width_tan
+    result: NDArray[np.bool_] = (space.bearing_tan + half <= left) | (space.bearing_tan - half >= right)
+    return result
+
+
+def test_bands_lie_side_by_side_across_the_view() -> None:
+    space = space_of(frame_of(floor()))
+    np.testing.assert_allclose(np.diff(space.bearing_tan), 2.0 * space.half_width_tan, rtol=1e-4)
+    assert space.bearing_tan[0] - space.half_width_tan == pytest.approx(-319.5 / 610.0, abs=0.01)
+    assert space.bearing_tan[-1] + space.half_width_tan == pytest.approx(319.5 / 610.0, abs=0.01)
+
+
+@pytest.mark.parametrize("distance_m", [1.0, 2.5, 4.0, 8.0])
+def test_a_plain_wall_is_seen_at_its_distance(distance_m: float) -> None:
+    space = space_of(frame_of(floor() + wall(distance_m)))
+    np.testing.assert_allclose(space.nearest_m, distance_m, rtol=0.02)
+    assert (space.known_m >= space.nearest_m).all()
+
+
+def test_a_wall_behind_real_depth_noise_is_not_much_nearer_nor_farther() -> None:
+    space = space_of(frame_of(floor() + wall(4.0), noise=0.0075))
+    assert space.nearest_m == pytest.approx(4.0, abs=0.4)
+
+
+def test_the_floor_is_free_as_far_as_the_depth_mask() -> None:
+    space = space_of(frame_of(floor()))
+    assert np.isinf(space.nearest_m).all()
+    assert (space.known_m > 9.0).all()
+    assert (space.known_m <= 10.0).all()
+
+
+def test_the_floor_stays_free_with_real_depth_noise() -> None:
+    space = space_of(frame_of(floor(), noise=0.0075))
+    assert np.isinf(space.nearest_m).all()
+    assert (space.known_m > 4.0).all()
+
+
+def test_without_any_depth_nothing_is_known() -> None:
+    frame = frame_of(floor() + wall())
+    space = space_of(with_depth(frame, np.zeros_like(frame.depth)))
+    assert np.isinf(space.nearest_m).all()
+    np.testing.assert_array_equal(space.known_m, 0.0)
+
+
+def test_a_corridor_without_depth_is_unknown_and_its_sides_are_not() -> None:
+    frame = frame_of(floor())
+    depth = frame.depth.copy()
+    depth[:, CENTRE] = 0
+    space = space_of(with_depth(frame, depth))
+    np.testing.assert_array_equal(space.known_m[inside(space)], 0.0)
+    assert (space.known_m[outside(space)] > 9.0).all()
+    assert np.count_nonzero(inside(space)) >= 20
+
+
+def test_known_ends_where_a_glass_front_swallows_the_depth() -> None:
+    frame = frame_of(floor())
+    depth = frame.depth.copy()
+    # The floor 3 m ahead is fy 0.5 / 3 below the horizon; above it nothing comes back.
+    depth[: round(VGA.cy + VGA.fy * 0.5 / 3.0), CENTRE] = 0
+    space = space_of(with_depth(frame, depth))
+    np.testing.assert_allclose(space.known_m[inside(space)], 3.0, atol=0.15)
+    assert (space.known_m[outside(space)] > 9.0).all()
+
+
+def test_known_ends_at_a_hole_in_the_floor_although_the_floor_goes_on_behind() -> None:
+    frame = frame_of(floor())
+    depth = frame.depth.copy()
+    far, near = (round(VGA.cy + VGA.fy * 0.5 / z) for z in (3.0, 2.0))
+    depth[far:near, CENTRE] = 0
+    space = space_of(with_depth(frame, depth))
+    np.testing.assert_allclose(space.known_m[inside(space)], 2.0, atol=0.1)
+
+
+def test_stairs_down_end_what_is_known() -> None:
+    # The floor ends at 3 m; the next one is 1 m lower, so its depth is three times as great.
+    near = replace(floor()[0], side_m=vector(0.0, -12.0, 0.0), down_m=vector(5.0, 0.0, 0.0))
+    lower = replace(floor()[0], corner_m=vector(-2.0, 6.0, -1.0))
+    space = space_of(frame_of([near, lower]))
+    np.testing.assert_allclose(space.known_m, 3.0, atol=0.15)
+
+
+def test_what_hangs_higher_than_the_robot_is_no_obstacle() -> None:
+    beam = box(vector(3.0, 0.0, ROBOT_HEIGHT_M + 0.12), vector(0.3, 3.0, 0.4), 10)
+    scene = scene_after_a_while(floor() + beam)
+    assert np.isinf(scene.free_space.nearest_m).all()
+    assert (scene.free_space.known_m > 9.0).all()
+    assert scene.obstacles == ()
+
+
+def test_what_hangs_within_the_robots_height_is_one() -> None:
+    beam = box(vector(3.0, 0.0, ROBOT_HEIGHT_M - 0.2), vector(0.3, 1.0, 0.6), 10)
+    scene = scene_after_a_while(floor() + beam)
+    ahead = np.abs(scene.free_space.bearing_tan) < 0.12
+    np.testing.assert_allclose(scene.free_space.nearest_m[ahead], 3.0, atol=0.06)
+    assert len(scene.obstacles) == 1
+
+
+@pytest.mark.parametrize("distance_m", [1.5, 3.0])
+def test_an_empty_pallet_of_12_cm_is_seen(distance_m: float) -> None:
+    pallet = box(vector(distance_m, 0.0, 0.0), vector(1.2, 0.8, 0.12), 10)
+    scene = scene_after_a_while(floor() + pallet)
+    ahead = np.abs(scene.free_space.bearing_tan) < 0.3 / distance_m
+    np.testing.assert_allclose(scene.free_space.nearest_m[ahead], distance_m, atol=0.2)
+    beside = np.abs(scene.free_space.bearing_tan) > 0.5 / distance_m
+    assert np.isinf(scene.free_space.nearest_m[beside]).all()
+    assert len(scene.obstacles) == 1
+
+
+def test_a_thin_pole_is_seen() -> None:
+    pole = box(vector(2.0, 0.0, 0.0), vector(0.04, 0.04, 1.2), 10)
+    space = space_of(frame_of(floor() + wall() + pole))
+    assert space.nearest_m.min() == pytest.approx(2.0, abs=0.06)
+
+
+def test_single_noisy_pixels_are_no_obstacle() -> None:
+    frame = frame_of(floor() + wall(6.0))
+    depth = frame.depth.copy()
+    rng = np.random.default_rng(5)
+    rows = rng.integers(20, 460, 300)
+    depth[rows, rng.integers(0, 640, 300)] = 1000
+    space = space_of(with_depth(frame, depth))
+    np.testing.assert_allclose(space.nearest_m, 6.0, rtol=0.02)
+
+
+def test_a_camera_that_looks_down_measures_along_the_floor() -> None:
+    tipped = CameraMount(0.0, 0.0, 1.0, 0.3)
+    space = space_of(frame_of(floor() + wall(3.0), tipped), tipped)
+    np.testing.assert_allclose(space.nearest_m, 3.0, rtol=0.02)
+    assert (space.known_m >= space.nearest_m).all()
+
+
+def test_bearings_of_a_tipped_camera_are_levelled() -> None:
+    tipped = CameraMount(0.0, 0.0, 1.0, 0.2)
+    crate = box(vector(4.0, -1.0, 0.0), vector(0.4, 0.6, 0.6), 10)
+    space = space_of(frame_of(floor() + crate, tipped), tipped)
+    hit = np.isfinite(space.nearest_m)
+    # From y = -0.7 to -1.3 at x = 4, right is positive; the image's rows differ a little in their bearing.
+    assert space.bearing_tan[hit].min() == pytest.approx(0.7 / 4.0, abs=0.03)
+    assert space.bearing_tan[hit].max() == pytest.approx(1.3 / 4.0, abs=0.03)

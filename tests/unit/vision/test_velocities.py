@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hal.types import FloatArray
+from vision.velocities import (
+    PointMotion,
+    chi2_2d,
+    depth_after,
+    lateral_after,
+    normal_equations,
+    solve_velocity,
+    static_miss,
+)
+
+
+def evidence(static_m: FloatArray, ray: FloatArray, lag_s: float) -> PointMotion:
+    """Points whose pixel covariance is the unit matrix (1 m^2) and whose depth is exact."""
+    count = len(static_m)
+    return PointMotion(
+        static_m=static_m,
+        ray=ray,
+        lag_s=np.full(count, lag_s),
+        miss_m=static_miss(static_m, ray),
+        covariance=np.tile([1.0, 0.0, 1.0], (count, 1)),
+        depth_effect=np.zeros((count, 2)),
+        depth_step_m=np.full(count, np.nan),
+        depth_step_sigma_m=np.ones(count),
+        static_chi2=np.zeros(count),
+        usable=np.ones(count, np.bool_),
+    )
+
+
+def test_depth_from_the_length_ratio_equations_6_and_8() -> None:
+    # 0.6 m at 4 m and a focal length of 300 px is 45 px; at 3 m it is 60 px. Going away: 30 px at 6 m.
+    depth = depth_after(np.array([4.0, 4.0]), np.array([45.0, 45.0]), np.array([60.0, 30.0]))
+    np.testing.assert_allclose(depth, [3.0, 6.0])
+
+
+def test_lateral_position_equations_7_and_9() -> None:
+    # 75 px right of the centre at f = 300 px is x = 0.25; in the centre of the image it is 0, not 0/0.
+    np.testing.assert_allclose(lateral_after(np.array([0.25, 0.0]), np.array([4.0, 3.0])), [1.0, 0.0])
+
+
+def test_length_ratio_and_lateral_speed_follow_from_the_point_equations() -> None:
+    """Two ends at one depth: the general equations give the paper's numbers."""
+    static = np.array([[-0.3, 0.0, 4.0], [0.3, 0.0, 4.0]])
+    # One second later, seen 60 px long instead of 45 (f = 300), and 20 px right of the centre.
+    ray = np.array([[-30.0 + 20.0, 0.0], [30.0 + 20.0, 0.0]]) / 300.0
+    equations = normal_equations(evidence(static, ray, 1.0), np.ones(2))
+    information = equations.matrix.sum(axis=0)
+    velocity = np.linalg.solve(information, equations.rhs.sum(axis=0))
+    later_m = float(depth_after(np.array([4.0]), np.array([45.0]), np.array([60.0]))[0])
+    assert velocity[2] == pytest.approx(later_m - 4.0)  # -1 m/s
+    middle = float(lateral_after(np.array([20.0 / 300.0]), np.array([later_m]))[0])
+    assert velocity[0] == pytest.approx(middle)  # 0.2 m/s
+    assert velocity[1] == pytest.approx(0.0)
+
+
+def test_static_miss_by_numbers() -> None:
+    miss = static_miss(np.array([[1.0, 0.5, 4.0], [1.0, 0.5, 4.0]]), np.array([[0.3, 0.1], [0.25, 0.125]]))
+    np.testing.assert_allclose(miss, [[0.2, -0.1], [0.0, 0.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("miss", "covariance", "effect", "expected"),
+    [
+        ((3.0, 4.0), (9.0, 0.0, 16.0), (0.0, 0.0), 2.0),
+        # The inverse of [[2, 1], [1, 2]] is [[2, -1], [-1, 2]] / 3.
+        ((1.0, 0.0), (2.0, 1.0, 2.0), (0.0, 0.0), 2.0 / 3.0),
+        # Depth's effect (1, 0) doubles the variance along x.
+        ((2.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0), 3.0),
+        # Effect (1, 1) on the unit matrix makes [[2, 1], [1, 2]] again.
+        ((1.0, 0.0), (1.0, 0.0, 1.0), (1.0, 1.0), 2.0 / 3.0),
+    ],
+)
+def test_chi2_by_numbers(
+    miss: tuple[float, float],
+    covariance: tuple[float, float, float],
+    effect: tuple[float, float],
+    expected: float,
+) -> None:
+    result = chi2_2d(np.array([miss]), np.array([covariance]), np.array([effect]))
+    np.testing.assert_allclose(result, [expected])
+
+
+def test_normal_equations_of_one_point_by_hand() -> None:
+    motion = evidence(np.array([[1.0, 0.0, 4.0]]), np.array([[0.5, 0.0]]), 2.0)
+    np.testing.assert_allclose(motion.miss_m, [[1.0, 0.0]])
+    equations = normal_equations(motion, np.array([3.0]))
+    # Rows (2, 0, -1) and (0, 2, 0), weighted with 3.
+    np.testing.assert_allclose(equations.matrix[0], [[12.0, 0.0, -6.0], [0.0, 12.0, 0.0], [-6.0, 0.0, 3.0]])
+    np.testing.assert_allclose(equations.rhs[0], [6.0, 0.0, -3.0])
+    np.testing.assert_allclose(equations.doubt[0], [0.0, 0.0, 0.0])
+
+
+def test_correlated_pixels_are_weighted_by_the_inverse_of_their_covariance() -> None:
+    base = evidence(np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, -0.2]]), 0.5)
+    covariance = np.array([[2.0, 1.0], [1.0, 3.0]])
+    motion = PointMotion(
+        base.static_m,
+        base.ray,
+        base.lag_s,
+        base.miss_m,
+        np.array([[2.0, 1.0, 3.0]]),
+        np.array([[0.4, 0.1]]),
+        base.depth_step_m,
+        base.depth_step_sigma_m,
+        base.static_chi2,
+        base.usable,
+    )
+    rows = 0.5 * np.array([[1.0, 0.0, -0.1], [0.0, 1.0, 0.2]])
+    weight = np.linalg.inv(covariance)
+    equations = normal_equations(motion, np.ones(1))
+    np.testing.assert_allclose(equations.matrix[0], rows.T @ weight @ rows)
+    np.testing.assert_allclose(equations.rhs[0], rows.T @ weight @ [0.2, -0.4])
+    np.testing.assert_allclose(equations.doubt[0], rows.T @ weight @ [0.4, 0.1])
+
+
+def test_what_nothing_measures_is_bounded_not_zero() -> None:
+    velocity, covariance = solve_velocity(np.zeros((3, 3)), np.zeros(3), np.zeros(3), 1.5)
+    np.testing.assert_allclose(velocity, 0.0)
+    np.testing.assert_allclose(covariance, 2.25 * np.eye(3))
+
+
+def test_solution_and_its_covariance_by_hand() -> None:
+    velocity, covariance = solve_velocity(
+        3.0 * np.eye(3), np.array([3.0, 0.0, -6.0]), np.array([4.0, 0.0, 0.0]), 1.0
+    )
+    # Information 3 + 1; one sigma of depth shifts the solution by (1, 0, 0).
+    np.testing.assert_allclose(velocity, [0.75, 0.0, -1.5])
+    np.testing.assert_allclose(covariance, np.diag([1.25, 0.25, 0.25]))
+
+
+def test_stacks_of_bodies_are_solved_at_once() -> None:
+    matrix = np.stack((3.0 * np.eye(3), np.zeros((3, 3))))
+    velocity, covariance = solve_velocity(matrix, np.ones((2, 3)), np.zeros((2, 3)), 1.0)
+    np.testing.assert_allclose(velocity, [[0.25] * 3, [1.0] * 3])
+    assert covariance.shape == (2, 3, 3)
