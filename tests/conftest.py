@@ -6,5 +6,6 @@ import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """--hil: every hardware-in-the-loop test; without it one of each kind, the quick one."""
+    """--hil: every hardware-in-the-loop test; without it the quick one. --fuzz: ten million of each."""
     parser.addoption("--hil", action="store_true", help="run every hardware-in-the-loop test, not one alone")
+    parser.addoption("--fuzz", action="store_true", help="ten million frames for every decoder")
