@@ -156,7 +156,7 @@ class RoboteqChassisConfig(Section):
 
 
 class KobukiChassisConfig(Section):
-    """A Kobuki, the base of Turtlebot 2. Its geometry is fixed: the base itself makes wheel speeds of a twist.
+    """A Kobuki, the base of Turtlebot 2. Its geometry is fixed: the base itself turns a twist into speeds.
 
     slip_factor: as for AgileX. base_timeout_ms: after so long without a command the base is taken to have
     stopped by itself. The firmware's time is not documented: measure it with the wheels off the floor.

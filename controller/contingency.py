@@ -1,9 +1,9 @@
 """The worst case: whatever moving obstacles may do within their means, can the robot still stand before it?
 
 An obstacle that moves may stop dead wherever its way leads it, may change its velocity by a bounded
-acceleration up to V_omax, and its velocity is only known with a spread. Standing when something touches it is all that a robot which cannot leave its path
-can promise; so for each speed the emergency stop is followed, latency included, against all that each
-obstacle could reach by then.
+acceleration up to V_omax, and its velocity is only known with a spread. Standing when something touches it is
+all that a robot which cannot leave its path can promise; so for each speed the emergency stop is followed,
+latency included, against all that each obstacle could reach by then.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ def carve(
     )
     large = np.concatenate(([False], ~mover & ~compact))
     inside = large[labels]
-    grown = np.asarray(cv2.dilate((evidence & inside).astype(np.uint8), np.ones((3, 3), np.uint8)))
-    grown = grown.astype(np.bool_) & inside
+    widened = cv2.dilate((evidence & inside).astype(np.uint8), np.ones((3, 3), np.uint8))
+    grown: BoolGrid = np.asarray(widened).astype(np.bool_) & inside
     if np.count_nonzero(grown) < _MIN_CELLS:
         return labels
     count, parts = regions.components(grid, grown)
@@ -98,7 +98,7 @@ def _near_ends(
     ends, depth = ends_px.reshape(-1, 2)[known].astype(float), depth[known]
     seeds = np.ones(grid.depth_m.shape, np.uint8)
     if len(depth) == 0:
-        return seeds == 0
+        return np.zeros(seeds.shape, np.bool_)
     rows, columns = grid.rows(ends[:, 1]), grid.columns(ends[:, 0])
     seeds[rows, columns] = 0
     distance, label = cv2.distanceTransformWithLabels(seeds, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)

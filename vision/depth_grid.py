@@ -1,4 +1,4 @@
-"""A coarse grid of depth with its height over the floor: what bodies are made of and free space is read from."""
+"""A coarse grid of depth with its height over the floor; bodies and free space are read from it."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     valid = (depth_m >= config.min_depth_m) & (depth_m <= config.max_depth_m)
     beyond = depth_m > config.max_depth_m
     inverse = _smooth(np.divide(1.0, depth_m, out=np.zeros_like(depth_m), where=valid), valid)
-    depth_m = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=valid)
+    depth_m = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=valid).astype(np.float32)
     x, y = _rays(frame.intrinsics, depth_m.shape, step, offset)
     if mount is None:
         nan = float("nan")

@@ -1,4 +1,4 @@
-"""The depth of fragments: valid up to 10 m (Daeef 2020, "Filtering featured fragments"), nearer surface first.
+"""The depth of fragments: valid up to 10 m (Daeef 2020, "Filtering featured fragments"), nearer surface.
 
 An edge that separates a body from what is behind it belongs to the body; the depth image is least
 trustworthy just there. So depth is read from a small neighbourhood: its samples fall into a near
@@ -8,11 +8,16 @@ surface and, at a silhouette, a far one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.types import DepthImage, FloatArray
+from vision.lens import RealArray
+
+Depths = TypeVar("Depths", NDArray[np.float32], NDArray[np.float64])
 
 _REACH_PX = (-6, -3, 0, 3, 6)
 _OFFSETS_U = np.tile(np.array(_REACH_PX), len(_REACH_PX))
@@ -32,15 +37,15 @@ class SurfaceDepth:
     far_m: FloatArray
 
 
-def depth_sigma_m(depth_m: FloatArray, noise: DepthNoise) -> FloatArray:
-    """One standard deviation of depth (Khoshelham's model, sigma_z ~ z^2, with a floor)."""
-    return noise.floor_m + noise.quadratic_per_m * depth_m * depth_m
+def depth_sigma_m(depth_m: Depths, noise: DepthNoise) -> Depths:
+    """One standard deviation of depth (Khoshelham's model, sigma_z ~ z^2, with a floor); float32 stays so."""
+    return np.asarray(noise.floor_m + noise.quadratic_per_m * depth_m * depth_m, dtype=depth_m.dtype)
 
 
 def surface_depth(
     depth: DepthImage,
     scale_m: float,
-    pixels: FloatArray,
+    pixels: RealArray,
     min_m: float,
     max_m: float,
     noise: DepthNoise,

@@ -1,4 +1,4 @@
-"""detect: an RGB-D frame and the odometry of its time -> tracked fragments, ego-motion and motion evidence."""
+"""detect: an RGB-D frame and the odometry of its time -> tracked fragments, ego-motion, motion evidence."""
 
 from __future__ import annotations
 
@@ -124,7 +124,8 @@ class Detector:
             store.pixel_cov.reshape(-1, 3),
             config.fragments,
         )
-        both = flow.found.reshape(-1, 2).all(axis=1)
+        found = flow.found.reshape(-1, 2)
+        both = found[:, 0] & found[:, 1]
         store.ends_px = flow.pixels.reshape(-1, 2, 2)
         store.keep(both)
         moving = moving[both]

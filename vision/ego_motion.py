@@ -1,4 +1,4 @@
-"""The camera's own motion from static fragments and depth, with a prior that holds when most of the view moves.
+"""The camera's own motion from static fragments and depth; a prior holds when most of the view moves.
 
 Gauss-Newton on the reprojection of points anchored some frames ago. A point's error has a pixel part
 and a depth part: depth moves the prediction along its epipolar line only, so a point with uncertain
@@ -129,7 +129,8 @@ def estimate(
     ratio = found.inliers / len(use)
     if found.inliers < least:
         return CameraEstimate(start, unseen.covariance, ratio, False)
-    return CameraEstimate(found.pose, np.linalg.inv(found.information), ratio, True)
+    covariance = np.linalg.inv(found.information).astype(np.float64, copy=False)
+    return CameraEstimate(found.pose, covariance, ratio, True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

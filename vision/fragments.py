@@ -113,7 +113,7 @@ class FragmentStore:
         self.age_frames += 1
 
     def break_history(self) -> None:
-        """The camera's way up to the frame that is committed next is not known: do not look back beyond it."""
+        """The camera's way to the frame that is committed next is not known: do not look back beyond it."""
         self._comparable = 0
 
     def anchors(self, now_ns: int, window_s: float) -> AnchorEnds:
@@ -123,7 +123,7 @@ class FragmentStore:
         """
         back = np.arange(1, self._comparable + 1)
         slots = (self._head - back + 1) % HISTORY
-        ages_s = (now_ns - self._stamps_ns[slots]) * 1e-9
+        ages_s: FloatArray = np.multiply(now_ns - self._stamps_ns[slots], 1e-9, dtype=np.float64)
         reach = max(1, int(np.count_nonzero(ages_s <= window_s)))
         lag = np.clip(self.age_frames, 1, reach)
         slot = slots[lag - 1]

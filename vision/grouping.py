@@ -116,10 +116,10 @@ def merges(
         & ~((regions.cells[a] == regions.cells[b]) & (a < b))
     )
     result, gone = [], set()
-    for s, l in zip(a[one].tolist(), b[one].tolist(), strict=True):
-        if s not in gone and l not in gone:
-            result.append((s, l))
-            gone.add(s)
+    for part, whole in zip(a[one].tolist(), b[one].tolist(), strict=True):
+        if part not in gone and whole not in gone:
+            result.append((part, whole))
+            gone.add(part)
     return result
 
 
@@ -155,4 +155,5 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
         return None
     if abs(np.median(along[second]) - np.median(along[~second])) < _PAIR_DISTANCE_M:
         return None
-    return cells[second]
+    cut_off: NDArray[np.intp] = cells[second]
+    return cut_off

@@ -113,7 +113,7 @@ def judge(
 
 
 def _second_opinion(seen: MotionEvidence) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(T,) each: whether the depth of the surface confirms the speed along the line of sight, or denies it."""
+    """(T,) each: whether the surface's depth confirms the speed along the line of sight, or denies it."""
     by_fragments, variance = _along(seen.velocity, seen.covariance, seen.sight)
     by_surface, surface_variance = _along(seen.surface_velocity, seen.surface_covariance, seen.sight)
     limit = _CONTRADICTION_SIGMAS**2 * (variance + surface_variance)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hal.types import FloatArray, Intrinsics
 
+# Images and grids are float32, geometry is float64; what reads both takes either.
+RealArray = NDArray[np.float32] | NDArray[np.float64]
 
-def rays(pixels: FloatArray, camera: Intrinsics) -> FloatArray:
+
+def rays(pixels: RealArray, camera: Intrinsics) -> FloatArray:
     """(N, 3) points at z = 1 m behind pixels (N, 2)."""
     result = np.ones((len(pixels), 3))
     result[:, 0] = (pixels[:, 0] - camera.cx) / camera.fx
@@ -32,7 +36,8 @@ def rotation_from_vector(vector_rad: FloatArray) -> FloatArray:
     # sin(a)/a and (1 - cos(a))/a^2 through sinc, which is exact at a = 0.
     first = float(np.sinc(angle / np.pi))
     half = float(np.sinc(0.5 * angle / np.pi))
-    return np.eye(3) + first * skew + 0.5 * half * half * (skew @ skew)
+    rotation: FloatArray = np.eye(3) + first * skew + 0.5 * half * half * (skew @ skew)
+    return rotation
 
 
 def vector_from_rotation(rotation: FloatArray) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -42,23 +43,22 @@ def track(
     if len(pixels) == 0:
         return Flow(np.empty((0, 2), np.float32), np.empty(0, np.bool_))
     window = (settings.lk_window_px, settings.lk_window_px)
-    options = {
-        "winSize": window,
-        "criteria": _CRITERIA,
-        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
-        "minEigThreshold": _MIN_EIGENVALUE,
-    }
+    search = partial(
+        cv2.calcOpticalFlowPyrLK,
+        winSize=window,
+        criteria=_CRITERIA,
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        minEigThreshold=_MIN_EIGENVALUE,
+    )
     start = pixels.reshape(-1, 1, 2)
-    there, there_ok, _ = cv2.calcOpticalFlowPyrLK(
-        before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=settings.lk_levels, **options
+    there, there_ok, _ = search(
+        before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=settings.lk_levels
     )
     # What all ends have in common was the guess's own error: a turn of the camera it did not know of.
     common = np.median(there[:, 0, :] - guess, axis=0)
     back_guess = there - (guess + common - pixels).reshape(-1, 1, 2)
-    back, back_ok, _ = cv2.calcOpticalFlowPyrLK(
-        now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1), **options
-    )
-    end = there[:, 0, :]
+    back, back_ok, _ = search(now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1))
+    end: NDArray[np.float32] = there[:, 0, :].astype(np.float32, copy=False)
     miss = back[:, 0, :] - pixels
     chi2 = mahalanobis(miss, covariance)
     height, width = now.shape

@@ -64,7 +64,7 @@ def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
     kept[:, :-1] &= across <= jump
     kept[1:] &= down >= -jump
     kept[:-1] &= down <= jump
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(kept.view(np.uint8), connectivity=4)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(kept.view(np.uint8), connectivity=4)
     # Renumber, leaving out the speckles.
     large = np.asarray(stats)[:, cv2.CC_STAT_AREA] >= _SPECKLE_CELLS
     large[0] = False

@@ -94,7 +94,7 @@ class Renewal:
         return segments
 
     def _edges(self, grey: GreyImage, block: int, band: int) -> GreyImage:
-        """Edges of one block. The next visit looks closer where little was seen, and less close where much."""
+        """Edges of one block. The next visit looks closer where little was seen, less close where much."""
         settings = self._config.fragments
         high = float(self._threshold[block, band])
         edges = find_edges(grey, _LOW_SHARE * high, high)
@@ -112,7 +112,7 @@ class Renewal:
         counts: NDArray[np.intp],
         room: tuple[int, int],
     ) -> NewFragments:
-        """Thin out to what the tiles lack; drop what has no depth, crosses a depth edge or cannot be tracked."""
+        """Thin out to what the tiles lack; drop what has no depth, crosses a depth edge or is untrackable."""
         settings, config = self._config.fragments, self._config
         missing = settings.fragments_per_tile - counts.ravel() // 2
         candidates = candidates[np.argsort(-lengths_px(candidates), kind="stable")]
@@ -135,7 +135,7 @@ class Renewal:
             config.depth_noise,
         )
         near, far = surface.near_m.reshape(-1, 5), surface.far_m.reshape(-1, 5)
-        # Where nothing is measured at all, it is far away most of the time: good to know the camera's turn by.
+        # Where nothing is measured at all, it is mostly far away: good to know the camera's turn by.
         beyond = np.isnan(near).all(axis=1)
         beyond &= np.cumsum(beyond) <= room[1]
         whole = np.flatnonzero(_on_one_surface(near, shares, config) | beyond)
@@ -176,7 +176,8 @@ def _not_taken(
     _, first = np.unique(cells.ravel(), return_index=True)
     is_first = np.zeros(cells.size, np.bool_)
     is_first[first] = True
-    result: NDArray[np.bool_] = (fresh & is_first.reshape(cells.shape)).all(axis=1)
+    alone = fresh & is_first.reshape(cells.shape)
+    result = alone[:, 0] & alone[:, 1]
     return result
 
 

@@ -74,7 +74,8 @@ def fragments(
     position[:, 0] = (middle[:, 0] - camera.cx) / camera.fx * depth
     position[:, 1] = (middle[:, 1] - camera.cy) / camera.fy * depth
     position[:, 2] = depth
-    measured = detection.motion.usable.reshape(-1, 2).any(axis=1)[:, None]
+    usable = detection.motion.usable.reshape(-1, 2)
+    measured = (usable[:, 0] | usable[:, 1])[:, None]
     sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return Fragments(
         ids=detection.ids,

@@ -30,9 +30,9 @@ _FIELDS = (
 
 class Tracks:
     """state (T, 6): position and velocity; covariance (T, 6, 6); surface_state and surface_covariance: the
-    same from the centres of the visible surface alone, without the fragments, as a second opinion; evidence (T,) of motion; moving (T,);
-    confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); area_m2 (T,): averaged, up to a common factor;
-    cells (T,) of the grid covered when last seen."""
+    same from the centres of the visible surface alone, without the fragments, as a second opinion; evidence
+    (T,) of motion; moving (T,); confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); area_m2 (T,):
+    averaged, up to a common factor; cells (T,) of the grid covered when last seen."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
 from config.chassis import PlantConfig, RoboclawChassisConfig
 from controller.bench.busy_scene import OBSTACLES, busy_scene
 from controller.bench.figures import Durations
 from controller.bench.reel import Tick
 from controller.control import ControlLoop
-from hal.api import Chassis
+from hal.api import Chassis, Closing
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.clocks import NS_PER_S
 from hal.links.scripted import serial_pair
@@ -104,7 +104,15 @@ def measure_control(
     raise RuntimeError(f"the emulated base obeyed in {len(spent_ns)} of {steps + _ARM_STEPS} control steps")
 
 
-def measure_exchange(chassis: TimedChassis, emulator: Emulator, exchanges: int, tick: Tick) -> Durations:
+class Answering(Closing, Protocol):
+    """What stands at the other end of the link."""
+
+    def advance_to(self, now_ns: int) -> None:
+        """Obey, move and answer up to now_ns."""
+        ...
+
+
+def measure_exchange(chassis: TimedChassis, emulator: Answering, exchanges: int, tick: Tick) -> Durations:
     """Exchanges with an armed base that drives a bend at 0.5 m/s; the emulator's own work is not counted.
 
     Raises RuntimeError if the emulated base does not obey: that is a fault of the program.
