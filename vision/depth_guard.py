@@ -38,7 +38,8 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     else:
         known = _known_m(grid, bands, width, max_depth_m)
-        known = np.where(np.isfinite(nearest), np.maximum(known, nearest), known)
+        # What stands there hides what is behind it.
+        known = np.where(np.isfinite(nearest), nearest, known)
     return FreeSpace(x / tilt, half_width, nearest, np.minimum(known, max_depth_m))
 
 
@@ -61,7 +62,9 @@ def _known_m(grid: DepthGrid, bands: int, width: int, max_depth_m: float) -> NDA
     for shift in range(1, _HOLE_ROWS):
         run[:-shift] &= hole[shift:]
     first = np.where(run.any(axis=0), run.argmax(axis=0), len(rows))
-    reach = np.append(floor_forward, max_depth_m)
+    # Where even the uppermost ray meets the floor, nothing beyond that was looked at.
+    horizon_m = max_depth_m if len(rows) < len(grid.y) else floor_forward[-1]
+    reach = np.append(floor_forward, horizon_m)
     # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known.
     return np.where(first == 0, 0.0, np.minimum(reach[np.minimum(first, len(rows))], max_depth_m)).astype(
         float

@@ -149,7 +149,7 @@ class Detector:
         average_depth(store, result.pose, camera, config.depth_noise)
         step = self._pose.inverse() @ result.pose
         ego = _ego(step, dt_s, result, prior)
-        health = _judge(health, ego, len(store))
+        health = _judge(health, ego)
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
         detection = self._detection(frame, grid, dt_s, motion, result.covariance, ego, health, False)
@@ -280,9 +280,9 @@ def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) ->
     )
 
 
-def _judge(health: CameraHealth, ego: EgoMotion, fragments: int) -> CameraHealth:
+def _judge(health: CameraHealth, ego: EgoMotion) -> CameraHealth:
     """What the ego-motion tells of the camera."""
-    if ego.source == "visual" or fragments == 0:
+    if ego.source == "visual":
         return health
     if ego.source == "odometry":
         reason = "too few static fragments: the camera's motion rests on the odometry alone"

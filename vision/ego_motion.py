@@ -127,7 +127,9 @@ def estimate(
         found = _solve(view, start, prior.sigma * _TRUSTED_SHARE)
         least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
     ratio = found.inliers / len(use)
-    if found.inliers < least:
+    # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
+    torn = prior.source == "odometry" and _conflict(found.pose, start, prior.sigma)
+    if found.inliers < least or torn:
         return CameraEstimate(start, unseen.covariance, ratio, False)
     covariance = np.linalg.inv(found.information).astype(np.float64, copy=False)
     return CameraEstimate(found.pose, covariance, ratio, True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -75,7 +76,8 @@ def test_bands_lie_side_by_side_across_the_view() -> None:
 def test_a_plain_wall_is_seen_at_its_distance(distance_m: float) -> None:
     space = space_of(frame_of(floor() + wall(distance_m)))
     np.testing.assert_allclose(space.nearest_m, distance_m, rtol=0.02)
-    assert (space.known_m >= space.nearest_m).all()
+    # What the wall hides is not known.
+    np.testing.assert_allclose(space.known_m, distance_m, rtol=0.06)
 
 
 def test_a_wall_behind_real_depth_noise_is_not_much_nearer_nor_farther() -> None:
@@ -187,7 +189,16 @@ def test_a_camera_that_looks_down_measures_along_the_floor() -> None:
     tipped = CameraMount(0.0, 0.0, 1.0, 0.3)
     space = space_of(frame_of(floor() + wall(3.0), tipped), tipped)
     np.testing.assert_allclose(space.nearest_m, 3.0, rtol=0.02)
-    assert (space.known_m >= space.nearest_m).all()
+    np.testing.assert_allclose(space.known_m, 3.0, rtol=0.06)
+
+
+def test_nothing_is_known_beyond_the_upper_rim_of_a_steep_view() -> None:
+    steep = CameraMount(0.0, 0.0, 1.0, math.radians(45.0))
+    space = space_of(frame_of(floor(), steep), steep)
+    reach_m = 1.0 / math.tan(math.radians(45.0) - math.atan(239.5 / 610.0))
+    assert np.isinf(space.nearest_m).all()
+    assert (space.known_m <= reach_m + 0.05).all()
+    assert (space.known_m >= reach_m - 0.2).all()
 
 
 def test_bearings_of_a_tipped_camera_are_levelled() -> None:

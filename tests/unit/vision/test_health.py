@@ -170,6 +170,7 @@ def test_losing_every_fragment_leaves_the_motion_unknown() -> None:
         assert scene.ego_motion.source == "none"
         assert np.isnan(scene.ego_motion.inlier_ratio)
         assert not any(one.moving for one in scene.obstacles)
+        assert scene.health.condition is UNTRUSTWORTHY
 
 
 def test_worsened_keeps_the_worse_condition_and_both_sentences() -> None:
