@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,9 @@ _DRIVES_AHEAD_MPS = 0.1
 # So much sooner than it would have to, the robot slows comfortably for the worst case.
 _FORESIGHT_S = 0.5
 _SAME_SURFACE_M = 0.8
+# Slower than this, arriving as it leaves is no better than waiting at the line.
+_WORTH_ARRIVING_MPS = 0.3
+_AVERAGE = 0.1
 # A choice that was made is kept unless this much time would be lost or gained.
 _STICKY_S = 0.5
 
@@ -47,8 +51,11 @@ class Appraiser:
         self._foreseen: Stops | None = None
         self._inside: set[int] = set()
         self._goes_first: set[int] = set()
+        self._leaves_s: dict[int, float] = {}
 
-    def limits(self, known: Knowledge, s_m: float, motion: Motion, base_mps: float) -> list[Limit]:
+    def limits(
+        self, known: Knowledge, s_m: float, motion: Motion, base_mps: float, now_s: float
+    ) -> list[Limit]:
         """Every limit that obstacles and depth put on the speed of a robot at s_m; base_mps: what the path
         allows."""
         found = [*self._depth(known, s_m, motion)]
@@ -61,7 +68,7 @@ class Appraiser:
         placed = place(bodies, known.corridor, since, s_m, self._config.sight.range_m + 2.0)
         found += self._standing(known, placed, s_m, motion)
         base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
-        crossing, chosen_mps = self._moving(known, placed, s_m, motion, base_mps)
+        crossing, chosen_mps = self._moving(known, placed, s_m, motion, base_mps, now_s)
         found += crossing
         worst = self._worst_case(known, placed, s_m, motion, chosen_mps)
         if worst is not None:
@@ -144,7 +151,7 @@ class Appraiser:
         return needed <= gap.distance_m
 
     def _moving(
-        self, known: Knowledge, placed: Placed, s_m: float, motion: Motion, base_mps: float
+        self, known: Knowledge, placed: Placed, s_m: float, motion: Motion, base_mps: float, now_s: float
     ) -> tuple[list[Limit], float]:
         """Limits by what crosses, comes or drives ahead, and the speed that remains."""
         bodies, margins = known.bodies, self._config.margins
@@ -165,6 +172,8 @@ class Appraiser:
         in_conflict = {int(bodies.ids[one.row]) for one in conflicts}
         self._inside |= in_conflict
         self._goes_first &= in_conflict
+        conflicts = [self._steadied(one, int(bodies.ids[one.row]), now_s) for one in conflicts]
+        self._leaves_s = {number: when for number, when in self._leaves_s.items() if number in in_conflict}
         if not conflicts:
             return [], base_mps
         ramps = self._ramps(motion, self._speeds)
@@ -174,6 +183,16 @@ class Appraiser:
             limit = self._when_it_stays(one, bodies, placed, s_m, motion, float(along[one.row]), leader_mps)
             offers.append((one, *self._offer(one, int(bodies.ids[one.row]), ramps, s_m, limit)))
         return self._settle(offers, bodies, base_mps)
+
+    def _steadied(self, conflict: Conflict, number: int, now_s: float) -> Conflict:
+        """With the time of leaving averaged over some frames: it is an extrapolation of a noisy speed."""
+        if math.isinf(conflict.out_s):
+            self._leaves_s.pop(number, None)
+            return conflict
+        leaves_s = now_s + conflict.out_s
+        before_s = self._leaves_s.get(number, leaves_s)
+        self._leaves_s[number] = before_s + _AVERAGE * (leaves_s - before_s)
+        return replace(conflict, out_s=max(self._leaves_s[number] - now_s, conflict.in_s))
 
     def _ramps(self, motion: Motion, targets_mps: FloatArray) -> SpeedRamps:
         """Comfortable, from now."""
@@ -223,7 +242,7 @@ class Appraiser:
         choice = choices(conflict, ramps, self._speeds, s_m, margins.least_m, margins.crossing_s, enter_s)
         if conflict.in_s <= 0.0 or conflict.hi_in_m <= s_m:
             choice = Choice(choice.yield_mps, math.inf)
-        if choice.yield_mps < stays.speed_mps:
+        if choice.yield_mps < min(stays.speed_mps, _WORTH_ARRIVING_MPS):
             return Choice(stays.speed_mps, choice.first_mps), stays
         sentence = (
             f"obstacle {number} crosses {max(conflict.lo_in_m - s_m, 0.0):.1f} m ahead until "

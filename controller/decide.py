@@ -69,12 +69,16 @@ class DecisionMaker:
         v_mps = max(v_mps, 0.0)
         known = self._knowledge(path, on_path)
         known.update(scene, pose, on_path, v_mps, now_ns)
+        if not known.has_seen:
+            # Nothing was decided yet: the first scene that shows a free way lets the robot go at once.
+            reason = Reason("camera", f"{known.fault}: stop")
+            return Decision(self._action(0.0, v_mps), 0.0, reason)
         motion = Motion(v_mps, a_mps2, self._latency_s)
         way = self._path_limits(path, on_path, motion)
         base_mps = min(limit.speed_mps for limit in way)
         limits = self._camera_limits(known)
-        if math.isfinite(known.age_s) and known.age_s >= 0.0:
-            limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps)
+        if known.age_s >= 0.0:
+            limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(way, limits, motion, now_ns)
 
     def _input_fault(
@@ -174,7 +178,7 @@ class DecisionMaker:
         self._emergency = self._brakes_hard(limits, target_mps, motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         return Decision(
-            self._action(target_mps, motion), target_mps, reason, self._emergency, self._stuck_since_ns
+            self._action(target_mps, motion.v_mps), target_mps, reason, self._emergency, self._stuck_since_ns
         )
 
     def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
@@ -217,11 +221,11 @@ class DecisionMaker:
         elif self._stuck_since_ns is None:
             self._stuck_since_ns = now_ns
 
-    def _action(self, target_mps: float, motion: Motion) -> Action:
+    def _action(self, target_mps: float, v_mps: float) -> Action:
         band = self._config.release.dead_band_mps
-        if target_mps > motion.v_mps + band:
+        if target_mps > v_mps + band:
             return Action.INCREASE
-        stopping = target_mps == 0.0 and motion.v_mps > _STANDING_MPS
-        if target_mps < motion.v_mps - band or stopping:
+        stopping = target_mps == 0.0 and v_mps > _STANDING_MPS
+        if target_mps < v_mps - band or stopping:
             return Action.DECREASE
         return Action.KEEP

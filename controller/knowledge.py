@@ -55,6 +55,11 @@ class Knowledge:
         self._captured_ns: int | None = None
         self._scene_fault = ""
 
+    @property
+    def has_seen(self) -> bool:
+        """Whether any scene was taken in yet."""
+        return self._captured_ns is not None
+
     def update(
         self, scene: Scene | None, pose: PlanarPose, on_path: OnPath, v_mps: float, now_ns: int
     ) -> None:

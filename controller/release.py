@@ -26,7 +26,7 @@ class ReleaseGate:
         """The target to use. let_go_mps: the speed that remains when the present deceleration is let go of,
         which may be kept at any time: that is no increase."""
         band = self._config.dead_band_mps
-        if raw_mps < self._held_mps - band:
+        if raw_mps < self._held_mps - band or raw_mps <= 0.0:
             self._rising = False
         if raw_mps <= self._held_mps:
             self._held_mps = raw_mps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from controller.campaign.store import MissionStore
 from controller.campaign.summary import Summary, why_failed
 from controller.campaign.task import Mode, Task, failed, run_task, time_ratio
 from controller.errors import UserError
+from controller.evaluation import markdown
 from sim.families import FAMILY_NAMES
 
 FAILING = "failing"
@@ -128,11 +130,10 @@ def _run_one(options: CampaignOptions, config: AppConfig, mission: Mission) -> i
 
 def line_of(row: Row) -> str:
     """A row for people."""
-    took = (
-        "not reached" if row.time_s is None else f"{row.time_s:.2f} s, {time_ratio(row):.2f} x the oracle's"
-    )
-    if row.time_s is None and not row.expected:
-        took = "not reached, as it should be"
+    if row.time_s is None:
+        took = "not reached" if row.expected else "not reached, as it should be"
+    else:
+        took = f"reached in {row.time_s:.2f} s, {time_ratio(row):.2f} x the oracle's"
     verdict = f"FAILED: {why_failed(row)}" if failed(row) else "ok"
     return (
         f"{row.policy:<8} {took}; contacts {row.contacts} ({row.contacts_at_fault} at fault), "
@@ -153,8 +154,8 @@ def command_line(options: CampaignOptions) -> str:
 
 def _say(summary: Summary, count: int, took_s: float, folder: Path) -> None:
     for name, one in summary.policies.items():
-        median = "-" if one.ratio_median is None else f"{one.ratio_median:.2f}"
-        p90 = "-" if one.ratio_p90 is None else f"{one.ratio_p90:.2f}"
+        median = markdown.fixed(math.nan if one.ratio_median is None else one.ratio_median, 2)
+        p90 = markdown.fixed(math.nan if one.ratio_p90 is None else one.ratio_p90, 2)
         click.echo(
             f"{name:<8} {one.missions} missions, reached {one.reached}/{one.expected}, "
             f"contacts {one.contacts} ({one.contacts_at_fault} at fault), time x{median} (p90 x{p90}), "

@@ -30,8 +30,8 @@ def ratio_figure(rows: list[Row]) -> Image:
         Axis("share of the missions", 0.0, 1.02, ticks=_SHARES),
     )
     for policy in dict.fromkeys(row.policy for row in rows):
-        ratios = [time_ratio(row) for row in rows if row.policy == policy and row.oracle_time_s is not None]
-        ratios = [ratio if math.isfinite(ratio) else math.inf for ratio in ratios]
+        ratios = [time_ratio(row) for row in rows if row.policy == policy]
+        ratios = [ratio for ratio in ratios if not math.isnan(ratio)]
         _distribution(chart, ratios, _COLOURS.get(policy, GREY), policy, 0.9, _MOST_RATIO)
     chart.legend("lower right")
     return image

@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -63,10 +63,10 @@ def run_there(tasks: list[Task], scheduler: str) -> Iterator[list[Row]]:
 
 def _run(pool: Executor, tasks: list[Task], workers: int) -> Iterator[list[Row]]:
     waiting = iter(tasks)
+    running: set[Future[list[Row]]] = set()
     try:
-        running = {
-            pool.submit(run_task, task) for _, task in zip(range(workers * _AHEAD), waiting, strict=False)
-        }
+        for _, task in zip(range(workers * _AHEAD), waiting, strict=False):
+            running.add(pool.submit(run_task, task))
         while running:
             done = next(as_completed(running))
             running.remove(done)
@@ -75,7 +75,10 @@ def _run(pool: Executor, tasks: list[Task], workers: int) -> Iterator[list[Row]]
                 running.add(pool.submit(run_task, following))
             yield done.result()
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        # Dask's executor knows no cancel_futures.
+        for one in running:
+            one.cancel()
+        pool.shutdown(wait=False)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -44,9 +45,9 @@ def report_lines(summary: Summary, command: str) -> list[str]:
     lines = ["# Campaign", "", f"    {command}", ""]
     lines += markdown.section(
         "Policies",
-        """Time is that of the drive over that of the oracle, which knows all motions in advance, for missions
-        that both finish. A contact is at fault when the robot moved faster than 0.02 m/s and a driver with
-        the same field of view avoids it.""",
+        """Time is that of the drive over that of the oracle, which knows all motions in advance; a drive that
+        hit something or did not arrive counts as one that never does. A contact is at fault when the robot
+        moved faster than 0.02 m/s and a driver with the same field of view and reaction avoids it.""",
     )
     lines += markdown.table(_HEAD, [[name, *_cells(one)] for name, one in summary.policies.items()])
     lines += markdown.picture("Time over the oracle's", "ratio.png")
@@ -89,4 +90,6 @@ def _cells(one: Totals) -> list[str]:
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if math.isfinite(value) else "never"

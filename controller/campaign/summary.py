@@ -14,8 +14,8 @@ from controller.campaign.task import failed, time_ratio
 
 @dataclass(frozen=True, slots=True)
 class Totals:
-    """Of some missions of one policy. ratio_*: time over the oracle's, of those that both finished; None if
-    there are none."""
+    """Of some missions of one policy. ratio_*: time over the oracle's, where there is something to reach; inf
+    if so many were not reached or had a contact at fault, None if there are none."""
 
     missions: int
     expected: int
@@ -37,7 +37,7 @@ class Totals:
 
 def totals(rows: list[Row]) -> Totals:
     """Add up; rows of one policy."""
-    ratios = [ratio for ratio in map(time_ratio, rows) if math.isfinite(ratio)]
+    ratios = [ratio for ratio in map(time_ratio, rows) if not math.isnan(ratio)]
     times = [row.time_s for row in rows if row.time_s is not None]
     clearances = [row.min_clearance_m for row in rows if math.isfinite(row.min_clearance_m)]
     return Totals(
@@ -61,7 +61,8 @@ def totals(rows: list[Row]) -> Totals:
 
 
 def _percentile(values: list[float], share: float) -> float | None:
-    return round(float(np.percentile(values, share)), 4) if values else None
+    """The smallest value that so many per cent do not exceed: no mean of a number and infinity."""
+    return round(float(np.percentile(values, share, method="inverted_cdf")), 4) if values else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +76,9 @@ class Summary:
     def as_dict(self) -> dict[str, object]:
         """For summary.json."""
         return {
-            "policies": {name: asdict(one) for name, one in self.policies.items()},
+            "policies": {name: _plain(one) for name, one in self.policies.items()},
             "families": {
-                family: {name: asdict(one) for name, one in by_policy.items()}
+                family: {name: _plain(one) for name, one in by_policy.items()}
                 for family, by_policy in self.families.items()
             },
             "failing": [
@@ -85,6 +86,12 @@ class Summary:
                 for family, seed, policy, why in self.failing
             ],
         }
+
+
+def _plain(one: Totals) -> dict[str, object]:
+    """JSON knows no infinity: null."""
+    values = asdict(one)
+    return {key: None if value == math.inf else value for key, value in values.items()}
 
 
 def summarise(rows: Iterable[Row]) -> Summary:

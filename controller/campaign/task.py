@@ -78,7 +78,13 @@ def failed(row: Row) -> bool:
 
 
 def time_ratio(row: Row) -> float:
-    """Time over the oracle's; NaN where either did not arrive."""
-    if row.time_s is None or row.oracle_time_s is None:
+    """Time over the oracle's; NaN where not even the oracle arrives or nobody should.
+
+    Infinite where the drive did not arrive, and where it hit something on its way: whoever drives through
+    people is not fast.
+    """
+    if row.oracle_time_s is None or not row.expected:
         return math.nan
+    if row.time_s is None or row.contacts_at_fault:
+        return math.inf
     return row.time_s / row.oracle_time_s

@@ -19,7 +19,7 @@ class Gate:
         self.gate = ReleaseGate(config or Release())
         self.now_ns = 0
         self.v = v
-        self.target = self.step(v)
+        self.target = self.step(v) if v > 0.0 else 0.0
 
     def step(self, raw: float) -> float:
         self.target = self.gate.step(raw, self.v, self.v, self.now_ns)
