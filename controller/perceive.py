@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from vision.perception import Perception
-
 from hal.api import OdometrySource
 from hal.types import PlanarPose, RgbdFrame
+from vision.perception import Perception
 from vision.scene import Fragments, Scene
 
 NS_PER_MS = 1_000_000
