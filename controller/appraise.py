@@ -6,13 +6,11 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.bodies import Bodies
-from controller.contingency import Reach, Stops, gets_through, reach, room, stops
 from controller.corridor import Placed, place, velocity_on_path
 from controller.crossing import Choice, Conflict, choices, find_conflicts
 from controller.decision import Reason
@@ -20,15 +18,14 @@ from controller.knowledge import Knowledge
 from controller.limits import Gap, Limit, Motion, allowed, stop_before
 from controller.memory import visible_from_m
 from controller.profile import SpeedRamps
+from controller.worst_case import WorstCase
 from hal.types import CameraMount, FloatArray
 
-_FINE_S, _COARSE_S = 0.2, 0.5
+_COARSE_S = 0.5
 _SPEEDS = 31
 _ALONGSIDE_M = 0.1
 _INSIDE_BODY_M = 0.05
 _DRIVES_AHEAD_MPS = 0.1
-# So much sooner than it would have to, the robot slows comfortably for the worst case.
-_FORESIGHT_S = 0.5
 _SAME_SURFACE_M = 0.8
 # Slower than this, arriving as it leaves is no better than waiting at the line.
 _WORTH_ARRIVING_MPS = 0.3
@@ -43,12 +40,11 @@ class Appraiser:
     def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount) -> None:
         self._config, self._limits, self._mount = config, limits, mount
         self._comfort, self._emergency = braking.comfort(limits), braking.emergency(limits)
-        longest_s = braking.stop(limits.max_speed_mps, 0.0, self._emergency).time_s + 1.0
-        self._worst_s = np.arange(0.0, longest_s + _FINE_S, _FINE_S)
-        coarse = np.arange(self._worst_s[-1] + _COARSE_S, config.prediction.horizon_s + _COARSE_S, _COARSE_S)
-        self._times_s = np.concatenate((self._worst_s, coarse))
+        self._worst_case = WorstCase(config, limits)
+        fine = self._worst_case.times_s
+        coarse = np.arange(fine[-1] + _COARSE_S, config.prediction.horizon_s + _COARSE_S, _COARSE_S)
+        self._times_s = np.concatenate((fine, coarse))
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
-        self._foreseen: Stops | None = None
         self._inside: set[int] = set()
         self._goes_first: set[int] = set()
         self._leaves_s: dict[int, float] = {}
@@ -70,7 +66,8 @@ class Appraiser:
         base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
         crossing, chosen_mps = self._moving(known, placed, s_m, motion, base_mps, now_s)
         found += crossing
-        worst = self._worst_case(known, placed, s_m, motion, chosen_mps)
+        go = self._ramps(motion, np.array([chosen_mps]))
+        worst = self._worst_case.limit(known, placed, s_m, motion, go)
         if worst is not None:
             found.append(worst)
         self._inside &= {int(one) for one in bodies.ids}
@@ -280,64 +277,6 @@ class Appraiser:
             else:
                 self._goes_first.discard(number)
         return found, speed
-
-    def _worst_case(
-        self, known: Knowledge, placed: Placed, s_m: float, motion: Motion, chosen_mps: float
-    ) -> Limit | None:
-        bodies, prediction = known.bodies, self._config.prediction
-        young = bodies.age_s < prediction.confirm_s
-        chosen = (bodies.moving | young) & (placed.lo_m[:, 0] > s_m - _ALONGSIDE_M)
-        if not chosen.any():
-            return None
-        reached = self._reach(known, placed, chosen)
-        if not reached.inside.any():
-            return None
-        if self._foreseen is None:
-            self._foreseen = self._stops(self._speeds, 0.0, motion.latency_s + _FORESIGHT_S)
-        fails = np.flatnonzero(room(self._foreseen, s_m, reached) < 0.0)
-        if not len(fails) or gets_through(
-            self._ramps(motion, np.array([chosen_mps])), s_m, self._worst_s, reached
-        ):
-            return None
-        speed = float(self._speeds[max(int(fails[0]) - 1, 0)])
-        now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
-        urgent = bool(room(now, s_m, reached)[0] < 0.0)
-        row = int(np.flatnonzero(chosen)[int(np.argmin(placed.lo_m[chosen, 0]))])
-        number = int(bodies.ids[row])
-        gap_m = float(placed.lo_m[row, 0]) - s_m
-        sentence = (
-            f"obstacle {number}, {max(gap_m, 0.0):.1f} m ahead, could step into the way: {allowed(speed)}"
-        )
-        return Limit(speed, Reason("worst case", sentence, number, gap_m), urgent)
-
-    def _reach(self, known: Knowledge, placed: Placed, chosen: NDArray[np.bool_]) -> Reach:
-        bodies, prediction = known.bodies, self._config.prediction
-        count = len(self._worst_s)
-        variance = np.trace(bodies.covariance[chosen], axis1=1, axis2=2) / 2.0
-        moving = bodies.moving[chosen]
-        near = Placed(*(getattr(placed, name)[chosen][:, :count] for name in Placed.__slots__))
-        return reach(
-            near,
-            self._worst_s,
-            known.age_s,
-            prediction.sigmas * np.sqrt(np.maximum(variance, 0.0)),
-            np.linalg.norm(bodies.velocity_mps[chosen], axis=1),
-            np.where(moving, prediction.manoeuvre_mps2, 0.0),
-            self._limits.max_obstacle_speed_mps,
-            self._config.margins.least_m,
-        )
-
-    def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:
-        ramps = SpeedRamps(
-            speeds,
-            a_mps2,
-            np.zeros(len(speeds)),
-            accel_mps2=self._limits.max_accel_mps2,
-            decel_mps2=self._limits.emergency_decel_mps2,
-            jerk_mps3=self._limits.emergency_jerk_mps3,
-            latency_s=latency_s,
-        )
-        return stops(ramps, self._worst_s)
 
 
 def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:
