@@ -35,6 +35,9 @@ from vision.velocities import PointMotion
 _UNKNOWN_DEPTH_M = 12.0
 _UNKNOWN_DEPTH_SIGMA_M = 10.0
 
+# Without odometry, at least this share of the fragments must fit one motion of the camera.
+_AGREEMENT = 0.5
+
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
 
 
@@ -44,7 +47,8 @@ class Detection:
 
     N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: evidence of the 2N
     ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
-    the fixed frame has begun anew, what was tracked before cannot be compared.
+    the fixed frame has begun anew, what was tracked before cannot be compared. motion_known: the camera's
+    own motion is known well enough to call anything else moving.
     """
 
     captured_ns: int
@@ -62,6 +66,7 @@ class Detection:
     ego_motion: EgoMotion
     health: CameraHealth
     restarted: bool
+    motion_known: bool
 
 
 class Detector:
@@ -149,10 +154,12 @@ class Detector:
         average_depth(store, result.pose, camera, config.depth_noise)
         step = self._pose.inverse() @ result.pose
         ego = _ego(step, dt_s, result, prior)
-        health = _judge(health, ego)
+        blurred = result.visual and prior.source == "none" and result.inlier_ratio < _AGREEMENT
+        health = _judge(health, ego, blurred)
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
-        detection = self._detection(frame, grid, dt_s, motion, result.covariance, ego, health, False)
+        known = ego.source != "none" and not blurred
+        detection = self._detection(frame, grid, dt_s, motion, result.covariance, ego, health, False, known)
         self._renew(frame, grey)
         if ego.source == "none":
             self._store.break_history()
@@ -202,6 +209,7 @@ class Detector:
         ego: EgoMotion,
         health: CameraHealth,
         restarted: bool,
+        motion_known: bool = False,
     ) -> Detection:
         store = self._store
         return Detection(
@@ -220,6 +228,7 @@ class Detector:
             ego,
             health,
             restarted,
+            motion_known,
         )
 
     def _prior(self, frame: RgbdFrame, odometry: Pose | None, dt_s: float) -> MotionPrior:
@@ -258,12 +267,11 @@ class Detector:
         spread = np.nan_to_num(anchor.far_m.ravel() - near_m, nan=0.0)
         noise = self._config.depth_noise
         sigma = averaged_sigma_m(near_m, anchor.looks.ravel(), noise)
-        covariance = self._store.pixel_cov.reshape(-1, 3)
-        variance = 0.5 * (covariance[:, 0] + covariance[:, 2]).astype(float)
+        covariance = self._store.pixel_cov.reshape(-1, 3).astype(float)
         sigma[~known] = _UNKNOWN_DEPTH_SIGMA_M
         usable = (spread <= 0.1 + 3.0 * depth_sigma_m(near_m, noise)) & np.repeat(~moving, 2)
         points = direction * near_m[:, None] + translation
-        anchors = Anchors(points, direction, sigma, variance, usable)
+        anchors = Anchors(points, direction, sigma, covariance, usable)
         pixels = self._store.ends_px.reshape(-1, 2).astype(float)
         return estimate(anchors, pixels, self._pose, prior, camera)
 
@@ -280,8 +288,14 @@ def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) ->
     )
 
 
-def _judge(health: CameraHealth, ego: EgoMotion) -> CameraHealth:
-    """What the ego-motion tells of the camera."""
+def _judge(health: CameraHealth, ego: EgoMotion, blurred: bool) -> CameraHealth:
+    """What the ego-motion tells of the camera. blurred: without odometry, most fragments fit no motion."""
+    if blurred:
+        reason = (
+            f"only {ego.inlier_ratio:.0%} of the fragments fit one motion of the camera:"
+            " is depth aligned with colour, in place and in time?"
+        )
+        return worsened(health, CameraCondition.DEGRADED, reason)
     if ego.source == "visual":
         return health
     if ego.source == "odometry":

@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 
 from config.perception import EgoMotionSettings
 from hal.types import FloatArray, GyroSamples, Intrinsics, Pose
-from vision.lens import rotation_from_vector, vector_from_rotation
+from vision.lens import project, rotation_from_vector, vector_from_rotation
 
 NS_PER_S = 1e9
-_ITERATIONS = 7
+_ITERATIONS = 6
 _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
-_ANNEAL = (64.0, 16.0, 4.0)  # robust scale of the first iterations, falling to 1
+_ANNEAL = (32.0, 4.0)  # robust scale of the first iterations, falling to 1
 _MIN_POINTS = 8
 _MIN_INLIER_RATIO = 0.25
 _MIN_BACKGROUND_RATIO = 0.10
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2])  # of the prior's sigma, where it decides
-_CONVERGED = 1e-6
+_CONVERGED = 2e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,12 +42,13 @@ class MotionPrior:
 @dataclass(frozen=True, slots=True, eq=False)
 class Anchors:
     """Points seen some frames ago: points_m (N, 3) in the fixed frame, range_m (N, 3) their derivative
-    with respect to depth, depth_sigma_m (N,), pixel_variance (N,), usable (N,) bool."""
+    with respect to depth, depth_sigma_m (N,), pixel_cov (N, 3): xx, xy, yy of where they are seen now,
+    usable (N,) bool."""
 
     points_m: FloatArray
     range_m: FloatArray
     depth_sigma_m: FloatArray
-    pixel_variance: FloatArray
+    pixel_cov: FloatArray
     usable: NDArray[np.bool_]
 
 
@@ -116,7 +117,7 @@ def estimate(
         anchors.points_m[use],
         anchors.range_m[use],
         np.square(anchors.depth_sigma_m[use]),
-        anchors.pixel_variance[use],
+        _whitening(anchors.pixel_cov[use]),
         pixels[use],
         camera,
     )
@@ -140,7 +141,7 @@ class _View:
     points: FloatArray
     towards: FloatArray
     depth_variance: FloatArray
-    pixel_variance: FloatArray
+    whitening: FloatArray
     seen: FloatArray
     camera: Intrinsics
 
@@ -162,16 +163,16 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
         jacobian, residual, derivative, in_front = _linearise(view, pose)
         # Depth's share of the covariance, by Sherman and Morrison: only along the epipolar line.
         squared = np.square(derivative).sum(axis=1)
-        shrink = view.depth_variance / (view.pixel_variance + view.depth_variance * squared)
+        shrink = view.depth_variance / (1.0 + view.depth_variance * squared)
         along = (derivative * residual).sum(axis=1)
-        chi2 = (np.square(residual).sum(axis=1) - shrink * along**2) / view.pixel_variance
+        chi2 = np.square(residual).sum(axis=1) - shrink * along**2
         if iteration == 0:
             doubt = np.square(jacobian * sigma).sum(axis=(1, 2))
-            allowed = in_front & (chi2 <= _GATE_CHI2 * (1.0 + doubt / view.pixel_variance))
+            allowed = in_front & (chi2 <= _GATE_CHI2 * (1.0 + doubt))
         inliers = int(np.count_nonzero(allowed & (chi2 <= _GATE_CHI2)))
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
         weight = np.where(allowed & in_front, np.square(1.0 / (1.0 + chi2 / (_GATE_CHI2 * scale))), 0.0)
-        weight = weight / (view.pixel_variance * scale)
+        weight = weight / scale
         projected = (jacobian * derivative[:, :, None]).sum(axis=1)
         flat = jacobian.reshape(-1, 6)
         weighted = flat * np.repeat(weight, 2)[:, None]
@@ -193,7 +194,8 @@ def _conflict(pose: Pose, start: Pose, sigma: FloatArray) -> bool:
 
 def _linearise(view: _View, pose: Pose) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """Jacobian (N, 2, 6) of the pixel by a small motion of the camera, residual (N, 2) seen minus
-    predicted, derivative (N, 2) of the pixel by depth, and which points lie in front."""
+    predicted, derivative (N, 2) of the pixel by depth, all in sigmas of the pixel, and which points lie
+    in front."""
     camera = view.camera
     local = (view.points - pose.translation_m) @ pose.rotation
     direction = view.towards @ pose.rotation
@@ -218,13 +220,32 @@ def _linearise(view: _View, pose: Pose) -> tuple[FloatArray, FloatArray, FloatAr
     derivative = np.empty((len(x), 2))
     derivative[:, 0] = camera.fx * inverse * (direction[:, 0] - x * direction[:, 2])
     derivative[:, 1] = camera.fy * inverse * (direction[:, 1] - y * direction[:, 2])
-    return jacobian, residual, derivative, in_front
+    white = view.whitening
+    return (
+        white @ jacobian,
+        (white @ residual[:, :, None])[:, :, 0],
+        (white @ derivative[:, :, None])[:, :, 0],
+        in_front,
+    )
+
+
+def _whitening(covariance: FloatArray) -> FloatArray:
+    """(N, 2, 2) that turns residuals of covariance (N, 3) into ones of unit variance (inverse Cholesky)."""
+    first = np.sqrt(covariance[:, 0])
+    low = covariance[:, 1] / first
+    second = np.sqrt(np.maximum(covariance[:, 2] - low * low, 1e-6))
+    result = np.zeros((len(covariance), 2, 2))
+    result[:, 0, 0] = 1.0 / first
+    result[:, 1, 0] = -low / (first * second)
+    result[:, 1, 1] = 1.0 / second
+    return result
 
 
 def _shift(view: _View, start: Pose, sigma: FloatArray) -> Pose:
     """A better start: turn by the median miss of all points, as far as sigma (6,) admits."""
-    _, residual, _, _ = _linearise(view, start)
-    miss = np.median(residual, axis=0)
+    local = (view.points - start.translation_m) @ start.rotation
+    local[:, 2] = np.maximum(local[:, 2], 0.1)
+    miss = np.median(view.seen - project(local, view.camera), axis=0)
     turn = np.array([miss[1] / view.camera.fy, -miss[0] / view.camera.fx, 0.0])
     limit = 3.0 * sigma[:3]
     return start @ Pose(rotation_from_vector(np.clip(turn, -limit, limit)), np.zeros(3))

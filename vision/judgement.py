@@ -17,6 +17,7 @@ from config.perception import MotionSettings
 from hal.types import FloatArray
 
 _RISE_S = 0.10
+_FASTEST = 2.5  # times, with overwhelming proof
 _FALL_S = 0.30
 _HOLD_S = 2.0  # without new proof
 _STOP_S = 0.12  # with proof of standing still
@@ -90,10 +91,17 @@ def judge(
     own_along, own_across = split_squared_sigmas(seen.own_velocity, seen.own_covariance, seen.sight)
     agreeing = np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0)
     by_fragments_across = (across > threshold) & (own_across > 0.5 * threshold) & (agreeing >= _ENDS_ACROSS)
-    confirmed, contradicted = _second_opinion(seen)
+    surface_along, surface_across = split_squared_sigmas(
+        seen.surface_velocity, seen.surface_covariance, seen.sight
+    )
+    contradicted, confirmed_along, confirmed_across = _second_opinion(seen, surface_along, surface_across)
     many = (own_along > 0.5 * threshold) & (agreeing >= _ENDS_ALONG) & ~contradicted
-    shared = confirmed & (own_along > _OWN_PROOF) & (agreeing >= 2)
-    by_fragments_along = ((along > threshold) & many) | ((along > _SHARED_PROOF * threshold) & shared)
+    few = agreeing >= 2
+    shared = _SHARED_PROOF * threshold
+    by_fragments_along = ((along > threshold) & many) | (
+        (along > shared) & confirmed_along & few & (own_along > _OWN_PROOF)
+    )
+    by_fragments_across |= (across > shared) & confirmed_across & few & (own_across > _OWN_PROOF)
     has_arrived = (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells)
     by_arrival = has_arrived & (significance > 0.5 * threshold)
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
@@ -105,21 +113,30 @@ def judge(
     own_sigma = np.sqrt(np.trace(seen.own_covariance, axis1=1, axis2=2))
     stands = (own_speed < 0.6 * least) & (own_sigma < 0.5 * least) & (agreeing >= _ENDS_ACROSS)
     falling = np.where(stands, dt_s / _STOP_S, np.where(holding, dt_s / _HOLD_S, dt_s / _FALL_S))
-    change = np.where(rising & ~stands, dt_s / _RISE_S, -falling)
+    strength = np.minimum(np.maximum(along, across), np.maximum(own_along, own_across)) / threshold
+    pace = np.clip(strength, 1.0, _FASTEST)
+    change = np.where(rising & ~stands, pace * dt_s / _RISE_S, -falling)
     new_evidence = np.clip(evidence + change, 0.0, _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
     confidence = 1.0 - np.exp(-significance / 60.0)
     return Verdict(new_evidence, new_moving, confidence)
 
 
-def _second_opinion(seen: MotionEvidence) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(T,) each: whether the surface's depth confirms the speed along the line of sight, or denies it."""
+def _second_opinion(
+    seen: MotionEvidence, surface_along: FloatArray, surface_across: FloatArray
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """(T,) each: whether the surface's centre denies the speed along the line of sight, confirms it, and
+    confirms the speed across. surface_along, surface_across (T,): its own squared sigmas."""
     by_fragments, variance = _along(seen.velocity, seen.covariance, seen.sight)
     by_surface, surface_variance = _along(seen.surface_velocity, seen.surface_covariance, seen.sight)
     limit = _CONTRADICTION_SIGMAS**2 * (variance + surface_variance)
     denies = np.square(by_fragments - by_surface) > limit
-    confirms = (by_surface**2 > _CONFIRMING_SIGMAS**2 * surface_variance) & (by_surface * by_fragments > 0)
-    return confirms & ~denies, denies
+    same_way = by_surface * by_fragments > 0
+    least = _CONFIRMING_SIGMAS**2
+    rest = seen.velocity - by_fragments[:, None] * seen.sight
+    surface_rest = seen.surface_velocity - by_surface[:, None] * seen.sight
+    same_side = (rest * surface_rest).sum(axis=1) > 0
+    return denies, (surface_along > least) & same_way & ~denies, (surface_across > least) & same_side
 
 
 def _along(velocity: FloatArray, covariance: FloatArray, sight: FloatArray) -> tuple[FloatArray, FloatArray]:

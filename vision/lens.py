@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,14 +31,8 @@ def project(points_m: FloatArray, camera: Intrinsics) -> FloatArray:
 
 def rotation_from_vector(vector_rad: FloatArray) -> FloatArray:
     """(3, 3) rotation about the axis of vector_rad by its length (Rodrigues' formula)."""
-    angle = float(np.sqrt(vector_rad @ vector_rad))
-    x, y, z = vector_rad
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # sin(a)/a and (1 - cos(a))/a^2 through sinc, which is exact at a = 0.
-    first = float(np.sinc(angle / np.pi))
-    half = float(np.sinc(0.5 * angle / np.pi))
-    rotation: FloatArray = np.eye(3) + first * skew + 0.5 * half * half * (skew @ skew)
-    return rotation
+    rotation, _ = cv2.Rodrigues(vector_rad)
+    return np.asarray(rotation, dtype=np.float64)
 
 
 def vector_from_rotation(rotation: FloatArray) -> FloatArray:

@@ -13,7 +13,8 @@ from config.perception import FragmentSettings
 from vision.edges import GreyImage
 
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)
-_MIN_EIGENVALUE = 1e-4
+_MIN_EIGENVALUE = 1e-5
+_EXPECTATION_PX = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +59,7 @@ def track(
     common = np.median(there[:, 0, :] - guess, axis=0)
     back_guess = there - (guess + common - pixels).reshape(-1, 1, 2)
     back, back_ok, _ = search(now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1))
-    end: NDArray[np.float32] = there[:, 0, :].astype(np.float32, copy=False)
+    end = _held(there[:, 0, :].astype(np.float32, copy=False), guess + common, covariance)
     miss = back[:, 0, :] - pixels
     chi2 = mahalanobis(miss, covariance)
     height, width = now.shape
@@ -71,6 +72,24 @@ def track(
         & inside
     )
     return Flow(end, found)
+
+
+def _held(
+    found: NDArray[np.float32], expected: NDArray[np.float32], covariance: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """found (N, 2), with the part that the image cannot tell taken from expected (N, 2).
+
+    Along a straight edge a search ends anywhere; across it, it ends on the edge. The two are weighted by
+    covariance (N, 3) and by how far off an expectation usually is.
+    """
+    prior = np.float32(_EXPECTATION_PX**2)
+    xx, xy, yy = covariance[:, 0] + prior, covariance[:, 1], covariance[:, 2] + prior
+    scale = prior / (xx * yy - xy * xy)
+    a, b = found[:, 0] - expected[:, 0], found[:, 1] - expected[:, 1]
+    result = np.empty_like(found)
+    result[:, 0] = expected[:, 0] + scale * (yy * a - xy * b)
+    result[:, 1] = expected[:, 1] + scale * (xx * b - xy * a)
+    return result
 
 
 def mahalanobis(miss: NDArray[np.float32], covariance: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -18,6 +18,8 @@ _MOST_JUMP = 0.03
 _SPECKLE_CELLS = 6
 _NOISE_INVERSE = 0.003  # 1/m: what noise alone spreads the inverse depth of cells
 _UNIFORM = 3.46  # a uniform spread is this many standard deviations long
+_FOOT_M = 0.12
+_FOOT_PER_METRE = 0.015
 _OCCLUDED_SHARE = 0.15
 
 
@@ -72,8 +74,11 @@ def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
     return int(large.sum()), number[np.asarray(labels)]
 
 
-def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
-    """Boxes, centres and sizes of the parts 1..count of labels (h, w); entry k - 1 is part k."""
+def measure(grid: DepthGrid, labels: IntGrid, count: int, hidden: bool = False) -> Regions:
+    """Boxes, centres and sizes of the parts 1..count of labels (h, w); entry k - 1 is part k.
+
+    hidden: look for what hides them, too; without it whole knows of the image's border only.
+    """
     height, width = labels.shape
     flat = np.flatnonzero(labels)
     part = labels.ravel()[flat] - 1
@@ -105,9 +110,8 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     )
     step, half = grid.step_px, 0.5 * grid.step_px
     first, last = grid.offset_px - half, grid.offset_px + half
-    bbox[present] = np.stack(
-        (left * step + first, top * step + first, right * step + last, bottom * step + last), axis=1
-    )
+    lowest = np.maximum(bottom * step + last, _foot_px(grid, bottom, depth))
+    bbox[present] = np.stack((left * step + first, top * step + first, right * step + last, lowest), axis=1)
     extent[present] = np.stack(
         (
             (grid.x[right] - grid.x[left]) * depth,
@@ -117,9 +121,26 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
         axis=1,
     )
     free = (left > 0) & (top > 0) & (right < width - 1) & (bottom < height - 1)
-    hidden = _hidden_cells(grid, labels, count)[present]
-    whole[present] = free & (hidden <= _OCCLUDED_SHARE * (bottom - top + 1))
+    if hidden:
+        free &= _hidden_cells(grid, labels, count)[present] <= _OCCLUDED_SHARE * (bottom - top + 1)
+    whole[present] = free
     return Regions(cells, bbox, position, extent, whole)
+
+
+def _foot_px(grid: DepthGrid, bottom: NDArray[np.intp], depth_m: FloatArray) -> FloatArray:
+    """(R,) image row where a part that nearly reaches down to the floor stands on it; -inf for others.
+
+    The lowest hand's breadth of a body is taken for floor, as the noise of depth demands.
+    """
+    if grid.height_m is None:
+        return np.full(len(bottom), -np.inf)
+    floor_y = (grid.camera_height_m / depth_m - np.sin(grid.pitch_rad)) / np.cos(grid.pitch_rad)
+    missing_m = (floor_y - grid.y[bottom]) * depth_m
+    row = (floor_y - grid.y[0]) / float(grid.y[1] - grid.y[0]) * grid.step_px + grid.offset_px
+    end = grid.offset_px + (len(grid.y) - 0.5) * grid.step_px
+    stands = missing_m <= _FOOT_M + _FOOT_PER_METRE * depth_m
+    result: FloatArray = np.where(stands, np.minimum(row, end), -np.inf)
+    return result
 
 
 def _hidden_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.intp]:

@@ -22,7 +22,7 @@ _LOW_SHARE = 0.4
 _CANDIDATES_PER_TILE = 4
 _SHARE_WITHOUT_DEPTH = 0.15
 _NOISE_STRUCTURE = 220.0  # what image noise of 3 grey levels adds to both eigenvalues over 7x7 px
-_LEAST_STRUCTURE = 30.0
+_LEAST_STRUCTURE = 3.0
 _MATCH_SIGMA = 6.0  # grey levels by which two sights of the same patch differ
 
 

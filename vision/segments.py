@@ -20,7 +20,7 @@ _PATCH_PX = _SNAP_PX + _WINDOW_PX + 1
 def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32]:
     """(N, 2, 2) segments of at least min_length_px that the probabilistic Hough transform finds."""
     found = cv2.HoughLinesP(
-        edges, 1.0, np.pi / 180.0, int(0.8 * min_length_px), minLineLength=min_length_px, maxLineGap=3
+        edges, 1.0, np.pi / 90.0, int(0.8 * min_length_px), minLineLength=min_length_px, maxLineGap=3
     )
     if found is None:
         return np.empty((0, 2, 2), np.float32)
@@ -57,17 +57,16 @@ def snap_to_corners(
 
 
 def _box_sum(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Sum over 7x7 windows, by running sums along both axes."""
-    width = 2 * _WINDOW_PX + 1
-    for axis in (1, 2):
-        running = np.cumsum(values, axis=axis, dtype=np.float32)
-        upper = np.take(running, range(width - 1, running.shape[axis]), axis=axis)
-        lower = np.take(running, range(running.shape[axis] - width), axis=axis)
-        keep = [slice(None)] * 3
-        keep[axis] = slice(1, None)
-        upper[tuple(keep)] -= lower
-        values = upper
-    return values
+    """(N, H - 6, W - 6) sums over 7x7 windows of values (N, H, W).
+
+    All patches are filtered as one tall image; windows that would reach into a neighbour are cut off.
+    """
+    count, height, width = values.shape
+    side = 2 * _WINDOW_PX + 1
+    tall = values.reshape(count * height, width)
+    summed = cv2.boxFilter(tall, cv2.CV_32F, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    inner = slice(_WINDOW_PX, -_WINDOW_PX)
+    return np.asarray(summed, np.float32).reshape(count, height, width)[:, inner, inner]
 
 
 def smaller_eigenvalue(

@@ -31,6 +31,9 @@ _CENTRE_NOISE = 0.2
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
 _AREA_GAIN = 0.2
 _JUMP_M = 0.3
+# Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor.
+_ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85])
+_ABOVE_PX = np.array([0.0, 0.0, 0.0, 8.0, 8.0, 8.0])
 _SMALL_SHARE = 0.3
 _ATTACH_M = 0.25
 
@@ -100,7 +103,7 @@ class Tracker:
         arrived = self._free.arrived(grid, standing, pose, detection.captured_ns)
         self._free.remember(grid, pose, detection.captured_ns)
         labels = self._label(detection, standing, arrived, elapsed_s)
-        measured = regions.measure(grid, labels, len(tracks))
+        measured = regions.measure(grid, labels, len(tracks), hidden=True)
         self._see(detection, measured)
         owner = self._adopt(detection, labels, owner)
         arrivals = np.bincount(labels[arrived], minlength=len(tracks) + 1)[1:]
@@ -212,12 +215,13 @@ class Tracker:
         if len(tracks) == 0 or len(owner) == 0:
             return np.full(len(owner), -1, np.int64)
         ends = detection.ends_px.astype(float)
-        shares = np.array([0.5, 0.15, 0.85])
-        along = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * shares[:, None]
+        along = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _ALONG[:, None]
+        along[..., 1] -= _ABOVE_PX
         rows, columns = grid.rows(along[..., 1].ravel()), grid.columns(along[..., 0].ravel())
-        there = labels[rows, columns].reshape(-1, 3)
+        count = len(_ALONG)
+        there = labels[rows, columns].reshape(-1, count)
         near = np.fmin(detection.near_m[:, 0], detection.near_m[:, 1]).astype(float)
-        gap = np.abs(grid.depth_m[rows, columns].reshape(-1, 3) - near[:, None])
+        gap = np.abs(grid.depth_m[rows, columns].reshape(-1, count) - near[:, None])
         gate = 0.3 + 2.0 * depth_sigma_m(near, self._config.depth_noise)
         agrees = (there > 0) & (gap <= gate[:, None])
         first = agrees.argmax(axis=1)
@@ -272,7 +276,7 @@ class Tracker:
             arrived=arrivals,
             cells=cells,
             size_m=tracks.extent_m.max(axis=1),
-            trusted=detection.ego_motion.source != "none",
+            trusted=detection.motion_known,
         )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving

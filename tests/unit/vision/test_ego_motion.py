@@ -35,7 +35,8 @@ def anchors(count: int = 160, seed: int = 7) -> Anchors:
     pixels = rng.uniform((20.0, 20.0), (620.0, 460.0), (count, 2))
     direction = rays(pixels, CAMERA)
     points = direction * rng.uniform(2.0, 8.0, count)[:, None]
-    return Anchors(points, direction, np.full(count, 0.02), np.full(count, 0.02), np.ones(count, np.bool_))
+    covariance = np.tile([0.02, 0.0, 0.02], (count, 1))
+    return Anchors(points, direction, np.full(count, 0.02), covariance, np.ones(count, np.bool_))
 
 
 def seen(points_m: FloatArray, motion: Pose = TRUE, noise_px: float = 0.0) -> FloatArray:
@@ -84,7 +85,7 @@ def test_the_motion_starts_from_where_the_camera_was() -> None:
         before.apply(local.points_m),
         local.range_m @ before.rotation.T,
         local.depth_sigma_m,
-        local.pixel_variance,
+        local.pixel_cov,
         local.usable,
     )
     found = estimate(placed, seen(local.points_m), before, nothing_known(), CAMERA)
@@ -221,3 +222,14 @@ def test_a_gyro_without_a_usable_reading_changes_nothing(readings: GyroSamples) 
     if len(readings.stamps_ns) == 0:
         readings = GyroSamples(np.empty(0, np.int64), np.empty((0, 3)))
     assert with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS) is prior
+
+
+def test_ends_on_upright_edges_count_across_them_only() -> None:
+    """Errors of several pixels along the edges, in every point alike, do not turn the camera."""
+    static = anchors()
+    slid = seen(static.points_m) + np.array([0.0, 4.0])
+    upright = replace(static, pixel_cov=np.tile([0.02, 0.0, 400.0], (len(slid), 1)))
+    found = estimate(upright, slid, IDENTITY, odometry(), CAMERA)
+    assert found.visual
+    yaw = vector_from_rotation((TRUE.inverse() @ found.pose).rotation)[1]
+    assert abs(yaw) < 2e-4
