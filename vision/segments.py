@@ -20,7 +20,7 @@ _PATCH_PX = _SNAP_PX + _WINDOW_PX + 1
 def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32]:
     """(N, 2, 2) segments of at least min_length_px that the probabilistic Hough transform finds."""
     found = cv2.HoughLinesP(
-        edges, 1.0, np.pi / 120.0, int(0.8 * min_length_px), minLineLength=min_length_px, maxLineGap=3
+        edges, 1.0, np.pi / 180.0, int(0.8 * min_length_px), minLineLength=min_length_px, maxLineGap=3
     )
     if found is None:
         return np.empty((0, 2, 2), np.float32)
