@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from config.perception import EgoMotionSettings
 from hal.types import FloatArray, GyroSamples, Intrinsics, Pose
-from vision.lens import project, rotation_from_vector, vector_from_rotation
+from vision.lens import rotation_from_vector, vector_from_rotation
 
 NS_PER_S = 1e9
 _ITERATIONS = 6
@@ -113,14 +113,7 @@ def estimate(
     use = np.flatnonzero(anchors.usable)
     if len(use) < _MIN_POINTS:
         return unseen
-    view = _View(
-        anchors.points_m[use],
-        anchors.range_m[use],
-        np.square(anchors.depth_sigma_m[use]),
-        _whitening(anchors.pixel_cov[use]),
-        pixels[use],
-        camera,
-    )
+    view = _view(anchors, pixels, use, camera)
     found = _solve(view, start, prior.sigma)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
     if prior.source == "odometry" and _conflict(found.pose, start, prior.sigma):
@@ -138,11 +131,15 @@ def estimate(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
-    points: FloatArray
-    towards: FloatArray
+    """The N points that count, coordinate by coordinate: at this size a NumPy call costs more than what it
+    computes, so everything of one kind lies in one array. lines (3, 2N): points, then their derivatives
+    by depth. seen (2, N): on the plane z = 1. whitening (3, N): turns an error (a, b) on that plane into
+    (w0 a, w1 a + w2 b), of unit variance."""
+
+    lines: FloatArray
+    seen: FloatArray
     depth_variance: FloatArray
     whitening: FloatArray
-    seen: FloatArray
     camera: Intrinsics
 
 
@@ -153,35 +150,58 @@ class _Solution:
     inliers: int
 
 
+def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: Intrinsics) -> _View:
+    """Of the points use (M,)."""
+    count = len(use)
+    lines = np.empty((3, 2 * count))
+    lines[:, :count] = anchors.points_m[use].T
+    lines[:, count:] = anchors.range_m[use].T
+    seen = np.empty((2, count))
+    u, v = pixels[use].T
+    seen[0] = (u - camera.cx) / camera.fx
+    seen[1] = (v - camera.cy) / camera.fy
+    # The inverse of Cholesky's factor.
+    xx, xy, yy = anchors.pixel_cov[use].T
+    first = np.sqrt(xx)
+    low = xy / first
+    second = np.sqrt(np.maximum(yy - low * low, 1e-6))
+    whitening = np.empty((3, count))
+    whitening[0] = camera.fx / first
+    whitening[1] = -camera.fx * low / (first * second)
+    whitening[2] = camera.fy / second
+    return _View(lines, seen, np.square(anchors.depth_sigma_m[use]), whitening, camera)
+
+
 def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
     """Iteratively reweighted Gauss-Newton from start, which is known to sigma (6,)."""
     prior_information = np.diag(1.0 / np.square(sigma))
     information, inliers = prior_information, 0
     pose = _shift(view, start, sigma)
-    allowed = np.ones(len(view.seen), np.bool_)
+    count = view.seen.shape[1]
+    table, weights = np.empty((8, 3, count)), np.empty((3, count))
+    flat = table[:7].reshape(7, 3 * count)
+    allowed = np.ones(count)
     for iteration in range(_ITERATIONS):
-        jacobian, residual, derivative, in_front = _linearise(view, pose)
+        in_front = _linearise(view, pose, table)
         # Depth's share of the covariance, by Sherman and Morrison: only along the epipolar line.
-        squared = np.square(derivative).sum(axis=1)
+        along, squared = table[6:, 2]
         shrink = view.depth_variance / (1.0 + view.depth_variance * squared)
-        along = (derivative * residual).sum(axis=1)
-        chi2 = np.square(residual).sum(axis=1) - shrink * along**2
+        a, b = table[6, :2]
+        chi2 = a * a + b * b - shrink * along * along
         if iteration == 0:
-            doubt = np.square(jacobian * sigma).sum(axis=(1, 2))
-            allowed = in_front & (chi2 <= _GATE_CHI2 * (1.0 + doubt))
-        inliers = int(np.count_nonzero(allowed & (chi2 <= _GATE_CHI2)))
+            doubt = np.square(table[:6, :2] * sigma[:, None, None]).sum(axis=(0, 1))
+            allowed = (in_front & (chi2 <= _GATE_CHI2 * (1.0 + doubt))).astype(np.float64)
+        inliers = int(np.count_nonzero(allowed * (chi2 <= _GATE_CHI2)))
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
-        weight = np.where(allowed & in_front, np.square(1.0 / (1.0 + chi2 / (_GATE_CHI2 * scale))), 0.0)
-        weight = weight / scale
-        projected = (jacobian * derivative[:, :, None]).sum(axis=1)
-        flat = jacobian.reshape(-1, 6)
-        weighted = flat * np.repeat(weight, 2)[:, None]
-        normal = weighted.T @ flat - (projected * (weight * shrink)[:, None]).T @ projected
-        rhs = weighted.T @ residual.ravel() - projected.T @ (weight * shrink * along)
-        information = normal + prior_information
-        step = np.linalg.solve(information, rhs + prior_information @ _difference(pose, start))
+        weight = allowed * in_front / (scale * np.square(1.0 + chi2 * (1.0 / (_GATE_CHI2 * scale))))
+        weights[:2] = weight
+        weights[2] = weight * -shrink
+        # Six rows of the normal matrix, and in the last column the right side.
+        normal = (table[:7] * weights).reshape(7, 3 * count) @ flat.T
+        information = normal[:6, :6] + prior_information
+        step = np.linalg.solve(information, normal[:6, 6] + prior_information @ _difference(pose, start))
         pose = pose @ Pose(rotation_from_vector(step[:3]), step[3:])
-        if iteration >= len(_ANNEAL) and float(np.abs(step).max()) < _CONVERGED:
+        if iteration >= len(_ANNEAL) and max(map(abs, step.tolist())) < _CONVERGED:
             break
     return _Solution(pose, information, inliers)
 
@@ -192,66 +212,63 @@ def _conflict(pose: Pose, start: Pose, sigma: FloatArray) -> bool:
     return float(off @ off) > _CONFLICT_CHI2
 
 
-def _linearise(view: _View, pose: Pose) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Jacobian (N, 2, 6) of the pixel by a small motion of the camera, residual (N, 2) seen minus
-    predicted, derivative (N, 2) of the pixel by depth, all in sigmas of the pixel, and which points lie
-    in front."""
-    camera = view.camera
-    local = (view.points - pose.translation_m) @ pose.rotation
-    direction = view.towards @ pose.rotation
-    in_front = local[:, 2] > 0.1
-    inverse = 1.0 / np.where(in_front, local[:, 2], 1.0)
-    x, y = local[:, 0] * inverse, local[:, 1] * inverse
-    residual = np.empty((len(x), 2))
-    residual[:, 0] = view.seen[:, 0] - (x * camera.fx + camera.cx)
-    residual[:, 1] = view.seen[:, 1] - (y * camera.fy + camera.cy)
+def _linearise(view: _View, pose: Pose, table: FloatArray) -> NDArray[np.bool_]:
+    """Fill table (8, 3, N); returns which points lie in front of the camera.
+
+    Rows 0 to 5: derivative of the image by a small motion of the camera (rotation, translation); row 6:
+    seen minus predicted; row 7: derivative by depth. First and second layer: across and down the image,
+    in sigmas. Third layer: the part along the derivative by depth, times its length.
+    """
+    count = view.seen.shape[1]
+    turned = pose.rotation.T @ view.lines
+    x, y, z = turned[:, :count] - (pose.rotation.T @ pose.translation_m)[:, None]
+    direction = turned[:, count:]
+    in_front: NDArray[np.bool_] = z > 0.1
+    inverse = 1.0 / np.maximum(z, 0.1)
+    x *= inverse
+    y *= inverse
     # The camera turns by w and goes by v: a point goes by -(w x p) - v in its frame.
-    jacobian = np.zeros((len(x), 2, 6))
-    jacobian[:, 0, 0] = camera.fx * x * y
-    jacobian[:, 0, 1] = -camera.fx * (1.0 + x * x)
-    jacobian[:, 0, 2] = camera.fx * y
-    jacobian[:, 0, 3] = -camera.fx * inverse
-    jacobian[:, 0, 5] = camera.fx * x * inverse
-    jacobian[:, 1, 0] = camera.fy * (1.0 + y * y)
-    jacobian[:, 1, 1] = -camera.fy * x * y
-    jacobian[:, 1, 2] = -camera.fy * x
-    jacobian[:, 1, 4] = -camera.fy * inverse
-    jacobian[:, 1, 5] = camera.fy * y * inverse
-    derivative = np.empty((len(x), 2))
-    derivative[:, 0] = camera.fx * inverse * (direction[:, 0] - x * direction[:, 2])
-    derivative[:, 1] = camera.fy * inverse * (direction[:, 1] - y * direction[:, 2])
-    white = view.whitening
-    return (
-        white @ jacobian,
-        (white @ residual[:, :, None])[:, :, 0],
-        (white @ derivative[:, :, None])[:, :, 0],
-        in_front,
-    )
-
-
-def _whitening(covariance: FloatArray) -> FloatArray:
-    """(N, 2, 2) that turns residuals of covariance (N, 3) into ones of unit variance (inverse Cholesky)."""
-    first = np.sqrt(covariance[:, 0])
-    low = covariance[:, 1] / first
-    second = np.sqrt(np.maximum(covariance[:, 2] - low * low, 1e-6))
-    result = np.zeros((len(covariance), 2, 2))
-    result[:, 0, 0] = 1.0 / first
-    result[:, 1, 0] = -low / (first * second)
-    result[:, 1, 1] = 1.0 / second
-    return result
+    across, down, along = table[:, 0], table[:, 1], table[:, 2]
+    np.multiply(x, y, out=across[0])
+    np.negative(across[0], out=down[1])
+    np.subtract(-1.0, x * x, out=across[1])
+    np.add(1.0, y * y, out=down[0])
+    across[2] = y
+    np.negative(x, out=down[2])
+    np.negative(inverse, out=across[3])
+    across[4] = 0.0
+    down[3] = 0.0
+    down[4] = across[3]
+    np.multiply(x, inverse, out=across[5])
+    np.multiply(y, inverse, out=down[5])
+    np.subtract(view.seen[0], x, out=across[6])
+    np.subtract(view.seen[1], y, out=down[6])
+    np.multiply(inverse, direction[0] - x * direction[2], out=across[7])
+    np.multiply(inverse, direction[1] - y * direction[2], out=down[7])
+    own, mixed, other = view.whitening
+    down *= other
+    down += across * mixed
+    across *= own
+    np.multiply(across, across[7], out=along)
+    along += down * down[7]
+    return in_front
 
 
 def _shift(view: _View, start: Pose, sigma: FloatArray) -> Pose:
     """A better start: turn by the median miss of all points, as far as sigma (6,) admits."""
-    local = (view.points - start.translation_m) @ start.rotation
-    local[:, 2] = np.maximum(local[:, 2], 0.1)
-    miss = np.median(view.seen - project(local, view.camera), axis=0)
-    turn = np.array([miss[1] / view.camera.fy, -miss[0] / view.camera.fx, 0.0])
+    count = view.seen.shape[1]
+    local = start.rotation.T @ view.lines[:, :count] - (start.rotation.T @ start.translation_m)[:, None]
+    miss = np.sort(view.seen - local[:2] / np.maximum(local[2], 0.1), axis=1)
+    across, down = 0.5 * (miss[:, (count - 1) // 2] + miss[:, count // 2])
+    turn = np.array([down, -across, 0.0])
     limit = 3.0 * sigma[:3]
     return start @ Pose(rotation_from_vector(np.clip(turn, -limit, limit)), np.zeros(3))
 
 
 def _difference(pose: Pose, start: Pose) -> FloatArray:
     """(6,) the small motion of pose that leads back to start."""
-    back = pose.inverse() @ start
-    return np.concatenate((vector_from_rotation(back.rotation), back.translation_m))
+    back = pose.rotation.T
+    result = np.empty(6)
+    result[:3] = vector_from_rotation(back @ start.rotation)
+    result[3:] = back @ (start.translation_m - pose.translation_m)
+    return result
