@@ -19,11 +19,11 @@ from vision.lens import RealArray
 
 Depths = TypeVar("Depths", NDArray[np.float32], NDArray[np.float64])
 
-_REACH_PX = (-6, -3, 0, 3, 6)
-_OFFSETS_U = np.tile(np.array(_REACH_PX), len(_REACH_PX))
-_OFFSETS_V = np.repeat(np.array(_REACH_PX), len(_REACH_PX))
+_REACH_PX = np.array((-6, -3, 0, 3, 6))
+_SAMPLES = len(_REACH_PX) ** 2
 _NEAR_RANK = 4  # the 5th nearest of 25 samples: a corner of a body still covers a fifth of them
 _MIN_SUPPORT = 4
+_NO_DATA_M = np.float32(1e6)  # sorts behind everything that is valid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,27 +51,37 @@ def surface_depth(
     noise: DepthNoise,
 ) -> SurfaceDepth:
     """Near and far surface around pixels (N, 2), within [min_m, max_m] (the paper's 10 m)."""
-    height, width = depth.shape
-    column = np.rint(pixels[:, 0]).astype(np.intp)[:, None] + _OFFSETS_U
-    row = np.rint(pixels[:, 1]).astype(np.intp)[:, None] + _OFFSETS_V
-    np.clip(column, 0, width - 1, out=column)
-    np.clip(row, 0, height - 1, out=row)
-    sample_m = depth.ravel()[row * width + column] * np.float32(scale_m)
-    valid = (sample_m >= min_m) & (sample_m <= max_m)
-    sample_m[~valid] = np.inf
+    sample_m = _samples(depth, pixels) * np.float32(scale_m)
+    sample_m[(sample_m < min_m) | (sample_m > max_m)] = _NO_DATA_M
     ordered = np.sort(sample_m, axis=1)
-    count = valid.sum(axis=1)
+    valid = ordered < _NO_DATA_M
+    count = _count(valid)
     # With holes around, the same share of what is valid decides.
     rank = np.minimum(_NEAR_RANK, count // 3)
-    anchor_m = ordered[np.arange(len(ordered)), rank]
-    with np.errstate(invalid="ignore"):
-        gate_m = 0.06 + 3.0 * depth_sigma_m(anchor_m.astype(float), noise)
-        is_near = np.abs(ordered - anchor_m[:, None]) <= gate_m[:, None]
-    is_far = np.isfinite(ordered) & ~is_near & (ordered > anchor_m[:, None])
-    values = np.where(np.isfinite(ordered), ordered, 0.0)
-    near_count = is_near.sum(axis=1)
-    far_count = is_far.sum(axis=1)
-    enough = (count >= _MIN_SUPPORT) & (near_count >= 2)
-    near_m = np.where(enough, (values * is_near).sum(axis=1) / np.maximum(near_count, 1), np.nan)
-    far_m = np.where(far_count >= 2, (values * is_far).sum(axis=1) / np.maximum(far_count, 1), near_m)
-    return SurfaceDepth(near_m, np.where(enough, far_m, np.nan))
+    anchor_m = ordered[np.arange(len(rank)), rank]
+    gate_m = (0.06 + 3.0 * depth_sigma_m(anchor_m.astype(float), noise)).astype(np.float32)[:, None]
+    behind_m = ordered - anchor_m[:, None]
+    is_near = np.abs(behind_m) <= gate_m
+    is_far = (behind_m > gate_m) & valid
+    near_count, far_count = _count(is_near), _count(is_far)
+    near_m = (ordered * is_near).sum(axis=1) / np.maximum(near_count, 1).astype(float)
+    far_m = (ordered * is_far).sum(axis=1) / np.maximum(far_count, 1).astype(float)
+    near_m[(count < _MIN_SUPPORT) | (near_count < 2)] = np.nan
+    return SurfaceDepth(near_m, np.where((far_count >= 2) & (near_m == near_m), far_m, near_m))
+
+
+def _samples(depth: DepthImage, pixels: RealArray) -> DepthImage:
+    """(N, 25) raw depth around pixels (N, 2); samples beyond the border are taken at the border."""
+    height, width = depth.shape
+    centre = np.rint(pixels).astype(np.intp)
+    column = np.minimum(np.maximum(centre[:, :1] + _REACH_PX, 0), width - 1)
+    row = np.minimum(np.maximum(centre[:, 1:] + _REACH_PX, 0), height - 1)
+    index = (row * width)[:, :, None] + column[:, None, :]
+    samples: DepthImage = depth.ravel().take(index.reshape(len(pixels), _SAMPLES))
+    return samples
+
+
+def _count(chosen: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """(N,) how many of the samples (N, 25) are chosen."""
+    result: NDArray[np.uint8] = np.add.reduce(chosen.view(np.uint8), axis=1, dtype=np.uint8)
+    return result

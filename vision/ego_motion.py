@@ -199,7 +199,8 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
         # Six rows of the normal matrix, and in the last column the right side.
         normal = (table[:7] * weights).reshape(7, 3 * count) @ flat.T
         information = normal[:6, :6] + prior_information
-        step = np.linalg.solve(information, normal[:6, 6] + prior_information @ _difference(pose, start))
+        rhs = normal[:6, 6] + prior_information @ _difference(pose, start)
+        step = np.linalg.solve(information, rhs).astype(np.float64, copy=False)
         pose = pose @ Pose(rotation_from_vector(step[:3]), step[3:])
         if iteration >= len(_ANNEAL) and max(map(abs, step.tolist())) < _CONVERGED:
             break
