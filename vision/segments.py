@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 
 from vision.edges import GreyImage
 
+FloatImage = NDArray[np.float32]
+
 _SNAP_PX = 4
 _WINDOW_PX = 3
-_PATCH_PX = _SNAP_PX + _WINDOW_PX + 1
+_MARGIN_PX = _SNAP_PX + _WINDOW_PX + 2
+_ONES = np.ones(2 * _WINDOW_PX + 1)
 
 
 def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32]:
@@ -38,35 +41,39 @@ def snap_to_corners(
     if len(ends_px) == 0:
         return ends_px, np.empty((0, 2, 3), np.float32)
     height, width = grey.shape
-    margin = _PATCH_PX + 1
     centre = np.rint(ends_px.reshape(-1, 2)).astype(np.intp)
-    column = np.clip(centre[:, 0], margin, width - 1 - margin)
-    row = np.clip(centre[:, 1], margin, height - 1 - margin)
-    reach = np.arange(-_PATCH_PX, _PATCH_PX + 1)
-    index = (row[:, None, None] + reach[:, None]) * width + column[:, None, None] + reach
-    patch = grey.ravel()[index].astype(np.float32)
-    du = 0.5 * (patch[:, 1:-1, 2:] - patch[:, 1:-1, :-2])
-    dv = 0.5 * (patch[:, 2:, 1:-1] - patch[:, :-2, 1:-1])
-    side = 2 * _SNAP_PX + 1
-    products = (du * du, du * dv, dv * dv)
-    tensor = np.stack([_box_sum(p).reshape(-1, side * side) for p in products], axis=-1)
-    best = smaller_eigenvalue(*np.moveaxis(tensor, -1, 0)).argmax(axis=1)
+    column = np.minimum(np.maximum(centre[:, 0], _MARGIN_PX), width - 1 - _MARGIN_PX)
+    row = np.minimum(np.maximum(centre[:, 1], _MARGIN_PX), height - 1 - _MARGIN_PX)
+    # The ends lie close together in one band of the image: filtering that is less than filtering patches.
+    left, top = int(column.min()) - _MARGIN_PX, int(row.min()) - _MARGIN_PX
+    right, bottom = int(column.max()) + _MARGIN_PX + 1, int(row.max()) + _MARGIN_PX + 1
+    tensor = _structure(grey[top:bottom, left:right])
+    reach = np.arange(-_SNAP_PX, _SNAP_PX + 1)
+    index = (
+        ((row - top)[:, None, None] + reach[:, None]) * (right - left)
+        + (column - left)[:, None, None]
+        + reach
+    )
+    index = index.reshape(len(centre), -1)
+    uu, uv, vv = (part.ravel().take(index) for part in tensor)
+    best = smaller_eigenvalue(uu, uv, vv).argmax(axis=1)
+    side = len(reach)
     snapped = np.stack((column + best % side - _SNAP_PX, row + best // side - _SNAP_PX), axis=1)
-    at_best = tensor[np.arange(len(best)), best]
+    each = np.arange(len(best))
+    at_best = np.stack((uu[each, best], uv[each, best], vv[each, best]), axis=1)
     return snapped.astype(np.float32).reshape(-1, 2, 2), at_best.reshape(-1, 2, 3)
 
 
-def _box_sum(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(N, H - 6, W - 6) sums over 7x7 windows of values (N, H, W).
-
-    All patches are filtered as one tall image; windows that would reach into a neighbour are cut off.
-    """
-    count, height, width = values.shape
-    side = 2 * _WINDOW_PX + 1
-    tall = values.reshape(count * height, width)
-    summed = cv2.boxFilter(tall, cv2.CV_32F, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    inner = slice(_WINDOW_PX, -_WINDOW_PX)
-    return np.asarray(summed, np.float32).reshape(count, height, width)[:, inner, inner]
+def _structure(grey: GreyImage) -> tuple[FloatImage, FloatImage, FloatImage]:
+    """uu, uv, vv of the structure tensor (H, W), summed over 7x7 px; not valid within 4 px of the border."""
+    du = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=1, scale=0.5)
+    dv = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=1, scale=0.5)
+    # Sums of whole quarters, far below 2^24 of them: exact, in whatever order they are added up.
+    uu, uv, vv = (
+        np.asarray(cv2.sepFilter2D(cv2.multiply(a, b), cv2.CV_32F, _ONES, _ONES), np.float32)
+        for a, b in ((du, du), (du, dv), (dv, dv))
+    )
+    return uu, uv, vv
 
 
 def smaller_eigenvalue(
