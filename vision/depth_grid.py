@@ -19,6 +19,7 @@ BoolGrid = NDArray[np.bool_]
 CELL_NOISE = (
     0.4  # noise of a cell over noise of a pixel: of neighbouring pixels, so less than the count tells
 )
+_SMALLEST = 1e-6
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
 
 
@@ -87,10 +88,10 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     else:
         raw, offset = frame.depth[step // 2 :: step, step // 2 :: step], float(step // 2)
     depth_m = raw * np.float32(scale_m)
-    valid = (depth_m >= config.min_depth_m) & (depth_m <= config.max_depth_m)
     beyond = depth_m > config.max_depth_m
-    inverse = _smooth(np.divide(1.0, depth_m, out=np.zeros_like(depth_m), where=valid), valid)
-    depth_m = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=valid).astype(np.float32)
+    valid = (depth_m >= config.min_depth_m) & ~beyond
+    inverse = _smooth(_inverted(depth_m, valid), valid)
+    depth_m = _inverted(inverse, valid)
     x, y = _rays(frame.intrinsics, depth_m.shape, step, offset)
     if mount is None:
         nan = float("nan")
@@ -115,11 +116,18 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     )
 
 
+def _inverted(values: FloatGrid, valid: BoolGrid) -> FloatGrid:
+    """1 / values where valid, else 0. valid values are not small: nothing else is divided by."""
+    result: FloatGrid = np.reciprocal(np.maximum(values, np.float32(_SMALLEST)))
+    result *= valid
+    return result
+
+
 def _smooth(inverse: FloatGrid, valid: BoolGrid) -> FloatGrid:
     """Median over 5x5 cells, but a cell that differs much keeps its own: a thin pole, a rim of a body."""
-    median = cv2.medianBlur(inverse, 5)
+    median = np.asarray(cv2.medianBlur(inverse, 5), np.float32)
     same = valid & (np.abs(inverse - median) <= np.float32(_AGREE_INVERSE))
-    return np.where(same, median, inverse)
+    return np.asarray(cv2.copyTo(median, same.view(np.uint8), inverse), np.float32)
 
 
 def _four_samples(depth: DepthImage, step: int, scale_m: float) -> DepthImage:
@@ -127,19 +135,21 @@ def _four_samples(depth: DepthImage, step: int, scale_m: float) -> DepthImage:
     lie on two surfaces, the nearer. A block with more than one sample without data has none."""
     rows, columns = depth.shape[0] // step * step, depth.shape[1] // step * step
     low, high = step // 4, step // 4 + step // 2
-    a = depth[low:rows:step, low:columns:step]
-    b = depth[low:rows:step, high:columns:step]
-    c = depth[high:rows:step, low:columns:step]
-    d = depth[high:rows:step, high:columns:step]
-    ab_low, ab_high = np.minimum(a, b), np.maximum(a, b)
-    cd_low, cd_high = np.minimum(c, d), np.maximum(c, d)
-    first, second = np.maximum(ab_low, cd_low), np.minimum(ab_high, cd_high)
+    a, b, c, d = (
+        np.ascontiguousarray(depth[row:rows:step, column:columns:step])
+        for row in (low, high)
+        for column in (low, high)
+    )
+    first = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    second = np.minimum(np.maximum(a, b), np.maximum(c, d))
     nearer, farther = np.minimum(first, second), np.maximum(first, second)
-    middle = nearer + (farther - nearer) // 2
+    gap = farther - nearer
     # 1/nearer - 1/farther <= k, without a division.
-    same = (farther - nearer) <= np.float32(_AGREE_INVERSE * scale_m) * nearer * farther.astype(np.float32)
-    result: DepthImage = np.where(same, middle, nearer)
-    return result
+    same = gap <= np.float32(_AGREE_INVERSE * scale_m) * nearer * farther.astype(np.float32)
+    gap >>= 1
+    gap *= same
+    nearer += gap
+    return nearer
 
 
 def _rays(

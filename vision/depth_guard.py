@@ -5,6 +5,7 @@ A plain wall has no fragments, and a corridor without valid depth (glass, black,
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,14 +24,11 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
     obstacle (h, w): cells between clearance and the robot's height; all valid ones where the mounting
     is not known. Without a floor to see, space is known up to the nearest surface only.
     """
-    rows, columns = obstacle.shape
+    columns = obstacle.shape[1]
     bands = min(BANDS, columns)
     width = columns // bands
     used = bands * width
-    forward = np.where(obstacle, grid.forward_m, np.float32(np.inf))[:, :used]
-    stacked = forward.reshape(rows, bands, width).transpose(1, 0, 2).reshape(bands, rows * width)
-    support = min(_SUPPORT, rows * width)
-    nearest = np.partition(stacked, support - 1, axis=1)[:, support - 1].astype(float)
+    nearest = _nearest_m(grid, obstacle, bands, width)
     x = grid.x[:used].reshape(bands, width).mean(axis=1).astype(float)
     half_width = 0.5 * width * float(grid.x[1] - grid.x[0])
     tilt = np.cos(grid.pitch_rad) - float(np.median(grid.y)) * np.sin(grid.pitch_rad)
@@ -43,6 +41,15 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
     return FreeSpace(x / tilt, half_width, nearest, np.minimum(known, max_depth_m))
 
 
+def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: int, width: int) -> NDArray[np.float64]:
+    """(bands,) forward distance of the nearest surface that enough obstacle cells agree on, inf without."""
+    forward = np.full(obstacle.shape, np.inf, np.float32)
+    cv2.copyTo(grid.forward_m, obstacle.view(np.uint8), forward)
+    upright = np.asarray(cv2.transpose(forward), np.float32)[: bands * width].reshape(bands, -1)
+    support = min(_SUPPORT, upright.shape[1])
+    return np.sort(upright, axis=1)[:, support - 1].astype(float)
+
+
 def _known_m(grid: DepthGrid, bands: int, width: int, max_depth_m: float) -> NDArray[np.float64]:
     """(bands,) how far the floor, or something on it, was seen without a hole."""
     cos_pitch, sin_pitch = np.cos(grid.pitch_rad), np.sin(grid.pitch_rad)
@@ -53,10 +60,11 @@ def _known_m(grid: DepthGrid, bands: int, width: int, max_depth_m: float) -> NDA
         return np.zeros(bands)
     floor_depth = grid.camera_height_m / drop[rows]
     floor_forward = floor_depth * (cos_pitch - grid.y[rows] * sin_pitch)
-    depth = grid.depth_m[rows, : bands * width]
-    seen = grid.valid[rows, : bands * width] & (depth <= _FLOOR_EXCESS * floor_depth[:, None])
-    share = seen.reshape(len(rows), bands, width).mean(axis=2)
-    hole = share < 0.5
+    limit_m = (_FLOOR_EXCESS * floor_depth).astype(np.float32)
+    lower = slice(len(grid.y) - len(rows), None)
+    seen = (grid.valid[lower] & (grid.depth_m[lower] <= limit_m[::-1, None]))[::-1, : bands * width]
+    count = sum(seen[:, column::width].astype(np.uint8) for column in range(width))
+    hole = count < 0.5 * width
     # A single row may be lost to noise; two in a row are a hole.
     run = hole.copy()
     for shift in range(1, _HOLE_ROWS):
