@@ -80,12 +80,13 @@ class FreeMemory:
     def _free_then(
         self, grid: DepthGrid, points: FloatGrid, pose: Pose, memory: _Memory
     ) -> NDArray[np.bool_]:
-        """(K,) which of points (K, 3), camera axes now, lay in what memory saw through."""
+        """(K,) which of points (3, K), camera axes now, lay in what memory saw through."""
         relative = memory.pose.inverse() @ pose
-        there = points @ relative.rotation.T.astype(np.float32) + relative.translation_m.astype(np.float32)
+        there = relative.rotation.astype(np.float32) @ points
+        there += relative.translation_m.astype(np.float32)[:, None]
         cell, inside = grid.project(there)
-        inverse = np.float32(1.0) / np.maximum(there[:, 2], np.float32(0.05))
-        seen = memory.nearest_inverse.ravel()[cell]
+        inverse = np.float32(1.0) / np.maximum(there[2], np.float32(0.05))
+        seen = memory.nearest_inverse.ravel().take(cell)
         sigma = np.float32(np.sqrt(2.0) * self._noise.quadratic_per_m)
         margin = np.float32(_MARGIN_M) * inverse * inverse + np.float32(_SIGMAS) * sigma
         result: NDArray[np.bool_] = inside & (inverse - seen > margin)

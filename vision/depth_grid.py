@@ -58,25 +58,26 @@ class DepthGrid:
         return np.clip(index, 0, self.depth_m.shape[0] - 1)
 
     def points(self, cells: NDArray[np.intp]) -> FloatGrid:
-        """(K, 3) camera coordinates of flat cell indices (K,)."""
-        rows, columns = np.divmod(cells, self.depth_m.shape[1])
-        depth = self.depth_m.ravel()[cells]
-        result = np.empty((len(cells), 3), np.float32)
-        result[:, 0] = self.x[columns] * depth
-        result[:, 1] = self.y[rows] * depth
-        result[:, 2] = depth
+        """(3, K) camera coordinates of flat cell indices (K,)."""
+        rows = cells // self.depth_m.shape[1]
+        columns = cells - rows * self.depth_m.shape[1]
+        depth = self.depth_m.ravel().take(cells)
+        result = np.empty((3, len(cells)), np.float32)
+        np.multiply(self.x.take(columns), depth, out=result[0])
+        np.multiply(self.y.take(rows), depth, out=result[1])
+        result[2] = depth
         return result
 
     def project(self, points: FloatGrid) -> tuple[NDArray[np.intp], BoolGrid]:
-        """Flat cell index (K,) of camera coordinates (K, 3), and which of them fall into the grid."""
+        """Flat cell index (K,) of camera coordinates (3, K), and which of them fall into the grid."""
         height, width = self.depth_m.shape
-        in_front = points[:, 2] > 0.1
-        inverse = np.float32(1.0) / np.where(in_front, points[:, 2], np.float32(1.0))
-        column = (points[:, 0] * inverse - self.x[0]) * (1.0 / (self.x[1] - self.x[0])) + 0.5
-        row = (points[:, 1] * inverse - self.y[0]) * (1.0 / (self.y[1] - self.y[0])) + 0.5
-        inside = in_front & (column >= 0) & (row >= 0) & (column < width) & (row < height)
-        flat = row.astype(np.intp) * width + column.astype(np.intp)
-        return np.where(inside, flat, 0), inside
+        x, y, z = points
+        inverse = np.reciprocal(np.maximum(z, np.float32(0.1)))
+        column = (x * inverse - self.x[0]) * (1.0 / (self.x[1] - self.x[0])) + 0.5
+        row = (y * inverse - self.y[0]) * (1.0 / (self.y[1] - self.y[0])) + 0.5
+        inside = (z > 0.1) & (column >= 0) & (row >= 0) & (column < width) & (row < height)
+        flat = row.astype(np.int32) * width + column.astype(np.int32)
+        return np.multiply(flat, inside, dtype=np.intp), inside
 
 
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:

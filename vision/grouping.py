@@ -132,7 +132,7 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
     cells = np.flatnonzero(labels.ravel() == track + 1)
     if len(cells) < 2 * _MIN_CELLS:
         return None
-    points = grid.points(cells).astype(float)[:, ::2]
+    points = grid.points(cells)[::2].T.astype(float)
     centred = points - np.median(points, axis=0)
     _, axes = np.linalg.eigh(centred.T @ centred)
     along = centred @ axes[:, 1]

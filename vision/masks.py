@@ -26,20 +26,27 @@ _DEPTH_GATE_M = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surfaces:
-    """What the tracks covered in one frame: points_m (K, 3) in the camera axes of pose, track id (K,)."""
+    """What T tracks covered in one frame: points_m (3, K) in the camera axes of pose, owner (K,): which of
+    the tracks, track_id (T,)."""
 
     points_m: FloatGrid
+    owner: NDArray[np.int32]
     track_id: NDArray[np.int64]
     pose: Pose
 
 
-NO_SURFACES = Surfaces(np.empty((0, 3), np.float32), np.empty(0, np.int64), Pose(np.eye(3), np.zeros(3)))
+NO_SURFACES = Surfaces(
+    np.empty((3, 0), np.float32),
+    np.empty(0, np.int32),
+    np.empty(0, np.int64),
+    Pose(np.eye(3), np.zeros(3)),
+)
 
 
 def surfaces(grid: DepthGrid, labels: IntGrid, ids: NDArray[np.int64], pose: Pose) -> Surfaces:
     """The surfaces of tracks with ids (T,), where labels (h, w) holds index + 1, 0 for none."""
-    cells = np.flatnonzero(labels)
-    return Surfaces(grid.points(cells), ids[labels.ravel()[cells] - 1], pose)
+    cells = np.flatnonzero(labels > 0)
+    return Surfaces(grid.points(cells), labels.ravel().take(cells) - 1, ids, pose)
 
 
 def predict(
@@ -47,27 +54,41 @@ def predict(
 ) -> IntGrid:
     """(h, w) track index + 1 that is expected, and found at the depth expected, in each cell; 0: none.
 
-    index (K,): track of each point of before, -1: gone. shift_m (T, 3): way of each track since then, in
-    the fixed frame that before.pose and pose are given in.
+    index (T,): what track each one of before is now, -1: gone. shift_m (now's tracks, 3): way of each since
+    then, in the fixed frame that before.pose and pose are given in.
     """
     result = np.zeros(grid.depth_m.shape, np.int32)
-    alive = index >= 0
-    if not alive.any():
+    if len(before.owner) == 0:
         return result
-    points, track = before.points_m[alive], index[alive]
+    number = (index + 1).astype(np.int32)
     relative = pose.inverse() @ before.pose
-    there = points @ relative.rotation.T.astype(np.float32) + relative.translation_m.astype(np.float32)
-    there += (shift_m @ pose.rotation).astype(np.float32)[track]
+    there = relative.rotation.astype(np.float32) @ before.points_m
+    there += relative.translation_m.astype(np.float32)[:, None]
+    if shift_m.any():
+        way = np.append(shift_m, [[0.0, 0.0, 0.0]], axis=0)[index] @ pose.rotation
+        there += way.T.astype(np.float32).take(before.owner, axis=1)
     cell, inside = grid.project(there)
-    measured = grid.inverse_depth.ravel()[cell]
-    expected = np.float32(1.0) / np.maximum(there[:, 2], np.float32(0.1))
+    measured = grid.inverse_depth.ravel().take(cell)
+    expected = np.float32(1.0) / np.maximum(there[2], np.float32(0.1))
     gate = np.float32(_DEPTH_GATE_INVERSE) + np.float32(_DEPTH_GATE_M) * expected * expected
     agrees = inside & (measured > 0) & (np.abs(measured - expected) <= gate)
-    chosen = np.flatnonzero(agrees)
-    # The nearer surface is written last and wins the cell.
-    chosen = chosen[np.argsort(expected[chosen], kind="stable")]
-    result.ravel()[cell[chosen]] = track[chosen] + 1
+    if not number.all():
+        agrees &= number.take(before.owner) > 0
+    chosen = _nearest_last(np.flatnonzero(agrees), expected)
+    result.ravel()[cell.take(chosen)] = number.take(before.owner.take(chosen))
     return result
+
+
+def _nearest_last(chosen: NDArray[np.intp], inverse_depth: NDArray[np.float32]) -> NDArray[np.intp]:
+    """chosen (M,), the farthest first: what is written last into a cell stays there.
+
+    The bits of positive floats are ordered as the floats are, so one sort of whole numbers will do.
+    """
+    key = inverse_depth.take(chosen).view(np.uint32).astype(np.int64)
+    key <<= 32
+    key |= chosen
+    key.sort()
+    return key & 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,8 +111,8 @@ def count_votes(
     if tracks == 0 or count == 0:
         nobody = np.zeros(count, np.int32)
         return Ballot(np.zeros((count, tracks), np.bool_), nobody, nobody.astype(np.intp))
-    ballots = (parts > 0) & (predicted > 0)
-    cast = (parts[ballots] - 1) * tracks + predicted[ballots] - 1
+    ballots = np.flatnonzero((parts > 0) & (predicted > 0))
+    cast = parts.ravel().take(ballots) * tracks + predicted.ravel().take(ballots) - (tracks + 1)
     votes = np.bincount(cast, minlength=count * tracks).reshape(count, tracks)
     total = votes.sum(axis=1, keepdims=True)
     own = votes.sum(axis=0, keepdims=True)
@@ -109,14 +130,19 @@ def count_votes(
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:
     """(h, w) track index + 1: whole parts to their winner (P,), shared ones by the nearest vote."""
-    labels = np.concatenate(([np.int32(0)], winner))[parts]
-    shared = np.concatenate(([False], (ballot.present.sum(axis=1) > 1) & (winner > 0)))
+    labels = np.append(np.int32(0), winner).take(parts)
+    shared = np.append(False, (np.count_nonzero(ballot.present, axis=1) > 1) & (winner > 0))
     if not shared.any():
         return labels
     count, tracks = ballot.present.shape
     allowed = np.zeros((count + 1, tracks + 1), np.bool_)
     allowed[1:, 1:] = ballot.present
-    inside = shared[parts]
-    seeds = np.where(inside & allowed[parts, predicted], predicted, 0).astype(np.int32)
-    filled = spread_labels(seeds, inside)
-    return np.where(inside & allowed[parts, filled], filled, labels).astype(np.int32)
+    inside = shared.take(parts)
+    cells = np.flatnonzero(inside)
+    part, vote = parts.ravel().take(cells), predicted.ravel().take(cells)
+    seeds = np.zeros(parts.shape, np.int32)
+    seeds.ravel()[cells] = vote * allowed[part, vote]
+    filled = spread_labels(seeds, inside).ravel().take(cells)
+    fits = allowed[part, filled]
+    labels.ravel()[cells[fits]] = filled[fits]
+    return labels

@@ -177,13 +177,16 @@ def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:
     owned = labels > 0
     if not owned.any():
         return labels
+    # Nothing outside of the cells in question is nearer to one of them than what is inside.
+    u, v, width, height = cv2.boundingRect((mask | owned).view(np.uint8))
+    box = slice(v, v + height), slice(u, u + width)
+    inner, owned = labels[box], owned[box]
     _, found = cv2.distanceTransformWithLabels(
         (~owned).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
     )
     nearest: IntGrid = np.asarray(found, np.int32)
     table = np.zeros(int(nearest.max()) + 1, np.int32)
-    table[nearest[owned]] = labels[owned]
-    wanted = np.flatnonzero(mask & ~owned)
+    table[nearest[owned]] = inner[owned]
     result = labels.copy()
-    result.ravel()[wanted] = table.take(nearest.ravel().take(wanted))
+    result[box] = np.where(mask[box] & ~owned, table[nearest], inner)
     return result
