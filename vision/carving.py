@@ -18,6 +18,7 @@ from vision.depth_mask import depth_sigma_m
 from vision.detector import Detection
 from vision.regions import IntGrid
 from vision.tracks import Tracks
+from vision.velocities import ends_of
 
 SUSPECT_EVIDENCE = 0.3
 _COMPACT_M = 1.6
@@ -77,10 +78,10 @@ def _around_moving_fragments(detection: Detection, labels: IntGrid, config: Perc
     if len(chosen) < _MIN_FRAGMENTS:
         return result
     limit = config.motion.max_speed_mps
-    velocity, covariance = obstacles.fragment_velocities(motion, limit)
+    velocity, covariance = obstacles.fragment_velocities(ends_of(motion, chosen), limit)
     position = 0.5 * (motion.static_m[0::2] + motion.static_m[1::2])[chosen]
     sigma = depth_sigma_m(position[:, 2], config.depth_noise)
-    group = obstacles.cluster(position, velocity[chosen], covariance[chosen], sigma)
+    group = obstacles.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
     chosen = chosen[company]
     if len(chosen) == 0:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.velocities import PointMotion, chi2_2d, normal_equations, solve_velocity
+from vision.velocities import NormalEquations, PointMotion, chi2_2d, normal_equations, solve_velocity
 
 _ROBUST_CHI2 = 9.0
 _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
@@ -47,33 +47,33 @@ def body_velocities(
     chosen = np.flatnonzero(use)
     member[owner[chosen], chosen] = 1.0
     ends = member.sum(axis=1).astype(np.intp)
-    base = normal_equations(motion, np.ones(len(owner)))
-    per_end = np.concatenate((base.matrix.reshape(-1, 9), base.rhs, base.doubt), axis=1)
-    step_ok = np.isfinite(motion.depth_step_m)
-    step = np.where(step_ok, motion.depth_step_m, 0.0)
-    information = np.where(step_ok, 1.0 / np.square(motion.depth_step_sigma_m), 0.0)
-    per_depth = np.stack((information * motion.lag_s**2, information * step * motion.lag_s), axis=1)
-    per_end[~use] = 0.0
-    per_depth[~use] = 0.0
-    share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))[:, None]
+    per_end = normal_equations(motion, np.ones(len(owner))).table
+    per_end = np.concatenate((per_end, _depth_steps(motion)))
+    per_end[:, ~use] = 0.0
+    share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))
     velocity = start_mps
     safe_owner = np.where(use, owner, 0)
     for scale in _ANNEAL:
         chi2 = end_chi2(motion, velocity[safe_owner])
         weight = np.where(use, np.square(1.0 / (1.0 + chi2 / (scale * _ROBUST_CHI2))), 0.0)
-        weighted = member * weight
-        summed = weighted @ per_end
-        depths = (weighted @ per_depth) * share
-        matrix, rhs = summed[:, :9].reshape(-1, 3, 3), summed[:, 9:12]
-        matrix[:, 2, 2] += depths[:, 0]
-        rhs[:, 2] += depths[:, 1]
-        velocity, covariance = solve_velocity(matrix, rhs, summed[:, 12:], max_speed_mps)
+        summed = per_end @ (member * weight).T
+        equations = NormalEquations(summed[:12])
+        equations.add_depth(summed[12] * share, summed[13] * share)
+        velocity, covariance = solve_velocity(equations, max_speed_mps)
     chi2 = end_chi2(motion, velocity[safe_owner])
     agree = (member * (chi2 <= _ROBUST_CHI2)).sum(axis=1) / np.maximum(ends, 1)
     # What the model does not explain (limbs, turning, sliding) widens the result.
     excess = (member * np.minimum(chi2, _ROBUST_CHI2)).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
     covariance = covariance * np.maximum(1.0, excess)[:, None, None]
     return BodyVelocities(velocity, covariance, ends, agree, chi2)
+
+
+def _depth_steps(motion: PointMotion) -> FloatArray:
+    """(2, 2N) information on the velocity along z in what depth itself does, and that times the velocity."""
+    known = np.isfinite(motion.depth_step_m)
+    root = np.where(known, motion.lag_s / motion.depth_step_sigma_m, 0.0)
+    step = np.where(known, motion.depth_step_m, 0.0) / motion.depth_step_sigma_m
+    return np.stack((root * root, root * step))
 
 
 def end_chi2(motion: PointMotion, velocity: FloatArray) -> FloatArray:
@@ -86,16 +86,11 @@ def end_chi2(motion: PointMotion, velocity: FloatArray) -> FloatArray:
 def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> tuple[FloatArray, FloatArray]:
     """(N, 3) velocity over ground of each fragment from its two ends, and its covariance (N, 3, 3)."""
     weight = motion.usable.astype(float)
-    base = normal_equations(motion, weight)
-    matrix = base.matrix.reshape(-1, 2, 3, 3).sum(axis=1)
-    rhs = base.rhs.reshape(-1, 2, 3).sum(axis=1)
-    doubt = base.doubt.reshape(-1, 2, 3).sum(axis=1)
-    step_ok = np.isfinite(motion.depth_step_m) & motion.usable
-    information = np.where(step_ok, 1.0 / np.square(motion.depth_step_sigma_m), 0.0)
-    step = np.where(step_ok, motion.depth_step_m, 0.0)
-    matrix[:, 2, 2] += (information * motion.lag_s**2).reshape(-1, 2).sum(axis=1)
-    rhs[:, 2] += (information * step * motion.lag_s).reshape(-1, 2).sum(axis=1)
-    return solve_velocity(matrix, rhs, doubt, max_speed_mps)
+    per_end = np.concatenate((normal_equations(motion, weight).table, _depth_steps(motion) * weight))
+    summed = per_end[:, 0::2] + per_end[:, 1::2]
+    equations = NormalEquations(summed[:12])
+    equations.add_depth(summed[12], summed[13])
+    return solve_velocity(equations, max_speed_mps)
 
 
 def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:

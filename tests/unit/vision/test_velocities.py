@@ -5,9 +5,11 @@ import pytest
 
 from hal.types import FloatArray
 from vision.velocities import (
+    NormalEquations,
     PointMotion,
     chi2_2d,
     depth_after,
+    ends_of,
     lateral_after,
     normal_equations,
     solve_velocity,
@@ -118,23 +120,54 @@ def test_correlated_pixels_are_weighted_by_the_inverse_of_their_covariance() -> 
     np.testing.assert_allclose(equations.doubt[0], rows.T @ weight @ [0.4, 0.1])
 
 
+def sums(matrix: FloatArray, rhs: list[float], doubt: list[float]) -> NormalEquations:
+    """One column of normal equations."""
+    upper = matrix[np.triu_indices(3)]
+    return NormalEquations(np.concatenate((upper, rhs, doubt))[:, None])
+
+
 def test_what_nothing_measures_is_bounded_not_zero() -> None:
-    velocity, covariance = solve_velocity(np.zeros((3, 3)), np.zeros(3), np.zeros(3), 1.5)
-    np.testing.assert_allclose(velocity, 0.0)
-    np.testing.assert_allclose(covariance, 2.25 * np.eye(3))
+    nothing = sums(np.zeros((3, 3)), [0.0] * 3, [0.0] * 3)
+    velocity, covariance = solve_velocity(nothing, 1.5)
+    np.testing.assert_allclose(velocity[0], 0.0)
+    np.testing.assert_allclose(covariance[0], 2.25 * np.eye(3))
 
 
 def test_solution_and_its_covariance_by_hand() -> None:
-    velocity, covariance = solve_velocity(
-        3.0 * np.eye(3), np.array([3.0, 0.0, -6.0]), np.array([4.0, 0.0, 0.0]), 1.0
-    )
+    equations = sums(3.0 * np.eye(3), [3.0, 0.0, -6.0], [4.0, 0.0, 0.0])
+    velocity, covariance = solve_velocity(equations, 1.0)
     # Information 3 + 1; one sigma of depth shifts the solution by (1, 0, 0).
-    np.testing.assert_allclose(velocity, [0.75, 0.0, -1.5])
-    np.testing.assert_allclose(covariance, np.diag([1.25, 0.25, 0.25]))
+    np.testing.assert_allclose(velocity[0], [0.75, 0.0, -1.5])
+    np.testing.assert_allclose(covariance[0], np.diag([1.25, 0.25, 0.25]))
 
 
-def test_stacks_of_bodies_are_solved_at_once() -> None:
-    matrix = np.stack((3.0 * np.eye(3), np.zeros((3, 3))))
-    velocity, covariance = solve_velocity(matrix, np.ones((2, 3)), np.zeros((2, 3)), 1.0)
-    np.testing.assert_allclose(velocity, [[0.25] * 3, [1.0] * 3])
-    assert covariance.shape == (2, 3, 3)
+def test_depth_adds_to_what_is_known_along_z() -> None:
+    equations = sums(np.eye(3), [0.0, 0.0, 1.0], [0.0] * 3)
+    equations.add_depth(np.array([2.0]), np.array([3.0]))
+    velocity, covariance = solve_velocity(equations, 1.0)
+    # Information 1 + 2 + 1, right side 1 + 3.
+    np.testing.assert_allclose(velocity[0], [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(covariance[0], np.diag([0.5, 0.5, 0.25]))
+
+
+def test_stacks_of_bodies_are_solved_at_once_and_as_a_general_solver_does() -> None:
+    rng = np.random.default_rng(3)
+    roots = rng.normal(size=(7, 3, 3)) * [1.0, 30.0, 900.0]
+    matrices = roots @ roots.transpose(0, 2, 1)
+    rhs, doubt = rng.normal(size=(2, 7, 3))
+    columns = [sums(*given).table for given in zip(matrices, rhs.tolist(), doubt.tolist(), strict=True)]
+    stacked = NormalEquations(np.concatenate(columns, axis=1))
+    np.testing.assert_allclose(stacked.matrix, matrices)
+    velocity, covariance = solve_velocity(stacked, 2.0)
+    inverse = np.linalg.inv(matrices + 0.25 * np.eye(3))
+    common = (inverse @ doubt[:, :, None])[:, :, 0]
+    np.testing.assert_allclose(velocity, (inverse @ rhs[:, :, None])[:, :, 0], rtol=1e-7)
+    np.testing.assert_allclose(covariance, inverse + common[:, :, None] * common[:, None, :], rtol=1e-7)
+
+
+def test_ends_of_some_fragments() -> None:
+    motion = evidence(np.arange(18.0).reshape(6, 3), np.arange(12.0).reshape(6, 2), 1.0)
+    some = ends_of(motion, np.array([2, 0]))
+    np.testing.assert_array_equal(some.static_m, motion.static_m[[4, 5, 0, 1]])
+    np.testing.assert_array_equal(some.miss_m, motion.miss_m[[4, 5, 0, 1]])
+    assert len(some.usable) == 4
