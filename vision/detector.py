@@ -12,10 +12,9 @@ from config.perception import PerceptionConfig
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
 from vision import optical_flow
 from vision.depth_grid import DepthGrid, make_grid
-from vision.depth_mask import depth_sigma_m, surface_depth
+from vision.depth_mask import surface_depth
 from vision.edges import GreyImage
 from vision.ego_motion import (
-    Anchors,
     CameraEstimate,
     MotionPrior,
     estimate,
@@ -23,17 +22,13 @@ from vision.ego_motion import (
     steady_prior,
     with_gyro,
 )
-from vision.evidence import average_depth, averaged_sigma_m, gather, observed_variance_scale
-from vision.fragments import AnchorEnds, FragmentStore
+from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
+from vision.fragments import FragmentStore
 from vision.health import Continuity, HealthMonitor, worsened
 from vision.lens import project, rays
 from vision.renewal import Renewal
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
 from vision.velocities import PointMotion
-
-# Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
-_UNKNOWN_DEPTH_M = 12.0
-_UNKNOWN_DEPTH_SIGMA_M = 10.0
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
 _AGREEMENT = 0.5
@@ -145,13 +140,16 @@ class Detector:
         store.near_m = surface.near_m.reshape(-1, 2).astype(np.float32)
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
         anchor = store.anchors(frame.captured_ns, config.motion.window_s)
-        result = self._camera(anchor, moving, prior, camera)
-        motion = gather(store, anchor, result, camera, config.depth_noise, self._variance_scale)
+        depths = appraise(anchor, config.depth_noise)
+        static = static_points(anchor, depths, store.pixel_cov, moving)
+        pixels = store.ends_px.reshape(-1, 2).astype(float)
+        result = estimate(static, pixels, self._pose, prior, camera)
+        motion = gather(store, anchor, depths, result, camera, config.depth_noise, self._variance_scale)
         if result.visual:
             self._variance_scale = observed_variance_scale(
                 motion, store.age_frames, moving, self._variance_scale
             )
-        average_depth(store, result.pose, camera, config.depth_noise)
+        average_depth(store, store.before(frame.captured_ns), result.pose, config.depth_noise)
         step = self._pose.inverse() @ result.pose
         ego = _ego(step, dt_s, result, prior)
         blurred = result.visual and prior.source == "none" and result.inlier_ratio < _AGREEMENT
@@ -172,7 +170,7 @@ class Detector:
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
     def _commit(self, frame: RgbdFrame, grey: GreyImage, odometry: Pose | None) -> None:
-        self._store.commit(frame.captured_ns, self._pose)
+        self._store.commit(frame.captured_ns, self._pose, frame.intrinsics)
         self._grey, self._last_ns, self._odometry = grey, frame.captured_ns, odometry
 
     def _restart(
@@ -254,26 +252,6 @@ class Detector:
         moved = (points - motion.translation_m) @ motion.rotation
         moved[:, 2] = np.maximum(moved[:, 2], 0.1)
         return project(moved, camera).astype(np.float32)
-
-    def _camera(
-        self, anchor: AnchorEnds, moving: NDArray[np.bool_], prior: MotionPrior, camera: Intrinsics
-    ) -> CameraEstimate:
-        rotation, translation = self._store.poses(np.repeat(anchor.slot, 2))
-        ray = rays(anchor.pixels.reshape(-1, 2), camera)
-        direction = (rotation @ ray[:, :, None])[:, :, 0]
-        near_m = anchor.depth_m.ravel().astype(float)
-        known = np.isfinite(near_m)
-        near_m = np.where(known, near_m, _UNKNOWN_DEPTH_M)
-        spread = np.nan_to_num(anchor.far_m.ravel() - near_m, nan=0.0)
-        noise = self._config.depth_noise
-        sigma = averaged_sigma_m(near_m, anchor.looks.ravel(), noise)
-        covariance = self._store.pixel_cov.reshape(-1, 3).astype(float)
-        sigma[~known] = _UNKNOWN_DEPTH_SIGMA_M
-        usable = (spread <= 0.1 + 3.0 * depth_sigma_m(near_m, noise)) & np.repeat(~moving, 2)
-        points = direction * near_m[:, None] + translation
-        anchors = Anchors(points, direction, sigma, covariance, usable)
-        pixels = self._store.ends_px.reshape(-1, 2).astype(float)
-        return estimate(anchors, pixels, self._pose, prior, camera)
 
 
 def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth_mask import depth_sigma_m
-from vision.ego_motion import CameraEstimate
+from vision.ego_motion import Anchors, CameraEstimate
 from vision.fragments import AnchorEnds, FragmentStore
 from vision.lens import rays
-from vision.velocities import PointMotion, chi2_2d, static_miss
+from vision.velocities import PointMotion, chi2_2d
 
+# Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
+_UNKNOWN_DEPTH_M = 12.0
+_UNKNOWN_DEPTH_SIGMA_M = 10.0
 _SETTLED_FRAMES = 3
 _LEAST_ENDS = 16
 _CHI2_THIRD = 0.811  # a third of static ends, 2 degrees of freedom, lies below
@@ -27,9 +33,45 @@ _MIXED_ALONG_PX = 3.0
 _MIXED_ACROSS_PX = 0.3
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class AnchorDepths:
+    """What the depths (2N,) of anchored ends are good for: near_m, sigma_m and far_m are finite throughout,
+    known tells where they were measured; mixed, where the end lies on two surfaces."""
+
+    near_m: FloatArray
+    sigma_m: FloatArray
+    far_m: FloatArray
+    known: NDArray[np.bool_]
+    mixed: NDArray[np.bool_]
+
+
+def appraise(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
+    """Where depth is missing, the end is taken for a distant one whose depth is hardly known."""
+    known = np.isfinite(anchor.depth_m)
+    near_m = np.where(known, anchor.depth_m, _UNKNOWN_DEPTH_M)
+    far_m = np.where(known, anchor.far_m, _UNKNOWN_DEPTH_M)
+    single = depth_sigma_m(near_m, noise)
+    sigma_m = np.where(known, single * _averaged(anchor.looks), _UNKNOWN_DEPTH_SIGMA_M)
+    return AnchorDepths(near_m, sigma_m, far_m, known, far_m - near_m > 0.1 + _MIXED_SIGMAS * single)
+
+
+def static_points(
+    anchor: AnchorEnds, depths: AnchorDepths, pixel_cov: NDArray[np.float32], moving: NDArray[np.bool_]
+) -> Anchors:
+    """The 2N ends as points to find the camera by. pixel_cov (N, 2, 3) and moving (N,) of the fragments."""
+    return Anchors(
+        (anchor.direction * depths.near_m + anchor.origin).T,
+        anchor.direction.T,
+        depths.sigma_m,
+        pixel_cov.reshape(-1, 3).astype(float),
+        ~(depths.mixed | np.repeat(moving, 2)),
+    )
+
+
 def gather(
     store: FragmentStore,
     anchor: AnchorEnds,
+    depths: AnchorDepths,
     now: CameraEstimate,
     camera: Intrinsics,
     noise: DepthNoise,
@@ -39,50 +81,39 @@ def gather(
 
     variance_scale: how much larger the variance of static ends has been found than it was assumed.
     """
-    rotation, translation = store.poses(np.repeat(anchor.slot, 2))
-    ray_before = rays(anchor.pixels.reshape(-1, 2), camera)
-    direction = (rotation @ ray_before[:, :, None])[:, :, 0] @ now.pose.rotation
-    origin = (translation - now.pose.translation_m) @ now.pose.rotation
-    near_m = anchor.depth_m.ravel().astype(float)
-    far_m = anchor.far_m.ravel().astype(float)
-    known = np.isfinite(near_m)
-    near_m, far_m = np.where(known, near_m, 1.0), np.where(known, far_m, 1.0)
-    ray = rays(store.ends_px.reshape(-1, 2), camera)[:, :2]
-    static = direction * near_m[:, None] + origin
-    in_front = static[:, 2] > 0.1
-    sigma = averaged_sigma_m(near_m, anchor.looks.ravel(), noise)
-    mixed = far_m - near_m > 0.1 + _MIXED_SIGMAS * depth_sigma_m(near_m, noise)
-    pixel_cov = _pixel_covariance(store, anchor, mixed)
-    metres = static[:, 2:3] / np.array([camera.fx, np.sqrt(camera.fx * camera.fy), camera.fy])
-    covariance = variance_scale * pixel_cov * metres**2
-    covariance[:, [0, 2]] += _pose_variance(now.covariance, static[:, 2])[:, None]
-    miss = static_miss(static, ray)
-    effect_per_m = ray * direction[:, 2:3] - direction[:, :2]
-    depth_scale = np.sqrt(variance_scale)
-    effect = effect_per_m * (depth_scale * sigma[:, None])
-    static_far = direction * far_m[:, None] + origin
-    scale = np.square(static_far[:, 2] / np.where(in_front, static[:, 2], 1.0))[:, None]
+    turn = now.pose.rotation.T
+    direction = turn @ anchor.direction
+    origin = turn @ (anchor.origin - now.pose.translation_m[:, None])
+    ray = np.ascontiguousarray(rays(store.ends_px.reshape(-1, 2), camera)[:, :2].T)
+    # Near and far surface at once, in the middle index: (3, 2, 2N), (2, 2, 2N).
+    static = direction[:, None] * np.stack((depths.near_m, depths.far_m)) + origin[:, None]
+    miss = ray[:, None] * static[2] - static[:2]
+    sigma = np.stack((depths.sigma_m, depth_sigma_m(depths.far_m, noise)))
+    effect = (ray * direction[2] - direction[:2])[:, None] * (sigma * math.sqrt(variance_scale))
+    depth = static[2, 0]
+    in_front = depth > 0.1
+    squared = np.square(depth)
+    per_pixel = np.array([[1.0 / camera.fx**2], [1.0 / (camera.fx * camera.fy)], [1.0 / camera.fy**2]])
+    covariance = _pixel_covariance(store, anchor, depths.mixed) * (per_pixel * (variance_scale * squared))
+    covariance[::2] += _pose_variance(now.covariance, squared)
+    behind = np.square(static[2, 1] / np.maximum(depth, 0.1))
     chi2 = np.minimum(
-        chi2_2d(miss, covariance, effect),
-        chi2_2d(
-            static_miss(static_far, ray),
-            covariance * scale,
-            effect_per_m * (depth_scale * depth_sigma_m(far_m, noise)[:, None]),
-        ),
+        chi2_2d(miss[:, 0].T, covariance.T, effect[:, 0].T),
+        chi2_2d(miss[:, 1].T, (covariance * behind).T, effect[:, 1].T),
     )
     depth_now = store.near_m.ravel().astype(float)
-    step_sigma = np.hypot(sigma, depth_sigma_m(np.nan_to_num(depth_now, nan=1.0), noise))
+    sigma_now = depth_sigma_m(np.where(np.isnan(depth_now), 1.0, depth_now), noise)
     return PointMotion(
-        static_m=static,
-        ray=ray,
+        static_m=static[:, 0].T,
+        ray=ray.T,
         lag_s=np.repeat(anchor.lag_s, 2),
-        miss_m=miss,
-        covariance=covariance,
-        depth_effect=effect,
-        depth_step_m=depth_now - static[:, 2],
-        depth_step_sigma_m=step_sigma,
+        miss_m=miss[:, 0].T,
+        covariance=covariance.T,
+        depth_effect=effect[:, 0].T,
+        depth_step_m=depth_now - depth,
+        depth_step_sigma_m=np.hypot(depths.sigma_m, sigma_now),
         static_chi2=chi2,
-        usable=known & in_front & np.isfinite(miss).all(axis=1),
+        usable=depths.known & in_front & np.isfinite(miss[0, 0] + miss[1, 0]),
     )
 
 
@@ -95,56 +126,59 @@ def observed_variance_scale(
     lower third of the ends decides, so that movers not yet known as such have no say.
     """
     settled = motion.usable & np.repeat((age_frames >= _SETTLED_FRAMES) & ~moving, 2)
-    if np.count_nonzero(settled) < _LEAST_ENDS:
+    ordered = np.sort(motion.static_chi2[settled])
+    if len(ordered) < _LEAST_ENDS:
         return before
-    third = float(np.quantile(motion.static_chi2[settled], 1.0 / 3.0))
+    place, rest = divmod(len(ordered) - 1, 3)
+    third = float(ordered[place] + (ordered[place + 1] - ordered[place]) * (rest / 3.0))
     seen = before * third / _CHI2_THIRD
-    return float(np.clip(before + _SCALE_GAIN * (seen - before), _LEAST_SCALE, _MOST_SCALE))
+    return min(max(before + _SCALE_GAIN * (seen - before), _LEAST_SCALE), _MOST_SCALE)
 
 
-def averaged_sigma_m(depth_m: FloatArray, looks: NDArray[np.float32], noise: DepthNoise) -> FloatArray:
-    """(N,) standard deviation of depth averaged over looks (N,) frames, whose noise is alike in part."""
-    share = np.maximum(1.0 / np.sqrt(np.maximum(looks, 1.0)), _COMMON_NOISE)
-    return depth_sigma_m(depth_m, noise) * share
+def _averaged(looks: FloatArray) -> FloatArray:
+    """(N,) what is left of the noise of depth averaged over looks (N,) frames, whose noise is alike in part."""
+    result: FloatArray = np.maximum(1.0 / np.sqrt(np.maximum(looks, 1.0)), _COMMON_NOISE)
+    return result
 
 
-def average_depth(store: FragmentStore, pose: Pose, camera: Intrinsics, noise: DepthNoise) -> None:
+def average_depth(store: FragmentStore, before: AnchorEnds, pose: Pose, noise: DepthNoise) -> None:
     """Carry the depth of every end on as if it were static, and average it with what is measured now.
 
     A measurement that does not fit begins anew: another surface, or something that moves in depth.
+    before: the ends in the frame before. pose: the camera now.
     """
-    pixels, depth, before = store.before()
-    relative = pose.inverse() @ before
-    points = rays(pixels.reshape(-1, 2), camera) * depth.reshape(-1, 1)
-    carried = (points @ relative.rotation[2] + relative.translation_m[2]).reshape(-1, 2)
-    with np.errstate(invalid="ignore"):
-        limit = 0.05 + 3.0 * depth_sigma_m(carried, noise)
-        fits = np.abs(store.near_m - carried) <= limit
+    forward = pose.rotation[:, 2]
+    way = forward @ (before.origin - pose.translation_m[:, None])
+    carried = ((forward @ before.direction) * before.depth_m + way).reshape(-1, 2)
+    off = store.near_m - carried
+    fits = np.abs(off) <= 0.05 + 3.0 * depth_sigma_m(carried, noise)  # not where either is missing
     looks = np.where(fits, np.minimum(store.looks + 1.0, _MOST_LOOKS), 1.0)
     store.looks = looks.astype(np.float32)
-    blended = carried + (store.near_m - carried) / looks
-    store.depth_m = np.where(fits, blended, store.near_m).astype(np.float32)
+    store.depth_m = np.where(fits, carried + off / looks, store.near_m).astype(np.float32)
 
 
 def _pixel_covariance(store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[np.bool_]) -> FloatArray:
-    """(2N, 3) covariance xx, xy, yy of the ends in the image, px^2, since their anchors.
+    """(3, 2N) covariance xx, xy, yy of the ends in the image, px^2, since their anchors.
 
     An end whose surroundings lie on two surfaces (mixed (2N,)) is often no corner of a body but the place
     where the outline of one crosses a line of another: it slides along the fragment when either moves.
     Across the fragment it is held as well as any.
     """
-    steps = np.maximum(1.0, _STEPS_SHARE * np.repeat(anchor.lag_frames, 2))
-    result: FloatArray = store.pixel_cov.reshape(-1, 3).astype(float) * steps[:, None]
-    along = (store.ends_px[:, 1] - store.ends_px[:, 0]).astype(float)
-    along /= np.maximum(np.sqrt(np.square(along).sum(axis=1, keepdims=True)), 1e-6)
-    tu, tv = np.repeat(along, 2, axis=0)[mixed].T
-    slide, rest = _MIXED_ALONG_PX**2, _MIXED_ACROSS_PX**2
-    result[mixed] += np.stack((slide * tu * tu + rest, slide * tu * tv, slide * tv * tv + rest), axis=1)
+    steps = np.repeat(np.maximum(1.0, _STEPS_SHARE * anchor.lag_frames), 2)
+    result: FloatArray = store.pixel_cov.reshape(-1, 3).T * steps
+    ends = np.flatnonzero(mixed)
+    both = store.ends_px[ends // 2].astype(float)
+    du, dv = (both[:, 1] - both[:, 0]).T
+    squared = np.maximum(du * du + dv * dv, 1e-12)
+    slide, rest = _MIXED_ALONG_PX**2 / squared, _MIXED_ACROSS_PX**2
+    result[0, ends] += slide * du * du + rest
+    result[1, ends] += slide * du * dv
+    result[2, ends] += slide * dv * dv + rest
     return result
 
 
-def _pose_variance(covariance: FloatArray, depth_m: FloatArray) -> FloatArray:
-    """(N,) variance in metres across the view that the camera's own uncertainty makes at depth_m (N,)."""
-    turn = float(np.max(np.diag(covariance)[:3]))
-    way = float(np.max(np.diag(covariance)[3:]))
-    return way + turn * np.square(depth_m)
+def _pose_variance(covariance: FloatArray, squared_depth: FloatArray) -> FloatArray:
+    """(N,) variance in metres across the view that the camera's own uncertainty makes at a depth."""
+    variance = covariance.diagonal().tolist()
+    result: FloatArray = max(variance[3:]) + max(variance[:3]) * squared_depth
+    return result

@@ -11,23 +11,28 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.types import FloatArray, Pose
+from hal.types import FloatArray, Intrinsics, Pose
+from vision.lens import rays
 
 HISTORY = 24
+_FEWEST_PLACES = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnchorEnds:
-    """Where the ends of each fragment were lag frames ago: pixels (N, 2, 2), depth_m, far_m (N, 2) and
-    looks (N, 2) as in the store, lag_frames (N,), lag_s (N,), slot (N,) of the camera pose."""
+    """Where the 2N ends of the fragments were some frames ago, both ends of one next to each other.
 
-    pixels: NDArray[np.float32]
-    depth_m: NDArray[np.float32]
-    far_m: NDArray[np.float32]
-    looks: NDArray[np.float32]
+    direction, origin (3, 2N): a point of depth d lay at d * direction + origin in the fixed frame.
+    depth_m, far_m, looks (2N,) as in the store. lag_frames, lag_s (N,): how long ago.
+    """
+
+    direction: FloatArray
+    origin: FloatArray
+    depth_m: FloatArray
+    far_m: FloatArray
+    looks: FloatArray
     lag_frames: NDArray[np.intp]
     lag_s: FloatArray
-    slot: NDArray[np.intp]
 
 
 class FragmentStore:
@@ -35,6 +40,9 @@ class FragmentStore:
 
     near_m, far_m (N, 2): depth measured in this frame. depth_m (N, 2): of the near surface, averaged over
     looks (N, 2) frames as for a static point.
+
+    The history is a ring of frames. Each fragment keeps its place in it for life, so that neither losing
+    nor finding fragments moves what is remembered of the others.
     """
 
     def __init__(self) -> None:
@@ -51,10 +59,11 @@ class FragmentStore:
         self.looks = np.empty((0, 2), np.float32)
         self.age_frames = np.empty(0, np.intp)
         self.pixel_cov = np.empty((0, 2, 3), np.float32)
-        self._history = np.empty((HISTORY, 0, 2, 5), np.float32)
+        # Direction (3), depth, far depth and looks of both ends: by frame and place.
+        self._history = np.empty((6, HISTORY, _FEWEST_PLACES, 2))
+        self._place = np.empty(0, np.intp)
         self._stamps_ns = np.zeros(HISTORY, np.int64)
-        self._rotations = np.tile(np.eye(3), (HISTORY, 1, 1))
-        self._translations = np.zeros((HISTORY, 3))
+        self._origins = np.zeros((3, HISTORY))
         self._comparable = 0
         self._head = -1
 
@@ -73,7 +82,7 @@ class FragmentStore:
         self.looks = self.looks[chosen]
         self.age_frames = self.age_frames[chosen]
         self.pixel_cov = self.pixel_cov[chosen]
-        self._history = self._history[:, chosen]
+        self._place = self._place[chosen]
 
     def add(
         self,
@@ -95,21 +104,33 @@ class FragmentStore:
         self.looks = np.concatenate((self.looks, np.ones((count, 2), np.float32)))
         self.age_frames = np.concatenate((self.age_frames, np.zeros(count, np.intp)))
         self.pixel_cov = np.concatenate((self.pixel_cov, pixel_cov))
-        room = np.full((HISTORY, count, 2, 5), np.nan, np.float32)
-        self._history = np.concatenate((self._history, room), axis=1)
+        self._place = np.concatenate((self._place, self._free_places(count)))
 
-    def commit(self, stamp_ns: int, pose: Pose) -> None:
-        """Write the present ends into the history, with the camera pose of this frame."""
+    def _free_places(self, count: int) -> NDArray[np.intp]:
+        """Places in the history that no fragment has; it grows where they do not suffice."""
+        free = np.ones(self._history.shape[2], np.bool_)
+        free[self._place] = False
+        places = np.flatnonzero(free)
+        missing = count - len(places)
+        if missing > 0:
+            more = max(missing, len(free))
+            room = np.empty((6, HISTORY, more, 2))
+            self._history = np.concatenate((self._history, room), axis=2)
+            places = np.concatenate((places, np.arange(len(free), len(free) + more)))
+        return places[:count]
+
+    def commit(self, stamp_ns: int, pose: Pose, camera: Intrinsics) -> None:
+        """Write the present ends into the history, with the camera of this frame."""
         self._head = (self._head + 1) % HISTORY
         self._comparable = min(self._comparable + 1, HISTORY)
-        slot = self._history[self._head]
-        slot[:, :, :2] = self.ends_px
-        slot[:, :, 2] = self.depth_m
-        slot[:, :, 3] = self.far_m
-        slot[:, :, 4] = self.looks
+        frame, place = self._history[:, self._head], self._place
+        direction = pose.rotation @ rays(self.ends_px.reshape(-1, 2), camera).T
+        frame[:3, place] = direction.reshape(3, -1, 2)
+        frame[3, place] = self.depth_m
+        frame[4, place] = self.far_m
+        frame[5, place] = self.looks
         self._stamps_ns[self._head] = stamp_ns
-        self._rotations[self._head] = pose.rotation
-        self._translations[self._head] = pose.translation_m
+        self._origins[:, self._head] = pose.translation_m
         self.age_frames += 1
 
     def break_history(self) -> None:
@@ -125,22 +146,18 @@ class FragmentStore:
         slots = (self._head - back + 1) % HISTORY
         ages_s: FloatArray = np.multiply(now_ns - self._stamps_ns[slots], 1e-9, dtype=np.float64)
         reach = max(1, int(np.count_nonzero(ages_s <= window_s)))
-        lag = np.clip(self.age_frames, 1, reach)
-        slot = slots[lag - 1]
-        rows = self._history[slot, np.arange(len(self.ids))]
-        return AnchorEnds(
-            rows[:, :, :2], rows[:, :, 2], rows[:, :, 3], rows[:, :, 4], lag, ages_s[lag - 1], slot
-        )
+        lag = np.minimum(np.maximum(self.age_frames, 1), reach)
+        return self._sight(slots.take(lag - 1), lag, ages_s.take(lag - 1))
 
-    def before(self) -> tuple[NDArray[np.float32], NDArray[np.float32], Pose]:
-        """Pixels (N, 2, 2) and depth_m (N, 2) in the frame before, and its camera pose."""
-        rows = self._history[self._head]
-        return (
-            rows[:, :, :2],
-            rows[:, :, 2],
-            Pose(self._rotations[self._head], self._translations[self._head]),
-        )
+    def before(self, now_ns: int) -> AnchorEnds:
+        """The last sight of each fragment: in the frame before."""
+        slot = np.full(len(self), self._head)
+        lag_s = (now_ns - int(self._stamps_ns[self._head])) * 1e-9
+        return self._sight(slot, np.ones(len(self), np.intp), np.full(len(self), lag_s))
 
-    def poses(self, slot: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-        """Camera rotation (N, 3, 3) and translation (N, 3) of history slots (N,)."""
-        return self._rotations[slot], self._translations[slot]
+    def _sight(self, slot: NDArray[np.intp], lag: NDArray[np.intp], lag_s: FloatArray) -> AnchorEnds:
+        """What the history holds of each fragment in its frame slot (N,)."""
+        rows = self._history.reshape(6, -1, 2).take(slot * self._history.shape[2] + self._place, axis=1)
+        rows = rows.reshape(6, -1)
+        origin = self._origins.take(np.repeat(slot, 2), axis=1)
+        return AnchorEnds(rows[:3], origin, rows[3], rows[4], rows[5], lag, lag_s)
