@@ -16,7 +16,7 @@ from vision import obstacles, regions
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_mask import depth_sigma_m
 from vision.detector import Detection
-from vision.regions import IntGrid
+from vision.regions import IntGrid, Regions
 from vision.tracks import Tracks
 from vision.velocities import ends_of
 
@@ -25,28 +25,41 @@ _COMPACT_M = 1.6
 _MIN_CELLS = 12
 _AROUND_M = 0.2
 _MIN_FRAGMENTS = 2
+_BLOCK = np.ones((3, 3), np.uint8)
+_AGREE_M = 0.3
+_AGREE_PER_M2 = 0.015
 
 
 def carve(
-    tracks: Tracks, detection: Detection, labels: IntGrid, arrived: BoolGrid, config: PerceptionConfig
+    tracks: Tracks,
+    detection: Detection,
+    labels: IntGrid,
+    measured: Regions,
+    arrived: BoolGrid,
+    config: PerceptionConfig,
 ) -> IntGrid:
-    """labels (h, w), track index + 1, with suspects cut out; they are started in tracks."""
+    """labels (h, w), track index + 1, with suspects cut out; they are started in tracks.
+
+    measured: of labels. The same labels come back where there is nothing to cut out.
+    """
     if len(tracks) == 0:
         return labels
     grid = detection.grid
     evidence = arrived | _around_moving_fragments(detection, labels, config)
     if not evidence.any():
         return labels
-    measured = regions.measure(grid, labels, len(tracks))
     mover = tracks.moving | (tracks.evidence > 0.0)
     compact = (measured.extent_m[:, 0] <= _COMPACT_M) & (
         measured.extent_m[:, 2]
         <= _COMPACT_M + 2.0 * depth_sigma_m(measured.position_m[:, 2], config.depth_noise)
     )
-    large = np.concatenate(([False], ~mover & ~compact))
-    inside = large[labels]
-    widened = cv2.dilate((evidence & inside).astype(np.uint8), np.ones((3, 3), np.uint8))
-    grown: BoolGrid = np.asarray(widened).astype(np.bool_) & inside
+    large = np.append(False, ~mover & ~compact)
+    inside = large.take(labels)
+    seeds = evidence & inside
+    if not seeds.any():
+        return labels
+    widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
+    grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
     if np.count_nonzero(grown) < _MIN_CELLS:
         return labels
     count, parts = regions.components(grid, grown)
@@ -56,7 +69,7 @@ def carve(
         return labels
     number = np.zeros(count + 1, np.int32)
     number[keep] = np.arange(1, len(keep) + 1)
-    own = number[parts]
+    own = number.take(parts)
     suspects = regions.measure(grid, own, len(keep))
     first = len(tracks)
     tracks.start(
@@ -94,20 +107,26 @@ def _around_moving_fragments(detection: Detection, labels: IntGrid, config: Perc
 def _near_ends(
     grid: DepthGrid, ends_px: NDArray[np.float32], depth_m: NDArray[np.float32], focal_px: float
 ) -> BoolGrid:
+    result = np.zeros(grid.depth_m.shape, np.bool_)
     depth = depth_m.ravel().astype(float)
     known = np.isfinite(depth)
     ends, depth = ends_px.reshape(-1, 2)[known].astype(float), depth[known]
-    seeds = np.ones(grid.depth_m.shape, np.uint8)
     if len(depth) == 0:
-        return np.zeros(seeds.shape, np.bool_)
+        return result
     rows, columns = grid.rows(ends[:, 1]), grid.columns(ends[:, 0])
+    # No cell farther away than this can be close to an end: the others need not be looked at.
+    reach_cells = int(_AROUND_M * focal_px / (grid.step_px * float(depth.min()))) + 2
+    top, left = max(int(rows.min()) - reach_cells, 0), max(int(columns.min()) - reach_cells, 0)
+    box = slice(top, int(rows.max()) + reach_cells + 1), slice(left, int(columns.max()) + reach_cells + 1)
+    rows, columns = rows - top, columns - left
+    seeds = np.ones(result[box].shape, np.uint8)
     seeds[rows, columns] = 0
-    distance, label = cv2.distanceTransformWithLabels(seeds, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
-    label = np.asarray(label)
+    distance, found = cv2.distanceTransformWithLabels(seeds, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
+    label: IntGrid = np.asarray(found, np.int32)
     there = np.zeros(int(label.max()) + 1)
     there[label[rows, columns]] = depth
-    nearest_m = there[label]
-    reach = np.asarray(distance) * grid.step_px * nearest_m <= _AROUND_M * focal_px
-    agrees = np.abs(grid.depth_m - nearest_m) <= 0.3 + 0.015 * nearest_m * nearest_m
-    result: BoolGrid = reach & agrees & grid.valid
+    nearest_m = there.take(label)
+    reach = np.asarray(distance) * (grid.step_px / (_AROUND_M * focal_px)) * nearest_m <= 1.0
+    agrees = np.abs(grid.depth_m[box] - nearest_m) <= _AGREE_M + _AGREE_PER_M2 * nearest_m * nearest_m
+    result[box] = reach & agrees & grid.valid[box]
     return result

@@ -136,7 +136,7 @@ def observed_variance_scale(
 
 
 def _averaged(looks: FloatArray) -> FloatArray:
-    """(N,) what is left of the noise of depth averaged over looks (N,) frames, whose noise is alike in part."""
+    """(N,) what is left of the noise of depth after looks (N,) frames, whose noise is alike in part."""
     result: FloatArray = np.maximum(1.0 / np.sqrt(np.maximum(looks, 1.0)), _COMMON_NOISE)
     return result
 

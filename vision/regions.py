@@ -27,11 +27,12 @@ _OCCLUDED_SHARE = 0.15
 class Regions:
     """What R labelled parts of the grid measure; entries without cells have cells == 0.
 
-    cells (R,). bbox_px (R, 4): u0, v0, u1, v1. position_m (R, 3): centre of the visible surface.
-    extent_m (R, 3). whole (R,): neither cut by the image's border nor hidden in part by something nearer.
+    cells (R,). rows (R,) of the grid that they reach over. bbox_px (R, 4): u0, v0, u1, v1. position_m (R, 3):
+    centre of the visible surface. extent_m (R, 3). whole (R,): not cut by the image's border.
     """
 
     cells: NDArray[np.intp]
+    rows: NDArray[np.intp]
     bbox_px: FloatArray
     position_m: FloatArray
     extent_m: FloatArray
@@ -97,10 +98,10 @@ def _sorted_cells(labels: IntGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]
     return both >> bits, both & ((1 << bits) - 1)
 
 
-def measure(grid: DepthGrid, labels: IntGrid, count: int, hidden: bool = False) -> Regions:
+def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     """Boxes, centres and sizes of the parts 1..count of labels (h, w); entry k - 1 is part k.
 
-    hidden: look for what hides them, too; without it whole knows of the image's border only.
+    whole knows of the image's border only; see unhidden.
     """
     height, width = labels.shape
     label, flat = _sorted_cells(labels)
@@ -110,7 +111,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int, hidden: bool = False) 
     position, extent = np.zeros((count, 3)), np.zeros((count, 3))
     whole = np.zeros(count, np.bool_)
     if len(flat) == 0:
-        return Regions(cells, bbox, position, extent, whole)
+        return Regions(cells, cells, bbox, position, extent, whole)
     present = np.flatnonzero(cells)
     starts, number = starts[present], cells[present]
     rows = flat // np.int32(width)
@@ -138,11 +139,16 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int, hidden: bool = False) 
     size[:, 1] = (grid.y[bottom] - grid.y[top]) * depth
     size[:, 2] = _UNIFORM * spread * depth * depth
     extent[present] = size
-    free = (left > 0) & (top > 0) & (right < width - 1) & (bottom < height - 1)
-    if hidden:
-        free &= _hidden_cells(grid, labels, count)[present] <= _OCCLUDED_SHARE * (bottom - top + 1)
-    whole[present] = free
-    return Regions(cells, bbox, position, extent, whole)
+    whole[present] = (left > 0) & (top > 0) & (right < width - 1) & (bottom < height - 1)
+    tall = np.zeros(count, np.intp)
+    tall[present] = bottom - top + 1
+    return Regions(cells, tall, bbox, position, extent, whole)
+
+
+def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[np.bool_]:
+    """(R,) which of the measured regions are whole and not hidden in part by something nearer, either."""
+    hidden = _hidden_cells(grid, labels, len(regions.cells))
+    return regions.whole & (hidden <= _OCCLUDED_SHARE * regions.rows)
 
 
 def _foot_px(grid: DepthGrid, bottom: NDArray[np.intp], depth_m: FloatArray) -> FloatArray:

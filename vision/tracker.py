@@ -102,9 +102,8 @@ class Tracker:
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         arrived = self._free.arrived(grid, standing, pose, detection.captured_ns)
         self._free.remember(grid, pose, detection.captured_ns)
-        labels = self._label(detection, standing, arrived, elapsed_s)
-        measured = regions.measure(grid, labels, len(tracks), hidden=True)
-        self._see(detection, measured)
+        labels, measured = self._label(detection, standing, arrived, elapsed_s)
+        self._see(detection, measured, regions.unhidden(grid, labels, measured))
         owner = self._adopt(detection, labels, owner)
         arrivals = np.bincount(labels[arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
@@ -114,8 +113,8 @@ class Tracker:
 
     def _label(
         self, detection: Detection, standing: BoolGrid, arrived: BoolGrid, elapsed_s: float
-    ) -> IntGrid:
-        """(h, w) track index + 1 of each cell, after births."""
+    ) -> tuple[IntGrid, Regions]:
+        """(h, w) track index + 1 of each cell, after births, and what the tracks' surfaces measure."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         mover = tracks.moving | (tracks.evidence > 0.0)
         shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
@@ -128,15 +127,20 @@ class Tracker:
         winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, mover)
         labels = masks.divide(parts, predicted, ballot, winner)
         labels = self._births(detection, parts, measured, winner, labels)
-        labels = carving.carve(tracks, detection, labels, arrived, self._config)
-        return self._regroup(detection, labels)
+        measured = regions.measure(grid, labels, len(tracks))
+        carved = carving.carve(tracks, detection, labels, measured, arrived, self._config)
+        if carved is not labels:
+            measured = regions.measure(grid, carved, len(tracks))
+        labels = self._regroup(detection, carved, measured)
+        if labels is not carved:
+            measured = regions.measure(grid, labels, len(tracks))
+        return labels, measured
 
-    def _regroup(self, detection: Detection, labels: IntGrid) -> IntGrid:
-        """Merge what is one body and split what is two."""
+    def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions) -> IntGrid:
+        """Merge what is one body and split what is two; the same labels where there is nothing to do."""
         tracks, grid = self._tracks, detection.grid
         if not tracks.moving.any():
             return labels
-        measured = regions.measure(grid, labels, len(tracks))
         sigma = np.sqrt(np.trace(tracks.covariance[:, 3:, 3:], axis1=1, axis2=2))
         mover = tracks.moving | (tracks.evidence > 0.0)
         pairs = grouping.merges(measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
@@ -180,7 +184,7 @@ class Tracker:
         own = number[parts]
         return np.where(own > 0, own, labels).astype(np.int32)
 
-    def _see(self, detection: Detection, measured: Regions) -> None:
+    def _see(self, detection: Detection, measured: Regions, unhidden: NDArray[np.bool_]) -> None:
         """The surfaces' centres update the filters; those that are cut or hidden only the position."""
         tracks, rotation = self._tracks, detection.pose.rotation
         seen = np.flatnonzero(measured.cells >= _MIN_CELLS // 2)
@@ -198,7 +202,7 @@ class Tracker:
         area_m2 = measured.cells[seen] * np.square(depth)
         same = np.abs(area_m2 - tracks.area_m2[seen]) <= _SAME_AREA * tracks.area_m2[seen]
         jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
-        smooth = measured.whole[seen] & same & (jump <= _JUMP_M + 2.0 * sigma)
+        smooth = unhidden[seen] & same & (jump <= _JUMP_M + 2.0 * sigma)
         tracks.locate(seen[smooth], position[smooth], noise[smooth])
         tracks.relocate(seen[~smooth], position[~smooth], noise[~smooth])
         tracks.area_m2[seen] += _AREA_GAIN * (area_m2 - tracks.area_m2[seen])
