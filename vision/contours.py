@@ -35,7 +35,7 @@ def find_contours(edges: GreyImage, min_length_px: float) -> Contours:
     if not kept:
         return Contours(np.empty((0, 2, 2), np.float32), remaining)
     points = np.concatenate(kept)[:, 0, :]
-    remaining[points[:, 1], points[:, 0]] = 255
+    remaining.ravel()[points[:, 1] * edges.shape[1] + points[:, 0]] = 255
     lengths = np.array([len(curve) for curve in kept])
     starts = np.cumsum(lengths) - lengths
     pieces = np.ceil(lengths / (_PIECE * min_length_px)).astype(np.intp)

@@ -84,9 +84,7 @@ class Renewal:
             top, bottom = block * height // blocks, (block + 1) * height // blocks
             edges[top:bottom] = self._edges(grey[top:bottom, start:stop], block, band)
         full = counts >= 2 * settings.fragments_per_tile
-        tile = settings.tile_px
-        mask = np.repeat(np.repeat(full, tile, axis=0), tile, axis=1)[:height, start:stop]
-        edges[mask] = 0
+        edges *= _pixels_of(~full, settings.tile_px, height, start, stop)
         contours = find_contours(edges, settings.min_length_px)
         lines = hough_segments(contours.edges, settings.min_length_px)
         segments = np.concatenate((lines, contours.ends_px))
@@ -117,9 +115,9 @@ class Renewal:
         missing = settings.fragments_per_tile - counts.ravel() // 2
         candidates = candidates[np.argsort(-lengths_px(candidates), kind="stable")]
         tile = _tiles(candidates, settings.tile_px, counts.shape[1])
-        candidates = candidates[_rank_within(tile) < np.minimum(4 * missing, _CANDIDATES_PER_TILE)[tile]]
-        snapped, tensor = snap_to_corners(grey, candidates)
-        held = smaller_eigenvalue(*np.moveaxis(tensor, -1, 0)).min(axis=1)
+        wanted = _rank_within(tile) < np.minimum(4 * missing, _CANDIDATES_PER_TILE).take(tile)
+        snapped, tensor = snap_to_corners(grey, candidates[wanted])
+        held = smaller_eigenvalue(tensor[..., 0], tensor[..., 1], tensor[..., 2]).min(axis=1)
         order = np.argsort(-held, kind="stable")
         snapped, tensor = snapped[order], tensor[order]
         wanted = (lengths_px(snapped) >= _MIN_END_DISTANCE_PX) & _not_taken(snapped, ends_px, grey.shape)
@@ -136,7 +134,7 @@ class Renewal:
         )
         near, far = surface.near_m.reshape(-1, 5), surface.far_m.reshape(-1, 5)
         # Where nothing is measured at all, it is mostly far away: good to know the camera's turn by.
-        beyond = np.isnan(near).all(axis=1)
+        beyond = ~(near == near).any(axis=1)
         beyond &= np.cumsum(beyond) <= room[1]
         whole = np.flatnonzero(_on_one_surface(near, shares, config) | beyond)
         tile = _tiles(snapped[whole], settings.tile_px, counts.shape[1])
@@ -149,11 +147,20 @@ class Renewal:
         )
 
 
+def _pixels_of(
+    tiles: NDArray[np.bool_], tile_px: int, height: int, start: int, stop: int
+) -> NDArray[np.bool_]:
+    """tiles (rows, columns) in the size of the image: (height, stop - start) from column start on."""
+    across = tiles.take(np.arange(start, stop) // tile_px, axis=1)
+    return np.repeat(across, tile_px, axis=0)[:height]
+
+
 def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width: int) -> NDArray[np.intp]:
     """Ends per tile."""
     rows, columns = -(-height // tile_px), -(-width // tile_px)
     flat = ends_px.reshape(-1, 2)
-    index = (flat[:, 1] // tile_px).astype(np.intp) * columns + (flat[:, 0] // tile_px).astype(np.intp)
+    cell = (flat * (1.0 / tile_px)).astype(np.intp)  # no pixel is negative: cutting off rounds down
+    index = cell[:, 1] * columns + cell[:, 0]
     return np.bincount(index, minlength=rows * columns).reshape(rows, columns)
 
 
@@ -171,13 +178,12 @@ def _not_taken(
     columns = shape[1] // _TAKEN_PX + 1
     taken = np.zeros((shape[0] // _TAKEN_PX + 1) * columns, np.bool_)
     taken[_cells(ends_px, columns).ravel()] = True
-    cells = _cells(candidates, columns)
-    fresh = ~taken[cells]
-    _, first = np.unique(cells.ravel(), return_index=True)
-    is_first = np.zeros(cells.size, np.bool_)
-    is_first[first] = True
-    alone = fresh & is_first.reshape(cells.shape)
-    result = alone[:, 0] & alone[:, 1]
+    cells = _cells(candidates, columns).ravel()
+    # Writing backwards leaves in each cell the first one that wants it.
+    first = np.empty(len(taken), np.intp)
+    first[cells[::-1]] = np.arange(len(cells))[::-1]
+    alone = (first.take(cells) == np.arange(len(cells))) & ~taken.take(cells)
+    result: NDArray[np.bool_] = alone[0::2] & alone[1::2]
     return result
 
 
@@ -192,11 +198,12 @@ def _rank_within(groups: NDArray[np.intp]) -> NDArray[np.intp]:
     if len(groups) == 0:
         return np.empty(0, np.intp)
     order = np.argsort(groups, kind="stable")
-    ordered = groups[order]
-    is_first = np.concatenate(([True], ordered[1:] != ordered[:-1]))
-    starts = np.maximum.accumulate(np.where(is_first, np.arange(len(groups)), 0))
+    ordered = groups.take(order)
+    place = np.arange(len(groups))
+    starts = place.copy()
+    starts[1:] *= ordered[1:] != ordered[:-1]
     rank = np.empty(len(groups), np.intp)
-    rank[order] = np.arange(len(groups)) - starts
+    rank[order] = place - np.maximum.accumulate(starts)
     return rank
 
 
@@ -204,16 +211,15 @@ def _on_one_surface(
     near_m: NDArray[np.float64], shares: NDArray[np.float32], config: PerceptionConfig
 ) -> NDArray[np.bool_]:
     """Inverse depth runs straight along a segment of one plane; a segment across a depth edge jumps."""
-    with np.errstate(invalid="ignore"):
-        inverse = 1.0 / near_m
-        straight = inverse[:, :1] + (inverse[:, 4:] - inverse[:, :1]) * shares
-        expected_m = 1.0 / straight
-        gate_m = 0.05 + 3.0 * depth_sigma_m(expected_m, config.depth_noise)
-        inside = np.abs(near_m - expected_m)[:, 1:4] <= gate_m[:, 1:4]
+    inverse = 1.0 / near_m
+    straight = inverse[:, :1] + (inverse[:, 4:] - inverse[:, :1]) * shares
+    expected_m = 1.0 / straight[:, 1:4]
+    gate_m = 0.05 + 3.0 * depth_sigma_m(expected_m, config.depth_noise)
+    inside = np.abs(near_m[:, 1:4] - expected_m) <= gate_m
     # One of the three samples in between may fall into a hole.
-    missing = np.isnan(near_m[:, 1:4])
-    good = (inside | missing).all(axis=1) & (missing.sum(axis=1) <= 1)
-    result: NDArray[np.bool_] = good & np.isfinite(near_m[:, 0]) & np.isfinite(near_m[:, 4])
+    missing = np.isnan(near_m)
+    good = (inside | missing[:, 1:4]).all(axis=1) & (missing[:, 1:4].sum(axis=1) <= 1)
+    result: NDArray[np.bool_] = good & ~missing[:, 0] & ~missing[:, 4]
     return result
 
 
@@ -223,7 +229,7 @@ def _flow_covariance(tensor: NDArray[np.float32], floor_px: float) -> NDArray[np
     Image noise makes every direction look structured; that share is taken off first, or an end on a
     straight edge would seem as well held along the edge as across it.
     """
-    uu, uv, vv = np.moveaxis(tensor, -1, 0)
+    uu, uv, vv = tensor[..., 0], tensor[..., 1], tensor[..., 2]
     middle, half = 0.5 * (uu + vv), 0.5 * (uu - vv)
     radius = np.sqrt(half * half + uv * uv)
     larger = np.maximum(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)

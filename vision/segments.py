@@ -88,5 +88,6 @@ def smaller_eigenvalue(
 def lengths_px(ends_px: NDArray[np.float32]) -> NDArray[np.float32]:
     """(N,) L_t of the paper: distance between the two ends."""
     difference = ends_px[:, 0] - ends_px[:, 1]
-    length: NDArray[np.float32] = np.sqrt(np.square(difference).sum(axis=1))
+    du, dv = difference.T
+    length: NDArray[np.float32] = np.sqrt(du * du + dv * dv)
     return length
