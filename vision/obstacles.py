@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.velocities import NormalEquations, PointMotion, chi2_2d, normal_equations, solve_velocity
+from vision.velocities import (
+    NormalEquations,
+    PointMotion,
+    end_information,
+    normal_equations,
+    solve_velocity,
+)
 
 _ROBUST_CHI2 = 9.0
 _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
@@ -53,14 +59,15 @@ def body_velocities(
     share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))
     velocity = start_mps
     safe_owner = np.where(use, owner, 0)
+    used, trust = use.astype(float), end_information(motion)
     for scale in _ANNEAL:
-        chi2 = end_chi2(motion, velocity[safe_owner])
-        weight = np.where(use, np.square(1.0 / (1.0 + chi2 / (scale * _ROBUST_CHI2))), 0.0)
+        chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
+        weight = used / np.square(1.0 + chi2 * (1.0 / (scale * _ROBUST_CHI2)))
         summed = per_end @ (member * weight).T
         equations = NormalEquations(summed[:12])
         equations.add_depth(summed[12] * share, summed[13] * share)
         velocity, covariance = solve_velocity(equations, max_speed_mps)
-    chi2 = end_chi2(motion, velocity[safe_owner])
+    chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
     agree = (member * (chi2 <= _ROBUST_CHI2)).sum(axis=1) / np.maximum(ends, 1)
     # What the model does not explain (limbs, turning, sliding) widens the result.
     excess = (member * np.minimum(chi2, _ROBUST_CHI2)).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
@@ -76,11 +83,15 @@ def _depth_steps(motion: PointMotion) -> FloatArray:
     return np.stack((root * root, root * step))
 
 
-def end_chi2(motion: PointMotion, velocity: FloatArray) -> FloatArray:
-    """(2N,) chi-square of each end if it moves with velocity (2N, 3)."""
-    way = velocity * motion.lag_s[:, None]
-    miss = motion.miss_m - (way[:, :2] - motion.ray * way[:, 2:3])
-    return chi2_2d(miss, motion.covariance, motion.depth_effect)
+def _end_chi2(motion: PointMotion, trust: FloatArray, velocity: FloatArray) -> FloatArray:
+    """(2N,) chi-square of each end if it moves with velocity (3, 2N). trust: see end_information."""
+    x, y = motion.ray.T
+    across, down, away = velocity * motion.lag_s
+    a = motion.miss_m[:, 0] - across + x * away
+    b = motion.miss_m[:, 1] - down + y * away
+    xx, xy, yy = trust
+    result: FloatArray = (xx * a + xy * b) * a + (xy * a + yy * b) * b
+    return result
 
 
 def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> tuple[FloatArray, FloatArray]:

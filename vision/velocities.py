@@ -79,6 +79,15 @@ def chi2_2d(miss: FloatArray, covariance: FloatArray, effect: FloatArray) -> Flo
     return result
 
 
+def end_information(motion: PointMotion) -> FloatArray:
+    """(3, N) xx, xy, yy of the inverse covariance of miss_m, from pixels and from depth."""
+    xx, xy, yy = motion.covariance.T
+    a, b = motion.depth_effect.T
+    xx, xy, yy = xx + a * a, xy + a * b, yy + b * b
+    result: FloatArray = np.stack((yy, -xy, xx)) / np.maximum(xx * yy - xy * xy, 1e-18)
+    return result
+
+
 # Where the entries of a symmetric 3x3 matrix stand in its six different ones 00, 01, 02, 11, 12, 22, and
 # which of these make its cofactors: a b - c d.
 _SYMMETRIC = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])

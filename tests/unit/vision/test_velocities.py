@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from vision.velocities import (
     PointMotion,
     chi2_2d,
     depth_after,
+    end_information,
     ends_of,
     lateral_after,
     normal_equations,
@@ -85,6 +88,13 @@ def test_chi2_by_numbers(
 ) -> None:
     result = chi2_2d(np.array([miss]), np.array([covariance]), np.array([effect]))
     np.testing.assert_allclose(result, [expected])
+
+
+def test_information_of_an_end_is_the_inverse_of_its_covariance() -> None:
+    base = evidence(np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, -0.2]]), 0.5)
+    motion = replace(base, covariance=np.array([[1.0, 0.5, 1.0]]), depth_effect=np.array([[1.0, 0.5]]))
+    # [[1, 0.5], [0.5, 1]] + [[1, 0.5], [0.5, 0.25]] = [[2, 1], [1, 1.25]], determinant 1.5.
+    np.testing.assert_allclose(end_information(motion)[:, 0], np.array([1.25, -1.0, 2.0]) / 1.5)
 
 
 def test_normal_equations_of_one_point_by_hand() -> None:
