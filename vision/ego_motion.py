@@ -27,6 +27,7 @@ _MIN_BACKGROUND_RATIO = 0.10
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2])  # of the prior's sigma, where it decides
 _CONVERGED = 2e-5
+_STRAIGHT = 3e-4  # after a step that is no longer (rad, m) the image moves as its derivatives say
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,15 +175,17 @@ def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: I
 
 def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
     """Iteratively reweighted Gauss-Newton from start, which is known to sigma (6,)."""
-    prior_information = np.diag(1.0 / np.square(sigma))
-    information, inliers = prior_information, 0
+    prior = 1.0 / np.square(sigma)
+    information, inliers = np.diag(prior), 0
     pose = _shift(view, start, sigma)
     count = view.seen.shape[1]
     table, weights = np.empty((8, 3, count)), np.empty((3, count))
     flat = table[:7].reshape(7, 3 * count)
+    in_front = _linearise(view, pose, table)
+    missing = _difference(pose, start)
     allowed = np.ones(count)
+    gone = np.zeros(6)  # since the image was linearised
     for iteration in range(_ITERATIONS):
-        in_front = _linearise(view, pose, table)
         # Depth's share of the covariance, by Sherman and Morrison: only along the epipolar line.
         along, squared = table[6:, 2]
         shrink = view.depth_variance / (1.0 + view.depth_variance * squared)
@@ -198,13 +201,25 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
         weights[2] = weight * -shrink
         # Six rows of the normal matrix, and in the last column the right side.
         normal = (table[:7] * weights).reshape(7, 3 * count) @ flat.T
-        information = normal[:6, :6] + prior_information
-        rhs = normal[:6, 6] + prior_information @ _difference(pose, start)
-        step = np.linalg.solve(information, rhs).astype(np.float64, copy=False)
-        pose = pose @ Pose(rotation_from_vector(step[:3]), step[3:])
-        if iteration >= len(_ANNEAL) and max(map(abs, step.tolist())) < _CONVERGED:
+        information = normal[:6, :6] + np.diag(prior)
+        step = np.linalg.solve(information, normal[:6, 6] + prior * missing).astype(np.float64, copy=False)
+        length = max(map(abs, step.tolist()))
+        gone = gone + step
+        if iteration >= len(_ANNEAL) and length < _CONVERGED:
             break
-    return _Solution(pose, information, inliers)
+        if length > _STRAIGHT:
+            pose, gone = _moved(pose, gone), np.zeros(6)
+            in_front = _linearise(view, pose, table)
+            missing = _difference(pose, start)
+        else:
+            missing = missing - step
+            table[6] -= (step @ flat[:6]).reshape(3, count)
+    return _Solution(_moved(pose, gone), information, inliers)
+
+
+def _moved(pose: Pose, step: FloatArray) -> Pose:
+    """After a small motion (6,) of its own."""
+    return pose @ Pose(rotation_from_vector(step[:3]), step[3:])
 
 
 def _conflict(pose: Pose, start: Pose, sigma: FloatArray) -> bool:
