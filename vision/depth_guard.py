@@ -5,6 +5,8 @@ A plain wall has no fragments, and a corridor without valid depth (glass, black,
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +31,10 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
     width = columns // bands
     used = bands * width
     nearest = _nearest_m(grid, obstacle, bands, width)
-    x = grid.x[:used].reshape(bands, width).mean(axis=1).astype(float)
+    x = (sum(grid.x[column:used:width] for column in range(width)) / np.float32(width)).astype(float)
     half_width = 0.5 * width * float(grid.x[1] - grid.x[0])
-    tilt = np.cos(grid.pitch_rad) - float(np.median(grid.y)) * np.sin(grid.pitch_rad)
+    middle_y = 0.5 * float(grid.y[(len(grid.y) - 1) // 2] + grid.y[len(grid.y) // 2])
+    tilt = math.cos(grid.pitch_rad) - middle_y * math.sin(grid.pitch_rad)
     if grid.height_m is None:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     else:
@@ -52,18 +55,21 @@ def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: int, width: int) -> N
 
 def _known_m(grid: DepthGrid, bands: int, width: int, max_depth_m: float) -> NDArray[np.float64]:
     """(bands,) how far the floor, or something on it, was seen without a hole."""
-    cos_pitch, sin_pitch = np.cos(grid.pitch_rad), np.sin(grid.pitch_rad)
-    drop = grid.y * cos_pitch + sin_pitch
+    cos_pitch, sin_pitch = math.cos(grid.pitch_rad), math.sin(grid.pitch_rad)
+    y = grid.y.astype(float)
+    drop = y * cos_pitch + sin_pitch
     below = drop > grid.camera_height_m / (1.5 * max_depth_m)
     rows = np.flatnonzero(below)[::-1]  # from the bottom of the image outwards
     if len(rows) == 0:
         return np.zeros(bands)
     floor_depth = grid.camera_height_m / drop[rows]
-    floor_forward = floor_depth * (cos_pitch - grid.y[rows] * sin_pitch)
+    floor_forward = floor_depth * (cos_pitch - y[rows] * sin_pitch)
     limit_m = (_FLOOR_EXCESS * floor_depth).astype(np.float32)
     lower = slice(len(grid.y) - len(rows), None)
     seen = (grid.valid[lower] & (grid.depth_m[lower] <= limit_m[::-1, None]))[::-1, : bands * width]
-    count = sum(seen[:, column::width].astype(np.uint8) for column in range(width))
+    count = np.zeros((len(rows), bands), np.uint8)
+    for column in range(width):
+        count += seen[:, column::width]
     hole = count < 0.5 * width
     # A single row may be lost to noise; two in a row are a hole.
     run = hole.copy()

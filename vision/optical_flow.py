@@ -14,6 +14,8 @@ from vision.edges import GreyImage
 
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)
 _MIN_EIGENVALUE = 1e-5
+# Eigenvalues are at hand; the other error that could be asked for would be worked out pixel by pixel.
+_FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 _EXPECTATION_PX = 2.0
 
 
@@ -48,7 +50,7 @@ def track(
         cv2.calcOpticalFlowPyrLK,
         winSize=window,
         criteria=_CRITERIA,
-        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        flags=_FLAGS,
         minEigThreshold=_MIN_EIGENVALUE,
     )
     start = pixels.reshape(-1, 1, 2)
@@ -56,22 +58,28 @@ def track(
         before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=settings.lk_levels
     )
     # What all ends have in common was the guess's own error: a turn of the camera it did not know of.
-    common = np.median(there[:, 0, :] - guess, axis=0)
-    back_guess = there - (guess + common - pixels).reshape(-1, 1, 2)
+    expected = guess + _median(there[:, 0, :] - guess)
+    back_guess = there - (expected - pixels).reshape(-1, 1, 2)
     back, back_ok, _ = search(now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1))
-    end = _held(there[:, 0, :].astype(np.float32, copy=False), guess + common, covariance)
+    end = _held(there[:, 0, :].astype(np.float32, copy=False), expected, covariance)
     miss = back[:, 0, :] - pixels
-    chi2 = mahalanobis(miss, covariance)
     height, width = now.shape
-    inside = (end[:, 0] >= 2) & (end[:, 1] >= 2) & (end[:, 0] <= width - 3) & (end[:, 1] <= height - 3)
-    found = (
-        (there_ok[:, 0] == 1)
-        & (back_ok[:, 0] == 1)
-        & (chi2 <= settings.forward_backward_sigmas**2)
-        & (np.abs(miss).max(axis=1) <= settings.forward_backward_px)
-        & inside
-    )
+    found = (there_ok[:, 0] == 1) & (back_ok[:, 0] == 1)
+    found &= mahalanobis(miss, covariance) <= settings.forward_backward_sigmas**2
+    near = np.abs(miss) <= settings.forward_backward_px
+    inside = (end >= 2.0) & (end <= (width - 3, height - 3))
+    near &= inside
+    found &= near[:, 0] & near[:, 1]
     return Flow(end, found)
+
+
+def _median(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(2,) of each column of values (N, 2)."""
+    ordered, middle = np.sort(values.T, axis=1), len(values) // 2
+    result: NDArray[np.float32] = ordered[:, middle]
+    if len(values) % 2 == 0:
+        result = (result + ordered[:, middle - 1]) * np.float32(0.5)
+    return result
 
 
 def _held(

@@ -166,7 +166,7 @@ class Tracker:
         """Parts that nobody claims become tracks if they are large enough and reach down to the robot."""
         grid, tracks = detection.grid, self._tracks
         large = (winner == 0) & (measured.cells >= _MIN_CELLS)
-        if grid.height_m is not None:
+        if grid.height_m is not None and large.any():
             low = np.bincount(parts[grid.height_m < self._body_height_m], minlength=len(winner) + 1)[1:]
             large &= low >= _MIN_CELLS // 2
         born = np.flatnonzero(large)
