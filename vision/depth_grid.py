@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -50,12 +51,14 @@ class DepthGrid:
     def columns(self, pixels_u: FloatArray) -> NDArray[np.intp]:
         """Grid columns of image columns, clipped to the grid."""
         index = np.rint((pixels_u - self.offset_px) / self.step_px).astype(np.intp)
-        return np.clip(index, 0, self.depth_m.shape[1] - 1)
+        clipped: NDArray[np.intp] = np.minimum(np.maximum(index, 0), self.depth_m.shape[1] - 1)
+        return clipped
 
     def rows(self, pixels_v: FloatArray) -> NDArray[np.intp]:
         """Grid rows of image rows, clipped to the grid."""
         index = np.rint((pixels_v - self.offset_px) / self.step_px).astype(np.intp)
-        return np.clip(index, 0, self.depth_m.shape[0] - 1)
+        clipped: NDArray[np.intp] = np.minimum(np.maximum(index, 0), self.depth_m.shape[0] - 1)
+        return clipped
 
     def points(self, cells: NDArray[np.intp]) -> FloatGrid:
         """(3, K) camera coordinates of flat cell indices (K,)."""
@@ -93,12 +96,11 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     valid = (depth_m >= config.min_depth_m) & ~beyond
     inverse = _smooth(_inverted(depth_m, valid), valid)
     depth_m = _inverted(inverse, valid)
-    x, y = _rays(frame.intrinsics, depth_m.shape, step, offset)
+    view = _view(frame.intrinsics, mount, depth_m.shape, step, offset)
+    x, y = view.x, view.y
     if mount is None:
         nan = float("nan")
         return DepthGrid(step, offset, depth_m, inverse, valid, beyond, x, y, depth_m, None, None, nan, 0.0)
-    cos_pitch, sin_pitch = math.cos(mount.pitch_rad), math.sin(mount.pitch_rad)
-    drop = (y * np.float32(cos_pitch) + np.float32(sin_pitch))[:, None]  # metres down per metre of depth
     sigma_m = np.float32(CELL_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
     return DepthGrid(
         step,
@@ -109,12 +111,40 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
         beyond,
         x,
         y,
-        depth_m * (np.float32(cos_pitch) - y * np.float32(sin_pitch))[:, None],
-        np.float32(mount.height_m) - depth_m * drop,
-        sigma_m * np.abs(drop),
+        depth_m * view.ahead,
+        np.float32(mount.height_m) - depth_m * view.drop,
+        sigma_m * np.abs(view.drop),
         mount.height_m,
         mount.pitch_rad,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """Where the cells look: x (w,), y (h,) as in DepthGrid. ahead, drop (h, 1): metres along the floor and
+    metres down per metre of depth."""
+
+    x: FloatGrid
+    y: FloatGrid
+    ahead: FloatGrid
+    drop: FloatGrid
+
+
+@lru_cache(maxsize=4)
+def _view(
+    camera: Intrinsics, mount: CameraMount | None, shape: tuple[int, int], step: int, offset: float
+) -> _View:
+    """The same in every frame of one camera."""
+    u = (offset + step * np.arange(shape[1])).astype(np.float32)
+    v = (offset + step * np.arange(shape[0])).astype(np.float32)
+    x = (u - np.float32(camera.cx)) / np.float32(camera.fx)
+    y = (v - np.float32(camera.cy)) / np.float32(camera.fy)
+    pitch_rad = 0.0 if mount is None else mount.pitch_rad
+    cosine, sine = np.float32(math.cos(pitch_rad)), np.float32(math.sin(pitch_rad))
+    view = _View(x, y, (cosine - y * sine)[:, None], (y * cosine + sine)[:, None])
+    for values in (view.x, view.y, view.ahead, view.drop):
+        values.setflags(write=False)
+    return view
 
 
 def _inverted(values: FloatGrid, valid: BoolGrid) -> FloatGrid:
@@ -151,13 +181,3 @@ def _four_samples(depth: DepthImage, step: int, scale_m: float) -> DepthImage:
     gap *= same
     nearer += gap
     return nearer
-
-
-def _rays(
-    camera: Intrinsics, shape: tuple[int, ...], step: int, offset: float
-) -> tuple[FloatGrid, FloatGrid]:
-    u = (offset + step * np.arange(shape[1])).astype(np.float32)
-    v = (offset + step * np.arange(shape[0])).astype(np.float32)
-    x: FloatGrid = (u - np.float32(camera.cx)) / np.float32(camera.fx)
-    y: FloatGrid = (v - np.float32(camera.cy)) / np.float32(camera.fy)
-    return x, y

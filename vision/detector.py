@@ -247,11 +247,14 @@ class Detector:
         pixels = store.ends_px.reshape(-1, 2)
         if len(pixels) == 0:
             return pixels
-        depth_m = np.nan_to_num(store.near_m.ravel().astype(float), nan=5.0)
-        points = rays(pixels, camera) * depth_m[:, None] + np.repeat(velocity, 2, axis=0) * dt_s
-        moved = (points - motion.translation_m) @ motion.rotation
-        moved[:, 2] = np.maximum(moved[:, 2], 0.1)
-        return project(moved, camera).astype(np.float32)
+        near_m = store.near_m.ravel().astype(float)
+        depth_m = np.where(np.isnan(near_m), 5.0, near_m)
+        points = rays(pixels, camera).T * depth_m - motion.translation_m[:, None]
+        if velocity.any():
+            points += np.repeat(velocity.T * dt_s, 2, axis=1)
+        moved = motion.rotation.T @ points
+        moved[2] = np.maximum(moved[2], 0.1)
+        return project(moved.T, camera).astype(np.float32)
 
 
 def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:
@@ -292,7 +295,8 @@ def _hint(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[n
     index = np.minimum(index, len(previous.ids) - 1)
     same = previous.ids[index] == ids
     moving[same] = previous.moving[index[same]]
-    velocity[moving] = np.nan_to_num(previous.velocity_mps[index[moving]])
+    if moving.any():
+        velocity[moving] = np.nan_to_num(previous.velocity_mps[index[moving]])
     return moving, velocity
 
 

@@ -114,18 +114,19 @@ def count_votes(
     ballots = np.flatnonzero((parts > 0) & (predicted > 0))
     cast = parts.ravel().take(ballots) * tracks + predicted.ravel().take(ballots) - (tracks + 1)
     votes = np.bincount(cast, minlength=count * tracks).reshape(count, tracks)
-    total = votes.sum(axis=1, keepdims=True)
-    own = votes.sum(axis=0, keepdims=True)
-    present = (votes >= _LEAST_VOTES) & ((votes >= _SHARE_OF_PART * total) | (votes >= _SHARE_OF_TRACK * own))
-    static_votes = np.where(mover[None, :], 0, votes) * present
+    total, own = votes.sum(axis=1)[:, None], votes.sum(axis=0)
+    least = np.minimum(_SHARE_OF_PART * total, _SHARE_OF_TRACK * own)
+    present = votes >= np.maximum(least, _LEAST_VOTES)
+    # Of the static tracks the strongest stays.
+    static_votes = np.where(mover, 0, votes) * present
     strongest = static_votes.argmax(axis=1)
+    each = np.arange(count)
     keep_static = np.zeros_like(present)
-    keep_static[np.arange(count), strongest] = static_votes.max(axis=1) > 0
-    present &= mover[None, :] | keep_static
+    keep_static[each, strongest] = static_votes[each, strongest] > 0
+    present &= mover | keep_static
     best = np.where(present, votes, -1).argmax(axis=1)
-    claimed = present.any(axis=1)
-    winner = np.where(claimed, best + 1, 0).astype(np.int32)
-    return Ballot(present, winner, np.where(claimed, votes[np.arange(count), best], 0))
+    claimed = present[each, best]
+    return Ballot(present, ((best + 1) * claimed).astype(np.int32), votes[each, best] * claimed)
 
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:

@@ -166,7 +166,7 @@ def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width:
 
 def _tiles(ends_px: NDArray[np.float32], tile_px: int, columns: int) -> NDArray[np.intp]:
     """(N,) flat tile index of the middle of each segment."""
-    middle = (ends_px.mean(axis=1) // tile_px).astype(np.intp)
+    middle = ((ends_px[:, 0] + ends_px[:, 1]) * (0.5 / tile_px)).astype(np.intp)
     result: NDArray[np.intp] = middle[:, 1] * columns + middle[:, 0]
     return result
 
@@ -188,7 +188,7 @@ def _not_taken(
 
 
 def _cells(ends_px: NDArray[np.float32], columns: int) -> NDArray[np.intp]:
-    index = (ends_px // _TAKEN_PX).astype(np.intp)
+    index = (ends_px * (1.0 / _TAKEN_PX)).astype(np.intp)
     result: NDArray[np.intp] = index[:, :, 1] * columns + index[:, :, 0]
     return result
 

@@ -68,8 +68,8 @@ def fragments(
 ) -> Fragments:
     """The fragments with their owners (N,) and whether these move (N,)."""
     camera = detection.camera
-    depth = detection.near_m.mean(axis=1).astype(float)
-    middle = detection.ends_px.mean(axis=1).astype(float)
+    depth = (0.5 * (detection.near_m[:, 0] + detection.near_m[:, 1])).astype(float)
+    middle = (0.5 * (detection.ends_px[:, 0] + detection.ends_px[:, 1])).astype(float)
     position = np.empty((len(depth), 3))
     position[:, 0] = (middle[:, 0] - camera.cx) / camera.fx * depth
     position[:, 1] = (middle[:, 1] - camera.cy) / camera.fy * depth
