@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -145,10 +145,10 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     return Regions(cells, tall, bbox, position, extent, whole)
 
 
-def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[np.bool_]:
-    """(R,) which of the measured regions are whole and not hidden in part by something nearer, either."""
+def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
+    """regions as measured, whole only where nothing nearer hides a part, either."""
     hidden = _hidden_cells(grid, labels, len(regions.cells))
-    return regions.whole & (hidden <= _OCCLUDED_SHARE * regions.rows)
+    return replace(regions, whole=regions.whole & (hidden <= _OCCLUDED_SHARE * regions.rows))
 
 
 def _foot_px(grid: DepthGrid, bottom: NDArray[np.intp], depth_m: FloatArray) -> FloatArray:

@@ -103,7 +103,7 @@ class Tracker:
         arrived = self._free.arrived(grid, standing, pose, detection.captured_ns)
         self._free.remember(grid, pose, detection.captured_ns)
         labels, measured = self._label(detection, standing, arrived, elapsed_s)
-        self._see(detection, measured, regions.unhidden(grid, labels, measured))
+        self._see(detection, regions.unhidden(grid, labels, measured))
         owner = self._adopt(detection, labels, owner)
         arrivals = np.bincount(labels[arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
@@ -184,7 +184,7 @@ class Tracker:
         own = number[parts]
         return np.where(own > 0, own, labels).astype(np.int32)
 
-    def _see(self, detection: Detection, measured: Regions, unhidden: NDArray[np.bool_]) -> None:
+    def _see(self, detection: Detection, measured: Regions) -> None:
         """The surfaces' centres update the filters; those that are cut or hidden only the position."""
         tracks, rotation = self._tracks, detection.pose.rotation
         seen = np.flatnonzero(measured.cells >= _MIN_CELLS // 2)
@@ -202,7 +202,7 @@ class Tracker:
         area_m2 = measured.cells[seen] * np.square(depth)
         same = np.abs(area_m2 - tracks.area_m2[seen]) <= _SAME_AREA * tracks.area_m2[seen]
         jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
-        smooth = unhidden[seen] & same & (jump <= _JUMP_M + 2.0 * sigma)
+        smooth = measured.whole[seen] & same & (jump <= _JUMP_M + 2.0 * sigma)
         tracks.locate(seen[smooth], position[smooth], noise[smooth])
         tracks.relocate(seen[~smooth], position[~smooth], noise[~smooth])
         tracks.area_m2[seen] += _AREA_GAIN * (area_m2 - tracks.area_m2[seen])
