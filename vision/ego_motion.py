@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from config.perception import EgoMotionSettings
 from hal.types import FloatArray, GyroSamples, Intrinsics, Pose
 from vision.lens import rotation_from_vector, vector_from_rotation
+from vision.order import median
 
 NS_PER_S = 1e9
 _ITERATIONS = 6
@@ -274,8 +275,7 @@ def _shift(view: _View, start: Pose, sigma: FloatArray) -> Pose:
     """A better start: turn by the median miss of all points, as far as sigma (6,) admits."""
     count = view.seen.shape[1]
     local = start.rotation.T @ view.lines[:, :count] - (start.rotation.T @ start.translation_m)[:, None]
-    miss = np.sort(view.seen - local[:2] / np.maximum(local[2], 0.1), axis=1)
-    across, down = 0.5 * (miss[:, (count - 1) // 2] + miss[:, count // 2])
+    across, down = median(view.seen - local[:2] / np.maximum(local[2], 0.1))
     turn = np.array([down, -across, 0.0])
     limit = 3.0 * sigma[:3]
     return start @ Pose(rotation_from_vector(np.clip(turn, -limit, limit)), np.zeros(3))

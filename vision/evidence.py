@@ -14,6 +14,7 @@ from vision.depth_mask import depth_sigma_m
 from vision.ego_motion import Anchors, CameraEstimate
 from vision.fragments import AnchorEnds, FragmentStore
 from vision.lens import rays
+from vision.order import quantile
 from vision.velocities import PointMotion, chi2_2d
 
 # Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
@@ -126,12 +127,10 @@ def observed_variance_scale(
     lower third of the ends decides, so that movers not yet known as such have no say.
     """
     settled = motion.usable & np.repeat((age_frames >= _SETTLED_FRAMES) & ~moving, 2)
-    ordered = np.sort(motion.static_chi2[settled])
-    if len(ordered) < _LEAST_ENDS:
+    chi2 = motion.static_chi2[settled]
+    if len(chi2) < _LEAST_ENDS:
         return before
-    place, rest = divmod(len(ordered) - 1, 3)
-    third = float(ordered[place] + (ordered[place + 1] - ordered[place]) * (rest / 3.0))
-    seen = before * third / _CHI2_THIRD
+    seen = before * quantile(chi2, 1.0 / 3.0) / _CHI2_THIRD
     return min(max(before + _SCALE_GAIN * (seen - before), _LEAST_SCALE), _MOST_SCALE)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision.depth_grid import DepthGrid
+from vision.order import median, quantile
 from vision.regions import IntGrid, Regions
 
 _CLOSE_M = 0.25
@@ -133,10 +134,10 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
     if len(cells) < 2 * _MIN_CELLS:
         return None
     points = grid.points(cells)[::2].T.astype(float)
-    centred = points - np.median(points, axis=0)
+    centred = points - median(points.T)
     _, axes = np.linalg.eigh(centred.T @ centred)
     along = centred @ axes[:, 1]
-    low, high = np.percentile(along, (3, 97))
+    low, high = quantile(along, 0.03), quantile(along, 0.97)
     if high - low < _SINGLE_WIDTH_M:
         return None
     # A far cell stands for more surface than a near one.
@@ -153,7 +154,7 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
         second = ~second
     if np.count_nonzero(second) < _MIN_CELLS:
         return None
-    if abs(np.median(along[second]) - np.median(along[~second])) < _PAIR_DISTANCE_M:
+    if abs(median(along[second]) - median(along[~second])) < _PAIR_DISTANCE_M:
         return None
     cut_off: NDArray[np.intp] = cells[second]
     return cut_off

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
 from vision.edges import GreyImage
+from vision.order import median
 
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)
 _MIN_EIGENVALUE = 1e-5
@@ -58,7 +59,7 @@ def track(
         before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=settings.lk_levels
     )
     # What all ends have in common was the guess's own error: a turn of the camera it did not know of.
-    expected = guess + _median(there[:, 0, :] - guess)
+    expected = guess + median((there[:, 0, :] - guess).T)
     back_guess = there - (expected - pixels).reshape(-1, 1, 2)
     back, back_ok, _ = search(now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1))
     end = _held(there[:, 0, :].astype(np.float32, copy=False), expected, covariance)
@@ -71,15 +72,6 @@ def track(
     near &= inside
     found &= near[:, 0] & near[:, 1]
     return Flow(end, found)
-
-
-def _median(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(2,) of each column of values (N, 2)."""
-    ordered, middle = np.sort(values.T, axis=1), len(values) // 2
-    result: NDArray[np.float32] = ordered[:, middle]
-    if len(values) % 2 == 0:
-        result = (result + ordered[:, middle - 1]) * np.float32(0.5)
-    return result
 
 
 def _held(

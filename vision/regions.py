@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.depth_grid import BoolGrid, DepthGrid
+from vision.order import median
 
 IntGrid = NDArray[np.int32]
 
@@ -60,7 +61,8 @@ def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
     across = inverse[:, 1:] - inverse[:, :-1]
     down = inverse[1:] - inverse[:-1]
     inner = np.abs(across[::2])[mask[::2, 1:] & mask[::2, :-1]]
-    jump = np.float32(min(max(12.0 * _median(inner), _LEAST_JUMP), _MOST_JUMP))
+    typical = float(median(inner)) if len(inner) else 0.0
+    jump = np.float32(min(max(12.0 * typical, _LEAST_JUMP), _MOST_JUMP))
     kept = mask.copy()
     kept[:, 1:] &= across >= -jump
     kept[:, :-1] &= across <= jump
@@ -74,14 +76,6 @@ def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
     large[0] = False
     number = np.where(large, np.cumsum(large), 0).astype(np.int32)
     return int(np.count_nonzero(large)), number.take(labels)
-
-
-def _median(values: FloatGrid) -> float:
-    """Of values (N,), 0 where there are none. np.median takes six times as long."""
-    if len(values) == 0:
-        return 0.0
-    ordered, middle = np.sort(values), len(values) // 2
-    return float(ordered[middle] if len(values) % 2 else (ordered[middle - 1] + ordered[middle]) * 0.5)
 
 
 def _sorted_cells(labels: IntGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
