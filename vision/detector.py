@@ -311,5 +311,6 @@ def _no_motion(count: int) -> PointMotion:
         np.full(count, np.nan),
         np.ones(count),
         np.zeros(count),
+        np.zeros(count),
         np.zeros(count, np.bool_),
     )

@@ -28,6 +28,7 @@ _LEAST_SCALE = 0.3
 _MOST_SCALE = 8.0
 _STEPS_SHARE = 0.5  # flow errors of successive frames cancel in part
 _MOST_LOOKS = 6.0
+_SETTLED_LATE_FRAMES = 4.0  # between the plain mean of the first looks and the running one: 2.5 to 5
 _COMMON_NOISE = 0.5
 _MIXED_SIGMAS = 3.0
 _MIXED_ALONG_PX = 3.0
@@ -113,6 +114,7 @@ def gather(
         depth_effect=effect[:, 0].T,
         depth_step_m=depth_now - depth,
         depth_step_sigma_m=np.hypot(depths.sigma_m, sigma_now),
+        depth_lag_s=_depth_lag_s(anchor),
         static_chi2=chi2,
         usable=depths.known & in_front & np.isfinite(miss[0, 0] + miss[1, 0]),
     )
@@ -154,6 +156,14 @@ def average_depth(store: FragmentStore, before: AnchorEnds, pose: Pose, noise: D
     looks = np.where(fits, np.minimum(store.looks + 1.0, _MOST_LOOKS), 1.0)
     store.looks = looks.astype(np.float32)
     store.depth_m = np.where(fits, carried + off / looks, store.near_m).astype(np.float32)
+
+
+def _depth_lag_s(anchor: AnchorEnds) -> FloatArray:
+    """(2N,) how long before now the averaged depth of the anchors was measured, on average."""
+    looks = anchor.looks
+    late_frames = np.where(looks < _MOST_LOOKS, 0.5 * (looks - 1.0), _SETTLED_LATE_FRAMES)
+    frame_s = np.repeat(anchor.lag_s / anchor.lag_frames, 2)
+    return np.repeat(anchor.lag_s, 2) + late_frames * frame_s
 
 
 def _pixel_covariance(store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[np.bool_]) -> FloatArray:

@@ -26,6 +26,7 @@ _PAIR_DISTANCE_M = 0.5
 _VALLEY = 0.35
 _MIN_CELLS = 24
 _BINS = 12
+_OVERLAP = 0.5  # of the smaller box: side by side people overlap less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,11 +108,17 @@ def merges(
     difference = np.sqrt(np.square(velocity[a] - velocity[b]).sum(axis=1))
     alike = difference <= _SAME_VELOCITY_MPS + velocity_sigma[a] + velocity_sigma[b]
     width = np.maximum(box.high_m[a, 0], box.high_m[b, 0]) - np.minimum(box.low_m[a, 0], box.low_m[b, 0])
-    fits = (regions.cells[a] <= _SMALL_SHARE * regions.cells[b]) | (width <= _SINGLE_WIDTH_M)
+    overlap = _overlaps(regions.bbox_px[a], regions.bbox_px[b])
+    fits = (
+        (regions.cells[a] <= _SMALL_SHARE * regions.cells[b])
+        | (width <= _SINGLE_WIDTH_M)
+        | (overlap >= _OVERLAP)
+    )
+    reach = np.where(overlap >= _OVERLAP, _APART_M, _CLOSE_M)
     one = (
         (a != b)
         & (regions.cells[a] <= regions.cells[b])
-        & (gaps_m(box, a, box, b) <= _CLOSE_M)
+        & (gaps_m(box, a, box, b) <= reach)
         & alike
         & fits
         & ~((regions.cells[a] == regions.cells[b]) & (a < b))
@@ -121,6 +128,14 @@ def merges(
         if part not in gone and whole not in gone:
             result.append((part, whole))
             gone.add(part)
+    return result
+
+
+def _overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(K,) share of box a[k] that box b[k] covers in the image; (K, 4) each: u0, v0, u1, v1."""
+    size = np.minimum(a[:, 2:], b[:, 2:]) - np.maximum(a[:, :2], b[:, :2])
+    shared = np.maximum(size, 0.0).prod(axis=1)
+    result: FloatArray = shared / np.maximum((a[:, 2:] - a[:, :2]).prod(axis=1), 1.0)
     return result
 
 

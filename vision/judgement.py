@@ -36,6 +36,11 @@ _ARRIVED_SHARE = 0.05
 _MUCH_CELLS = 20
 _MUCH_SHARE = 0.2
 _IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
+_CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
+_CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewhat longer
+_COMPACT_M = 2.2
+_WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
+_SURE_SQUARED_SIGMAS = 30.0
 _LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them is carved out
 
 
@@ -46,8 +51,10 @@ class MotionEvidence:
     sight (T, 3): unit vector from the camera; distance_m (T,). velocity (T, 3), covariance (T, 3, 3): as
     filtered. own_velocity, own_covariance: of this frame's fragments alone, from ends (T,) points of
     which agreement (T,) agree. surface_velocity, surface_covariance: from the surface's centre alone.
-    arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent. trusted: the camera's
-    motion is known.
+    arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
+    its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
+    another side; growth_mps (T,): how fast its centre may wander because its visible part grows or shrinks.
+    trusted: the camera's motion is known.
     """
 
     sight: FloatArray
@@ -63,6 +70,9 @@ class MotionEvidence:
     arrived: NDArray[np.intp]
     cells: NDArray[np.intp]
     size_m: FloatArray
+    clean_s: FloatArray
+    view_radps: FloatArray
+    growth_mps: FloatArray
     trusted: bool
 
 
@@ -90,23 +100,25 @@ def judge(
     along, across = split_squared_sigmas(seen.velocity, seen.covariance, seen.sight)
     own_along, own_across = split_squared_sigmas(seen.own_velocity, seen.own_covariance, seen.sight)
     agreeing = np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0)
-    by_fragments_across = (across > threshold) & (own_across > 0.5 * threshold) & (agreeing >= _ENDS_ACROSS)
     surface_along, surface_across = split_squared_sigmas(
         seen.surface_velocity, seen.surface_covariance, seen.sight
     )
-    contradicted, confirmed_along, confirmed_across = _second_opinion(seen, surface_along, surface_across)
-    many = (own_along > 0.5 * threshold) & (agreeing >= _ENDS_ALONG) & ~contradicted
+    second = _second_opinion(seen, surface_along, surface_across)
+    by_fragments_across = (across > threshold) & (own_across > 0.5 * threshold) & (agreeing >= _ENDS_ACROSS)
+    by_fragments_across &= ~second.denies_across | (agreeing >= _ENDS_ALONG)
+    many = (own_along > 0.5 * threshold) & (agreeing >= _ENDS_ALONG) & ~second.denies_along
     few = agreeing >= 2
     shared = _SHARED_PROOF * threshold
     by_fragments_along = ((along > threshold) & many) | (
-        (along > shared) & confirmed_along & few & (own_along > _OWN_PROOF)
+        (along > shared) & second.confirms_along & few & (own_along > _OWN_PROOF)
     )
-    by_fragments_across |= (across > shared) & confirmed_across & few & (own_across > _OWN_PROOF)
+    by_fragments_across |= (across > shared) & second.confirms_across & few & (own_across > _OWN_PROOF)
+    by_surface = _by_surface(seen, surface_along, surface_across, threshold, least)
     has_arrived = (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells)
     by_arrival = has_arrived & (significance > 0.5 * threshold)
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
     possible = (speed <= _IMPLAUSIBLE * settings.max_speed_mps) & (seen.size_m <= _LARGEST_M)
-    evident = by_fragments_across | by_fragments_along | by_arrival
+    evident = by_fragments_across | by_fragments_along | by_arrival | by_surface
     rising = possible & ((evident & (speed > least)) | much) & seen.trusted
     holding = moving & (speed > 0.6 * least) & ((significance > 4.0) | has_arrived)
     own_speed = np.sqrt(np.square(seen.own_velocity).sum(axis=1))
@@ -114,29 +126,68 @@ def judge(
     stands = (own_speed < 0.6 * least) & (own_sigma < 0.5 * least) & (agreeing >= _ENDS_ACROSS)
     falling = np.where(stands, dt_s / _STOP_S, np.where(holding, dt_s / _HOLD_S, dt_s / _FALL_S))
     strength = np.minimum(np.maximum(along, across), np.maximum(own_along, own_across)) / threshold
-    pace = np.clip(strength, 1.0, _FASTEST)
+    pace = np.clip(np.minimum(strength, agreeing / _ENDS_ACROSS), 1.0, _FASTEST)
     change = np.where(rising & ~stands, pace * dt_s / _RISE_S, -falling)
     new_evidence = np.clip(evidence + change, 0.0, _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
-    confidence = 1.0 - np.exp(-significance / 60.0)
+    confidence = 1.0 - np.exp(-significance / _SURE_SQUARED_SIGMAS)
     return Verdict(new_evidence, new_moving, confidence)
+
+
+def _by_surface(
+    seen: MotionEvidence,
+    along: FloatArray,
+    across: FloatArray,
+    threshold: float,
+    least_mps: FloatArray,
+) -> NDArray[np.bool_]:
+    """(T,) whether the centre of a whole, compact surface moves too long and too clearly for an accident.
+
+    along, across (T,): its squared sigmas. A new viewpoint shows other sides of a thing that stands still,
+    so its centre wanders with the view, and it wanders while more and more of it comes to be seen: that much
+    speed proves nothing.
+    """
+    speed = np.sqrt(np.square(seen.surface_velocity).sum(axis=1))
+    clear = ((across > threshold) & (seen.clean_s >= _CLEAN_ACROSS_S)) | (
+        (along > threshold) & (seen.clean_s >= _CLEAN_ALONG_S)
+    )
+    wander = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps
+    result: NDArray[np.bool_] = clear & (seen.size_m <= _COMPACT_M) & (speed > least_mps + wander)
+    return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SecondOpinion:
+    """What the surface's centre says of the fragments' speed, along the line of sight and across: (T,)."""
+
+    denies_along: NDArray[np.bool_]
+    denies_across: NDArray[np.bool_]
+    confirms_along: NDArray[np.bool_]
+    confirms_across: NDArray[np.bool_]
 
 
 def _second_opinion(
     seen: MotionEvidence, surface_along: FloatArray, surface_across: FloatArray
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-    """(T,) each: whether the surface's centre denies the speed along the line of sight, confirms it, and
-    confirms the speed across. surface_along, surface_across (T,): its own squared sigmas."""
+) -> _SecondOpinion:
+    """surface_along, surface_across (T,): squared sigmas of the surface's own velocity."""
     by_fragments, variance = _along(seen.velocity, seen.covariance, seen.sight)
     by_surface, surface_variance = _along(seen.surface_velocity, seen.surface_covariance, seen.sight)
-    limit = _CONTRADICTION_SIGMAS**2 * (variance + surface_variance)
-    denies = np.square(by_fragments - by_surface) > limit
+    limit = _CONTRADICTION_SIGMAS**2
+    denies_along = np.square(by_fragments - by_surface) > limit * (variance + surface_variance)
+    _, apart = split_squared_sigmas(
+        seen.velocity - seen.surface_velocity, seen.covariance + seen.surface_covariance, seen.sight
+    )
     same_way = by_surface * by_fragments > 0
     least = _CONFIRMING_SIGMAS**2
     rest = seen.velocity - by_fragments[:, None] * seen.sight
     surface_rest = seen.surface_velocity - by_surface[:, None] * seen.sight
     same_side = (rest * surface_rest).sum(axis=1) > 0
-    return denies, (surface_along > least) & same_way & ~denies, (surface_across > least) & same_side
+    return _SecondOpinion(
+        denies_along,
+        apart > limit,
+        (surface_along > least) & same_way & ~denies_along,
+        (surface_across > least) & same_side,
+    )
 
 
 def _along(velocity: FloatArray, covariance: FloatArray, sight: FloatArray) -> tuple[FloatArray, FloatArray]:

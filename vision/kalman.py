@@ -6,14 +6,25 @@ import numpy as np
 
 from hal.types import FloatArray
 
+_VERTICAL_S = 0.1  # how long a vertical velocity lasts: limbs have one, bodies have not
+
 
 def predict(
-    state: FloatArray, covariance: FloatArray, dt_s: float, accel_density: float
+    state: FloatArray,
+    covariance: FloatArray,
+    dt_s: float,
+    accel_density: float,
+    up: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """States (T, 6), position then velocity, and covariances (T, 6, 6) dt_s later; accel_density:
-    spectral density of a white acceleration, (m/s^2)^2 s."""
+    spectral density of a white acceleration, (m/s^2)^2 s.
+
+    up (3,): what stands on the floor keeps no velocity along it; None where the floor is not known.
+    """
     move = np.eye(6)
     move[:3, 3:] = np.eye(3) * dt_s
+    if up is not None:
+        move[3:, 3:] -= (1.0 - np.exp(-dt_s / _VERTICAL_S)) * np.outer(up, up)
     spread = np.zeros((6, 6))
     density = accel_density
     spread[:3, :3] = np.eye(3) * (density * dt_s**3 / 3.0)

@@ -18,7 +18,7 @@ from vision.velocities import (
 
 _ROBUST_CHI2 = 9.0
 _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
-_INDEPENDENT_DEPTHS = 4.0  # depth noise is shared by neighbours: a body never has more looks than these
+_INDEPENDENT_DEPTHS = 10.0  # depth noise is shared by neighbours: a body never has more looks than these
 _STATIC_END_CHI2 = 6.0
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
 _NEAR_M = 0.5
@@ -78,7 +78,7 @@ def body_velocities(
 def _depth_steps(motion: PointMotion) -> FloatArray:
     """(2, 2N) information on the velocity along z in what depth itself does, and that times the velocity."""
     known = np.isfinite(motion.depth_step_m)
-    root = np.where(known, motion.lag_s / motion.depth_step_sigma_m, 0.0)
+    root = np.where(known, motion.depth_lag_s / motion.depth_step_sigma_m, 0.0)
     step = np.where(known, motion.depth_step_m, 0.0) / motion.depth_step_sigma_m
     return np.stack((root * root, root * step))
 

@@ -20,16 +20,21 @@ from vision.regions import IntGrid, Regions
 from vision.scene import CameraCondition, Fragments, Scene
 from vision.tracks import Tracks
 
-_ACCEL_DENSITY = 0.3  # (m/s^2)^2 s: how briskly people start, stop and turn
+_ACCEL_DENSITY = 0.2  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
-_CENTRE_SIGMA_M = 0.03
-_CENTRE_SHARE = 0.05
-_CENTRE_DEPTH_SHARE = 0.15
+_CENTRE_SIGMA_M = 0.015
+_CENTRE_SHARE = 0.0125
+_CENTRE_DEPTH_SHARE = 0.04
 _CENTRE_NOISE = 0.2
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
-_AREA_GAIN = 0.2
+_AREA_GAIN = 0.1
+_AREA_MEMORY_S = 0.33
+_SLIVER = 0.4  # of its usual surface
+# Limbs swing about as fast as their body goes. Where fragments disagree, some of them are limbs, and for
+# half a step it is the same ones: the disagreement is no noise that averages out from frame to frame.
+_LIMBS_MPS = 1.0
 _JUMP_M = 0.3
 # Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor.
 _ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85])
@@ -70,7 +75,7 @@ class Tracker:
             self._free.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
         elapsed_s = min(max(elapsed_s, 0.0), self._config.max_gap_s)
-        tracks.predict(elapsed_s, _ACCEL_DENSITY)
+        tracks.predict(elapsed_s, _ACCEL_DENSITY, _up(detection))
         self._last_ns = max(detection.captured_ns, self._last_ns or 0)
         owner = self._owners(detection.ids)
         standing = regions.standing(detection.grid, self._clearance_m)
@@ -145,8 +150,10 @@ class Tracker:
         mover = tracks.moving | (tracks.evidence > 0.0)
         pairs = grouping.merges(measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
         for small, large in pairs:
-            labels = np.where(labels == small + 1, np.int32(large + 1), labels)
-            tracks.seen_ns[small] = 0
+            joined = np.where(labels == small + 1, np.int32(large + 1), labels)
+            if grouping.split(grid, joined, large) is None:
+                labels = joined
+                tracks.seen_ns[small] = 0
         for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
             second = grouping.split(grid, labels, track)
             if second is not None:
@@ -200,12 +207,19 @@ class Tracker:
         noise[:, 2, 2] = np.square(depth_part) + np.square(_CENTRE_NOISE * sigma)
         noise = rotation @ noise @ rotation.T
         area_m2 = measured.cells[seen] * np.square(depth)
-        same = np.abs(area_m2 - tracks.area_m2[seen]) <= _SAME_AREA * tracks.area_m2[seen]
+        change = np.abs(area_m2 - tracks.area_m2[seen]) / np.maximum(tracks.area_m2[seen], 1e-6)
+        same = change <= _SAME_AREA
+        tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S
         jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
         smooth = measured.whole[seen] & same & (jump <= _JUMP_M + 2.0 * sigma)
         tracks.locate(seen[smooth], position[smooth], noise[smooth])
-        tracks.relocate(seen[~smooth], position[~smooth], noise[~smooth])
-        tracks.area_m2[seen] += _AREA_GAIN * (area_m2 - tracks.area_m2[seen])
+        # What is left to see of a mover that goes behind something is not where its body is.
+        sliver = tracks.moving[seen] & (area_m2 < _SLIVER * tracks.area_m2[seen])
+        cut = ~smooth & ~sliver
+        tracks.relocate(seen[cut], position[cut], noise[cut])
+        tracks.clean_s[seen[smooth]] += detection.dt_s
+        tracks.clean_s[seen[~smooth]] = 0.0
+        tracks.area_m2[seen[~sliver]] += _AREA_GAIN * (area_m2 - tracks.area_m2[seen])[~sliver]
         tracks.area_m2[seen[tracks.sightings[seen] == 0]] = area_m2[tracks.sightings[seen] == 0]
         tracks.seen_ns[seen] = detection.captured_ns
         tracks.sightings[seen] += 1
@@ -257,6 +271,7 @@ class Tracker:
             # Windows overlap: each frame brings dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
             noise = body.covariance[use] * (lag_s / detection.dt_s)
+            noise += np.square(_LIMBS_MPS * (1.0 - body.agreement[use]))[:, None, None] * np.eye(3)
             tracks.state[use], tracks.covariance[use] = kalman.update(
                 tracks.state[use],
                 tracks.covariance[use],
@@ -280,6 +295,9 @@ class Tracker:
             arrived=arrivals,
             cells=cells,
             size_m=tracks.extent_m.max(axis=1),
+            clean_s=tracks.clean_s,
+            growth_mps=tracks.growth_mps,
+            view_radps=_view_radps(detection, sight, distance),
             trusted=detection.motion_known,
         )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
@@ -312,3 +330,24 @@ class Tracker:
 
     def _in_the_way(self, grid: DepthGrid, standing: BoolGrid) -> BoolGrid:
         return standing if grid.height_m is None else standing & (grid.height_m < self._body_height_m)
+
+
+def _up(detection: Detection) -> FloatArray | None:
+    """(3,) the floor's normal in the fixed frame; None where the mounting is not known."""
+    grid = detection.grid
+    if grid.height_m is None:
+        return None
+    up: FloatArray = detection.pose.rotation @ np.array(
+        [0.0, -np.cos(grid.pitch_rad), -np.sin(grid.pitch_rad)]
+    )
+    return up
+
+
+def _view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
+    """(T,) rate at which the direction to points at sight (T, 3) turns by the camera's own way."""
+    ego = detection.ego_motion
+    if ego.dt_s <= 0.0:
+        return np.zeros(len(sight))
+    way = detection.pose.rotation @ ego.motion.translation_m / ego.dt_s
+    turn: FloatArray = np.sqrt(np.square(np.cross(sight, way)).sum(axis=1))
+    return turn / np.square(np.maximum(distance_m, 0.1))

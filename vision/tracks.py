@@ -25,6 +25,8 @@ _FIELDS = (
     "area_m2",
     "cells",
     "fragments",
+    "clean_s",
+    "growth_mps",
 )
 
 
@@ -32,7 +34,8 @@ class Tracks:
     """state (T, 6): position and velocity; covariance (T, 6, 6); surface_state and surface_covariance: the
     same from the centres of the visible surface alone, without the fragments, as a second opinion; evidence
     (T,) of motion; moving (T,); confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); area_m2 (T,):
-    averaged, up to a common factor; cells (T,) of the grid covered when last seen."""
+    averaged, up to a common factor; cells (T,) of the grid covered when last seen; clean_s (T,): for how long
+    the surface's centre has told of the velocity without a break."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -51,6 +54,8 @@ class Tracks:
         self.area_m2 = np.empty(0)
         self.cells = np.empty(0, np.intp)
         self.fragments = np.empty(0, np.intp)
+        self.clean_s = np.empty(0)
+        self.growth_mps = np.empty(0)
         self._next_id = 1
 
     def __len__(self) -> int:
@@ -97,6 +102,8 @@ class Tracks:
             "area_m2": np.zeros(count),
             "cells": np.zeros(count),
             "fragments": np.zeros(count),
+            "clean_s": np.zeros(count),
+            "growth_mps": np.zeros(count),
         }
         self._next_id += count
         for name in _FIELDS:
@@ -109,12 +116,12 @@ class Tracks:
         self.start(self.state[track : track + 1, :3], 0.3, 1.0, evidence, now_ns)
         self.state[-1, 3:] = self.state[track, 3:]
 
-    def predict(self, dt_s: float, accel_density: float) -> None:
-        """Move every track on."""
+    def predict(self, dt_s: float, accel_density: float, up: FloatArray | None) -> None:
+        """Move every track on. up (3,): along the floor's normal nothing keeps going; None: not known."""
         if len(self) and dt_s > 0:
-            self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_density)
+            self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_density, up)
             self.surface_state, self.surface_covariance = kalman.predict(
-                self.surface_state, self.surface_covariance, dt_s, accel_density
+                self.surface_state, self.surface_covariance, dt_s, accel_density, up
             )
 
     def locate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:

@@ -39,7 +39,8 @@ class PointMotion:
     static_m (N, 3): where it would be if static. ray (N, 2): x', y' now. lag_s (N,): T.
     miss_m (N, 2): x' Z - X, y' Z - Y: zero for a static point. covariance (N, 3): xx, xy, yy of miss_m
     from pixels (m^2). depth_effect (N, 2): change of miss_m by one sigma of the anchor's depth.
-    depth_step_m (N,): z' - Z, NaN where depth is missing. depth_step_sigma_m (N,).
+    depth_step_m (N,): z' - Z, NaN where depth is missing. depth_step_sigma_m (N,). depth_lag_s (N,): the
+    time in which it came about; longer than T, since Z is an average over the frames before, too.
     static_chi2 (N,): 2 degrees of freedom, the smaller one of the near and the far surface.
     usable (N,) bool.
     """
@@ -52,6 +53,7 @@ class PointMotion:
     depth_effect: FloatArray
     depth_step_m: FloatArray
     depth_step_sigma_m: FloatArray
+    depth_lag_s: FloatArray
     static_chi2: FloatArray
     usable: NDArray[np.bool_]
 

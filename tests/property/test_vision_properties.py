@@ -57,6 +57,7 @@ def test_any_translation_over_ground_is_recovered_from_exact_projections(
         depth_effect=np.zeros((count, 2)),
         depth_step_m=np.full(count, np.nan),
         depth_step_sigma_m=np.ones(count),
+        depth_lag_s=np.full(count, lag_s),
         static_chi2=np.zeros(count),
         usable=np.ones(count, np.bool_),
     )

@@ -32,6 +32,7 @@ def evidence(static_m: FloatArray, ray: FloatArray, lag_s: float) -> PointMotion
         depth_effect=np.zeros((count, 2)),
         depth_step_m=np.full(count, np.nan),
         depth_step_sigma_m=np.ones(count),
+        depth_lag_s=np.full(count, lag_s),
         static_chi2=np.zeros(count),
         usable=np.ones(count, np.bool_),
     )
@@ -119,6 +120,7 @@ def test_correlated_pixels_are_weighted_by_the_inverse_of_their_covariance() -> 
         np.array([[0.4, 0.1]]),
         base.depth_step_m,
         base.depth_step_sigma_m,
+        base.depth_lag_s,
         base.static_chi2,
         base.usable,
     )
