@@ -31,7 +31,8 @@ class DepthGrid:
     depth_m (h, w): 0 where not valid. inverse_depth (h, w): 0 where not valid. valid (h, w).
     beyond (h, w): measured, but farther than the depth mask: seen through up to there at least.
     x (w,), y (h,): ray at z = 1 m. forward_m (h, w): distance along the floor. height_m (h, w) over the
-    floor and height_sigma_m (h, w): None where the mounting is not known. pitch_rad: 0 where not known.
+    floor, height_sigma_m (h, w) and up (3,), the floor's normal in optical axes: None where the floor is not
+    known. pitch_rad: of the mounting, NaN where the mounting is not known.
     """
 
     step_px: int
@@ -47,6 +48,7 @@ class DepthGrid:
     height_sigma_m: FloatGrid | None
     camera_height_m: float
     pitch_rad: float
+    up: FloatArray | None
 
     def columns(self, pixels_u: FloatArray) -> NDArray[np.intp]:
         """Grid columns of image columns, clipped to the grid."""
@@ -100,7 +102,9 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     x, y = view.x, view.y
     if mount is None:
         nan = float("nan")
-        return DepthGrid(step, offset, depth_m, inverse, valid, beyond, x, y, depth_m, None, None, nan, 0.0)
+        return DepthGrid(
+            step, offset, depth_m, inverse, valid, beyond, x, y, depth_m, None, None, nan, nan, None
+        )
     sigma_m = np.float32(CELL_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
     return DepthGrid(
         step,
@@ -116,6 +120,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
         sigma_m * np.abs(view.drop),
         mount.height_m,
         mount.pitch_rad,
+        np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
     )
 
 

@@ -23,8 +23,8 @@ _FLOOR_EXCESS = 1.35  # a ray that goes this much farther than the floor has fou
 def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeSpace:
     """Nearest obstacle cell (supported) and known distance for each of 80 upright bands.
 
-    obstacle (h, w): cells between clearance and the robot's height; all valid ones where the mounting
-    is not known. Without a floor to see, space is known up to the nearest surface only.
+    obstacle (h, w): cells between clearance and the robot's height; all valid ones where the floor is not
+    known. Without a known mounting, space is known up to the nearest surface only.
     """
     columns = obstacle.shape[1]
     bands = min(BANDS, columns)
@@ -34,8 +34,9 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
     x = (sum(grid.x[column:used:width] for column in range(width)) / np.float32(width)).astype(float)
     half_width = 0.5 * width * float(grid.x[1] - grid.x[0])
     middle_y = 0.5 * float(grid.y[(len(grid.y) - 1) // 2] + grid.y[len(grid.y) // 2])
-    tilt = math.cos(grid.pitch_rad) - middle_y * math.sin(grid.pitch_rad)
-    if grid.height_m is None:
+    mounted = math.isfinite(grid.pitch_rad)
+    tilt = math.cos(grid.pitch_rad) - middle_y * math.sin(grid.pitch_rad) if mounted else 1.0
+    if not mounted:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     else:
         known = _known_m(grid, bands, width, max_depth_m)

@@ -23,6 +23,7 @@ from vision.ego_motion import (
     with_gyro,
 )
 from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
+from vision.floor import FloorFinder, on_floor
 from vision.fragments import FragmentStore
 from vision.health import Continuity, HealthMonitor, worsened
 from vision.lens import project, rays
@@ -73,6 +74,7 @@ class Detector:
         self._store = FragmentStore()
         self._renewal = Renewal(config)
         self._health = HealthMonitor(config)
+        self._floor = FloorFinder()
         self._grey: GreyImage | None = None
         self._last_ns = 0
         self._pose = _IDENTITY
@@ -88,7 +90,7 @@ class Detector:
         the ego-motion and searched for where their obstacle goes.
         """
         grey = np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        grid = make_grid(frame, self._config, self._mount)
+        grid = self._grid(frame)
         check = self._health.check(frame, grey, grid)
         usable = check.usable_colour and check.usable_depth
         known = self._grey is not None and self._grey.shape == grey.shape
@@ -163,6 +165,14 @@ class Detector:
             self._store.break_history()
         self._commit(frame, grey, odometry)
         return detection
+
+    def _grid(self, frame: RgbdFrame) -> DepthGrid:
+        grid = make_grid(frame, self._config, self._mount)
+        if self._mount is None:
+            floor = self._floor.find(grid)
+            if floor is not None:
+                return on_floor(grid, floor, self._config.depth_noise)
+        return grid
 
     def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
         without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))

@@ -41,7 +41,7 @@ class Regions:
 
 
 def standing(grid: DepthGrid, clearance_m: float) -> BoolGrid:
-    """(h, w) cells that stand out of the floor; every valid cell where the mounting is not known."""
+    """(h, w) cells that stand out of the floor; every valid cell where the floor is not known."""
     if grid.height_m is None or grid.height_sigma_m is None:
         return grid.valid
     margin = (
@@ -126,7 +126,9 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     box[:, 0] = left * step + (grid.offset_px - half)
     box[:, 1] = top * step + (grid.offset_px - half)
     box[:, 2] = right * step + (grid.offset_px + half)
-    box[:, 3] = np.maximum(bottom * step + (grid.offset_px + half), _foot_px(grid, bottom, depth))
+    box[:, 3] = np.maximum(
+        bottom * step + (grid.offset_px + half), _foot_px(grid, bottom, centre[:, 0] / depth, depth)
+    )
     bbox[present] = box
     size = np.empty((len(present), 3))
     size[:, 0] = (grid.x[right] - grid.x[left]) * depth
@@ -145,14 +147,17 @@ def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
     return replace(regions, whole=regions.whole & (hidden <= _OCCLUDED_SHARE * regions.rows))
 
 
-def _foot_px(grid: DepthGrid, bottom: NDArray[np.intp], depth_m: FloatArray) -> FloatArray:
+def _foot_px(
+    grid: DepthGrid, bottom: NDArray[np.intp], middle_x: FloatArray, depth_m: FloatArray
+) -> FloatArray:
     """(R,) image row where a part that nearly reaches down to the floor stands on it; -inf for others.
 
     The lowest hand's breadth of a body is taken for floor, as the noise of depth demands.
     """
-    if grid.height_m is None:
+    if grid.up is None:
         return np.full(len(bottom), -np.inf)
-    floor_y = (grid.camera_height_m / depth_m - np.sin(grid.pitch_rad)) / np.cos(grid.pitch_rad)
+    # On the floor: camera height = - up . ray * depth.
+    floor_y = (-grid.camera_height_m / depth_m - grid.up[2] - grid.up[0] * middle_x) / grid.up[1]
     missing_m = (floor_y - grid.y[bottom]) * depth_m
     row = (floor_y - grid.y[0]) / float(grid.y[1] - grid.y[0]) * grid.step_px + grid.offset_px
     end = grid.offset_px + (len(grid.y) - 0.5) * grid.step_px

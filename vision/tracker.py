@@ -333,14 +333,9 @@ class Tracker:
 
 
 def _up(detection: Detection) -> FloatArray | None:
-    """(3,) the floor's normal in the fixed frame; None where the mounting is not known."""
-    grid = detection.grid
-    if grid.height_m is None:
-        return None
-    up: FloatArray = detection.pose.rotation @ np.array(
-        [0.0, -np.cos(grid.pitch_rad), -np.sin(grid.pitch_rad)]
-    )
-    return up
+    """(3,) the floor's normal in the fixed frame; None where the floor is not known."""
+    up = detection.grid.up
+    return None if up is None else np.asarray(detection.pose.rotation @ up)
 
 
 def _view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
