@@ -32,7 +32,7 @@ from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
 from vision.velocities import PointMotion
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
-_AGREEMENT = 0.5
+_AGREEMENT = 0.4
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
 
