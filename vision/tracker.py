@@ -266,7 +266,7 @@ class Tracker:
             settings.max_speed_mps,
         )
         agreeing = body.agreement * body.ends
-        use = (agreeing >= 2) & ((body.agreement >= 0.3) | (agreeing >= 6))
+        use = (agreeing >= 2) & ((body.agreement >= 0.2) | (agreeing >= 4))
         if use.any():
             # Windows overlap: each frame brings dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
