@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.types import FloatArray
 
-_RISE_S = 0.10
+_RISE_S = 0.07
 _FASTEST = 2.5  # times, with overwhelming proof
 _FALL_S = 0.30
 _HOLD_S = 2.0  # without new proof
