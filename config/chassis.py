@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ipaddress
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from config.loader import Section
 
@@ -62,18 +64,45 @@ class SerialLinkConfig(Section):
     baud: int = Field(default=115_200, ge=1_200, le=4_000_000)
 
 
-class AgilexChassisConfig(Section):
-    """An AgileX base that speaks protocol V2 over CAN.
+AgilexModelName = Literal["bunker", "bunker_mini", "bunker_pro", "scout", "scout_mini", "tracer"]
 
+# Why a model cannot be reached over RS-232.
+NO_SERIAL: Mapping[AgilexModelName, str] = MappingProxyType(
+    {
+        "bunker_mini": "it has CAN only",
+        "bunker_pro": "it has CAN only",
+        "tracer": "its serial line speaks another protocol (percentages), which has no driver here",
+    }
+)
+
+
+def _wire(link: object) -> str:
+    """Which of the two link sections this is: a serial port has a url."""
+    if isinstance(link, dict):
+        return "serial" if "url" in link else "can"
+    return "serial" if isinstance(link, SerialLinkConfig) else "can"
+
+
+AgilexLinkConfig = Annotated[
+    Annotated[CanLinkConfig, Tag("can")] | Annotated[SerialLinkConfig, Tag("serial")], Discriminator(_wire)
+]
+
+
+class AgilexChassisConfig(Section):
+    """An AgileX base that speaks protocol V2, over CAN or, where it has that, over RS-232.
+
+    link: ``{interface: socketcan, channel: can0}``, or ``{url: /dev/ttyUSB0}`` for RS-232.
     track_width_m: distance between the track centres. With it, dead reckoning counts the track
-    odometer (0x311); without it, it integrates the reported speeds (0x221), whose yaw rate needs no
-    geometry. slip_factor: effective over real track width, >= 1 because tracks scrub sideways
-    in a turn: the base turns 1 / slip_factor of what its tracks say. Measure it by turning on the spot.
+    odometer (0x311); with null, it integrates the reported speeds (0x221), whose yaw rate needs no
+    geometry; without the key it is the model's, where a manual says it. slip_factor: effective over real
+    track width, >= 1 because tracks scrub sideways in a turn: the base turns 1 / slip_factor of what its
+    tracks say. Measure it by turning on the spot. actuators: how many motors report, where your base
+    differs from its model.
     """
 
     kind: Literal["agilex"]
-    model: Literal["bunker"] = "bunker"
-    link: CanLinkConfig
+    model: AgilexModelName = "bunker"
+    link: AgilexLinkConfig
     command_period_ms: int = Field(default=20, ge=5, le=100)
     command_timeout_ms: int = Field(default=200, ge=40, le=1000, description="older setpoints stop the robot")
     feedback_timeout_ms: int = Field(default=200, ge=40, le=2000, description="of motion feedback 0x221")
@@ -81,6 +110,16 @@ class AgilexChassisConfig(Section):
     arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
     track_width_m: float | None = Field(default=None, gt=0.05, le=5)
     slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
+    actuators: int | None = Field(default=None, ge=1, le=8)
+
+    @model_validator(mode="after")
+    def _has_that_wire(self) -> Self:
+        if isinstance(self.link, SerialLinkConfig) and self.model in NO_SERIAL:
+            raise ValueError(
+                f"link: {self.model} cannot be driven over a serial port: {NO_SERIAL[self.model]}; use CAN, "
+                "such as {interface: socketcan, channel: can0}"
+            )
+        return self
 
 
 class RoboclawChassisConfig(Section):
@@ -174,8 +213,8 @@ class KobukiChassisConfig(Section):
     arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
 
 
-SerialChassisConfig = RoboclawChassisConfig | RoboteqChassisConfig | KobukiChassisConfig
-ChassisConfig = Annotated[AgilexChassisConfig | SerialChassisConfig, Field(discriminator="kind")]
+AnyChassisConfig = AgilexChassisConfig | RoboclawChassisConfig | RoboteqChassisConfig | KobukiChassisConfig
+ChassisConfig = Annotated[AnyChassisConfig, Field(discriminator="kind")]
 
 
 class PlantConfig(Section):

@@ -16,12 +16,12 @@ from config.app import AppConfig, ReplayConfig, SimulationConfig
 from config.camera import OdometryChoice, RealsenseCameraConfig, ReplayCameraConfig, SimulatedCameraConfig
 from config.chassis import (
     AgilexChassisConfig,
+    AnyChassisConfig,
     CanLinkConfig,
     KobukiChassisConfig,
     PlantConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
-    SerialChassisConfig,
 )
 from config.loader import resolve
 from config.path import LineSpec, PathSpec
@@ -36,12 +36,14 @@ from controller.path import Path
 from controller.perceive import Perceiver
 from controller.recorder import Surroundings
 from controller.shape import SpeedShaper
-from hal.api import Chassis, Clock, FrameSource, OdometrySource, SerialLink
+from hal.api import CanLink, Chassis, Clock, FrameSource, OdometrySource, SerialLink
 from hal.cameras.pose_file import PoseFile, open_odometry
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
 from hal.chassis.agilex import COMMANDS as AGILEX_COMMANDS
-from hal.chassis.agilex import AgilexChassis
+from hal.chassis.agilex import AgilexChassis, no_can_frames
+from hal.chassis.agilex_models import model_of, over_serial
+from hal.chassis.agilex_serial import AgilexSerialBus
 from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
@@ -190,17 +192,17 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
 
 
 def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Chassis, Emulator | None]:
-    simulation = config.simulation
+    simulation, link = config.simulation, config.chassis.link
     emulated = simulation is not None and simulation.base == "emulated"
     plant = None
     if simulation is not None and emulated:
         plant = TrackedPlant(simulation.plant, start, start_ns)
-    if isinstance(config.chassis, AgilexChassisConfig):
-        link = config.chassis.link
-        driver = AgilexChassis(GuardedCanLink(CanBusLink(link), AGILEX_COMMANDS), config.chassis)
-        return driver, None if plant is None else build_can_emulator(link, plant)
+    if isinstance(link, CanLinkConfig):
+        assert isinstance(config.chassis, AgilexChassisConfig), "one kind of chassis is reached over CAN"
+        driver = _agilex_driver(config.chassis, CanBusLink(link), no_can_frames)
+        return driver, None if plant is None else build_can_emulator(config.chassis, link, plant)
     if plant is None:
-        return _serial_driver(config.chassis, SerialPortLink(config.chassis.link)), None
+        return _serial_driver(config.chassis, SerialPortLink(link)), None
     # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
     here, there = serial_pair()
     return _serial_driver(config.chassis, here), build_serial_emulator(config.chassis, there, plant)
@@ -214,17 +216,39 @@ def build_base_in_memory(
         PlantConfig() if config.simulation is None else config.simulation.plant, start, start_ns
     )
     limits = GuardLimits.of(config.robot.limits, 1.0 / config.runner.control_rate_hz)
-    if isinstance(config.chassis, AgilexChassisConfig):
+    if isinstance(config.chassis.link, CanLinkConfig):
+        assert isinstance(config.chassis, AgilexChassisConfig), "one kind of chassis is reached over CAN"
         near, far = can_pair()
-        driver = AgilexChassis(GuardedCanLink(near, AGILEX_COMMANDS), config.chassis)
-        return GuardedChassis(driver, limits), AgilexEmulator(far, plant), near
+        driver = _agilex_driver(config.chassis, near, no_can_frames)
+        return GuardedChassis(driver, limits), _agilex_emulator(config.chassis, far, plant), near
     here, there = serial_pair()
     guarded = GuardedChassis(_serial_driver(config.chassis, here), limits)
     return guarded, build_serial_emulator(config.chassis, there, plant), here
 
 
-def _serial_driver(config: SerialChassisConfig, link: SerialLink) -> Chassis:
+def _agilex_driver(
+    config: AgilexChassisConfig, link: CanLink, no_frames: Callable[[], str]
+) -> AgilexChassis:
+    return AgilexChassis(GuardedCanLink(link, AGILEX_COMMANDS), config, no_frames)
+
+
+def _agilex_emulator(config: AgilexChassisConfig, link: CanLink, plant: TrackedPlant) -> AgilexEmulator:
+    model = model_of(config)
+    return AgilexEmulator(
+        link,
+        plant,
+        command_timeout_ms=model.base_timeout_ms,
+        actuators=config.actuators or model.actuators,
+        obeying_mode=model.obeying_mode(over_serial(config)),
+        mode_timeout_ms=None if model.mode_period_ms is None else model.base_timeout_ms,
+    )
+
+
+def _serial_driver(config: AnyChassisConfig, link: SerialLink) -> Chassis:
     match config:
+        case AgilexChassisConfig():
+            bus = AgilexSerialBus(link)
+            return _agilex_driver(config, bus, bus.silence)
         case RoboclawChassisConfig():
             return RoboclawChassis(link, config)
         case RoboteqChassisConfig():
@@ -235,9 +259,9 @@ def _serial_driver(config: SerialChassisConfig, link: SerialLink) -> Chassis:
             assert_never(unknown)
 
 
-def build_can_emulator(link: CanLinkConfig, plant: TrackedPlant) -> Emulator:
+def build_can_emulator(config: AgilexChassisConfig, link: CanLinkConfig, plant: TrackedPlant) -> Emulator:
     """The base at the other end of a CAN bus. Raises DeviceNotFound, DeviceRefused when entered."""
-    return AgilexEmulator(CanBusLink(link), plant)
+    return _agilex_emulator(config, CanBusLink(link), plant)
 
 
 def build_pseudo_terminal() -> PseudoTerminal:
@@ -245,9 +269,11 @@ def build_pseudo_terminal() -> PseudoTerminal:
     return PseudoTerminal()
 
 
-def build_serial_emulator(config: SerialChassisConfig, link: SerialLink, plant: TrackedPlant) -> Emulator:
+def build_serial_emulator(config: AnyChassisConfig, link: SerialLink, plant: TrackedPlant) -> Emulator:
     """The base that this driver's configuration expects, at the other end of a serial line."""
     match config:
+        case AgilexChassisConfig():
+            return _agilex_emulator(config, AgilexSerialBus(link), plant)
         case RoboclawChassisConfig():
             return RoboclawEmulator(link, plant, counts_per_m=config.counts_per_m, address=config.address)
         case RoboteqChassisConfig():

@@ -17,7 +17,13 @@ import click
 from pydantic import ValidationError
 
 from config.app import AppConfig, load_app
-from config.chassis import AgilexChassisConfig, CanLinkConfig, PlantConfig
+from config.chassis import (
+    AgilexChassisConfig,
+    AnyChassisConfig,
+    CanLinkConfig,
+    PlantConfig,
+    SerialLinkConfig,
+)
 from config.loader import CONFIG_DIR, describe
 from controller.build import build_can_emulator, build_pseudo_terminal, build_serial_emulator
 from controller.errors import UserError
@@ -78,19 +84,37 @@ def run_emulator(options: EmulateOptions, commands: TextIO | None) -> None:
 def _emulator(config: AppConfig, options: EmulateOptions, now_ns: int) -> Iterator[Emulator]:
     plant_config = PlantConfig() if config.simulation is None else config.simulation.plant
     plant = TrackedPlant(plant_config, None, now_ns)
-    if isinstance(config.chassis, AgilexChassisConfig):
-        link = can_link(config.chassis.link, options)
-        with build_can_emulator(link, plant) as can_emulator:
+    chassis = with_wire(config.chassis, options)
+    if isinstance(chassis.link, CanLinkConfig):
+        assert isinstance(chassis, AgilexChassisConfig), "one kind of chassis is reached over CAN"
+        link = can_link(chassis.link, options)
+        with build_can_emulator(chassis, link, plant) as can_emulator:
             click.echo(f"emulating {options.kind} on CAN {link.interface} {link.channel!r}", err=True)
             yield can_emulator
         return
     if options.interface is not None or options.port is not None:
-        raise UserError(f"--interface, --port: {options.kind} is serial; only --channel PATH says where")
+        raise UserError(
+            f"--interface, --port: this {options.kind} is on a serial port; only --channel PATH says where"
+        )
     terminal = build_pseudo_terminal()
-    wanted = options.channel or config.chassis.link.url
-    with build_serial_emulator(config.chassis, terminal, plant) as emulator, _linked(wanted, terminal.path):
+    wanted = options.channel or chassis.link.url
+    with build_serial_emulator(chassis, terminal, plant) as emulator, _linked(wanted, terminal.path):
         click.echo(f"emulating {options.kind} on {wanted} -> {terminal.path}", err=True)
         yield emulator
+
+
+def with_wire(chassis: AnyChassisConfig, options: EmulateOptions) -> AnyChassisConfig:
+    """The chassis on the kind of wire that the channel names: a path is a serial port. Raises UserError."""
+    channel = options.channel
+    if channel is None or "/" not in channel or options.interface is not None:
+        return chassis
+    if not isinstance(chassis, AgilexChassisConfig):
+        return chassis
+    values = {key: getattr(chassis, key) for key in chassis.model_fields_set}
+    try:
+        return AgilexChassisConfig.model_validate(values | {"link": SerialLinkConfig(url=channel)})
+    except ValidationError as error:
+        raise UserError(f"--channel {channel}: {describe(error)}") from error
 
 
 def can_link(link: CanLinkConfig, options: EmulateOptions) -> CanLinkConfig:

@@ -1,4 +1,4 @@
-"""A BUNKER at the other end of a CAN bus: AgileX protocol V2, stepped by a time that is passed in.
+"""An AgileX base at the other end of its wire: protocol V2, stepped by a time that is passed in.
 
 Like the real base it starts in standby, obeys 0x421 before anything else, and stops by itself when 0x111
 stays away. What it reports are its tracks: slip in a turn is not visible to it.
@@ -6,6 +6,7 @@ stays away. What it reports are its tracks: slip in a turn is not visible to it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
@@ -47,6 +48,10 @@ class _Broadcast:
 class AgilexEmulator:
     """Frames that have arrived are obeyed as of the time of the last step, so in lock-step the order
     "advance the emulator, then exchange with the driver" has no hidden delay.
+
+    obeying_mode: the control mode in which commands from this link count (1 CAN, 2 serial). actuators: its
+    motors, alternately left and right. mode_timeout_ms: after so long without 0x421 it is back in standby, as
+    BUNKER MINI; None: it stays.
     """
 
     def __init__(
@@ -57,11 +62,18 @@ class AgilexEmulator:
         command_timeout_ms: int = 500,
         state_period_ms: int = 100,
         boot_ms: int = 1000,
+        actuators: int = 2,
+        obeying_mode: int = _CAN,
+        mode_timeout_ms: int | None = None,
     ) -> None:
         self._link = link
+        self._actuators = actuators
+        self._obeying_mode = obeying_mode
         self._plant = plant
         self._command_timeout_ns = command_timeout_ms * _MS
         self._boot_ns = boot_ms * _MS
+        self._mode_timeout_ns = None if mode_timeout_ms is None else mode_timeout_ms * _MS
+        self._mode_heard_ns = plant.now_ns
         start_ns = plant.now_ns
         self._now_ns = start_ns
         self._broadcasts = (
@@ -187,14 +199,18 @@ class AgilexEmulator:
     def _obey(self, message: AgilexMessage) -> None:
         if isinstance(message, ControlModeCommand):
             if self.mode != _REMOTE and message.mode in (_STANDBY, _CAN, _SERIAL):
-                if message.mode != self.mode:
-                    self._plant.command(0.0, 0.0)
-                    self._command_ns = None
-                self.mode = message.mode
-        elif isinstance(message, MotionCommand) and self.mode == _CAN and self.vehicle_state == _NORMAL:
+                self._mode_heard_ns = self._now_ns
+                self._enter(message.mode)
+        elif isinstance(message, MotionCommand) and self.mode == self._obeying_mode and self.vehicle_state == _NORMAL:
             self._command_ns = self._now_ns
             self._plant.command(message.v_mps, message.w_radps)
             self.commands_obeyed += 1
+
+    def _enter(self, mode: int) -> None:
+        if mode != self.mode:
+            self._plant.command(0.0, 0.0)
+            self._command_ns = None
+        self.mode = mode
 
     def _next_event_ns(self) -> int:
         next_ns = min(broadcast.due_ns for broadcast in self._broadcasts)
@@ -205,6 +221,9 @@ class AgilexEmulator:
     def _move_to(self, now_ns: int) -> None:
         self._plant.advance_to(now_ns)
         self._now_ns = max(self._now_ns, now_ns)
+        waits_ns, commanded = self._mode_timeout_ns, self.mode in (_CAN, _SERIAL)
+        if commanded and waits_ns is not None and self._now_ns - self._mode_heard_ns >= waits_ns:
+            self._enter(_STANDBY)
         if self._command_ns is not None and self._now_ns - self._command_ns >= self._command_timeout_ns:
             self._command_ns = None
             self._plant.command(0.0, 0.0)
@@ -236,16 +255,17 @@ class AgilexEmulator:
 
     def _actuators_fast(self) -> tuple[AgilexMessage, ...]:
         frames = []
-        for index, (speed_mps, travel_m) in enumerate(
-            zip(self._plant.track_speeds_mps, self._plant.track_travel_m, strict=True)
-        ):
-            rpm = round(speed_mps / _WHEEL_RADIUS_M * 60.0 / 6.283185307)
-            pulses = _as_int32(round(travel_m * _PULSES_PER_M))
+        for index in range(self._actuators):
+            speed_mps = self._plant.track_speeds_mps[index % 2]
+            rpm = round(speed_mps / _WHEEL_RADIUS_M * 60.0 / math.tau)
+            pulses = _as_int32(round(self._plant.track_travel_m[index % 2] * _PULSES_PER_M))
             frames.append(ActuatorFast(index, rpm, 0.5 + 2.0 * abs(speed_mps), pulses))
         return tuple(frames)
 
     def _actuators_slow(self) -> tuple[AgilexMessage, ...]:
-        return tuple(ActuatorSlow(index, self.battery_v, 35, 40, self.driver_bits) for index in (0, 1))
+        return tuple(
+            ActuatorSlow(index, self.battery_v, 35, 40, self.driver_bits) for index in range(self._actuators)
+        )
 
     def _battery(self) -> tuple[AgilexMessage, ...]:
         return (Battery(80, 100, self.battery_v, -2.0, 25.0),)

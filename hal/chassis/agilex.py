@@ -1,4 +1,4 @@
-"""AgileX tracked bases over CAN, protocol V2, stepped by the control loop.
+"""AgileX tracked and skid-steer bases, protocol V2, over CAN or RS-232, stepped by the control loop.
 
 Every command period one motion command 0x111 goes out: zero in every mode but armed. 0x421 takes the
 base out of standby while arming and puts it back afterwards.
@@ -6,7 +6,7 @@ base out of standby while arming and puts it back afterwards.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from config.chassis import AgilexChassisConfig
@@ -20,7 +20,7 @@ from hal.chassis.agilex_messages import (
     decode,
     encode,
 )
-from hal.chassis.agilex_models import model_of
+from hal.chassis.agilex_models import model_of, over_serial
 from hal.chassis.arming import NS_PER_MS, ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero, zero
 from hal.chassis.driver import ChassisDriver
@@ -33,18 +33,27 @@ COMMANDS: Mapping[int, int] = MappingProxyType({0x111: 8, 0x421: 1})
 _MAX_FRAMES = 256
 
 # Motor speeds and currents, 100 frames a second: nothing here depends on them.
-_NOT_NEEDED = frozenset(range(0x251, 0x251 + ACTUATORS))
+_FIRST_ACTUATOR = 0x251
+_NOT_NEEDED = frozenset(range(_FIRST_ACTUATOR, _FIRST_ACTUATOR + ACTUATORS))
 
 # How often 0x421 is repeated while the base has not followed it.
 _MODE_RETRY_NS = 40 * NS_PER_MS
 
 
-class AgilexChassis(ChassisDriver):
-    """hal.api.Chassis for AgileX V2."""
+def no_can_frames() -> str:
+    """What to check on a silent bus."""
+    return "not one frame came; check power, wiring, termination and 500 kbit/s"
 
-    def __init__(self, link: CanLink, config: AgilexChassisConfig) -> None:
+
+class AgilexChassis(ChassisDriver):
+    """hal.api.Chassis for AgileX V2. Over RS-232 link is a hal.chassis.agilex_serial.AgilexSerialBus, and
+    no_frames its silence."""
+
+    def __init__(
+        self, link: CanLink, config: AgilexChassisConfig, no_frames: Callable[[], str] = no_can_frames
+    ) -> None:
         model = model_of(config)
-        feedback = AgilexFeedback(config, model)
+        feedback = AgilexFeedback(config, model, no_frames)
         commands = CommandLimits(
             model.max_speed_mps, model.max_yaw_rate_radps, config.command_timeout_ms * NS_PER_MS
         )
@@ -57,6 +66,7 @@ class AgilexChassis(ChassisDriver):
         super().__init__(link, feedback, commands, limits)
         self._link = link
         self._model = model
+        self._obeying = model.obeying_mode(over_serial(config))
         self._feedback = feedback
         self._slip_factor = config.slip_factor
         self._period_ns = config.command_period_ms * NS_PER_MS
@@ -72,6 +82,7 @@ class AgilexChassis(ChassisDriver):
                 if frame is None:
                     break
                 if frame.arbitration_id in _NOT_NEEDED:
+                    self._feedback.note_actuator(frame.arbitration_id - _FIRST_ACTUATOR)
                     continue
                 message = decode(frame)
                 if message is None:
@@ -105,12 +116,12 @@ class AgilexChassis(ChassisDriver):
         if mode is ChassisMode.ARMED:
             period_ms = self._model.mode_period_ms
             if period_ms is not None and due(self._mode_sent_ns, period_ms * NS_PER_MS, now_ns):
-                return self._model.mode_can
+                return self._obeying
             return None
         if not due(self._mode_sent_ns, _MODE_RETRY_NS, now_ns):
             return None
         if mode is ChassisMode.ARMING:
-            return self._model.mode_can
+            return self._obeying
         return None if self._feedback.disobeys else self._model.mode_standby
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from config.chassis import AgilexChassisConfig
 from hal.chassis.agilex_messages import (
@@ -18,7 +18,8 @@ from hal.chassis.agilex_models import (
     VEHICLE_ESTOP,
     VEHICLE_NORMAL,
     AgilexModel,
-    describe_driver_state,
+    over_serial,
+    track_width_of,
 )
 from hal.chassis.arming import NS_PER_MS
 from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
@@ -48,14 +49,21 @@ class AgilexFeedback:
     Dead reckoning: with the track width known, the odometer 0x311 is counted: it loses nothing
     when frames are lost or late, and its 1 mm steps do not add up. Without it the speeds 0x221 are
     integrated over the time of their arrival: they need no geometry.
+
+    no_frames: what came and what to check, for the case that not one frame was understood.
     """
 
-    def __init__(self, config: AgilexChassisConfig, model: AgilexModel) -> None:
+    def __init__(
+        self, config: AgilexChassisConfig, model: AgilexModel, no_frames: Callable[[], str]
+    ) -> None:
         self._model = model
+        self._obeying = model.obeying_mode(over_serial(config))
+        self._others = (model.modes_remote | {model.mode_can, model.mode_serial}) - {self._obeying}
+        self._actuators = config.actuators or model.actuators
+        self._no_frames = no_frames
         self._slip_factor = config.slip_factor
-        self._geometry = (
-            None if config.track_width_m is None else TrackGeometry(config.track_width_m, config.slip_factor)
-        )
+        width_m = track_width_of(config)
+        self._geometry = None if width_m is None else TrackGeometry(width_m, config.slip_factor)
         self._silence_ns = config.feedback_timeout_ms * NS_PER_MS
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter()
@@ -65,6 +73,7 @@ class AgilexFeedback:
         self._battery: Battery | None = None
         self._driver_bits: dict[int, int] = {}
         self._foreign_id: int | None = None
+        self._highest_actuator = 0
         self.motion_ns: int | None = None
         self.status_ns: int | None = None
         self.v_mps = math.nan
@@ -93,7 +102,7 @@ class AgilexFeedback:
         """Why the base does not take commands, as its newest system state tells; "" when it does."""
         if self._state is None:
             return "no system state heard"
-        if self._state.control_mode == self._model.mode_can:
+        if self._state.control_mode == self._obeying:
             return ""
         return f"control mode is {self._model.describe_mode(self._state.control_mode)}"
 
@@ -106,12 +115,16 @@ class AgilexFeedback:
             return "0x221 came, but no 0x211"
         if self._foreign_id is not None:
             return f"only foreign frames came, such as 0x{self._foreign_id:X}; is this the base's bus?"
-        return "not one frame came; check power, wiring, termination and 500 kbit/s"
+        return self._no_frames()
 
     def note_foreign(self, arbitration_id: int) -> None:
         """A frame came that is none of protocol V2. The first of V1 is remembered, else the newest."""
         if self._foreign_id != _V1_STATE_ID:
             self._foreign_id = arbitration_id
+
+    def note_actuator(self, index: int) -> None:
+        """Motor index, counted from 0, has reported."""
+        self._highest_actuator = max(self._highest_actuator, index)
 
     @property
     def standing(self) -> bool:
@@ -132,6 +145,11 @@ class AgilexFeedback:
         Fault bits alone are no cause: several models set "remote control lost" whenever the remote
         control is switched off. What stops the base shows in its vehicle state.
         """
+        if self._highest_actuator >= self._actuators:
+            return (
+                f"motor {self._highest_actuator + 1} reports, but model {self._model.name} has {self._actuators}; "
+                "check chassis.model, or set chassis.actuators if your base has more"
+            )
         state = self._state
         if state is None:
             return ""
@@ -140,7 +158,7 @@ class AgilexFeedback:
         if state.vehicle_state != VEHICLE_NORMAL:
             faults = ", ".join(self.faults) or "no fault named"
             return f"the base reports an exception (vehicle state {state.vehicle_state}: {faults})"
-        if state.control_mode in self._model.modes_manual:
+        if state.control_mode in self._others:
             return f"{self._model.describe_mode(state.control_mode)} has taken over"
         return self._disagreement.sentence
 
@@ -157,6 +175,7 @@ class AgilexFeedback:
                     self._state, self.status_ns = message, now_ns
                     self._list_faults()
                 case ActuatorSlow():
+                    self.note_actuator(message.index)
                     if self._driver_bits.get(message.index) != message.state_bits:
                         self._driver_bits[message.index] = message.state_bits
                         self._list_faults()
@@ -199,7 +218,7 @@ class AgilexFeedback:
         bits = 0 if self._state is None else self._state.fault_bits
         found = self._model.describe_system_faults(bits)
         for index, driver_bits in sorted(self._driver_bits.items()):
-            found += describe_driver_state(index, driver_bits)
+            found += self._model.describe_driver_state(index, driver_bits)
         self.faults = found
 
 

@@ -5,17 +5,16 @@ nothing here is shared between models unless a source says so.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from config.chassis import AgilexChassisConfig
+from config.chassis import AgilexChassisConfig, SerialLinkConfig
 
 VEHICLE_NORMAL = 0
 VEHICLE_ESTOP = 1
 
-# 0x261+n byte 5. Bit 0x10 is "sensor" in the vendor's SDK and "CAN lost" in the SCOUT manual; 0x40 and
-# 0x80 are no faults (enabled, reset).
-DRIVER_FAULTS: Mapping[int, str] = MappingProxyType(
+# 0x261+n byte 5 as in the vendor's SDK, where 0x40 (enabled) and 0x80 (reset) are no faults.
+_SDK_DRIVER_FAULTS: Mapping[int, str] = MappingProxyType(
     {
         0x01: "supply voltage low",
         0x02: "motor too hot",
@@ -27,41 +26,56 @@ DRIVER_FAULTS: Mapping[int, str] = MappingProxyType(
 )
 _DRIVER_NO_FAULTS = 0x40 | 0x80
 
+# 0x211 byte 1 as in the vendor's SDK.
+_SDK_MODES: Mapping[int, str] = MappingProxyType({0: "standby", 1: "CAN", 2: "serial", 3: "remote control"})
+
 
 @dataclass(frozen=True, slots=True)
 class AgilexModel:
-    """Limits, mode bytes and fault bits of one model.
+    """Limits, geometry, mode bytes and fault bits of one model.
 
-    mode_names: 0x211 byte 1. mode_can: the value that means "obeys us"; modes_manual: somebody else
-    drives. system_faults: bits of 0x211 bytes 4-5; a set bit without an entry is reported too.
-    base_timeout_ms: after so long without 0x111 the base stops by itself. mode_period_ms: how
-    often 0x421 must be repeated while driving; None: once is enough, and repeating it would
-    take a base that restarted out of standby without anybody's consent.
+    actuators: how many motors report (0x251+n, 0x261+n). mode_names: 0x211 byte 1. mode_can, mode_serial: the
+    value that means "obeys this wire" (None: has no serial port of this protocol); modes_remote: a person
+    drives. system_faults: bits of 0x211 bytes 4-5, byte 4 the higher one; driver_faults: bits of 0x261+n byte 5;
+    a set bit without an entry is reported too. base_timeout_ms: after so long without 0x111 the base stops by
+    itself. mode_period_ms: how often 0x421 must be repeated while driving; None: once is enough, and repeating
+    it would take a base that restarted out of standby without anybody's consent. track_width_m: between the
+    centres of the tracks or wheels, None where no manual says it.
     """
 
     name: str
     max_speed_mps: float
     max_yaw_rate_radps: float
-    mode_names: Mapping[int, str]
-    mode_standby: int
-    mode_can: int
-    modes_manual: frozenset[int]
-    system_faults: Mapping[int, str]
-    base_timeout_ms: int
-    mode_period_ms: int | None
+    actuators: int = 2
+    mode_names: Mapping[int, str] = field(default_factory=lambda: _SDK_MODES)
+    mode_standby: int = 0
+    mode_can: int = 1
+    mode_serial: int | None = 2
+    modes_remote: frozenset[int] = frozenset({3})
+    system_faults: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
+    driver_faults: Mapping[int, str] = field(default_factory=lambda: _SDK_DRIVER_FAULTS)
+    base_timeout_ms: int = 500
+    mode_period_ms: int | None = None
+    track_width_m: float | None = None
+
+    def obeying_mode(self, over_serial: bool) -> int:
+        """0x211 byte 1 while the base takes commands from this wire. Raises ValueError if it has none."""
+        mode = self.mode_serial if over_serial else self.mode_can
+        if mode is None:
+            raise ValueError(f"{self.name} has no serial port of this protocol")
+        return mode
 
     def describe_system_faults(self, bits: int) -> tuple[str, ...]:
         """One sentence for each set bit of 0x211 bytes 4-5."""
         return _describe(bits, self.system_faults, "system fault")
 
+    def describe_driver_state(self, index: int, bits: int) -> tuple[str, ...]:
+        """One sentence for each fault bit of 0x261 + index byte 5."""
+        return _describe(bits & ~_DRIVER_NO_FAULTS, self.driver_faults, f"driver {index}")
+
     def describe_mode(self, mode: int) -> str:
         """The name of 0x211 byte 1."""
         return self.mode_names.get(mode, f"unknown mode {mode}")
-
-
-def describe_driver_state(index: int, bits: int) -> tuple[str, ...]:
-    """One sentence for each fault bit of 0x261 + index byte 5."""
-    return _describe(bits & ~_DRIVER_NO_FAULTS, DRIVER_FAULTS, f"driver {index}")
 
 
 def _describe(bits: int, names: Mapping[int, str], what: str) -> tuple[str, ...]:
@@ -75,22 +89,78 @@ def _describe(bits: int, names: Mapping[int, str], what: str) -> tuple[str, ...]
 
 # Limits: the vendor's SDK for BUNKER (robot_limits). Its fault table was published as pictures only,
 # so every bit is reported by number until it has been checked on a robot.
-BUNKER = AgilexModel(
-    name="bunker",
-    max_speed_mps=3.0,
-    max_yaw_rate_radps=2.5235,
-    mode_names=MappingProxyType({0: "standby", 1: "CAN", 2: "serial", 3: "remote control"}),
-    mode_standby=0,
-    mode_can=1,
-    modes_manual=frozenset({2, 3}),
-    system_faults=MappingProxyType({}),
-    base_timeout_ms=500,
-    mode_period_ms=None,
+BUNKER = AgilexModel(name="bunker", max_speed_mps=3.0, max_yaw_rate_radps=2.5235)
+
+# BUNKER MINI manual pp. 7-9: CAN only, and 0x421 every 20 ms, taken back by the base after 500 ms without it.
+# No limits were found: held at what the paper's task needs.
+BUNKER_MINI = AgilexModel(
+    name="bunker_mini", max_speed_mps=1.5, max_yaw_rate_radps=1.0, mode_serial=None, mode_period_ms=20
 )
 
-_MODELS: Mapping[str, AgilexModel] = MappingProxyType({BUNKER.name: BUNKER})
+# BUNKER PRO 2.0: CAN only, 0x211 every 200 ms. No limits were found: as for BUNKER MINI.
+BUNKER_PRO = AgilexModel(name="bunker_pro", max_speed_mps=1.5, max_yaw_rate_radps=1.0, mode_serial=None)
+
+# SCOUT user manual v1.3.0: tables 3.2 and 3.10, 1.2 (wheels 576 mm apart). Limits: the vendor's SDK.
+SCOUT = AgilexModel(
+    name="scout",
+    max_speed_mps=1.5,
+    max_yaw_rate_radps=0.5235,
+    actuators=4,
+    system_faults=MappingProxyType(
+        {
+            0x0100: "battery below 22 V",
+            0x0200: "battery low",
+            0x0400: "remote control lost",
+        }
+    ),
+    driver_faults=MappingProxyType(
+        {
+            0x01: "supply voltage low",
+            0x02: "motor too hot",
+            0x04: "over-current",
+            0x08: "driver too hot",
+            0x10: "CAN lost",
+        }
+    ),
+    track_width_m=0.576,
+)
+
+# Limits: the vendor's SDK. Its fault table was not found.
+SCOUT_MINI = AgilexModel(name="scout_mini", max_speed_mps=3.0, max_yaw_rate_radps=2.5235, actuators=4)
+
+# TRACER user manual v1.2, tables 3.1 and 3.2: mode 0 is the remote control, and no value says standby. Its serial
+# line carries percentages.
+TRACER = AgilexModel(
+    name="tracer",
+    max_speed_mps=1.5,
+    max_yaw_rate_radps=0.7853,
+    mode_names=MappingProxyType({0: "remote control or standby", 1: "CAN", 2: "serial"}),
+    mode_serial=None,
+    modes_remote=frozenset(),
+    system_faults=MappingProxyType(
+        {
+            0x0100: "battery below 22 V",
+            0x0200: "battery low",
+            0x0400: "remote control lost",
+        }
+    ),
+)
+
+MODELS: Mapping[str, AgilexModel] = MappingProxyType(
+    {model.name: model for model in (BUNKER, BUNKER_MINI, BUNKER_PRO, SCOUT, SCOUT_MINI, TRACER)}
+)
 
 
 def model_of(config: AgilexChassisConfig) -> AgilexModel:
     """The data of the model that the configuration names."""
-    return _MODELS[config.model]
+    return MODELS[config.model]
+
+
+def over_serial(config: AgilexChassisConfig) -> bool:
+    """Whether the base is reached over RS-232."""
+    return isinstance(config.link, SerialLinkConfig)
+
+
+def track_width_of(config: AgilexChassisConfig) -> float | None:
+    """The configured width; the model's where the key is absent; None where neither is known."""
+    return config.track_width_m if "track_width_m" in config.model_fields_set else model_of(config).track_width_m

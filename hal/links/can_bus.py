@@ -161,10 +161,14 @@ def _open(config: CanLinkConfig) -> can.BusABC:
             raise DeviceRefused(
                 f"{where}: in use by another program ({_reason(error)}); stop that one first"
             ) from error
-        raise DeviceNotFound(f"{where}: cannot be opened ({_reason(error)}); {_advice(config)}") from error
+        raise DeviceNotFound(f"{where}: cannot be opened ({_reason(error)}); {_advice(config, number)}") from error
 
 
-def _advice(config: CanLinkConfig) -> str:
+def _advice(config: CanLinkConfig, number: int | None) -> str:
+    if config.interface == "socketcan" and number == errno.EAFNOSUPPORT:
+        return "this kernel has no SocketCAN; try `modprobe can_raw`, or use another interface"
+    if config.interface == "socketcan" and config.channel.startswith("vcan"):
+        return f"`ip link add dev {config.channel} type vcan`, then `ip link set {config.channel} up`"
     if config.interface == "socketcan":
         return (
             f"check `ip link show {config.channel}`, then "

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import pytest
 
+from config.chassis import CanLinkConfig
 from hal.errors import HalError
 from hal.links.can_bus import open_can_link
 from hal.types import ChassisMode, ChassisState
@@ -37,6 +38,17 @@ def _open(name: str) -> AbstractContextManager[Rig]:
                     return agilex_rig("bus", config)
             except HalError as error:
                 pytest.skip(f"no multicast on this machine: {error}")
+        case "agilex-vcan":
+            config = CanLinkConfig(interface="socketcan", channel="vcan0")
+            try:
+                with open_can_link(config):
+                    return agilex_rig("bus", config)
+            except HalError as error:
+                pytest.skip(f"no virtual CAN in this kernel: {error}")
+        case "agilex-serial-scripted" | "agilex-serial-pty":
+            return agilex_rig(name.removeprefix("agilex-"))
+        case "agilex-scripted-bunker_mini" | "agilex-scripted-scout" | "agilex-scripted-tracer":
+            return agilex_rig("scripted", model=name.rpartition("-")[2])
         case "roboclaw-scripted":
             return roboclaw_rig("scripted")
         case "roboclaw-old-firmware":
@@ -59,6 +71,12 @@ def _open(name: str) -> AbstractContextManager[Rig]:
         "agilex-scripted",
         "agilex-virtual",
         "agilex-udp",
+        "agilex-vcan",
+        "agilex-serial-scripted",
+        "agilex-serial-pty",
+        "agilex-scripted-bunker_mini",
+        "agilex-scripted-scout",
+        "agilex-scripted-tracer",
         "roboclaw-scripted",
         "roboclaw-old-firmware",
         "roboclaw-pty",

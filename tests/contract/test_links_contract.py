@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from config.chassis import SerialLinkConfig
+from config.chassis import CanLinkConfig, SerialLinkConfig
 from hal.api import CanLink, SerialLink
 from hal.errors import HalError, LinkLost
 from hal.links.can_bus import CanBusLink
@@ -25,12 +25,19 @@ class CanPair:
     far: CanLink
 
 
-@pytest.fixture(params=["scripted", "virtual", "udp_multicast"])
+BUSES: dict[str, Callable[[], CanLinkConfig]] = {
+    "virtual": can_link_config,
+    "udp_multicast": udp_link_config,
+    "vcan": lambda: CanLinkConfig(interface="socketcan", channel="vcan0"),
+}
+
+
+@pytest.fixture(params=["scripted", "virtual", "udp_multicast", "vcan"])
 def can_ends(request: pytest.FixtureRequest) -> Iterator[CanPair]:
     with ExitStack() as stack:
         ends: tuple[CanLink, CanLink] = can_pair()
         if request.param != "scripted":
-            config = can_link_config() if request.param == "virtual" else udp_link_config()
+            config = BUSES[request.param]()
             ends = CanBusLink(config), CanBusLink(config)
         try:
             near, far = stack.enter_context(ends[0]), stack.enter_context(ends[1])

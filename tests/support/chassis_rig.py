@@ -15,6 +15,7 @@ from uuid import uuid4
 
 from config.chassis import (
     AgilexChassisConfig,
+    AgilexLinkConfig,
     CanLinkConfig,
     KobukiChassisConfig,
     PlantConfig,
@@ -23,7 +24,9 @@ from config.chassis import (
     SerialLinkConfig,
 )
 from hal.api import CanLink, Chassis, SerialLink
-from hal.chassis.agilex import AgilexChassis
+from hal.chassis.agilex import AgilexChassis, no_can_frames
+from hal.chassis.agilex_models import model_of, over_serial
+from hal.chassis.agilex_serial import AgilexSerialBus
 from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.kobuki_packets import WHEEL_BASE_M
 from hal.chassis.roboclaw import RoboclawChassis
@@ -46,6 +49,9 @@ SLIP_FACTOR = 1.1
 PLANT = PlantConfig(slip_factor=SLIP_FACTOR)
 KOBUKI_PLANT = PlantConfig(track_width_m=WHEEL_BASE_M, slip_factor=SLIP_FACTOR)
 COUNTS_PER_M = 20_000.0
+
+# Bytes that can be waited for where nobody reads: a terminal's buffer, less what it keeps free.
+_TERMINAL_HOLDS = 3_900
 
 
 class Emulator(Protocol):
@@ -137,7 +143,7 @@ class SettledTerminal(PseudoTerminal):
     def write(self, data: bytes) -> None:
         before = _waiting(self._slave)
         super().write(data)
-        _await(self._slave, before + len(data))
+        _await(self._slave, min(before + len(data), _TERMINAL_HOLDS))
 
     @contextmanager
     def settled(self, count: int) -> Iterator[None]:
@@ -147,7 +153,7 @@ class SettledTerminal(PseudoTerminal):
             return
         before = _waiting(self._master)
         yield
-        _await(self._master, before + count)
+        _await(self._master, min(before + count, _TERMINAL_HOLDS))
 
 
 class SettledPort(SerialPortLink):
@@ -241,7 +247,7 @@ def udp_link_config() -> CanLinkConfig:
     return CanLinkConfig(interface="udp_multicast", channel="239.74.163.91", port=port)
 
 
-def agilex_config(link: CanLinkConfig | None = None, **changes: object) -> AgilexChassisConfig:
+def agilex_config(link: AgilexLinkConfig | None = None, **changes: object) -> AgilexChassisConfig:
     """A BUNKER; the track width is known unless changed."""
     values: dict[str, object] = {
         "kind": "agilex",
@@ -289,26 +295,45 @@ def kobuki_config(**changes: object) -> KobukiChassisConfig:
     return KobukiChassisConfig.model_validate(values | changes)
 
 
-@contextmanager
-def agilex_rig(kind: str, link: CanLinkConfig | None = None) -> Iterator[Rig]:
-    """kind: "scripted", or "bus" for two python-can buses on link."""
-    config = agilex_config(link)
-    with ExitStack() as stack:
-        ends: tuple[CanLink, CanLink] = can_pair()
-        if kind == "bus":
-            ends = CanBusLink(config.link), CanBusLink(config.link)
-        plug = PluggedCan(ends[0])
-        emulator = stack.enter_context(AgilexEmulator(ends[1], TrackedPlant(PLANT)))
-        chassis = stack.enter_context(AgilexChassis(plug, config))
-        yield Rig(chassis, emulator, plug, own_timeout_s=0.5, battery_v=50.0)
-
-
 def serial_ends(kind: str) -> tuple[SerialLink, SerialLink]:
     """Driver's end, emulator's end; kind: "scripted", or "pty" for pyserial on a pseudo-terminal."""
     if kind == "scripted":
         return serial_pair()
     terminal = SettledTerminal()
     return SettledPort(SerialLinkConfig(url=terminal.path, baud=38_400), terminal), terminal
+
+
+@contextmanager
+def agilex_rig(kind: str, link: CanLinkConfig | None = None, model: str = "bunker") -> Iterator[Rig]:
+    """kind: "scripted" or "bus" (two python-can buses on link) for CAN; "serial-scripted" or "serial-pty"
+    for RS-232."""
+    can_bus = link or can_link_config()
+    bus: AgilexLinkConfig = can_bus
+    no_frames = no_can_frames
+    with ExitStack() as stack:
+        if kind.startswith("serial-"):
+            near, far = serial_ends(kind.removeprefix("serial-"))
+            serial_plug = PluggedSerial(near)
+            serial_bus = AgilexSerialBus(serial_plug)
+            ends: tuple[CanLink, CanLink] = serial_bus, AgilexSerialBus(far)
+            plug: PluggedCan | PluggedSerial = serial_plug
+            bus, no_frames = SerialLinkConfig(url="loop://"), serial_bus.silence
+        else:
+            ends = can_pair() if kind == "scripted" else (CanBusLink(can_bus), CanBusLink(can_bus))
+            plug = can_plug = PluggedCan(ends[0])
+            ends = can_plug, ends[1]
+        config = agilex_config(bus, model=model)
+        about = model_of(config)
+        emulator = AgilexEmulator(
+            ends[1],
+            TrackedPlant(PLANT),
+            actuators=about.actuators,
+            obeying_mode=about.obeying_mode(over_serial(config)),
+            mode_timeout_ms=None if about.mode_period_ms is None else 500,
+        )
+        stack.enter_context(emulator)
+        chassis = stack.enter_context(AgilexChassis(ends[0], config, no_frames))
+        yield Rig(chassis, emulator, plug, own_timeout_s=0.5, battery_v=50.0)
 
 
 @contextmanager

@@ -7,10 +7,12 @@ import pytest
 from config.app import load_app
 from config.chassis import (
     AgilexChassisConfig,
+    CanLinkConfig,
     ChassisConfig,
     KobukiChassisConfig,
     RoboclawChassisConfig,
     RoboteqChassisConfig,
+    SerialLinkConfig,
 )
 from config.loader import CONFIG_DIR, ConfigError, Section, load
 
@@ -44,7 +46,9 @@ def read(tmp_path: Path, text: str) -> ChassisConfig:
 def test_kind_chooses_the_driver(tmp_path: Path) -> None:
     agilex = read(tmp_path, AGILEX)
     assert isinstance(agilex, AgilexChassisConfig)
-    assert (agilex.model, agilex.command_period_ms, agilex.link.bitrate) == ("bunker", 20, 500_000)
+    assert (agilex.model, agilex.command_period_ms) == ("bunker", 20)
+    assert agilex.link == CanLinkConfig(interface="virtual", channel="sim")
+    assert CanLinkConfig(interface="virtual", channel="sim").bitrate == 500_000
     roboclaw = read(tmp_path, ROBOCLAW)
     assert isinstance(roboclaw, RoboclawChassisConfig)
     assert (roboclaw.address, roboclaw.timeout_ms, roboclaw.link.baud) == (0x80, 300, 115_200)
@@ -76,7 +80,22 @@ def test_kind_chooses_the_driver(tmp_path: Path) -> None:
             "needs a group address such as 239.74.163.2, found '10.0.0.1'",
         ),
         (AGILEX.replace("virtual, channel: sim", "udp_multicast, channel: can0"), "found 'can0'"),
-        (AGILEX.replace("}}", "}, model: bnuker}"), "model"),
+        (
+            AGILEX.replace("}}", "}, model: bnuker}"),
+            "model: Input should be 'bunker', 'bunker_mini', 'bunker_pro', 'scout', 'scout_mini' or 'tracer', "
+            "found 'bnuker'",
+        ),
+        (AGILEX.replace("}}", "}, model: hunter}"), "found 'hunter'"),
+        (
+            AGILEX.replace("interface: virtual, channel: sim}", "url: /dev/ttyUSB0}, model: tracer"),
+            "tracer cannot be driven over a serial port: its serial line speaks another protocol",
+        ),
+        (
+            AGILEX.replace("interface: virtual, channel: sim}", "url: /dev/ttyUSB0}, model: bunker_mini"),
+            "bunker_mini cannot be driven over a serial port: it has CAN only; use CAN",
+        ),
+        (AGILEX.replace("channel: sim", "url: /dev/ttyUSB0"), "interface: unknown key"),
+        (AGILEX.replace("{interface: virtual, channel: sim}", "can0"), "link"),
         (AGILEX.replace("}}", "}, slip_factor: 0.9}"), "slip_factor"),
         (AGILEX.replace("}}", "}, command_period_ms: 20.5}"), "command_period_ms"),
         (ROBOCLAW.replace("9000.0", "0.0"), "counts_per_m"),
@@ -103,6 +122,12 @@ def test_mistakes_are_named_in_one_line(tmp_path: Path, text: str, words: str) -
 def test_socketcan_without_a_bitrate_is_fine(tmp_path: Path) -> None:
     chassis = read(tmp_path, AGILEX.replace("virtual, channel: sim", "socketcan, channel: can0"))
     assert isinstance(chassis, AgilexChassisConfig)
+
+
+def test_one_line_takes_an_agilex_base_to_its_serial_port(tmp_path: Path) -> None:
+    chassis = read(tmp_path, AGILEX.replace("interface: virtual, channel: sim", "url: /dev/ttyUSB0"))
+    assert isinstance(chassis, AgilexChassisConfig)
+    assert chassis.link == SerialLinkConfig(url="/dev/ttyUSB0", baud=115_200)
 
 
 def test_mirrored_motors(tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ def test_the_path_is_a_link_while_it_runs(tmp_path: Path) -> None:
     ("arguments", "words"),
     [
         (["roboteq", "--channel", "/nowhere/at/all"], "no link can be made there"),
-        (["kobuki", "--port", "5000"], "kobuki is serial"),
+        (["kobuki", "--port", "5000"], "this kobuki is on a serial port"),
         (["roboclaw", "--config", str(CONFIG_DIR / "hil-agilex.yaml")], "its chassis is 'agilex'"),
         (["agilex", "--channel", "can7"], "can7"),
     ],
