@@ -226,9 +226,7 @@ def build_base_in_memory(
     return guarded, build_serial_emulator(config.chassis, there, plant), here
 
 
-def _agilex_driver(
-    config: AgilexChassisConfig, link: CanLink, no_frames: Callable[[], str]
-) -> AgilexChassis:
+def _agilex_driver(config: AgilexChassisConfig, link: CanLink, no_frames: Callable[[], str]) -> AgilexChassis:
     return AgilexChassis(GuardedCanLink(link, AGILEX_COMMANDS), config, no_frames)
 
 

@@ -201,7 +201,11 @@ class AgilexEmulator:
             if self.mode != _REMOTE and message.mode in (_STANDBY, _CAN, _SERIAL):
                 self._mode_heard_ns = self._now_ns
                 self._enter(message.mode)
-        elif isinstance(message, MotionCommand) and self.mode == self._obeying_mode and self.vehicle_state == _NORMAL:
+        elif (
+            isinstance(message, MotionCommand)
+            and self.mode == self._obeying_mode
+            and self.vehicle_state == _NORMAL
+        ):
             self._command_ns = self._now_ns
             self._plant.command(message.v_mps, message.w_radps)
             self.commands_obeyed += 1

@@ -53,9 +53,7 @@ class AgilexFeedback:
     no_frames: what came and what to check, for the case that not one frame was understood.
     """
 
-    def __init__(
-        self, config: AgilexChassisConfig, model: AgilexModel, no_frames: Callable[[], str]
-    ) -> None:
+    def __init__(self, config: AgilexChassisConfig, model: AgilexModel, no_frames: Callable[[], str]) -> None:
         self._model = model
         self._obeying = model.obeying_mode(over_serial(config))
         self._others = (model.modes_remote | {model.mode_can, model.mode_serial}) - {self._obeying}
@@ -147,8 +145,8 @@ class AgilexFeedback:
         """
         if self._highest_actuator >= self._actuators:
             return (
-                f"motor {self._highest_actuator + 1} reports, but model {self._model.name} has {self._actuators}; "
-                "check chassis.model, or set chassis.actuators if your base has more"
+                f"motor {self._highest_actuator + 1} reports, but model {self._model.name} has "
+                f"{self._actuators}; check chassis.model, or set chassis.actuators if your base has more"
             )
         state = self._state
         if state is None:

@@ -36,11 +36,11 @@ class AgilexModel:
 
     actuators: how many motors report (0x251+n, 0x261+n). mode_names: 0x211 byte 1. mode_can, mode_serial: the
     value that means "obeys this wire" (None: has no serial port of this protocol); modes_remote: a person
-    drives. system_faults: bits of 0x211 bytes 4-5, byte 4 the higher one; driver_faults: bits of 0x261+n byte 5;
-    a set bit without an entry is reported too. base_timeout_ms: after so long without 0x111 the base stops by
-    itself. mode_period_ms: how often 0x421 must be repeated while driving; None: once is enough, and repeating
-    it would take a base that restarted out of standby without anybody's consent. track_width_m: between the
-    centres of the tracks or wheels, None where no manual says it.
+    drives. system_faults: bits of 0x211 bytes 4-5, byte 4 the higher one; driver_faults: bits of 0x261+n
+    byte 5; a set bit without an entry is reported too. base_timeout_ms: after so long without 0x111 the base
+    stops by itself. mode_period_ms: how often 0x421 must be repeated while driving; None: once is enough, and
+    repeating it would take a base that restarted out of standby without anybody's consent. track_width_m:
+    between the centres of the tracks or wheels, None where no manual says it.
     """
 
     name: str
@@ -128,8 +128,8 @@ SCOUT = AgilexModel(
 # Limits: the vendor's SDK. Its fault table was not found.
 SCOUT_MINI = AgilexModel(name="scout_mini", max_speed_mps=3.0, max_yaw_rate_radps=2.5235, actuators=4)
 
-# TRACER user manual v1.2, tables 3.1 and 3.2: mode 0 is the remote control, and no value says standby. Its serial
-# line carries percentages.
+# TRACER user manual v1.2, tables 3.1 and 3.2: mode 0 is the remote control, and no value says standby. Its
+# serial line carries percentages.
 TRACER = AgilexModel(
     name="tracer",
     max_speed_mps=1.5,
@@ -163,4 +163,6 @@ def over_serial(config: AgilexChassisConfig) -> bool:
 
 def track_width_of(config: AgilexChassisConfig) -> float | None:
     """The configured width; the model's where the key is absent; None where neither is known."""
-    return config.track_width_m if "track_width_m" in config.model_fields_set else model_of(config).track_width_m
+    return (
+        config.track_width_m if "track_width_m" in config.model_fields_set else model_of(config).track_width_m
+    )

@@ -1,8 +1,8 @@
 """AgileX protocol V2 over RS-232: what the CAN frames carry, in an envelope with a checksum.
 
-Source: SCOUT user manual v1.3.0 3.4.2 (firmware 1.5.0 or newer); 115200 baud 8N1. A frame is 5A A5, length, type,
-id, data, count, sum. The length counts all but the two start bytes and the sum; the sum is that of all bytes
-before it, modulo 256. The data are those of the CAN frame, but for 0x111, whose last two bytes are not sent.
+Source: SCOUT user manual v1.3.0 3.4.2 (firmware 1.5.0 or newer); 115200 baud 8N1. A frame is 5A A5, length,
+type, id, data, count, sum. The length counts all but the two start bytes and the sum; the sum is that of all
+bytes before it, modulo 256. The data are those of the CAN frame; of 0x111 the last two bytes are not sent.
 
 TRACER's manual v1.2 has the same envelope around other data (percentages): it is no base for this.
 """
@@ -150,10 +150,10 @@ class AgilexSerialBus:
             return "not one byte came; check port, power and that RX and TX are crossed"
         if self._reader.strangers:
             return (
-                f"{self._reader.strangers} frames came whose checksum is right, but of another protocol; check "
-                "chassis.model, and that the firmware is 1.5.0 or newer"
+                f"{self._reader.strangers} frames came whose checksum is right, but of another protocol; "
+                "check chassis.model, and that the firmware is 1.5.0 or newer"
             )
         return (
-            f"{self._bytes_heard} bytes came, not one frame with a right checksum; check baud (115200) and that "
-            "it is an AgileX base"
+            f"{self._bytes_heard} bytes came, not one frame with a right checksum; check baud (115200) and "
+            "that it is an AgileX base"
         )

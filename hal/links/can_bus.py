@@ -161,7 +161,9 @@ def _open(config: CanLinkConfig) -> can.BusABC:
             raise DeviceRefused(
                 f"{where}: in use by another program ({_reason(error)}); stop that one first"
             ) from error
-        raise DeviceNotFound(f"{where}: cannot be opened ({_reason(error)}); {_advice(config, number)}") from error
+        raise DeviceNotFound(
+            f"{where}: cannot be opened ({_reason(error)}); {_advice(config, number)}"
+        ) from error
 
 
 def _advice(config: CanLinkConfig, number: int | None) -> str:

@@ -49,20 +49,30 @@ def short_mission(kind: str, folder: Path, length_m: float = 1.5) -> Path:
 @contextmanager
 def emulator(kind: str, config: Path) -> Iterator[subprocess.Popen[str]]:
     """`treadwatch emulate` as its own process, ready; killed if it is still there at the end."""
-    command = [sys.executable, "-m", "controller", "emulate", kind, "--config", str(config)]
+    command = [
+        sys.executable,
+        "-m",
+        "controller",
+        "emulate",
+        kind.removesuffix("-serial"),
+        "--config",
+        str(config),
+    ]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         try:
             assert process.stderr is not None
             ready = process.stderr.readline()
-            assert ready.startswith(f"emulating {kind} on "), ready + process.stderr.read()
+            assert ready.startswith(f"emulating {kind.removesuffix('-serial')} on "), (
+                ready + process.stderr.read()
+            )
             yield process
         finally:
             process.kill()
 
 
-@pytest.mark.parametrize("kind", ["agilex", "roboclaw", "roboteq", "kobuki"])
+@pytest.mark.parametrize("kind", ["agilex", "agilex-serial", "roboclaw", "roboteq", "kobuki"])
 def test_the_mission_is_reached(kind: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     if kind != QUICK and not request.config.getoption("--hil"):
         pytest.skip("one kind is enough for every day; all of them with --hil")

@@ -8,7 +8,8 @@ from binascii import crc_hqx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hal.chassis import kobuki_packets
+from config.chassis import SerialLinkConfig
+from hal.chassis import agilex_serial, kobuki_packets
 from hal.chassis import roboclaw_packets as packets
 from hal.chassis import roboteq_lines as lines
 from hal.chassis.agilex import AgilexChassis
@@ -151,6 +152,36 @@ def test_agilex_driver_survives_any_frames(bursts: list[list[CanFrame]]) -> None
     allowed = {0x111, 0x421}
     assert {frame.arbitration_id for frame in link.sent} <= allowed
     assert all(frame.data == bytes(8) for frame in link.sent if frame.arbitration_id == 0x111)
+
+
+serial_noise = st.one_of(
+    st.binary(max_size=30), frames.map(lambda frame: agilex_serial.wrap(frame, 7) or b"\x5a\xa5\x0c")
+)
+
+
+@settings(max_examples=300)
+@given(st.lists(serial_noise, max_size=12), st.integers(1, 40))
+def test_agilex_serial_accepts_nothing_but_a_right_checksum(chunks: list[bytes], size: int) -> None:
+    stream = b"".join(chunks)
+    reader = agilex_serial.FrameReader()
+    found = [frame for k in range(0, len(stream), size) for frame in reader.feed(stream[k : k + size])]
+    assert found == agilex_serial.FrameReader().feed(stream), "however the bytes arrive"
+    for frame in found:
+        said = [agilex_serial.wrap(frame, count) for count in range(256)]
+        assert any(data is not None and data in stream for data in said)
+
+
+@settings(max_examples=50)
+@given(st.lists(serial_noise, max_size=60))
+def test_agilex_serial_driver_survives_any_bytes(chunks: list[bytes]) -> None:
+    link = ScriptedSerialLink()
+    bus = agilex_serial.AgilexSerialBus(link)
+    chassis = AgilexChassis(bus, agilex_config(SerialLinkConfig(url="loop://")), bus.silence)
+    for k, chunk in enumerate(chunks, start=1):
+        link.deliver(chunk)
+        check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))
+    motions = {data[5:-2] for data in link.written if data[3:5] == b"\x55\x01"}
+    assert motions == ({bytes(6)} if chunks else set())
 
 
 @settings(max_examples=50)

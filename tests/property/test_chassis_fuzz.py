@@ -12,7 +12,7 @@ from operator import xor
 
 import pytest
 
-from hal.chassis import kobuki_packets, roboclaw_packets
+from hal.chassis import agilex_serial, kobuki_packets, roboclaw_packets
 from hal.chassis.agilex_messages import decode, encode
 from hal.chassis.roboteq_lines import QUERIES, LineReader, Value
 from hal.types import CanFrame
@@ -92,6 +92,28 @@ def test_roboclaw(share: int) -> None:
             roboclaw_packets.status(accepted)
             right += 1
     assert right > 0.4 * share
+
+
+def test_agilex_serial() -> None:
+    rng = random.Random(6)
+    state = agilex_serial.wrap(CanFrame(0x211, bytes(8)), 0) or b""
+    wrong = state[:-1] + bytes((state[-1] ^ 1,))
+    reader, right, fed, before = agilex_serial.FrameReader(), 0, 0, b""
+    while fed < WHOLE:
+        chunk = spiced(rng, [state, wrong, b"\x5a\xa5", state[:9]])
+        fed += len(chunk)
+        for frame in reader.feed(chunk):
+            data = (
+                frame.data
+                if len(frame.data) == 1
+                else frame.data[: 6 if frame.arbitration_id == 0x111 else 8]
+            )
+            assert data in before + chunk
+            decode(frame)
+            right += 1
+        before = chunk
+    assert right > 1000
+    assert reader.rejected > 1000
 
 
 def test_agilex(share: int) -> None:

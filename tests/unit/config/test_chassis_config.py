@@ -82,8 +82,8 @@ def test_kind_chooses_the_driver(tmp_path: Path) -> None:
         (AGILEX.replace("virtual, channel: sim", "udp_multicast, channel: can0"), "found 'can0'"),
         (
             AGILEX.replace("}}", "}, model: bnuker}"),
-            "model: Input should be 'bunker', 'bunker_mini', 'bunker_pro', 'scout', 'scout_mini' or 'tracer', "
-            "found 'bnuker'",
+            "model: Input should be 'bunker', 'bunker_mini', 'bunker_pro', 'scout', 'scout_mini' or "
+            "'tracer', found 'bnuker'",
         ),
         (AGILEX.replace("}}", "}, model: hunter}"), "found 'hunter'"),
         (

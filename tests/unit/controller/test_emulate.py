@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from config.app import load_app
-from config.chassis import CanLinkConfig
+from config.chassis import CanLinkConfig, SerialLinkConfig
 from config.loader import CONFIG_DIR
-from controller.emulate import EmulateOptions, _linked, can_link, run_in_real_time
+from controller.emulate import EmulateOptions, _linked, can_link, run_in_real_time, with_wire
 from controller.errors import UserError
 from controller.service import StopRequest
 from hal.chassis.agilex_messages import ControlModeCommand, MotionCommand, encode
@@ -112,6 +112,20 @@ def test_a_link_that_cannot_be_is_refused() -> None:
         can_link(LINK, EmulateOptions("agilex", channel="can0", port=5000))
 
 
+def test_a_path_is_a_serial_port_for_a_base_that_has_both() -> None:
+    agilex = load_app(CONFIG_DIR / "hil-agilex.yaml").chassis
+    moved = with_wire(agilex, EmulateOptions("agilex", channel="/tmp/port"))
+    assert moved == agilex.model_copy(update={"link": SerialLinkConfig(url="/tmp/port")})
+    assert with_wire(agilex, EmulateOptions("agilex", channel="can0")) is agilex
+    adapter = EmulateOptions("agilex", channel="/dev/ttyACM0", interface="slcan")
+    assert with_wire(agilex, adapter) is agilex, "a CAN adapter on a serial port"
+    kobuki = load_app(CONFIG_DIR / "hil-kobuki.yaml").chassis
+    assert with_wire(kobuki, EmulateOptions("kobuki", channel="/tmp/port")) is kobuki
+    tracer = agilex.model_copy(update={"model": "tracer"})
+    with pytest.raises(UserError, match="tracer cannot be driven over a serial port"):
+        with_wire(tracer, EmulateOptions("agilex", channel="/tmp/port"))
+
+
 def test_the_path_is_a_link_while_it_runs(tmp_path: Path) -> None:
     path = tmp_path / "port"
     path.symlink_to("/dev/pts/999999")  # of an emulator that was killed
@@ -143,13 +157,13 @@ def test_mistakes_are_one_line(arguments: list[str], words: str) -> None:
     assert words in done.stderr
 
 
-@pytest.mark.parametrize("kind", ["agilex", "roboclaw", "roboteq", "kobuki"])
+@pytest.mark.parametrize("kind", ["agilex", "agilex-serial", "roboclaw", "roboteq", "kobuki"])
 def test_the_files_that_ship_fit_their_emulator(kind: str) -> None:
     """The emulated base is driven with its own geometry: what the driver believes is what the plant is."""
     config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")
     assert config.simulation is not None
     assert config.simulation.base == "external"
-    assert config.chassis.kind == kind
+    assert config.chassis.kind == kind.removesuffix("-serial")
     content = yaml.safe_load((CONFIG_DIR / f"hil-{kind}.yaml").read_text())
     plant, chassis = content["simulation"]["plant"], content["chassis"]
     assert plant["slip_factor"] == chassis.get("slip_factor", 1.0)

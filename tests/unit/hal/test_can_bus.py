@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import errno
 import logging
+import os
 import socket
 from collections.abc import Iterator
 
@@ -64,7 +66,7 @@ def config(interface: str, channel: str) -> CanLinkConfig:
 @pytest.mark.parametrize(
     ("link", "reason"),
     [
-        (config("socketcan", "nocan0"), "ip link"),
+        (config("socketcan", "nocan0"), "socketcan"),
         (config("slcan", "/dev/ttyNotThere"), "No such file"),
         (config("pcan", "PCAN_USBBUS1"), "pcan"),
     ],
@@ -99,6 +101,26 @@ def test_vendor_errors_are_translated_with_their_cause(
     with pytest.raises(kind, match=words) as caught:
         open_can_link(config("socketcan", "can0"))
     assert caught.value.__cause__ is error
+
+
+@pytest.mark.parametrize(
+    ("channel", "number", "words"),
+    [
+        ("can0", errno.ENODEV, "`ip link set can0 up type can bitrate 500000`"),
+        ("vcan0", errno.ENODEV, "`ip link add dev vcan0 type vcan`, then `ip link set vcan0 up`"),
+        ("can0", errno.EAFNOSUPPORT, "this kernel has no SocketCAN; try `modprobe can_raw`"),
+    ],
+)
+def test_what_to_do_about_a_bus_of_the_system(
+    monkeypatch: pytest.MonkeyPatch, channel: str, number: int, words: str
+) -> None:
+    def refuse(**options: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(can, "Bus", refuse)
+    with pytest.raises(DeviceNotFound) as caught:
+        open_can_link(config("socketcan", channel))
+    assert words in str(caught.value)
 
 
 def test_settings_of_the_machine_are_not_mixed_in(monkeypatch: pytest.MonkeyPatch) -> None:
