@@ -94,8 +94,20 @@ def envelope(config_path: Path) -> None:
 @cli.command()
 @click.option("--json", "json_path", type=_FILE, help="Also write every figure as JSON.")
 @click.option("--frames", type=click.IntRange(min=10), default=150, show_default=True)
-def bench(json_path: Path | None, frames: int) -> None:
+@click.option(
+    "--period", is_flag=True, help="Instead: the command period in real time, perception at full load."
+)
+@click.option(
+    "--seconds", type=click.FloatRange(5.0, 60.0), default=30.0, show_default=True,
+    help="With --period: how long, with ordinary scheduling and again with SCHED_FIFO.",
+)  # fmt: skip
+def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> None:
     """Measure perception beside the bare OpenCV calls, renderer, control step, driver, lock-step speed."""
+    if period:
+        from controller.bench.period import run_period_bench
+
+        run_period_bench(seconds)
+        return
     from controller.bench.command import run_bench
 
     run_bench(frames, json_path)

@@ -36,9 +36,11 @@ class Farewell:
 
 @dataclass
 class Punctuality:
-    """How late the control steps began, in nanoseconds, and how many periods were skipped."""
+    """How late the control steps began, in nanoseconds, when each of their commands had gone out, and how
+    many periods were skipped."""
 
     late_ns: list[int] = field(default_factory=list)
+    commanded_ns: list[int] = field(default_factory=list)
     skipped: int = 0
 
 
@@ -117,6 +119,8 @@ def run_realtime(
         if outside is not None:
             outside.advance_to(now_ns)
         step = loop.step(None if perception.newest is None else perception.newest.scene, now_ns)
+        if step.chassis.sent is not None:
+            punctuality.commanded_ns.append(clock.now_ns())
         perception.send(step)
         service.feed_watchdog(now_ns)
         yield RealtimeMoment(tuple(arrived), step)

@@ -14,6 +14,7 @@ from controller.build import build_base, build_control, build_path, build_simula
 from controller.channel import Channel, channel_sockets
 from controller.console import Console
 from controller.perception_process import perceive_forever
+from controller.punctual import PunctualChassis
 from controller.realtime import PerceptionLink, Punctuality, run_realtime
 from controller.recorder import RecordingOptions
 from controller.result import MissionOptions, MissionResult
@@ -45,8 +46,9 @@ def drive_realtime(
     with ExitStack() as devices:
         if simulation is not None:
             devices.enter_context(simulation)
-        devices.enter_context(chassis)
-        loop = build_control(config, options.config_path, chassis)
+        period_ns = round(NS_PER_S / runner.control_rate_hz)
+        punctual = devices.enter_context(PunctualChassis(chassis, clock, period_ns))
+        loop = build_control(config, options.config_path, punctual)
         link = devices.enter_context(_perception(config, options.config_path, start_ns, recording))
         stop = devices.enter_context(stop_on_signals())
         result = MissionResult(

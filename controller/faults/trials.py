@@ -13,7 +13,7 @@ from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
 
-KINDS = ("agilex", "roboclaw", "roboteq", "kobuki")
+KINDS = ("agilex", "agilex-serial", "roboclaw", "roboteq", "kobuki")
 
 _PERIOD_NS = NS_PER_S // 50
 _SPEED_MPS = 0.5

@@ -14,7 +14,7 @@ from controller.faults.trials import FAULTS, KINDS, Fault, TrialResult, run_tria
 from hal.types import ChassisMode
 
 # The bases' own time-outs, and what 0.5 m/s needs to go at 2 m/s2 with a lag of 0.08 s, to 1 mm/s.
-OWN_TIMEOUT_S = {"agilex": 0.5, "roboclaw": 0.3, "roboteq": 0.3, "kobuki": 0.6}
+OWN_TIMEOUT_S = {"agilex": 0.5, "agilex-serial": 0.5, "roboclaw": 0.3, "roboteq": 0.3, "kobuki": 0.6}
 STOPPING_S = 0.7
 
 
