@@ -12,7 +12,6 @@ import click
 
 from config.app import AppConfig, load_app, load_replay
 from config.camera import SimulatedCameraConfig
-from config.chassis import RoboclawChassisConfig
 from config.loader import CONFIG_DIR
 from config.perception import PerceptionConfig
 from config.robot import Body
@@ -20,10 +19,9 @@ from controller.bench.driving import (
     ControlFigures,
     TimedChassis,
     measure_control,
-    measure_exchange,
-    roboclaw_in_memory,
 )
-from controller.bench.figures import Durations, Stopwatches
+from controller.bench.exchanges import measure_exchanges
+from controller.bench.figures import Stopwatches
 from controller.bench.machine import describe_machine, one_opencv_thread
 from controller.bench.mission_speed import LockstepFigures, measure_lockstep
 from controller.bench.perception import PerceptionFigures, measure_perception
@@ -48,7 +46,6 @@ from sim.simulation import Emulator
 from sim.world import World
 from vision.perception import Perception
 
-_ROBOCLAW = CONFIG_DIR / "robot-roboclaw.yaml"
 _REPLAY = CONFIG_DIR / "replay.yaml"
 
 
@@ -91,8 +88,8 @@ def measure_all(plan: Plan) -> BenchReport:
     if plan.recording.is_dir():
         perception[f"recorded_{plan.recording.name}"] = _recorded_reel_figures(plan)
     renderer = _renderer_figures(config, plan)
-    control, agilex = _driving_figures(config, plan)
-    roboclaw = _roboclaw_figures(config, plan)
+    control = _control_figures(config, plan)
+    drivers = measure_exchanges(plan.control_steps, _stopwatches.processor_ns)
     lockstep = _lockstep_figures(config, plan)
     return BenchReport(
         taken_at=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -101,7 +98,7 @@ def measure_all(plan: Plan) -> BenchReport:
         perception=perception,
         renderer=renderer,
         control=control,
-        drivers={"agilex_virtual_can": agilex, "roboclaw_in_memory": roboclaw},
+        drivers=drivers,
         lockstep=lockstep,
     )
 
@@ -168,33 +165,18 @@ def _renderer_figures(config: AppConfig, plan: Plan) -> RendererFigures:
         return measure_renderer(camera, renderer, plan.pictures, _stopwatches.processor_ns, tick)
 
 
-def _driving_figures(config: AppConfig, plan: Plan) -> tuple[ControlFigures, Durations]:
-    """The control step, and the exchange of the mission's chassis driver, each in a run of its own."""
-    steps = plan.control_steps
+def _control_figures(config: AppConfig, plan: Plan) -> ControlFigures:
+    """The control step without the exchange of the mission's chassis driver."""
     timed, emulator = _base(config, plan)
     loop = build_control(config, plan.mission, timed)
-    with progress("control step", steps) as tick:
-        control = measure_control(loop, timed, emulator, steps, _stopwatches.processor_ns, tick)
-    timed, emulator = _base(config, plan)
-    with progress("driver, AgileX over virtual CAN", steps) as tick:
-        return control, measure_exchange(timed, emulator, steps, tick)
+    with progress("control step", plan.control_steps) as tick:
+        return measure_control(loop, timed, emulator, plan.control_steps, _stopwatches.processor_ns, tick)
 
 
 def _base(config: AppConfig, plan: Plan) -> tuple[TimedChassis, Emulator]:
     chassis, emulator = build_base(config, build_path(config, plan.mission).start, 0)
     assert emulator is not None, "the mission's base is emulated"
     return TimedChassis(chassis, _stopwatches.processor_ns), emulator
-
-
-def _roboclaw_figures(config: AppConfig, plan: Plan) -> Durations:
-    roboclaw = load_app(_ROBOCLAW).chassis
-    assert isinstance(roboclaw, RoboclawChassisConfig), "robot-roboclaw.yaml drives a RoboClaw"
-    assert config.simulation is not None, "the mission is simulated"
-    chassis, emulator = roboclaw_in_memory(roboclaw, config.simulation.plant)
-    with progress("driver, RoboClaw in memory", plan.control_steps) as tick:
-        return measure_exchange(
-            TimedChassis(chassis, _stopwatches.processor_ns), emulator, plan.control_steps, tick
-        )
 
 
 def _lockstep_figures(config: AppConfig, plan: Plan) -> LockstepFigures:

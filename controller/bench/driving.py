@@ -7,18 +7,13 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self
 
-from config.chassis import PlantConfig, RoboclawChassisConfig
 from controller.bench.busy_scene import OBSTACLES, busy_scene
 from controller.bench.figures import Durations
 from controller.bench.reel import Tick
 from controller.control import ControlLoop
 from hal.api import Chassis, Closing
-from hal.chassis.roboclaw import RoboclawChassis
 from hal.clocks import NS_PER_S
-from hal.links.scripted import serial_pair
 from hal.types import ChassisMode, ChassisState, Setpoint
-from sim.plant import TrackedPlant
-from sim.roboclaw_emulator import RoboclawEmulator
 from sim.simulation import Emulator
 
 PERIOD_NS = NS_PER_S // 50
@@ -112,8 +107,16 @@ class Answering(Closing, Protocol):
         ...
 
 
-def measure_exchange(chassis: TimedChassis, emulator: Answering, exchanges: int, tick: Tick) -> Durations:
+def measure_exchange(
+    chassis: TimedChassis,
+    emulator: Answering,
+    exchanges: int,
+    tick: Tick,
+    carry: Callable[[], None] = lambda: None,
+) -> Durations:
     """Exchanges with an armed base that drives a bend at 0.5 m/s; the emulator's own work is not counted.
+
+    carry: waits until what was written at one end of the wire has arrived at the other.
 
     Raises RuntimeError if the emulated base does not obey: that is a fault of the program.
     """
@@ -122,7 +125,9 @@ def measure_exchange(chassis: TimedChassis, emulator: Answering, exchanges: int,
         chassis.arm(0)
         for index in range(exchanges + _ARM_STEPS):
             now_ns = index * PERIOD_NS
+            carry()
             emulator.advance_to(now_ns)
+            carry()
             # A quarter of a m/s2: the output guard lets no jump pass.
             v_mps = min(0.005 * len(spent_ns), 0.5)
             setpoint = Setpoint(now_ns, v_mps, 0.0, 0.4 * v_mps)
@@ -133,12 +138,3 @@ def measure_exchange(chassis: TimedChassis, emulator: Answering, exchanges: int,
             if len(spent_ns) == exchanges:
                 return Durations.of(spent_ns)
     raise RuntimeError(f"the emulated base obeyed in {len(spent_ns)} of {exchanges + _ARM_STEPS} exchanges")
-
-
-def roboclaw_in_memory(config: RoboclawChassisConfig, plant: PlantConfig) -> tuple[Chassis, Emulator]:
-    """A RoboClaw driver and its emulator on a wire in memory: no port, no operating system in between."""
-    near, far = serial_pair()
-    emulator = RoboclawEmulator(
-        far, TrackedPlant(plant), counts_per_m=config.counts_per_m, address=config.address
-    )
-    return RoboclawChassis(near, config), emulator

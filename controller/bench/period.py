@@ -83,9 +83,9 @@ def run_period_bench(seconds: float) -> None:
     # This process has become what the second drive made of it.
     _print_row("SCHED_FIFO, empty loop", partial(measure_floor, clock, seconds))
     click.echo(
-        "off: distance of one period from 20 ms. empty loop: nothing but waiting for the next 20 ms, so what\n"
-        "it shows is the machine's. load: average of the minute. stolen: processor time that the host of a\n"
-        "virtual machine gave to others meanwhile, of all cores."
+        "off: distance of one period from 20 ms. empty loop: nothing but waiting for the next 20 ms, so it\n"
+        "shows what is the machine's. load: average of the minute. stolen: processor time that the host of\n"
+        "a virtual machine gave to others meanwhile, of all cores."
     )
 
 

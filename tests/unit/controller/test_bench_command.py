@@ -164,8 +164,8 @@ def test_one_short_run_of_everything(tmp_path: Path) -> None:
 def test_without_the_recording_the_rest_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "_simulated_reel_figures", lambda *_: perception(4.0, 3.0))
     monkeypatch.setattr(command, "_renderer_figures", lambda *_: report().renderer)
-    monkeypatch.setattr(command, "_driving_figures", lambda *_: (report().control, duration(0.1)))
-    monkeypatch.setattr(command, "_roboclaw_figures", lambda *_: duration(0.1))
+    monkeypatch.setattr(command, "_control_figures", lambda *_: report().control)
+    monkeypatch.setattr(command, "measure_exchanges", lambda *_: {"roboclaw_in_memory": duration(0.1)})
     monkeypatch.setattr(command, "_lockstep_figures", lambda *_: report().lockstep)
     figures = command.measure_all(command.Plan(recording=tmp_path / "none"))
     assert list(figures.perception) == ["simulated_640x480", "simulated_848x480"]

@@ -9,19 +9,16 @@ import numpy as np
 import pytest
 
 from config.app import load_app
-from config.chassis import PlantConfig, RoboclawChassisConfig
+from config.chassis import PlantConfig
 from config.loader import CONFIG_DIR
 from controller.bench.busy_scene import OBSTACLES, busy_scene
-from controller.bench.driving import TimedChassis, measure_control, measure_exchange, roboclaw_in_memory
-from controller.build import build_base, build_control, build_path
+from controller.bench.driving import TimedChassis, measure_control, measure_exchange
+from controller.build import build_base, build_base_in_memory, build_control, build_path
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
 from sim.plant import TrackedPlant
 
 MISSION = CONFIG_DIR / "sim.yaml"
-ROBOCLAW = RoboclawChassisConfig.model_validate(
-    {"kind": "roboclaw", "link": {"url": "unused"}, "counts_per_m": 12000.0, "track_width_m": 0.48,
-     "max_qpps": 12000, "accel_qpps2": 24000}
-)  # fmt: skip
+ROBOCLAW = CONFIG_DIR / "hil-roboclaw.yaml"
 
 
 class Stubborn:
@@ -82,7 +79,7 @@ def test_the_stopwatch_runs_during_the_exchange_only() -> None:
 
 
 def test_exchanges_of_an_armed_roboclaw() -> None:
-    chassis, emulator = roboclaw_in_memory(ROBOCLAW, PlantConfig())
+    chassis, emulator, _ = build_base_in_memory(load_app(ROBOCLAW), PlanarPose(0.0, 0.0, 0.0), 0)
     ticks = Ticks()
     exchange = measure_exchange(TimedChassis(chassis, every(1000)), emulator, 20, ticks)
     assert exchange.count == ticks.count == 20

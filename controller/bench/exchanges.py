@@ -1,0 +1,126 @@
+"""The exchange of every chassis driver over every link that works without hardware."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from uuid import uuid4
+
+from config.app import AppConfig, load_app
+from config.chassis import CanLinkConfig
+from config.loader import CONFIG_DIR
+from controller.bench.driving import TimedChassis, measure_exchange
+from controller.bench.figures import Durations
+from controller.bench.progress import progress
+from controller.bench.reel import Tick
+from controller.build import (
+    build_base,
+    build_base_in_memory,
+    build_pseudo_terminal,
+    build_serial_emulator,
+)
+from hal.api import Chassis
+from hal.errors import HalError
+from hal.types import PlanarPose
+from sim.plant import TrackedPlant
+from sim.simulation import Emulator
+
+_ORIGIN = PlanarPose(0.0, 0.0, 0.0)
+# The kernel carries the bytes of a pseudo-terminal when it likes, soon.
+_CARRIED_NS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """name: as in the figures. file: of which hil-*.yaml. build: the guarded driver and the base at the other
+    end. asynchronous: what was sent arrives a moment later."""
+
+    name: str
+    file: str
+    build: Callable[[AppConfig], tuple[Chassis, Emulator]]
+    asynchronous: bool = False
+
+
+def _in_memory(config: AppConfig) -> tuple[Chassis, Emulator]:
+    chassis, emulator, _ = build_base_in_memory(config, _ORIGIN, 0)
+    return chassis, emulator
+
+
+def _on_bus(link: CanLinkConfig) -> Callable[[AppConfig], tuple[Chassis, Emulator]]:
+    def build(config: AppConfig) -> tuple[Chassis, Emulator]:
+        assert config.simulation is not None
+        inside = {
+            "chassis": config.chassis.model_copy(update={"link": link}),
+            "simulation": config.simulation.model_copy(update={"base": "emulated"}),
+        }
+        chassis, emulator = build_base(config.model_copy(update=inside), _ORIGIN, 0)
+        assert emulator is not None, "it is emulated"
+        return chassis, emulator
+
+    return build
+
+
+def _on_terminal(config: AppConfig) -> tuple[Chassis, Emulator]:
+    assert config.simulation is not None
+    terminal = build_pseudo_terminal()
+    assert not isinstance(config.chassis.link, CanLinkConfig)
+    link = config.chassis.link.model_copy(update={"url": terminal.path})
+    chassis_config = config.chassis.model_copy(update={"link": link})
+    chassis, _ = build_base(config.model_copy(update={"chassis": chassis_config}), _ORIGIN, 0)
+    plant = TrackedPlant(config.simulation.plant, _ORIGIN, 0)
+    return chassis, build_serial_emulator(chassis_config, terminal, plant)
+
+
+def wires() -> tuple[Wire, ...]:
+    """Buses and ports are drawn anew at each call."""
+    virtual = CanLinkConfig(interface="virtual", channel=f"bench-{uuid4().hex}")
+    multicast = CanLinkConfig(
+        interface="udp_multicast", channel="239.74.163.90", port=20_000 + uuid4().int % 40_000
+    )
+    return (
+        Wire("agilex_in_memory", "agilex", _in_memory),
+        Wire("agilex_virtual_can", "agilex", _on_bus(virtual)),
+        Wire("agilex_multicast_can", "agilex", _on_bus(multicast)),
+        *(
+            wire
+            for kind in ("agilex-serial", "roboclaw", "roboteq", "kobuki")
+            for wire in (
+                Wire(f"{kind.replace('-', '_')}_in_memory", kind, _in_memory),
+                Wire(f"{kind.replace('-', '_')}_pty", kind, _on_terminal, asynchronous=True),
+            )
+        ),
+    )
+
+
+def measure_exchanges(exchanges: int, stopwatch_ns: Callable[[], int]) -> dict[str, Durations]:
+    """By name of chassis and link. A link that this machine does not have is left out."""
+    figures = {}
+    for wire in wires():
+        config = load_app(CONFIG_DIR / f"hil-{wire.file}.yaml")
+        with progress(f"exchange, {wire.name.replace('_', ' ')}", exchanges) as tick:
+            try:
+                figures[wire.name] = _measure(wire, config, exchanges, stopwatch_ns, tick)
+            except HalError:
+                continue
+    return figures
+
+
+def _measure(
+    wire: Wire, config: AppConfig, exchanges: int, stopwatch_ns: Callable[[], int], tick: Tick
+) -> Durations:
+    chassis, emulator = wire.build(config)
+    wait = _wait if wire.asynchronous else _go_on
+    return measure_exchange(TimedChassis(chassis, stopwatch_ns), emulator, exchanges, tick, wait)
+
+
+def _wait() -> None:
+    # Not asleep: what is measured next would find cold caches, whatever the driver does.
+    ends_ns = time.perf_counter_ns() + _CARRIED_NS
+    while time.perf_counter_ns() < ends_ns:
+        os.sched_yield()
+
+
+def _go_on() -> None:
+    """What was sent is there at once."""

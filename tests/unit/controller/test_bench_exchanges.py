@@ -1,0 +1,41 @@
+"""Every driver over every link that works without hardware is measured, or left out where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from config.loader import CONFIG_DIR
+from controller.bench import exchanges
+from controller.bench.exchanges import measure_exchanges, wires
+from hal.errors import DeviceNotFound
+
+SERIAL = ("agilex_serial", "roboclaw", "roboteq", "kobuki")
+NAMES = ["agilex_in_memory", "agilex_virtual_can", "agilex_multicast_can"]
+NAMES += [f"{kind}_{wire}" for kind in SERIAL for wire in ("in_memory", "pty")]
+
+
+def every(step_ns: int) -> Callable[[], int]:
+    readings = iter(range(0, 1 << 62, step_ns))
+    return lambda: next(readings)
+
+
+def test_every_driver_over_every_link() -> None:
+    assert [wire.name for wire in wires()] == NAMES
+    figures = measure_exchanges(5, every(1000))
+    assert set(NAMES) - set(figures) <= {"agilex_multicast_can"}, "where the machine has no multicast"
+    assert {(exchange.count, exchange.median_ms) for exchange in figures.values()} == {(5, 0.001)}
+
+
+def test_every_kind_that_ships_is_among_them() -> None:
+    files = {path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob("hil-*.yaml")}
+    assert {wire.file for wire in wires()} == files
+
+
+def test_a_link_that_is_not_there_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise DeviceNotFound("no such link")
+
+    monkeypatch.setattr(exchanges, "_measure", refuse)
+    assert measure_exchanges(5, every(1000)) == {}
