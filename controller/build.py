@@ -41,8 +41,8 @@ from hal.cameras.pose_file import PoseFile, open_odometry
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
 from hal.chassis.agilex import COMMANDS as AGILEX_COMMANDS
-from hal.chassis.agilex import AgilexChassis, no_can_frames
-from hal.chassis.agilex_models import model_of, over_serial
+from hal.chassis.agilex import AgilexChassis
+from hal.chassis.agilex_models import model_of
 from hal.chassis.agilex_serial import AgilexSerialBus
 from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.roboclaw import RoboclawChassis
@@ -192,61 +192,50 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
 
 
 def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Chassis, Emulator | None]:
-    simulation, link = config.simulation, config.chassis.link
-    emulated = simulation is not None and simulation.base == "emulated"
+    simulation, chassis, link = config.simulation, config.chassis, config.chassis.link
     plant = None
-    if simulation is not None and emulated:
+    if simulation is not None and simulation.base == "emulated":
         plant = TrackedPlant(simulation.plant, start, start_ns)
     if isinstance(link, CanLinkConfig):
-        assert isinstance(config.chassis, AgilexChassisConfig), "one kind of chassis is reached over CAN"
-        driver = _agilex_driver(config.chassis, CanBusLink(link), no_can_frames)
-        return driver, None if plant is None else build_can_emulator(config.chassis, link, plant)
+        driver = build_can_driver(chassis, CanBusLink(link))
+        return driver, None if plant is None else build_can_emulator(chassis, link, plant)
     if plant is None:
-        return _serial_driver(config.chassis, SerialPortLink(link)), None
+        return build_serial_driver(chassis, SerialPortLink(link)), None
     # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
     here, there = serial_pair()
-    return _serial_driver(config.chassis, here), build_serial_emulator(config.chassis, there, plant)
+    return build_serial_driver(chassis, here), build_serial_emulator(chassis, there, plant)
 
 
 def build_base_in_memory(
     config: AppConfig, start: PlanarPose, start_ns: int
 ) -> tuple[Chassis, Emulator, ScriptedCanLink | ScriptedSerialLink]:
     """Guarded driver and emulator on a wire in memory, and the driver's end of it, to be pulled out."""
+    chassis = config.chassis
     plant = TrackedPlant(
         PlantConfig() if config.simulation is None else config.simulation.plant, start, start_ns
     )
     limits = GuardLimits.of(config.robot.limits, 1.0 / config.runner.control_rate_hz)
-    if isinstance(config.chassis.link, CanLinkConfig):
-        assert isinstance(config.chassis, AgilexChassisConfig), "one kind of chassis is reached over CAN"
+    if isinstance(chassis.link, CanLinkConfig):
         near, far = can_pair()
-        driver = _agilex_driver(config.chassis, near, no_can_frames)
-        return GuardedChassis(driver, limits), _agilex_emulator(config.chassis, far, plant), near
+        guarded = GuardedChassis(build_can_driver(chassis, near), limits)
+        return guarded, _can_emulator(chassis, far, plant), near
     here, there = serial_pair()
-    guarded = GuardedChassis(_serial_driver(config.chassis, here), limits)
-    return guarded, build_serial_emulator(config.chassis, there, plant), here
+    guarded = GuardedChassis(build_serial_driver(chassis, here), limits)
+    return guarded, build_serial_emulator(chassis, there, plant), here
 
 
-def _agilex_driver(config: AgilexChassisConfig, link: CanLink, no_frames: Callable[[], str]) -> AgilexChassis:
-    return AgilexChassis(GuardedCanLink(link, AGILEX_COMMANDS), config, no_frames)
+def build_can_driver(config: AnyChassisConfig, link: CanLink) -> Chassis:
+    """The driver on a CAN bus, behind the list of what may be sent there; without the output guard."""
+    assert isinstance(config, AgilexChassisConfig), "the one kind that is reached over CAN"
+    return AgilexChassis(GuardedCanLink(link, AGILEX_COMMANDS), config)
 
 
-def _agilex_emulator(config: AgilexChassisConfig, link: CanLink, plant: TrackedPlant) -> AgilexEmulator:
-    model = model_of(config)
-    return AgilexEmulator(
-        link,
-        plant,
-        command_timeout_ms=model.base_timeout_ms,
-        actuators=config.actuators or model.actuators,
-        obeying_mode=model.obeying_mode(over_serial(config)),
-        mode_timeout_ms=None if model.mode_period_ms is None else model.base_timeout_ms,
-    )
-
-
-def _serial_driver(config: AnyChassisConfig, link: SerialLink) -> Chassis:
+def build_serial_driver(config: AnyChassisConfig, link: SerialLink) -> Chassis:
+    """The driver on a serial line; without the output guard."""
     match config:
         case AgilexChassisConfig():
             bus = AgilexSerialBus(link)
-            return _agilex_driver(config, bus, bus.silence)
+            return AgilexChassis(GuardedCanLink(bus, AGILEX_COMMANDS), config, bus.silence)
         case RoboclawChassisConfig():
             return RoboclawChassis(link, config)
         case RoboteqChassisConfig():
@@ -257,9 +246,14 @@ def _serial_driver(config: AnyChassisConfig, link: SerialLink) -> Chassis:
             assert_never(unknown)
 
 
-def build_can_emulator(config: AgilexChassisConfig, link: CanLinkConfig, plant: TrackedPlant) -> Emulator:
+def build_can_emulator(config: AnyChassisConfig, link: CanLinkConfig, plant: TrackedPlant) -> Emulator:
     """The base at the other end of a CAN bus. Raises DeviceNotFound, DeviceRefused when entered."""
-    return _agilex_emulator(config, CanBusLink(link), plant)
+    return _can_emulator(config, CanBusLink(link), plant)
+
+
+def _can_emulator(config: AnyChassisConfig, link: CanLink, plant: TrackedPlant) -> Emulator:
+    assert isinstance(config, AgilexChassisConfig), "the one kind that is reached over CAN"
+    return AgilexEmulator(link, plant, model=model_of(config))
 
 
 def build_pseudo_terminal() -> PseudoTerminal:
@@ -271,7 +265,8 @@ def build_serial_emulator(config: AnyChassisConfig, link: SerialLink, plant: Tra
     """The base that this driver's configuration expects, at the other end of a serial line."""
     match config:
         case AgilexChassisConfig():
-            return _agilex_emulator(config, AgilexSerialBus(link), plant)
+            bus = AgilexSerialBus(link)
+            return AgilexEmulator(bus, plant, model=model_of(config), over_serial=True)
         case RoboclawChassisConfig():
             return RoboclawEmulator(link, plant, counts_per_m=config.counts_per_m, address=config.address)
         case RoboteqChassisConfig():

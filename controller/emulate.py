@@ -86,7 +86,6 @@ def _emulator(config: AppConfig, options: EmulateOptions, now_ns: int) -> Iterat
     plant = TrackedPlant(plant_config, None, now_ns)
     chassis = with_wire(config.chassis, options)
     if isinstance(chassis.link, CanLinkConfig):
-        assert isinstance(chassis, AgilexChassisConfig), "one kind of chassis is reached over CAN"
         link = can_link(chassis.link, options)
         with build_can_emulator(chassis, link, plant) as can_emulator:
             click.echo(f"emulating {options.kind} on CAN {link.interface} {link.channel!r}", err=True)

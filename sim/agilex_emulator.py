@@ -26,6 +26,7 @@ from hal.chassis.agilex_messages import (
     decode,
     encode,
 )
+from hal.chassis.agilex_models import BUNKER, AgilexModel
 from hal.errors import LinkLost
 from sim.plant import TrackedPlant
 
@@ -49,9 +50,8 @@ class AgilexEmulator:
     """Frames that have arrived are obeyed as of the time of the last step, so in lock-step the order
     "advance the emulator, then exchange with the driver" has no hidden delay.
 
-    obeying_mode: the control mode in which commands from this link count (1 CAN, 2 serial). actuators: its
-    motors, alternately left and right. mode_timeout_ms: after so long without 0x421 it is back in standby, as
-    BUNKER MINI; None: it stays.
+    Motors are alternately left and right. Commands count in the control mode of this wire (1 CAN, 2 serial).
+    A model that wants 0x421 again and again, as BUNKER MINI, is back in standby when it stays away.
     """
 
     def __init__(
@@ -59,20 +59,19 @@ class AgilexEmulator:
         link: CanLink,
         plant: TrackedPlant,
         *,
-        command_timeout_ms: int = 500,
+        model: AgilexModel = BUNKER,
+        over_serial: bool = False,
         state_period_ms: int = 100,
         boot_ms: int = 1000,
-        actuators: int = 2,
-        obeying_mode: int = _CAN,
-        mode_timeout_ms: int | None = None,
     ) -> None:
         self._link = link
-        self._actuators = actuators
-        self._obeying_mode = obeying_mode
+        self._actuators = model.actuators
+        self._obeying_mode = model.obeying_mode(over_serial)
         self._plant = plant
-        self._command_timeout_ns = command_timeout_ms * _MS
+        self._command_timeout_ns = model.base_timeout_ms * _MS
         self._boot_ns = boot_ms * _MS
-        self._mode_timeout_ns = None if mode_timeout_ms is None else mode_timeout_ms * _MS
+        # What must be repeated is forgotten as soon as the motion command.
+        self._mode_timeout_ns = None if model.mode_period_ms is None else self._command_timeout_ns
         self._mode_heard_ns = plant.now_ns
         start_ns = plant.now_ns
         self._now_ns = start_ns

@@ -8,4 +8,9 @@ import pytest
 def pytest_addoption(parser: pytest.Parser) -> None:
     """--hil: every hardware-in-the-loop test; without it the quick one. --fuzz: ten million of each."""
     parser.addoption("--hil", action="store_true", help="run every hardware-in-the-loop test, not one alone")
+    parser.addoption(
+        "--channel", help="run the contract suite on a real base, tracks in the air: can0, a port"
+    )
+    parser.addoption("--base", help="with --channel: the YAML whose chassis it is (robot-bunker.yaml)")
+    parser.addoption("--attended", action="store_true", help="with --channel: ask a person to press buttons")
     parser.addoption("--fuzz", action="store_true", help="ten million frames for every decoder")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
@@ -23,6 +24,7 @@ from tests.support.chassis_rig import (
     roboteq_rig,
     udp_link_config,
 )
+from tests.support.real_base import DEFAULT_BASE, real_rig
 
 
 def _open(name: str) -> AbstractContextManager[Rig]:
@@ -66,32 +68,52 @@ def _open(name: str) -> AbstractContextManager[Rig]:
     raise ValueError(name)
 
 
-@pytest.fixture(
-    params=[
-        "agilex-scripted",
-        "agilex-virtual",
-        "agilex-udp",
-        "agilex-vcan",
-        "agilex-serial-scripted",
-        "agilex-serial-pty",
-        "agilex-scripted-bunker_mini",
-        "agilex-scripted-scout",
-        "agilex-scripted-tracer",
-        "roboclaw-scripted",
-        "roboclaw-old-firmware",
-        "roboclaw-pty",
-        "roboteq-scripted",
-        "roboteq-pty",
-        "kobuki-scripted",
-        "kobuki-pty",
-    ]
-)
+EMULATED = [
+    "agilex-scripted",
+    "agilex-virtual",
+    "agilex-udp",
+    "agilex-vcan",
+    "agilex-serial-scripted",
+    "agilex-serial-pty",
+    "agilex-scripted-bunker_mini",
+    "agilex-scripted-scout",
+    "agilex-scripted-tracer",
+    "roboclaw-scripted",
+    "roboclaw-old-firmware",
+    "roboclaw-pty",
+    "roboteq-scripted",
+    "roboteq-pty",
+    "kobuki-scripted",
+    "kobuki-pty",
+]
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Every emulated base; or, with --channel, the real one alone."""
+    if "rig" in metafunc.fixturenames:
+        real = metafunc.config.getoption("--channel") is not None
+        metafunc.parametrize("rig", ["real base"] if real else EMULATED, indirect=True)
+
+
+@pytest.fixture
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
-    with _open(request.param) as opened:
-        yield opened
+    opened = _open(request.param) if request.param != "real base" else _open_real(request.config)
+    with opened as one:
+        yield one
+
+
+def _open_real(config: pytest.Config) -> AbstractContextManager[Rig]:
+    if not config.getoption("--hil"):
+        pytest.skip("moves a real base: put its tracks in the air and add --hil")
+    return real_rig(
+        Path(config.getoption("--base") or DEFAULT_BASE),
+        config.getoption("--channel"),
+        config.getoption("--attended"),
+    )
 
 
 def test_nothing_is_known_before_the_base_speaks(rig: Rig) -> None:
+    rig.needs_emulator("it speaks as soon as the port is open")
     state = rig.chassis.exchange(None, 1 * MS)
     assert state.mode is ChassisMode.STANDBY
     assert state.feedback_ns is None
@@ -115,8 +137,8 @@ def test_arms_and_stands_until_told(rig: Rig) -> None:
     state = rig.run(1.0)
     assert (state.mode, state.reason) == (ChassisMode.ARMED, "armed")
     assert rig.plant.track_travel_m == (0.0, 0.0)
-    assert state.battery_v == pytest.approx(rig.battery_v)
-    assert state.faults == ()
+    assert state.battery_v == pytest.approx(rig.battery_v, nan_ok=True) or math.isnan(rig.battery_v)
+    assert state.faults == () or math.isnan(rig.battery_v), "a real base may complain and yet drive"
 
 
 def test_does_not_arm_into_a_command(rig: Rig) -> None:
@@ -133,15 +155,16 @@ def test_moves_as_commanded(rig: Rig, v_mps: float, w_radps: float) -> None:
     rig.arm()
     state = rig.run(2.0, v_mps, w_radps)
     rounding_radps = 0.5 * rig.wire_step_radps
-    assert rig.plant.twist[0] == pytest.approx(v_mps, abs=0.002)
-    assert rig.plant.twist[1] == pytest.approx(w_radps, abs=0.0015 + rounding_radps)
-    assert state.v_mps == pytest.approx(v_mps, abs=0.005)
-    assert state.w_radps == pytest.approx(w_radps, abs=0.0045 + rounding_radps)
+    assert rig.plant.twist[0] == pytest.approx(v_mps, abs=rig.tolerance_mps)
+    assert rig.plant.twist[1] == pytest.approx(w_radps, abs=rig.tolerance_radps + rounding_radps)
+    assert state.v_mps == pytest.approx(v_mps, abs=rig.tolerance_mps + 0.003)
+    assert state.w_radps == pytest.approx(w_radps, abs=rig.tolerance_radps + 0.003 + rounding_radps)
     assert state.feedback_ns is not None
     assert rig.now_ns - state.feedback_ns <= 100 * MS
 
 
 def test_dead_reckoning_follows_the_true_body(rig: Rig) -> None:
+    rig.needs_emulator("where it truly is, nobody knows")
     rig.run(0.2)
     rig.arm()
     rig.run(2.0, 0.5)
@@ -156,6 +179,7 @@ def test_dead_reckoning_follows_the_true_body(rig: Rig) -> None:
 
 def test_dead_reckoning_moves_with_every_exchange(rig: Rig) -> None:
     """However seldom the base reports: who compares poses must not see them stand and jump."""
+    rig.needs_emulator("its frames come when they like")
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
@@ -179,6 +203,7 @@ def test_says_what_was_sent(rig: Rig) -> None:
 
 
 def test_too_fast_a_command_is_slowed_on_the_same_curve(rig: Rig) -> None:
+    rig.needs_emulator("its full speed is not wanted")
     rig.run(0.2)
     rig.arm()
     twists = sent_twists([rig.step(100.0, 50.0) for _ in range(10)])
@@ -189,6 +214,7 @@ def test_too_fast_a_command_is_slowed_on_the_same_curve(rig: Rig) -> None:
 
 
 def test_the_newest_command_arrives_within_three_periods(rig: Rig) -> None:
+    rig.needs_emulator("how soon it brakes is its own affair")
     rig.run(0.2)
     rig.arm()
     rig.run(2.0, 0.5)
@@ -204,7 +230,7 @@ def test_stop_is_explicit_zero_then_standby_and_may_be_repeated(rig: Rig) -> Non
     rig.run(1.0, 0.5)
     for _ in range(3):
         rig.chassis.stop(rig.now_ns)
-    rig.coast(0.1)
+    rig.coast(rig.braking_s)
     assert rig.plant.twist[0] < 0.35, "braking by the explicit zero, well before the base's own time-out"
     state = rig.run(2.0, 0.5)
     assert rig.stands()
@@ -215,6 +241,7 @@ def test_leaving_the_context_stops(rig: Rig) -> None:
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
+    rig.needs_emulator("its driver is closed, so nobody could tell")
     rig.chassis.__exit__(None, None, None)
     rig.coast(0.1)
     assert rig.plant.twist[0] < 0.35
@@ -228,7 +255,7 @@ def assert_latched(rig: Rig, mode: ChassisMode, word: str) -> None:
     travelled = rig.plant.track_travel_m
     state = rig.run(1.0, 0.5)
     assert state.mode is mode
-    assert rig.plant.track_travel_m == pytest.approx(travelled, abs=1e-4)
+    assert rig.plant.track_travel_m == pytest.approx(travelled, abs=0.05 * rig.tolerance_mps)
     assert state.sent is None or (state.sent.v_mps, state.sent.w_radps) == (0.0, 0.0)
 
 
@@ -240,7 +267,7 @@ def assert_drives_again_after_consent(rig: Rig) -> None:
     rig.step()
     rig.arm()
     rig.run(2.0, 0.3)
-    assert rig.plant.twist[0] == pytest.approx(0.3, abs=0.002)
+    assert rig.plant.twist[0] == pytest.approx(0.3, abs=rig.tolerance_mps)
 
 
 def test_emergency_stop_latches(rig: Rig) -> None:
@@ -281,6 +308,7 @@ def test_frozen_base_latches(rig: Rig) -> None:
 
 
 def test_unplugging_latches_and_the_base_stops_by_itself(rig: Rig) -> None:
+    rig.needs_emulator("unplugged, it cannot tell that it stands: see for yourself")
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
@@ -316,7 +344,7 @@ def test_stop_on_a_link_that_has_come_back_is_heard(rig: Rig) -> None:
     rig.step(0.5)
     rig.plug.plug()
     rig.chassis.stop(rig.now_ns)
-    rig.coast(0.1)
+    rig.coast(rig.braking_s)
     assert rig.plant.twist[0] < 0.35
 
 

@@ -17,6 +17,7 @@ from hal.chassis.agilex_messages import (
     decode,
     encode,
 )
+from hal.chassis.agilex_models import BUNKER, BUNKER_MINI, SCOUT, AgilexModel
 from hal.links.scripted import can_pair
 from sim.agilex_emulator import AgilexEmulator
 from sim.plant import TrackedPlant
@@ -29,10 +30,12 @@ CAN = 1
 class Bench:
     """A host's hand on the bus of one emulated base."""
 
-    def __init__(self, **options: int) -> None:
+    def __init__(self, state_period_ms: int = 100, boot_ms: int = 1000, model: AgilexModel = BUNKER) -> None:
         self.host, self.far = can_pair()
         self.plant = TrackedPlant(PlantConfig(slip_factor=1.25))
-        self.base = AgilexEmulator(self.far, self.plant, **options)
+        self.base = AgilexEmulator(
+            self.far, self.plant, model=model, state_period_ms=state_period_ms, boot_ms=boot_ms
+        )
         self.now_ns = 0
 
     def say(self, *messages: AgilexMessage) -> None:
@@ -217,3 +220,19 @@ def test_an_unplugged_base_stops_and_does_not_mind() -> None:
     assert bench.plant.twist[0] == pytest.approx(0.0, abs=1e-3)
     bench.far.plug()
     assert bench.run(40) != []
+
+
+def test_a_scout_reports_four_motors() -> None:
+    bench = Bench(model=SCOUT)
+    bench.base.advance_to(100 * MS)
+    heard = set()
+    while (frame := bench.host.receive()) is not None:
+        heard.add(frame.arbitration_id)
+    assert {0x251, 0x252, 0x253, 0x254, 0x261, 0x262, 0x263, 0x264} <= heard
+
+
+def test_a_bunker_mini_falls_back_into_standby_when_its_mode_is_not_repeated() -> None:
+    for model, v_mps in ((BUNKER, 0.5), (BUNKER_MINI, 0.0)):
+        bench = Bench(model=model)
+        bench.drive(ms=1500)
+        assert bench.plant.twist[0] == pytest.approx(v_mps, abs=1e-3)
