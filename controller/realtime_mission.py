@@ -10,9 +10,11 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner
+from config.chassis import AgilexChassisConfig, AnyChassisConfig, CanLinkConfig
 from controller.build import build_base, build_control, build_path, build_simulation
 from controller.channel import Channel, channel_sockets
 from controller.console import Console
+from controller.control import Outcome
 from controller.perception_process import perceive_forever
 from controller.punctual import PunctualChassis
 from controller.realtime import PerceptionLink, Punctuality, run_realtime
@@ -23,6 +25,8 @@ from controller.service import ServiceManager, stop_on_signals
 from controller.summary import report
 from controller.tally import SetpointTally, TimingTally
 from hal.clocks import NS_PER_S, MonotonicClock
+from hal.errors import DeviceRefused
+from hal.types import ChassisMode
 
 # The perception process needs a moment to import and open the camera; a simulated world starts after that.
 HEAD_START_S = 3.0
@@ -32,7 +36,7 @@ GOODBYE_S = 5.0
 def drive_realtime(
     config: AppConfig, runner: RealtimeRunner, options: MissionOptions, console: Console
 ) -> MissionResult:
-    """Drive on the machine's clock. Raises ConfigError, HalError, UserError before anything moves."""
+    """Drive on the machine's clock. Raises ConfigError, HalError, UserError, and nothing has moved then."""
     clock = MonotonicClock()
     start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)
     path = build_path(config, options.config_path)
@@ -62,9 +66,10 @@ def drive_realtime(
         for refused in become_realtime(runner.priority):
             console.event(f"not permitted, running without: {refused}")
         moments = run_realtime(runner, clock, simulation, link, loop, service, stop, punctuality)
-        told_ready = told_stopping = False
+        told_ready = told_stopping = was_armed = False
         for moment in moments:
             result.take(moment.control)
+            was_armed = was_armed or moment.control.chassis.mode is ChassisMode.ARMED
             for message in moment.arrived:
                 result.timing.add(message.timing_ms)
             if link.newest is not None and not told_ready:
@@ -74,7 +79,18 @@ def drive_realtime(
                 told_stopping = True
                 service.stopping(loop.stop_reason)
             report(console, path.length_m, moment.control, result.started_ns)
+    if loop.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
+        raise DeviceRefused(f"{describe_base(config.chassis)}: {loop.stop_reason}; nothing has moved")
     return result
+
+
+def describe_base(chassis: AnyChassisConfig) -> str:
+    """What was tried: the kind of base, and the link as configured."""
+    link = chassis.link
+    kind = f"{chassis.kind} {chassis.model}" if isinstance(chassis, AgilexChassisConfig) else chassis.kind
+    if isinstance(link, CanLinkConfig):
+        return f"{kind} on CAN {link.interface} {link.channel!r}"
+    return f"{kind} on serial port {link.url} at {link.baud} baud"
 
 
 @contextmanager

@@ -72,7 +72,10 @@ class RoboclawFeedback:
     def silence(self) -> str:
         """What came instead of a status, and what to check."""
         if self.bytes_heard == 0:
-            return "not one byte came; check port, power and that packet serial is switched on"
+            return (
+                f"not one byte came; check port, power, baud, address 0x{self._config.address:X} and that "
+                "packet serial is on"
+            )
         return (
             f"{self.bytes_heard} bytes came, none a status with a right checksum; "
             f"check baud, address 0x{self._config.address:X} and that it is a RoboClaw"

@@ -75,7 +75,7 @@ class RoboteqFeedback:
     def silence(self) -> str:
         """What came instead of a status, and what to check."""
         if self.bytes_heard == 0:
-            return "not one byte came; check port, power and the crossed lines"
+            return "not one byte came; check port, power, baud and the crossed lines"
         return (
             f"{self.bytes_heard} bytes came, none an answer to ?FF; check baud and that it is a Roboteq "
             "whose serial input takes ASCII commands"

@@ -26,6 +26,10 @@ _MAX_FOREIGN = 256
 
 # linux/can/error.h: the controller has left the bus.
 _ERROR_BUS_OFF = 0x40
+_BUS_OFF = "bus-off"
+
+# What python-can says when nobody on the bus acknowledges.
+_FULL = "Transmit buffer full"
 
 _OPEN_ERRORS = (can.CanError, OSError, ValueError, ImportError, NotImplementedError)
 
@@ -89,7 +93,7 @@ class CanBusLink:
                 return None
             if message.is_error_frame:
                 if message.arbitration_id & _ERROR_BUS_OFF:
-                    raise self._lost("receiving", can.CanOperationError("bus-off"))
+                    raise self._lost("receiving", can.CanOperationError(_BUS_OFF))
                 continue
             if message.is_extended_id or message.is_remote_frame or message.is_fd:
                 continue
@@ -114,7 +118,7 @@ class CanBusLink:
         self._shut()
         return LinkLost(
             f"CAN {self._config.interface} {self._config.channel!r}: lost while {doing} ({_reason(error)}); "
-            "check the adapter, the cable and the power of the base"
+            f"{_remedy(self._config, error)}"
         )
 
     def _shut(self) -> None:
@@ -155,7 +159,8 @@ def _open(config: CanLinkConfig) -> can.BusABC:
         number = _errno(error)
         if number in (errno.EACCES, errno.EPERM):
             raise DeviceRefused(
-                f"{where}: permission denied; add the user to the port's group or run as the service user"
+                f"{where}: permission denied; add the user to the group of the adapter's port (often "
+                "dialout), then log in again"
             ) from error
         if number in (errno.EBUSY, errno.EADDRINUSE, errno.EAGAIN):
             raise DeviceRefused(
@@ -179,6 +184,15 @@ def _advice(config: CanLinkConfig, number: int | None) -> str:
     if config.interface == "udp_multicast":
         return "check that the channel is a multicast address and that the machine has a multicast route"
     return "check interface and channel in the configuration, and that the adapter is plugged in"
+
+
+def _remedy(config: CanLinkConfig, error: Exception) -> str:
+    """What to do about a bus that worked, as far as its error tells."""
+    if config.interface == "socketcan" and _errno(error) == errno.ENETDOWN:
+        return f"the bus is down: `ip link set {config.channel} up type can bitrate 500000`"
+    if _errno(error) == errno.ENOBUFS or str(error) in (_BUS_OFF, _FULL):
+        return "nobody acknowledges: check that the base is on, CAN high and low, termination and 500 kbit/s"
+    return "check the adapter, the cable and the power of the base"
 
 
 def _reason(error: BaseException) -> str:

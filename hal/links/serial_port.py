@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import errno
+import grp
 import logging
+import os
 import termios
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -18,6 +21,8 @@ from hal.errors import DeviceNotFound, DeviceRefused, HalError, LinkLost
 _WRITE_TIMEOUT_S = 0.02
 
 _MAX_READ = 4096
+
+_DEVICES = Path("/dev")
 
 # An unplugged port raises all three kinds; termios.error is not an OSError.
 _ERRORS = (serial.SerialException, OSError, termios.error)
@@ -113,17 +118,43 @@ def _translated(error: Exception, config: SerialLinkConfig) -> HalError:
     where = f"serial port {config.url}"
     number = getattr(error, "errno", None)
     if number in (errno.EACCES, errno.EPERM):
-        return DeviceRefused(f"{where}: permission denied; add the user to the port's group (often dialout)")
+        group = _group_of(config.url)
+        return DeviceRefused(
+            f"{where}: permission denied; `sudo usermod -aG {group} $USER`, then log in again (a service: "
+            f"SupplementaryGroups={group})"
+        )
     if number in (errno.EBUSY, errno.EAGAIN):
-        return DeviceRefused(f"{where}: in use by another program; stop that one first")
+        return DeviceRefused(
+            f"{where}: in use by another program; stop that one first (ModemManager takes new ports for a "
+            "while, unless a udev rule tells it not to)"
+        )
     # pyserial drops the number when the file is there but does not take a port's settings.
     if isinstance(error.__context__, termios.error) or number not in (None, errno.ENOENT):
         return DeviceRefused(
             f"{where}: is not a serial port that takes {config.baud} baud ({_reason(error)})"
         )
     return DeviceNotFound(
-        f"{where}: cannot be opened ({_reason(error)}); check the url and that the adapter is plugged in"
+        f"{where}: cannot be opened ({_reason(error)}); check the url and that the adapter is plugged in "
+        f"({_ports_here(_DEVICES)})"
     )
+
+
+def _group_of(path: str) -> str:
+    """The group that may use the port; dialout where that cannot be found out or is nobody's to join."""
+    try:
+        group = grp.getgrgid(os.stat(path).st_gid).gr_name
+    except (OSError, KeyError):
+        return "dialout"
+    return "dialout" if group == "root" else group
+
+
+def _ports_here(devices: Path) -> str:
+    """The names that stay the same when adapters are plugged in another order, or else any."""
+    stable = sorted(str(path) for path in devices.glob("serial/by-id/*"))
+    ports = stable or sorted(
+        str(path) for pattern in ("ttyUSB*", "ttyACM*") for path in devices.glob(pattern)
+    )
+    return f"here are: {', '.join(ports)}" if ports else "no USB serial port is here"
 
 
 def _reason(error: BaseException) -> str:

@@ -155,16 +155,22 @@ class RealRig(Rig):
         return self.state
 
     def _measure(self) -> None:
-        """After a time in which nobody listened: ask until something new has come, commanding nothing."""
+        """After a time in which nobody listened: ask until three new readings have come, commanding nothing.
+
+        The first may have waited since before; the second is then the mean since the first, where speed is
+        counted.
+        """
         if self._fresh_ns == self.now_ns:
             return
-        before_ns = None if self.person.measured.state is None else self.person.measured.state.feedback_ns
+        before = None if self.person.measured.state is None else self.person.measured.state.feedback_ns
+        heard = {before}
         for _ in range(_MEASURING):
             self.now_ns += PERIOD_NS
             self.emulator.advance_to(self.now_ns)
             self.state = self.chassis.exchange(None, self.now_ns)
             self._took()
-            if self.state.feedback_ns != before_ns:
+            heard.add(self.state.feedback_ns)
+            if len(heard) > 3:
                 return
 
     def needs_emulator(self, why: str) -> None:
@@ -192,7 +198,7 @@ def real_rig(file: Path, channel: str, attended: bool) -> Iterator[Rig]:
             battery_v=math.nan,
             tolerance_mps=0.05,
             tolerance_radps=0.1,
-            braking_s=0.3,
+            braking_s=0.2,
             person=person,
         )
         yield rig

@@ -159,6 +159,26 @@ def test_an_error_in_use_is_a_lost_link_and_the_next_use_opens_anew(bus: FaultyB
     assert len(bus.sent) == 2
 
 
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.ENETDOWN, "Network is down"), "`ip link set can0 up type can bitrate 500000`"),
+        (
+            OSError(errno.ENOBUFS, "No buffer space available"),
+            "nobody acknowledges: check that the base is on",
+        ),
+        (can.CanOperationError("Transmit buffer full"), "nobody acknowledges"),
+        (OSError(errno.ENODEV, "No such device"), "check the adapter, the cable and the power of the base"),
+    ],
+)
+def test_a_lost_bus_says_what_to_do(bus: FaultyBus, error: Exception, words: str) -> None:
+    bus.error = error
+    with pytest.raises(LinkLost) as caught:
+        CanBusLink(config("socketcan", "can0")).send(FRAME)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
 def test_a_bus_that_cannot_be_opened_again_stays_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     link = CanBusLink(config("slcan", "/dev/ttyNotThere"))
     for _ in range(2):

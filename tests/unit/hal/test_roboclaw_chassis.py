@@ -315,7 +315,10 @@ def test_nothing_is_known_before_the_second_encoder_answer() -> None:
 @pytest.mark.parametrize(
     ("babble", "hint"),
     [
-        (b"", "not one byte came; check port, power and that packet serial is switched on"),
+        (
+            b"",
+            "not one byte came; check port, power, baud, address 0x80 and that packet serial is on",
+        ),
         (b"+\r", "bytes came, none a status with a right checksum; check baud, address 0x80"),
     ],
 )

@@ -341,7 +341,7 @@ def test_nothing_is_known_before_the_second_counter_answer() -> None:
 @pytest.mark.parametrize(
     ("babble", "hint"),
     [
-        (b"", "not one byte came; check port, power and the crossed lines"),
+        (b"", "not one byte came; check port, power, baud and the crossed lines"),
         (b"\xff\x00\x12", "bytes came, none an answer to ?FF; check baud and that it is a Roboteq"),
     ],
 )

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import grp
 import os
 import termios
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from config.chassis import SerialLinkConfig
 from hal.api import SerialLink
 from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
 from hal.links.pseudo_terminal import PseudoTerminal
-from hal.links.serial_port import SerialPortLink, open_serial_link
+from hal.links.serial_port import SerialPortLink, _ports_here, open_serial_link
 
 
 def config(url: str, baud: int = 115_200) -> SerialLinkConfig:
@@ -72,8 +73,23 @@ def test_no_permission_is_refused_with_advice(monkeypatch: pytest.MonkeyPatch) -
         raise serial.SerialException(13, "could not open port: Permission denied")
 
     monkeypatch.setattr(serial, "serial_for_url", refuse)
-    with pytest.raises(DeviceRefused, match="dialout"):
-        open_serial_link(config("/dev/ttyUSB0"))
+    with pytest.raises(DeviceRefused, match=r"`sudo usermod -aG dialout \$USER`, then log in again"):
+        open_serial_link(config("/dev/ttyNotThere"))
+    with PseudoTerminal() as terminal:
+        owners = grp.getgrgid(os.stat(terminal.path).st_gid).gr_name
+        group = "dialout" if owners == "root" else owners
+        with pytest.raises(DeviceRefused, match=f"SupplementaryGroups={group}"):
+            open_serial_link(config(terminal.path))
+
+
+def test_the_ports_that_are_there_are_named(tmp_path: Path) -> None:
+    assert _ports_here(tmp_path) == "no USB serial port is here"
+    (tmp_path / "ttyUSB0").touch()
+    (tmp_path / "ttyACM3").touch()
+    assert _ports_here(tmp_path) == f"here are: {tmp_path}/ttyACM3, {tmp_path}/ttyUSB0"
+    (tmp_path / "serial" / "by-id").mkdir(parents=True)
+    (tmp_path / "serial" / "by-id" / "usb-FTDI").touch()
+    assert _ports_here(tmp_path) == f"here are: {tmp_path}/serial/by-id/usb-FTDI", "these names stay"
 
 
 def test_opened_so_that_nothing_can_block(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,55 @@
+"""The whole program in front of a wrong base, or of none: one line, exit code 2, and nothing has moved."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hal.links.pseudo_terminal import PseudoTerminal
+from tests.support.hil_missions import emulator, short_mission
+
+
+def refusal(config: Path) -> str:
+    """What `treadwatch run` says before it gives up."""
+    command = [sys.executable, "-m", "controller", "run", "--config", str(config), "--quiet"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert done.stdout == "", "no summary of a drive that was none"
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1, done.stderr
+    return lines[0]
+
+
+def with_port(config: Path, port: str) -> Path:
+    line = port_line(config)
+    config.write_text(config.read_text().replace(line, f"{line.split('url:')[0]}url: {port}"))
+    return config
+
+
+def port_line(config: Path) -> str:
+    return next(line for line in config.read_text().splitlines() if line.strip().startswith("url:"))
+
+
+def test_nobody_answers(tmp_path: Path) -> None:
+    with PseudoTerminal() as terminal:
+        said = refusal(with_port(short_mission("roboteq", tmp_path), terminal.path))
+    assert said.startswith(
+        f"treadwatch: roboteq on serial port {terminal.path} at 115200 baud: arming gave up"
+    )
+    assert "not one byte came; check port, power, baud and the crossed lines" in said
+    assert said.endswith("nothing has moved")
+
+
+def test_another_protocol_answers(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    if not request.config.getoption("--hil"):
+        pytest.skip("a quarter of a minute; with --hil")
+    config = short_mission("kobuki", tmp_path)
+    with emulator("kobuki", config):
+        port = port_line(config).split("url:")[1].strip()
+        (tmp_path / "other").mkdir()
+        said = refusal(with_port(short_mission("agilex-serial", tmp_path / "other"), port))
+    assert said.startswith(f"treadwatch: agilex bunker on serial port {port}")
+    assert "not one frame with a right checksum; check baud (115200) and that it is an AgileX base" in said
