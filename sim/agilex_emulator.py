@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
 from hal.api import CanLink
 from hal.chassis.agilex_messages import (
@@ -28,9 +26,9 @@ from hal.chassis.agilex_messages import (
 )
 from hal.chassis.agilex_models import BUNKER, AgilexModel
 from hal.errors import LinkLost
+from sim.emulator import MS, ChassisEmulator, as_int32
 from sim.plant import TrackedPlant
 
-_MS = 1_000_000
 _STANDBY, _CAN, _SERIAL, _REMOTE = 0, 1, 2, 3
 _NORMAL, _ESTOP, _EXCEPTION = 0, 1, 2
 _WHEEL_RADIUS_M = 0.1
@@ -46,12 +44,9 @@ class _Broadcast:
     make: Callable[[], tuple[AgilexMessage, ...]]
 
 
-class AgilexEmulator:
-    """Frames that have arrived are obeyed as of the time of the last step, so in lock-step the order
-    "advance the emulator, then exchange with the driver" has no hidden delay.
-
-    Motors are alternately left and right. Commands count in the control mode of this wire (1 CAN, 2 serial).
-    A model that wants 0x421 again and again, as BUNKER MINI, is back in standby when it stays away.
+class AgilexEmulator(ChassisEmulator):
+    """Motors are alternately left and right. Commands count in the control mode of this wire (1 CAN, 2
+    serial). A model that wants 0x421 again and again, as BUNKER MINI, is back in standby when it stays away.
     """
 
     def __init__(
@@ -64,24 +59,22 @@ class AgilexEmulator:
         state_period_ms: int = 100,
         boot_ms: int = 1000,
     ) -> None:
+        super().__init__(link, plant, boot_ms)
         self._link = link
         self._actuators = model.actuators
         self._obeying_mode = model.obeying_mode(over_serial)
-        self._plant = plant
-        self._command_timeout_ns = model.base_timeout_ms * _MS
-        self._boot_ns = boot_ms * _MS
+        self._command_timeout_ns = model.base_timeout_ms * MS
         # What must be repeated is forgotten as soon as the motion command.
         self._mode_timeout_ns = None if model.mode_period_ms is None else self._command_timeout_ns
         self._mode_heard_ns = plant.now_ns
         start_ns = plant.now_ns
-        self._now_ns = start_ns
         self._broadcasts = (
-            _Broadcast(20 * _MS, start_ns, self._motion),
-            _Broadcast(20 * _MS, start_ns, self._odometer),
-            _Broadcast(20 * _MS, start_ns, self._actuators_fast),
-            _Broadcast(state_period_ms * _MS, start_ns, self._state),
-            _Broadcast(100 * _MS, start_ns, self._actuators_slow),
-            _Broadcast(500 * _MS, start_ns, self._battery),
+            _Broadcast(20 * MS, start_ns, self._motion),
+            _Broadcast(20 * MS, start_ns, self._odometer),
+            _Broadcast(20 * MS, start_ns, self._actuators_fast),
+            _Broadcast(state_period_ms * MS, start_ns, self._state),
+            _Broadcast(100 * MS, start_ns, self._actuators_slow),
+            _Broadcast(500 * MS, start_ns, self._battery),
         )
         self.mode = _STANDBY
         self.vehicle_state = _NORMAL
@@ -90,26 +83,7 @@ class AgilexEmulator:
         self.battery_v = 50.0
         self._count = 0
         self._command_ns: int | None = None
-        self._silent_until_ns: int | None = None
-        self._frozen = False
         self._muted: frozenset[int] = frozenset()
-        self._travel_zero_m = (0.0, 0.0)
-        self.commands_obeyed = 0
-
-    def __enter__(self) -> Self:
-        """Open the link. Raises DeviceNotFound, DeviceRefused."""
-        self._link.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._link.__exit__(kind, error, trace)
-
-    @property
-    def plant(self) -> TrackedPlant:
-        """The body that this base moves."""
-        return self._plant
 
     def advance_to(self, now_ns: int) -> None:
         """Obey what has arrived, move, and send what falls due up to and including now_ns."""
@@ -155,35 +129,18 @@ class AgilexEmulator:
         self.mode = _STANDBY
         self._plant.command(0.0, 0.0)
 
-    def restart(self) -> None:
-        """Power interrupted: silent while booting, then standby, odometer at zero."""
-        self._silent_until_ns = self._now_ns + self._boot_ns
-        self.mode = _STANDBY
-        self.vehicle_state = _NORMAL
-        self._count = 0
-        self._command_ns = None
-        self._travel_zero_m = self._plant.track_travel_m
-        self._plant.command(0.0, 0.0)
-
-    def freeze(self) -> None:
-        """Its processor hangs: nothing is sent or obeyed, but the motors' own time-out still runs."""
-        self._frozen = True
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self._frozen = False
-
     def mute(self, *arbitration_ids: int) -> None:
         """These frames are no longer sent; without arguments all are sent again."""
         self._muted = frozenset(arbitration_ids)
 
     # The base's own work.
 
-    @property
-    def _silent(self) -> bool:
-        if self._silent_until_ns is not None and self._now_ns >= self._silent_until_ns:
-            self._silent_until_ns = None
-        return self._frozen or self._silent_until_ns is not None
+    def _power_up(self) -> None:
+        self.mode = _STANDBY
+        self.vehicle_state = _NORMAL
+        self._count = 0
+        self._command_ns = None
+        self._plant.command(0.0, 0.0)
 
     def _listen(self) -> None:
         try:
@@ -247,10 +204,8 @@ class AgilexEmulator:
         return (MotionFeedback(*self._plant.track_twist),)
 
     def _odometer(self) -> tuple[AgilexMessage, ...]:
-        left_m, right_m = self._plant.track_travel_m
-        left_mm = round(1000.0 * (left_m - self._travel_zero_m[0]))
-        right_mm = round(1000.0 * (right_m - self._travel_zero_m[1]))
-        return (Odometer(_as_int32(left_mm), _as_int32(right_mm)),)
+        left_m, right_m = self._travel_m
+        return (Odometer(as_int32(round(1000.0 * left_m)), as_int32(round(1000.0 * right_m))),)
 
     def _state(self) -> tuple[AgilexMessage, ...]:
         count, self._count = self._count, (self._count + 1) % 256
@@ -261,7 +216,7 @@ class AgilexEmulator:
         for index in range(self._actuators):
             speed_mps = self._plant.track_speeds_mps[index % 2]
             rpm = round(speed_mps / _WHEEL_RADIUS_M * 60.0 / math.tau)
-            pulses = _as_int32(round(self._plant.track_travel_m[index % 2] * _PULSES_PER_M))
+            pulses = as_int32(round(self._plant.track_travel_m[index % 2] * _PULSES_PER_M))
             frames.append(ActuatorFast(index, rpm, 0.5 + 2.0 * abs(speed_mps), pulses))
         return tuple(frames)
 
@@ -272,7 +227,3 @@ class AgilexEmulator:
 
     def _battery(self) -> tuple[AgilexMessage, ...]:
         return (Battery(80, 100, self.battery_v, -2.0, 25.0),)
-
-
-def _as_int32(value: int) -> int:
-    return (value + (1 << 31)) % (1 << 32) - (1 << 31)

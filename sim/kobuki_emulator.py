@@ -9,25 +9,20 @@ import math
 import struct
 from functools import reduce
 from operator import xor
-from types import TracebackType
-from typing import Self
 
 from hal.api import SerialLink
-from hal.errors import LinkLost
+from sim.emulator import MS, SerialEmulator
 from sim.plant import TrackedPlant
 
-_MS = 1_000_000
-_STREAM_NS = 20 * _MS
+_STREAM_NS = 20 * MS
 _HEADER = b"\xaa\x55"
 _HALF_BASE_MM = 115.0
 _TICKS_PER_M = 1.0 / (0.002436916871363930187454 * 0.035)
 _CENTRE = 0x2
 
 
-class KobukiEmulator:
-    """Bytes that have arrived count as of the time of the last step.
-
-    command_timeout_ms: after so long without base control the wheels stop. The real firmware's time is not
+class KobukiEmulator(SerialEmulator):
+    """command_timeout_ms: after so long without base control the wheels stop. The real firmware's time is not
     documented; 0.6 s is what the vendor's own node waits.
     """
 
@@ -39,19 +34,13 @@ class KobukiEmulator:
         command_timeout_ms: int = 600,
         boot_ms: int = 1000,
     ) -> None:
-        self._link = link
-        self._plant = plant
-        self._command_timeout_ns = command_timeout_ms * _MS
-        self._boot_ns = boot_ms * _MS
-        self._now_ns = plant.now_ns
+        super().__init__(link, plant, boot_ms)
+        self._command_timeout_ns = command_timeout_ms * MS
         self._stream_ns = plant.now_ns
-        self._silent_until_ns = plant.now_ns
-        self._frozen = False
         self._received = bytearray()
         self._extra = b""
         self._command_ns: int | None = None
         self._start_ns = plant.now_ns
-        self._travel_zero_m = plant.track_travel_m
         self._heading_zero_rad = plant.pose.heading_rad
         self.bumper = 0
         self.wheel_drop = 0
@@ -61,22 +50,6 @@ class KobukiEmulator:
         self.battery_v = 16.2
         self.gyro = True
         self.rejected = 0
-        self.commands_obeyed = 0
-
-    def __enter__(self) -> Self:
-        """Open the link. Raises DeviceNotFound, DeviceRefused."""
-        self._link.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._link.__exit__(kind, error, trace)
-
-    @property
-    def plant(self) -> TrackedPlant:
-        """The body that the wheels move."""
-        return self._plant
 
     def advance_to(self, now_ns: int) -> None:
         """Obey what has arrived, move, and stream what falls due up to and including now_ns."""
@@ -98,38 +71,18 @@ class KobukiEmulator:
         """It no longer does."""
         self.bumper = 0
 
-    def restart(self) -> None:
-        """Power interrupted: silent while booting; clock, ticks and gyro at zero."""
-        self._silent_until_ns = self._now_ns + self._boot_ns
+    # The base's own work.
+
+    def _power_up(self) -> None:
+        """Clock, ticks and gyro at zero."""
         self._received.clear()
         self._command_ns = None
         self._start_ns = self._now_ns
-        self._travel_zero_m = self._plant.track_travel_m
         self._heading_zero_rad = self._plant.pose.heading_rad
         self._plant.command_tracks(0.0, 0.0)
 
-    def freeze(self) -> None:
-        """Its processor hangs: nothing is said or obeyed, but the wheels' own time-out still runs."""
-        self._frozen = True
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self._frozen = False
-
-    # The base's own work.
-
-    @property
-    def _silent(self) -> bool:
-        return self._frozen or self._now_ns < self._silent_until_ns
-
     def _listen(self) -> None:
-        try:
-            arrived = self._link.read()
-        except LinkLost:
-            # The base does not know that its cable is out; its own time-out stops it.
-            return
-        if not self._silent:
-            self._received += arrived
+        self._received += self._hear()
         while self._take_frame():
             pass
 
@@ -202,18 +155,11 @@ class KobukiEmulator:
         payload = self._core() + (self._inertia() if self.gyro else b"") + bytes((6, 2, 8, 8)) + self._extra
         self._extra = b""
         body = bytes((len(payload),)) + payload
-        try:
-            self._link.write(_HEADER + body + bytes((reduce(xor, body),)))
-        except LinkLost:
-            # As in _listen: it goes on talking to a cable that is out.
-            return
+        self._say(_HEADER + body + bytes((reduce(xor, body),)))
 
     def _core(self) -> bytes:
-        left, right = (
-            round((travel_m - zero_m) * _TICKS_PER_M) % (1 << 16)
-            for travel_m, zero_m in zip(self._plant.track_travel_m, self._travel_zero_m, strict=True)
-        )
-        clock_ms = (self._now_ns - self._start_ns) // _MS % (1 << 16)
+        left, right = (round(travel_m * _TICKS_PER_M) % (1 << 16) for travel_m in self._travel_m)
+        clock_ms = (self._now_ns - self._start_ns) // MS % (1 << 16)
         return bytes((1, 15)) + struct.pack(
             "<HBBBHHbbBBBB",
             clock_ms, self.bumper, self.wheel_drop, self.cliff, left, right, 0, 0, 0,

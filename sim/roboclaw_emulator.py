@@ -9,16 +9,13 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 from collections.abc import Callable, Mapping
-from types import MappingProxyType, TracebackType
-from typing import Self
+from types import MappingProxyType
 
 from hal.api import SerialLink
-from hal.errors import LinkLost
+from sim.emulator import MS, MotorController
 from sim.plant import TrackedPlant
 
-_MS = 1_000_000
-_STEP_NS = 1 * _MS
-_GAP_NS = 10 * _MS
+_GAP_NS = 10 * MS
 _ACK = b"\xff"
 
 # Bytes of data that a write carries. Everything else that is known is a read, which carries none.
@@ -30,10 +27,10 @@ _READS = frozenset({15, 16, 17, 18, 19, 24, 25, 30, 31, 49, 78, 79, 82, 83, 90, 
 _ESTOP_BIT = {2: 0x4, 4: 0x1}
 
 
-class RoboclawEmulator:
+class RoboclawEmulator(MotorController):
     """Motor 1 is the left track, motor 2 the right one.
 
-    Bytes that have arrived count as of the time of the last step. status_bytes: 4 as of firmware
+    status_bytes: 4 as of firmware
     4.1.29, 2 before. The serial time-out is off at power-up, as a host must expect it to be.
     """
 
@@ -47,53 +44,20 @@ class RoboclawEmulator:
         status_bytes: int = 4,
         boot_ms: int = 500,
     ) -> None:
-        self._link = link
-        self._plant = plant
+        super().__init__(link, plant, boot_ms)
         self._counts_per_m = counts_per_m
         self._address = address
         self._status_bytes = status_bytes
-        self._boot_ns = boot_ms * _MS
-        self._now_ns = plant.now_ns
         self._buffer = bytearray()
         self._heard_ns = self._now_ns
         self._valid_ns = self._now_ns
-        self._silent_until_ns = self._now_ns
-        self._travel_zero_m = plant.track_travel_m
-        self._goal_mps = [0.0, 0.0]
         self._ramp_mps2 = [float("inf"), float("inf")]
-        self._target_mps = [0.0, 0.0]
-        self._frozen = False
         self._estop = False
         self.status_bits = 0
         self.timeout_ms = 0
         self.settable_timeout = True
         self.battery_v = 25.2
         self.rejected = 0
-        self.commands_obeyed = 0
-
-    def __enter__(self) -> Self:
-        """Open the link. Raises DeviceNotFound, DeviceRefused."""
-        self._link.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._link.__exit__(kind, error, trace)
-
-    @property
-    def plant(self) -> TrackedPlant:
-        """The body that the tracks move."""
-        return self._plant
-
-    def advance_to(self, now_ns: int) -> None:
-        """Answer what has arrived, then move on to now_ns."""
-        self._listen()
-        while self._now_ns < now_ns:
-            step_ns = min(_STEP_NS, now_ns - self._now_ns)
-            self._ramp(step_ns)
-            self._now_ns += step_ns
-            self._plant.advance_to(self._now_ns)
 
     # Faults, for tests and scenarios.
 
@@ -106,34 +70,15 @@ class RoboclawEmulator:
         """The input closes (automatic reset): the next command is followed."""
         self._estop = False
 
-    def restart(self) -> None:
-        """Power interrupted: silent while booting, encoders at zero, time-out off again."""
-        self._silent_until_ns = self._now_ns + self._boot_ns
-        self._travel_zero_m = self._plant.track_travel_m
+    # The controller's own work.
+
+    def _power_up(self) -> None:
         self._buffer.clear()
         self.timeout_ms = 0
         self._stop_motors()
 
-    def freeze(self) -> None:
-        """It hears and says nothing, but its own time-out still runs."""
-        self._frozen = True
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self._frozen = False
-
-    # The controller's own work.
-
-    @property
-    def _silent(self) -> bool:
-        return self._frozen or self._now_ns < self._silent_until_ns
-
     def _listen(self) -> None:
-        try:
-            arrived = self._link.read()
-        except LinkLost:
-            # The controller does not know that its cable is out; its own time-out stops it.
-            return
+        arrived = self._hear()
         if self._silent:
             return
         if self._now_ns - self._heard_ns > _GAP_NS:
@@ -156,7 +101,7 @@ class RoboclawEmulator:
             del buffer[:2]
             self._valid_ns = self._now_ns
             data = self._read(command)
-            self._reply(data + self._crc(bytes((self._address, command)) + data))
+            self._say(data + self._crc(bytes((self._address, command)) + data))
             return True
         if command not in _WRITES:
             buffer.clear()
@@ -174,15 +119,8 @@ class RoboclawEmulator:
             return False
         self._valid_ns = self._now_ns
         self._write(command, packet[2:-2])
-        self._reply(_ACK)
+        self._say(_ACK)
         return True
-
-    def _reply(self, data: bytes) -> None:
-        try:
-            self._link.write(data)
-        except LinkLost:
-            # As in _listen: it goes on talking to a cable that is out.
-            return
 
     @staticmethod
     def _crc(data: bytes) -> bytes:
@@ -216,11 +154,8 @@ class RoboclawEmulator:
         return bits.to_bytes(self._status_bytes, "big")
 
     def _counts(self) -> tuple[int, int]:
-        left_m, right_m = self._plant.track_travel_m
-        return (
-            round((left_m - self._travel_zero_m[0]) * self._counts_per_m) % (1 << 32),
-            round((right_m - self._travel_zero_m[1]) * self._counts_per_m) % (1 << 32),
-        )
+        left_m, right_m = self._travel_m
+        return round(left_m * self._counts_per_m) % (1 << 32), round(right_m * self._counts_per_m) % (1 << 32)
 
     def _write(self, command: int, data: bytes) -> None:
         if command == 14:
@@ -246,17 +181,9 @@ class RoboclawEmulator:
             self._goal_mps[track] = speed_mps
             self._ramp_mps2[track] = ramp_mps2
 
-    def _ramp(self, step_ns: int) -> None:
+    def _ramp(self, step_s: float) -> None:
         """Move the targets along their ramps; stop the motors when the serial time-out has passed."""
-        if self.timeout_ms and self._now_ns - self._valid_ns >= self.timeout_ms * _MS:
+        if self.timeout_ms and self._now_ns - self._valid_ns >= self.timeout_ms * MS:
             self._stop_motors()
         for track in (0, 1):
-            limit = self._ramp_mps2[track] * step_ns / 1e9
-            change = self._goal_mps[track] - self._target_mps[track]
-            self._target_mps[track] += min(max(change, -limit), limit)
-        self._plant.command_tracks(*self._target_mps)
-
-    def _stop_motors(self) -> None:
-        self._goal_mps = [0.0, 0.0]
-        self._target_mps = [0.0, 0.0]
-        self._plant.command_tracks(0.0, 0.0)
+            self._towards(track, self._goal_mps[track], self._ramp_mps2[track], step_s)

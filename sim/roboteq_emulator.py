@@ -8,15 +8,11 @@ as any valid command comes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
 
 from hal.api import SerialLink
-from hal.errors import LinkLost
+from sim.emulator import MS, MotorController, as_int32
 from sim.plant import TrackedPlant
 
-_MS = 1_000_000
-_STEP_NS = 1 * _MS
 _ESTOP_FLAG = 0x10
 _DEFAULT_WATCHDOG_MS = 1000
 _ACCEPTED, _REFUSED = "+", "-"
@@ -26,10 +22,10 @@ class _Refused(Exception):
     """The command is unknown or wrong: answered by "-"."""
 
 
-class RoboteqEmulator:
+class RoboteqEmulator(MotorController):
     """Channel 1 is the left track, channel 2 the right one.
 
-    Bytes that have arrived count as of the time of the last step. full_speed_mps: what a track makes at
+    full_speed_mps: what a track makes at
     command 1000, max_rpm the motor speed there. ramp_mps2: both ramps as the device was set up; !AC and !DC
     change them, in 0.1 rpm/s.
     """
@@ -45,17 +41,11 @@ class RoboteqEmulator:
         ramp_mps2: float = 5.0,
         boot_ms: int = 500,
     ) -> None:
-        self._link = link
-        self._plant = plant
+        super().__init__(link, plant, boot_ms)
         self._full_speed_mps = full_speed_mps
         self._counts_per_m = counts_per_m
         self._max_rpm = max_rpm
-        self._boot_ns = boot_ms * _MS
-        self._now_ns = plant.now_ns
-        self._silent_until_ns = self._now_ns
-        self._frozen = False
         self._button_pressed = False
-        self._travel_zero_m = plant.track_travel_m
         self._rise_mps2 = [ramp_mps2, ramp_mps2]
         self._fall_mps2 = [ramp_mps2, ramp_mps2]
         self.fault_flags = 0
@@ -63,32 +53,7 @@ class RoboteqEmulator:
         self.battery_v = 24.6
         self.settable_watchdog = True
         self.refused = 0
-        self.commands_obeyed = 0
         self._power_up()
-
-    def __enter__(self) -> Self:
-        """Open the link. Raises DeviceNotFound, DeviceRefused."""
-        self._link.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._link.__exit__(kind, error, trace)
-
-    @property
-    def plant(self) -> TrackedPlant:
-        """The body that the tracks move."""
-        return self._plant
-
-    def advance_to(self, now_ns: int) -> None:
-        """Answer what has arrived, then move on to now_ns."""
-        self._listen()
-        while self._now_ns < now_ns:
-            step_ns = min(_STEP_NS, now_ns - self._now_ns)
-            self._ramp(step_ns)
-            self._now_ns += step_ns
-            self._plant.advance_to(self._now_ns)
 
     # Faults, for tests and scenarios.
 
@@ -101,66 +66,38 @@ class RoboteqEmulator:
         """The input closes. The controller stays in emergency stop until !MG."""
         self._button_pressed = False
 
-    def restart(self) -> None:
-        """Power interrupted: silent while booting, counters at zero, echo on, watchdog at its default."""
-        self._silent_until_ns = self._now_ns + self._boot_ns
-        self._travel_zero_m = self._plant.track_travel_m
-        self._power_up()
-
-    def freeze(self) -> None:
-        """It hears and says nothing, but its own watchdog still runs."""
-        self._frozen = True
-
-    def thaw(self) -> None:
-        """It goes on."""
-        self._frozen = False
-
     # The controller's own work.
 
     def _power_up(self) -> None:
+        """Counters at zero, echo on, watchdog at its default; pressed, the button stops it again."""
         self._line = ""
         self.echo = True
         self.watchdog_ms = _DEFAULT_WATCHDOG_MS
         self.fault_flags &= ~_ESTOP_FLAG
         self._fed_ns = self._now_ns
         self._timed_out = False
-        self._goal_mps = [0.0, 0.0]
-        self._target_mps = [0.0, 0.0]
-        self._plant.command_tracks(0.0, 0.0)
+        self._stop_motors()
         if self._button_pressed:
             self._shut_down()
 
     def _shut_down(self) -> None:
         self.fault_flags |= _ESTOP_FLAG
-        self._goal_mps = [0.0, 0.0]
-        self._target_mps = [0.0, 0.0]
-        self._plant.command_tracks(0.0, 0.0)
+        self._stop_motors()
 
     def _listen(self) -> None:
-        try:
-            arrived = self._link.read()
-        except LinkLost:
-            # The controller does not know that its cable is out; its own watchdog stops it.
-            return
-        if self._frozen or self._now_ns < self._silent_until_ns:
-            return
-        for character in arrived.decode("latin-1"):
+        for character in self._hear().decode("latin-1"):
             if self.echo:
-                self._say(character)
+                self._tell(character)
             if character not in "\r_":
                 # As the device: a line without an end does not grow for ever.
                 self._line = (self._line + character)[-128:]
                 continue
             line, self._line = self._line, ""
             if line:
-                self._say(self._answer(line) + "\r")
+                self._tell(self._answer(line) + "\r")
 
-    def _say(self, text: str) -> None:
-        try:
-            self._link.write(text.encode("latin-1"))
-        except LinkLost:
-            # As in _listen: it goes on talking to a cable that is out.
-            return
+    def _tell(self, text: str) -> None:
+        self._say(text.encode("latin-1"))
 
     def _answer(self, line: str) -> str:
         mark, (name, *arguments) = line[0], line[1:].upper().split() or [""]
@@ -257,10 +194,7 @@ class RoboteqEmulator:
         return f"{name}={':'.join(map(str, told))}"
 
     def _counts(self) -> tuple[int, ...]:
-        return tuple(
-            _as_int32(round((travel_m - zero_m) * self._counts_per_m))
-            for travel_m, zero_m in zip(self._plant.track_travel_m, self._travel_zero_m, strict=True)
-        )
+        return tuple(as_int32(round(travel_m * self._counts_per_m)) for travel_m in self._travel_m)
 
     def _currents(self) -> tuple[int, ...]:
         return tuple(round(5 + 30 * abs(speed)) for speed in self._target_mps)
@@ -283,21 +217,15 @@ class RoboteqEmulator:
                 return f"RWD={self.watchdog_ms}"
         raise _Refused
 
-    def _ramp(self, step_ns: int) -> None:
+    def _ramp(self, step_s: float) -> None:
         """Move the targets along their ramps, to rest once the watchdog has expired."""
-        if self.watchdog_ms and self._now_ns - self._fed_ns >= self.watchdog_ms * _MS:
+        if self.watchdog_ms and self._now_ns - self._fed_ns >= self.watchdog_ms * MS:
             self._timed_out = True
         if self.fault_flags:
             # The motors are off for good: a fault that goes does not bring the old speed back.
             self._goal_mps = [0.0, 0.0]
         for track in (0, 1):
             goal_mps = 0.0 if self._timed_out else self._goal_mps[track]
-            now_mps = self._target_mps[track]
-            ramps = self._rise_mps2 if abs(goal_mps) > abs(now_mps) else self._fall_mps2
-            limit = ramps[track] * step_ns / 1e9
-            self._target_mps[track] += min(max(goal_mps - now_mps, -limit), limit)
-        self._plant.command_tracks(*self._target_mps)
-
-
-def _as_int32(value: int) -> int:
-    return (value + (1 << 31)) % (1 << 32) - (1 << 31)
+            rises = abs(goal_mps) > abs(self._target_mps[track])
+            ramps = self._rise_mps2 if rises else self._fall_mps2
+            self._towards(track, goal_mps, ramps[track], step_s)

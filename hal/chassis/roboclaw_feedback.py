@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 from config.chassis import RoboclawChassisConfig
 from hal.chassis import roboclaw_packets as packets
+from hal.chassis.encoder_feedback import EncoderFeedback
 from hal.chassis.roboclaw_packets import Status
-from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
-from hal.types import PlanarPose
-
-_NS_PER_S = 1e9
-
-# An encoder step larger than this times what the motors can do is a restart, not travel.
-_JUMP_RATIO = 1.5
-_JUMP_SLACK_M = 0.05
-
-_STANDING_MPS = 0.005
-_STANDING_RADPS = 0.01
+from hal.chassis.tracks import TrackGeometry
 
 
-class RoboclawFeedback:
+class RoboclawFeedback(EncoderFeedback):
     """The newest of everything the controller says.
 
     Speed is encoder steps over the time between two replies: the controller's own speeds come in
@@ -28,32 +17,11 @@ class RoboclawFeedback:
     """
 
     def __init__(self, config: RoboclawChassisConfig, geometry: TrackGeometry) -> None:
+        signs = (config.left_sign, config.right_sign)
+        super().__init__(geometry, config.counts_per_m, signs, config.max_qpps / config.counts_per_m)
         self._config = config
-        self._geometry = geometry
-        self._reckoning = DeadReckoning()
-        self._counter = TrackCounter()
         self._status: Status | None = None
         self._timeout_ms: int | None = None
-        self._restarted = False
-        self._wanted = False
-        self.bytes_heard = 0
-        self.pose_ns: int | None = None
-        self.feedback_ns: int | None = None
-        self.status_ns: int | None = None
-        self.v_mps = math.nan
-        self.w_radps = math.nan
-        self.battery_v = math.nan
-        self.currents_a = (math.nan, math.nan)
-
-    @property
-    def pose(self) -> PlanarPose:
-        """Dead reckoning since the driver was made."""
-        return self._reckoning.pose
-
-    @property
-    def standing(self) -> bool:
-        """Measured speed is zero but for a count or two of jitter; False while unknown."""
-        return abs(self.v_mps) <= _STANDING_MPS and abs(self.w_radps) <= _STANDING_RADPS
 
     @property
     def disobeys(self) -> str:
@@ -96,14 +64,8 @@ class RoboclawFeedback:
         return () if self._status is None else self._status.errors + self._status.warnings
 
     def await_setup(self) -> None:
-        """Arming begins: what was set before is no longer trusted, it must be set and read back."""
-        self._wanted = True
+        super().await_setup()
         self._timeout_ms = None
-        self._restarted = False
-
-    def forget_setup(self) -> None:
-        """The controller is no longer asked to obey."""
-        self._wanted = False
 
     def take(self, command: int, data: bytes, asked_ns: int, now_ns: int) -> None:
         """Take in the valid answer to a request that was written at asked_ns."""
@@ -118,23 +80,3 @@ class RoboclawFeedback:
                 self.battery_v = packets.main_battery_v(data)
             case packets.CURRENTS:
                 self.currents_a = packets.currents_a(data)
-
-    def _count(self, left: int, right: int, asked_ns: int, now_ns: int) -> None:
-        config = self._config
-        last_ns, self.pose_ns = self.pose_ns, asked_ns
-        elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / _NS_PER_S
-        limit = _JUMP_RATIO * config.max_qpps * elapsed_s + _JUMP_SLACK_M * config.counts_per_m
-        steps = self._counter.increments(left, right, limit)
-        if steps is None:
-            self._restarted = True
-            self.v_mps = self.w_radps = math.nan
-            return
-        if last_ns is None or elapsed_s <= 0.0:
-            return
-        distance_m, turn_rad = self._geometry.to_twist(
-            config.left_sign * steps[0] / config.counts_per_m,
-            config.right_sign * steps[1] / config.counts_per_m,
-        )
-        self._reckoning.advance(distance_m, turn_rad)
-        self.v_mps, self.w_radps = distance_m / elapsed_s, turn_rad / elapsed_s
-        self.feedback_ns = now_ns

@@ -2,59 +2,27 @@
 
 from __future__ import annotations
 
-import math
-
 from config.chassis import RoboteqChassisConfig
 from hal.chassis import roboteq_lines as lines
+from hal.chassis.encoder_feedback import EncoderFeedback
 from hal.chassis.roboteq_lines import MotorFlags
-from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
-from hal.types import PlanarPose
-
-_NS_PER_S = 1e9
-
-# A counter step larger than this times what the motors can do is a restart or noise, not travel.
-_JUMP_RATIO = 1.5
-_JUMP_SLACK_M = 0.05
-
-_STANDING_MPS = 0.005
-_STANDING_RADPS = 0.01
+from hal.chassis.tracks import TrackGeometry
 
 # Single refusals are noise on the line; so many in a row are a controller that takes no commands.
 _MOST_REFUSALS = 5
 
 
-class RoboteqFeedback:
+class RoboteqFeedback(EncoderFeedback):
     """The newest of everything the controller says. Speed is counter steps over the time between answers."""
 
     def __init__(self, config: RoboteqChassisConfig, geometry: TrackGeometry) -> None:
+        signs = (config.left_sign, config.right_sign)
+        super().__init__(geometry, config.counts_per_m, signs, config.full_speed_mps)
         self._config = config
-        self._geometry = geometry
-        self._reckoning = DeadReckoning()
-        self._counter = TrackCounter()
         self._flags = 0
         self._motors = MotorFlags((), ())
         self._watchdog_ms: int | None = None
         self._refusals = 0
-        self._restarted = False
-        self._wanted = False
-        self.bytes_heard = 0
-        self.pose_ns: int | None = None
-        self.feedback_ns: int | None = None
-        self.status_ns: int | None = None
-        self.v_mps = math.nan
-        self.w_radps = math.nan
-        self.battery_v = math.nan
-        self.currents_a = (math.nan, math.nan)
-
-    @property
-    def pose(self) -> PlanarPose:
-        """Dead reckoning since the driver was made."""
-        return self._reckoning.pose
-
-    @property
-    def standing(self) -> bool:
-        """Measured speed is zero but for a count or two of jitter; False while unknown."""
-        return abs(self.v_mps) <= _STANDING_MPS and abs(self.w_radps) <= _STANDING_RADPS
 
     @property
     def disobeys(self) -> str:
@@ -104,15 +72,9 @@ class RoboteqFeedback:
         return self.errors + self._motors.warnings
 
     def await_setup(self) -> None:
-        """Arming begins: what was set before is no longer trusted, it must be set and read back."""
-        self._wanted = True
+        super().await_setup()
         self._watchdog_ms = None
-        self._restarted = False
         self._refusals = 0
-
-    def forget_setup(self) -> None:
-        """The controller is no longer asked to obey."""
-        self._wanted = False
 
     def note_reply(self, accepted: bool) -> None:
         """A command was accepted or refused."""
@@ -133,23 +95,3 @@ class RoboteqFeedback:
                 self.battery_v = values[1] / 10.0
             case lines.CURRENTS:
                 self.currents_a = (values[0] / 10.0, values[1] / 10.0)
-
-    def _count(self, left: int, right: int, asked_ns: int, now_ns: int) -> None:
-        config = self._config
-        last_ns, self.pose_ns = self.pose_ns, asked_ns
-        elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / _NS_PER_S
-        limit_m = _JUMP_RATIO * config.full_speed_mps * elapsed_s + _JUMP_SLACK_M
-        steps = self._counter.increments(left, right, limit_m * config.counts_per_m)
-        if steps is None:
-            self._restarted = True
-            self.v_mps = self.w_radps = math.nan
-            return
-        if last_ns is None or elapsed_s <= 0.0:
-            return
-        distance_m, turn_rad = self._geometry.to_twist(
-            config.left_sign * steps[0] / config.counts_per_m,
-            config.right_sign * steps[1] / config.counts_per_m,
-        )
-        self._reckoning.advance(distance_m, turn_rad)
-        self.v_mps, self.w_radps = distance_m / elapsed_s, turn_rad / elapsed_s
-        self.feedback_ns = now_ns

@@ -1,0 +1,83 @@
+"""What controllers that count two encoders have told: track speeds and pose. Pure bookkeeping."""
+
+from __future__ import annotations
+
+import math
+
+from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
+from hal.types import PlanarPose
+
+_NS_PER_S = 1e9
+
+# A counter step larger than this times what the motors can do is a restart or noise, not travel.
+_JUMP_RATIO = 1.5
+_JUMP_SLACK_M = 0.05
+
+_STANDING_MPS = 0.005
+_STANDING_RADPS = 0.01
+
+
+class EncoderFeedback:
+    """The part of hal.chassis.driver.Told that rests on the counters. Speed is counter steps over the time
+    between two answers.
+
+    signs: counts of (left, right) that mean ahead. fastest_mps: what a track can do.
+    """
+
+    def __init__(
+        self, geometry: TrackGeometry, counts_per_m: float, signs: tuple[int, int], fastest_mps: float
+    ) -> None:
+        self._geometry = geometry
+        self._counts_per_m = counts_per_m
+        self._signs = signs
+        self._fastest_mps = fastest_mps
+        self._reckoning = DeadReckoning()
+        self._counter = TrackCounter()
+        self._restarted = False
+        self._wanted = False
+        self.bytes_heard = 0
+        self.pose_ns: int | None = None
+        self.feedback_ns: int | None = None
+        self.status_ns: int | None = None
+        self.v_mps = math.nan
+        self.w_radps = math.nan
+        self.battery_v = math.nan
+        self.currents_a = (math.nan, math.nan)
+
+    @property
+    def pose(self) -> PlanarPose:
+        """Dead reckoning since the driver was made."""
+        return self._reckoning.pose
+
+    @property
+    def standing(self) -> bool:
+        """Measured speed is zero but for a count or two of jitter; False while unknown."""
+        return abs(self.v_mps) <= _STANDING_MPS and abs(self.w_radps) <= _STANDING_RADPS
+
+    def await_setup(self) -> None:
+        """Arming begins: what was set before is no longer trusted, it must be set and read back."""
+        self._wanted = True
+        self._restarted = False
+
+    def forget_setup(self) -> None:
+        """The controller is no longer asked to obey."""
+        self._wanted = False
+
+    def _count(self, left: int, right: int, asked_ns: int, now_ns: int) -> None:
+        """Both counters, as answered at now_ns to what was asked at asked_ns."""
+        last_ns, self.pose_ns = self.pose_ns, asked_ns
+        elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / _NS_PER_S
+        limit_m = _JUMP_RATIO * self._fastest_mps * elapsed_s + _JUMP_SLACK_M
+        steps = self._counter.increments(left, right, limit_m * self._counts_per_m)
+        if steps is None:
+            self._restarted = True
+            self.v_mps = self.w_radps = math.nan
+            return
+        if last_ns is None or elapsed_s <= 0.0:
+            return
+        distance_m, turn_rad = self._geometry.to_twist(
+            self._signs[0] * steps[0] / self._counts_per_m, self._signs[1] * steps[1] / self._counts_per_m
+        )
+        self._reckoning.advance(distance_m, turn_rad)
+        self.v_mps, self.w_radps = distance_m / elapsed_s, turn_rad / elapsed_s
+        self.feedback_ns = now_ns

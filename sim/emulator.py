@@ -1,0 +1,143 @@
+"""What all chassis emulators share: an end of a link, a body that moves, and the accidents of a real base."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import Self
+
+from hal.api import Closing, SerialLink
+from hal.errors import LinkLost
+from sim.plant import TrackedPlant
+
+MS = 1_000_000
+_STEP_NS = 1 * MS
+
+
+class ChassisEmulator(ABC):
+    """Stepped by a time that is passed in. What has arrived counts as of the time of the last step, so in
+    lock-step the order "advance the emulator, then exchange with the driver" has no hidden delay.
+
+    boot_ms: how long it is silent after a restart.
+    """
+
+    def __init__(self, link: Closing, plant: TrackedPlant, boot_ms: int) -> None:
+        self._closing = link
+        self._plant = plant
+        self._boot_ns = boot_ms * MS
+        self._now_ns = plant.now_ns
+        self._silent_until_ns = plant.now_ns
+        self._travel_zero_m = plant.track_travel_m
+        self._frozen = False
+        self.commands_obeyed = 0
+
+    def __enter__(self) -> Self:
+        """Open the link. Raises DeviceNotFound, DeviceRefused."""
+        self._closing.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closing.__exit__(kind, error, trace)
+
+    @property
+    def plant(self) -> TrackedPlant:
+        """The body that this base moves."""
+        return self._plant
+
+    @abstractmethod
+    def advance_to(self, now_ns: int) -> None:
+        """Obey what has arrived, move, and say what falls due up to and including now_ns."""
+
+    def restart(self) -> None:
+        """Power interrupted: silent while booting, travel counted from zero, what was set forgotten."""
+        self._silent_until_ns = self._now_ns + self._boot_ns
+        self._travel_zero_m = self._plant.track_travel_m
+        self._power_up()
+
+    def freeze(self) -> None:
+        """Its processor hangs: nothing is said or obeyed, but the motors' own time-out still runs."""
+        self._frozen = True
+
+    def thaw(self) -> None:
+        """It goes on."""
+        self._frozen = False
+
+    @abstractmethod
+    def _power_up(self) -> None:
+        """The state after power has come: motors off."""
+
+    @property
+    def _silent(self) -> bool:
+        return self._frozen or self._now_ns < self._silent_until_ns
+
+    @property
+    def _travel_m(self) -> tuple[float, float]:
+        """(left, right) since power came."""
+        left_m, right_m = self._plant.track_travel_m
+        return left_m - self._travel_zero_m[0], right_m - self._travel_zero_m[1]
+
+
+class SerialEmulator(ChassisEmulator):
+    """At the end of a serial line. That the cable is out it does not know: it hears nothing and talks on."""
+
+    def __init__(self, link: SerialLink, plant: TrackedPlant, boot_ms: int) -> None:
+        super().__init__(link, plant, boot_ms)
+        self._link = link
+
+    def _hear(self) -> bytes:
+        """What has arrived; nothing while it is silent."""
+        try:
+            arrived = self._link.read()
+        except LinkLost:
+            return b""
+        return b"" if self._silent else arrived
+
+    def _say(self, data: bytes) -> None:
+        try:
+            self._link.write(data)
+        except LinkLost:
+            return
+
+
+class MotorController(SerialEmulator):
+    """Answers only when asked, and moves two tracks along ramps, in steps of a millisecond."""
+
+    def __init__(self, link: SerialLink, plant: TrackedPlant, boot_ms: int) -> None:
+        super().__init__(link, plant, boot_ms)
+        self._goal_mps = [0.0, 0.0]
+        self._target_mps = [0.0, 0.0]
+
+    def advance_to(self, now_ns: int) -> None:
+        """Answer what has arrived, then move on to now_ns."""
+        self._listen()
+        while self._now_ns < now_ns:
+            step_ns = min(_STEP_NS, now_ns - self._now_ns)
+            self._ramp(step_ns / 1e9)
+            self._plant.command_tracks(*self._target_mps)
+            self._now_ns += step_ns
+            self._plant.advance_to(self._now_ns)
+
+    @abstractmethod
+    def _listen(self) -> None:
+        """Handle what has arrived."""
+
+    @abstractmethod
+    def _ramp(self, step_s: float) -> None:
+        """Move the targets towards the goals."""
+
+    def _towards(self, track: int, goal_mps: float, ramp_mps2: float, step_s: float) -> None:
+        limit_mps = ramp_mps2 * step_s
+        change_mps = goal_mps - self._target_mps[track]
+        self._target_mps[track] += min(max(change_mps, -limit_mps), limit_mps)
+
+    def _stop_motors(self) -> None:
+        self._goal_mps = [0.0, 0.0]
+        self._target_mps = [0.0, 0.0]
+        self._plant.command_tracks(0.0, 0.0)
+
+
+def as_int32(value: int) -> int:
+    """A counter that wraps."""
+    return (value + (1 << 31)) % (1 << 32) - (1 << 31)
