@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +19,6 @@ _STANDING_MPS = 1e-3
 _DRIVING_MPS = 0.3
 _START_S = 40.0
 _STOP_S = 15.0
-_FROZEN_S = 2.0
 
 _TOLD = re.compile(r"v (-?[\d.]+) m/s, w (-?[\d.]+) rad/s, x (-?[\d.]+) m, y (-?[\d.]+) m")
 _ENDED = re.compile(r"^mission +[^:]*: (.*); [\d.]+ m in", re.MULTILINE)
@@ -66,6 +65,11 @@ class Trio:
                 return int(child)
         raise UserError("the drive has no perception process")
 
+    def wait_for_drive(self, within_s: float) -> None:
+        """Until the drive has ended by itself, or this long."""
+        with suppress(subprocess.TimeoutExpired):
+            self.drive.wait(within_s)
+
     def await_speed(self, reached: Callable[[float], bool], within_s: float) -> float:
         """Read what the base tells until its speed is so; how long that took. Raises UserError."""
         began_s = time.monotonic()
@@ -106,7 +110,7 @@ def _kill_base(trio: Trio) -> None:
 
 def _freeze_base(trio: Trio) -> None:
     trio.base.send_signal(signal.SIGSTOP)
-    time.sleep(_FROZEN_S)
+    trio.wait_for_drive(_STOP_S)
     trio.base.send_signal(signal.SIGCONT)
 
 
@@ -125,7 +129,7 @@ KILLS: dict[str, Callable[[Trio], None]] = {
     "kill -9 of perception": _kill_perception,
     "perception frozen (SIGSTOP)": _freeze_perception,
     "kill -9 of the emulator (base gone)": _kill_base,
-    f"emulator frozen for {_FROZEN_S:g} s (SIGSTOP)": _freeze_base,
+    "emulator frozen (SIGSTOP) until the drive has ended": _freeze_base,
     "e-stop": _press_estop,
 }
 
@@ -148,8 +152,10 @@ def run_kill(kind: str, config_path: Path, fault: str) -> KillResult:
         if frozen is not None:
             # A mission whose scenes are stale waits for better ones; this one has shown what it does.
             trio.drive.terminate()
-            time.sleep(1.0)
-            os.kill(frozen, signal.SIGCONT)
+            # Still frozen: the drive must come to its end without it, and take it along.
+            trio.wait_for_drive(_STOP_S)
+            with suppress(ProcessLookupError):
+                os.kill(frozen, signal.SIGKILL)
         out, _ = trio.drive.communicate(timeout=_STOP_S)
         ended = _ENDED.search(out)
         return KillResult(fault, stood_s, ended[1] if ended else out.strip(), trio.drive.returncode)

@@ -7,15 +7,14 @@ command while the program hangs): the control loop sends and receives by itself.
 from __future__ import annotations
 
 import errno
-import logging
 from collections import deque
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import can
 
 from config.chassis import CanLinkConfig
-from hal.errors import DeviceNotFound, DeviceRefused, HalError, LinkLost
+from hal.errors import DeviceNotFound, DeviceRefused
+from hal.links.reopening import ReopeningLink, reason
 from hal.types import CanFrame
 
 # Positive, because with 0 pyserial (below slcan) spins for ever on a full port.
@@ -33,37 +32,17 @@ _FULL = "Transmit buffer full"
 
 _OPEN_ERRORS = (can.CanError, OSError, ValueError, ImportError, NotImplementedError)
 
-_log = logging.getLogger(__name__)
 
-
-class CanBusLink:
-    """hal.api.CanLink over python-can. Opened by ``with``, or by the first use.
-
-    After LinkLost the next use opens the bus anew, so that a re-plugged adapter is found again;
-    whoever uses the link decides how often.
-    """
+class CanBusLink(ReopeningLink[can.BusABC]):
+    """hal.api.CanLink over python-can."""
 
     def __init__(self, config: CanLinkConfig) -> None:
+        super().__init__(f"CAN {config.interface} {config.channel!r}", (can.CanError, OSError))
         self._config = config
-        self._bus: can.BusABC | None = None
-        self._closed = False
         # python-can's udp_multicast hears what it sends itself, and cannot be told not to.
         self._echoes: deque[CanFrame] | None = (
             deque(maxlen=_MAX_FOREIGN) if config.interface == "udp_multicast" else None
         )
-
-    def __enter__(self) -> Self:
-        """Open the bus. Raises DeviceNotFound, DeviceRefused."""
-        self._closed = False
-        if self._bus is None:
-            self._bus = _open(self._config)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._closed = True
-        self._shut()
 
     def send(self, frame: CanFrame) -> None:
         """Queue one frame; waits for room at most 2 ms. Raises LinkLost."""
@@ -104,32 +83,19 @@ class CanBusLink:
             return frame
         return None
 
-    def _opened(self) -> can.BusABC:
-        if self._closed:
-            raise LinkLost(f"CAN {self._config.interface} {self._config.channel!r}: the link is closed")
-        if self._bus is None:
-            try:
-                self._bus = _open(self._config)
-            except HalError as error:
-                raise LinkLost(str(error)) from error
-        return self._bus
+    def _open(self) -> can.BusABC:
+        return _open(self._config, self._where)
 
-    def _lost(self, doing: str, error: Exception) -> LinkLost:
-        self._shut()
-        return LinkLost(
-            f"CAN {self._config.interface} {self._config.channel!r}: lost while {doing} ({_reason(error)}); "
-            f"{_remedy(self._config, error)}"
-        )
+    def _close(self, device: can.BusABC) -> None:
+        device.shutdown()
 
-    def _shut(self) -> None:
-        bus, self._bus = self._bus, None
-        if bus is None:
-            return
-        try:
-            bus.shutdown()
-        except (can.CanError, OSError) as error:
-            # The bus is gone anyway; python-can raises here after an unplug.
-            _log.debug("shutting down %s: %s", self._config.channel, error)
+    def _remedy(self, error: Exception) -> str:
+        number = _errno(error)
+        if self._config.interface == "socketcan" and number == errno.ENETDOWN:
+            return f"the bus is down: `ip link set {self._config.channel} up type can bitrate 500000`"
+        if number == errno.ENOBUFS or str(error) in (_BUS_OFF, _FULL):
+            return "nobody acknowledges: check the base's power, CAN high and low, termination and 500 kbit/s"
+        return super()._remedy(error)
 
 
 def open_can_link(config: CanLinkConfig) -> CanBusLink:
@@ -137,7 +103,7 @@ def open_can_link(config: CanLinkConfig) -> CanBusLink:
     return CanBusLink(config).__enter__()
 
 
-def _open(config: CanLinkConfig) -> can.BusABC:
+def _open(config: CanLinkConfig, where: str) -> can.BusABC:
     options: dict[str, Any] = {}
     if config.interface == "udp_multicast":
         options = {"port": config.port, "hop_limit": config.hop_limit, "fd": False}
@@ -145,7 +111,6 @@ def _open(config: CanLinkConfig) -> can.BusABC:
         options = {"bitrate": config.bitrate, "sleep_after_open": 0.1, "timeout": 0}
     elif config.interface not in ("virtual", "socketcan"):
         options = {"bitrate": config.bitrate}
-    where = f"CAN {config.interface} {config.channel!r}"
     try:
         # ignore_config: else files and environment variables of the machine would add options unseen.
         return can.Bus(
@@ -164,10 +129,10 @@ def _open(config: CanLinkConfig) -> can.BusABC:
             ) from error
         if number in (errno.EBUSY, errno.EADDRINUSE, errno.EAGAIN):
             raise DeviceRefused(
-                f"{where}: in use by another program ({_reason(error)}); stop that one first"
+                f"{where}: in use by another program ({reason(error)}); stop that one first"
             ) from error
         raise DeviceNotFound(
-            f"{where}: cannot be opened ({_reason(error)}); {_advice(config, number)}"
+            f"{where}: cannot be opened ({reason(error)}); {_advice(config, number)}"
         ) from error
 
 
@@ -184,22 +149,6 @@ def _advice(config: CanLinkConfig, number: int | None) -> str:
     if config.interface == "udp_multicast":
         return "check that the channel is a multicast address and that the machine has a multicast route"
     return "check interface and channel in the configuration, and that the adapter is plugged in"
-
-
-def _remedy(config: CanLinkConfig, error: Exception) -> str:
-    """What to do about a bus that worked, as far as its error tells."""
-    if config.interface == "socketcan" and _errno(error) == errno.ENETDOWN:
-        return f"the bus is down: `ip link set {config.channel} up type can bitrate 500000`"
-    if _errno(error) == errno.ENOBUFS or str(error) in (_BUS_OFF, _FULL):
-        return "nobody acknowledges: check that the base is on, CAN high and low, termination and 500 kbit/s"
-    return "check the adapter, the cable and the power of the base"
-
-
-def _reason(error: BaseException) -> str:
-    """The innermost cause in one line: python-can wraps the telling error in general ones."""
-    while error.__cause__ is not None:
-        error = error.__cause__
-    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _errno(error: BaseException | None) -> int | None:

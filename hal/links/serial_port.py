@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import errno
 import grp
-import logging
 import os
 import termios
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import serial
 
 from config.chassis import SerialLinkConfig
-from hal.errors import DeviceNotFound, DeviceRefused, HalError, LinkLost
+from hal.errors import DeviceNotFound, DeviceRefused, HalError
+from hal.links.reopening import ReopeningLink, reason
 
 # Short, because the control loop waits for it; positive, because with 0 pyserial spins for ever when the
 # peer stops reading.
@@ -27,33 +25,13 @@ _DEVICES = Path("/dev")
 # An unplugged port raises all three kinds; termios.error is not an OSError.
 _ERRORS = (serial.SerialException, OSError, termios.error)
 
-_log = logging.getLogger(__name__)
 
-
-class SerialPortLink:
-    """hal.api.SerialLink over pyserial: exclusive, raw, 8N1. Opened by ``with``, or by the first use.
-
-    After LinkLost the next use opens the port anew, so that a re-plugged adapter is found again;
-    whoever uses the link decides how often.
-    """
+class SerialPortLink(ReopeningLink[serial.SerialBase]):
+    """hal.api.SerialLink over pyserial: exclusive, raw, 8N1."""
 
     def __init__(self, config: SerialLinkConfig) -> None:
+        super().__init__(f"serial port {config.url}", _ERRORS)
         self._config = config
-        self._port: serial.SerialBase | None = None
-        self._closed = False
-
-    def __enter__(self) -> Self:
-        """Open the port. Raises DeviceNotFound, DeviceRefused."""
-        self._closed = False
-        if self._port is None:
-            self._port = _open(self._config)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._closed = True
-        self._shut()
 
     def write(self, data: bytes) -> None:
         """Hand all of data to the system within 20 ms. Raises LinkLost; part of data may then be out."""
@@ -71,32 +49,11 @@ class SerialPortLink:
         except _ERRORS as error:
             raise self._lost("reading", error) from error
 
-    def _opened(self) -> serial.SerialBase:
-        if self._closed:
-            raise LinkLost(f"serial port {self._config.url}: the link is closed")
-        if self._port is None:
-            try:
-                self._port = _open(self._config)
-            except HalError as error:
-                raise LinkLost(str(error)) from error
-        return self._port
+    def _open(self) -> serial.SerialBase:
+        return _open(self._config)
 
-    def _lost(self, doing: str, error: Exception) -> LinkLost:
-        self._shut()
-        return LinkLost(
-            f"serial port {self._config.url}: lost while {doing} ({_reason(error)}); "
-            "check the adapter, the cable and the power of the base"
-        )
-
-    def _shut(self) -> None:
-        port, self._port = self._port, None
-        if port is None:
-            return
-        try:
-            port.close()
-        except _ERRORS as error:
-            # The port is gone anyway.
-            _log.debug("closing %s: %s", self._config.url, error)
+    def _close(self, device: serial.SerialBase) -> None:
+        device.close()
 
 
 def open_serial_link(config: SerialLinkConfig) -> SerialPortLink:
@@ -130,11 +87,9 @@ def _translated(error: Exception, config: SerialLinkConfig) -> HalError:
         )
     # pyserial drops the number when the file is there but does not take a port's settings.
     if isinstance(error.__context__, termios.error) or number not in (None, errno.ENOENT):
-        return DeviceRefused(
-            f"{where}: is not a serial port that takes {config.baud} baud ({_reason(error)})"
-        )
+        return DeviceRefused(f"{where}: is not a serial port that takes {config.baud} baud ({reason(error)})")
     return DeviceNotFound(
-        f"{where}: cannot be opened ({_reason(error)}); check the url and that the adapter is plugged in "
+        f"{where}: cannot be opened ({reason(error)}); check the url and that the adapter is plugged in "
         f"({_ports_here(_DEVICES)})"
     )
 
@@ -155,7 +110,3 @@ def _ports_here(devices: Path) -> str:
         str(path) for pattern in ("ttyUSB*", "ttyACM*") for path in devices.glob(pattern)
     )
     return f"here are: {', '.join(ports)}" if ports else "no USB serial port is here"
-
-
-def _reason(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

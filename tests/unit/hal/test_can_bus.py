@@ -11,7 +11,7 @@ import pytest
 
 from config.chassis import CanLinkConfig
 from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
-from hal.links import can_bus
+from hal.links import reopening
 from hal.links.can_bus import CanBusLink, open_can_link
 from hal.links.pseudo_terminal import PseudoTerminal
 from hal.types import CanFrame
@@ -165,7 +165,7 @@ def test_an_error_in_use_is_a_lost_link_and_the_next_use_opens_anew(bus: FaultyB
         (OSError(errno.ENETDOWN, "Network is down"), "`ip link set can0 up type can bitrate 500000`"),
         (
             OSError(errno.ENOBUFS, "No buffer space available"),
-            "nobody acknowledges: check that the base is on",
+            "nobody acknowledges: check the base",
         ),
         (can.CanOperationError("Transmit buffer full"), "nobody acknowledges"),
         (OSError(errno.ENODEV, "No such device"), "check the adapter, the cable and the power of the base"),
@@ -216,7 +216,7 @@ def test_shutting_down_a_dead_adapter_raises_nothing(
     bus: FaultyBus, caplog: pytest.LogCaptureFixture
 ) -> None:
     """python-can's slcan raises from shutdown() after an unplug."""
-    with caplog.at_level(logging.DEBUG, logger=can_bus.__name__), CanBusLink(config("slcan", "x")):
+    with caplog.at_level(logging.DEBUG, logger=reopening.__name__), CanBusLink(config("slcan", "x")):
         bus.error = can.CanOperationError("gone")
     assert "gone" in caplog.text
 
