@@ -49,6 +49,7 @@ class KobukiEmulator(SerialEmulator):
         self.over_current = 0
         self.battery_v = 16.2
         self.gyro = True
+        self.gyro_gain = 1.0  # 0: stuck
         self.rejected = 0
 
     def advance_to(self, now_ns: int) -> None:
@@ -167,8 +168,9 @@ class KobukiEmulator(SerialEmulator):
         )  # fmt: skip
 
     def _inertia(self) -> bytes:
-        angle_rad = math.remainder(self._plant.pose.heading_rad - self._heading_zero_rad, math.tau)
-        rate = round(100.0 * math.degrees(self._plant.twist[1]))
+        turned_rad = self._plant.pose.heading_rad - self._heading_zero_rad
+        angle_rad = self.gyro_gain * math.remainder(turned_rad, math.tau)
+        rate = round(100.0 * self.gyro_gain * math.degrees(self._plant.twist[1]))
         return bytes((4, 7)) + struct.pack(
             "<hh3x", round(100.0 * math.degrees(angle_rad)), min(max(rate, -32_768), 32_767)
         )

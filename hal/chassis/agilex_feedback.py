@@ -22,6 +22,7 @@ from hal.chassis.agilex_models import (
     track_width_of,
 )
 from hal.chassis.arming import NS_PER_MS
+from hal.chassis.disagreement import Disagreement
 from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
 from hal.types import PlanarPose
 
@@ -40,7 +41,6 @@ _JUMP_SLACK_M = 0.2
 # 0x221 and 0x311 tell of the same tracks. Past this difference since the last comparison, one of them lies.
 _DISAGREEMENT_M = 0.15
 _DISAGREEMENT_RATIO = 0.3
-_COMPARED_NS = 1_000_000_000
 
 
 class AgilexFeedback:
@@ -65,7 +65,9 @@ class AgilexFeedback:
         self._silence_ns = config.feedback_timeout_ms * NS_PER_MS
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter()
-        self._disagreement = _Disagreement()
+        self._disagreement = Disagreement(
+            "odometer and speed feedback disagree", "m", _DISAGREEMENT_M, _DISAGREEMENT_RATIO
+        )
         self._odometer_ns: int | None = None
         self._state: SystemState | None = None
         self._battery: Battery | None = None
@@ -188,7 +190,7 @@ class AgilexFeedback:
         elapsed_ns = 0 if self.motion_ns is None else min(now_ns - self.motion_ns, self._silence_ns)
         share_s = elapsed_ns / _NS_PER_S / len(motions)
         for motion in motions:
-            self._disagreement.spoke(motion.v_mps * share_s)
+            self._disagreement.expect(motion.v_mps * share_s)
             if self._geometry is None:
                 self._reckoning.advance(motion.v_mps * share_s, motion.w_radps / self._slip_factor * share_s)
         self.motion_ns = now_ns
@@ -210,7 +212,7 @@ class AgilexFeedback:
             return
         distance_m, turn_rad = self._geometry.to_twist(steps[0] / 1000.0, steps[1] / 1000.0)
         self._reckoning.advance(distance_m, turn_rad)
-        self._disagreement.counted(distance_m, now_ns)
+        self._disagreement.compare(distance_m, now_ns)
 
     def _list_faults(self) -> None:
         bits = 0 if self._state is None else self._state.fault_bits
@@ -218,35 +220,3 @@ class AgilexFeedback:
         for index, driver_bits in sorted(self._driver_bits.items()):
             found += self._model.describe_driver_state(index, driver_bits)
         self.faults = found
-
-
-class _Disagreement:
-    """Compares, second by second, the distance counted with the distance spoken of."""
-
-    def __init__(self) -> None:
-        self.sentence = ""
-        self._counted_m = 0.0
-        self._spoken_m = 0.0
-        self._since_ns: int | None = None
-
-    def spoke(self, distance_m: float) -> None:
-        self._spoken_m += distance_m
-
-    def restart(self, now_ns: int) -> None:
-        self._counted_m = self._spoken_m = 0.0
-        self._since_ns = now_ns
-
-    def counted(self, distance_m: float, now_ns: int) -> None:
-        if self._since_ns is None:
-            self.restart(now_ns)
-        self._counted_m += distance_m
-        if self._since_ns is None or now_ns - self._since_ns < _COMPARED_NS:
-            return
-        apart_m = abs(self._counted_m - self._spoken_m)
-        allowed_m = _DISAGREEMENT_M + _DISAGREEMENT_RATIO * abs(self._spoken_m)
-        self.sentence = (
-            f"odometer and speed feedback disagree: {self._counted_m:.2f} m against {self._spoken_m:.2f} m"
-            if apart_m > allowed_m
-            else ""
-        )
-        self.restart(now_ns)

@@ -6,6 +6,7 @@ import math
 
 from config.chassis import KobukiChassisConfig
 from hal.chassis.arming import NS_PER_MS
+from hal.chassis.disagreement import Disagreement
 from hal.chassis.kobuki_packets import (
     CLOCK_BITS,
     ENCODER_BITS,
@@ -31,6 +32,10 @@ _STANDING_RADPS = 0.03
 _JUMP_RATIO = 1.5
 _JUMP_SLACK_M = 0.02
 
+# In a second: the wheels slip a little, and the gyro drifts. Past this a wheel is held, or one of them lies.
+_DISAGREEMENT_RAD = 0.3
+_DISAGREEMENT_RATIO = 0.4
+
 # The base's clock and ours may disagree by what a frame waits in buffers, not by this.
 _CLOCKS_APART_MS = 500
 
@@ -38,7 +43,8 @@ _CLOCKS_APART_MS = 500
 class KobukiFeedback:
     """The newest of everything the base says.
 
-    Distance is wheel ticks; yaw is the gyro's, which no slip fools, where a frame has one. Time between
+    Distance is wheel ticks; yaw is the gyro's, which no slip fools, where a frame has one; the wheels' yaw is
+    compared with it, and past a difference the base stops. Time between
     two frames is the base's own clock: frames wait in buffers, ticks do not.
     """
 
@@ -49,6 +55,9 @@ class KobukiFeedback:
         self._counter = TrackCounter(ENCODER_BITS)
         self._core: Core | None = None
         self._angle_rad: float | None = None
+        self._disagreement = Disagreement(
+            "gyro and wheels disagree", "rad", _DISAGREEMENT_RAD, _DISAGREEMENT_RATIO
+        )
         self._restarted = False
         self._wanted = False
         self.bytes_heard = 0
@@ -106,6 +115,8 @@ class KobukiFeedback:
         ]
         if core.charger in STANDING_ON_CABLE:
             causes.append("the charging cable is plugged in")
+        if self._disagreement.sentence and not causes:
+            return self._disagreement.sentence
         return f"emergency stop by the base's own sensors: {', '.join(causes)}" if causes else ""
 
     @property
@@ -153,7 +164,10 @@ class KobukiFeedback:
         self.w_radps = turn_rad / elapsed_s
         if inertia is not None:
             self.w_radps = inertia.rate_radps
-            turn_rad = turn_rad if last_rad is None else wrap_angle_rad(inertia.angle_rad - last_rad)
+            if last_rad is not None:
+                self._disagreement.expect(turn_rad)
+                turn_rad = wrap_angle_rad(inertia.angle_rad - last_rad)
+                self._disagreement.compare(turn_rad, now_ns)
         self._reckoning.advance(distance_m, turn_rad)
         self.v_mps = distance_m / elapsed_s
         self.feedback_ns = now_ns
@@ -161,6 +175,8 @@ class KobukiFeedback:
     def _jumped(self, core: Core) -> None:
         """What happened meanwhile is not known; counting begins anew."""
         self._restarted = True
+        if self.pose_ns is not None:
+            self._disagreement.restart(self.pose_ns)
         self._counter = TrackCounter(ENCODER_BITS)
         self._counter.increments(core.left_ticks, core.right_ticks, math.inf)
         self.v_mps = self.w_radps = math.nan

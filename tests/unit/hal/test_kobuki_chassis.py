@@ -237,3 +237,24 @@ def test_the_fastest_is_the_wire_s_too() -> None:
     bench.arm()
     bench.step(9.0)
     assert bench.near.written == [base_control(0.7, 0.0)]
+
+
+@pytest.mark.parametrize("gain", [0.0, -1.0, 3.0])
+def test_a_gyro_that_does_not_agree_with_the_wheels_latches(gain: float) -> None:
+    """Stuck, mounted upside down, or the wheels turn and the base does not."""
+    bench = Bench()
+    bench.arm()
+    bench.emulator.gyro_gain = gain
+    for _ in range(125):
+        state = bench.step(0.1, 0.8)
+        if state.mode is not ChassisMode.ARMED:
+            break
+    assert state.mode is ChassisMode.ESTOP
+    assert state.reason.startswith("gyro and wheels disagree: ")
+    assert bench.near.written == [STOP]
+
+
+def test_an_ordinary_slip_is_no_disagreement() -> None:
+    bench = Bench(slip_factor=1.0)  # the plant's is 1.1
+    bench.arm()
+    assert bench.run(300, 0.2, 1.2).mode is ChassisMode.ARMED

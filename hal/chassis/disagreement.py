@@ -1,0 +1,47 @@
+"""Two sensors of one motion, compared second by second: past a difference, one of them lies."""
+
+from __future__ import annotations
+
+_COMPARED_NS = 1_000_000_000
+
+
+class Disagreement:
+    """sentence: "" while both agree, and until the first second is full.
+
+    what: the sentence's beginning. unit: of both sums. slack, ratio: the difference that may be, and the
+    share of the expected sum that may come on top.
+    """
+
+    def __init__(self, what: str, unit: str, slack: float, ratio: float) -> None:
+        self.sentence = ""
+        self._what = what
+        self._unit = unit
+        self._slack = slack
+        self._ratio = ratio
+        self._measured = 0.0
+        self._expected = 0.0
+        self._since_ns: int | None = None
+
+    def expect(self, amount: float) -> None:
+        """What one sensor says happened."""
+        self._expected += amount
+
+    def compare(self, amount: float, now_ns: int) -> None:
+        """What the other one says, up to now_ns."""
+        if self._since_ns is None:
+            self.restart(now_ns)
+        self._measured += amount
+        if self._since_ns is None or now_ns - self._since_ns < _COMPARED_NS:
+            return
+        apart = abs(self._measured - self._expected)
+        self.sentence = (
+            f"{self._what}: {self._measured:.2f} {self._unit} against {self._expected:.2f} {self._unit}"
+            if apart > self._slack + self._ratio * abs(self._expected)
+            else ""
+        )
+        self.restart(now_ns)
+
+    def restart(self, now_ns: int) -> None:
+        """One of them began anew: compare from here."""
+        self._measured = self._expected = 0.0
+        self._since_ns = now_ns
