@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from types import TracebackType
 from typing import Self
 
 from config.robot import Limits
 from hal.api import CanLink, Chassis
 from hal.clocks import NS_PER_S
+from hal.enclosing import Enclosing
 from hal.errors import LinkLost
 from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
 
@@ -132,10 +132,11 @@ def self_check(limits: GuardLimits) -> str:
     return ""
 
 
-class GuardedChassis:
+class GuardedChassis(Enclosing):
     """hal.api.Chassis around another one."""
 
     def __init__(self, chassis: Chassis, limits: GuardLimits) -> None:
+        super().__init__(chassis)
         self._chassis = chassis
         self._limits = limits
         self._last: Setpoint | None = None
@@ -144,16 +145,6 @@ class GuardedChassis:
         self._armed = False
         self._violation = ""
         self._refusal = ""
-
-    def __enter__(self) -> Self:
-        """Open the chassis. Raises DeviceNotFound, DeviceRefused."""
-        self._chassis.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._chassis.__exit__(kind, error, trace)
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """See hal.api.Chassis."""
@@ -205,22 +196,13 @@ class GuardedChassis:
         return replace(state, mode=ChassisMode.ESTOP, reason=reason)
 
 
-class GuardedCanLink:
+class GuardedCanLink(Enclosing):
     """hal.api.CanLink that sends nothing but the identifiers it was given, each with its length at most."""
 
     def __init__(self, link: CanLink, allowed: Mapping[int, int]) -> None:
+        super().__init__(link)
         self._link = link
         self._allowed = allowed
-
-    def __enter__(self) -> Self:
-        """Open the link. Raises DeviceNotFound, DeviceRefused."""
-        self._link.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._link.__exit__(kind, error, trace)
 
     def send(self, frame: CanFrame) -> None:
         """See hal.api.CanLink. A frame that is not allowed raises LinkLost: the driver latches."""

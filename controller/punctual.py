@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Self
-
 from hal.api import Chassis, Clock
+from hal.enclosing import Enclosing
 from hal.types import ChassisState, Setpoint
 
 # Of the period, after its beginning: later than nearly every decision takes, and only this much older.
 _HOLD_SHARE = 0.2
 
 
-class PunctualChassis:
+class PunctualChassis(Enclosing):
     """hal.api.Chassis around another one, for a loop that steps at a fixed rate on absolute deadlines.
 
     The first exchange sets the beat; each later one is held until a fifth of its period is over. A step
@@ -20,21 +18,12 @@ class PunctualChassis:
     """
 
     def __init__(self, chassis: Chassis, clock: Clock, period_ns: int) -> None:
+        super().__init__(chassis)
         self._chassis = chassis
         self._clock = clock
         self._period_ns = period_ns
         self._hold_ns = round(_HOLD_SHARE * period_ns)
         self._first_ns: int | None = None
-
-    def __enter__(self) -> Self:
-        """Open the chassis. Raises DeviceNotFound, DeviceRefused."""
-        self._chassis.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._chassis.__exit__(kind, error, trace)
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """See hal.api.Chassis. now_ns: when the step began, within the period to which it belongs."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from types import TracebackType
-from typing import Self
 
 from hal.api import Closing, SerialLink
+from hal.enclosing import Enclosing
 from hal.errors import LinkLost
 from sim.plant import TrackedPlant
 
@@ -14,7 +13,7 @@ MS = 1_000_000
 _STEP_NS = 1 * MS
 
 
-class ChassisEmulator(ABC):
+class ChassisEmulator(Enclosing, ABC):
     """Stepped by a time that is passed in. What has arrived counts as of the time of the last step, so in
     lock-step the order "advance the emulator, then exchange with the driver" has no hidden delay.
 
@@ -22,7 +21,7 @@ class ChassisEmulator(ABC):
     """
 
     def __init__(self, link: Closing, plant: TrackedPlant, boot_ms: int) -> None:
-        self._closing = link
+        super().__init__(link)
         self._plant = plant
         self._boot_ns = boot_ms * MS
         self._now_ns = plant.now_ns
@@ -30,16 +29,6 @@ class ChassisEmulator(ABC):
         self._travel_zero_m = plant.track_travel_m
         self._frozen = False
         self.commands_obeyed = 0
-
-    def __enter__(self) -> Self:
-        """Open the link. Raises DeviceNotFound, DeviceRefused."""
-        self._closing.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._closing.__exit__(kind, error, trace)
 
     @property
     def plant(self) -> TrackedPlant:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol
 
 from controller.bench.busy_scene import OBSTACLES, busy_scene
 from controller.bench.figures import Durations
@@ -13,6 +12,7 @@ from controller.bench.reel import Tick
 from controller.control import ControlLoop
 from hal.api import Chassis, Closing
 from hal.clocks import NS_PER_S
+from hal.enclosing import Enclosing
 from hal.types import ChassisMode, ChassisState, Setpoint
 from sim.simulation import Emulator
 
@@ -23,22 +23,14 @@ _LATENCY_NS = NS_PER_S * 60 // 1000
 _ARM_STEPS = 250
 
 
-class TimedChassis:
+class TimedChassis(Enclosing):
     """A chassis with a stopwatch on its exchange: spent_ns of the last one."""
 
     def __init__(self, chassis: Chassis, stopwatch_ns: Callable[[], int]) -> None:
+        super().__init__(chassis)
         self._chassis = chassis
         self._stopwatch_ns = stopwatch_ns
         self.spent_ns = 0
-
-    def __enter__(self) -> Self:
-        self._chassis.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._chassis.__exit__(kind, error, trace)
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """See hal.api.Chassis."""

@@ -12,10 +12,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType, TracebackType
-from typing import Self
+from types import MappingProxyType
 
 from hal.api import SerialLink
+from hal.enclosing import Enclosing
 from hal.types import CanFrame
 
 _START = b"\x5a\xa5"
@@ -109,25 +109,16 @@ class FrameReader:
         frames.append(CanFrame(kind.arbitration_id, data.ljust(8, b"\0") if len(data) > 1 else data))
 
 
-class AgilexSerialBus:
+class AgilexSerialBus(Enclosing):
     """hal.api.CanLink over a serial line, for either end of it."""
 
     def __init__(self, link: SerialLink) -> None:
+        super().__init__(link)
         self._link = link
         self._reader = FrameReader()
         self._arrived: deque[CanFrame] = deque()
         self._count = 0
         self._bytes_heard = 0
-
-    def __enter__(self) -> Self:
-        """Open the port. Raises DeviceNotFound, DeviceRefused."""
-        self._link.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._link.__exit__(kind, error, trace)
 
     def send(self, frame: CanFrame) -> None:
         """See hal.api.CanLink. A frame that the serial line has no word for is not sent, as on the base."""

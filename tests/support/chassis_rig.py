@@ -9,8 +9,7 @@ import termios
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol
 from uuid import uuid4
 
 from config.chassis import (
@@ -23,7 +22,7 @@ from config.chassis import (
     RoboteqChassisConfig,
     SerialLinkConfig,
 )
-from hal.api import CanLink, Chassis, SerialLink
+from hal.api import CanLink, Chassis, Closing, SerialLink
 from hal.chassis.agilex import AgilexChassis, no_can_frames
 from hal.chassis.agilex_models import model_of, over_serial
 from hal.chassis.agilex_serial import AgilexSerialBus
@@ -31,6 +30,7 @@ from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.kobuki_packets import WHEEL_BASE_M
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
+from hal.enclosing import Enclosing
 from hal.errors import LinkLost
 from hal.links.can_bus import CanBusLink
 from hal.links.pseudo_terminal import PseudoTerminal
@@ -67,10 +67,11 @@ class Emulator(Protocol):
     def plant(self) -> TrackedPlant: ...
 
 
-class _Plug:
+class _Plug(Enclosing):
     """A plug in front of any link: out, every use raises LinkLost and nothing reaches it."""
 
-    def __init__(self) -> None:
+    def __init__(self, link: Closing) -> None:
+        super().__init__(link)
         self.out = False
 
     def _check(self) -> None:
@@ -82,17 +83,8 @@ class PluggedCan(_Plug):
     """A CAN link that can be pulled out."""
 
     def __init__(self, link: CanLink) -> None:
-        super().__init__()
+        super().__init__(link)
         self._link = link
-
-    def __enter__(self) -> Self:
-        self._link.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._link.__exit__(kind, error, trace)
 
     def send(self, frame: CanFrame) -> None:
         self._check()
@@ -112,17 +104,8 @@ class PluggedSerial(_Plug):
     """A serial link that can be pulled out."""
 
     def __init__(self, link: SerialLink) -> None:
-        super().__init__()
+        super().__init__(link)
         self._link = link
-
-    def __enter__(self) -> Self:
-        self._link.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._link.__exit__(kind, error, trace)
 
     def write(self, data: bytes) -> None:
         self._check()

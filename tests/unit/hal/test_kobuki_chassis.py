@@ -8,42 +8,21 @@ import pytest
 
 from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.kobuki_packets import TICK_M, base_control
-from hal.links.scripted import ScriptedSerialLink, serial_pair
-from hal.types import ChassisMode, ChassisState, Setpoint
+from hal.types import ChassisMode
 from sim.kobuki_emulator import KobukiEmulator
-from sim.plant import TrackedPlant
 from tests.support.chassis_rig import KOBUKI_PLANT, MS, kobuki_config
+from tests.support.serial_bench import SerialBench, reason_for_giving_up
 
 STOP = bytes.fromhex("AA 55 06 01 04 00 00 00 00 03")
 
 
-class Bench:
-    """The driver with the emulator, and the line between them."""
-
+class Bench(SerialBench[KobukiEmulator]):
     def __init__(self, **changes: object) -> None:
-        self.near, self.far = serial_pair()
-        self.plant = TrackedPlant(KOBUKI_PLANT)
-        self.emulator = KobukiEmulator(self.far, self.plant, boot_ms=0)
-        self.chassis = KobukiChassis(self.near, kobuki_config(**changes))
-        self.now_ns = 0
-
-    def step(self, v_mps: float | None = None, w_radps: float = 0.0, after_ms: int = 20) -> ChassisState:
-        self.now_ns += after_ms * MS
-        self.emulator.advance_to(self.now_ns)
-        self.near.written.clear()
-        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
-        return self.chassis.exchange(command, self.now_ns)
-
-    def run(self, steps: int, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
-        for _ in range(steps):
-            state = self.step(v_mps, w_radps)
-        return state
-
-    def arm(self) -> None:
-        self.run(5)
-        self.chassis.arm(self.now_ns)
-        state = self.run(5)
-        assert state.mode is ChassisMode.ARMED, state.reason
+        super().__init__(
+            KOBUKI_PLANT,
+            lambda link, plant: KobukiEmulator(link, plant, boot_ms=0),
+            lambda link: KobukiChassis(link, kobuki_config(**changes)),
+        )
 
 
 def test_standby_says_zero_every_period() -> None:
@@ -221,15 +200,7 @@ def test_nothing_is_known_before_the_second_frame() -> None:
     ],
 )
 def test_a_device_that_is_no_kobuki_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    link = ScriptedSerialLink()
-    chassis = KobukiChassis(link, kobuki_config())
-    chassis.arm(0)
-    for k in range(1, 160):
-        link.deliver(babble)
-        state = chassis.exchange(None, k * 20 * MS)
-    assert state.mode is ChassisMode.STANDBY
-    assert state.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
-    assert hint in state.reason
+    assert hint in reason_for_giving_up(lambda link: KobukiChassis(link, kobuki_config()), babble)
 
 
 def test_the_fastest_is_the_wire_s_too() -> None:

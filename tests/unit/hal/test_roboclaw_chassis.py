@@ -10,11 +10,11 @@ import pytest
 from hal.chassis import roboclaw_packets as packets
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboclaw_port import Answer, RoboclawPort
-from hal.links.scripted import ScriptedSerialLink, serial_pair
-from hal.types import ChassisMode, ChassisState, Setpoint
-from sim.plant import TrackedPlant
+from hal.links.scripted import ScriptedSerialLink
+from hal.types import ChassisMode
 from sim.roboclaw_emulator import RoboclawEmulator
 from tests.support.chassis_rig import COUNTS_PER_M, MS, PLANT, roboclaw_config
+from tests.support.serial_bench import SerialBench, first_known, reason_for_giving_up
 
 ADDRESS = 0x80
 
@@ -112,33 +112,13 @@ class TestPort:
         assert port.poll(4 * MS) == Answer(packets.STATUS_REQUEST, bytes.fromhex("00 00 00 01"), 0)
 
 
-class Bench:
-    """The driver with the emulator, and the line between them."""
-
+class Bench(SerialBench[RoboclawEmulator]):
     def __init__(self, **changes: object) -> None:
-        self.near, self.far = serial_pair()
-        self.plant = TrackedPlant(PLANT)
-        self.emulator = RoboclawEmulator(self.far, self.plant, counts_per_m=COUNTS_PER_M, boot_ms=0)
-        self.chassis = RoboclawChassis(self.near, roboclaw_config(**changes))
-        self.now_ns = 0
-
-    def step(self, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
-        self.now_ns += 20 * MS
-        self.emulator.advance_to(self.now_ns)
-        self.near.written.clear()
-        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
-        return self.chassis.exchange(command, self.now_ns)
-
-    def run(self, steps: int, v_mps: float | None = None) -> ChassisState:
-        for _ in range(steps):
-            state = self.step(v_mps)
-        return state
-
-    def arm(self) -> None:
-        self.run(10)
-        self.chassis.arm(self.now_ns)
-        state = self.run(40)
-        assert state.mode is ChassisMode.ARMED, state.reason
+        super().__init__(
+            PLANT,
+            lambda link, plant: RoboclawEmulator(link, plant, counts_per_m=COUNTS_PER_M, boot_ms=0),
+            lambda link: RoboclawChassis(link, roboclaw_config(**changes)),
+        )
 
 
 def test_the_time_out_is_set_and_read_back_before_arming() -> None:
@@ -305,11 +285,7 @@ def test_errors_latch_and_warnings_are_told(bits: int, mode: ChassisMode, faults
 def test_nothing_is_known_before_the_second_encoder_answer() -> None:
     """One reading of an encoder is no speed."""
     bench = Bench()
-    seen = [bench.step() for _ in range(20)]
-    first_known = next(k for k, state in enumerate(seen) if state.feedback_ns is not None)
-    assert first_known > 3
-    assert all(math.isnan(state.v_mps) for state in seen[:first_known])
-    assert seen[first_known].v_mps == 0.0
+    assert first_known([bench.step() for _ in range(20)]) > 3
 
 
 @pytest.mark.parametrize(
@@ -323,12 +299,4 @@ def test_nothing_is_known_before_the_second_encoder_answer() -> None:
     ],
 )
 def test_a_device_that_is_no_roboclaw_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    link = ScriptedSerialLink()
-    chassis = RoboclawChassis(link, roboclaw_config())
-    chassis.arm(0)
-    for k in range(1, 160):
-        link.deliver(babble)
-        state = chassis.exchange(None, k * 20 * MS)
-    assert state.mode is ChassisMode.STANDBY
-    assert state.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
-    assert hint in state.reason
+    assert hint in reason_for_giving_up(lambda link: RoboclawChassis(link, roboclaw_config()), babble)

@@ -7,42 +7,21 @@ import math
 import pytest
 
 from hal.chassis.roboteq import RoboteqChassis
-from hal.links.scripted import ScriptedSerialLink, serial_pair
-from hal.types import ChassisMode, ChassisState, Setpoint
-from sim.plant import TrackedPlant
+from hal.types import ChassisMode
 from sim.roboteq_emulator import RoboteqEmulator
-from tests.support.chassis_rig import COUNTS_PER_M, MS, PLANT, roboteq_config
+from tests.support.chassis_rig import COUNTS_PER_M, PLANT, roboteq_config
+from tests.support.serial_bench import SerialBench, first_known, reason_for_giving_up
 
 
-class Bench:
-    """The driver with the emulator, and the line between them."""
-
+class Bench(SerialBench[RoboteqEmulator]):
     def __init__(self, **changes: object) -> None:
-        self.near, self.far = serial_pair()
-        self.plant = TrackedPlant(PLANT)
-        self.emulator = RoboteqEmulator(
-            self.far, self.plant, full_speed_mps=1.0, counts_per_m=COUNTS_PER_M, boot_ms=0
+        super().__init__(
+            PLANT,
+            lambda link, plant: RoboteqEmulator(
+                link, plant, full_speed_mps=1.0, counts_per_m=COUNTS_PER_M, boot_ms=0
+            ),
+            lambda link: RoboteqChassis(link, roboteq_config(**changes)),
         )
-        self.chassis = RoboteqChassis(self.near, roboteq_config(**changes))
-        self.now_ns = 0
-
-    def step(self, v_mps: float | None = None, w_radps: float = 0.0, after_ms: int = 20) -> ChassisState:
-        self.now_ns += after_ms * MS
-        self.emulator.advance_to(self.now_ns)
-        self.near.written.clear()
-        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
-        return self.chassis.exchange(command, self.now_ns)
-
-    def run(self, steps: int, v_mps: float | None = None) -> ChassisState:
-        for _ in range(steps):
-            state = self.step(v_mps)
-        return state
-
-    def arm(self) -> None:
-        self.run(10)
-        self.chassis.arm(self.now_ns)
-        state = self.run(40)
-        assert state.mode is ChassisMode.ARMED, state.reason
 
     def written(self) -> list[bytes]:
         """The lines of the last exchange."""
@@ -331,11 +310,7 @@ def test_the_fastest_speed_holds_for_each_track() -> None:
 
 def test_nothing_is_known_before_the_second_counter_answer() -> None:
     bench = Bench()
-    seen = [bench.step() for _ in range(20)]
-    first_known = next(k for k, state in enumerate(seen) if state.feedback_ns is not None)
-    assert first_known >= 3
-    assert all(math.isnan(state.v_mps) for state in seen[:first_known])
-    assert seen[first_known].v_mps == 0.0
+    assert first_known([bench.step() for _ in range(20)]) >= 3
 
 
 @pytest.mark.parametrize(
@@ -346,12 +321,4 @@ def test_nothing_is_known_before_the_second_counter_answer() -> None:
     ],
 )
 def test_a_device_that_is_no_roboteq_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    link = ScriptedSerialLink()
-    chassis = RoboteqChassis(link, roboteq_config())
-    chassis.arm(0)
-    for k in range(1, 160):
-        link.deliver(babble)
-        state = chassis.exchange(None, k * 20 * MS)
-    assert state.mode is ChassisMode.STANDBY
-    assert state.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
-    assert hint in state.reason
+    assert hint in reason_for_giving_up(lambda link: RoboteqChassis(link, roboteq_config()), babble)

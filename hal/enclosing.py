@@ -1,0 +1,25 @@
+"""The part of every wrapper that is only opening and closing what it wraps."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Self
+
+from hal.api import Closing
+
+
+class Enclosing:
+    """Open while what it encloses is open."""
+
+    def __init__(self, enclosed: Closing) -> None:
+        self._enclosed = enclosed
+
+    def __enter__(self) -> Self:
+        """Open what is enclosed. Raises DeviceNotFound, DeviceRefused."""
+        self._enclosed.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._enclosed.__exit__(kind, error, trace)

@@ -1,0 +1,80 @@
+"""A serial driver and its emulator on a wire in memory, for the tests of one driver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from config.chassis import PlantConfig
+from hal.api import Chassis, SerialLink
+from hal.links.scripted import ScriptedSerialLink, serial_pair
+from hal.types import ChassisMode, ChassisState, Setpoint
+from sim.emulator import SerialEmulator
+from sim.plant import TrackedPlant
+from tests.support.chassis_rig import MS
+
+EmulatorT = TypeVar("EmulatorT", bound=SerialEmulator)
+
+
+class SerialBench(Generic[EmulatorT]):
+    """The driver with the emulator, and the line between them; near is the driver's end.
+
+    periods: how long arming may take.
+    """
+
+    periods = 40
+
+    def __init__(
+        self,
+        plant: PlantConfig,
+        make_emulator: Callable[[SerialLink, TrackedPlant], EmulatorT],
+        make_chassis: Callable[[SerialLink], Chassis],
+    ) -> None:
+        self.near, self.far = serial_pair()
+        self.plant = TrackedPlant(plant)
+        self.emulator = make_emulator(self.far, self.plant)
+        self.chassis = make_chassis(self.near)
+        self.now_ns = 0
+
+    def step(self, v_mps: float | None = None, w_radps: float = 0.0, after_ms: int = 20) -> ChassisState:
+        """Emulator, then driver; near.written is what this exchange wrote."""
+        self.now_ns += after_ms * MS
+        self.emulator.advance_to(self.now_ns)
+        self.near.written.clear()
+        command = None if v_mps is None else Setpoint(self.now_ns, v_mps, 0.0, w_radps)
+        return self.chassis.exchange(command, self.now_ns)
+
+    def run(self, steps: int, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
+        """Many periods."""
+        for _ in range(steps):
+            state = self.step(v_mps, w_radps)
+        return state
+
+    def arm(self) -> None:
+        """Consent, and wait until it is followed."""
+        self.run(10)
+        self.chassis.arm(self.now_ns)
+        state = self.run(self.periods)
+        assert state.mode is ChassisMode.ARMED, state.reason
+
+
+def first_known(states: list[ChassisState]) -> int:
+    """The first state with a speed. Before it there is none, and it begins with standing."""
+    known = next(k for k, state in enumerate(states) if state.feedback_ns is not None)
+    assert all(state.v_mps != state.v_mps for state in states[:known])
+    assert states[known].v_mps == 0.0
+    return known
+
+
+def reason_for_giving_up(make_chassis: Callable[[SerialLink], Chassis], babble: bytes) -> str:
+    """What the driver says when the base at the other end says nothing but this, again and again."""
+    link = ScriptedSerialLink()
+    chassis = make_chassis(link)
+    chassis.arm(0)
+    for k in range(1, 160):
+        link.deliver(babble)
+        state = chassis.exchange(None, k * 20 * MS)
+    assert state.mode is ChassisMode.STANDBY
+    begins = "arming gave up after 3.0 s: no status heard from the base: "
+    assert state.reason.startswith(begins)
+    return state.reason.removeprefix(begins)
