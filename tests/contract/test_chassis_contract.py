@@ -24,6 +24,7 @@ from tests.support.chassis_rig import (
     roboteq_rig,
     udp_link_config,
 )
+from tests.support.page_chassis import page_rig
 from tests.support.real_base import DEFAULT_BASE, real_rig
 
 
@@ -65,6 +66,8 @@ def _open(name: str) -> AbstractContextManager[Rig]:
             return kobuki_rig("scripted")
         case "kobuki-pty":
             return kobuki_rig("pty")
+        case "page-scripted" | "page-pty":
+            return page_rig(name.removeprefix("page-"))
     raise ValueError(name)
 
 
@@ -85,6 +88,8 @@ EMULATED = [
     "roboteq-pty",
     "kobuki-scripted",
     "kobuki-pty",
+    "page-scripted",  # the example of docs/add-a-chassis.md
+    "page-pty",
 ]
 
 

@@ -14,6 +14,7 @@ from config.loader import CONFIG_DIR
 from controller.cli import emulate
 from controller.emulate import FAULTS
 from hal.chassis.driver import ChassisDriver, Told
+from tests.support.page_chassis import CODE, page_module
 
 ROOT = CONFIG_DIR.parent
 PAGE = (ROOT / "docs" / "add-a-chassis.md").read_text()
@@ -64,7 +65,20 @@ def test_the_faults_to_type() -> None:
 def test_the_commands_it_gives() -> None:
     assert "treadwatch emulate roboteq" in QUOTED
     assert "treadwatch run --config config/hil-roboteq.yaml" in QUOTED
-    assert 'addoption("--hil"' in read("tests/conftest.py")
+    for option in ("--hil", "--channel", "--base", "--attended"):
+        assert option in PAGE
+        assert f'"{option}"' in read("tests/conftest.py"), option
+
+
+def test_the_code_of_the_page_is_one_chassis_in_the_contract_suite() -> None:
+    assert len(CODE) == 5, "config, bytes, feedback, driver, emulator"
+    assert max(len(line) for block in CODE for line in block.splitlines()) <= 110
+    assert read("tests/contract/test_chassis_contract.py").count('"page-') >= 4
+    page = page_module()
+    assert issubclass(page.MinitrackChassis, ChassisDriver)
+    assert page.drive(0.5, -0.25) == b"D 500 -250*3C\n"
+    assert page.parse(b"S 1 -2 3 240*FB") == page.Status(1, -2, 3, 24.0)
+    assert page.parse(b"S 1 -2 3 240*FC") is None
 
 
 STEPS = {
@@ -81,6 +95,7 @@ STEPS = {
     "property": lambda kind: (
         f"def test_{kind}_driver_survives_any_" in read("tests/property/test_chassis_codec_properties.py")
     ),
+    "wrong device": lambda kind: f'"{kind}' in read("tests/contract/test_wrong_device.py"),
     "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/test_guard.py"),
     "emulate": lambda kind: kind in emulate.get_help(Context(emulate, info_name="emulate")),
     "mission": lambda kind: f'"{kind}"' in read("tests/hil/test_hil_missions.py"),
