@@ -76,8 +76,8 @@ def test_the_code_of_the_page_is_one_chassis_in_the_contract_suite() -> None:
     assert read("tests/contract/test_chassis_contract.py").count('"page-') >= 4
     page = page_module()
     assert issubclass(page.MinitrackChassis, ChassisDriver)
-    assert page.drive(0.5, -0.25) == b"D 500 -250*3C\n"
-    assert page.parse(b"S 1 -2 3 240*FB") == page.Status(1, -2, 3, 24.0)
+    assert page.drive(0.5, -0.25) == b"D 500 -250*DD\n"
+    assert page.parse(b"S 1 -2 3 240*2C") == page.Status(1, -2, 3, 24.0)
     assert page.parse(b"S 1 -2 3 240*FC") is None
 
 
