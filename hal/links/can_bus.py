@@ -94,7 +94,12 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         if self._config.interface == "socketcan" and number == errno.ENETDOWN:
             return f"the bus is down: `ip link set {self._config.channel} up type can bitrate 500000`"
         if number == errno.ENOBUFS or str(error) in (_BUS_OFF, _FULL):
-            return "nobody acknowledges: check the base's power, CAN high and low, termination and 500 kbit/s"
+            advice = (
+                "nobody acknowledges: check the base's power, CAN high and low, termination and 500 kbit/s"
+            )
+            if self._config.interface == "socketcan" and str(error) == _BUS_OFF:
+                return f"{advice}, then `ip link set {self._config.channel} type can restart`"
+            return advice
         return super()._remedy(error)
 
 

@@ -189,7 +189,7 @@ def test_a_bus_that_cannot_be_opened_again_stays_lost(monkeypatch: pytest.Monkey
 def test_bus_off_is_a_lost_link(bus: FaultyBus) -> None:
     link = CanBusLink(config("socketcan", "can0"))
     bus.messages = [can.Message(arbitration_id=0x40, is_error_frame=True)]
-    with pytest.raises(LinkLost, match="bus-off"):
+    with pytest.raises(LinkLost, match=r"\(bus-off\); .*, then `ip link set can0 type can restart`"):
         link.receive()
 
 
