@@ -1,120 +1,32 @@
-"""What every chassis driver must do, over every link that its protocol has. One line for a new one."""
+"""What every chassis driver must do, over every link that it has: see tests/support/contract_rigs.py."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
-from config.chassis import CanLinkConfig
-from hal.errors import HalError
-from hal.links.can_bus import open_can_link
 from hal.types import ChassisMode, ChassisState
-from tests.support.chassis_rig import (
-    MS,
-    Rig,
-    agilex_rig,
-    can_link_config,
-    kobuki_rig,
-    roboclaw_rig,
-    roboteq_rig,
-    udp_link_config,
-)
-from tests.support.page_chassis import page_rig
-from tests.support.real_base import DEFAULT_BASE, real_rig
+from tests.support.chassis_rig import MS, Rig, agilex_rig, can_link_config
+from tests.support.contract_rigs import EMULATED, open_real
 
-
-def _open(name: str) -> AbstractContextManager[Rig]:
-    match name:
-        case "agilex-scripted":
-            return agilex_rig("scripted")
-        case "agilex-virtual":
-            return agilex_rig("bus", can_link_config())
-        case "agilex-udp":
-            config = udp_link_config()
-            try:
-                with open_can_link(config):
-                    return agilex_rig("bus", config)
-            except HalError as error:
-                pytest.skip(f"no multicast on this machine: {error}")
-        case "agilex-vcan":
-            config = CanLinkConfig(interface="socketcan", channel="vcan0")
-            try:
-                with open_can_link(config):
-                    return agilex_rig("bus", config)
-            except HalError as error:
-                pytest.skip(f"no virtual CAN in this kernel: {error}")
-        case "agilex-serial-scripted" | "agilex-serial-pty":
-            return agilex_rig(name.removeprefix("agilex-"))
-        case "agilex-scripted-bunker_mini" | "agilex-scripted-scout" | "agilex-scripted-tracer":
-            return agilex_rig("scripted", model=name.rpartition("-")[2])
-        case "roboclaw-scripted":
-            return roboclaw_rig("scripted")
-        case "roboclaw-old-firmware":
-            return roboclaw_rig("scripted", status_bytes=2)
-        case "roboclaw-pty":
-            return roboclaw_rig("pty")
-        case "roboteq-scripted":
-            return roboteq_rig("scripted")
-        case "roboteq-pty":
-            return roboteq_rig("pty")
-        case "kobuki-scripted":
-            return kobuki_rig("scripted")
-        case "kobuki-pty":
-            return kobuki_rig("pty")
-        case "page-scripted" | "page-pty":
-            return page_rig(name.removeprefix("page-"))
-    raise ValueError(name)
-
-
-EMULATED = [
-    "agilex-scripted",
-    "agilex-virtual",
-    "agilex-udp",
-    "agilex-vcan",
-    "agilex-serial-scripted",
-    "agilex-serial-pty",
-    "agilex-scripted-bunker_mini",
-    "agilex-scripted-scout",
-    "agilex-scripted-tracer",
-    "roboclaw-scripted",
-    "roboclaw-old-firmware",
-    "roboclaw-pty",
-    "roboteq-scripted",
-    "roboteq-pty",
-    "kobuki-scripted",
-    "kobuki-pty",
-    "page-scripted",  # the example of docs/add-a-chassis.md
-    "page-pty",
-]
+REAL = "real base"
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Every emulated base; or, with --channel, the real one alone."""
     if "rig" in metafunc.fixturenames:
         real = metafunc.config.getoption("--channel") is not None
-        metafunc.parametrize("rig", ["real base"] if real else EMULATED, indirect=True)
+        metafunc.parametrize("rig", [REAL] if real else list(EMULATED), indirect=True)
 
 
 @pytest.fixture
 def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
-    opened = _open(request.param) if request.param != "real base" else _open_real(request.config)
+    opened = open_real(request.config) if request.param == REAL else EMULATED[request.param]()
     with opened as one:
         yield one
-
-
-def _open_real(config: pytest.Config) -> AbstractContextManager[Rig]:
-    if not config.getoption("--hil"):
-        pytest.skip("moves a real base: put its tracks in the air and add --hil")
-    return real_rig(
-        Path(config.getoption("--base") or DEFAULT_BASE),
-        config.getoption("--channel"),
-        config.getoption("--attended"),
-    )
 
 
 def test_nothing_is_known_before_the_base_speaks(rig: Rig) -> None:

@@ -14,7 +14,9 @@ from hal.errors import HalError, LinkLost
 from hal.links.can_bus import CanBusLink
 from hal.links.scripted import can_pair, serial_pair
 from hal.types import CanFrame
-from tests.support.chassis_rig import SettledPort, SettledTerminal, can_link_config, udp_link_config
+from tests.support.chassis_rig import can_link_config, udp_link_config
+from tests.support.contract_rigs import vcan_link_config
+from tests.support.wires import SettledPort, SettledTerminal
 
 
 @dataclass
@@ -28,7 +30,7 @@ class CanPair:
 BUSES: dict[str, Callable[[], CanLinkConfig]] = {
     "virtual": can_link_config,
     "udp_multicast": udp_link_config,
-    "vcan": lambda: CanLinkConfig(interface="socketcan", channel="vcan0"),
+    "vcan": vcan_link_config,
 }
 
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
-import sys
-import termios
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -22,7 +18,7 @@ from config.chassis import (
     RoboteqChassisConfig,
     SerialLinkConfig,
 )
-from hal.api import CanLink, Chassis, Closing, SerialLink
+from hal.api import CanLink, Chassis, SerialLink
 from hal.chassis.agilex import AgilexChassis, no_can_frames
 from hal.chassis.agilex_models import model_of, over_serial
 from hal.chassis.agilex_serial import AgilexSerialBus
@@ -30,18 +26,15 @@ from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.kobuki_packets import WHEEL_BASE_M
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
-from hal.enclosing import Enclosing
-from hal.errors import LinkLost
 from hal.links.can_bus import CanBusLink
-from hal.links.pseudo_terminal import PseudoTerminal
 from hal.links.scripted import can_pair, serial_pair
-from hal.links.serial_port import SerialPortLink
-from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
+from hal.types import ChassisMode, ChassisState, Setpoint
 from sim.agilex_emulator import AgilexEmulator
 from sim.kobuki_emulator import KobukiEmulator
 from sim.plant import TrackedPlant
 from sim.roboclaw_emulator import RoboclawEmulator
 from sim.roboteq_emulator import RoboteqEmulator
+from tests.support.wires import PluggedCan, PluggedSerial, SettledPort, SettledTerminal
 
 MS = 1_000_000
 PERIOD_NS = 20 * MS
@@ -49,9 +42,6 @@ SLIP_FACTOR = 1.1
 PLANT = PlantConfig(slip_factor=SLIP_FACTOR)
 KOBUKI_PLANT = PlantConfig(track_width_m=WHEEL_BASE_M, slip_factor=SLIP_FACTOR)
 COUNTS_PER_M = 20_000.0
-
-# Bytes that can be waited for where nobody reads: a terminal's buffer, less what it keeps free.
-_TERMINAL_HOLDS = 3_900
 
 
 class Emulator(Protocol):
@@ -65,104 +55,6 @@ class Emulator(Protocol):
     def thaw(self) -> None: ...
     @property
     def plant(self) -> TrackedPlant: ...
-
-
-class _Plug(Enclosing):
-    """A plug in front of any link: out, every use raises LinkLost and nothing reaches it."""
-
-    def __init__(self, link: Closing) -> None:
-        super().__init__(link)
-        self.out = False
-
-    def _check(self) -> None:
-        if self.out:
-            raise LinkLost("unplugged")
-
-
-class PluggedCan(_Plug):
-    """A CAN link that can be pulled out."""
-
-    def __init__(self, link: CanLink) -> None:
-        super().__init__(link)
-        self._link = link
-
-    def send(self, frame: CanFrame) -> None:
-        self._check()
-        self._link.send(frame)
-
-    def receive(self) -> CanFrame | None:
-        self._check()
-        return self._link.receive()
-
-    def plug(self) -> None:
-        while self._link.receive() is not None:
-            """What was sent meanwhile never got here."""
-        self.out = False
-
-
-class PluggedSerial(_Plug):
-    """A serial link that can be pulled out."""
-
-    def __init__(self, link: SerialLink) -> None:
-        super().__init__(link)
-        self._link = link
-
-    def write(self, data: bytes) -> None:
-        self._check()
-        self._link.write(data)
-
-    def read(self) -> bytes:
-        self._check()
-        return self._link.read()
-
-    def plug(self) -> None:
-        self._link.read()
-        self.out = False
-
-
-class SettledTerminal(PseudoTerminal):
-    """Waits until the kernel has carried the bytes over: simulated time must not outrun it."""
-
-    def write(self, data: bytes) -> None:
-        before = _waiting(self._slave)
-        super().write(data)
-        _await(self._slave, min(before + len(data), _TERMINAL_HOLDS))
-
-    @contextmanager
-    def settled(self, count: int) -> Iterator[None]:
-        """Inside, the other end writes count bytes; wait until they can be read here."""
-        if not self._open:
-            yield
-            return
-        before = _waiting(self._master)
-        yield
-        _await(self._master, min(before + count, _TERMINAL_HOLDS))
-
-
-class SettledPort(SerialPortLink):
-    """The same for the other direction."""
-
-    def __init__(self, config: SerialLinkConfig, terminal: SettledTerminal) -> None:
-        super().__init__(config)
-        self._terminal = terminal
-
-    def write(self, data: bytes) -> None:
-        with self._terminal.settled(len(data)):
-            super().write(data)
-
-
-def _waiting(descriptor: int) -> int:
-    answer = bytearray(4)
-    fcntl.ioctl(descriptor, termios.FIONREAD, answer)
-    return int.from_bytes(answer, sys.byteorder)
-
-
-def _await(descriptor: int, count: int) -> None:
-    for _ in range(100_000):
-        if _waiting(descriptor) >= count:
-            return
-        os.sched_yield()
-    raise AssertionError(f"the kernel did not carry {count} bytes over")
 
 
 @dataclass

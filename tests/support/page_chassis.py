@@ -9,7 +9,8 @@ from contextlib import ExitStack, contextmanager
 from types import ModuleType
 
 from config.loader import CONFIG_DIR
-from tests.support.chassis_rig import COUNTS_PER_M, PLANT, SLIP_FACTOR, PluggedSerial, Rig, serial_ends
+from tests.support.chassis_rig import COUNTS_PER_M, PLANT, SLIP_FACTOR, Rig, serial_ends
+from tests.support.wires import PluggedSerial
 
 PAGE = (CONFIG_DIR.parent / "docs" / "add-a-chassis.md").read_text(encoding="utf-8")
 CODE = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)

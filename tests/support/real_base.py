@@ -24,7 +24,8 @@ from hal.clocks import MonotonicClock
 from hal.links.can_bus import CanBusLink
 from hal.links.serial_port import SerialPortLink
 from hal.types import ChassisMode, ChassisState, PlanarPose
-from tests.support.chassis_rig import PERIOD_NS, PluggedCan, PluggedSerial, Rig
+from tests.support.chassis_rig import PERIOD_NS, Rig
+from tests.support.wires import PluggedCan, PluggedSerial
 
 if TYPE_CHECKING:
     from sim.plant import TrackedPlant
