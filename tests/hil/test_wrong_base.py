@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from config.chassis import SerialLinkConfig
 from hal.links.pseudo_terminal import PseudoTerminal
+from hal.links.serial_port import open_serial_link
 from tests.support.hil_missions import emulator, short_mission
 
 
@@ -31,6 +33,35 @@ def with_port(config: Path, port: str) -> Path:
 
 def port_line(config: Path) -> str:
     return next(line for line in config.read_text().splitlines() if line.strip().startswith("url:"))
+
+
+def test_a_port_that_is_not_there(tmp_path: Path) -> None:
+    said = refusal(with_port(short_mission("roboclaw", tmp_path), "/dev/ttyNotThere"))
+    assert said.startswith("treadwatch: serial port /dev/ttyNotThere: cannot be opened (")
+    assert "check the url and that the adapter is plugged in (" in said
+
+
+def test_a_file_that_is_no_port(tmp_path: Path) -> None:
+    (tmp_path / "plain").touch()
+    said = refusal(with_port(short_mission("kobuki", tmp_path), str(tmp_path / "plain")))
+    assert "is not a serial port that takes 115200 baud" in said
+
+
+def test_a_port_in_use(tmp_path: Path) -> None:
+    with PseudoTerminal() as terminal, open_serial_link(SerialLinkConfig(url=terminal.path)):
+        said = refusal(with_port(short_mission("roboteq", tmp_path), terminal.path))
+    assert f"serial port {terminal.path}: in use by another program; stop that one first" in said
+
+
+def test_a_wrong_model_and_a_model_without_that_port(tmp_path: Path) -> None:
+    config = short_mission("agilex-serial", tmp_path)
+    right = config.read_text()
+    config.write_text(right.replace("model: bunker", "model: hunter"))
+    said = refusal(config)
+    assert "chassis.agilex.model: Input should be 'bunker', 'bunker_mini'" in said
+    assert said.endswith("found 'hunter'")
+    config.write_text(right.replace("model: bunker", "model: tracer"))
+    assert "tracer cannot be driven over a serial port" in refusal(config)
 
 
 def test_nobody_answers(tmp_path: Path) -> None:

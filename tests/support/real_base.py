@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +21,7 @@ from config.loader import CONFIG_DIR
 from controller.build import build_can_driver, build_serial_driver
 from controller.emulate import EmulateOptions, can_link, with_wire
 from hal.clocks import MonotonicClock
+from hal.errors import HalError
 from hal.links.can_bus import CanBusLink
 from hal.links.serial_port import SerialPortLink
 from hal.types import ChassisMode, ChassisState, PlanarPose
@@ -190,7 +191,14 @@ def real_rig(file: Path, channel: str, attended: bool) -> Iterator[Rig]:
         plug = PluggedSerial(SerialPortLink(config.link))
         chassis = build_serial_driver(config, plug)
     person = Person(attended)
-    with chassis:
+    with ExitStack() as stack:
+        refusal = None
+        try:
+            stack.enter_context(chassis)
+        except HalError as error:
+            refusal = str(error)
+        if refusal is not None:
+            pytest.fail(refusal, pytrace=False)
         rig = RealRig(
             chassis,
             person,
