@@ -98,6 +98,8 @@ class ChassisDriver(ABC):
     def arm(self, now_ns: int) -> None:
         """See hal.api.Chassis. A refusal is told in the state's reason."""
         self._now_ns = now_ns
+        # What has waited in the port since who knows when must not count as an answer to this consent.
+        self._hear(now_ns)
         before = self._arming.mode
         self._arming = arming.consent(self._arming, self._evidence(now_ns), self._limits)
         if self._arming.mode is not before:

@@ -81,6 +81,18 @@ def test_arming_sends_the_mode_until_the_base_is_in_it_and_never_again() -> None
         assert bench.sent() == [MotionCommand(0.1, 0.0)]
 
 
+def test_what_waited_in_the_port_is_no_answer_to_the_consent() -> None:
+    """Frames from before a restart may still say that the base obeys."""
+    bench = Bench()
+    bench.exchange()
+    bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+    bench.chassis.arm(bench.now_ns)
+    seen = bench.exchange()
+    assert (seen.mode, seen.reason) == (ChassisMode.ARMING, "arming: no status heard from the base")
+    bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+    assert bench.exchange().mode is ChassisMode.ARMED
+
+
 def test_the_frames_of_a_drive_byte_for_byte() -> None:
     bench = Bench()
     bench.chassis.arm(0)
