@@ -187,8 +187,20 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
     Neither is opened yet; enter the emulator first. Raises DeviceNotFound, DeviceRefused when entered.
     """
     driver, emulator = _bare_base(config, start, start_ns)
-    limits = GuardLimits.of(config.robot.limits, 1.0 / config.runner.control_rate_hz)
-    return GuardedChassis(driver, limits), emulator
+    return _guarded(config, driver), emulator
+
+
+def build_base_in_memory(
+    config: AppConfig, start: PlanarPose, start_ns: int
+) -> tuple[Chassis, Emulator, ScriptedCanLink | ScriptedSerialLink]:
+    """Guarded driver and emulator on a wire in memory, and the driver's end of it, to be pulled out."""
+    of_plant = PlantConfig() if config.simulation is None else config.simulation.plant
+    driver, emulator, near = _in_memory(config.chassis, TrackedPlant(of_plant, start, start_ns))
+    return _guarded(config, driver), emulator, near
+
+
+def _guarded(config: AppConfig, driver: Chassis) -> Chassis:
+    return GuardedChassis(driver, GuardLimits.of(config.robot.limits, 1.0 / config.runner.control_rate_hz))
 
 
 def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Chassis, Emulator | None]:
@@ -202,26 +214,17 @@ def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
     if plant is None:
         return build_serial_driver(chassis, SerialPortLink(link)), None
     # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
-    here, there = serial_pair()
-    return build_serial_driver(chassis, here), build_serial_emulator(chassis, there, plant)
+    return _in_memory(chassis, plant)[:2]
 
 
-def build_base_in_memory(
-    config: AppConfig, start: PlanarPose, start_ns: int
+def _in_memory(
+    chassis: AnyChassisConfig, plant: TrackedPlant
 ) -> tuple[Chassis, Emulator, ScriptedCanLink | ScriptedSerialLink]:
-    """Guarded driver and emulator on a wire in memory, and the driver's end of it, to be pulled out."""
-    chassis = config.chassis
-    plant = TrackedPlant(
-        PlantConfig() if config.simulation is None else config.simulation.plant, start, start_ns
-    )
-    limits = GuardLimits.of(config.robot.limits, 1.0 / config.runner.control_rate_hz)
     if isinstance(chassis.link, CanLinkConfig):
         near, far = can_pair()
-        guarded = GuardedChassis(build_can_driver(chassis, near), limits)
-        return guarded, _can_emulator(chassis, far, plant), near
+        return build_can_driver(chassis, near), _can_emulator(chassis, far, plant), near
     here, there = serial_pair()
-    guarded = GuardedChassis(build_serial_driver(chassis, here), limits)
-    return guarded, build_serial_emulator(chassis, there, plant), here
+    return build_serial_driver(chassis, here), build_serial_emulator(chassis, there, plant), here
 
 
 def build_can_driver(config: AnyChassisConfig, link: CanLink) -> Chassis:
