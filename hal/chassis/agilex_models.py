@@ -100,7 +100,7 @@ BUNKER_MINI = AgilexModel(
 # BUNKER PRO 2.0: CAN only, 0x211 every 200 ms. No limits were found: as for BUNKER MINI.
 BUNKER_PRO = AgilexModel(name="bunker_pro", max_speed_mps=1.5, max_yaw_rate_radps=1.0, mode_serial=None)
 
-# SCOUT user manual v1.3.0: tables 3.2 and 3.10, 1.2 (wheels 576 mm apart). Limits: the vendor's SDK.
+# SCOUT user manual v1.3.0: tables 3.2 and 3.9, section 1.2 (wheels 576 mm apart). Limits: the vendor's SDK.
 SCOUT = AgilexModel(
     name="scout",
     max_speed_mps=1.5,
