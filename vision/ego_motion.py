@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -177,7 +178,8 @@ def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: I
 def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
     """Iteratively reweighted Gauss-Newton from start, which is known to sigma (6,)."""
     prior = 1.0 / np.square(sigma)
-    information, inliers = np.diag(prior), 0
+    prior_information = np.diag(prior)
+    information, inliers = prior_information, 0
     pose = _shift(view, start, sigma)
     count = view.seen.shape[1]
     table, weights = np.empty((8, 3, count)), np.empty((3, count))
@@ -202,8 +204,9 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
         weights[2] = weight * -shrink
         # Six rows of the normal matrix, and in the last column the right side.
         normal = (table[:7] * weights).reshape(7, 3 * count) @ flat.T
-        information = normal[:6, :6] + np.diag(prior)
-        step = np.linalg.solve(information, normal[:6, 6] + prior * missing).astype(np.float64, copy=False)
+        information = normal[:6, :6] + prior_information
+        _, solved = cv2.solve(information, (normal[:6, 6] + prior * missing)[:, None])
+        step = np.asarray(solved, np.float64)[:, 0]
         length = max(map(abs, step.tolist()))
         gone = gone + step
         if iteration >= len(_ANNEAL) and length < _CONVERGED:
