@@ -39,7 +39,8 @@ class SurfaceDepth:
 
 def depth_sigma_m(depth_m: Depths, noise: DepthNoise) -> Depths:
     """One standard deviation of depth (Khoshelham's model, sigma_z ~ z^2, with a floor); float32 stays so."""
-    return np.asarray(noise.floor_m + noise.quadratic_per_m * depth_m * depth_m, dtype=depth_m.dtype)
+    sigma_m: Depths = noise.floor_m + noise.quadratic_per_m * depth_m * depth_m
+    return sigma_m
 
 
 def surface_depth(

@@ -119,13 +119,14 @@ def estimate(
     view = _view(anchors, pixels, use, camera)
     found = _solve(view, start, prior.sigma)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
-    if prior.source == "odometry" and _conflict(found.pose, start, prior.sigma):
+    torn = prior.source == "odometry" and _conflict(found.pose, start, prior.sigma)
+    if torn:
         # Something large moves, and the data follow it. What agrees with the odometry is the ground.
         found = _solve(view, start, prior.sigma * _TRUSTED_SHARE)
         least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
+        # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
+        torn = _conflict(found.pose, start, prior.sigma)
     ratio = found.inliers / len(use)
-    # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
-    torn = prior.source == "odometry" and _conflict(found.pose, start, prior.sigma)
     if found.inliers < least or torn:
         return CameraEstimate(start, unseen.covariance, ratio, False)
     covariance = np.linalg.inv(found.information).astype(np.float64, copy=False)

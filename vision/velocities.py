@@ -14,7 +14,7 @@ The third is the depth image itself, as good as its noise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,7 @@ def ends_of(motion: PointMotion, fragments: NDArray[np.intp]) -> PointMotion:
     """The evidence of the ends of some fragments only; both ends lie next to each other."""
     ends = np.repeat(2 * fragments, 2)
     ends[1::2] += 1
-    return PointMotion(*(getattr(motion, field.name)[ends] for field in fields(motion)))
+    return PointMotion(*(getattr(motion, name)[ends] for name in PointMotion.__slots__))
 
 
 def static_miss(static_m: FloatArray, ray: FloatArray) -> FloatArray:
