@@ -1,0 +1,65 @@
+"""Where fragments are looked for, and that in time it is everywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from config.perception import FragmentSettings, PerceptionConfig
+from hal.types import RgbdFrame
+from tests.support.painted import VGA
+from vision.renewal import PART_PX, Renewal
+
+
+def picture() -> tuple[RgbdFrame, NDArray[np.uint8]]:
+    """Black and white cells of 48 px, all 3 m away."""
+    cells = np.random.default_rng(5).integers(0, 2, (10, 14), np.uint8) * np.uint8(180) + np.uint8(30)
+    grey = np.repeat(np.repeat(cells, 48, axis=0), 48, axis=1)[:480, :640]
+    colour = np.repeat(grey[:, :, None], 3, axis=2)
+    depth = np.full(grey.shape, 3000, np.uint16)
+    return RgbdFrame(colour, depth, 0.001, 0, 0.0, 0, VGA), grey
+
+
+def present(count: int) -> NDArray[np.float32]:
+    """So many fragments in the upper left corner."""
+    ends = np.zeros((count, 2, 2), np.float32)
+    ends[:, :, 0] = np.arange(2 * count).reshape(count, 2) % 30
+    return ends
+
+
+def parts_of(ends_px: NDArray[np.float32]) -> set[tuple[int, int]]:
+    """Row and column of the parts that the middles of segments fall into."""
+    middle = ends_px.mean(axis=1)[:, ::-1] // np.array(PART_PX)
+    return {(int(row), int(column)) for row, column in middle.tolist()}
+
+
+def test_at_first_it_looks_everywhere() -> None:
+    frame, grey = picture()
+    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=400))
+    new = Renewal(config).find(frame, grey, present(0), 0)
+    assert parts_of(new.ends_px) == {(row, column) for row in range(2) for column in range(4)}
+
+
+@pytest.mark.parametrize(("missing", "parts"), [(15, 1), (40, 2)])
+def test_then_in_one_part_after_the_other_and_in_a_whole_band_where_many_are_missing(
+    missing: int, parts: int
+) -> None:
+    frame, grey = picture()
+    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=160))
+    renewal, seen = Renewal(config), set[tuple[int, int]]()
+    for visit in range(8 // parts):
+        new = renewal.find(frame, grey, present(160 - missing), 0)
+        assert len(new.ends_px) <= missing
+        there = {(row, column) for row, column in parts_of(new.ends_px) if (row, column) not in seen}
+        assert {column for _, column in there} <= {visit * parts // 2, visit * parts // 2 + 1}
+        assert len(there) >= parts
+        seen |= there
+    assert seen >= {(row, column) for row in range(2) for column in range(4)}
+
+
+def test_no_more_than_there_is_room_for() -> None:
+    frame, grey = picture()
+    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=30))
+    assert len(Renewal(config).find(frame, grey, present(0), 0).ends_px) == 30
+    assert len(Renewal(config).find(frame, grey, present(30), 0).ends_px) == 0
