@@ -1,21 +1,26 @@
-"""New fragments where they have thinned out, one upright band of the image at a time."""
+"""New fragments where they have thinned out, one part of the image at a time."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import pairwise
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
-from hal.types import RgbdFrame
+from hal.types import FloatArray, RgbdFrame
 from vision.contours import find_contours
 from vision.depth_mask import depth_sigma_m, surface_depth
 from vision.edges import GreyImage, find_edges
 from vision.segments import hough_segments, lengths_px, smaller_eigenvalue, snap_to_corners
 
-BAND_PX = 160
+PART_PX = (240, 160)
+_BLOCKS = 2  # per part, one above the other: each has its own threshold of contrast
 _MARGIN_PX = 8
+_MANY_MISSING = 8  # where more than one fragment in so many is missing, all parts of a band are searched
 _MIN_END_DISTANCE_PX = 12.0
 _TAKEN_PX = 6
 _LOW_SHARE = 0.4
@@ -37,68 +42,74 @@ class NewFragments:
 
 
 class Renewal:
-    """Decides where to look and finds segments there. Keeps when each band was last visited, and how much
-    contrast makes an edge in each block of it."""
+    """Decides where to look and finds segments there. Keeps when each part of the image was last visited,
+    and how much contrast makes an edge in each block of it."""
 
     def __init__(self, config: PerceptionConfig) -> None:
         self._config = config
         self._last_visit = np.empty(0, np.intp)
-        self._threshold = np.empty((0, 0))
+        self._threshold = np.empty((0, 0, 0))
         self._visits = 0
 
     def find(
         self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], without_depth: int
     ) -> NewFragments:
-        """Fragments for the tiles of one band that hold too few of ends_px (N, 2, 2); all bands at first.
+        """Fragments for the tiles that hold too few of ends_px (N, 2, 2), in the part of the image that was
+        not visited for longest, or in the upright band of such parts where many are missing, or everywhere
+        where there are none.
 
         without_depth: how many of the present ones have no depth; only a small share of all may.
         """
         settings = self._config.fragments
-        height, width = grey.shape
-        blocks, bands = max(1, round(height / BAND_PX)), max(1, round(width / BAND_PX))
-        if self._threshold.shape != (blocks, bands):
-            self._last_visit = np.full(bands, -1, np.intp)
-            self._threshold = np.full((blocks, bands), 0.5 * (settings.canny_least + settings.canny_most))
+        rows, columns = (max(1, round(size / part)) for size, part in zip(grey.shape, PART_PX, strict=True))
+        if self._threshold.shape != (rows, columns, _BLOCKS):
+            usual = 0.5 * (settings.canny_least + settings.canny_most)
+            self._threshold = np.full((rows, columns, _BLOCKS), usual)
+            self._last_visit = np.full(rows * columns, -1, np.intp)
         self._visits += 1
-        counts = _tile_counts(ends_px, settings.tile_px, height, width)
-        chosen = range(bands) if len(ends_px) == 0 else [int(self._last_visit.argmin())]
-        found = [np.empty((0, 2, 2), np.float32)]
-        for band in chosen:
-            self._last_visit[band] = self._visits
-            found.append(self._segments(grey, counts, band, bands))
+        counts = _tile_counts(ends_px, settings.tile_px, *grey.shape)
         room = settings.max_fragments - len(ends_px)
+        parts = rows if room * _MANY_MISSING > settings.max_fragments else 1
+        chosen = np.argsort(self._last_visit, kind="stable")[: parts if len(ends_px) else None]
+        self._last_visit[chosen] = self._visits
+        found = [self._segments(grey, counts, part % rows, part // rows) for part in chosen.tolist()]
         far_room = max(0, int(_SHARE_WITHOUT_DEPTH * settings.max_fragments) - without_depth)
         return self._select(frame, grey, np.concatenate(found), ends_px, counts, (room, far_room))
 
     def _segments(
-        self, grey: GreyImage, counts: NDArray[np.intp], band: int, bands: int
+        self, grey: GreyImage, counts: NDArray[np.intp], row: int, column: int
     ) -> NDArray[np.float32]:
-        """Segments of one band, by Hough and by contours, outside of tiles that are full."""
+        """Segments of one part, by Hough and by contours, outside of tiles that are full."""
         settings = self._config.fragments
-        height, width = grey.shape
-        start = max(0, band * width // bands - _MARGIN_PX)
-        stop = min(width, (band + 1) * width // bands + _MARGIN_PX)
-        edges = np.empty((height, stop - start), np.uint8)
-        blocks = len(self._threshold)
-        for block in range(blocks):
-            top, bottom = block * height // blocks, (block + 1) * height // blocks
-            edges[top:bottom] = self._edges(grey[top:bottom, start:stop], block, band)
-        full = counts >= 2 * settings.fragments_per_tile
-        edges *= _pixels_of(~full, settings.tile_px, height, start, stop)
+        rows, columns = (
+            slice(
+                max(0, size * index // count - _MARGIN_PX),
+                min(size, size * (index + 1) // count + _MARGIN_PX),
+            )
+            for size, index, count in zip(grey.shape, (row, column), self._threshold.shape[:2], strict=True)
+        )
+        edges = self._edges(grey[rows, columns], self._threshold[row, column])
+        free = counts < 2 * settings.fragments_per_tile
+        edges *= _pixels_of(free, settings.tile_px, rows, columns)
         contours = find_contours(edges, settings.min_length_px)
         lines = hough_segments(contours.edges, settings.min_length_px)
         segments = np.concatenate((lines, contours.ends_px))
-        segments[:, :, 0] += start
+        segments += np.array((columns.start, rows.start), np.float32)
         return segments
 
-    def _edges(self, grey: GreyImage, block: int, band: int) -> GreyImage:
-        """Edges of one block. The next visit looks closer where little was seen, less close where much."""
+    def _edges(self, grey: GreyImage, thresholds: FloatArray) -> GreyImage:
+        """Edges of one part, block by block. The next visit looks closer where little was seen, less close
+        where much: thresholds (_BLOCKS,) are changed."""
         settings = self._config.fragments
-        high = float(self._threshold[block, band])
-        edges = find_edges(grey, _LOW_SHARE * high, high)
-        share = max(float(np.count_nonzero(edges)) / edges.size, 1e-3)
-        wanted = high * min(max(float(np.sqrt(share / settings.edge_share)), 0.6), 1.6)
-        self._threshold[block, band] = min(max(wanted, settings.canny_least), settings.canny_most)
+        edges = np.empty(grey.shape, np.uint8)
+        borders = [len(grey) * block // _BLOCKS for block in range(_BLOCKS + 1)]
+        for block, (top, bottom) in enumerate(pairwise(borders)):
+            high = float(thresholds[block])
+            inside = find_edges(grey[top:bottom], _LOW_SHARE * high, high)
+            edges[top:bottom] = inside
+            share = max(cv2.countNonZero(inside) / inside.size, 1e-3)
+            wanted = high * min(max(math.sqrt(share / settings.edge_share), 0.6), 1.6)
+            thresholds[block] = min(max(wanted, settings.canny_least), settings.canny_most)
         return edges
 
     def _select(
@@ -147,12 +158,11 @@ class Renewal:
         )
 
 
-def _pixels_of(
-    tiles: NDArray[np.bool_], tile_px: int, height: int, start: int, stop: int
-) -> NDArray[np.bool_]:
-    """tiles (rows, columns) in the size of the image: (height, stop - start) from column start on."""
-    across = tiles.take(np.arange(start, stop) // tile_px, axis=1)
-    return np.repeat(across, tile_px, axis=0)[:height]
+def _pixels_of(tiles: NDArray[np.bool_], tile_px: int, rows: slice, columns: slice) -> NDArray[np.bool_]:
+    """tiles (h, w) in the size of the image, of which only rows and columns are wanted."""
+    down, across = (np.arange(part.start, part.stop) // tile_px for part in (rows, columns))
+    result: NDArray[np.bool_] = tiles.take(across, axis=1).take(down, axis=0)
+    return result
 
 
 def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width: int) -> NDArray[np.intp]:
