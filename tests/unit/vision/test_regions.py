@@ -23,7 +23,8 @@ def grid_of(depth_m: NDArray[np.float32]) -> DepthGrid:
     y = ((np.arange(height) - 0.5 * (height - 1)) * 0.01).astype(np.float32)
     valid = depth_m > 0
     inverse = np.where(valid, 1.0 / np.maximum(depth_m, 1e-3), 0.0).astype(np.float32)
-    return DepthGrid(4, 2.0, depth_m, inverse, valid, ~valid, x, y, depth_m, None, None, float("nan"), 0.0)
+    nan = float("nan")
+    return DepthGrid(4, 2.0, depth_m, inverse, valid, ~valid, x, y, depth_m, None, None, nan, nan, None)
 
 
 def flat(depth_m: float) -> NDArray[np.float32]:
