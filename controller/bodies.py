@@ -48,10 +48,14 @@ class Bodies:
 
     def select(self, chosen: NDArray[np.bool_]) -> Bodies:
         """Only the chosen ones."""
+        if chosen.all():
+            return self
         return Bodies(self.captured_ns, *(getattr(self, name)[chosen] for name in _ARRAYS))
 
     def joined(self, other: Bodies) -> Bodies:
         """These and, behind them, others; the time is that of these."""
+        if not len(other):
+            return self
         arrays = (np.concatenate((getattr(self, name), getattr(other, name))) for name in _ARRAYS)
         return Bodies(self.captured_ns, *arrays)
 

@@ -32,9 +32,12 @@ class Corridor:
         radius = 1.0 / np.maximum(bend, 1e-9)
         outer = np.sqrt((radius + half_m) ** 2 + overhang_m**2) - radius
         self._half_width = np.where(bend > 1e-6, outer, half_m)
+        self._even_m = half_m if not (bend > 1e-6).any() else None
 
     def half_width(self, s_m: FloatArray) -> FloatArray:
         """Half of the swept width at s_m, in metres; on bends the outer corner's, on both sides."""
+        if self._even_m is not None:
+            return np.full(s_m.shape, self._even_m)
         return np.interp(s_m, self._s, self._half_width)
 
 
@@ -42,23 +45,25 @@ class Corridor:
 class Placed:
     """N bodies at K times in path coordinates, each (N, K).
 
-    s_m, d_m: centre. half_s_m, half_d_m: half sizes along and across the path. half_width_m: of the swept
-    corridor there. lo_m, hi_m: between these positions of the robot's turning centre, the robot's length and
-    the body's overlap along the path.
+    s_m, d_m: centre. heading_rad: of the path there. half_s_m, half_d_m: half sizes along and across the
+    path. half_width_m: of the swept corridor there. lo_m, hi_m: between these positions of the robot's
+    turning centre, the robot's length and the body's overlap along the path. clear_m: free floor between the
+    body's side and the swept corridor; negative: inside it.
     """
 
     s_m: FloatArray
     d_m: FloatArray
+    heading_rad: FloatArray
     half_s_m: FloatArray
     half_d_m: FloatArray
     half_width_m: FloatArray
     lo_m: FloatArray
     hi_m: FloatArray
+    clear_m: FloatArray
 
-    @property
-    def clear_m(self) -> FloatArray:
-        """(N, K) free floor between the body's side and the swept corridor; negative: inside it."""
-        return np.abs(self.d_m) - self.half_d_m - self.half_width_m
+    def select(self, rows: NDArray[np.bool_], count: int) -> Placed:
+        """Only these bodies, at the first count times."""
+        return Placed(*(getattr(self, name)[rows, :count] for name in Placed.__slots__))
 
 
 def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: float, reach_m: float) -> Placed:
@@ -67,35 +72,29 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
     The path is looked at from a little behind near_s_m to reach_m ahead of it.
     """
     count, steps = len(bodies), len(times_s)
-    moving = np.flatnonzero(bodies.moving)
-    s, d = np.empty((count, steps)), np.empty((count, steps))
+    low, high = near_s_m - _BEHIND_M, near_s_m + reach_m
     # What stands is projected once, whatever the time.
+    standing, moving = np.flatnonzero(~bodies.moving), np.flatnonzero(bodies.moving)
     moved = bodies.xy_m[moving, None, :] + bodies.velocity_mps[moving, None, :] * times_s[:, None]
-    points = np.concatenate((bodies.xy_m, moved.reshape(-1, 2)))
-    found_s, found_d = corridor.path.project_points(points, near_s_m - _BEHIND_M, near_s_m + reach_m)
-    s[:], d[:] = found_s[:count, None], found_d[:count, None]
-    s[moving] = found_s[count:].reshape(-1, steps)
-    d[moving] = found_d[count:].reshape(-1, steps)
-    heading = corridor.path.poses(s)[2]
+    points = np.concatenate((bodies.xy_m[standing], moved.reshape(-1, 2)))
+    found = np.empty((3, count, steps))
+    for values, located in zip(found, corridor.path.locate_points(points, low, high), strict=True):
+        values[standing] = located[: len(standing), None]
+        values[moving] = located[len(standing) :].reshape(-1, steps)
+    s, d, heading = found
     turned = bodies.view_rad[:, None] - heading
     cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
     along, across = bodies.half_view_m[:, None], bodies.half_across_m[:, None]
     half_s, half_d = cos * along + sin * across, sin * along + cos * across
-    return Placed(
-        s,
-        d,
-        half_s,
-        half_d,
-        corridor.half_width(s),
-        s - half_s - corridor.front_m,
-        s + half_s + corridor.rear_m,
-    )
+    half_width = corridor.half_width(s)
+    lo, hi = s - half_s - corridor.front_m, s + half_s + corridor.rear_m
+    return Placed(s, d, heading, half_s, half_d, half_width, lo, hi, np.abs(d) - half_d - half_width)
 
 
-def velocity_on_path(bodies: Bodies, corridor: Corridor, s_m: FloatArray) -> tuple[FloatArray, ...]:
-    """Of each body at s_m (N,): speed along the path, to its left, and the standard deviation of either."""
-    heading = corridor.path.poses(s_m)[2]
-    tangent = np.stack((np.cos(heading), np.sin(heading)), axis=1)
+def velocity_on_path(bodies: Bodies, heading_rad: FloatArray) -> tuple[FloatArray, ...]:
+    """Of each body where the path has heading_rad (N,): speed along it, to its left, and the standard
+    deviation of either."""
+    tangent = np.stack((np.cos(heading_rad), np.sin(heading_rad)), axis=1)
     normal = np.stack((-tangent[:, 1], tangent[:, 0]), axis=1)
     return (
         np.sum(bodies.velocity_mps * tangent, axis=1),

@@ -50,13 +50,15 @@ def find_conflicts(
     clear = placed.clear_m[rows] - margin_m[rows, None]
     spread = sigma_side_mps[rows, None] * times_s
     likely = np.minimum(spread, _MOST_SPREAD_M)
+    comes_in = (clear[:, 0] <= 0.0) | ((clear + likely).min(axis=1) <= 0.0)
     found = []
-    for k, row in enumerate(rows):
+    for k in np.flatnonzero(comes_in).tolist():
+        row = int(rows[k])
         entry = -1.0 if clear[k, 0] <= 0.0 else _first_below(clear[k] + likely[k], times_s)
         if math.isinf(entry):
             continue
         exit_s = _first_above(clear[k] - spread[k], times_s, max(entry, 0.0))
-        found.append(_conflict(placed, times_s, int(row), max(entry, 0.0), exit_s))
+        found.append(_conflict(placed, times_s, row, max(entry, 0.0), exit_s))
     return found
 
 

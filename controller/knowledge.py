@@ -119,7 +119,7 @@ class Knowledge:
         """What stands where something stood before is no newcomer, whatever number it has now."""
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
-        if not len(bodies) or not self._places:
+        if not self._places or not (bodies.age_s < _SETTLED_S).any():
             return bodies
         captured_ns, points = self._places[0]
         if captured_ns > bodies.captured_ns - _BEFORE_NS:

@@ -8,6 +8,9 @@ from controller import braking
 from controller.braking import BrakeLimits
 from controller.decision import Reason
 
+# So far the front may be past the near side of something that still counts as ahead.
+ALONGSIDE_M = 0.1
+
 # Rules of a Reason that mean: something stands or moves in the way.
 BLOCKING_RULES = frozenset({"static", "oncoming", "leader", "crossing", "depth", "unseen", "worst case"})
 

@@ -1,7 +1,7 @@
 """The planned path: where the robot is along it, how it bends, and how fast it may be driven.
 
-A path is a chain of pieces of constant curvature; a blend (a clothoid) is a chain of short ones. Every
-measure is closed-form on a piece, and points are projected in arrays over pieces.
+Every measure is closed-form on a piece of constant curvature (controller/path_pieces.py), and points are
+projected in arrays over pieces; where all that is looked at is straight, without a search.
 
 Path coordinates: s_m along the path from its start, d_m to the left of it.
 """
@@ -9,7 +9,7 @@ Path coordinates: s_m along the path from its start, d_m to the left of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from config.loader import ConfigError
 from config.path import ArcSpec, PathSpec
 from config.robot import Robot
-from controller.braking import comfort, slowing_distance, speed_before_section
+from controller.path_pieces import EXTENSION_M, pieces_of, sinc
+from controller.path_speeds import YAW_RATE_FOR_THE_BEND, section_speeds
 from hal.geometry import wrap_angle_rad
 from hal.types import FloatArray, PlanarPose
 
 IntArray = NDArray[np.intp]
 
-_BLEND_PIECES = 16
-_EXTENSION_M = 20.0
 _SAMPLE_M = 0.25
 _ROUNDS = 2
 _STRAIGHT_1PM = 1e-7
@@ -33,9 +32,6 @@ _STRAIGHT_1PM = 1e-7
 _INNERMOST = 0.05
 _LOOK_BACK_M = 0.25
 _LOOK_AHEAD_M = 2.0
-_SPEED_STEP_M = 0.05
-# The rest is kept for holding the path: tracks slip in yaw by 10 % and more.
-_YAW_RATE_FOR_THE_BEND = 0.8
 _SLOWEST_BEND_MPS = 0.1
 _OPPOSED_RAD = math.radians(120.0)
 
@@ -53,16 +49,6 @@ class OnPath:
     heading_rad: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Piece:
-    s_m: float
-    length_m: float
-    x_m: float
-    y_m: float
-    heading_rad: float
-    curvature_1pm: float
-
-
 class Path:
     """The path in the frame of its start pose; immutable.
 
@@ -70,20 +56,26 @@ class Path:
     """
 
     def __init__(self, spec: PathSpec, robot: Robot) -> None:
-        pieces = list(_chain(spec))
-        self.length_m = pieces[-1].s_m + pieces[-1].length_m
+        pieces = pieces_of(spec)
+        self.length_m = pieces[-1].s_m
         _check_bends(spec, robot)
-        # The body overhangs both ends, so what stands beyond them is measured along straight extensions.
-        pieces = [_extension_back(pieces[0]), *pieces, _extension_ahead(pieces[-1])]
+        self._starts = [piece.s_m for piece in pieces]
         self._s = np.array([piece.s_m for piece in pieces])
         self._x = np.array([piece.x_m for piece in pieces])
         self._y = np.array([piece.y_m for piece in pieces])
         self._heading = np.array([piece.heading_rad for piece in pieces])
         self._curvature = np.array([piece.curvature_1pm for piece in pieces])
-        samples = np.arange(-_EXTENSION_M, self.length_m + _EXTENSION_M + _SAMPLE_M, _SAMPLE_M)
+        samples = np.arange(-EXTENSION_M, self.length_m + EXTENSION_M + _SAMPLE_M, _SAMPLE_M)
         self._sample_x, self._sample_y, _ = self.poses(samples)
         self._check_doubling_back(robot.body.width_m)
-        self._speed_s, self._speed = _section_speeds(spec, robot, self._curvature[1:-1], self._s[1:-1])
+        speed_s, speed = section_speeds(spec, robot, self._curvature[1:-1], self._s[1:-1])
+        self._speed_step_m = float(speed_s[1] - speed_s[0])
+        self._speed: list[float] = speed.tolist()
+        # Straight on from a piece without a bend to the next one: how far that goes.
+        self._straight_to = list(range(len(pieces)))
+        for k in range(len(pieces) - 2, -1, -1):
+            if pieces[k].curvature_1pm == 0.0 == pieces[k + 1].curvature_1pm:
+                self._straight_to[k] = self._straight_to[k + 1]
 
     @property
     def start(self) -> PlanarPose:
@@ -102,7 +94,7 @@ class Path:
     def _poses_on(self, k: IntArray, s_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         along = s_m - self._s[k]
         half_turn = 0.5 * self._curvature[k] * along
-        chord = along * _sinc(half_turn)
+        chord = along * sinc(half_turn)
         middle = self._heading[k] + half_turn
         return (
             self._x[k] + chord * np.cos(middle),
@@ -122,10 +114,10 @@ class Path:
         """The pose in path coordinates, searched near hint_s_m only, so that it cannot jump to another turn
         of the path: at most 0.25 m behind the hint and 2 m ahead of it."""
         low, high = hint_s_m - _LOOK_BACK_M, hint_s_m + _LOOK_AHEAD_M
-        first = max(math.ceil((low + _EXTENSION_M) / _SAMPLE_M), 0)
-        last = max(int((high + _EXTENSION_M) / _SAMPLE_M), first) + 1
+        first = max(math.ceil((low + EXTENSION_M) / _SAMPLE_M), 0)
+        last = max(int((high + EXTENSION_M) / _SAMPLE_M), first) + 1
         dx, dy = pose.x_m - self._sample_x[first:last], pose.y_m - self._sample_y[first:last]
-        s = (first + int((dx * dx + dy * dy).argmin())) * _SAMPLE_M - _EXTENSION_M
+        s = (first + int((dx * dx + dy * dy).argmin())) * _SAMPLE_M - EXTENSION_M
         for _ in range(_ROUNDS):
             ahead, left, _, bend = self._one_seen_from(s, pose)
             if abs(bend) < _STRAIGHT_1PM:
@@ -155,37 +147,61 @@ class Path:
     def project_points(
         self, points_m: FloatArray, from_s_m: float = -math.inf, to_s_m: float = math.inf
     ) -> tuple[FloatArray, FloatArray]:
-        """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m.
+        """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m."""
+        return self.locate_points(points_m, from_s_m, to_s_m)[:2]
+
+    def locate_points(
+        self, points_m: FloatArray, from_s_m: float, to_s_m: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The same with the path's heading_rad (N,) there (not wrapped).
 
         From the nearest of samples 0.25 m apart, on the circle that the path is there: exact but for the
         steps of a blend, and those take a second round.
         """
-        low = min(max(from_s_m, -_EXTENSION_M), self.length_m + _EXTENSION_M - _SAMPLE_M)
-        high = min(max(to_s_m, low + _SAMPLE_M), self.length_m + _EXTENSION_M)
-        first = math.ceil((low + _EXTENSION_M) / _SAMPLE_M)
-        last = max(int((high + _EXTENSION_M) / _SAMPLE_M), first) + 1
+        low = min(max(from_s_m, -EXTENSION_M), self.length_m + EXTENSION_M - _SAMPLE_M)
+        high = min(max(to_s_m, low + _SAMPLE_M), self.length_m + EXTENSION_M)
+        piece = max(bisect_right(self._starts, low) - 1, 0)
+        if self._curvature[piece] == 0.0 and self._straight_to[piece] >= bisect_right(self._starts, high) - 1:
+            return self._project_on_line(piece, points_m, low, high)
+        first = math.ceil((low + EXTENSION_M) / _SAMPLE_M)
+        last = max(int((high + EXTENSION_M) / _SAMPLE_M), first) + 1
         dx = points_m[:, :1] - self._sample_x[first:last]
         dy = points_m[:, 1:2] - self._sample_y[first:last]
-        s = (first + np.argmin(dx * dx + dy * dy, axis=1)) * _SAMPLE_M - _EXTENSION_M
+        s = (first + np.argmin(dx * dx + dy * dy, axis=1)) * _SAMPLE_M - EXTENSION_M
         for _ in range(_ROUNDS):
-            ahead, left, bend = self._seen_from(s, points_m)
+            ahead, left, bend, _ = self._seen_from(s, points_m)
             inward = np.maximum(1.0 - bend * left, _INNERMOST)
             curved = np.where(np.abs(bend) < _STRAIGHT_1PM, _STRAIGHT_1PM, bend)
             s = np.minimum(np.maximum(s + np.arctan2(curved * ahead, inward) / curved, low), high)
-        ahead, left, _ = self._seen_from(s, points_m)
-        return s, np.copysign(np.hypot(ahead, left), left)
+        ahead, left, _, heading = self._seen_from(s, points_m)
+        return s, np.copysign(np.hypot(ahead, left), left), heading
 
-    def _seen_from(self, s_m: FloatArray, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Each point ahead and to the left of the path's pose at its s_m, and the curvature there."""
+    def _project_on_line(
+        self, piece: int, points_m: FloatArray, low: float, high: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        heading = self._heading.item(piece)
+        cos, sin = math.cos(heading), math.sin(heading)
+        dx, dy = points_m[:, 0] - self._x.item(piece), points_m[:, 1] - self._y.item(piece)
+        along = dx * cos + dy * sin + self._starts[piece]
+        left = dy * cos - dx * sin
+        s = np.minimum(np.maximum(along, low), high)
+        return s, np.copysign(np.hypot(along - s, left), left), np.full(len(s), heading)
+
+    def _seen_from(
+        self, s_m: FloatArray, points_m: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Each point ahead and to the left of the path's pose at its s_m; the curvature and heading there."""
         k = self._piece_at(s_m)
         x, y, heading = self._poses_on(k, s_m)
         cos, sin = np.cos(heading), np.sin(heading)
         dx, dy = points_m[:, 0] - x, points_m[:, 1] - y
-        return dx * cos + dy * sin, dy * cos - dx * sin, self._curvature[k]
+        return dx * cos + dy * sin, dy * cos - dx * sin, self._curvature[k], heading
 
     def speed_limit(self, s_m: float) -> float:
         """The greatest speed at s_m so that every section and bend ahead is entered slowly enough, m/s."""
-        return float(np.interp(s_m, self._speed_s, self._speed))
+        place = min(max(s_m, 0.0), self.length_m) / self._speed_step_m
+        k = min(int(place), len(self._speed) - 2)
+        return self._speed[k] + (place - k) * (self._speed[k + 1] - self._speed[k])
 
     def _piece_at(self, s_m: FloatArray) -> IntArray:
         return np.maximum(self._s.searchsorted(s_m, side="right") - 1, 0)
@@ -219,73 +235,9 @@ def compose(outer: PlanarPose, inner: PlanarPose) -> PlanarPose:
     )
 
 
-def _sinc(angle_rad: FloatArray) -> FloatArray:
-    """sin(x) / x for |x| <= pi / 4 (no piece turns by more than 90 degrees), to 1e-11."""
-    square = angle_rad * angle_rad
-    series: FloatArray = 1.0 - square / 6.0 * (
-        1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0 * (1.0 - square / 110.0)))
-    )
-    return series
-
-
-def _chain(spec: PathSpec) -> Iterator[_Piece]:
-    """The pieces of constant curvature, end to end."""
-    s = 0.0
-    x, y = spec.start.x_m, spec.start.y_m
-    heading = math.radians(spec.start.heading_deg)
-    for segment in spec.segments:
-        steps = _arc_pieces(segment) if isinstance(segment, ArcSpec) else [(segment.length_m, 0.0)]
-        for length, curvature in steps:
-            yield _Piece(s, length, x, y, heading, curvature)
-            half_turn = 0.5 * curvature * length
-            chord = length * float(_sinc(np.array(half_turn)))
-            x += chord * math.cos(heading + half_turn)
-            y += chord * math.sin(heading + half_turn)
-            heading += 2.0 * half_turn
-            s += length
-
-
-def _arc_pieces(arc: ArcSpec) -> list[tuple[float, float]]:
-    """(length, curvature): the blend in, the circle, the blend out; a blend turns by half its length."""
-    curvature = math.copysign(1.0 / arc.radius_m, arc.angle_deg)
-    circle_m = arc.length_m - 2.0 * arc.blend_m
-    # No piece turns by more than 90 degrees: the angle of a point about its centre is never ambiguous.
-    parts = max(1, math.ceil(circle_m * abs(curvature) / (math.pi / 2.0) - 1e-9))
-    circle = [(circle_m / parts, curvature)] * parts if circle_m > 0.0 else []
-    if arc.blend_m == 0.0:
-        return circle
-    step_m = arc.blend_m / _BLEND_PIECES
-    rise = [(step_m, curvature * (k + 0.5) / _BLEND_PIECES) for k in range(_BLEND_PIECES)]
-    return [*rise, *circle, *reversed(rise)]
-
-
-def _extension_back(piece: _Piece) -> _Piece:
-    return _Piece(
-        -_EXTENSION_M,
-        _EXTENSION_M,
-        piece.x_m - _EXTENSION_M * math.cos(piece.heading_rad),
-        piece.y_m - _EXTENSION_M * math.sin(piece.heading_rad),
-        piece.heading_rad,
-        0.0,
-    )
-
-
-def _extension_ahead(piece: _Piece) -> _Piece:
-    turn = piece.curvature_1pm * piece.length_m
-    chord = piece.length_m * float(_sinc(np.array(turn / 2.0)))
-    return _Piece(
-        piece.s_m + piece.length_m,
-        _EXTENSION_M,
-        piece.x_m + chord * math.cos(piece.heading_rad + turn / 2.0),
-        piece.y_m + chord * math.sin(piece.heading_rad + turn / 2.0),
-        piece.heading_rad + turn,
-        0.0,
-    )
-
-
 def _check_bends(spec: PathSpec, robot: Robot) -> None:
     """The inner track must not run backwards, and the yaw rate must leave a speed to drive the bend with."""
-    slow_m = _SLOWEST_BEND_MPS / (robot.limits.max_yaw_rate_radps * _YAW_RATE_FOR_THE_BEND)
+    slow_m = _SLOWEST_BEND_MPS / (robot.limits.max_yaw_rate_radps * YAW_RATE_FOR_THE_BEND)
     tightest_m = max(robot.body.width_m / 2.0, slow_m)
     for number, segment in enumerate(spec.segments):
         if isinstance(segment, ArcSpec) and segment.radius_m < tightest_m:
@@ -293,29 +245,3 @@ def _check_bends(spec: PathSpec, robot: Robot) -> None:
                 f"path: segments.{number}: radius_m {segment.radius_m:g} is tighter than this robot can "
                 f"drive; use at least {tightest_m:.2f} m (its half width, and what its yaw rate allows)"
             )
-
-
-def _section_speeds(
-    spec: PathSpec, robot: Robot, curvature: FloatArray, piece_s: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Speed over s: what section and bend allow, lowered ahead of each slower one as a comfortable
-    braking needs (controller/braking.py)."""
-    top = robot.limits.max_speed_mps
-    brake = comfort(robot.limits)
-    yaw = robot.limits.max_yaw_rate_radps * _YAW_RATE_FOR_THE_BEND
-    length = spec.length_m
-    s = np.linspace(0.0, length, max(2, math.ceil(length / _SPEED_STEP_M) + 1))
-    ends = np.cumsum([segment.length_m for segment in spec.segments])
-    asked = np.array([segment.max_speed_mps or top for segment in spec.segments])
-    speed = np.minimum(asked[np.minimum(np.searchsorted(ends, s, side="right"), len(ends) - 1)], top)
-    bend = np.abs(curvature[np.searchsorted(piece_s, s, side="right") - 1])
-    speed = np.minimum(speed, yaw / np.maximum(bend, yaw / top))
-    starts = np.flatnonzero(np.diff(speed) < 0.0) + 1
-    for start in starts:
-        # One grid step early: the step itself may lie anywhere between two grid points.
-        distances = s[start - 1] - s[:start]
-        slowed = np.flatnonzero(distances <= slowing_distance(top, float(speed[start]), brake))
-        for k in slowed:
-            reach = speed_before_section(float(distances[k]), float(speed[start]), brake)
-            speed[k] = min(speed[k], reach)
-    return s, speed

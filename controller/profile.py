@@ -10,7 +10,9 @@ import math
 
 import numpy as np
 
+from config.robot import Limits
 from controller.braking import BrakeLimits
+from controller.limits import Motion
 from hal.types import FloatArray
 
 _STANDING_MPS = 1e-9
@@ -91,6 +93,19 @@ class SpeedRamps:
         x2 = np.clip(rest - t1, 0.0, t2)
         x3 = np.clip(rest - t1 - t2, 0.0, t3)
         return held, x1, x2, x3, np.maximum(rest - t1 - t2 - t3, 0.0)
+
+
+def comfortable(limits: Limits, motion: Motion, targets_mps: FloatArray) -> SpeedRamps:
+    """From now on, within the everyday limits, to targets_mps (N,)."""
+    return SpeedRamps(
+        motion.v_mps,
+        motion.a_mps2,
+        targets_mps,
+        accel_mps2=limits.max_accel_mps2,
+        decel_mps2=limits.max_accel_mps2,
+        jerk_mps3=limits.max_jerk_mps3,
+        latency_s=motion.latency_s,
+    )
 
 
 def stop_step(v_mps: float, a_mps2: float, limits: BrakeLimits, dt_s: float) -> tuple[float, float]:

@@ -176,6 +176,8 @@ class SpeedShaper:
         return self._ramp_to(0.0, BrakeLimits(self._active.decel_mps2, jerk))
 
     def _ramp_to(self, target_mps: float, brake: BrakeLimits) -> tuple[float, float]:
+        if self._v == target_mps and self._a == 0.0:
+            return target_mps, 0.0
         problem = self._problem(brake)
         problem.control_interface = ControlInterface.Velocity
         problem.target_velocity = [target_mps]

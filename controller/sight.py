@@ -45,6 +45,7 @@ class Sight:
         self._sight, self._lateral_m = config.sight, config.margins.lateral_m
         length = corridor.path.length_m + corridor.front_m + _CELL_M
         self._cells = np.arange(0.5 * _CELL_M, length, _CELL_M)
+        self._lanes = self._lanes_of(self._cells)
         self._seen_ns = np.full(len(self._cells), _NEVER_NS, np.int64)
         # Under the nose and beside it nothing can be seen: what the robot stands before is free by consent.
         self._consent_s_m = start_s_m + mount.forward_m + self._sight.near_m + _CELL_M
@@ -69,8 +70,11 @@ class Sight:
         self.points_m = points = self._surface_points(forward, free.bearing_tan[bands], pose)
         surface_s, inside = self._in_corridor(points, forward * free.half_width_tan, s_m)
         reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
-        explained = explained_by.covers(points, reach_m, _AROUND_M).any(axis=1)
-        self._note_surface(surface_s[inside & ~explained], s_m, standing)
+        way_s = surface_s[inside]
+        if len(way_s):
+            explained = explained_by.covers(points[inside], reach_m[inside], _AROUND_M).any(axis=1)
+            way_s = way_s[~explained]
+        self._note_surface(way_s, s_m, standing)
         in_corridor = np.zeros(len(free.bearing_tan), np.bool_)
         in_corridor[bands] = inside
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
@@ -115,9 +119,8 @@ class Sight:
         """Mark the cells whose width was seen; then find the first one ahead that is not known."""
         first = int(np.searchsorted(self._cells, s_m))
         last = int(np.searchsorted(self._cells, s_m + self._sight.range_m + self._mount.forward_m))
-        cells = self._cells[first:last]
-        if len(cells) and len(free.bearing_tan):
-            seen = self._lanes_seen(free, pose, cells, surface_in_corridor)
+        if last > first and len(free.bearing_tan):
+            seen = self._lanes_seen(free, pose, first, last, surface_in_corridor)
             self._seen_ns[first:last][seen >= self._sight.known_share] = captured_ns
         memory_ns = round(self._sight.memory_s * NS_PER_S)
         fresh = self._seen_ns >= captured_ns - memory_ns
@@ -127,20 +130,29 @@ class Sight:
         unknown = np.flatnonzero(~known[first:])
         self.known_s_m = float(self._cells[first + unknown[0]]) - 0.5 * _CELL_M if len(unknown) else math.inf
 
+    def _lanes_of(self, cells: FloatArray) -> FloatArray:
+        """(2, C, L) points across the swept width at each cell: they depend on the path alone."""
+        x, y, heading = self._corridor.path.poses(cells)
+        half = self._corridor.half_width(cells)
+        lanes = np.linspace(-1.0, 1.0, _LANES)
+        return np.stack(
+            (
+                x[:, None] - np.sin(heading)[:, None] * half[:, None] * lanes,
+                y[:, None] + np.cos(heading)[:, None] * half[:, None] * lanes,
+            )
+        )
+
     def _lanes_seen(
         self,
         free: FreeSpace,
         pose: PlanarPose,
-        cells: FloatArray,
+        first: int,
+        last: int,
         surface_in_corridor: NDArray[np.bool_],
     ) -> FloatArray:
-        """(C,) share of each cell's width that was seen as free, or lies behind a surface in the corridor:
-        that surface limits the speed itself."""
-        x, y, heading = self._corridor.path.poses(cells)
-        half = self._corridor.half_width(cells)
-        lanes = np.linspace(-1.0, 1.0, _LANES)
-        px = x[:, None] - np.sin(heading)[:, None] * half[:, None] * lanes
-        py = y[:, None] + np.cos(heading)[:, None] * half[:, None] * lanes
+        """(C,) share of the width of the cells first..last that was seen as free, or lies behind a surface in
+        the corridor: that surface limits the speed itself."""
+        px, py = self._lanes[:, first:last]
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         dx, dy = px - pose.x_m, py - pose.y_m
         forward = dx * cos + dy * sin - self._mount.forward_m
@@ -149,10 +161,10 @@ class Sight:
         left_edge = free.bearing_tan[0] - free.half_width_tan
         band = np.floor((bearing - left_edge) / (2.0 * free.half_width_tan)).astype(np.intp)
         in_view = (forward > 0.0) & (band >= 0) & (band < len(free.bearing_tan))
-        band = np.clip(band, 0, len(free.bearing_tan) - 1)
+        band = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
         # The far edge of a cell, so that a cell is not known for the sake of its beginning.
         far_edge = forward + 0.5 * _CELL_M
         behind = surface_in_corridor[band] & (far_edge >= free.nearest_m[band])
         seen = in_view & ((far_edge <= free.known_m[band]) | behind)
-        share: FloatArray = seen.mean(axis=1)
+        share: FloatArray = seen.sum(axis=1) / _LANES
         return share

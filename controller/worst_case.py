@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
+from controller.bodies import Bodies
 from controller.contingency import Reach, Stops, gets_through, reach, room, stops
 from controller.corridor import Placed
 from controller.decision import Reason
-from controller.knowledge import Knowledge
-from controller.limits import Limit, Motion, allowed
-from controller.profile import SpeedRamps
+from controller.limits import ALONGSIDE_M, Limit, Motion, allowed
+from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
 
 _STEP_S = 0.2
 _SPEEDS = 31
-_ALONGSIDE_M = 0.1
 # So much sooner than it would have to, the robot slows comfortably for the worst case.
 _FORESIGHT_S = 0.5
 
@@ -32,32 +32,35 @@ class WorstCase:
         self.times_s: FloatArray = np.arange(0.0, longest_s + _STEP_S, _STEP_S)
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
         self._foreseen: Stops | None = None
+        self._furthest_m = math.inf
 
     def limit(
-        self, known: Knowledge, placed: Placed, s_m: float, motion: Motion, go: SpeedRamps
+        self, bodies: Bodies, placed: Placed, s_m: float, motion: Motion, since_s: float, chosen_mps: float
     ) -> Limit | None:
         """The greatest speed from which the robot at s_m could still stand in time; None: no need to slow.
 
-        placed: the bodies, its first times are times_s. go: what is driven if nothing happens; where that
-        gets through whatever they do, the robot need not be able to stop.
+        placed: the bodies, seen since_s ago; its first times are times_s. chosen_mps: what is driven if
+        nothing happens; where that gets through whatever they do, the robot need not be able to stop.
         """
-        bodies = known.bodies
-        young = bodies.age_s < self._config.prediction.confirm_s
-        chosen = (bodies.moving | young) & (placed.lo_m[:, 0] > s_m - _ALONGSIDE_M)
-        if not chosen.any():
+        rows = placed.lo_m[:, 0] > s_m - ALONGSIDE_M
+        if not rows.any():
             return None
-        reached = self._reach(known, placed, chosen)
-        if not reached.inside.any():
-            return None
+        reached = self._reach(bodies.select(rows), placed.select(rows, len(self.times_s)), since_s)
         if self._foreseen is None:
             self._foreseen = self._stops(self._speeds, 0.0, motion.latency_s + _FORESIGHT_S)
+            self._furthest_m = float(self._foreseen.distance_m.max())
+        if reached.lo_m[:, -1].min() > s_m + self._furthest_m:
+            return None
         fails = np.flatnonzero(room(self._foreseen, s_m, reached) < 0.0)
-        if not len(fails) or gets_through(go, s_m, self.times_s, reached):
+        if not len(fails):
+            return None
+        go = comfortable(self._limits, motion, np.array([chosen_mps]))
+        if gets_through(go, s_m, self.times_s, reached):
             return None
         speed = float(self._speeds[max(int(fails[0]) - 1, 0)])
         now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
         urgent = bool(room(now, s_m, reached)[0] < 0.0)
-        row = int(np.flatnonzero(chosen)[int(np.argmin(placed.lo_m[chosen, 0]))])
+        row = int(np.argmin(np.where(rows, placed.lo_m[:, 0], np.inf)))
         number = int(bodies.ids[row])
         gap_m = float(placed.lo_m[row, 0]) - s_m
         sentence = (
@@ -65,18 +68,16 @@ class WorstCase:
         )
         return Limit(speed, Reason("worst case", sentence, number, gap_m), urgent)
 
-    def _reach(self, known: Knowledge, placed: Placed, chosen: NDArray[np.bool_]) -> Reach:
-        bodies, prediction = known.bodies, self._config.prediction
-        count = len(self.times_s)
-        variance = np.trace(bodies.covariance[chosen], axis1=1, axis2=2) / 2.0
-        near = Placed(*(getattr(placed, name)[chosen][:, :count] for name in Placed.__slots__))
+    def _reach(self, bodies: Bodies, placed: Placed, since_s: float) -> Reach:
+        prediction = self._config.prediction
+        variance = np.trace(bodies.covariance, axis1=1, axis2=2) / 2.0
         return reach(
-            near,
+            placed,
             self.times_s,
-            known.age_s,
+            since_s,
             prediction.sigmas * np.sqrt(np.maximum(variance, 0.0)),
-            np.linalg.norm(bodies.velocity_mps[chosen], axis=1),
-            np.where(bodies.moving[chosen], prediction.manoeuvre_mps2, 0.0),
+            np.hypot(bodies.velocity_mps[:, 0], bodies.velocity_mps[:, 1]),
+            np.where(bodies.moving, prediction.manoeuvre_mps2, 0.0),
             self._limits.max_obstacle_speed_mps,
             self._config.margins.least_m,
         )

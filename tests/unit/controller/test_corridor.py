@@ -56,7 +56,8 @@ def test_a_body_beside_a_bend_is_turned_against_the_path() -> None:
 def test_velocity_along_and_across_the_path() -> None:
     corridor = Corridor(arc_path(4.0, 90.0), BODY)
     body = box(4.0, 4.0, -0.3, -1.0, sigma_mps=0.2)
-    along, left, sigma_along, sigma_left = velocity_on_path(body, corridor, np.array([2.0 * math.pi]))
-    # There the path leads to +y; its left is -x.
+    # At the end of the quarter turn the path leads to +y; its left is -x.
+    heading = place(body, corridor, np.zeros(1), 3.0, 12.0).heading_rad[:, 0]
+    along, left, sigma_along, sigma_left = velocity_on_path(body, heading)
     assert (along[0], left[0]) == pytest.approx((-1.0, 0.3), abs=1e-6)
     assert (sigma_along[0], sigma_left[0]) == pytest.approx((0.2, 0.2))

@@ -1,0 +1,98 @@
+"""What stands in the corridor -> speed limits: stop before it, where it can still be seen to leave."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from config.decision import DecisionConfig
+from config.robot import Limits
+from controller import braking
+from controller.bodies import Bodies, no_bodies
+from controller.corridor import Placed, place
+from controller.knowledge import Knowledge
+from controller.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
+from controller.memory import visible_from_m
+from hal.types import CameraMount, FloatArray
+
+_INSIDE_BODY_M = 0.05
+_NOW = np.zeros(1)
+
+
+class StandingLimits:
+    """inside: ids of who counts as in the corridor; shared with whoever watches the moving ones, because
+    bodies start and stop. Standing bodies are placed once a scene, not once a step."""
+
+    def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount, inside: set[int]) -> None:
+        self._config, self._limits, self._mount = config, limits, mount
+        self._comfort, self._emergency = braking.comfort(limits), braking.emergency(limits)
+        self._inside = inside
+        self._of: Bodies | None = None
+        self._bodies = no_bodies(0)
+        self._placed: Placed | None = None
+        self._stop_m: FloatArray = np.zeros(0)
+        self._near: list[int] = []
+
+    def limits(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
+        """For the robot at s_m."""
+        if known.bodies is not self._of:
+            self._take_in(known, s_m)
+        placed, margins = self._placed, self._config.margins
+        if placed is None:
+            return []
+        found = []
+        for row in self._near:
+            if placed.hi_m[row, 0] <= s_m:
+                continue
+            number, gap_m = int(self._bodies.ids[row]), float(placed.lo_m[row, 0]) - s_m
+            beside_m = margins.lateral_m + (margins.graze_m if number in self._inside else 0.0)
+            if gap_m < -ALONGSIDE_M:
+                # The front has passed it already: only what the body would really touch counts.
+                beside_m = -_INSIDE_BODY_M
+            if placed.clear_m[row, 0] > beside_m:
+                self._inside.discard(number)
+                continue
+            gap = Gap(gap_m, obstacle_id=number)
+            if self._may_wait(gap, motion, float(self._bodies.age_s[row])):
+                continue
+            self._inside.add(number)
+            stop_m, what = float(self._stop_m[row]), "stands on the path"
+            found.append(stop_before(gap, motion, self._comfort, stop_m, margins.least_m, "static", what))
+        return found
+
+    def _take_in(self, known: Knowledge, s_m: float) -> None:
+        """Place what stands in a new scene, and leave out what is too far aside to matter."""
+        self._of = known.bodies
+        self._bodies = bodies = known.bodies.select(~known.bodies.moving)
+        self._placed, self._near = None, []
+        if not len(bodies):
+            return
+        sight, margins = self._config.sight, self._config.margins
+        self._placed = placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
+        near = placed.clear_m[:, 0] <= margins.lateral_m + margins.graze_m
+        self._near = np.flatnonzero(near).tolist()
+        self._inside.difference_update(bodies.ids[~near].tolist())
+        if self._near:
+            self._stop_m = self._standing_off(known, bodies, placed)
+
+    def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:
+        """(N,) where to stand before a body: so that it is still seen, and seen to leave."""
+        sight = self._config.sight
+        visible_m = visible_from_m(
+            bodies, placed.d_m[:, 0], known.edge_tan, sight.near_m, self._mount.height_m
+        )
+        front_m = known.corridor.front_m - self._mount.forward_m
+        return np.clip(visible_m - front_m, self._config.margins.stop_m, sight.near_m)
+
+    def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:
+        """A young obstacle may be confirmed first while an emergency stop fits even if it came at V_o."""
+        if age_s >= self._config.prediction.confirm_s:
+            return False
+        needed = braking.required_distance(
+            motion.v_mps,
+            motion.a_mps2,
+            self._limits.max_obstacle_speed_mps,
+            motion.latency_s + self._config.prediction.confirm_s,
+            self._emergency,
+            self._config.margins.stop_m,
+        )
+        return needed <= gap.distance_m
