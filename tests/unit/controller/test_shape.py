@@ -174,7 +174,7 @@ def test_when_ruckig_fails_it_brakes_by_the_stop_profile(
     a = shaper.a_mps2
     while shaper.v_mps > 0.0:
         before = shaper.v_mps
-        command = shaper.step(1.5)
+        command = shaper.step(1.4)
         assert command.fault.startswith("ruckig: ")
         assert "\n" not in command.fault
         assert abs(command.a_mps2 - a) <= 0.6 * PERIOD_S + 1e-9
