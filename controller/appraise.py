@@ -10,7 +10,8 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.bodies import Bodies, no_bodies
-from controller.corridor import place
+from controller.corridor import place, velocity_on_path
+from controller.crossing import comes_in
 from controller.decision import Reason
 from controller.knowledge import Knowledge
 from controller.limits import Gap, Limit, Motion, allowed, stop_before
@@ -54,10 +55,15 @@ class Appraiser:
         placed = place(
             watched, known.corridor, known.age_s + self._times_s, s_m, self._config.sight.range_m + 2.0
         )
+        _, _, _, sigma_d = velocity_on_path(watched, placed.heading_rad[:, 0])
+        sigma_d = sigma_d * self._config.prediction.sigmas
+        enters = comes_in(placed, self._times_s, sigma_d)
         base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
-        in_the_way, chosen_mps = self._moving.limits(watched, placed, s_m, motion, base_mps, now_s)
+        in_the_way, chosen_mps = self._moving.limits(
+            watched, placed, sigma_d, enters, s_m, motion, base_mps, now_s
+        )
         found += in_the_way
-        worst = self._worst_case.limit(watched, placed, s_m, motion, known.age_s, chosen_mps)
+        worst = self._worst_case.limit(watched, placed, enters, s_m, motion, known.age_s, chosen_mps)
         if worst is not None:
             found.append(worst)
         return found

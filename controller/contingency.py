@@ -28,12 +28,16 @@ class Reach:
     lo_m: FloatArray
     hi_m: FloatArray
 
+    def select(self, rows: NDArray[np.bool_]) -> Reach:
+        """Only these obstacles."""
+        return Reach(self.inside[rows], self.lo_m[rows], self.hi_m[rows])
+
 
 def reach(
     placed: Placed,
     times_s: FloatArray,
     since_s: float,
-    sigma_mps: FloatArray,
+    spread_mps: tuple[FloatArray, FloatArray],
     speed_mps: FloatArray,
     manoeuvre_mps2: FloatArray,
     most_mps: float,
@@ -41,16 +45,17 @@ def reach(
 ) -> Reach:
     """Grow the bodies by what they could do in times_s (K,) from now; they were seen since_s ago.
 
-    sigma_mps (N,) spread of the velocity as far as it is to be covered, speed_mps (N,) measured speed,
-    manoeuvre_mps2 (N,), most_mps the top speed of any obstacle.
+    spread_mps: by how much their velocities may be other than thought, along the path and across it, each
+    (N,). speed_mps (N,) measured speed, manoeuvre_mps2 (N,), most_mps the top speed of any obstacle.
     """
     t = times_s + since_s
-    could = sigma_mps[:, None] * t + 0.5 * manoeuvre_mps2[:, None] * t * t
-    grown = np.minimum(could, (most_mps + speed_mps)[:, None] * t)
-    inside = placed.clear_m - grown <= 0.0
+    bent = 0.5 * manoeuvre_mps2[:, None] * t * t
+    furthest = (most_mps + speed_mps)[:, None] * t
+    along, across = (np.minimum(spread[:, None] * t + bent, furthest) for spread in spread_mps)
+    inside = placed.clear_m - across <= 0.0
     # Once in the way it may stay there: what it could block only grows.
-    lo = np.where(inside, placed.lo_m - grown - margin_m, np.inf)
-    hi = np.where(inside, placed.hi_m + grown, -np.inf)
+    lo = np.where(inside, placed.lo_m - along - margin_m, np.inf)
+    hi = np.where(inside, placed.hi_m + along, -np.inf)
     return Reach(
         np.logical_or.accumulate(inside, axis=1),
         np.minimum.accumulate(lo, axis=1),
@@ -81,6 +86,13 @@ def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
     matters = reached.inside & (at < reached.hi_m) & moves
     least: FloatArray = np.where(matters, reached.lo_m - at, np.inf).min(axis=(1, 2), initial=np.inf)
     return least
+
+
+def stands_in_time(stopping: Stops, reached: Reach) -> NDArray[np.bool_]:
+    """(R,) which stops are over before anything could be in the way at all, however near it is."""
+    first = int(reached.inside.any(axis=0).argmax())
+    stands: NDArray[np.bool_] = stopping.speed_mps[:, max(first - 1, 0)] <= _STANDING_MPS
+    return stands
 
 
 def gets_through(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:

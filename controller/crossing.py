@@ -34,6 +34,18 @@ class Conflict:
     hi_out_m: float
 
 
+def comes_in(placed: Placed, times_s: FloatArray, sigma_side_mps: FloatArray) -> NDArray[np.bool_]:
+    """(N,) which bodies are, or are likely to come, within the swept width. times_s (K,) begins at 0 = now.
+
+    Likely: with the spread of the sideways velocity taken off, so that nobody is braked for because of noise.
+    What an unlikely entry could do is watched by controller/contingency.py.
+    """
+    found: NDArray[np.bool_] = (placed.clear_m[:, 0] <= 0.0) | (
+        (placed.clear_m + _likely(times_s, sigma_side_mps)).min(axis=1) <= 0.0
+    )
+    return found
+
+
 def find_conflicts(
     placed: Placed,
     times_s: FloatArray,
@@ -41,25 +53,24 @@ def find_conflicts(
     margin_m: FloatArray,
     rows: NDArray[np.intp],
 ) -> list[Conflict]:
-    """For the bodies rows: when they are within margin_m (N,) of the corridor.
+    """For the bodies rows, which come in: when they are within margin_m (N,) of the corridor.
 
-    times_s (K,) begins at 0 = now. Entering must be likely (the spread of the sideways velocity taken off),
-    leaving must be certain (the spread added): the first avoids braking for noise, the second for hope; what
-    an unlikely entry could do is watched by controller/contingency.py.
+    Leaving must be certain, the spread added: hope is no reason to go.
     """
     clear = placed.clear_m[rows] - margin_m[rows, None]
-    spread = sigma_side_mps[rows, None] * times_s
-    likely = np.minimum(spread, _MOST_SPREAD_M)
-    comes_in = (clear[:, 0] <= 0.0) | ((clear + likely).min(axis=1) <= 0.0)
+    likely = clear + _likely(times_s, sigma_side_mps[rows])
+    certain = clear - sigma_side_mps[rows, None] * times_s
     found = []
-    for k in np.flatnonzero(comes_in).tolist():
-        row = int(rows[k])
-        entry = -1.0 if clear[k, 0] <= 0.0 else _first_below(clear[k] + likely[k], times_s)
+    for k, row in enumerate(rows.tolist()):
+        entry = 0.0 if clear[k, 0] <= 0.0 else max(_first_below(likely[k], times_s), 0.0)
         if math.isinf(entry):
             continue
-        exit_s = _first_above(clear[k] - spread[k], times_s, max(entry, 0.0))
-        found.append(_conflict(placed, times_s, row, max(entry, 0.0), exit_s))
+        found.append(_conflict(placed, times_s, row, entry, _first_above(certain[k], times_s, entry)))
     return found
+
+
+def _likely(times_s: FloatArray, sigma_side_mps: FloatArray) -> FloatArray:
+    return np.minimum(sigma_side_mps[:, None] * times_s, _MOST_SPREAD_M)
 
 
 def _first_below(values: FloatArray, times_s: FloatArray) -> float:

@@ -15,6 +15,7 @@ from controller.localise import PoseHistory
 from controller.memory import OutOfView
 from controller.path import OnPath, Path
 from controller.sight import Sight
+from controller.steadying import SteadyVelocities
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import CameraCondition, CameraHealth, Scene
@@ -49,6 +50,7 @@ class Knowledge:
         self._mount, self._config = mount, config
         self._poses = PoseHistory()
         self._boxes = no_bodies(0)
+        self._steady = SteadyVelocities()
         self._memory = OutOfView(mount, config.sight.near_m)
         self.edge_tan = 0.5
         self._places: deque[tuple[int, FloatArray]] = deque()
@@ -101,7 +103,7 @@ class Knowledge:
             return str(error)
         s_m = self.corridor.path.project(pose, on_path.s_m).s_m
         sprawling = ~seen.moving & (np.maximum(seen.half_view_m, seen.half_across_m) > _SPRAWLING_M)
-        boxes = self._recognise(seen.select(~sprawling))
+        boxes = self._steady.update(self._recognise(seen.select(~sprawling)))
         standing = v_mps <= _STANDING_MPS
         if len(scene.free_space.bearing_tan):
             self.edge_tan = (

@@ -46,16 +46,28 @@ class MovingLimits:
         self._goes_first.clear()
 
     def limits(
-        self, bodies: Bodies, placed: Placed, s_m: float, motion: Motion, base_mps: float, now_s: float
+        self,
+        bodies: Bodies,
+        placed: Placed,
+        sigma_d_mps: FloatArray,
+        enters: NDArray[np.bool_],
+        s_m: float,
+        motion: Motion,
+        base_mps: float,
+        now_s: float,
     ) -> tuple[list[Limit], float]:
-        """For the robot at s_m whose speed is otherwise base_mps; and the speed that remains."""
+        """For the robot at s_m whose speed is otherwise base_mps; and the speed that remains.
+
+        enters (N,): who is or is likely to come within the swept width; sigma_d_mps (N,): spread of the speed
+        across it.
+        """
         ahead = placed.s_m[:, 0] + placed.half_s_m[:, 0] > s_m
-        rows = np.flatnonzero(bodies.moving & ahead)
+        rows = np.flatnonzero(bodies.moving & ahead & enters)
         if not len(rows):
             self.nobody()
             return [], base_mps
-        along, _, sigma_s, sigma_d = velocity_on_path(bodies, placed.heading_rad[:, 0])
-        conflicts = self._conflicts(bodies, placed, s_m, sigma_d, rows, now_s)
+        along, _, sigma_s, _ = velocity_on_path(bodies, placed.heading_rad[:, 0])
+        conflicts = self._conflicts(bodies, placed, s_m, sigma_d_mps, rows, now_s)
         if not conflicts:
             return [], base_mps
         ramps = comfortable(self._limits, motion, self._speeds)
@@ -71,21 +83,16 @@ class MovingLimits:
         bodies: Bodies,
         placed: Placed,
         s_m: float,
-        sigma_d: FloatArray,
+        sigma_d_mps: FloatArray,
         rows: NDArray[np.intp],
         now_s: float,
     ) -> list[Conflict]:
         margins = self._config.margins
         grazes = np.array([number in self._inside for number in bodies.ids.tolist()])
+        beside_m = margins.lateral_m + margins.graze_m * grazes
         found = [
             one
-            for one in find_conflicts(
-                placed,
-                self._times_s,
-                sigma_d * self._config.prediction.sigmas,
-                margins.lateral_m + margins.graze_m * grazes,
-                rows,
-            )
+            for one in find_conflicts(placed, self._times_s, sigma_d_mps, beside_m, rows)
             if one.hi_in_m > s_m and one.lo_in_m > s_m - ALONGSIDE_M
         ]
         numbers = {int(bodies.ids[one.row]) for one in found}

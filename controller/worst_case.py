@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.bodies import Bodies
-from controller.contingency import Reach, Stops, gets_through, reach, room, stops
-from controller.corridor import Placed
+from controller.contingency import Reach, Stops, gets_through, reach, room, stands_in_time, stops
+from controller.corridor import Placed, velocity_on_path
 from controller.decision import Reason
 from controller.limits import ALONGSIDE_M, Limit, Motion, allowed
 from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
 
-_STEP_S = 0.2
+# Fine where stops from low speeds end, coarser for the long ones.
+_STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
 _SPEEDS = 31
 # So much sooner than it would have to, the robot slows comfortably for the worst case.
 _FORESIGHT_S = 0.5
@@ -29,37 +31,47 @@ class WorstCase:
     def __init__(self, config: DecisionConfig, limits: Limits) -> None:
         self._config, self._limits = config, limits
         longest_s = braking.stop(limits.max_speed_mps, 0.0, braking.emergency(limits)).time_s + 1.0
-        self.times_s: FloatArray = np.arange(0.0, longest_s + _STEP_S, _STEP_S)
+        self.times_s: FloatArray = np.concatenate(
+            (
+                np.arange(0.0, _FINE_S, _STEP_S),
+                np.arange(_FINE_S, longest_s + _COARSE_STEP_S, _COARSE_STEP_S),
+            )
+        )
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
-        self._foreseen: Stops | None = None
-        self._furthest_m = math.inf
+        self._latency_s = math.nan
+        self._foreseen = self._at_once = self._stops(self._speeds, 0.0, 0.0)
 
     def limit(
-        self, bodies: Bodies, placed: Placed, s_m: float, motion: Motion, since_s: float, chosen_mps: float
+        self,
+        bodies: Bodies,
+        placed: Placed,
+        enters: NDArray[np.bool_],
+        s_m: float,
+        motion: Motion,
+        since_s: float,
+        chosen_mps: float,
     ) -> Limit | None:
         """The greatest speed from which the robot at s_m could still stand in time; None: no need to slow.
 
-        placed: the bodies, seen since_s ago; its first times are times_s. chosen_mps: what is driven if
-        nothing happens; where that gets through whatever they do, the robot need not be able to stop.
+        placed: the bodies, seen since_s ago; its first times are times_s. enters (N,): whose motion as it was
+        measured leads into the way. chosen_mps: what is driven if nothing happens; where that gets through
+        whatever they do, the robot need not be able to stop.
         """
         rows = placed.lo_m[:, 0] > s_m - ALONGSIDE_M
         if not rows.any():
             return None
         reached = self._reach(bodies.select(rows), placed.select(rows, len(self.times_s)), since_s)
-        if self._foreseen is None:
-            self._foreseen = self._stops(self._speeds, 0.0, motion.latency_s + _FORESIGHT_S)
-            self._furthest_m = float(self._foreseen.distance_m.max())
+        self._prepare(motion.latency_s)
         if reached.lo_m[:, -1].min() > s_m + self._furthest_m:
             return None
-        fails = np.flatnonzero(room(self._foreseen, s_m, reached) < 0.0)
-        if not len(fails):
+        speed = self._speed(reached, enters[rows], s_m)
+        if speed is None:
             return None
         go = comfortable(self._limits, motion, np.array([chosen_mps]))
         if gets_through(go, s_m, self.times_s, reached):
             return None
-        speed = float(self._speeds[max(int(fails[0]) - 1, 0)])
         now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
-        urgent = bool(room(now, s_m, reached)[0] < 0.0)
+        urgent = motion.v_mps > speed and bool(room(now, s_m, reached)[0] < 0.0)
         row = int(np.argmin(np.where(rows, placed.lo_m[:, 0], np.inf)))
         number = int(bodies.ids[row])
         gap_m = float(placed.lo_m[row, 0]) - s_m
@@ -68,14 +80,47 @@ class WorstCase:
         )
         return Limit(speed, Reason("worst case", sentence, number, gap_m), urgent)
 
+    def _speed(self, reached: Reach, enters: NDArray[np.bool_], s_m: float) -> float | None:
+        """With foresight, but not below what suffices right beside them, nor, for those who keep clear, below
+        beside_mps."""
+        fails = np.flatnonzero(room(self._foreseen, s_m, reached) < 0.0)
+        if not len(fails):
+            return None
+        speed = float(self._speeds[max(int(fails[0]) - 1, 0)])
+        soon = self._speeds[stands_in_time(self._at_once, reached)]
+        speed = max(speed, float(soon.max(initial=0.0)))
+        beside_mps = self._config.prediction.beside_mps
+        if speed >= beside_mps:
+            return speed
+        fails = np.flatnonzero(room(self._foreseen, s_m, reached.select(enters)) < 0.0)
+        for_entering = float(self._speeds[max(int(fails[0]) - 1, 0)]) if len(fails) else math.inf
+        return max(speed, min(for_entering, beside_mps))
+
+    def _prepare(self, latency_s: float) -> None:
+        if latency_s == self._latency_s:
+            return
+        self._latency_s = latency_s
+        self._foreseen = self._stops(self._speeds, 0.0, latency_s + _FORESIGHT_S)
+        self._at_once = self._stops(self._speeds, 0.0, latency_s)
+        self._furthest_m = float(self._foreseen.distance_m.max())
+
     def _reach(self, bodies: Bodies, placed: Placed, since_s: float) -> Reach:
         prediction = self._config.prediction
-        variance = np.trace(bodies.covariance, axis1=1, axis2=2) / 2.0
+        heading = placed.heading_rad[:, 0]
+        _, _, sigma_s, sigma_d = velocity_on_path(bodies, heading)
+        tangent = np.stack((np.cos(heading), np.sin(heading)), axis=1)
+        beyond_s = np.abs((bodies.surprise_mps * tangent).sum(axis=1))
+        beyond_d = np.abs(
+            bodies.surprise_mps[:, 1] * tangent[:, 0] - bodies.surprise_mps[:, 0] * tangent[:, 1]
+        )
         return reach(
             placed,
             self.times_s,
             since_s,
-            prediction.sigmas * np.sqrt(np.maximum(variance, 0.0)),
+            (
+                np.maximum(prediction.sigmas * sigma_s, beyond_s),
+                np.maximum(prediction.sigmas * sigma_d, beyond_d),
+            ),
             np.hypot(bodies.velocity_mps[:, 0], bodies.velocity_mps[:, 1]),
             np.where(bodies.moving, prediction.manoeuvre_mps2, 0.0),
             self._limits.max_obstacle_speed_mps,

@@ -23,7 +23,7 @@ def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, s
         placed,
         TIMES,
         since_s,
-        np.full(len(body), sigma_mps),
+        (np.full(len(body), sigma_mps), np.full(len(body), sigma_mps)),
         speed,
         np.full(len(body), manoeuvre_mps2),
         most_mps=1.5,
