@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 from config.decision import Release
 from hal.clocks import NS_PER_S
 
@@ -9,55 +11,61 @@ from hal.clocks import NS_PER_S
 class ReleaseGate:
     """Passes a falling target on at once and holds a rising one back.
 
-    A decrease begins when the target falls below the present speed by the dead band. No increase follows
-    sooner than hold_s after that, so in hold_s the target can turn round at most twice; and the way must
-    have been free for delay_s without a break.
+    The target rises to the least that was allowed during delay_s, so one free moment is no reason to go, nor
+    one good number a reason to go fast. After it has turned from faster to slower, it does not turn again
+    within hold_s: in hold_s it can turn round at most twice.
     """
 
     def __init__(self, config: Release) -> None:
         self._config = config
         self._held_mps = 0.0
         self._rising = True
-        self._decreasing = False
-        self._decreased_ns: int | None = None
-        self._free_since_ns: int | None = None
+        self._went_faster = True
+        self._turned_ns: int | None = None
+        # Of what was allowed during delay_s: (when, how much), growing, so the first is the least.
+        self._lately: deque[tuple[int, float]] = deque()
 
     def step(self, raw_mps: float, v_mps: float, let_go_mps: float, now_ns: int) -> float:
         """The target to use. let_go_mps: the speed that remains when the present deceleration is let go of,
         which may be kept at any time: that is no increase."""
         band = self._config.dead_band_mps
+        least_mps = self._least_lately(raw_mps, now_ns)
         if raw_mps < self._held_mps - band or raw_mps <= 0.0:
             self._rising = False
         if raw_mps <= self._held_mps:
             self._held_mps = raw_mps
-            self._free_since_ns = None
-        else:
-            self._raise(raw_mps, let_go_mps, now_ns)
-        self._note_decrease(v_mps, now_ns)
-        return self._held_mps if self._may_rise(now_ns) else min(self._held_mps, v_mps)
-
-    def _raise(self, raw_mps: float, let_go_mps: float, now_ns: int) -> None:
-        if self._rising:
+        elif self._rising:
             self._held_mps = raw_mps
-            return
-        if self._free_since_ns is None:
-            self._free_since_ns = now_ns
-        free_s = (now_ns - self._free_since_ns) / NS_PER_S
-        if free_s < self._config.delay_s:
-            return
-        if self._may_rise(now_ns):
-            self._held_mps = raw_mps
-            self._rising = True
+        elif least_mps > self._held_mps:
+            self._raise(least_mps, let_go_mps, now_ns)
+        target_mps = self._held_mps if self._may_turn(now_ns) else min(self._held_mps, v_mps)
+        self._note_turn(target_mps, v_mps, now_ns)
+        return target_mps
+
+    def _least_lately(self, raw_mps: float, now_ns: int) -> float:
+        """The least raw target of the last delay_s; 0 until so much time has been seen."""
+        while self._lately and self._lately[-1][1] >= raw_mps:
+            self._lately.pop()
+        self._lately.append((now_ns, raw_mps))
+        since_ns = now_ns - round(self._config.delay_s * NS_PER_S)
+        while self._lately[0][0] < since_ns:
+            self._lately.popleft()
+        return self._lately[0][1]
+
+    def _raise(self, least_mps: float, let_go_mps: float, now_ns: int) -> None:
+        if self._may_turn(now_ns):
+            self._held_mps = least_mps
         else:
-            self._held_mps = max(self._held_mps, min(raw_mps, let_go_mps))
+            self._held_mps = max(self._held_mps, min(least_mps, let_go_mps))
 
-    def _may_rise(self, now_ns: int) -> bool:
-        began_ns = self._decreased_ns
-        return began_ns is None or (now_ns - began_ns) / NS_PER_S >= self._config.hold_s
+    def _may_turn(self, now_ns: int) -> bool:
+        turned_ns = self._turned_ns
+        return turned_ns is None or (now_ns - turned_ns) / NS_PER_S >= self._config.hold_s
 
-    def _note_decrease(self, v_mps: float, now_ns: int) -> None:
-        decreasing = self._held_mps < v_mps - self._config.dead_band_mps
-        if decreasing and not self._decreasing:
-            self._decreased_ns = now_ns
-            self._rising = False
-        self._decreasing = decreasing
+    def _note_turn(self, target_mps: float, v_mps: float, now_ns: int) -> None:
+        band = self._config.dead_band_mps
+        if target_mps > v_mps + band:
+            self._went_faster = True
+        elif target_mps < v_mps - band and self._went_faster:
+            self._went_faster = False
+            self._turned_ns = now_ns
