@@ -32,9 +32,7 @@ class ReleaseGate:
         least_mps = self._least_lately(raw_mps, now_ns)
         if raw_mps < self._held_mps - band or raw_mps <= 0.0:
             self._rising = False
-        if raw_mps <= self._held_mps:
-            self._held_mps = raw_mps
-        elif self._rising:
+        if raw_mps <= self._held_mps or self._rising:
             self._held_mps = raw_mps
         elif least_mps > self._held_mps:
             self._raise(least_mps, let_go_mps, now_ns)

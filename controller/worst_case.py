@@ -23,6 +23,7 @@ _STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
 _SPEEDS = 31
 # So much sooner than it would have to, the robot slows comfortably for the worst case.
 _FORESIGHT_S = 0.5
+_SOFT_MPS = 0.1
 
 
 class WorstCase:
@@ -39,7 +40,7 @@ class WorstCase:
         )
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
         self._latency_s = math.nan
-        self._foreseen = self._at_once = self._stops(self._speeds, 0.0, 0.0)
+        self._foreseen = self._confirming = self._at_once = self._stops(self._speeds, 0.0, 0.0)
 
     def limit(
         self,
@@ -60,19 +61,25 @@ class WorstCase:
         rows = placed.lo_m[:, 0] > s_m - ALONGSIDE_M
         if not rows.any():
             return None
-        reached = self._reach(bodies.select(rows), placed.select(rows, len(self.times_s)), since_s)
+        bodies, placed = bodies.select(rows), placed.select(rows, len(self.times_s))
+        reached = self._reach(bodies, placed, since_s)
         self._prepare(motion.latency_s)
         if reached.lo_m[:, -1].min() > s_m + self._furthest_m:
             return None
-        speed = self._speed(reached, enters[rows], s_m)
-        if speed is None:
+        young = bodies.age_s < self._config.prediction.confirm_s
+        speed = self._speed(reached, young, enters[rows], s_m)
+        if math.isinf(speed):
             return None
         go = comfortable(self._limits, motion, np.array([chosen_mps]))
         if gets_through(go, s_m, self.times_s, reached):
             return None
         now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
-        urgent = motion.v_mps > speed and bool(room(now, s_m, reached)[0] < 0.0)
-        row = int(np.argmin(np.where(rows, placed.lo_m[:, 0], np.inf)))
+        in_time = bool(room(now, s_m, reached)[0] >= 0.0)
+        if in_time and speed < motion.v_mps <= speed + _SOFT_MPS:
+            # Foresight may wait a moment; braking for every breath of noise would only delay going on.
+            speed = motion.v_mps
+        urgent = motion.v_mps > speed and not in_time
+        row = int(np.argmin(placed.lo_m[:, 0]))
         number = int(bodies.ids[row])
         gap_m = float(placed.lo_m[row, 0]) - s_m
         sentence = (
@@ -80,27 +87,37 @@ class WorstCase:
         )
         return Limit(speed, Reason("worst case", sentence, number, gap_m), urgent)
 
-    def _speed(self, reached: Reach, enters: NDArray[np.bool_], s_m: float) -> float | None:
-        """With foresight, but not below what suffices right beside them, nor, for those who keep clear, below
-        beside_mps."""
-        fails = np.flatnonzero(room(self._foreseen, s_m, reached) < 0.0)
-        if not len(fails):
-            return None
-        speed = float(self._speeds[max(int(fails[0]) - 1, 0)])
-        soon = self._speeds[stands_in_time(self._at_once, reached)]
-        speed = max(speed, float(soon.max(initial=0.0)))
+    def _speed(
+        self, reached: Reach, young: NDArray[np.bool_], enters: NDArray[np.bool_], s_m: float
+    ) -> float:
+        """inf: no need to slow.
+
+        For confirmed ones with foresight, but not below what suffices right beside them. What is hardly seen
+        yet may be confirmed first while there is time for that. Not below beside_mps for those who keep clear.
+        """
+        speed = self._greatest(self._foreseen, reached.select(~young), s_m)
+        if math.isfinite(speed):
+            soon = self._speeds[stands_in_time(self._at_once, reached)]
+            speed = max(speed, float(soon.max(initial=0.0)))
+        if young.any():
+            speed = min(speed, self._greatest(self._confirming, reached.select(young), s_m))
         beside_mps = self._config.prediction.beside_mps
         if speed >= beside_mps:
             return speed
-        fails = np.flatnonzero(room(self._foreseen, s_m, reached.select(enters)) < 0.0)
-        for_entering = float(self._speeds[max(int(fails[0]) - 1, 0)]) if len(fails) else math.inf
-        return max(speed, min(for_entering, beside_mps))
+        return max(speed, min(self._greatest(self._foreseen, reached.select(enters), s_m), beside_mps))
+
+    def _greatest(self, stopping: Stops, reached: Reach, s_m: float) -> float:
+        """The greatest speed whose stop stays short of everything; inf: all of them do."""
+        fails = np.flatnonzero(room(stopping, s_m, reached) < 0.0)
+        return float(self._speeds[max(int(fails[0]) - 1, 0)]) if len(fails) else math.inf
 
     def _prepare(self, latency_s: float) -> None:
         if latency_s == self._latency_s:
             return
         self._latency_s = latency_s
+        confirm_s = self._config.prediction.confirm_s
         self._foreseen = self._stops(self._speeds, 0.0, latency_s + _FORESIGHT_S)
+        self._confirming = self._stops(self._speeds, 0.0, latency_s + confirm_s)
         self._at_once = self._stops(self._speeds, 0.0, latency_s)
         self._furthest_m = float(self._foreseen.distance_m.max())
 
