@@ -39,12 +39,17 @@ class Prediction(Section):
     manoeuvre_mps2: float = Field(
         default=0.25, ge=0, le=5, description="by how much a moving obstacle may change its velocity"
     )
+    cut_in_mps2: float = Field(
+        default=1.0,
+        ge=0,
+        le=5,
+        description="the same, sideways, for who goes the robot's way: they do not see it and may cut in",
+    )
     beside_mps: float = Field(
         default=0.3,
         ge=0,
         le=2,
-        description="past somebody near whose measured motion keeps clear of the swept width (ISO 3691-4 knows "
-        "0.3 m/s for places where people are nearer than 0.5 m)",
+        description="past somebody near whose measured motion keeps clear of the swept width",
     )
     leader_decel_mps2: float = Field(
         default=1.0, gt=0, le=10, description="how hard an obstacle driving ahead may brake"

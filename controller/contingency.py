@@ -39,19 +39,22 @@ def reach(
     since_s: float,
     spread_mps: tuple[FloatArray, FloatArray],
     speed_mps: FloatArray,
-    manoeuvre_mps2: FloatArray,
+    manoeuvre_mps2: tuple[FloatArray, FloatArray],
     most_mps: float,
     margin_m: float,
 ) -> Reach:
     """Grow the bodies by what they could do in times_s (K,) from now; they were seen since_s ago.
 
-    spread_mps: by how much their velocities may be other than thought, along the path and across it, each
-    (N,). speed_mps (N,) measured speed, manoeuvre_mps2 (N,), most_mps the top speed of any obstacle.
+    spread_mps: by how much their velocities may be other than thought, manoeuvre_mps2: by how much they may
+    change them; each along the path and across it, (N,). speed_mps (N,) measured speed, most_mps the top
+    speed of any obstacle.
     """
     t = times_s + since_s
-    bent = 0.5 * manoeuvre_mps2[:, None] * t * t
     furthest = (most_mps + speed_mps)[:, None] * t
-    along, across = (np.minimum(spread[:, None] * t + bent, furthest) for spread in spread_mps)
+    along, across = (
+        np.minimum(spread[:, None] * t + 0.5 * change[:, None] * t * t, furthest)
+        for spread, change in zip(spread_mps, manoeuvre_mps2, strict=True)
+    )
     inside = placed.clear_m - across <= 0.0
     # Once in the way it may stay there: what it could block only grows.
     lo = np.where(inside, placed.lo_m - along - margin_m, np.inf)

@@ -22,7 +22,8 @@ from hal.types import FloatArray
 _STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
 _SPEEDS = 31
 # So much sooner than it would have to, the robot slows comfortably for the worst case.
-_FORESIGHT_S = 0.5
+_FORESIGHT_S = 0.25
+_GOES_MPS = 0.1
 _SOFT_MPS = 0.1
 
 
@@ -93,7 +94,7 @@ class WorstCase:
         """inf: no need to slow.
 
         For confirmed ones with foresight, but not below what suffices right beside them. What is hardly seen
-        yet may be confirmed first while there is time for that. Not below beside_mps for those who keep clear.
+        yet may be confirmed first while there is time for that. Those who keep clear are passed at beside_mps.
         """
         speed = self._greatest(self._foreseen, reached.select(~young), s_m)
         if math.isfinite(speed):
@@ -124,24 +125,27 @@ class WorstCase:
     def _reach(self, bodies: Bodies, placed: Placed, since_s: float) -> Reach:
         prediction = self._config.prediction
         heading = placed.heading_rad[:, 0]
-        _, _, sigma_s, sigma_d = velocity_on_path(bodies, heading)
-        tangent = np.stack((np.cos(heading), np.sin(heading)), axis=1)
-        beyond_s = np.abs((bodies.surprise_mps * tangent).sum(axis=1))
-        beyond_d = np.abs(
-            bodies.surprise_mps[:, 1] * tangent[:, 0] - bodies.surprise_mps[:, 0] * tangent[:, 1]
-        )
+        along, across, sigma_s, sigma_d = velocity_on_path(bodies, heading)
+        cos, sin = np.cos(heading), np.sin(heading)
+        beyond_x, beyond_y = bodies.surprise_mps.T
+        # Who goes the robot's way does not see it coming, and is beside it for long.
+        unaware = along > np.maximum(np.abs(across), _GOES_MPS)
+        sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
         return reach(
             placed,
             self.times_s,
             since_s,
-            (
-                np.maximum(prediction.sigmas * sigma_s, beyond_s),
-                np.maximum(prediction.sigmas * sigma_d, beyond_d),
+            spread_mps=(
+                np.maximum(prediction.sigmas * sigma_s, np.abs(beyond_x * cos + beyond_y * sin)),
+                np.maximum(prediction.sigmas * sigma_d, np.abs(beyond_y * cos - beyond_x * sin)),
             ),
-            np.hypot(bodies.velocity_mps[:, 0], bodies.velocity_mps[:, 1]),
-            np.where(bodies.moving, prediction.manoeuvre_mps2, 0.0),
-            self._limits.max_obstacle_speed_mps,
-            self._config.margins.least_m,
+            speed_mps=np.hypot(along, across),
+            manoeuvre_mps2=(
+                np.where(bodies.moving, prediction.manoeuvre_mps2, 0.0),
+                np.where(bodies.moving, sideways, 0.0),
+            ),
+            most_mps=self._limits.max_obstacle_speed_mps,
+            margin_m=self._config.margins.least_m,
         )
 
     def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:

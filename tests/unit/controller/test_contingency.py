@@ -25,7 +25,7 @@ def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, s
         since_s,
         (np.full(len(body), sigma_mps), np.full(len(body), sigma_mps)),
         speed,
-        np.full(len(body), manoeuvre_mps2),
+        (np.full(len(body), manoeuvre_mps2), np.full(len(body), manoeuvre_mps2)),
         most_mps=1.5,
         margin_m=0.2,
     )
