@@ -94,7 +94,7 @@ class WorstCase:
         """inf: no need to slow.
 
         For confirmed ones with foresight, but not below what suffices right beside them. What is hardly seen
-        yet may be confirmed first while there is time for that. Those who keep clear are passed at beside_mps.
+        yet may be confirmed first while there is time for that. Who keeps clear is passed at beside_mps.
         """
         speed = self._greatest(self._foreseen, reached.select(~young), s_m)
         if math.isfinite(speed):
