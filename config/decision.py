@@ -86,6 +86,7 @@ class Release(Section):
     hold_s: float = Field(
         default=2.0, ge=0, le=30, description="no increase sooner than this after a decrease began"
     )
+    worth_mps: float = Field(default=0.1, ge=0, le=1, description="a smaller gain is no reason to go faster")
     dead_band_mps: float = Field(default=0.03, gt=0, le=0.5, description="a smaller difference means keep")
     creep_mps: float = Field(default=0.06, ge=0, le=0.5, description="a slower target means stop")
     go_m: float = Field(

@@ -12,6 +12,7 @@ from controller import braking
 from controller.bodies import Bodies, no_bodies
 from controller.corridor import place, velocity_on_path
 from controller.crossing import comes_in
+from controller.debounce import Debounced
 from controller.decision import Reason
 from controller.knowledge import Knowledge
 from controller.limits import Gap, Limit, Motion, allowed, stop_before
@@ -22,6 +23,9 @@ from hal.types import CameraMount
 
 _COARSE_S = 0.5
 _SAME_SURFACE_M = 0.8
+# So long somebody must head for the way until he counts as coming in, and head elsewhere until he does not;
+# meanwhile the worst case is what is reckoned with.
+_SETTLES_S = 0.3
 
 
 class Appraiser:
@@ -36,6 +40,7 @@ class Appraiser:
         self._inside: set[int] = set()
         self._standing = StandingLimits(config, limits, mount, self._inside)
         self._moving = MovingLimits(config, limits, self._times_s, self._inside)
+        self._enters = Debounced(_SETTLES_S)
         self._of: Bodies | None = None
         self._watched = no_bodies(0)
 
@@ -57,7 +62,9 @@ class Appraiser:
         )
         _, _, _, sigma_d = velocity_on_path(watched, placed.heading_rad[:, 0])
         sigma_d = sigma_d * self._config.prediction.sigmas
-        enters = comes_in(placed, self._times_s, sigma_d)
+        enters = self._enters.update(
+            watched.ids, comes_in(placed, self._times_s, sigma_d), placed.clear_m[:, 0] <= 0.0, now_s
+        )
         base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
         in_the_way, chosen_mps = self._moving.limits(
             watched, placed, sigma_d, enters, s_m, motion, base_mps, now_s

@@ -172,7 +172,7 @@ class DecisionMaker:
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
             self._last = watched
-        gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns)
+        gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
         target_mps = min(gated_mps, on_way.speed_mps)
         reason = self._reason(watched, on_way, raw_mps, gated_mps)
         self._emergency = self._brakes_hard(limits, target_mps, motion)

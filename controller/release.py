@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 from config.decision import Release
@@ -13,7 +14,7 @@ class ReleaseGate:
 
     The target rises to the least that was allowed during delay_s, so one free moment is no reason to go, nor
     one good number a reason to go fast. After it has turned from faster to slower, it does not turn again
-    within hold_s: in hold_s it can turn round at most twice.
+    within hold_s, and then only for a gain of worth_mps: in hold_s it can turn round at most twice.
     """
 
     def __init__(self, config: Release) -> None:
@@ -25,9 +26,14 @@ class ReleaseGate:
         # Of what was allowed during delay_s: (when, how much), growing, so the first is the least.
         self._lately: deque[tuple[int, float]] = deque()
 
-    def step(self, raw_mps: float, v_mps: float, let_go_mps: float, now_ns: int) -> float:
-        """The target to use. let_go_mps: the speed that remains when the present deceleration is let go of,
-        which may be kept at any time: that is no increase."""
+    def step(
+        self, raw_mps: float, v_mps: float, let_go_mps: float, now_ns: int, most_mps: float = math.inf
+    ) -> float:
+        """The target to use.
+
+        let_go_mps: the speed that remains when the present deceleration is let go of, which may be kept at
+        any time: that is no increase. most_mps: what the path allows, for which nothing is held back.
+        """
         band = self._config.dead_band_mps
         least_mps = self._least_lately(raw_mps, now_ns)
         if raw_mps < self._held_mps - band or raw_mps <= 0.0:
@@ -36,7 +42,10 @@ class ReleaseGate:
             self._held_mps = raw_mps
         elif least_mps > self._held_mps:
             self._raise(least_mps, let_go_mps, now_ns)
-        target_mps = self._held_mps if self._may_turn(now_ns) else min(self._held_mps, v_mps)
+        target_mps = self._held_mps
+        hardly = not self._went_faster and min(target_mps, most_mps) < v_mps + self._config.worth_mps
+        if hardly or not self._may_turn(now_ns):
+            target_mps = min(target_mps, v_mps)
         self._note_turn(target_mps, v_mps, now_ns)
         return target_mps
 

@@ -191,18 +191,29 @@ def _at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, rea
 
 
 def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
-    """The step at which what was touched could first be seen as what it is; None: not before the contact."""
+    """The step at which what was touched could first be seen as what it is; None: not before the contact.
+
+    Somebody who stood meanwhile is seen as what it is once it moves again: nobody sees in who stands that it
+    will go on.
+    """
+    body, first = contact.body, None
+    moves = bool(stage.world.moves[body])
     for k in range(0, len(log.times_s), _SIGHT_STEPS):
         if log.times_s[k] >= contact.t_s:
-            return None
+            break
         polygons, velocity = stage.world.look(log.times_s[k])
-        if stage.world.moves[contact.body] and math.hypot(*velocity[contact.body]) < _SEEN_MOVING_MPS:
+        if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
+            first = None
             continue
-        view = eye.look(polygons, PlanarPose(*log.poses[k]))
-        column = np.flatnonzero(view.bodies == contact.body)
-        if len(column) and np.isfinite(view.forward_m[:, column[0]]).any():
-            return k
-    return None
+        if first is None and _in_view(body, polygons, PlanarPose(*log.poses[k]), eye):
+            first = k
+    return first
+
+
+def _in_view(body: int, polygons: FloatArray, pose: PlanarPose, eye: PlanarEye) -> bool:
+    view = eye.look(polygons, pose)
+    column = np.flatnonzero(view.bodies == body)
+    return bool(len(column) and np.isfinite(view.forward_m[:, column[0]]).any())
 
 
 def _touches(

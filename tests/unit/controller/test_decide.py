@@ -97,8 +97,8 @@ class Bench:
     def settle(
         self, *obstacles: Obstacle, v_mps: float = 1.0, x_m: float = 0.0, free: FreeSpace | None = None
     ) -> Decision:
-        """The same scene for ten frames."""
-        for _ in range(10):
+        """The same scene for twenty frames."""
+        for _ in range(20):
             decision = self.step(self.scene(*obstacles, x_m=x_m, free=free), v_mps, x_m=x_m)
         return decision
 

@@ -1,0 +1,33 @@
+"""A yes or no for each obstacle that does not change with every frame's noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+BoolArray = NDArray[np.bool_]
+
+
+class Debounced:
+    """A flag turns round when it has been seen otherwise for settle_s without a break."""
+
+    def __init__(self, settle_s: float) -> None:
+        self._settle_s = settle_s
+        self._flags: dict[int, bool] = {}
+        self._otherwise_since_s: dict[int, float] = {}
+
+    def update(self, ids: NDArray[np.int64], seen: BoolArray, at_once: BoolArray, now_s: float) -> BoolArray:
+        """(N,) the flags of ids at now_s; who is not among them is forgotten. at_once: where a yes needs no
+        time to settle. Somebody new begins with no."""
+        flags, since = {}, {}
+        for number, yes, now in zip(ids.tolist(), seen.tolist(), at_once.tolist(), strict=True):
+            flag = self._flags.get(number, False)
+            if yes != flag:
+                began_s = self._otherwise_since_s.get(number, now_s)
+                if (yes and now) or now_s - began_s >= self._settle_s:
+                    flag = yes
+                else:
+                    since[number] = began_s
+            flags[number] = flag
+        self._flags, self._otherwise_since_s = flags, since
+        return np.fromiter(flags.values(), np.bool_, len(flags))
