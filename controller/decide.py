@@ -15,7 +15,7 @@ from controller import braking
 from controller.appraise import Appraiser
 from controller.decision import Action, Decision, Reason
 from controller.knowledge import Knowledge
-from controller.limits import BLOCKING_RULES, Limit, Motion, allowed
+from controller.limits import BLOCKING_RULES, STANDING_MPS, Limit, Motion, allowed
 from controller.path import OnPath, Path
 from controller.release import ReleaseGate
 from hal.clocks import NS_PER_S
@@ -24,7 +24,6 @@ from vision.scene import CameraCondition, Scene
 
 __all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
 
-_STANDING_MPS = 0.01
 _BACKWARDS_MPS = -0.05
 _OVER_COMFORT_MPS = 0.05
 # The target point is closed in on by the shaper; the limit that is reported for it must not do so earlier.
@@ -104,7 +103,7 @@ class DecisionMaker:
         v = v_mps if math.isfinite(v_mps) else 0.0
         self._gate.step(0.0, v, 0.0, now_ns)
         self._stuck_since_ns = None
-        moving = abs(v) > _STANDING_MPS
+        moving = abs(v) > STANDING_MPS
         return Decision(
             Action.DECREASE if moving else Action.KEEP,
             0.0,
@@ -187,7 +186,7 @@ class DecisionMaker:
             return limit.speed_mps
         release = self._config.release
         least = release.creep_mps
-        if motion.v_mps <= _STANDING_MPS:
+        if motion.v_mps <= STANDING_MPS:
             least = max(least, braking.speed_for_distance(release.go_m, self._comfort))
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
@@ -209,14 +208,14 @@ class DecisionMaker:
 
     def _brakes_hard(self, limits: list[Limit], target_mps: float, motion: Motion) -> bool:
         """From the moment when comfort would be too late until it suffices again."""
-        if motion.v_mps <= _STANDING_MPS:
+        if motion.v_mps <= STANDING_MPS:
             return False
         urgent = any(limit.urgent for limit in limits)
         return urgent or (self._emergency and motion.v_mps > target_mps + _OVER_COMFORT_MPS)
 
     def _note_stuck(self, target_mps: float, motion: Motion, reason: Reason, now_ns: int) -> None:
         blocked = reason.rule in BLOCKING_RULES or reason.rule == "release"
-        if motion.v_mps > _STANDING_MPS or target_mps > 0.0 or not blocked:
+        if motion.v_mps > STANDING_MPS or target_mps > 0.0 or not blocked:
             self._stuck_since_ns = None
         elif self._stuck_since_ns is None:
             self._stuck_since_ns = now_ns
@@ -225,7 +224,7 @@ class DecisionMaker:
         band = self._config.release.dead_band_mps
         if target_mps > v_mps + band:
             return Action.INCREASE
-        stopping = target_mps == 0.0 and v_mps > _STANDING_MPS
+        stopping = target_mps == 0.0 and v_mps > STANDING_MPS
         if target_mps < v_mps - band or stopping:
             return Action.DECREASE
         return Action.KEEP

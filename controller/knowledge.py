@@ -11,6 +11,7 @@ from config.decision import DecisionConfig
 from config.robot import Body
 from controller.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.corridor import Corridor
+from controller.limits import STANDING_MPS
 from controller.localise import PoseHistory
 from controller.memory import OutOfView
 from controller.path import OnPath, Path
@@ -23,7 +24,6 @@ from vision.scene import CameraCondition, CameraHealth, Scene
 # A wall or a rack is not a box: as a box it would reach into the corridor wherever the path bends. Its
 # surface in the corridor is what depth sees (controller/sight.py).
 _SPRAWLING_M = 0.8
-_STANDING_MPS = 0.01
 _BEFORE_NS = 200_000_000
 _SAME_PLACE_M = 0.25
 _SETTLED_S = 0.5
@@ -104,7 +104,7 @@ class Knowledge:
         s_m = self.corridor.path.project(pose, on_path.s_m).s_m
         sprawling = ~seen.moving & (np.maximum(seen.half_view_m, seen.half_across_m) > _SPRAWLING_M)
         boxes = self._steady.update(self._recognise(seen.select(~sprawling)))
-        standing = v_mps <= _STANDING_MPS
+        standing = v_mps <= STANDING_MPS
         if len(scene.free_space.bearing_tan):
             self.edge_tan = (
                 float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan

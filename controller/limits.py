@@ -10,6 +10,7 @@ from controller.decision import Reason
 
 # So far the front may be past the near side of something that still counts as ahead.
 ALONGSIDE_M = 0.1
+STANDING_MPS = 0.01
 
 # Rules of a Reason that mean: something stands or moves in the way.
 BLOCKING_RULES = frozenset({"static", "oncoming", "leader", "crossing", "depth", "unseen", "worst case"})

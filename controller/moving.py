@@ -16,7 +16,7 @@ from controller.bodies import Bodies
 from controller.corridor import Placed, velocity_on_path
 from controller.crossing import Choice, Conflict, choices, find_conflicts
 from controller.decision import Reason
-from controller.limits import ALONGSIDE_M, Gap, Limit, Motion, allowed, stop_before
+from controller.limits import ALONGSIDE_M, STANDING_MPS, Gap, Limit, Motion, allowed, stop_before
 from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
 
@@ -67,7 +67,9 @@ class MovingLimits:
             self.nobody()
             return [], base_mps
         along, _, sigma_s, _ = velocity_on_path(bodies, placed.heading_rad[:, 0])
-        conflicts = self._conflicts(bodies, placed, s_m, sigma_d_mps, rows, now_s)
+        # Nobody starts while somebody is about to walk into his side; who drives is past before that.
+        behind_m = math.inf if motion.v_mps <= STANDING_MPS else ALONGSIDE_M
+        conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, sigma_d_mps, rows, now_s)
         if not conflicts:
             return [], base_mps
         ramps = comfortable(self._limits, motion, self._speeds)
@@ -83,6 +85,7 @@ class MovingLimits:
         bodies: Bodies,
         placed: Placed,
         s_m: float,
+        from_s_m: float,
         sigma_d_mps: FloatArray,
         rows: NDArray[np.intp],
         now_s: float,
@@ -93,7 +96,7 @@ class MovingLimits:
         found = [
             one
             for one in find_conflicts(placed, self._times_s, sigma_d_mps, beside_m, rows)
-            if one.hi_in_m > s_m and one.lo_in_m > s_m - ALONGSIDE_M
+            if one.hi_in_m > s_m and one.lo_in_m > from_s_m
         ]
         numbers = {int(bodies.ids[one.row]) for one in found}
         self._inside |= numbers
