@@ -47,8 +47,8 @@ class Appraiser:
     def limits(
         self, known: Knowledge, s_m: float, motion: Motion, base_mps: float, now_s: float
     ) -> list[Limit]:
-        """Every limit that obstacles and depth put on the speed of a robot at s_m; base_mps: what the path
-        allows."""
+        """Every limit that obstacles and depth put on the speed of a robot at s_m; base_mps: what path
+        and camera allow."""
         if known.bodies is not self._of:
             self._take_in(known.bodies)
         found = self._depth(known, s_m, motion)
@@ -58,7 +58,7 @@ class Appraiser:
             self._moving.nobody()
             return found
         placed = place(
-            watched, known.corridor, known.age_s + self._times_s, s_m, self._config.sight.range_m + 2.0
+            watched, known.corridor, known.since_s + self._times_s, s_m, self._config.sight.range_m + 2.0
         )
         _, _, _, sigma_d = velocity_on_path(watched, placed.heading_rad[:, 0])
         sigma_d = sigma_d * self._config.prediction.sigmas
@@ -70,7 +70,7 @@ class Appraiser:
             watched, placed, sigma_d, enters, s_m, motion, base_mps, now_s
         )
         found += in_the_way
-        worst = self._worst_case.limit(watched, placed, enters, s_m, motion, known.age_s, chosen_mps)
+        worst = self._worst_case.limit(watched, placed, enters, s_m, motion, known.since_s, chosen_mps)
         if worst is not None:
             found.append(worst)
         return found

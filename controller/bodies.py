@@ -29,7 +29,7 @@ class Bodies:
     ids (N,). xy_m (N, 2) centre. velocity_mps (N, 2) over ground, 0 for what stands. surprise_mps (N, 2) by
     how much the newest measurement differs from that. covariance (N, 2, 2) of the velocity. half_view_m,
     half_across_m (N,) half sizes along and across view_rad (N,), the direction it was seen in. top_m (N,)
-    height. moving (N,). age_s (N,) at captured_ns.
+    height. moving (N,). age_s, unseen_s (N,) since they were seen first and last, at captured_ns.
     """
 
     captured_ns: int
@@ -44,6 +44,7 @@ class Bodies:
     top_m: FloatArray
     moving: NDArray[np.bool_]
     age_s: FloatArray
+    unseen_s: FloatArray
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -89,6 +90,7 @@ def no_bodies(captured_ns: int) -> Bodies:
         n,
         np.zeros(0, np.bool_),
         n,
+        n,
     )
 
 
@@ -105,7 +107,8 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     speed = np.array([one.velocity_mps for one in scene.obstacles], np.float64)
     spread = np.array([one.velocity_cov for one in scene.obstacles], np.float64)
     age = np.array([one.age_s for one in scene.obstacles], np.float64)
-    _check(scene.obstacles, optical, extent, speed, spread, age)
+    unseen = np.array([one.unseen_s for one in scene.obstacles], np.float64)
+    _check(scene.obstacles, optical, extent, speed, spread, age, unseen)
     camera = camera_in_floor(pose, mount)
     floor = camera.rotation[:2]
     position = camera.apply(optical)
@@ -127,6 +130,7 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
         top_m=position[:, 2] + extent[:, 1] / 2.0,
         moving=moving,
         age_s=age,
+        unseen_s=unseen,
     )
 
 
@@ -137,6 +141,7 @@ def _check(
     velocity: FloatArray,
     covariance: FloatArray,
     age: FloatArray,
+    unseen: FloatArray,
 ) -> None:
     """Written so that NaN fails every comparison."""
     flat = covariance.reshape(len(obstacles), -1)
@@ -147,6 +152,7 @@ def _check(
         & np.isfinite(flat).all(axis=1)
         & (np.diagonal(covariance, axis1=1, axis2=2) >= 0.0).all(axis=1)
         & (age >= 0.0)
+        & (unseen >= 0.0)
     )
     if reasonable.all():
         return

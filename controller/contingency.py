@@ -36,20 +36,20 @@ class Reach:
 def reach(
     placed: Placed,
     times_s: FloatArray,
-    since_s: float,
+    since_s: FloatArray,
     spread_mps: tuple[FloatArray, FloatArray],
     speed_mps: FloatArray,
     manoeuvre_mps2: tuple[FloatArray, FloatArray],
     most_mps: float,
     margin_m: float,
 ) -> Reach:
-    """Grow the bodies by what they could do in times_s (K,) from now; they were seen since_s ago.
+    """Grow the bodies by what they could do in times_s (K,) from now; they were seen since_s (N,) ago.
 
     spread_mps: by how much their velocities may be other than thought, manoeuvre_mps2: by how much they may
     change them; each along the path and across it, (N,). speed_mps (N,) measured speed, most_mps the top
     speed of any obstacle.
     """
-    t = times_s + since_s
+    t = times_s + since_s[:, None]
     furthest = (most_mps + speed_mps)[:, None] * t
     along, across = (
         np.minimum(spread[:, None] * t + 0.5 * change[:, None] * t * t, furthest)

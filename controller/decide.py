@@ -74,8 +74,8 @@ class DecisionMaker:
             return Decision(self._action(0.0, v_mps), 0.0, reason)
         motion = Motion(v_mps, a_mps2, self._latency_s)
         way = self._path_limits(path, on_path, motion)
-        base_mps = min(limit.speed_mps for limit in way)
         limits = self._camera_limits(known)
+        base_mps = min(limit.speed_mps for limit in (*way, *limits))
         if known.age_s >= 0.0:
             limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(way, limits, motion, now_ns)

@@ -46,7 +46,7 @@ class Knowledge:
         self.bodies = self.sprawling = no_bodies(0)
         self.health = _GOOD
         self.fault = "no scene yet"
-        self.age_s = float("inf")
+        self.age_s = self.since_s = float("inf")
         self._mount, self._config = mount, config
         self._poses = PoseHistory()
         self._boxes = no_bodies(0)
@@ -71,6 +71,7 @@ class Knowledge:
             self._scene_fault = self._order_fault(scene) or self._learn(scene, on_path, v_mps)
         if self._captured_ns is not None:
             self.age_s = (now_ns - self._captured_ns) / NS_PER_S
+            self.since_s = (now_ns - self.bodies.captured_ns) / NS_PER_S
         self.fault = self._judge()
 
     def _order_fault(self, scene: Scene) -> str:
@@ -93,7 +94,13 @@ class Knowledge:
         return ""
 
     def _learn(self, scene: Scene, on_path: OnPath, v_mps: float) -> str:
-        """Returns what is wrong with the scene, "" if nothing is."""
+        """Returns what is wrong with the scene, "" if nothing is.
+
+        Of a camera that cannot be trusted nothing but that is taken in: who was seen before goes on.
+        """
+        if scene.health.condition is CameraCondition.UNTRUSTWORTHY:
+            self.health, self._captured_ns = scene.health, scene.captured_ns
+            return ""
         pose = scene.robot_pose or self._poses.at(scene.captured_ns)
         if pose is None:
             return "where the robot was when the scene was taken is not known"

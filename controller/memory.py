@@ -17,14 +17,14 @@ BoolArray = NDArray[np.bool_]
 _SAME_PLACE_M = 0.25
 # What was seen for less than this is not believed once it is gone.
 _SETTLED_S = 0.5
-_MOVING_KEPT_S, _COMING_KEPT_S = 2.0, 6.0
+_MOVING_KEPT_S, _MAY_COME_KEPT_S = 2.0, 6.0
 # The height of what is seen only in part is known no better.
 _UNCERTAIN_M = 0.1
 
 
 class OutOfView:
     """Standing bodies are kept until their place is seen again or has been passed, moving ones go on as they
-    did: for a while, or, where that leads them before the robot, until they must have come into view again.
+    did: for a while, or, where they may come before the robot, until they must have come into view again.
     near_m: ahead of the camera, nearer than this the floor is not seen."""
 
     def __init__(self, mount: CameraMount, near_m: float) -> None:
@@ -47,10 +47,17 @@ class OutOfView:
             return no_bodies(seen.captured_ns)
         since = np.concatenate((self._since_s, np.zeros(int(gone.sum())))) + dt_s
         bodies = self._bodies.joined(before.select(gone))
-        bodies = replace(bodies, captured_ns=seen.captured_ns, xy_m=bodies.xy_m + bodies.velocity_mps * dt_s)
+        bodies = replace(
+            bodies,
+            captured_ns=seen.captured_ns,
+            xy_m=bodies.xy_m + bodies.velocity_mps * dt_s,
+            unseen_s=bodies.unseen_s + dt_s,
+        )
         part = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M).any(axis=1)
         kept = self._hidden(bodies, pose, edge_tan) & ~part & _missing(bodies.ids, seen.ids)
-        kept &= ~bodies.moving | (since <= np.where(_comes(bodies, pose), _COMING_KEPT_S, _MOVING_KEPT_S))
+        kept &= ~bodies.moving | (
+            since <= np.where(_may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
+        )
         self._bodies, self._since_s = bodies.select(kept), since[kept]
         return self._bodies
 
@@ -68,12 +75,13 @@ class OutOfView:
         return hidden
 
 
-def _comes(bodies: Bodies, pose: PlanarPose) -> BoolArray:
-    """(N,) towards the robot's axis, from either side."""
+def _may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:
+    """(N,) towards the robot's axis, from either side, or along with the robot: that is how one cuts in."""
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     left = (bodies.xy_m[:, 1] - pose.y_m) * cos - (bodies.xy_m[:, 0] - pose.x_m) * sin
     leftward = bodies.velocity_mps[:, 1] * cos - bodies.velocity_mps[:, 0] * sin
-    comes: BoolArray = left * leftward < 0.0
+    forward = bodies.velocity_mps[:, 0] * cos + bodies.velocity_mps[:, 1] * sin
+    comes: BoolArray = (left * leftward < 0.0) | (forward > np.abs(leftward))
     return comes
 
 

@@ -55,9 +55,9 @@ class WorstCase:
     ) -> Limit | None:
         """The greatest speed from which the robot at s_m could still stand in time; None: no need to slow.
 
-        placed: the bodies, seen since_s ago; its first times are times_s. enters (N,): whose motion as it was
-        measured leads into the way. chosen_mps: what is driven if nothing happens; where that gets through
-        whatever they do, the robot need not be able to stop.
+        placed: the bodies, since_s after their scene; its first times are times_s. enters (N,): whose motion
+        as it was measured leads into the way. chosen_mps: what is driven if nothing happens; where that gets
+        through whatever they do, the robot need not be able to stop.
         """
         rows = placed.lo_m[:, 0] > s_m - ALONGSIDE_M
         if not rows.any():
@@ -128,13 +128,14 @@ class WorstCase:
         along, across, sigma_s, sigma_d = velocity_on_path(bodies, heading)
         cos, sin = np.cos(heading), np.sin(heading)
         beyond_x, beyond_y = bodies.surprise_mps.T
-        # Who goes the robot's way does not see it coming, and is beside it for long.
+        # Who goes the robot's way does not see it coming, is beside it for long, and may have turned since it
+        # left the view; who comes towards it sees it and goes on.
         unaware = along > np.maximum(np.abs(across), _GOES_MPS)
         sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
         return reach(
             placed,
             self.times_s,
-            since_s,
+            since_s + np.where(unaware, bodies.unseen_s, 0.0),
             spread_mps=(
                 np.maximum(prediction.sigmas * sigma_s, np.abs(beyond_x * cos + beyond_y * sin)),
                 np.maximum(prediction.sigmas * sigma_d, np.abs(beyond_y * cos - beyond_x * sin)),

@@ -47,4 +47,5 @@ def box(
         top_m=np.array([top_m]),
         moving=np.array([vx_mps != 0.0 or vy_mps != 0.0]),
         age_s=np.array([age_s]),
+        unseen_s=np.zeros(1),
     )

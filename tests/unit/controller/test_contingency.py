@@ -22,7 +22,7 @@ def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, s
     return reach(
         placed,
         TIMES,
-        since_s,
+        np.full(len(body), since_s),
         (np.full(len(body), sigma_mps), np.full(len(body), sigma_mps)),
         speed,
         (np.full(len(body), manoeuvre_mps2), np.full(len(body), manoeuvre_mps2)),
