@@ -74,6 +74,13 @@ class Sight(Section):
     memory_s: float = Field(
         default=1.0, ge=0, le=10, description="how long floor that was seen free counts as free"
     )
+    blind_corner_m: float = Field(
+        default=1.0,
+        ge=0,
+        le=5,
+        description="the end of a rack or wall so near beside the swept width is a blind corner (0: none is)",
+    )
+    blind_corner_mps: float = Field(default=0.8, gt=0, le=5, description="past a blind corner")
     known_share: float = Field(
         default=0.6, gt=0, le=1, description="share of the corridor's width that must be seen as free"
     )

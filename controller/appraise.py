@@ -9,6 +9,7 @@ import numpy as np
 from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
+from controller.blind_corners import BlindCorner
 from controller.bodies import Bodies, no_bodies
 from controller.corridor import place, velocity_on_path
 from controller.crossing import comes_in
@@ -85,7 +86,7 @@ class Appraiser:
         """The nearest unexplained surface, and the end of the floor that was seen to be free."""
         margins, sight = self._config.margins, known.sight
         front_m = s_m + known.corridor.front_m
-        found: list[Limit] = []
+        found = self._corner(sight.corners.nearest(front_m), front_m, motion)
         if math.isfinite(sight.surface_s_m):
             gap = Gap(sight.surface_s_m - front_m, obstacle_id=_owner(known, sight.surface_s_m, s_m))
             found.append(
@@ -107,6 +108,18 @@ class Appraiser:
             )
             found.append(Limit(limit.speed_mps, reason))
         return found
+
+    def _corner(self, corner: BlindCorner | None, front_m: float, motion: Motion) -> list[Limit]:
+        """Past a blind corner, slow enough that whoever steps out has a chance."""
+        if corner is None:
+            return []
+        ahead_m = corner.s_m - front_m
+        slow_mps = self._config.sight.blind_corner_mps
+        speed = braking.speed_before_section(
+            ahead_m - motion.v_mps * motion.latency_s, slow_mps, self._comfort
+        )
+        sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
+        return [Limit(speed, Reason("corner", sentence + allowed(speed), distance_m=ahead_m))]
 
 
 def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:

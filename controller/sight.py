@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
+from controller.blind_corners import BlindCorners
 from controller.bodies import Bodies
 from controller.corridor import Corridor
 from hal.clocks import NS_PER_S
@@ -36,6 +37,7 @@ class Sight:
     surface_s_m: where the nearest unexplained surface stands in the corridor (path coordinate of its nearest
     point, inf: none), steady against single frames; newest_surface_s_m: the same of the newest frame alone.
     known_s_m: the corridor was seen free up to here. points_m (P, 2): every surface of the newest scene.
+    corners: where somebody could step out from behind something.
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class Sight:
         self.surface_s_m = self.newest_surface_s_m = math.inf
         self.known_s_m = self._consent_s_m
         self.points_m: FloatArray = np.zeros((0, 2))
+        self.corners = BlindCorners(config.sight)
 
     def look(
         self,
@@ -68,7 +71,21 @@ class Sight:
         bands = np.flatnonzero(np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan))
         forward = free.nearest_m[bands]
         self.points_m = points = self._surface_points(forward, free.bearing_tan[bands], pose)
-        surface_s, inside = self._in_corridor(points, forward * free.half_width_tan, s_m)
+        surface_s, surface_d = self._corridor.path.project_points(
+            points, s_m, s_m + self._sight.range_m + 2.0
+        )
+        half_width = self._corridor.half_width(surface_s)
+        side = np.abs(surface_d) - forward * free.half_width_tan
+        inside = (side <= half_width + self._lateral_m) & (surface_s > s_m)
+        self.corners.look(
+            bands,
+            forward,
+            surface_s,
+            surface_d,
+            half_width,
+            2.0 * free.half_width_tan,
+            s_m + self._corridor.front_m,
+        )
         reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
         way_s = surface_s[inside]
         if len(way_s):
@@ -85,13 +102,6 @@ class Sight:
         left = self._mount.left_m - forward * bearing
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         return np.stack((pose.x_m + ahead * cos - left * sin, pose.y_m + ahead * sin + left * cos), axis=1)
-
-    def _in_corridor(
-        self, points: FloatArray, half_band_m: FloatArray, s_m: float
-    ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        s, d = self._corridor.path.project_points(points, s_m, s_m + self._sight.range_m + 2.0)
-        side = np.abs(d) - half_band_m
-        return s, (side <= self._corridor.half_width(s) + self._lateral_m) & (s > s_m)
 
     def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
         nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
