@@ -11,7 +11,7 @@ from config.robot import Limits
 from controller import braking
 from controller.blind_corners import BlindCorner
 from controller.bodies import Bodies, no_bodies
-from controller.corridor import place, velocity_on_path
+from controller.corridor import course_of, place
 from controller.crossing import comes_in
 from controller.debounce import Debounced
 from controller.decision import Reason
@@ -61,17 +61,19 @@ class Appraiser:
         placed = place(
             watched, known.corridor, known.since_s + self._times_s, s_m, self._config.sight.range_m + 2.0
         )
-        _, _, _, sigma_d = velocity_on_path(watched, placed.heading_rad[:, 0])
-        sigma_d = sigma_d * self._config.prediction.sigmas
+        course = course_of(watched, placed.heading_rad[:, 0])
+        sigma_left = course.sigma_left_mps * self._config.prediction.sigmas
         enters = self._enters.update(
-            watched.ids, comes_in(placed, self._times_s, sigma_d), placed.clear_m[:, 0] <= 0.0, now_s
+            watched.ids, comes_in(placed, self._times_s, sigma_left), placed.clear_m[:, 0] <= 0.0, now_s
         )
         base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
         in_the_way, chosen_mps = self._moving.limits(
-            watched, placed, sigma_d, enters, s_m, motion, base_mps, now_s
+            watched, placed, course, enters, s_m, motion, base_mps, now_s
         )
         found += in_the_way
-        worst = self._worst_case.limit(watched, placed, enters, s_m, motion, known.since_s, chosen_mps)
+        worst = self._worst_case.limit(
+            watched, placed, course, enters, s_m, motion, known.since_s, chosen_mps
+        )
         if worst is not None:
             found.append(worst)
         return found

@@ -32,12 +32,13 @@ class Corridor:
         radius = 1.0 / np.maximum(bend, 1e-9)
         outer = np.sqrt((radius + half_m) ** 2 + overhang_m**2) - radius
         self._half_width = np.where(bend > 1e-6, outer, half_m)
-        self._even_m = half_m if not (bend > 1e-6).any() else None
+        self.straight = not (bend > 1e-6).any()
+        self._half_m = half_m
 
     def half_width(self, s_m: FloatArray) -> FloatArray:
         """Half of the swept width at s_m, in metres; on bends the outer corner's, on both sides."""
-        if self._even_m is not None:
-            return np.full(s_m.shape, self._even_m)
+        if self.straight:
+            return np.full(s_m.shape, self._half_m)
         return np.interp(s_m, self._s, self._half_width)
 
 
@@ -48,7 +49,8 @@ class Placed:
     s_m, d_m: centre. heading_rad: of the path there. half_s_m, half_d_m: half sizes along and across the
     path. half_width_m: of the swept corridor there. lo_m, hi_m: between these positions of the robot's
     turning centre, the robot's length and the body's overlap along the path. clear_m: free floor between the
-    body's side and the swept corridor; negative: inside it.
+    body's side and the swept corridor; negative: inside it. (On a straight path heading and half sizes are
+    (N, 1): they do not change.)
     """
 
     s_m: FloatArray
@@ -63,6 +65,8 @@ class Placed:
 
     def select(self, rows: NDArray[np.bool_], count: int) -> Placed:
         """Only these bodies, at the first count times."""
+        if rows.all():
+            return Placed(*(getattr(self, name)[:, :count] for name in Placed.__slots__))
         return Placed(*(getattr(self, name)[rows, :count] for name in Placed.__slots__))
 
 
@@ -82,6 +86,8 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
         values[standing] = located[: len(standing), None]
         values[moving] = located[len(standing) :].reshape(-1, steps)
     s, d, heading = found
+    if corridor.straight:
+        heading = heading[:, :1]
     turned = bodies.view_rad[:, None] - heading
     cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
     along, across = bodies.half_view_m[:, None], bodies.half_across_m[:, None]
@@ -91,19 +97,38 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
     return Placed(s, d, heading, half_s, half_d, half_width, lo, hi, np.abs(d) - half_d - half_width)
 
 
-def velocity_on_path(bodies: Bodies, heading_rad: FloatArray) -> tuple[FloatArray, ...]:
-    """Of each body where the path has heading_rad (N,): speed along it, to its left, and the standard
-    deviation of either."""
-    tangent = np.stack((np.cos(heading_rad), np.sin(heading_rad)), axis=1)
-    normal = np.stack((-tangent[:, 1], tangent[:, 0]), axis=1)
-    return (
-        np.sum(bodies.velocity_mps * tangent, axis=1),
-        np.sum(bodies.velocity_mps * normal, axis=1),
-        _sigma(bodies.covariance, tangent),
-        _sigma(bodies.covariance, normal),
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """How N bodies go, seen from the path where they are: speed along it and to its left, the standard
+    deviation of either, and by how much the newest measurement differs; each (N,)."""
+
+    along_mps: FloatArray
+    left_mps: FloatArray
+    sigma_along_mps: FloatArray
+    sigma_left_mps: FloatArray
+    surprise_along_mps: FloatArray
+    surprise_left_mps: FloatArray
+
+    def select(self, rows: NDArray[np.bool_]) -> Course:
+        """Only these bodies."""
+        if rows.all():
+            return self
+        return Course(*(getattr(self, name)[rows] for name in Course.__slots__))
+
+
+def course_of(bodies: Bodies, heading_rad: FloatArray) -> Course:
+    """heading_rad (N,): of the path where each body is."""
+    cos, sin = np.cos(heading_rad), np.sin(heading_rad)
+    x, y = bodies.velocity_mps.T
+    more_x, more_y = bodies.surprise_mps.T
+    xx, yy = bodies.covariance[:, 0, 0], bodies.covariance[:, 1, 1]
+    mixed = bodies.covariance[:, 0, 1] + bodies.covariance[:, 1, 0]
+    turned = mixed * cos * sin
+    return Course(
+        x * cos + y * sin,
+        y * cos - x * sin,
+        np.sqrt(np.maximum(xx * cos * cos + turned + yy * sin * sin, 0.0)),
+        np.sqrt(np.maximum(xx * sin * sin - turned + yy * cos * cos, 0.0)),
+        more_x * cos + more_y * sin,
+        more_y * cos - more_x * sin,
     )
-
-
-def _sigma(covariance: FloatArray, direction: FloatArray) -> FloatArray:
-    variance: NDArray[np.float64] = np.einsum("ni,nij,nj->n", direction, covariance, direction)
-    return np.sqrt(np.maximum(variance, 0.0))

@@ -34,7 +34,7 @@ _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 class Knowledge:
     """Takes in scenes along one path.
 
-    bodies: boxes to reckon with, sprawling: those that are not boxes. fault: why the camera cannot be relied
+    bodies: boxes to reckon with. fault: why the camera cannot be relied
     on now, "" if it can. age_s: of the newest scene (inf: none yet). edge_tan: how wide the camera looks.
     """
 
@@ -43,13 +43,14 @@ class Knowledge:
     ) -> None:
         self.corridor = Corridor(path, body)
         self.sight = Sight(self.corridor, mount, config, start_s_m)
-        self.bodies = self.sprawling = no_bodies(0)
+        self.bodies = self._seen = no_bodies(0)
         self.health = _GOOD
         self.fault = "no scene yet"
         self.age_s = self.since_s = float("inf")
         self._mount, self._config = mount, config
         self._poses = PoseHistory()
         self._boxes = no_bodies(0)
+        self._sprawls = np.zeros(0, np.bool_)
         self._steady = SteadyVelocities()
         self._memory = OutOfView(mount, config.sight.near_m)
         self.edge_tan = 0.5
@@ -61,6 +62,11 @@ class Knowledge:
     def has_seen(self) -> bool:
         """Whether any scene was taken in yet."""
         return self._captured_ns is not None
+
+    @property
+    def sprawling(self) -> Bodies:
+        """Seen, but no boxes."""
+        return self._seen.select(self._sprawls)
 
     def update(
         self, scene: Scene | None, pose: PlanarPose, on_path: OnPath, v_mps: float, now_ns: int
@@ -117,7 +123,7 @@ class Knowledge:
                 float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
             )
         self.bodies = boxes.joined(self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing))
-        self._boxes, self.sprawling = boxes, seen.select(sprawling)
+        self._boxes, self._seen, self._sprawls = boxes, seen, sprawling
         self.sight.look(scene.free_space, pose, s_m, scene.captured_ns, boxes, standing)
         self._places.append((scene.captured_ns, np.concatenate((self.sight.points_m, seen.xy_m))))
         self.health = scene.health

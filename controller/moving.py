@@ -13,7 +13,7 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.bodies import Bodies
-from controller.corridor import Placed, velocity_on_path
+from controller.corridor import Course, Placed
 from controller.crossing import Choice, Conflict, choices, find_conflicts
 from controller.decision import Reason
 from controller.limits import ALONGSIDE_M, STANDING_MPS, Gap, Limit, Motion, allowed, stop_before
@@ -49,7 +49,7 @@ class MovingLimits:
         self,
         bodies: Bodies,
         placed: Placed,
-        sigma_d_mps: FloatArray,
+        course: Course,
         enters: NDArray[np.bool_],
         s_m: float,
         motion: Motion,
@@ -58,25 +58,24 @@ class MovingLimits:
     ) -> tuple[list[Limit], float]:
         """For the robot at s_m whose speed is otherwise base_mps; and the speed that remains.
 
-        enters (N,): who is or is likely to come within the swept width; sigma_d_mps (N,): spread of the speed
-        across it.
+        enters (N,): who is or is likely to come within the swept width.
         """
         ahead = placed.s_m[:, 0] + placed.half_s_m[:, 0] > s_m
         rows = np.flatnonzero(bodies.moving & ahead & enters)
         if not len(rows):
             self.nobody()
             return [], base_mps
-        along, _, sigma_s, _ = velocity_on_path(bodies, placed.heading_rad[:, 0])
         # Nobody starts while somebody is about to walk into his side; who drives is past before that.
         behind_m = math.inf if motion.v_mps <= STANDING_MPS else ALONGSIDE_M
-        conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, sigma_d_mps, rows, now_s)
+        conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, course, rows, now_s)
         if not conflicts:
             return [], base_mps
         ramps = comfortable(self._limits, motion, self._speeds)
         offers = []
         for one in conflicts:
-            leader_mps = float(along[one.row] - sigma_s[one.row])
-            stays = self._when_it_stays(one, bodies, placed, s_m, motion, float(along[one.row]), leader_mps)
+            along_mps = float(course.along_mps[one.row])
+            leader_mps = along_mps - float(course.sigma_along_mps[one.row])
+            stays = self._when_it_stays(one, bodies, placed, s_m, motion, along_mps, leader_mps)
             offers.append((one, *self._offer(one, int(bodies.ids[one.row]), ramps, s_m, stays)))
         return self._settle(offers, bodies, base_mps)
 
@@ -86,16 +85,17 @@ class MovingLimits:
         placed: Placed,
         s_m: float,
         from_s_m: float,
-        sigma_d_mps: FloatArray,
+        course: Course,
         rows: NDArray[np.intp],
         now_s: float,
     ) -> list[Conflict]:
         margins = self._config.margins
         grazes = np.array([number in self._inside for number in bodies.ids.tolist()])
         beside_m = margins.lateral_m + margins.graze_m * grazes
+        sigma_mps = course.sigma_left_mps * self._config.prediction.sigmas
         found = [
             one
-            for one in find_conflicts(placed, self._times_s, sigma_d_mps, beside_m, rows)
+            for one in find_conflicts(placed, self._times_s, sigma_mps, beside_m, rows)
             if one.hi_in_m > s_m and one.lo_in_m > from_s_m
         ]
         numbers = {int(bodies.ids[one.row]) for one in found}

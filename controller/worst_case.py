@@ -12,7 +12,7 @@ from config.robot import Limits
 from controller import braking
 from controller.bodies import Bodies
 from controller.contingency import Reach, Stops, gets_through, reach, room, stands_in_time, stops
-from controller.corridor import Placed, velocity_on_path
+from controller.corridor import Course, Placed
 from controller.decision import Reason
 from controller.limits import ALONGSIDE_M, Limit, Motion, allowed
 from controller.profile import SpeedRamps, comfortable
@@ -47,6 +47,7 @@ class WorstCase:
         self,
         bodies: Bodies,
         placed: Placed,
+        course: Course,
         enters: NDArray[np.bool_],
         s_m: float,
         motion: Motion,
@@ -63,23 +64,24 @@ class WorstCase:
         if not rows.any():
             return None
         bodies, placed = bodies.select(rows), placed.select(rows, len(self.times_s))
-        reached = self._reach(bodies, placed, since_s)
+        reached = self._reach(bodies, placed, course.select(rows), since_s)
         self._prepare(motion.latency_s)
         if reached.lo_m[:, -1].min() > s_m + self._furthest_m:
             return None
         young = bodies.age_s < self._config.prediction.confirm_s
         speed = self._speed(reached, young, enters[rows], s_m)
-        if math.isinf(speed):
+        if speed >= min(chosen_mps, self._limits.max_speed_mps):
             return None
         go = comfortable(self._limits, motion, np.array([chosen_mps]))
         if gets_through(go, s_m, self.times_s, reached):
             return None
-        now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
-        in_time = bool(room(now, s_m, reached)[0] >= 0.0)
-        if in_time and speed < motion.v_mps <= speed + _SOFT_MPS:
-            # Foresight may wait a moment; braking for every breath of noise would only delay going on.
-            speed = motion.v_mps
-        urgent = motion.v_mps > speed and not in_time
+        urgent = False
+        if motion.v_mps > speed:
+            now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
+            urgent = bool(room(now, s_m, reached)[0] < 0.0)
+            if not urgent and motion.v_mps <= speed + _SOFT_MPS:
+                # Foresight may wait a moment; braking for every breath of noise would only delay going on.
+                speed = motion.v_mps
         row = int(np.argmin(placed.lo_m[:, 0]))
         number = int(bodies.ids[row])
         gap_m = float(placed.lo_m[row, 0]) - s_m
@@ -122,25 +124,22 @@ class WorstCase:
         self._at_once = self._stops(self._speeds, 0.0, latency_s)
         self._furthest_m = float(self._foreseen.distance_m.max())
 
-    def _reach(self, bodies: Bodies, placed: Placed, since_s: float) -> Reach:
+    def _reach(self, bodies: Bodies, placed: Placed, course: Course, since_s: float) -> Reach:
         prediction = self._config.prediction
-        heading = placed.heading_rad[:, 0]
-        along, across, sigma_s, sigma_d = velocity_on_path(bodies, heading)
-        cos, sin = np.cos(heading), np.sin(heading)
-        beyond_x, beyond_y = bodies.surprise_mps.T
+        sigmas = prediction.sigmas
         # Who goes the robot's way does not see it coming, is beside it for long, and may have turned since it
         # left the view; who comes towards it sees it and goes on.
-        unaware = along > np.maximum(np.abs(across), _GOES_MPS)
+        unaware = course.along_mps > np.maximum(np.abs(course.left_mps), _GOES_MPS)
         sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
         return reach(
             placed,
             self.times_s,
             since_s + np.where(unaware, bodies.unseen_s, 0.0),
             spread_mps=(
-                np.maximum(prediction.sigmas * sigma_s, np.abs(beyond_x * cos + beyond_y * sin)),
-                np.maximum(prediction.sigmas * sigma_d, np.abs(beyond_y * cos - beyond_x * sin)),
+                np.maximum(sigmas * course.sigma_along_mps, np.abs(course.surprise_along_mps)),
+                np.maximum(sigmas * course.sigma_left_mps, np.abs(course.surprise_left_mps)),
             ),
-            speed_mps=np.hypot(along, across),
+            speed_mps=np.hypot(course.along_mps, course.left_mps),
             manoeuvre_mps2=(
                 np.where(bodies.moving, prediction.manoeuvre_mps2, 0.0),
                 np.where(bodies.moving, sideways, 0.0),

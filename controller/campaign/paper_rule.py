@@ -12,7 +12,7 @@ from config.robot import Robot
 from controller import braking
 from controller.bodies import Bodies, bodies_of
 from controller.campaign.rivals import decision, free_speed
-from controller.corridor import Corridor, place, velocity_on_path
+from controller.corridor import Corridor, course_of, place
 from controller.decision import Decision
 from controller.path import OnPath, Path
 from hal.types import CameraMount, PlanarPose
@@ -67,6 +67,6 @@ class PaperRule:
         if not len(bodies):
             return []
         placed = place(bodies, corridor, np.zeros(1), s_m, _LOOK_M)
-        along = velocity_on_path(bodies, corridor, placed.s_m[:, 0])[0]
+        along = course_of(bodies, placed.heading_rad[:, 0]).along_mps
         rows = np.flatnonzero((placed.clear_m[:, 0] <= 0.0) & (placed.hi_m[:, 0] > s_m))
         return [(float(placed.lo_m[k, 0]) - s_m, -float(along[k]) if bodies.moving[k] else 0.0) for k in rows]
