@@ -20,6 +20,7 @@ _SETTLED_S = 0.5
 _MOVING_KEPT_S, _MAY_COME_KEPT_S = 2.0, 6.0
 # The height of what is seen only in part is known no better.
 _UNCERTAIN_M = 0.1
+_EDGE_M, _EDGE_MPS = 0.3, 0.15
 
 
 class OutOfView:
@@ -70,7 +71,9 @@ class OutOfView:
         near_face = ahead - bodies.half_view_m
         lowest_seen_m = self._mount.height_m * (1.0 - near_face / self._near_m)
         below = (near_face < self._near_m) & (bodies.top_m < lowest_seen_m + _UNCERTAIN_M)
-        beside = np.abs(left) > edge_tan * np.maximum(ahead, 0.0)
+        # At the edge of the view it may be outside by what is not known of it.
+        edge_m = edge_tan * np.maximum(ahead, 0.0) - _EDGE_M - _EDGE_MPS * bodies.unseen_s
+        beside = np.abs(left) > edge_m
         hidden: BoolArray = (below | beside) & (ahead > -2.0)
         return hidden
 

@@ -131,6 +131,9 @@ class WorstCase:
         # left the view; who comes towards it sees it and goes on.
         unaware = course.along_mps > np.maximum(np.abs(course.left_mps), _GOES_MPS)
         sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
+        # Turning in, one also becomes slower along the path.
+        beside = placed.clear_m[:, 0] > 0.0
+        along = np.where(unaware & beside, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
         return reach(
             placed,
             self.times_s,
@@ -141,7 +144,7 @@ class WorstCase:
             ),
             speed_mps=np.hypot(course.along_mps, course.left_mps),
             manoeuvre_mps2=(
-                np.where(bodies.moving, prediction.manoeuvre_mps2, 0.0),
+                np.where(bodies.moving, along, 0.0),
                 np.where(bodies.moving, sideways, 0.0),
             ),
             most_mps=self._limits.max_obstacle_speed_mps,
