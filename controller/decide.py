@@ -174,7 +174,7 @@ class DecisionMaker:
         gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
         target_mps = min(gated_mps, on_way.speed_mps)
         reason = self._reason(watched, on_way, raw_mps, gated_mps)
-        self._emergency = self._brakes_hard(limits, target_mps, motion)
+        self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         return Decision(
             self._action(target_mps, motion.v_mps), target_mps, reason, self._emergency, self._stuck_since_ns
@@ -206,12 +206,13 @@ class DecisionMaker:
             watched.reason.margin_m,
         )
 
-    def _brakes_hard(self, limits: list[Limit], target_mps: float, motion: Motion) -> bool:
-        """From the moment when comfort would be too late until it suffices again."""
+    def _brakes_hard(self, limits: list[Limit], allowed_mps: float, motion: Motion) -> bool:
+        """From the moment when comfort would be too late until the speed is what is allowed now: not what is
+        held back for a while."""
         if motion.v_mps <= STANDING_MPS:
             return False
         urgent = any(limit.urgent for limit in limits)
-        return urgent or (self._emergency and motion.v_mps > target_mps + _OVER_COMFORT_MPS)
+        return urgent or (self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS)
 
     def _note_stuck(self, target_mps: float, motion: Motion, reason: Reason, now_ns: int) -> None:
         blocked = reason.rule in BLOCKING_RULES or reason.rule == "release"

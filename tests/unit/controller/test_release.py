@@ -99,3 +99,39 @@ def test_a_rising_target_is_followed_without_steps_once_released() -> None:
     gate = Gate(0.0)
     targets = [gate.step(0.2 + 0.004 * k) for k in range(100)]
     assert targets == pytest.approx([0.2 + 0.004 * k for k in range(100)])
+
+
+def test_stepping_down_further_does_not_begin_the_hold_anew() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.8, 1.0)
+    gate.hold(0.5, 0.9)
+    began = gate.now_ns
+    while gate.step(1.5) <= gate.v + 1e-9:
+        assert gate.now_ns - began < 3e9
+    assert (gate.now_ns - began) / 1e9 < 0.5
+
+
+def test_it_rises_to_the_least_of_the_last_moments() -> None:
+    gate = Gate(0.0)
+    gate.step(1.0)
+    gate.hold(0.0, 3.0)
+    gate.v = 0.0
+    for k in range(40):
+        target = gate.step(1.4 if k % 2 else 0.7)
+    assert target == 0.7
+
+
+def test_a_hair_is_no_reason_to_go_faster() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.5, 4.0)
+    assert gate.hold(0.58, 1.0) <= 0.5 + 1e-9
+    assert gate.hold(0.65, 1.0) == 0.65
+
+
+def test_nor_where_the_path_hardly_allows_more() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.5, 4.0)
+    for _ in range(60):
+        target = gate.gate.step(1.5, 0.5, 0.5, gate.now_ns, most_mps=0.55)
+        gate.now_ns += STEP_NS
+    assert target == 0.5
