@@ -6,6 +6,7 @@ import math
 from collections import deque
 
 from config.decision import Release
+from controller.limits import STANDING_MPS
 from hal.clocks import NS_PER_S
 
 
@@ -73,6 +74,8 @@ class ReleaseGate:
         band = self._config.dead_band_mps
         if target_mps > v_mps + band:
             self._went_faster = True
-        elif target_mps < v_mps - band and self._went_faster:
-            self._went_faster = False
-            self._turned_ns = now_ns
+        elif self._went_faster:
+            stops = target_mps <= 0.0 and v_mps > STANDING_MPS
+            if stops or target_mps < v_mps - band:
+                self._went_faster = False
+                self._turned_ns = now_ns

@@ -135,3 +135,16 @@ def test_nor_where_the_path_hardly_allows_more() -> None:
         target = gate.gate.step(1.5, 0.5, 0.5, gate.now_ns, most_mps=0.55)
         gate.now_ns += STEP_NS
     assert target == 0.5
+
+
+def test_a_stop_from_a_crawl_is_a_turn_too() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.0, 4.0)
+    gate.hold(0.5, 0.4)
+    gate.v = 0.02
+    gate.step(0.0)
+    began = gate.now_ns
+    gate.v = 0.0
+    while gate.step(0.5) <= 0.0:
+        assert gate.now_ns - began < 3e9
+    assert (gate.now_ns - began) / 1e9 > 1.9
