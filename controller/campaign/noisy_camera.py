@@ -115,23 +115,22 @@ class NoisyCamera:
     def _sight(self, view: View, t_s: float, pose: PlanarPose) -> None:
         """Take in what this frame shows."""
         noise = self._noise
-        missed = self._random.random(len(self._ids))
-        for column, body in enumerate(view.bodies.tolist()):
-            if self._glass[body]:
+        missed = self._random.random(len(self._ids)).tolist()
+        columns = np.flatnonzero(np.isfinite(view.forward_m).any(axis=0) & ~self._glass[view.bodies])
+        z = view.forward_m[:, columns]
+        shown = np.isfinite(z)
+        x = z * self.eye.bearing_tan[:, None]
+        low_z, high_z = z.min(axis=0), np.where(shown, z, -np.inf).max(axis=0)
+        low_x = np.where(shown, x, np.inf).min(axis=0) - low_z * self.eye.half_width_tan
+        high_x = np.where(shown, x, -np.inf).max(axis=0) + low_z * self.eye.half_width_tan
+        right, forward = (0.5 * (low_x + high_x)).tolist(), (0.5 * (low_z + high_z)).tolist()
+        far = (low_z / self.eye.range_m).tolist()
+        for k, body in enumerate(view.bodies[columns].tolist()):
+            share = noise.missed_share_at_range * (2.0 * far[k] - 1.0)
+            if missed[body] < max(noise.missed_share, share):
                 continue
-            hits = view.forward_m[:, column]
-            bands = np.flatnonzero(np.isfinite(hits))
-            if not len(bands):
-                continue
-            z = hits[bands]
-            far = float(z.min()) / self.eye.range_m
-            if missed[body] < max(noise.missed_share, noise.missed_share_at_range * (2.0 * far - 1.0)):
-                continue
-            x = z * self.eye.bearing_tan[bands]
-            side = float(z.min()) * self.eye.half_width_tan
-            low_x, high_x, low_z, high_z = x.min() - side, x.max() + side, z.min(), z.max()
-            self._see(body, 0.5 * (low_x + high_x), 0.5 * (low_z + high_z), t_s, pose)
-            self._extent[body] = high_x - low_x, high_z - low_z
+            self._see(body, right[k], forward[k], t_s, pose)
+            self._extent[body] = high_x[k] - low_x[k], high_z[k] - low_z[k]
         gone = self._seen_s < t_s - noise.forget_s
         self._sightings[gone] = 0
         self._moving[gone] = False
@@ -164,52 +163,49 @@ class NoisyCamera:
     def _obstacles(self, t_s: float, pose: PlanarPose) -> tuple[Obstacle, ...]:
         noise = self._noise
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        found = []
-        for body in np.flatnonzero(self._sightings >= noise.sightings).tolist():
-            dx, dy = self._centre[body, 0] - pose.x_m, self._centre[body, 1] - pose.y_m
-            ahead, left = dx * cos + dy * sin - self._mount.forward_m, dy * cos - dx * sin
-            if ahead <= 0.0:
-                continue
-            wander = self._wander[body]
-            sigma_m = noise.kept_by_tracker * noise.depth_sigma_1pm * ahead * ahead
-            low_m, high_m = self._stage.world.z_m[body].tolist()
-            in_camera = np.array(
-                [
-                    ahead + sigma_m * wander[0],
-                    left - self._mount.left_m + noise.side_sigma_m * wander[1],
-                    0.5 * (low_m + high_m) - self._mount.height_m,
-                ]
+        dx, dy = self._centre[:, 0] - pose.x_m, self._centre[:, 1] - pose.y_m
+        all_ahead = dx * cos + dy * sin - self._mount.forward_m
+        rows = np.flatnonzero((self._sightings >= noise.sightings) & (all_ahead > 0.0))
+        if not len(rows):
+            return ()
+        ahead, left = all_ahead[rows], dy[rows] * cos - dx[rows] * sin
+        wander, z_m = self._wander[rows], self._stage.world.z_m[rows]
+        sigma_m = noise.kept_by_tracker * noise.depth_sigma_1pm * ahead * ahead
+        in_camera = np.empty((len(rows), 3))
+        in_camera[:, 0] = ahead + sigma_m * wander[:, 0]
+        in_camera[:, 1] = left - self._mount.left_m + noise.side_sigma_m * wander[:, 1]
+        in_camera[:, 2] = 0.5 * (z_m[:, 0] + z_m[:, 1]) - self._mount.height_m
+        age_s = t_s - self._first_s[rows]
+        young = noise.first_velocity_mps * np.exp(-age_s / noise.first_velocity_fades_s)
+        radial = noise.radial_velocity_mps + noise.radial_velocity_per_m * ahead
+        side = noise.side_velocity_mps + noise.side_velocity_per_m * ahead
+        vx, vy = self._velocity[rows].T
+        velocity = np.zeros((len(rows), 3))
+        velocity[:, 0] = vx * cos + vy * sin + radial * wander[:, 2]
+        velocity[:, 1] = vy * cos - vx * sin + side * wander[:, 3]
+        variance = np.stack((radial + young, side + young, 0.1 + young), axis=1) ** 2
+        turn = self._to_optical
+        position, velocity = in_camera @ turn.T, velocity @ turn.T
+        covariance = (turn * variance[:, None, :]) @ turn.T
+        extent = np.stack((self._extent[rows, 0], z_m[:, 1] - z_m[:, 0], self._extent[rows, 1]), axis=1)
+        unseen_s = (t_s - self._seen_s[rows]).tolist()
+        ids, moving = self._ids[rows].tolist(), self._moving[rows].tolist()
+        return tuple(
+            Obstacle(
+                id=ids[k],
+                bbox_px=_BOX_PX,
+                position_m=position[k],
+                extent_m=extent[k],
+                velocity_mps=velocity[k],
+                velocity_cov=covariance[k],
+                moving=moving[k],
+                score=0.9 if moving[k] else 0.5,
+                fragments=8,
+                age_s=age,
+                unseen_s=unseen_s[k],
             )
-            age_s = t_s - float(self._first_s[body])
-            young_mps = noise.first_velocity_mps * math.exp(-age_s / noise.first_velocity_fades_s)
-            radial = noise.radial_velocity_mps + noise.radial_velocity_per_m * ahead
-            side = noise.side_velocity_mps + noise.side_velocity_per_m * ahead
-            vx, vy = self._velocity[body].tolist()
-            velocity = np.array(
-                [
-                    vx * cos + vy * sin + radial * wander[2],
-                    vy * cos - vx * sin + side * wander[3],
-                    0.0,
-                ]
-            )
-            variance = np.array([radial + young_mps, side + young_mps, 0.1 + young_mps]) ** 2
-            moving = bool(self._moving[body])
-            found.append(
-                Obstacle(
-                    id=int(self._ids[body]),
-                    bbox_px=_BOX_PX,
-                    position_m=self._to_optical @ in_camera,
-                    extent_m=np.array([self._extent[body, 0], high_m - low_m, self._extent[body, 1]]),
-                    velocity_mps=self._to_optical @ velocity,
-                    velocity_cov=(self._to_optical * variance) @ self._to_optical.T,
-                    moving=moving,
-                    score=0.9 if moving else 0.5,
-                    fragments=8,
-                    age_s=age_s,
-                    unseen_s=t_s - float(self._seen_s[body]),
-                )
-            )
-        return tuple(found)
+            for k, age in enumerate(age_s.tolist())
+        )
 
     def _free_space(self, view: View) -> FreeSpace:
         """What the bands show: the nearest thing in the robot's height, and how far the floor is free."""
