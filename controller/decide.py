@@ -144,7 +144,9 @@ class DecisionMaker:
     def _camera_limits(self, known: Knowledge) -> list[Limit]:
         sight, limits = self._config.sight, self._robot.limits
         if known.fault:
-            return [Limit(0.0, Reason("camera", f"{known.fault}: stop"))]
+            # Blind among people who were moving a moment ago: comfort would be at their cost.
+            people = bool(known.bodies.moving.any())
+            return [Limit(0.0, Reason("camera", f"{known.fault}: stop"), urgent=people)]
         found = [self._range_limit(known, limits)]
         if known.health.condition is CameraCondition.DEGRADED:
             sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"

@@ -127,9 +127,10 @@ class WorstCase:
     def _reach(self, bodies: Bodies, placed: Placed, course: Course, since_s: float) -> Reach:
         prediction = self._config.prediction
         sigmas = prediction.sigmas
-        # Who goes the robot's way does not see it coming, is beside it for long, and may have turned since it
-        # left the view; who comes towards it sees it and goes on.
-        unaware = course.along_mps > np.maximum(np.abs(course.left_mps), _GOES_MPS)
+        # Who goes the robot's way does not see it coming and is beside it for long; who comes towards it sees
+        # it and keeps its lane; all others may have become faster or turned since they left the view.
+        aslant_mps = np.maximum(np.abs(course.left_mps), _GOES_MPS)
+        unaware, comes = course.along_mps > aslant_mps, course.along_mps < -aslant_mps
         sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
         # Turning in, one also becomes slower along the path.
         beside = placed.clear_m[:, 0] > 0.0
@@ -137,7 +138,7 @@ class WorstCase:
         return reach(
             placed,
             self.times_s,
-            since_s + np.where(unaware, bodies.unseen_s, 0.0),
+            since_s + np.where(comes, 0.0, bodies.unseen_s),
             spread_mps=(
                 np.maximum(sigmas * course.sigma_along_mps, np.abs(course.surprise_along_mps)),
                 np.maximum(sigmas * course.sigma_left_mps, np.abs(course.surprise_left_mps)),

@@ -193,20 +193,21 @@ def _at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, rea
 def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
     """The step at which what was touched could first be seen as what it is; None: not before the contact.
 
-    Somebody who stood meanwhile is seen as what it is once it moves again: nobody sees in who stands that it
-    will go on.
+    It takes two looks, 0.1 s apart. Somebody who stood meanwhile is seen as what it is once it moves again:
+    nobody sees in who stands that it will go on.
     """
-    body, first = contact.body, None
+    body, first, before = contact.body, None, None
     moves = bool(stage.world.moves[body])
     for k in range(0, len(log.times_s), _SIGHT_STEPS):
         if log.times_s[k] >= contact.t_s:
             break
         polygons, velocity = stage.world.look(log.times_s[k])
         if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
-            first = None
+            first = before = None
             continue
-        if first is None and _in_view(body, polygons, PlanarPose(*log.poses[k]), eye):
-            first = k
+        if first is None:
+            seen = _in_view(body, polygons, PlanarPose(*log.poses[k]), eye)
+            first, before = (before if seen else None), (k if seen else None)
     return first
 
 

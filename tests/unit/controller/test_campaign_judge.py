@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from config.scenario import Go, Motion, Wait
 from controller.campaign.drive import DriveLog
 from controller.campaign.judge import Row, false_stops, flaps, judge
 from controller.campaign.oracle import OracleTime
@@ -60,6 +61,19 @@ def test_a_contact_with_what_was_seen_coming_is_at_fault() -> None:
     row = judged(stage(mover(9.0, 2.0, 3.0, -1.0, 0.9), length_m=9.0), cruise(0.6, 9.0))
     assert row.contacts == 1
     assert row.contacts_at_fault == 1
+
+
+def test_nobody_sees_in_who_stands_that_it_will_go_on() -> None:
+    """It comes to 1.5 m beside the path in full view, stands, and walks into the robot's side."""
+    steps = (
+        Go(kind="go", x_m=4.5, y_m=1.5, speed_mps=1.5),
+        Wait(kind="wait", duration_s=3.0),
+        Go(kind="go", x_m=4.5, y_m=-3.0, speed_mps=1.5),
+    )
+    who = mover(4.5, 3.5, 4.5, -3.0, 1.5)
+    made = stage(who.model_copy(update={"motion": Motion(accel_mps2=20.0, steps=steps)}), length_m=9.0)
+    row = judged(made, cruise(1.0, 8.0))
+    assert (row.contacts, row.contacts_at_fault) == (1, 0)
 
 
 def test_a_touch_between_two_control_steps_is_found() -> None:

@@ -7,9 +7,10 @@ import pytest
 
 from config.robot import Body
 from controller.bodies import Bodies
-from controller.contingency import Reach, gets_through, reach, room, stops
+from controller.contingency import Reach, gets_through, reach, room, stands_in_time, stops
 from controller.corridor import Corridor, place
 from controller.profile import SpeedRamps
+from hal.types import FloatArray
 from tests.support.bodies import box, line_path
 
 TIMES = np.arange(0.0, 4.01, 0.1)
@@ -106,3 +107,23 @@ def test_getting_through_before_it_comes() -> None:
     crosser = reached(box(2.0, 4.0, 0.0, -1.0))
     assert gets_through(go(1.5, 1.5), 0.0, TIMES, crosser)
     assert not gets_through(go(0.5, 0.5), 0.0, TIMES, crosser)
+
+
+def test_what_may_happen_along_and_across_is_told_apart() -> None:
+    """0.5 m/s more along the path brings nobody into it, 0.5 m/s across it does."""
+    body = box(5.0, 0.65 + 0.9, 0.01, 0.0)
+    placed = place(body, CORRIDOR, TIMES, 0.0, 12.0)
+    none, half = np.zeros(1), np.full(1, 0.5)
+
+    def worst(spread: tuple[FloatArray, FloatArray]) -> Reach:
+        return reach(placed, TIMES, none, spread, none, (none, none), most_mps=1.5, margin_m=0.2)
+
+    assert not worst((half, none)).inside.any()
+    assert worst((none, half)).inside.any()
+
+
+def test_a_stop_that_is_over_in_time_needs_no_room() -> None:
+    """It could be in the way after 2 s at the earliest, right before the robot's nose."""
+    near = reached(box(0.9, 0.65 + 1.0, 0.01, 0.0), manoeuvre_mps2=0.5)
+    assert stands_in_time(stops(stop_from(1.0), TIMES), near)[0]
+    assert not stands_in_time(stops(stop_from(1.5), TIMES), near)[0]

@@ -370,6 +370,64 @@ def test_a_person_beside_the_path_who_walks_along_is_passed_slower_not_waited_fo
     assert decision.target_speed_mps > 0.7
 
 
+def test_who_comes_along_the_side_is_passed_slowly_not_waited_for() -> None:
+    """0.1 m stay between a person of 0.5 m, who comes at 1 m/s, and the swept width."""
+    for x_m in (4.0, 2.5, 1.6):
+        decision = Bench().settle(obstacle(x_m, 0.74, vx_mps=-1.0, sigma_mps=0.05), v_mps=0.3)
+        assert 0.3 <= decision.target_speed_mps < 0.8
+
+
+def test_who_heads_into_the_way_is_waited_for() -> None:
+    decision = Bench().settle(obstacle(1.6, 0.74, vx_mps=-1.0, vy_mps=-0.6, sigma_mps=0.05), v_mps=0.3)
+    assert decision.target_speed_mps < 0.1
+
+
+def test_who_goes_the_robots_way_beside_it_may_cut_in() -> None:
+    """It does not see the robot coming; who comes towards it does."""
+    along = obstacle(2.5, 1.2, vx_mps=0.6, sigma_mps=0.05)
+    careful = Bench().settle(along, v_mps=1.2)
+    assert careful.reason.rule == "worst case"
+    trusting = DecisionConfig.model_validate({"prediction": {"cut_in_mps2": 0.25}})
+    assert Bench(config=trusting).settle(along, v_mps=1.2).target_speed_mps > careful.target_speed_mps
+
+
+def test_a_blind_camera_teaches_nothing() -> None:
+    """A frozen picture shows the person where he was: he is reckoned with where he would be by now."""
+    bench = Bench()
+    person = obstacle(7.0, 0.0, vx_mps=-1.0)
+    for _ in range(20):
+        bench.step(bench.scene(person), 0.5)
+    blind = CameraHealth(CameraCondition.UNTRUSTWORTHY, "frozen", 0.9)
+    for _ in range(100):
+        decision = bench.step(bench.scene(person, health=blind), 0.5)
+    assert decision.target_speed_mps == 0.0
+    assert decision.emergency
+    seen = bench.step(bench.scene(obstacle(5.0, 0.0, vx_mps=-1.0)), 0.5)
+    assert seen.target_speed_mps < 0.5
+
+
+def test_past_a_blind_corner_it_is_slower() -> None:
+    """A rack whose end is 3 m ahead of the front, 0.6 m beside the swept width, on the right."""
+    scan = free_space(known_m=9.0)
+    with np.errstate(divide="ignore"):
+        face = 0.99 / scan.bearing_tan
+    on_rack = (face > 0.0) & (face + 0.45 < 3.5)
+    rack = replace(scan, nearest_m=np.where(on_rack, face, math.inf), known_m=np.where(on_rack, face, 9.0))
+    decision = Bench().settle(v_mps=1.5, free=rack)
+    assert decision.reason.rule == "corner"
+    assert "0.6 m beside the way" in decision.reason.sentence
+    assert 0.8 <= decision.target_speed_mps < 1.5
+    assert not decision.emergency
+    off = DecisionConfig.model_validate({"sight": {"blind_corner_m": 0.0}})
+    assert Bench(config=off).settle(v_mps=1.5, free=rack).target_speed_mps == 1.5
+
+
+def test_nobody_is_started_into() -> None:
+    """A person beside the nose of a robot at rest walks into where its side would be."""
+    walks_in = obstacle(0.9, 1.6, vy_mps=-0.7, sigma_mps=0.05)
+    assert Bench().settle(walks_in, v_mps=0.0).target_speed_mps == 0.0
+
+
 def test_the_target_is_reported_when_it_is_near() -> None:
     bench = Bench()
     decision = bench.step(bench.scene(x_m=28.5), 0.9, x_m=28.5)

@@ -120,3 +120,39 @@ def test_where_a_body_can_be_seen_from() -> None:
     bodies = box(5.0, 0.6, top_m=1.7).joined(box(5.0, 0.0, top_m=0.15)).joined(box(5.0, 0.0, top_m=0.7))
     seen_from = visible_from_m(bodies, np.array([0.6, 0.0, 0.0]), 0.5, NEAR_M, 0.6)
     assert seen_from.tolist() == pytest.approx([1.2, NEAR_M * (1 - 0.05 / 0.6), 0.0])
+
+
+def test_who_left_the_view_on_its_way_into_the_path_is_remembered_for_longer() -> None:
+    """Beside the view's edge, walking slowly towards the path: for more than the 2 s of who walks away."""
+    recall = Recall()
+    recall.see(box(2.0, 2.5, 0.0, -0.3), 0.0)
+    for _ in range(40):
+        kept = recall.see(None, 0.0, standing=True)
+    assert kept == [1]
+    for _ in range(25):
+        kept = recall.see(None, 0.0, standing=True)
+    assert kept == []
+
+
+def test_who_walks_away_is_not() -> None:
+    recall = Recall()
+    recall.see(box(2.0, 2.5, 0.0, 0.3), 0.0)
+    for _ in range(19):
+        assert recall.see(None, 0.0) == [1]
+    for _ in range(2):
+        kept = recall.see(None, 0.0)
+    assert kept == []
+
+
+def test_how_long_it_was_not_seen_is_counted() -> None:
+    memory, before = OutOfView(MOUNT, NEAR_M), box(2.0, 2.5, 0.0, -0.3)
+    seen = replace(no_bodies(0), captured_ns=FRAME_NS)
+    kept = memory.update(before, seen, PlanarPose(0.0, 0.0, 0.0), EDGE, False)
+    assert kept.unseen_s.tolist() == pytest.approx([0.1])
+
+
+def test_at_the_edge_of_the_view_nobody_is_missed() -> None:
+    """Predicted 10 cm inside the edge: it may as well be outside."""
+    recall = Recall()
+    recall.see(box(2.4, 1.0 - 0.1, 0.01, -0.01), 0.0)
+    assert recall.see(None, 0.0) == [1]
