@@ -15,7 +15,7 @@ from config.perception import PerceptionConfig
 from vision import obstacles, regions
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_mask import depth_sigma_m
-from vision.detector import Detection
+from vision.detection import Detection
 from vision.regions import IntGrid, Regions
 from vision.tracks import Tracks
 from vision.velocities import ends_of

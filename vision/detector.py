@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +11,7 @@ from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
 from vision import optical_flow
 from vision.depth_grid import DepthGrid, make_grid
 from vision.depth_mask import surface_depth
+from vision.detection import Detection, camera_health, no_motion
 from vision.edges import GreyImage
 from vision.ego_motion import (
     CameraEstimate,
@@ -25,44 +24,16 @@ from vision.ego_motion import (
 from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
 from vision.floor import FloorFinder, on_floor
 from vision.fragments import FragmentStore
-from vision.health import Continuity, HealthMonitor, worsened
+from vision.health import Continuity, HealthMonitor
 from vision.lens import project, rays
 from vision.renewal import Renewal
-from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
+from vision.scene import CameraHealth, EgoMotion, Fragments
 from vision.velocities import PointMotion
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
 _AGREEMENT = 0.4
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Detection:
-    """What one frame yields before anything is called an obstacle.
-
-    N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: evidence of the 2N
-    ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
-    the fixed frame has begun anew, what was tracked before cannot be compared. motion_known: the camera's
-    own motion is known well enough to call anything else moving.
-    """
-
-    captured_ns: int
-    sequence: int
-    dt_s: float
-    camera: Intrinsics
-    grid: DepthGrid
-    ids: NDArray[np.int64]
-    ends_px: NDArray[np.float32]
-    near_m: NDArray[np.float32]
-    age_frames: NDArray[np.intp]
-    motion: PointMotion
-    pose: Pose
-    pose_covariance: FloatArray
-    ego_motion: EgoMotion
-    health: CameraHealth
-    restarted: bool
-    motion_known: bool
 
 
 class Detector:
@@ -155,7 +126,7 @@ class Detector:
         step = self._pose.inverse() @ result.pose
         ego = _ego(step, dt_s, result, prior)
         blurred = result.visual and prior.source == "none" and result.inlier_ratio < _AGREEMENT
-        health = _judge(health, ego, blurred)
+        health = camera_health(health, ego, blurred)
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
         known = ego.source != "none" and not blurred
@@ -196,7 +167,7 @@ class Detector:
         self._motion, self._motion_dt_s = _IDENTITY, 0.0
         ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
         self._renew(frame, grey)
-        motion = _no_motion(2 * len(self._store))
+        motion = no_motion(2 * len(self._store))
         detection = self._detection(frame, grid, 0.0, motion, np.eye(6), ego, health, True)
         self._commit(frame, grey, odometry)
         return detection
@@ -204,7 +175,7 @@ class Detector:
     def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
         """Nothing can be followed through this frame; the fragments wait for the next good one."""
         ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
-        motion = _no_motion(2 * len(self._store))
+        motion = no_motion(2 * len(self._store))
         return self._detection(frame, grid, 0.0, motion, np.eye(6), ego, health, False)
 
     def _detection(
@@ -279,23 +250,6 @@ def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) ->
     )
 
 
-def _judge(health: CameraHealth, ego: EgoMotion, blurred: bool) -> CameraHealth:
-    """What the ego-motion tells of the camera. blurred: without odometry, most fragments fit no motion."""
-    if blurred:
-        reason = (
-            f"only {ego.inlier_ratio:.0%} of the fragments fit one motion of the camera:"
-            " is depth aligned with colour, in place and in time?"
-        )
-        return worsened(health, CameraCondition.DEGRADED, reason)
-    if ego.source == "visual":
-        return health
-    if ego.source == "odometry":
-        reason = "too few static fragments: the camera's motion rests on the odometry alone"
-        return worsened(health, CameraCondition.DEGRADED, reason)
-    reason = "the camera's motion is not known: too few static fragments agree, and there is no odometry"
-    return worsened(health, CameraCondition.UNTRUSTWORTHY, reason)
-
-
 def _hint(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[np.bool_], FloatArray]:
     """Which of the fragments ids tracking knew as moving, and how fast: (N,), (N, 3)."""
     moving, velocity = np.zeros(len(ids), np.bool_), np.zeros((len(ids), 3))
@@ -308,19 +262,3 @@ def _hint(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[n
     if moving.any():
         velocity[moving] = np.nan_to_num(previous.velocity_mps[index[moving]])
     return moving, velocity
-
-
-def _no_motion(count: int) -> PointMotion:
-    return PointMotion(
-        np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
-        np.zeros((count, 2)),
-        np.zeros(count),
-        np.zeros((count, 2)),
-        np.ones((count, 3)) * np.array([1.0, 0.0, 1.0]),
-        np.zeros((count, 2)),
-        np.full(count, np.nan),
-        np.ones(count),
-        np.zeros(count),
-        np.zeros(count),
-        np.zeros(count, np.bool_),
-    )

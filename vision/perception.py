@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, PlanarPose, Pose, RgbdFrame
-from vision.detector import Detection, Detector
+from vision.detection import Detection
+from vision.detector import Detector
 from vision.scene import Fragments
 from vision.tracker import Percept, Tracker
 

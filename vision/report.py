@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.detector import Detection
+from vision.detection import Detection
 from vision.scene import Fragments, Obstacle
 from vision.tracks import Tracks
 

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import FloatArray, PlanarPose
-from vision import carving, grouping, kalman, masks, obstacles, regions, report
+from vision import carving, grouping, kalman, masks, obstacles, regions, report, sightings
 from vision.arrivals import FreeMemory
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
 from vision.depth_mask import depth_sigma_m
-from vision.detector import Detection
+from vision.detection import Detection
 from vision.judgement import MotionEvidence, judge
 from vision.regions import IntGrid, Regions
 from vision.scene import CameraCondition, Fragments, Scene
@@ -24,18 +24,9 @@ _ACCEL_DENSITY = 0.2  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
-_CENTRE_SIGMA_M = 0.015
-_CENTRE_SHARE = 0.0125
-_CENTRE_DEPTH_SHARE = 0.04
-_CENTRE_NOISE = 0.2
-_SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
-_AREA_GAIN = 0.1
-_AREA_MEMORY_S = 0.33
-_SLIVER = 0.4  # of its usual surface
 # Limbs swing about as fast as their body goes. Where fragments disagree, some of them are limbs, and for
 # half a step it is the same ones: the disagreement is no noise that averages out from frame to frame.
 _LIMBS_MPS = 1.0
-_JUMP_M = 0.3
 # Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor.
 _ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85])
 _ABOVE_PX = np.array([0.0, 0.0, 0.0, 8.0, 8.0, 8.0])
@@ -75,7 +66,7 @@ class Tracker:
             self._free.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
         elapsed_s = min(max(elapsed_s, 0.0), self._config.max_gap_s)
-        tracks.predict(elapsed_s, _ACCEL_DENSITY, _up(detection))
+        tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.up(detection))
         self._last_ns = max(detection.captured_ns, self._last_ns or 0)
         owner = self._owners(detection.ids)
         standing = regions.standing(detection.grid, self._clearance_m)
@@ -108,7 +99,7 @@ class Tracker:
         arrived = self._free.arrived(grid, standing, pose, detection.captured_ns)
         self._free.remember(grid, pose, detection.captured_ns)
         labels, measured = self._label(detection, standing, arrived, elapsed_s)
-        self._see(detection, regions.unhidden(grid, labels, measured))
+        sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
         owner = self._adopt(detection, labels, owner)
         arrivals = np.bincount(labels[arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
@@ -191,42 +182,6 @@ class Tracker:
         own = number[parts]
         return np.where(own > 0, own, labels).astype(np.int32)
 
-    def _see(self, detection: Detection, measured: Regions) -> None:
-        """The surfaces' centres update the filters; those that are cut or hidden only the position."""
-        tracks, rotation = self._tracks, detection.pose.rotation
-        seen = np.flatnonzero(measured.cells >= _MIN_CELLS // 2)
-        if len(seen) == 0:
-            return
-        position = detection.pose.apply(measured.position_m[seen])
-        depth = measured.position_m[seen, 2]
-        sigma = depth_sigma_m(depth, self._config.depth_noise)
-        across = _CENTRE_SIGMA_M + _CENTRE_SHARE * measured.extent_m[seen, :2].max(axis=1)
-        depth_part = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * measured.extent_m[seen, 2]
-        noise = np.zeros((len(seen), 3, 3))
-        noise[:, 0, 0] = noise[:, 1, 1] = np.square(across)
-        noise[:, 2, 2] = np.square(depth_part) + np.square(_CENTRE_NOISE * sigma)
-        noise = rotation @ noise @ rotation.T
-        area_m2 = measured.cells[seen] * np.square(depth)
-        change = np.abs(area_m2 - tracks.area_m2[seen]) / np.maximum(tracks.area_m2[seen], 1e-6)
-        same = change <= _SAME_AREA
-        tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S
-        jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
-        smooth = measured.whole[seen] & same & (jump <= _JUMP_M + 2.0 * sigma)
-        tracks.locate(seen[smooth], position[smooth], noise[smooth])
-        # What is left to see of a mover that goes behind something is not where its body is.
-        sliver = tracks.moving[seen] & (area_m2 < _SLIVER * tracks.area_m2[seen])
-        cut = ~smooth & ~sliver
-        tracks.relocate(seen[cut], position[cut], noise[cut])
-        tracks.clean_s[seen[smooth]] += detection.dt_s
-        tracks.clean_s[seen[~smooth]] = 0.0
-        tracks.area_m2[seen[~sliver]] += _AREA_GAIN * (area_m2 - tracks.area_m2[seen])[~sliver]
-        tracks.area_m2[seen[tracks.sightings[seen] == 0]] = area_m2[tracks.sightings[seen] == 0]
-        tracks.seen_ns[seen] = detection.captured_ns
-        tracks.sightings[seen] += 1
-        tracks.bbox_px[seen] = measured.bbox_px[seen]
-        tracks.extent_m[seen] = measured.extent_m[seen]
-        tracks.cells[seen] = measured.cells[seen]
-
     def _adopt(self, detection: Detection, labels: IntGrid, owner: NDArray[np.int64]) -> NDArray[np.int64]:
         """(N,) fragments belong to the body whose surface they lie on."""
         grid, tracks = detection.grid, self._tracks
@@ -297,7 +252,7 @@ class Tracker:
             size_m=tracks.extent_m.max(axis=1),
             clean_s=tracks.clean_s,
             growth_mps=tracks.growth_mps,
-            view_radps=_view_radps(detection, sight, distance),
+            view_radps=sightings.view_radps(detection, sight, distance),
             trusted=detection.motion_known,
         )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
@@ -330,19 +285,3 @@ class Tracker:
 
     def _in_the_way(self, grid: DepthGrid, standing: BoolGrid) -> BoolGrid:
         return standing if grid.height_m is None else standing & (grid.height_m < self._body_height_m)
-
-
-def _up(detection: Detection) -> FloatArray | None:
-    """(3,) the floor's normal in the fixed frame; None where the floor is not known."""
-    up = detection.grid.up
-    return None if up is None else np.asarray(detection.pose.rotation @ up)
-
-
-def _view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
-    """(T,) rate at which the direction to points at sight (T, 3) turns by the camera's own way."""
-    ego = detection.ego_motion
-    if ego.dt_s <= 0.0:
-        return np.zeros(len(sight))
-    way = detection.pose.rotation @ ego.motion.translation_m / ego.dt_s
-    turn: FloatArray = np.sqrt(np.square(np.cross(sight, way)).sum(axis=1))
-    return turn / np.square(np.maximum(distance_m, 0.1))

@@ -1,0 +1,76 @@
+"""What detect yields and track reads: fragments with the evidence of their motion, and what it is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray, Intrinsics, Pose
+from vision.depth_grid import DepthGrid
+from vision.health import worsened
+from vision.scene import CameraCondition, CameraHealth, EgoMotion
+from vision.velocities import PointMotion
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection:
+    """What one frame yields before anything is called an obstacle.
+
+    N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: evidence of the 2N
+    ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
+    the fixed frame has begun anew, what was tracked before cannot be compared. motion_known: the camera's
+    own motion is known well enough to call anything else moving.
+    """
+
+    captured_ns: int
+    sequence: int
+    dt_s: float
+    camera: Intrinsics
+    grid: DepthGrid
+    ids: NDArray[np.int64]
+    ends_px: NDArray[np.float32]
+    near_m: NDArray[np.float32]
+    age_frames: NDArray[np.intp]
+    motion: PointMotion
+    pose: Pose
+    pose_covariance: FloatArray
+    ego_motion: EgoMotion
+    health: CameraHealth
+    restarted: bool
+    motion_known: bool
+
+
+def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> CameraHealth:
+    """What the ego-motion tells of the camera. blurred: without odometry, most fragments fit no motion."""
+    if blurred:
+        reason = (
+            f"only {ego.inlier_ratio:.0%} of the fragments fit one motion of the camera:"
+            " is depth aligned with colour, in place and in time?"
+        )
+        return worsened(health, CameraCondition.DEGRADED, reason)
+    if ego.source == "visual":
+        return health
+    if ego.source == "odometry":
+        reason = "too few static fragments: the camera's motion rests on the odometry alone"
+        return worsened(health, CameraCondition.DEGRADED, reason)
+    reason = "the camera's motion is not known: too few static fragments agree, and there is no odometry"
+    return worsened(health, CameraCondition.UNTRUSTWORTHY, reason)
+
+
+def no_motion(count: int) -> PointMotion:
+    """Evidence of count ends of which nothing is known."""
+    return PointMotion(
+        np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
+        np.zeros((count, 2)),
+        np.zeros(count),
+        np.zeros((count, 2)),
+        np.ones((count, 3)) * np.array([1.0, 0.0, 1.0]),
+        np.zeros((count, 2)),
+        np.full(count, np.nan),
+        np.ones(count),
+        np.zeros(count),
+        np.zeros(count),
+        np.zeros(count, np.bool_),
+    )

@@ -1,0 +1,89 @@
+"""The visible surfaces of the tracks into their filters: where the bodies are, and how fast these centres go.
+
+A centre tells of the velocity only while the same whole surface is seen. Where it is cut by the image's
+border, hidden in part or suddenly another one, it tells of the position alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import DepthNoise
+from hal.types import FloatArray
+from vision.depth_mask import depth_sigma_m
+from vision.detection import Detection
+from vision.regions import Regions
+from vision.tracks import Tracks
+
+MIN_CELLS = 6
+_CENTRE_SIGMA_M = 0.015
+_CENTRE_SHARE = 0.0125  # of its size, across the line of sight: cells at the rim come and go
+_CENTRE_DEPTH_SHARE = 0.04
+_CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it does not average out
+_SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
+_AREA_GAIN = 0.1
+_AREA_MEMORY_S = 0.33  # what that gain comes to at 30 frames a second
+_SLIVER = 0.4  # of its usual surface
+_JUMP_M = 0.3
+
+
+def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
+    """Update tracks with the surfaces measured, entry k for track k; without cells they stay as predicted."""
+    seen = np.flatnonzero(measured.cells >= MIN_CELLS)
+    if len(seen) == 0:
+        return
+    position = detection.pose.apply(measured.position_m[seen])
+    depth = measured.position_m[seen, 2]
+    covariance = _centre_covariance(measured, seen, detection.pose.rotation, noise)
+    area_m2 = measured.cells[seen] * np.square(depth)
+    usual_m2 = np.where(tracks.sightings[seen] == 0, area_m2, tracks.area_m2[seen])
+    change = np.abs(area_m2 - usual_m2) / usual_m2
+    jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
+    smooth = (
+        measured.whole[seen] & (change <= _SAME_AREA) & (jump <= _JUMP_M + 2.0 * depth_sigma_m(depth, noise))
+    )
+    # What is left to see of a mover that goes behind something is not where its body is.
+    sliver = tracks.moving[seen] & (area_m2 < _SLIVER * usual_m2)
+    cut = ~smooth & ~sliver
+    tracks.locate(seen[smooth], position[smooth], covariance[smooth])
+    tracks.relocate(seen[cut], position[cut], covariance[cut])
+    tracks.clean_s[seen] = np.where(smooth, tracks.clean_s[seen] + detection.dt_s, 0.0)
+    tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S
+    tracks.area_m2[seen] = np.where(sliver, usual_m2, usual_m2 + _AREA_GAIN * (area_m2 - usual_m2))
+    tracks.seen_ns[seen] = detection.captured_ns
+    tracks.sightings[seen] += 1
+    tracks.bbox_px[seen] = measured.bbox_px[seen]
+    tracks.extent_m[seen] = measured.extent_m[seen]
+    tracks.cells[seen] = measured.cells[seen]
+
+
+def up(detection: Detection) -> FloatArray | None:
+    """(3,) the floor's normal in the fixed frame; None where the floor is not known."""
+    normal = detection.grid.up
+    return None if normal is None else np.asarray(detection.pose.rotation @ normal)
+
+
+def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
+    """(T,) rate at which the direction to points at sight (T, 3) turns by the camera's own way."""
+    ego = detection.ego_motion
+    if ego.dt_s <= 0.0:
+        return np.zeros(len(sight))
+    way = detection.pose.rotation @ ego.motion.translation_m / ego.dt_s
+    ahead = sight @ way / np.maximum(distance_m, 0.1)
+    turn: FloatArray = np.sqrt(np.maximum(way @ way - ahead * ahead, 0.0))
+    return turn / np.maximum(distance_m, 0.1)
+
+
+def _centre_covariance(
+    measured: Regions, seen: NDArray[np.intp], rotation: FloatArray, noise: DepthNoise
+) -> FloatArray:
+    """(K, 3, 3) of the centres of the surfaces seen (K,), in the fixed frame that rotation leads to."""
+    extent, sigma = measured.extent_m[seen], depth_sigma_m(measured.position_m[seen, 2], noise)
+    covariance = np.zeros((len(seen), 3, 3))
+    across = _CENTRE_SIGMA_M + _CENTRE_SHARE * extent[:, :2].max(axis=1)
+    covariance[:, 0, 0] = covariance[:, 1, 1] = np.square(across)
+    along = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * extent[:, 2]
+    covariance[:, 2, 2] = np.square(along) + np.square(_CENTRE_NOISE * sigma)
+    result: FloatArray = rotation @ covariance @ rotation.T
+    return result
