@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from config.camera import CameraConfig
 from config.chassis import ChassisConfig, PlantConfig
 from config.decision import DecisionConfig
+from config.governor import GovernorConfig
 from config.loader import Section, load
 from config.path import PathSpec
 from config.perception import PerceptionConfig
@@ -57,7 +58,7 @@ RunnerConfig = Annotated[LockstepRunner | RealtimeRunner, Field(discriminator="k
 
 
 class AppConfig(Section):
-    """What `treadwatch run --config FILE` reads."""
+    """What `treadwatch run` and `treadwatch govern` read with --config FILE."""
 
     robot: Robot = Robot()
     camera: CameraConfig
@@ -66,6 +67,10 @@ class AppConfig(Section):
     decision: DecisionConfig = DecisionConfig()
     path: PathSpec | None = Field(default=None, description="the route; a simulation has its own")
     simulation: SimulationConfig | None = None
+    governor: GovernorConfig | None = Field(
+        default=None,
+        description="another planner commands the robot, in place of a path: `treadwatch govern`",
+    )
     runner: RunnerConfig
 
     @model_validator(mode="after")
@@ -73,10 +78,14 @@ class AppConfig(Section):
         simulated = self.camera.kind == "simulated"
         if simulated and self.simulation is None:
             raise ValueError("camera.kind 'simulated' needs a 'simulation' section with a scenario")
-        if not simulated and self.path is None:
+        if not simulated and self.path is None and self.governor is None:
             raise ValueError(
                 f"camera.kind {self.camera.kind!r} needs a 'path': there is no scenario to give one"
             )
+        if self.governor is not None and self.path is not None:
+            raise ValueError("give a 'path' or a 'governor', not both: who plans the way?")
+        if self.governor is not None and self.runner.kind != "realtime":
+            raise ValueError("a 'governor' hears commands as they come and needs runner.kind 'realtime'")
         if simulated and self.path is not None:
             raise ValueError("give the path in the scenario or here, not both")
         if self.runner.kind == "lockstep" and not simulated:

@@ -88,9 +88,14 @@ def scenario_of(simulation: SimulationConfig, config_path: FilePath) -> Scenario
 
 
 def build_path(config: AppConfig, config_path: FilePath) -> Path:
-    """The route, from the program's YAML or from the scenario. Raises ConfigError, PathError."""
+    """The route, from the program's YAML or from the scenario. Raises ConfigError, PathError.
+
+    A governed robot has none but in a simulation: straight on from where it stands.
+    """
     if config.path is not None:
         return Path(config.path, config.robot)
+    if config.governor is not None and config.simulation is None:
+        return straight_ahead(config.robot)
     assert config.simulation is not None, "AppConfig asks for a path or a simulation"
     return Path(scenario_of(config.simulation, config_path).path, config.robot)
 
@@ -320,5 +325,5 @@ def replay_surroundings(config: ReplayConfig, mount: CameraMount | None) -> Surr
 
 
 def straight_ahead(robot: Robot) -> Path:
-    """A path for a recording that has none: straight on, longer than any camera sees."""
+    """A path where there is none: straight on, longer than any camera sees."""
     return Path(PathSpec(segments=(LineSpec(kind="line", length_m=1000.0),)), robot)

@@ -52,6 +52,34 @@ def run(
 
 
 @cli.command()
+@click.option(
+    "--config", "config_path", type=_FILE, default=CONFIG_DIR / "governor.yaml",
+    show_default="a simulated warehouse, commands over UDP", help="YAML with a `governor` section.",
+)  # fmt: skip
+@click.option("--scenario", help="Simulation only: another world, a YAML file or the name of one that ships.")
+@click.option("--seed", type=click.IntRange(min=0), help="Simulation only: another seed.")
+@click.option("--observations", type=_FILE, help="Write what is seen and decided, one JSON line a frame.")
+@click.option("--video", type=_FILE, help="Write an annotated video (.mp4, .webm or .avi).")
+@click.option("--quiet", is_flag=True, help="Only the summary.")
+def govern(
+    config_path: Path,
+    scenario: str | None,
+    seed: int | None,
+    observations: Path | None,
+    video: Path | None,
+    quiet: bool,
+) -> None:
+    """Let another planner drive: slow its (v, w) commands down to what is safe, until SIGTERM.
+
+    The messages, and a client in thirty lines: docs/governor.md. Exit code 1 if anything was touched.
+    """
+    from controller.governor.command import run_governor
+    from controller.result import MissionOptions
+
+    sys.exit(run_governor(MissionOptions(config_path, scenario, seed, observations, video, quiet)))
+
+
+@cli.command()
 @click.argument("recording", type=_FOLDER_OR_FILE)
 @click.option(
     "--odometry", type=click.Choice(["file", "none", "groundtruth"]), default="file", show_default=True,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
@@ -14,7 +14,7 @@ from controller.path import OnPath, Path
 from controller.shape import SpeedShaper
 from hal.api import Chassis
 from hal.clocks import NS_PER_S
-from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
+from hal.types import ChassisMode, ChassisState, FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene
 
 # At rest within this of the path's end counts as arrived, after the chassis has come to rest too.
@@ -41,7 +41,8 @@ class ControlStep:
     """What one step knew, decided and sent.
 
     pose: the body in the path's frame; progress_m along the path, lateral_m to its left.
-    scene_sequence: which frame the decision used, None if there was none yet.
+    scene_sequence: which frame the decision used, None if there was none yet. ahead_m: (N, 2) the way ahead
+    in the body frame, where it is not the path that the runner knows.
     """
 
     now_ns: int
@@ -52,6 +53,7 @@ class ControlStep:
     decision: Decision
     setpoint: Setpoint
     chassis: ChassisState
+    ahead_m: FloatArray | None = field(default=None, compare=False)
 
 
 class Drive(Protocol):

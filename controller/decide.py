@@ -51,6 +51,10 @@ class DecisionMaker:
         self._stuck_since_ns: int | None = None
         self._last: Limit | None = None
 
+    def take_path(self, path: Path, known: Knowledge) -> None:
+        """Go on along another path, of which this is known already; what hysteresis needs is kept."""
+        self._path, self._known = path, known
+
     def step(
         self,
         scene: Scene | None,

@@ -33,6 +33,10 @@ def run_mission(options: MissionOptions) -> int:
     Raises ConfigError, HalError, UserError.
     """
     config = with_overrides(load_app(options.config_path), options)
+    if config.governor is not None:
+        raise UserError(
+            f"{options.config_path}: has a 'governor' and no path to drive; use `treadwatch govern`"
+        )
     console = Console(options.quiet)
     if isinstance(config.runner, LockstepRunner):
         result = drive_lockstep(config, config.runner, options, console)

@@ -53,7 +53,7 @@ def drive_realtime(
         period_ns = round(NS_PER_S / runner.control_rate_hz)
         punctual = devices.enter_context(PunctualChassis(chassis, clock, period_ns))
         loop = build_control(config, options.config_path, punctual)
-        link = devices.enter_context(_perception(config, options.config_path, start_ns, recording))
+        link = devices.enter_context(perception_beside(config, options.config_path, start_ns, recording))
         stop = devices.enter_context(stop_on_signals())
         result = MissionResult(
             loop,
@@ -94,10 +94,11 @@ def describe_base(chassis: AnyChassisConfig) -> str:
 
 
 @contextmanager
-def _perception(
+def perception_beside(
     config: AppConfig, config_path: FilePath, start_ns: int, recording: RecordingOptions
 ) -> Iterator[PerceptionLink]:
-    """The perception process; when the block ends, its channel is closed, and it with that."""
+    """The perception process; when the block ends, its channel is closed, and it with that. start_ns: time
+    zero of a simulated world."""
     here, there = channel_sockets()
     process: BaseProcess = multiprocessing.get_context("spawn").Process(
         target=perceive_forever,

@@ -127,7 +127,7 @@ class RunRecorder:
                 step.decision,
                 step.setpoint.v_mps,
                 step.chassis.v_mps,
-                path_ahead(self._path, step.progress_m, step.pose),
+                path_ahead(self._path, step.progress_m, step.pose) if step.ahead_m is None else step.ahead_m,
             )
 
     def finish(self) -> None:

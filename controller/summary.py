@@ -30,8 +30,8 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
     """The summary as (subject, text)."""
     rows = [("mission", _mission_text(config, result)), ("target", _target_text(result))]
     if result.simulation is not None:
-        rows.append(("contacts", _contact_text(result.simulation)))
-    rows.append(("limits", _limits_text(config, result.setpoints)))
+        rows.append(("contacts", contact_text(result.simulation)))
+    rows.append(("limits", limits_text(config, result.setpoints)))
     rows.append(("perception", result.timing.line()))
     if math.isfinite(result.wall_s):
         ratio = result.duration_s / result.wall_s
@@ -42,11 +42,12 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
             )
         )
     if result.punctuality is not None and result.punctuality.late_ns:
-        rows.append(("control", _punctuality_text(result.punctuality)))
+        rows.append(("control", punctuality_text(result.punctuality)))
     return rows
 
 
-def _punctuality_text(punctuality: Punctuality) -> str:
+def punctuality_text(punctuality: Punctuality) -> str:
+    """How late the control steps began."""
     late_ms = np.array(punctuality.late_ns) / 1e6
     return (
         f"steps began {np.median(late_ms):.2f} ms late (median), {np.percentile(late_ms, 99):.2f} ms (p99), "
@@ -82,7 +83,8 @@ def _target_text(result: MissionResult) -> str:
     return text
 
 
-def _contact_text(simulation: Simulation) -> str:
+def contact_text(simulation: Simulation) -> str:
+    """What was touched, and what was passed nearest."""
     referee = simulation.referee
     count = len(referee.contacts)
     text = f"{count}" + (f" with {', '.join(referee.contacts)}" if count else "")
@@ -91,7 +93,8 @@ def _contact_text(simulation: Simulation) -> str:
     return text
 
 
-def _limits_text(config: AppConfig, tally: SetpointTally) -> str:
+def limits_text(config: AppConfig, tally: SetpointTally) -> str:
+    """Whether what was sent kept the limits."""
     limits = config.robot.limits
     kept = "kept" if tally.violations == 0 else f"broken {tally.violations} times"
     return (

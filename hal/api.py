@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Protocol, Self
 
-from hal.types import CanFrame, ChassisState, Intrinsics, Pose, RgbdFrame, Setpoint
+from hal.types import CanFrame, ChassisState, Intrinsics, Pose, RgbdFrame, Sender, Setpoint
 
 
 class Closing(Protocol):
@@ -82,4 +82,17 @@ class SerialLink(Closing, Protocol):
 
     def read(self) -> bytes:
         """All bytes that have arrived, without waiting; b"" is silence. Raises LinkLost."""
+        ...
+
+
+class DatagramLink(Closing, Protocol):
+    """Whole messages of other programs, in the order in which they arrive."""
+
+    def receive(self) -> tuple[bytes, Sender | None] | None:
+        """The oldest message that has arrived and who sent it (None: has no address); None is silence.
+        Raises LinkLost."""
+        ...
+
+    def send(self, data: bytes, receiver: Sender) -> bool:
+        """False if it cannot be delivered now: whoever does not listen must not make us wait."""
         ...

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 ColourImage = NDArray[np.uint8]
 DepthImage = NDArray[np.uint16]
+# Whom a datagram came from, as the socket module says it: (host, port, ...) or the path of a Unix socket.
+Sender = tuple[Any, ...] | str | bytes
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,118 @@
+"""From a requested (v, w) to the path it implies: an arc from where the robot is, with its curvature kept."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from config.path import ArcSpec, LineSpec, PathSpec, StartSpec
+from config.robot import Robot
+from controller import braking
+from controller.governor.request import Twist
+from controller.path import Path
+from hal.types import PlanarPose
+
+# As controller/path.py: the rest of the yaw rate is kept.
+_YAW_RATE_FOR_THE_BEND = 0.8
+# Slower than this is no motion: encoders and noise of a planner's own arithmetic.
+STANDING_MPS = 0.005
+STANDING_RADPS = 0.005
+# Straighter than a circle of 10 km is straight (config.path.ArcSpec.radius_m ends there).
+_STRAIGHT_1PM = 1e-4
+# An arc is looked along until it has turned round; a very tight one not so far, or it would meet itself.
+_HALF_TURN_RAD = 3.0
+_TIGHT_TURN_RAD = 2.0
+# Beyond what the camera sees, so that the arc's own end is never what limits the speed.
+_BEYOND_M = 2.0
+
+
+class Kind(Enum):
+    """What a request asks for."""
+
+    STAND = "stand"
+    ARC = "arc"
+    TURN = "turn in place"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """A request, understood.
+
+    speed_mps: along the arc, or of the body's corner in a turn, as far as the robot's own limits admit it; 0
+    for STAND and REFUSED. curvature_1pm: of the arc. left: a turn's direction, +1 or -1. why: it is refused.
+    """
+
+    kind: Kind
+    speed_mps: float = 0.0
+    curvature_1pm: float = 0.0
+    left: int = 0
+    why: str = ""
+
+
+def corner_m(robot: Robot) -> float:
+    """From the turning centre to the body's farthest corner."""
+    body = robot.body
+    return math.hypot(max(body.front_m, body.rear_m), body.width_m / 2.0)
+
+
+def tightest_m(robot: Robot) -> float:
+    """The least radius that can be driven: tighter, and the inner track would run backwards."""
+    return 1.01 * max(robot.body.width_m / 2.0, _least_radius_by_yaw_m(robot))
+
+
+def _least_radius_by_yaw_m(robot: Robot) -> float:
+    # controller/path.py refuses a bend that cannot be driven at 0.1 m/s.
+    return 0.1 / (_YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps)
+
+
+def understand(twist: Twist, robot: Robot) -> Wish:
+    """What twist asks of this robot."""
+    v, w = twist.v_mps, twist.w_radps
+    if not (math.isfinite(v) and math.isfinite(w)):
+        return Wish(Kind.REFUSED, why=f"the command is not a number: {v} m/s, {w} rad/s")
+    if v < -STANDING_MPS:
+        return Wish(Kind.REFUSED, why=f"reverse at {-v:.2f} m/s is refused: the camera does not see behind")
+    if v <= STANDING_MPS:
+        if abs(w) <= STANDING_RADPS:
+            return Wish(Kind.STAND)
+        yaw_radps = min(abs(w), robot.limits.max_yaw_rate_radps)
+        return Wish(Kind.TURN, yaw_radps * corner_m(robot), left=1 if w > 0.0 else -1)
+    curvature = w / v
+    if abs(curvature) * tightest_m(robot) > 1.0:
+        return Wish(
+            Kind.REFUSED,
+            why=f"a radius of {1.0 / abs(curvature):.2f} m is tighter than this robot can drive "
+            f"({tightest_m(robot):.2f} m): ask for a wider arc, or for v = 0 to turn in place",
+        )
+    curvature = 0.0 if abs(curvature) < _STRAIGHT_1PM else curvature
+    yaw_radps = _YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps
+    top_mps = min(robot.limits.max_speed_mps, yaw_radps / max(abs(curvature), _STRAIGHT_1PM))
+    return Wish(Kind.ARC, min(v, top_mps), curvature)
+
+
+def driveable(wish: Wish, v_mps: float, robot: Robot) -> Wish:
+    """An arc that can be driven at once: at v_mps the yaw rate may not yet admit the one that is asked for,
+    so the robot slows down on the tightest that it does admit."""
+    most_1pm = robot.limits.max_yaw_rate_radps / max(v_mps, STANDING_MPS)
+    if abs(wish.curvature_1pm) <= most_1pm:
+        return wish
+    return replace(wish, curvature_1pm=math.copysign(most_1pm, wish.curvature_1pm))
+
+
+def arc_path(pose: PlanarPose, curvature_1pm: float, speed_mps: float, range_m: float, robot: Robot) -> Path:
+    """The arc from pose on, as far as matters: speed_mps is its section's speed, so that the decision never
+    reckons with more than was asked for."""
+    stop_m = braking.stop(robot.limits.max_speed_mps, 0.0, braking.comfort(robot.limits)).distance_m
+    length_m = max(range_m, stop_m) + _BEYOND_M
+    most = max(min(speed_mps, 5.0), STANDING_MPS)
+    start = StartSpec(x_m=pose.x_m, y_m=pose.y_m, heading_deg=math.degrees(pose.heading_rad))
+    if curvature_1pm == 0.0:
+        line = LineSpec(kind="line", length_m=length_m, max_speed_mps=most)
+        return Path(PathSpec(start=start, segments=(line,)), robot)
+    radius_m = 1.0 / abs(curvature_1pm)
+    most_rad = _HALF_TURN_RAD if radius_m > robot.body.width_m else _TIGHT_TURN_RAD
+    turn_rad = math.copysign(min(length_m / radius_m, most_rad), curvature_1pm)
+    arc = ArcSpec(kind="arc", radius_m=radius_m, angle_deg=math.degrees(turn_rad), max_speed_mps=most)
+    return Path(PathSpec(start=start, segments=(arc,)), robot)

@@ -1,0 +1,294 @@
+"""Another planner's (v, w) in, the greatest safe part of it out: both scaled alike, so the arc is kept.
+
+The decision is the mission's (controller/decide.py) with the arc as the path ahead; the floor that is too
+near for the camera to see along a path that begins only now is remembered (controller/governor/ground.py);
+the speed goes through the same shaper. A turn in place is driven where the circle that it sweeps is free.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+
+from config.decision import DecisionConfig
+from config.governor import GovernorConfig
+from config.robot import Robot
+from controller.bodies import SceneError, bodies_of, no_bodies
+from controller.decide import DecisionMaker
+from controller.decision import Action, Decision, Reason
+from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand
+from controller.governor.ground import GroundMemory
+from controller.governor.request import Twist
+from controller.governor.surroundings import near_limits, turn_objection
+from controller.knowledge import Knowledge
+from controller.limits import Limit, Motion
+from controller.localise import PoseHistory
+from controller.path import OnPath, Path
+from controller.shape import SpeedShaper
+from hal.types import CameraMount, PlanarPose
+from vision.scene import Scene
+
+# A new arc is laid out when the robot has left the old one by this, or has come this far along it.
+_OFF_M = 0.02
+_OFF_RAD = 0.02
+_ALONG_M = 0.25
+# So far ahead of the robot's standing place the remembered floor answers instead of the camera.
+_NEAR_EXTRA_M = 0.3
+# As many scenes as controller/sight.py compares before it believes a surface.
+_SCENES = 5
+_STANDING_MPS = 0.01
+_SAME_MPS = 1e-3
+# At the end of the camera's range 10 cm aside, and a centimetre where the robot may have to stop.
+_SAME_1PM = 0.002
+_CAMERA_RULES = frozenset({"camera", "fault"})
+
+
+@dataclass(frozen=True, slots=True)
+class Governed:
+    """What to command. decision: why; its target_speed_mps is that of the arc, or of the body's corner in a
+    turn in place. fault: the shaper's, "" if there is none."""
+
+    v_mps: float
+    a_mps2: float
+    w_radps: float
+    decision: Decision
+    fault: str = ""
+
+
+class SpeedGovernor:
+    """One step a control period. Calls no clock, keeps no socket: controller/governor/loop.py does the rest.
+
+    Poses, and robot_pose of the scenes where they have one, are in one frame that does not move (odometry).
+    """
+
+    def __init__(
+        self,
+        config: GovernorConfig,
+        decision: DecisionConfig,
+        robot: Robot,
+        mount: CameraMount,
+        period_s: float,
+    ) -> None:
+        self._config, self._decision, self._robot, self._mount = config, decision, robot, mount
+        self._latency_s = period_s + decision.chassis_delay_s
+        self._decide = DecisionMaker(decision, robot, mount, period_s)
+        self._shape = SpeedShaper(robot.limits, period_s, decision.chassis_delay_s)
+        self._ground = GroundMemory(robot, mount, decision)
+        self._poses = PoseHistory()
+        self._scenes: deque[Scene] = deque(maxlen=_SCENES)
+        self._bodies = no_bodies(0)
+        # How the robot moves now: kept until it stands, whatever is asked for meanwhile.
+        self._motion = Wish(Kind.STAND)
+        self._path: Path | None = None
+        self._known: Knowledge | None = None
+        self._laid_out = (0.0, 0.0)
+        self._on_path = OnPath(0.0, 0.0, 0.0)
+        self._has_moved = False
+
+    @property
+    def path(self) -> Path | None:
+        """The arc that is looked along now."""
+        return self._path
+
+    @property
+    def on_path(self) -> OnPath:
+        """Where the robot is on it."""
+        return self._on_path
+
+    def rest(self) -> None:
+        """The chassis does not obey now: begin again from standstill."""
+        self._shape.reset()
+        self._motion = Wish(Kind.STAND)
+
+    def step(
+        self,
+        now_ns: int,
+        scene: Scene | None,
+        requested: Twist | None,
+        pose: PlanarPose,
+        measured_mps: float = math.nan,
+        silence: str = "no command",
+    ) -> Governed:
+        """What to command for one period from now_ns on.
+
+        scene: the newest there is, in every step until a newer one comes. requested: what is asked for now;
+        None: nothing, which means a jerk-limited stop, and silence says why. pose: of the body, by odometry.
+        measured_mps: by the chassis.
+        """
+        wish = Wish(Kind.REFUSED, why=silence) if requested is None else understand(requested, self._robot)
+        known_pose = math.isfinite(pose.x_m + pose.y_m + pose.heading_rad)
+        if known_pose:
+            self._look(scene, pose, now_ns)
+        self._choose_motion(wish)
+        decision = self._decided(scene, wish, pose, measured_mps, now_ns)
+        decision = self._as_asked(decision, wish, requested)
+        return self._command(decision)
+
+    def _look(self, scene: Scene | None, pose: PlanarPose, now_ns: int) -> None:
+        """Every scene is remembered once; one without a pose gets the one that the robot had then."""
+        self._poses.append(now_ns, pose)
+        self._ground.move(pose, now_ns)
+        if not self._has_moved:
+            self._ground.renew_consent(now_ns)
+        if scene is None or (self._scenes and scene.captured_ns <= self._scenes[-1].captured_ns):
+            return
+        then = scene.robot_pose or self._poses.at(scene.captured_ns)
+        if then is None or scene.captured_ns > now_ns:
+            return
+        try:
+            bodies = bodies_of(scene, then, self._mount, self._decision.prediction.body_depth_m)
+        except SceneError:
+            return  # the decision says so and stops
+        self._scenes.append(replace(scene, robot_pose=then))
+        self._bodies = bodies
+        standing = self._shape.v_mps == 0.0
+        self._ground.look(scene.free_space, then, scene.captured_ns, bodies.select(bodies.moving), standing)
+
+    def _choose_motion(self, wish: Wish) -> None:
+        """An arc may bend into another one while it is driven; between an arc and a turn in place, and
+        between two directions of turning, the robot stands."""
+        stands = self._shape.v_mps == 0.0 and self._shape.a_mps2 == 0.0
+        if wish.kind is Kind.ARC and (stands or self._motion.kind is Kind.ARC):
+            self._motion = driveable(wish, self._shape.v_mps, self._robot)
+        elif wish.kind is Kind.TURN and (
+            stands or (self._motion.kind is Kind.TURN and self._motion.left == wish.left)
+        ):
+            self._motion = wish
+        elif stands:
+            self._motion = Wish(Kind.STAND)
+
+    def _decided(
+        self, scene: Scene | None, wish: Wish, pose: PlanarPose, measured_mps: float, now_ns: int
+    ) -> Decision:
+        """The mission's decision along the present motion, before it is compared with what is asked."""
+        turns = self._motion.kind is Kind.TURN
+        v_mps = 0.0 if turns else self._speed_mps(measured_mps)
+        a_mps2 = 0.0 if turns else self._shape.a_mps2
+        path = self._arc(pose, now_ns)
+        if scene is not None and self._scenes and scene.captured_ns == self._scenes[-1].captured_ns:
+            scene = self._scenes[-1]
+        decision = self._decide.step(scene, path, pose, self._on_path, v_mps, a_mps2, now_ns)
+        if turns:
+            return self._turn(decision, pose, now_ns)
+        if self._motion.kind is Kind.ARC and decision.reason.rule != "fault":
+            assert self._known is not None
+            motion = Motion(v_mps, a_mps2, self._latency_s)
+            near = near_limits(
+                self._ground, self._known.corridor, self._on_path.s_m, self._near_m, motion,
+                self._robot, self._decision, now_ns,
+            )  # fmt: skip
+            for limit in near:
+                decision = self._least(decision, limit)
+        return decision
+
+    @property
+    def _near_m(self) -> float:
+        """Along the arc, from where it was laid out."""
+        return self._ground.consent_m + _NEAR_EXTRA_M
+
+    def _arc(self, pose: PlanarPose, now_ns: int) -> Path:
+        """The arc of the present motion; straight ahead where it is none. Laid out anew where it no longer
+        fits: what was seen lately is then looked at again, along the new arc."""
+        arc = self._motion.kind is Kind.ARC
+        wanted = (self._motion.curvature_1pm, self._motion.speed_mps) if arc else (0.0, self._shape.v_mps)
+        if not math.isfinite(pose.x_m + pose.y_m + pose.heading_rad):
+            pose = PlanarPose(0.0, 0.0, 0.0) if self._path is None else self._path.start
+        if self._path is not None:
+            self._on_path = on = self._path.project(pose, self._on_path.s_m)
+            fits = abs(on.d_m) <= _OFF_M and abs(on.heading_rad) <= _OFF_RAD and on.s_m <= _ALONG_M
+            bends = abs(wanted[0] - self._laid_out[0]) <= _SAME_1PM
+            if fits and bends and abs(wanted[1] - self._laid_out[1]) < _SAME_MPS:
+                return self._path
+        path = arc_path(pose, *wanted, self._decision.sight.range_m, self._robot)
+        on_start = OnPath(0.0, 0.0, 0.0)
+        known = Knowledge(path, self._robot.body, self._mount, self._decision, _NEAR_EXTRA_M)
+        for scene in self._scenes:
+            assert scene.robot_pose is not None
+            known.update(scene, scene.robot_pose, on_start, self._shape.v_mps, scene.captured_ns)
+        self._decide.take_path(path, known)
+        self._path, self._known, self._laid_out, self._on_path = path, known, wanted, on_start
+        return path
+
+    def _turn(self, decision: Decision, pose: PlanarPose, now_ns: int) -> Decision:
+        """A turn in place: only what the camera's condition says is taken from the decision ahead."""
+        speed_mps = self._motion.speed_mps
+        objection = ""
+        if decision.reason.rule in _CAMERA_RULES:
+            speed_mps = min(speed_mps, decision.target_speed_mps)
+            if speed_mps <= 0.0:
+                objection = decision.reason.sentence
+        else:
+            objection = turn_objection(
+                self._ground, self._bodies, pose, self._robot, self._decision,
+                self._config.turn_memory_s, now_ns,
+            )  # fmt: skip
+        if objection:
+            rule = decision.reason.rule if decision.reason.rule in _CAMERA_RULES else "turn"
+            return self._with(decision, 0.0, Reason(rule, objection), emergency=rule == "turn")
+        yaw_radps = self._motion.left * speed_mps / corner_m(self._robot)
+        reason = Reason("requested", f"turns in place at {yaw_radps:.2f} rad/s")
+        return self._with(decision, speed_mps, reason, emergency=False)
+
+    def _least(self, decision: Decision, limit: Limit) -> Decision:
+        """The decision under one more limit; what hardly lets the robot move does not let it start."""
+        speed_mps = limit.speed_mps
+        if speed_mps < self._decision.release.creep_mps:
+            speed_mps = 0.0
+        if speed_mps >= decision.target_speed_mps:
+            return decision
+        return self._with(decision, speed_mps, limit.reason, emergency=decision.emergency or limit.urgent)
+
+    def _as_asked(self, decision: Decision, wish: Wish, requested: Twist | None) -> Decision:
+        """Never faster than asked for; and the reason, if that is what holds it back."""
+        stop = wish.kind in (Kind.STAND, Kind.REFUSED) or wish.kind is not self._motion.kind
+        stop = stop or (wish.kind is Kind.TURN and wish.left != self._motion.left)
+        if stop:
+            return self._with(decision, 0.0, self._why_stop(wish, requested), emergency=decision.emergency)
+        assert requested is not None
+        if wish.kind is Kind.TURN:
+            return decision
+        target_mps = min(decision.target_speed_mps, wish.speed_mps)
+        reason = decision.reason
+        if reason.rule in ("free", "section"):
+            reason = Reason(
+                "requested", f"as asked: {requested.v_mps:.2f} m/s, {requested.w_radps:.2f} rad/s"
+            )
+            if target_mps < wish.speed_mps - _SAME_MPS:
+                sentence = (
+                    f"asked {wish.speed_mps:.2f} m/s; on this arc the robot drives {target_mps:.2f} m/s"
+                )
+                reason = Reason("robot", sentence)
+        elif reason.rule == "target":
+            reason = Reason("robot", f"such an arc is looked along only so far: {target_mps:.2f} m/s")
+        return self._with(decision, target_mps, reason, emergency=decision.emergency)
+
+    def _why_stop(self, wish: Wish, requested: Twist | None) -> Reason:
+        if wish.kind is Kind.REFUSED:
+            return Reason("no command" if requested is None else "refused", f"{wish.why}: stop")
+        if wish.kind is Kind.STAND:
+            return Reason("requested", "asked to stand")
+        return Reason("requested", f"stands before it can {'turn in place' if wish.left else 'drive on'}")
+
+    def _with(self, decision: Decision, target_mps: float, reason: Reason, *, emergency: bool) -> Decision:
+        v, band = self._shape.v_mps, self._decision.release.dead_band_mps
+        action = Action.KEEP
+        if target_mps > v + band:
+            action = Action.INCREASE
+        elif target_mps < v - band or (target_mps == 0.0 and v > _STANDING_MPS):
+            action = Action.DECREASE
+        stuck_ns = decision.stuck_since_ns if reason is decision.reason else None
+        return Decision(action, target_mps, reason, emergency and v > _STANDING_MPS, stuck_ns)
+
+    def _speed_mps(self, measured_mps: float) -> float:
+        """The greater of commanded and measured, as in controller/control.py."""
+        return max(self._shape.v_mps, measured_mps) if math.isfinite(measured_mps) else self._shape.v_mps
+
+    def _command(self, decision: Decision) -> Governed:
+        shaped = self._shape.step(decision.target_speed_mps, emergency=decision.emergency)
+        self._has_moved = self._has_moved or shaped.v_mps > 0.0
+        if self._motion.kind is Kind.TURN:
+            w_radps = self._motion.left * shaped.v_mps / corner_m(self._robot)
+            return Governed(0.0, 0.0, w_radps, decision, shaped.fault)
+        w_radps = self._motion.curvature_1pm * shaped.v_mps
+        return Governed(shaped.v_mps, shaped.a_mps2, w_radps, decision, shaped.fault)

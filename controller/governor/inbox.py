@@ -1,0 +1,157 @@
+"""Which command holds now: from the newest valid message of one planner, until it falls silent.
+
+A message that is not obeyed is dropped and counted; the first of each kind is told. The planner that is heard
+first has the command until it has been silent for timeout_s; a planner that restarts is heard again after
+that, whatever number it begins with.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from config.governor import GovernorConfig
+from controller.decision import Decision
+from controller.governor.request import MessageError, Request, Twist, answer, parse_request
+from hal.api import DatagramLink
+from hal.clocks import NS_PER_S
+from hal.errors import LinkLost
+from hal.types import Sender
+
+_NS_PER_MS = 1_000_000
+# A flood must not keep a control step busy; what is left over waits for the next one.
+_MOST_A_POLL = 64
+# Two clocks drift apart by less than this; the fastest message so far is forgotten at this rate.
+_DRIFT = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """twist: what is asked for now; None: nothing, and then silence says why in a sentence."""
+
+    twist: Twist | None
+    silence: str = ""
+
+
+@dataclass(slots=True)
+class _Session:
+    """One planner while it has the command. least_offset_s: our clock minus its, of its fastest message."""
+
+    sender: Sender | None
+    began_ns: int
+    last: Request
+    last_ns: int
+    least_offset_s: float
+
+
+class Inbox:
+    """Polled once a control step. warn: told the first message of each kind that is dropped."""
+
+    def __init__(self, link: DatagramLink, config: GovernorConfig, warn: Callable[[str], None]) -> None:
+        self._link, self._config, self._warn = link, config, warn
+        self._session: _Session | None = None
+        self._heard_ns: int | None = None
+        self._to_answer: Request | None = None
+        self._lost = ""
+        self.dropped: Counter[str] = Counter()
+        self.accepted = 0
+
+    def poll(self, now_ns: int) -> Asked:
+        """Read what has arrived; what is asked for at now_ns."""
+        self._end_if_silent(now_ns)
+        if not self._lost:
+            self._read(now_ns)
+        if self._lost:
+            return Asked(None, self._lost)
+        session = self._session
+        if session is None:
+            if self._heard_ns is None:
+                return Asked(None, "no command yet")
+            return Asked(None, f"no command for {(now_ns - self._heard_ns) // _NS_PER_MS} ms")
+        steady_s = (now_ns - session.began_ns) / NS_PER_S
+        if steady_s < self._config.resume_s:
+            return Asked(None, f"commands have come for only {steady_s:.2f} s")
+        return Asked(session.last.twist)
+
+    def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None:
+        """Answer the newest message, once."""
+        request, self._to_answer = self._to_answer, None
+        session = self._session
+        if request is None or session is None or session.sender is None:
+            return
+        message = answer(request, v_mps, w_radps, decision, chassis, self.dropped.total())
+        if not self._link.send(message, session.sender):
+            self.dropped["answers that could not be delivered"] += 1
+
+    def _end_if_silent(self, now_ns: int) -> None:
+        session = self._session
+        if session is not None and now_ns - session.last_ns > self._config.timeout_s * NS_PER_S:
+            self._session, self._to_answer = None, None
+
+    def _read(self, now_ns: int) -> None:
+        try:
+            for _ in range(_MOST_A_POLL):
+                arrived = self._link.receive()
+                if arrived is None:
+                    return
+                self._take(*arrived, now_ns)
+        except LinkLost as error:
+            self._lost = str(error)
+            self._warn(self._lost)
+
+    def _take(self, data: bytes, sender: Sender | None, now_ns: int) -> None:
+        try:
+            request = parse_request(data)
+        except MessageError as error:
+            self._drop("malformed", f"{_name(sender)} sent {error}")
+            return
+        session = self._session
+        offset_s = now_ns / NS_PER_S - request.t_s
+        if session is None:
+            session = self._session = _Session(sender, now_ns, request, now_ns, offset_s)
+        elif not self._in_order(session, request, sender, offset_s, now_ns):
+            return
+        waited_s = (now_ns - session.last_ns) / NS_PER_S
+        session.least_offset_s = min(offset_s, session.least_offset_s + _DRIFT * waited_s)
+        session.last, session.last_ns = request, now_ns
+        self._heard_ns = now_ns
+        self._to_answer = request
+        self.accepted += 1
+
+    def _in_order(
+        self, session: _Session, request: Request, sender: Sender | None, offset_s: float, now_ns: int
+    ) -> bool:
+        if sender != session.sender:
+            has = f"{_name(session.sender)} has the command"
+            return self._drop("from another sender", f"{_name(sender)} is not obeyed while {has}")
+        if request.seq == session.last.seq:
+            return self._drop("duplicate", f"seq {request.seq} came twice")
+        if request.seq < session.last.seq:
+            return self._drop("out of order", f"seq {request.seq} came after {session.last.seq}")
+        if request.t_s < session.last.t_s:
+            back_s = session.last.t_s - request.t_s
+            return self._drop("clock went back", f"t_s of seq {request.seq} went back by {back_s:.3f} s")
+        waited_s = (now_ns - session.last_ns) / NS_PER_S
+        late_s = offset_s - session.least_offset_s - _DRIFT * waited_s
+        if late_s > self._config.late_s:
+            return self._drop("late", f"seq {request.seq} came {late_s:.2f} s late")
+        return True
+
+    def _drop(self, kind: str, why: str) -> bool:
+        self.dropped[kind] += 1
+        if self.dropped[kind] == 1:
+            self._warn(f"message dropped ({kind}): {why}; more of the kind are only counted")
+        return False
+
+
+def _name(sender: Sender | None) -> str:
+    match sender:
+        case None:
+            return "a sender without address"
+        case (host, port, *_):
+            return f"{host}:{port}"
+        case bytes():
+            return sender.decode(errors="replace").replace("\0", "@")
+        case _:
+            return str(sender)

@@ -1,0 +1,127 @@
+"""What the remembered floor says of an arc's beginning, and of a turn in place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from config.decision import DecisionConfig
+from config.robot import Robot
+from controller import braking
+from controller.bodies import Bodies
+from controller.corridor import Corridor
+from controller.decision import Reason
+from controller.governor.arcs import corner_m
+from controller.governor.ground import CELL_M, IN_VIEW_NS, GroundMemory
+from controller.limits import Gap, Limit, Motion, allowed, stop_before
+from controller.path import Path
+from hal.clocks import NS_PER_S
+from hal.types import FloatArray, PlanarPose
+
+_LANES = 9
+_STEP_M = 0.1
+# What comes towards a robot that turns must still find it standing.
+_STOP_S = 1.5
+
+
+def near_limits(
+    ground: GroundMemory,
+    corridor: Corridor,
+    s_m: float,
+    to_s_m: float,
+    motion: Motion,
+    robot: Robot,
+    config: DecisionConfig,
+    now_ns: int,
+) -> list[Limit]:
+    """Limits by the floor of the corridor up to to_s_m, which is too near for the camera: from the tail on,
+    because in a bend that swings out."""
+    cells = np.arange(s_m - corridor.rear_m + 0.5 * _STEP_M, to_s_m, _STEP_M)
+    points = _across(corridor.path, cells, corridor.half_width(cells))
+    flat = points.reshape(-1, 2)
+    # What is in view is the decision's business, which knows it better than to a cell.
+    stands = ground.blocked(flat, now_ns, now_ns - IN_VIEW_NS).reshape(len(cells), _LANES).any(axis=1)
+    unknown = ground.free(flat).reshape(len(cells), _LANES).mean(axis=1) < config.sight.known_share
+    comfort, margins = braking.comfort(robot.limits), config.margins
+    found = []
+    front_s_m = s_m + corridor.front_m + 0.5 * _STEP_M
+    if stands.any():
+        gap = Gap(max(float(cells[stands.argmax()]) - front_s_m, 0.0))
+        what = "stood when it was last seen,"
+        found.append(stop_before(gap, motion, comfort, margins.stop_m, margins.least_m, "depth", what))
+    if unknown.any():
+        gap = Gap(max(float(cells[unknown.argmax()]) - front_s_m, 0.0))
+        limit = stop_before(gap, motion, comfort, margins.least_m, -math.inf, "unseen", "")
+        sentence = (
+            f"the floor of the arc was never seen beyond {gap.distance_m:.1f} m: {allowed(limit.speed_mps)}"
+        )
+        reason = Reason("unseen", sentence, distance_m=gap.distance_m, required_m=limit.reason.required_m)
+        found.append(Limit(limit.speed_mps, reason))
+    return found
+
+
+def _across(path: Path, s_m: FloatArray, half_m: FloatArray) -> FloatArray:
+    """(C, lanes, 2) floor points across the corridor at s_m (C,)."""
+    x, y, heading = path.poses(s_m)
+    side = half_m[:, None] * np.linspace(-1.0, 1.0, _LANES)
+    return np.stack(
+        (x[:, None] - np.sin(heading)[:, None] * side, y[:, None] + np.cos(heading)[:, None] * side), axis=-1
+    )
+
+
+def turn_objection(
+    ground: GroundMemory,
+    bodies: Bodies,
+    pose: PlanarPose,
+    robot: Robot,
+    config: DecisionConfig,
+    memory_s: float,
+    now_ns: int,
+) -> str:
+    """Why the robot must not turn on the spot at pose; "" if the circle that it sweeps is free."""
+    sweep_m = corner_m(robot) + config.margins.lateral_m
+    if len(bodies):
+        comes = np.hypot(bodies.velocity_mps[:, 0], bodies.velocity_mps[:, 1]) * bodies.moving * _STOP_S
+        room = _distance_m(bodies, pose) - comes - sweep_m
+        nearest = int(room.argmin())
+        if room[nearest] < 0.0:
+            return f"obstacle {bodies.ids[nearest]} is too near to turn in place: stop"
+    steps = np.arange(-sweep_m, sweep_m + CELL_M, CELL_M)
+    x, y = np.meshgrid(steps, steps)
+    inside = x * x + y * y <= sweep_m * sweep_m
+    around = np.stack((x[inside], y[inside]), axis=-1)
+    points = around + np.array((pose.x_m, pose.y_m))
+    stands = ground.blocked(points, now_ns)
+    if stands.any():
+        return (
+            f"something stands {_where(around[stands], pose)}, and a turn in place sweeps {sweep_m:.2f} m "
+            "around: stop"
+        )
+    unknown = ~ground.free(points, now_ns - round(memory_s * NS_PER_S))
+    if unknown.any():
+        return (
+            f"the floor {_where(around[unknown], pose)} has not been seen within {memory_s:g} s, and a turn "
+            f"in place sweeps {sweep_m:.2f} m around: stop"
+        )
+    return ""
+
+
+def _distance_m(bodies: Bodies, pose: PlanarPose) -> FloatArray:
+    """(N,) from the turning centre to each box."""
+    dx, dy = bodies.xy_m[:, 0] - pose.x_m, bodies.xy_m[:, 1] - pose.y_m
+    cos, sin = np.cos(bodies.view_rad), np.sin(bodies.view_rad)
+    along = np.maximum(np.abs(dx * cos + dy * sin) - bodies.half_view_m, 0.0)
+    across = np.maximum(np.abs(dy * cos - dx * sin) - bodies.half_across_m, 0.0)
+    distance: FloatArray = np.hypot(along, across)
+    return distance
+
+
+def _where(around_m: FloatArray, pose: PlanarPose) -> str:
+    """The nearest of these offsets in words."""
+    k = int(np.hypot(around_m[:, 0], around_m[:, 1]).argmin())
+    dx, dy = around_m[k]
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    ahead, left = dx * cos + dy * sin, dy * cos - dx * sin
+    along = f"{abs(ahead):.1f} m {'ahead' if ahead >= 0.0 else 'behind'}"
+    return f"{along} and {abs(left):.1f} m to the {'left' if left >= 0.0 else 'right'}"
