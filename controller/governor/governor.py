@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.robot import Robot
-from controller.bodies import SceneError, bodies_of, no_bodies
+from controller.bodies import SceneError, bodies_of
 from controller.decide import DecisionMaker
 from controller.decision import Action, Decision, Reason
 from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand
@@ -77,7 +77,6 @@ class SpeedGovernor:
         self._ground = GroundMemory(robot, mount, decision)
         self._poses = PoseHistory()
         self._scenes: deque[Scene] = deque(maxlen=_SCENES)
-        self._bodies = no_bodies(0)
         # How the robot moves now: kept until it stands, whatever is asked for meanwhile.
         self._motion = Wish(Kind.STAND)
         self._path: Path | None = None
@@ -141,7 +140,6 @@ class SpeedGovernor:
         except SceneError:
             return  # the decision says so and stops
         self._scenes.append(replace(scene, robot_pose=then))
-        self._bodies = bodies
         standing = self._shape.v_mps == 0.0
         self._ground.look(scene.free_space, then, scene.captured_ns, bodies.select(bodies.moving), standing)
 
@@ -212,6 +210,7 @@ class SpeedGovernor:
 
     def _turn(self, decision: Decision, pose: PlanarPose, now_ns: int) -> Decision:
         """A turn in place: only what the camera's condition says is taken from the decision ahead."""
+        assert self._known is not None
         speed_mps = self._motion.speed_mps
         objection = ""
         if decision.reason.rule in _CAMERA_RULES:
@@ -220,7 +219,7 @@ class SpeedGovernor:
                 objection = decision.reason.sentence
         else:
             objection = turn_objection(
-                self._ground, self._bodies, pose, self._robot, self._decision,
+                self._ground, self._known.bodies, pose, self._robot, self._decision,
                 self._config.turn_memory_s, now_ns,
             )  # fmt: skip
         if objection:
@@ -254,9 +253,9 @@ class SpeedGovernor:
             reason = Reason(
                 "requested", f"as asked: {requested.v_mps:.2f} m/s, {requested.w_radps:.2f} rad/s"
             )
-            if target_mps < wish.speed_mps - _SAME_MPS:
+            if target_mps < requested.v_mps - _SAME_MPS:
                 sentence = (
-                    f"asked {wish.speed_mps:.2f} m/s; on this arc the robot drives {target_mps:.2f} m/s"
+                    f"asked {requested.v_mps:.2f} m/s; on this arc the robot drives {target_mps:.2f} m/s"
                 )
                 reason = Reason("robot", sentence)
         elif reason.rule == "target":

@@ -51,6 +51,7 @@ class Inbox:
     def __init__(self, link: DatagramLink, config: GovernorConfig, warn: Callable[[str], None]) -> None:
         self._link, self._config, self._warn = link, config, warn
         self._session: _Session | None = None
+        self._heard: tuple[Sender | None, Request] | None = None
         self._heard_ns: int | None = None
         self._to_answer: Request | None = None
         self._lost = ""
@@ -109,13 +110,16 @@ class Inbox:
         session = self._session
         offset_s = now_ns / NS_PER_S - request.t_s
         if session is None:
+            if (sender, request) == self._heard:
+                self._drop("duplicate", f"seq {request.seq} came again after silence")
+                return
             session = self._session = _Session(sender, now_ns, request, now_ns, offset_s)
         elif not self._in_order(session, request, sender, offset_s, now_ns):
             return
         waited_s = (now_ns - session.last_ns) / NS_PER_S
         session.least_offset_s = min(offset_s, session.least_offset_s + _DRIFT * waited_s)
         session.last, session.last_ns = request, now_ns
-        self._heard_ns = now_ns
+        self._heard, self._heard_ns = (sender, request), now_ns
         self._to_answer = request
         self.accepted += 1
 

@@ -61,7 +61,7 @@ class GovernedDrive:
         self.steps: list[Step] = []
         self._frames = 0
         self._on_way: deque[tuple[float, Scene]] = deque()
-        self._scene: Scene | None = None
+        self.scene: Scene | None = None
 
     def run(self, until_s: float) -> list[Step]:
         while self.t_s < until_s:
@@ -80,10 +80,10 @@ class GovernedDrive:
             if scene is not None:
                 self._on_way.append((self.t_s + LATENCY_S, scene))
         while self._on_way and self._on_way[0][0] <= self.t_s:
-            self._scene = self._on_way.popleft()[1]
+            self.scene = self._on_way.popleft()[1]
         requested = self.planner(self.t_s)
         governed = self.governor.step(
-            round(self.t_s * NS_PER_S), self._scene, requested, self.pose, self.v_mps
+            round(self.t_s * NS_PER_S), self.scene, requested, self.pose, self.v_mps
         )
         share = 1.0 - math.exp(-PERIOD_S / self._lag_s)
         self.v_mps += share * (governed.v_mps - self.v_mps)
