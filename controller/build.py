@@ -23,6 +23,7 @@ from config.chassis import (
     RoboclawChassisConfig,
     RoboteqChassisConfig,
 )
+from config.governor import InputConfig, UdpInputConfig, UnixInputConfig
 from config.loader import resolve
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
@@ -36,7 +37,7 @@ from controller.path import Path
 from controller.perceive import Perceiver
 from controller.recorder import Surroundings
 from controller.shape import SpeedShaper
-from hal.api import CanLink, Chassis, Clock, FrameSource, OdometrySource, SerialLink
+from hal.api import CanLink, Chassis, Clock, DatagramLink, FrameSource, OdometrySource, SerialLink
 from hal.cameras.pose_file import PoseFile, open_odometry
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
@@ -48,6 +49,7 @@ from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboteq import RoboteqChassis
 from hal.links.can_bus import CanBusLink
+from hal.links.datagrams import UdpSocket, UnixSocket
 from hal.links.pseudo_terminal import PseudoTerminal
 from hal.links.scripted import ScriptedCanLink, ScriptedSerialLink, can_pair, serial_pair
 from hal.links.serial_port import SerialPortLink
@@ -283,6 +285,17 @@ def build_serial_emulator(config: AnyChassisConfig, link: SerialLink, plant: Tra
             )
         case KobukiChassisConfig():
             return KobukiEmulator(link, plant)
+        case unknown:
+            assert_never(unknown)
+
+
+def open_commands(config: InputConfig) -> DatagramLink:
+    """Where a governor's commands arrive, not yet entered."""
+    match config:
+        case UdpInputConfig():
+            return UdpSocket(config.host, config.port)
+        case UnixInputConfig():
+            return UnixSocket(FilePath(config.path).expanduser(), config.group_may_command)
         case unknown:
             assert_never(unknown)
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
-from controller.build import build_base, build_path, build_simulation
+from controller.build import build_base, build_path, build_simulation, open_commands
 from controller.console import Console
 from controller.control import ControlStep, Outcome
 from controller.errors import UserError
-from controller.governor.build import build_governor_loop, build_inbox, open_input
+from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
 from controller.mission import with_overrides
@@ -86,7 +86,7 @@ def _govern(
     service = ServiceManager(os.environ, os.getpid())
     recording = RecordingOptions(options.observations, options.video)
     with ExitStack() as devices:
-        link = devices.enter_context(open_input(governor.input))
+        link = devices.enter_context(open_commands(governor.input))
         if simulation is not None:
             devices.enter_context(simulation)
         devices.enter_context(chassis)
