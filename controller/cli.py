@@ -234,6 +234,38 @@ def campaign(
     sys.exit(run_campaign(options))
 
 
+@cli.command("stop-and-go")
+@click.option(
+    "--config", "config_path", type=_FILE, default=DEFAULT_CONFIG, show_default="the simulated warehouse",
+    help="YAML of robot, camera, chassis, perception and decision.",
+)  # fmt: skip
+@click.option("--drives", type=click.IntRange(1, 10_000), default=8, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="The first seed.")
+@click.option(
+    "--mode", type=click.Choice(["noise", "camera"]), default="camera", show_default=True,
+    help="A noise model in place of the camera, or rendered and perceived frames.",
+)  # fmt: skip
+@click.option(
+    "--report", type=click.Path(path_type=Path, file_okay=False), required=True,
+    help="Folder for the recorded drives, report.md and summary.json.",
+)  # fmt: skip
+@click.option("--keep", is_flag=True, help="Camera mode: keep frames, observations and a video as well.")
+@click.option("--quiet", is_flag=True, help="No progress bar.")
+def stop_and_go(
+    config_path: Path,
+    drives: int,
+    seed: int,
+    mode: Literal["noise", "camera"],
+    report: Path,
+    keep: bool,
+    quiet: bool,
+) -> None:
+    """Somebody steps into the way, stands, leaves: Nav2's bag metrics. Exit code 1 if a target is missed."""
+    from controller.campaign.stop_and_go_command import StopAndGoOptions, run_stop_and_go
+
+    sys.exit(run_stop_and_go(StopAndGoOptions(config_path, drives, seed, mode, report, keep, quiet)))
+
+
 def _names(text: str | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())
 

@@ -1,0 +1,189 @@
+"""Nav2's bag metrics on drives of our own: does it stop in time, hold, go on soon, never stop for nothing?
+
+Nav2's collision monitor is tested on recordings by four numbers (nav2_collision_monitor/test/
+collision_monitor_node_bag.cpp): time to stop, share of the time that the stop is held, time to resume, share
+of false stops, with 0.02 m/s as stopped, 0.10 m/s as driving and three samples in a row as certain. Here the
+window in which a stop is right comes from the truth of the simulated world, and the recording is what a drive
+leaves behind: one row a control step.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.decision import DecisionConfig
+from config.robot import Robot
+from controller import braking
+from controller.campaign.drive import DriveLog
+from controller.campaign.stage import Stage
+from controller.decision import Action
+from controller.errors import UserError
+from hal.types import FloatArray
+
+STOPPED_MPS, DRIVING_MPS, SAMPLES = 0.02, 0.10, 3
+_ROOM_M = 0.3
+_HEAD = ("t_s", "s_m", "v_mps", "action", "free_m")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """One drive, a row a control step (N,): time, way along the path and speed as they truly were, whether
+    the decision was to go faster, and free_m, the true free way of the front (inf: nothing ahead)."""
+
+    times_s: FloatArray
+    s_m: FloatArray
+    v_mps: FloatArray
+    faster: NDArray[np.bool_]
+    free_m: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class StopAndGo:
+    """Nav2's four numbers for one drive. NaN: the drive had no such moment; inf: it never did it.
+
+    to_stop_s counts from when the free way is no longer than a comfortable stop needs (for the last time
+    before it stands); braking_s is what physics takes of that. to_resume_s counts from when the way is free
+    until 0.10 m/s, starting_s is what the jerk limit takes of that; to_decide_s: until the decision says
+    faster.
+    """
+
+    to_stop_s: float
+    braking_s: float
+    hold_share: float
+    to_resume_s: float
+    starting_s: float
+    to_decide_s: float
+    false_stop_share: float
+
+    def as_dict(self) -> dict[str, float | None]:
+        """For JSON: null where there is no number."""
+        return {key: value if math.isfinite(value) else None for key, value in asdict(self).items()}
+
+
+def record(stage: Stage, log: DriveLog) -> Recording:
+    """A drive beside the truth of its world."""
+    times, s = np.array(log.times_s), np.array(log.s_m)
+    free = np.full(len(times), np.inf)
+    for k, stretches in enumerate(stage.blocked(times)):
+        ahead = [low - s[k] for low, high in stretches if high >= s[k]]
+        free[k] = max(min(ahead), 0.0) if ahead else np.inf
+    faster = np.array([action is Action.INCREASE for action in log.actions], np.bool_)
+    return Recording(times, s, np.array(log.v_mps), faster, free)
+
+
+def write(path: Path, recording: Recording) -> None:
+    """As CSV. Raises UserError."""
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            rows = csv.writer(file)
+            rows.writerow(_HEAD)
+            for t, s, v, faster, free in zip(
+                recording.times_s, recording.s_m, recording.v_mps, recording.faster, recording.free_m,
+                strict=True,
+            ):  # fmt: skip
+                rows.writerow((f"{t:.3f}", f"{s:.5f}", f"{v:.5f}", int(faster), f"{free:.3f}"))
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+def read(path: Path) -> Recording:
+    """What write wrote. Raises UserError."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            head, *rows = csv.reader(file)
+        table = np.array([[float(cell) for cell in row] for row in rows], np.float64)
+        if tuple(head) != _HEAD or table.shape[1:] != (len(_HEAD),) or not np.isfinite(table[:, :4]).all():
+            raise ValueError("other columns, or values that are no numbers")
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise UserError(f"{path}: is no recording of a drive ({error}); drive it again") from error
+    t, s, v, faster, free = table.T
+    return Recording(t, s, v, faster > 0.5, free)
+
+
+def measure(recording: Recording, robot: Robot, decision: DecisionConfig) -> StopAndGo:
+    """The four numbers of a drive in which at most one thing comes into the way and leaves it again."""
+    comfort = braking.comfort(robot.limits)
+    recording = _until_at_rest_for_good(recording)
+    times, v, free = recording.times_s, recording.v_mps, recording.free_m
+    needs = np.array(
+        [
+            braking.required_distance(
+                max(speed, 0.0), 0.0, 0.0, decision.chassis_delay_s, comfort, decision.margins.stop_m
+            )
+            for speed in v
+        ]
+    )
+    starting_s = math.sqrt(2.0 * DRIVING_MPS / robot.limits.max_jerk_mps3)
+    driving = _first(v >= DRIVING_MPS, 0)
+    must = _must_stop(free, needs, v, driving)
+    if must == len(v):
+        nothing = math.nan
+        false_stops = _standing_share(v[driving:])
+        return StopAndGo(nothing, nothing, nothing, nothing, starting_s, nothing, false_stops)
+    braking_s = braking.stop(max(float(v[must]), 0.0), 0.0, comfort).time_s
+    clear = _first(~np.isfinite(free) | (free > needs[must] + 1.0), must, certain=1)
+    stopped = _first(v <= STOPPED_MPS, must)
+    to_stop_s, hold = math.inf, 0.0
+    if stopped < clear:
+        to_stop_s = float(times[stopped] - times[must])
+        hold = _standing_share(v[stopped:clear])
+    resumed = _first(v >= DRIVING_MPS, clear) if clear < len(v) else len(v)
+    decided = _first(recording.faster, clear, certain=1) if clear < len(v) else len(v)
+    right = np.zeros(len(v), np.bool_)
+    right[must : max(resumed, clear)] = True
+    return StopAndGo(
+        to_stop_s,
+        braking_s,
+        hold,
+        _since(times, clear, resumed),
+        starting_s,
+        _since(times, clear, decided),
+        _standing_share(v[driving:], ~right[driving:]),
+    )
+
+
+def _must_stop(free_m: FloatArray, needs_m: FloatArray, v_mps: FloatArray, driving: int) -> int:
+    """From where on the free way is no longer than a comfortable stop needs, for the last time before it
+    stands: who slows down in good time has room again, and need not stop yet."""
+    first = _first(free_m <= needs_m, driving, certain=1)
+    until = min(_first(v_mps <= STOPPED_MPS, first), _first(~np.isfinite(free_m), first, certain=1))
+    roomy = np.flatnonzero(free_m[first:until] > needs_m[first:until] + _ROOM_M)
+    return first if not len(roomy) else _first(free_m <= needs_m, first + int(roomy[-1]), certain=1)
+
+
+def _until_at_rest_for_good(recording: Recording) -> Recording:
+    """Standing on the target is no stop. A drive that ends before something in its way is kept whole."""
+    moving = np.flatnonzero(recording.v_mps > STOPPED_MPS)
+    if not len(moving) or np.isfinite(recording.free_m[-1]):
+        return recording
+    end = int(moving[-1]) + 1
+    return Recording(*(getattr(recording, one.name)[:end] for one in fields(recording)))
+
+
+def _first(holds: NDArray[np.bool_], start: int, certain: int = SAMPLES) -> int:
+    """Where it first holds from start on, certain samples in a row; len where it never does."""
+    run = 0
+    for k in range(start, len(holds)):
+        run = run + 1 if holds[k] else 0
+        if run == certain:
+            return k - certain + 1
+    return len(holds)
+
+
+def _since(times_s: FloatArray, start: int, end: int) -> float:
+    if start >= len(times_s):
+        return math.nan
+    return float(times_s[end] - times_s[start]) if end < len(times_s) else math.inf
+
+
+def _standing_share(v_mps: FloatArray, of: NDArray[np.bool_] | None = None) -> float:
+    chosen = v_mps if of is None else v_mps[of]
+    return float(np.mean(chosen <= STOPPED_MPS)) if len(chosen) else 0.0

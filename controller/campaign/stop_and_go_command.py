@@ -1,0 +1,156 @@
+"""`treadwatch stop-and-go`: somebody steps into the way, stands, leaves; Nav2's bag metrics of what we do."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+import numpy as np
+
+from config.app import AppConfig, LockstepRunner, load_app
+from controller.campaign import stop_and_go
+from controller.campaign.camera_mission import drive_camera
+from controller.campaign.noise_mission import drive_noise
+from controller.campaign.policies import OURS, build_policy
+from controller.campaign.stage import Stage
+from controller.campaign.stop_and_go import StopAndGo
+from controller.campaign.task import Mode
+from controller.errors import UserError
+from controller.evaluation import markdown
+from sim.families.step_in import step_in
+
+TO_STOP_S, HOLD, TO_RESUME_S, FALSE_STOPS = 0.6, 0.95, 0.6, 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class StopAndGoOptions:
+    """The command line."""
+
+    config_path: Path
+    drives: int
+    seed: int
+    mode: Mode
+    report: Path
+    keep: bool = False
+    quiet: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Target:
+    """A number of Nav2's, physics taken off, and what it must reach."""
+
+    name: str
+    value: Callable[[StopAndGo], float]
+    limit: float
+    at_least: bool = False
+
+    def missed(self, one: StopAndGo) -> bool:
+        value = self.value(one)
+        return not (value >= self.limit if self.at_least else value <= self.limit)
+
+
+TARGETS = (
+    _Target("time to stop beyond braking, s", lambda one: one.to_stop_s - one.braking_s, TO_STOP_S),
+    _Target("hold, share", lambda one: one.hold_share, HOLD, at_least=True),
+    _Target("time to resume beyond starting, s", lambda one: one.to_resume_s - one.starting_s, TO_RESUME_S),
+    _Target("false stop, share", lambda one: one.false_stop_share, FALSE_STOPS),
+)
+
+
+def run_stop_and_go(options: StopAndGoOptions) -> int:
+    """Drive, record, measure the recordings, report. The exit code: 1 if any drive misses a target.
+
+    Raises ConfigError, UserError.
+    """
+    config = load_app(options.config_path)
+    if config.camera.kind != "simulated" or not isinstance(config.runner, LockstepRunner):
+        raise UserError(f"{options.config_path}: needs camera.kind 'simulated' and runner.kind 'lockstep'")
+    folder = options.report / "drives"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be made ({error.strerror}); choose another --report") from error
+    seeds = range(options.seed, options.seed + options.drives)
+    hidden = options.quiet or not sys.stderr.isatty()
+    with click.progressbar(seeds, label="drives", file=sys.stderr, hidden=hidden) as bar:
+        for seed in bar:
+            _drive(options, config, seed, folder / f"{seed}.csv")
+    # From the files, so that a recording says all there is to say.
+    found = {
+        seed: stop_and_go.measure(stop_and_go.read(folder / f"{seed}.csv"), config.robot, config.decision)
+        for seed in seeds
+    }
+    _write(options, found)
+    for target in TARGETS:
+        click.echo(f"{target.name:<36} {_line(target, list(found.values()))}")
+    click.echo(f"report   {options.report / 'report.md'}")
+    return int(any(target.missed(one) for one in found.values() for target in TARGETS))
+
+
+def _drive(options: StopAndGoOptions, config: AppConfig, seed: int, file: Path) -> None:
+    stage = Stage(step_in(seed), config.robot)
+    if options.mode == "noise":
+        log = drive_noise(stage, config, build_policy(OURS, config, stage))
+    else:
+        keep = options.report / f"step_in-{seed}" if options.keep else None
+        log = drive_camera(stage, config, OURS, keep)
+    stop_and_go.write(file, stop_and_go.record(stage, log))
+
+
+def _line(target: _Target, found: list[StopAndGo]) -> str:
+    values = [target.value(one) for one in found]
+    worst = min(values) if target.at_least else max(values)
+    missed = sum(target.missed(one) for one in found)
+    verdict = "all reach it" if not missed else f"{missed} of {len(found)} miss it"
+    sign = ">=" if target.at_least else "<="
+    return (
+        f"median {markdown.fixed(float(np.median(values)))}, worst {markdown.fixed(worst)}; "
+        f"{sign} {target.limit:g}: {verdict}"
+    )
+
+
+def _write(options: StopAndGoOptions, found: dict[int, StopAndGo]) -> None:
+    command = (
+        f"treadwatch stop-and-go --drives {options.drives} --seed {options.seed} --mode {options.mode} "
+        f"--report {options.report}"
+    )
+    lines = ["# Stop and go", "", f"    {command}", ""]
+    lines += markdown.section(
+        "Nav2's bag metrics",
+        """A person steps into the way, stands, and leaves it. Stopped is 0.02 m/s, driving 0.10 m/s, three
+        samples in a row. A stop is due from when the free way is no longer than a comfortable stop needs;
+        braking is what the stop from that speed takes by physics, starting what the jerk limit takes to
+        0.10 m/s. Decided: until the decision says faster.""",
+    )
+    head = (
+        "seed", "to stop s", "of that braking s", "hold", "to resume s", "of that starting s", "decided s",
+        "false stops",
+    )  # fmt: skip
+    lines += markdown.table(head, [[str(seed), *_cells(one)] for seed, one in found.items()])
+    lines += markdown.table(
+        ("metric", "result"), [(target.name, _line(target, list(found.values()))) for target in TARGETS]
+    )
+    content = {"command": command, "drives": {seed: one.as_dict() for seed, one in found.items()}}
+    try:
+        (options.report / "report.md").write_text("\n".join(lines), encoding="utf-8")
+        (options.report / "summary.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{options.report}: the report cannot be written ({error.strerror})") from error
+
+
+def _cells(one: StopAndGo) -> list[str]:
+    share = "n/a" if math.isnan(one.hold_share) else f"{100 * one.hold_share:.1f} %"
+    return [
+        markdown.fixed(one.to_stop_s, 2),
+        markdown.fixed(one.braking_s, 2),
+        share,
+        markdown.fixed(one.to_resume_s, 2),
+        markdown.fixed(one.starting_s, 2),
+        markdown.fixed(one.to_decide_s, 2),
+        f"{100 * one.false_stop_share:.2f} %",
+    ]
