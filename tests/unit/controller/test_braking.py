@@ -94,6 +94,16 @@ def test_harder_acceleration_than_allowed_is_first_eased() -> None:
     assert stop.distance_m == pytest.approx(0.2 + 0.7 * 0.02 - 2.0 * 0.008 / 6.0 + rest.distance_m)
 
 
+@pytest.mark.parametrize("a", [0.5, -0.5, -0.1, 0.3])
+def test_with_infinite_jerk_the_present_acceleration_is_gone_at_once(a: float) -> None:
+    """Also from outside the limits, and at standstill."""
+    limits = BrakeLimits(0.3, math.inf)
+    for stop in (braking.stop(1.0, a, limits), braking.onset_only_stop(1.0, a, limits)):
+        assert (stop.distance_m, stop.time_s) == (pytest.approx(1.0 / 0.6), pytest.approx(1.0 / 0.3))
+    assert braking.stop(0.0, a, limits) == braking.Stop(0.0, 0.0)
+    assert braking.onset_only_stop(0.0, a, limits) == braking.Stop(0.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("v", "big_a", "j", "distance"),
     [
@@ -173,6 +183,29 @@ def test_inverse_of_the_paper() -> None:
     assert braking.speed_for_distance(3.75, limits, a_mps2=0.3) == pytest.approx(1.5)
 
 
+def test_inverse_where_the_deceleration_cannot_be_let_go_of_in_time() -> None:
+    """v 0.105, a -0.5 under J 1 stands after 0.3 s and 0.0135 m, without ever letting go (see above)."""
+    limits = BrakeLimits(0.5, 1.0)
+    assert braking.speed_for_distance(0.0135, limits, a_mps2=-0.5) == pytest.approx(0.105, abs=1e-9)
+    late = braking.speed_for_distance(0.0135 + 0.2 * 0.105, limits, a_mps2=-0.5, latency_s=0.2)
+    assert late == pytest.approx(0.105, abs=1e-9)
+
+
+def test_inverse_where_the_formula_with_full_deceleration_has_no_root() -> None:
+    """A 1, J 1, V_o 0.5, a -1: b = 0 and c = 1/6 - d: the discriminant 2 d - 1/3 is negative below 1/6 m."""
+    limits = BrakeLimits(1.0, 1.0)
+    speed = braking.speed_for_distance(0.1, limits, closing_mps=0.5, a_mps2=-1.0)
+    assert 0.0 < speed < 0.5
+    assert braking.required_distance(speed, -1.0, 0.5, 0.0, limits) == pytest.approx(0.1, abs=1e-9)
+
+
+def test_inverse_where_newton_alone_would_run_away() -> None:
+    """A 4, J 0.6, a -1.57: the cubic has a minimum beside its root; only the bracket keeps to the root."""
+    limits = BrakeLimits(4.0, 0.6)
+    speed = braking.speed_for_distance(0.047, limits, closing_mps=0.3, a_mps2=-1.57)
+    assert braking.required_distance(speed, -1.57, 0.3, 0.0, limits) == pytest.approx(0.047, abs=1e-9)
+
+
 def test_no_speed_fits_when_the_obstacle_is_too_near() -> None:
     limits = BrakeLimits(0.3, 0.6)
     assert braking.speed_for_distance(0.4, limits, margin_m=0.4) == 0.0
@@ -187,6 +220,7 @@ def test_slowing_to_a_section() -> None:
     assert braking.slowing_distance(1.5, 0.0, limits) == pytest.approx(4.125)
     assert braking.speed_before_section(1.0 / 0.3 + 0.5, 0.5, limits) == pytest.approx(1.5)
     assert braking.speed_before_section(0.0, 0.5, limits) == 0.5
+    assert braking.speed_before_section(-0.1, 0.5, limits) == 0.5
 
 
 @pytest.mark.parametrize(
