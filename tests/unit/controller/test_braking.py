@@ -71,6 +71,12 @@ def test_too_slow_to_let_go_ends_at_standstill() -> None:
     assert stop.distance_m == pytest.approx(0.105 * 0.3 - 0.25 * 0.09 + 0.027 / 6.0)
 
 
+def test_ease_out_alone_where_rounding_leaves_less_than_nothing() -> None:
+    """v = a^2 / 2J in floats, but a^2 - 2 J v = -1e-19."""
+    stop = braking.stop(0.0005, -0.03, BrakeLimits(0.3, 0.9))
+    assert stop.time_s == pytest.approx(0.03 / 0.9)
+
+
 def test_standing_still_takes_nothing() -> None:
     stop = braking.stop(0.0, 0.0, BrakeLimits(0.3, 0.6))
     assert (stop.distance_m, stop.time_s) == (0.0, 0.0)
@@ -244,3 +250,5 @@ def test_impossible_limits_are_refused(a: float, j: float) -> None:
 def test_speeding_up_is_no_slowing_down() -> None:
     with pytest.raises(ValueError, match="can only slow down"):
         braking.slowing_distance(0.5, 1.0, BrakeLimits(0.3, 0.6))
+    with pytest.raises(ValueError, match="can only slow down"):
+        braking.slowing_distance(0.5, -0.5, BrakeLimits(0.3, 0.6))
