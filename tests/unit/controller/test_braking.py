@@ -205,6 +205,19 @@ def test_inverse_where_the_formula_with_full_deceleration_has_no_root() -> None:
     assert braking.required_distance(speed, -1.0, 0.5, 0.0, limits) == pytest.approx(0.1, abs=1e-9)
 
 
+def test_inverse_where_the_cubic_is_flat() -> None:
+    """a -0.35 under A 0.4, J 0.8, V_o 0: its slope falls to exactly nothing on the way to the root."""
+    limits = BrakeLimits(0.4, 0.8)
+    speed = braking.speed_for_distance(0.001, limits, a_mps2=-0.35)
+    assert braking.required_distance(speed, -0.35, 0.0, 0.0, limits) == pytest.approx(0.001, abs=1e-12)
+
+
+def test_inverse_under_a_great_jerk() -> None:
+    """A not reached: v = (J d^2)^(1/3)."""
+    speed = braking.speed_for_distance(0.007, BrakeLimits(2.0, 10.3))
+    assert speed == pytest.approx((10.3 * 0.007**2) ** (1 / 3), abs=1e-12)
+
+
 def test_inverse_where_newton_alone_would_run_away() -> None:
     """A 4, J 0.6, a -1.57: the cubic has a minimum beside its root; only the bracket keeps to the root."""
     limits = BrakeLimits(4.0, 0.6)
