@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from ruckig import Result, RuckigError  # type: ignore[import-not-found]  # a compiled module without stubs
 
@@ -85,6 +86,34 @@ def test_the_closing_brakes_once() -> None:
     assert sum(before != after for before, after in pairwise(signs)) == 1
 
 
+@pytest.mark.parametrize("length_m", [0.3, 3.0])
+def test_behind_a_chassis_that_obeys_at_once_the_end_is_met_exactly(length_m: float) -> None:
+    """The position interface aims at the point itself; a plain stop would be a fifth of a millimetre off."""
+    run = Run(length_m)
+    run.until_rest()
+    assert run.x_m == pytest.approx(length_m, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_odometry_that_shakes_by_a_centimetre_does_not_shake_the_closing(seed: int) -> None:
+    run, random = Run(12.0, lag_s=0.1, delay_s=0.1), np.random.default_rng(seed)
+    while run.time_s < 1.0 or run.commands[-1].v_mps > 0.0:
+        run.length_m = 12.0 + 0.01 * float(random.standard_normal())
+        run.step()
+    signs = [math.copysign(1.0, c.a_mps2) for c in run.commands if abs(c.a_mps2) > 0.01]
+    assert sum(before != after for before, after in pairwise(signs)) == 1
+    assert run.x_m == pytest.approx(12.0, abs=0.01)
+
+
+def test_reset_forgets_where_the_end_was() -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    shaper.step(0.0, distance_to_end_m=0.3)
+    shaper.reset()
+    # 5 mm are not worth a start; the 30 cm of before would be.
+    command = shaper.step(1.0, distance_to_end_m=0.005)
+    assert (command.v_mps, command.a_mps2) == (0.0, 0.0)
+
+
 def test_a_target_behind_is_not_chased_in_reverse() -> None:
     run = Run(5.0)
     for _ in range(150):
@@ -110,17 +139,32 @@ def test_emergency_brakes_harder_and_returns_to_comfort() -> None:
     assert lows[-1].a_mps2 == pytest.approx(-0.3)
 
 
-def test_hand_over_at_low_speed_does_not_reverse() -> None:
-    """v 0.2, a -0.7: comfort's jerk 0.6 would need v >= 0.41; the emergency's is kept to the end."""
-    shaper = SpeedShaper(Limits(), PERIOD_S)
-    for _ in range(200):
+@pytest.mark.parametrize("jerk_mps3", [0.6, 0.2])
+def test_hand_over_at_low_speed_does_not_reverse(jerk_mps3: float) -> None:
+    """v 0.2, a -0.7: comfort's jerk 0.6 would need v >= 0.41; the emergency's is kept to the end. With 0.2 it
+    would need 0.23 even for the comfortable -0.3."""
+    shaper = SpeedShaper(Limits(max_jerk_mps3=jerk_mps3), PERIOD_S)
+    for _ in range(300):
         shaper.step(0.7)
     while shaper.v_mps > 0.2:
         shaper.step(0.0, emergency=True)
     assert shaper.a_mps2 < -0.5
     while shaper.v_mps > 0.0:
-        assert shaper.step(0.0).v_mps >= 0.0
+        command = shaper.step(0.0)
+        assert command.v_mps >= 0.0
+        assert command.fault == ""
     assert shaper.a_mps2 == pytest.approx(0.0, abs=0.04)
+
+
+def test_a_chassis_lags_by_nothing_and_rests_unless_told_otherwise() -> None:
+    plain, told = SpeedShaper(Limits(), PERIOD_S), SpeedShaper(Limits(), PERIOD_S, 0.0)
+    for k in range(100):
+        assert plain.step(1.5, distance_to_end_m=1.0 - 0.005 * k) == told.step(
+            1.5, distance_to_end_m=1.0 - 0.005 * k
+        )
+    assert plain.v_mps > 0.0
+    plain.reset()
+    assert (plain.v_mps, plain.a_mps2) == (0.0, 0.0)
 
 
 def test_targets_beyond_the_limit_are_capped_also_while_accelerating() -> None:
@@ -144,7 +188,7 @@ def test_an_unknown_distance_to_the_end_means_stop() -> None:
     for _ in range(200):
         shaper.step(1.0, distance_to_end_m=50.0)
     for _ in range(400):
-        shaper.step(1.0, distance_to_end_m=math.nan)
+        assert shaper.step(1.0, distance_to_end_m=math.nan).fault == ""
     assert shaper.v_mps == 0.0
 
 
