@@ -86,12 +86,16 @@ def test_the_closing_brakes_once() -> None:
     assert sum(before != after for before, after in pairwise(signs)) == 1
 
 
-@pytest.mark.parametrize("length_m", [0.3, 3.0])
-def test_behind_a_chassis_that_obeys_at_once_the_end_is_met_exactly(length_m: float) -> None:
-    """The position interface aims at the point itself; a plain stop would be a fifth of a millimetre off."""
+@pytest.mark.parametrize("jerk_mps3", [0.2, 0.6, 3.0])
+@pytest.mark.parametrize("length_m", [0.1, 0.3, 2.0, 9.0])
+def test_behind_a_chassis_that_obeys_at_once_the_end_is_met_exactly(
+    length_m: float, jerk_mps3: float
+) -> None:
+    """The position interface aims at the point itself; a plain stop would be a tenth of a millimetre off."""
     run = Run(length_m)
+    run.shaper = SpeedShaper(Limits(max_jerk_mps3=jerk_mps3, emergency_jerk_mps3=3.0), PERIOD_S)
     run.until_rest()
-    assert run.x_m == pytest.approx(length_m, abs=1e-4)
+    assert run.x_m == pytest.approx(length_m, abs=2e-5)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -154,6 +158,28 @@ def test_hand_over_at_low_speed_does_not_reverse(jerk_mps3: float) -> None:
         assert command.v_mps >= 0.0
         assert command.fault == ""
     assert shaper.a_mps2 == pytest.approx(0.0, abs=0.04)
+
+
+@pytest.mark.parametrize("release_mps", [0.3, 0.34, 0.38, 0.42, 0.46, 0.5, 0.7])
+def test_back_from_an_emergency_comfort_is_kept_as_soon_as_it_cannot_reverse(release_mps: float) -> None:
+    """From when a >= -0.3 and v >= a^2 / 2J, with J 0.2, and not before; then also when it drives on."""
+    shaper = SpeedShaper(Limits(max_jerk_mps3=0.2), PERIOD_S)
+    for _ in range(500):
+        shaper.step(1.0)
+    while shaper.v_mps > release_mps:
+        shaper.step(0.0, emergency=True)
+    comfortable = False
+    for k in range(400):
+        v, a = shaper.v_mps, shaper.a_mps2
+        comfortable |= a >= -0.3 and v >= a * a / (2.0 * 0.2)
+        command = shaper.step(0.0 if k < 200 else 1.0)
+        jerk = abs(command.a_mps2 - a) / PERIOD_S
+        assert command.fault == ""
+        if comfortable:
+            assert jerk <= 0.2 + 1e-6
+        elif a < -0.301 and shaper.v_mps > 0.0:
+            assert jerk == pytest.approx(2.0, abs=0.01) or command.a_mps2 == pytest.approx(-0.3)
+    assert shaper.v_mps > 0.5
 
 
 def test_a_chassis_lags_by_nothing_and_rests_unless_told_otherwise() -> None:
@@ -236,6 +262,16 @@ def test_a_result_outside_the_limits_is_not_passed_on(monkeypatch: pytest.Monkey
     monkeypatch.setattr(shaper, "_follow", lambda target: (3.0, 0.0))
     command = shaper.step(1.0)
     assert "outside the limits" in command.fault
+    assert command.a_mps2 == pytest.approx(-0.6 * PERIOD_S)
+
+
+def test_a_jump_of_the_acceleration_is_not_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(400):
+        shaper.step(1.0)
+    monkeypatch.setattr(shaper, "_follow", lambda target: (1.0, -0.02))
+    command = shaper.step(1.0)
+    assert "1.000000 m/s3" in command.fault
     assert command.a_mps2 == pytest.approx(-0.6 * PERIOD_S)
 
 
