@@ -18,7 +18,7 @@ _YAW_RATE_FOR_THE_BEND = 0.8
 # Slower than this is no motion: encoders and noise of a planner's own arithmetic.
 STANDING_MPS = 0.005
 STANDING_RADPS = 0.005
-# Straighter than a circle of 10 km is straight (config.path.ArcSpec.radius_m ends there).
+# Straighter than a circle of 10 km is looked along as a straight line (config.path.ArcSpec ends there).
 _STRAIGHT_1PM = 1e-4
 # An arc is looked along until it has turned round; a very tight one not so far, or it would meet itself.
 _HALF_TURN_RAD = 3.0
@@ -86,7 +86,6 @@ def understand(twist: Twist, robot: Robot) -> Wish:
             why=f"a radius of {1.0 / abs(curvature):.2f} m is tighter than this robot can drive "
             f"({tightest_m(robot):.2f} m): ask for a wider arc, or for v = 0 to turn in place",
         )
-    curvature = 0.0 if abs(curvature) < _STRAIGHT_1PM else curvature
     yaw_radps = _YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps
     top_mps = min(robot.limits.max_speed_mps, yaw_radps / max(abs(curvature), _STRAIGHT_1PM))
     return Wish(Kind.ARC, min(v, top_mps), curvature)
@@ -108,7 +107,7 @@ def arc_path(pose: PlanarPose, curvature_1pm: float, speed_mps: float, range_m: 
     length_m = max(range_m, stop_m) + _BEYOND_M
     most = max(min(speed_mps, 5.0), STANDING_MPS)
     start = StartSpec(x_m=pose.x_m, y_m=pose.y_m, heading_deg=math.degrees(pose.heading_rad))
-    if curvature_1pm == 0.0:
+    if abs(curvature_1pm) < _STRAIGHT_1PM:
         line = LineSpec(kind="line", length_m=length_m, max_speed_mps=most)
         return Path(PathSpec(start=start, segments=(line,)), robot)
     radius_m = 1.0 / abs(curvature_1pm)

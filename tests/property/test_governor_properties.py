@@ -7,7 +7,7 @@ import math
 from contextlib import suppress
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from config.robot import Robot
@@ -50,6 +50,7 @@ def test_limits_are_kept_whatever_is_asked(sequence: list[tuple[Twist | None, in
 
 @settings(max_examples=6, deadline=None)
 @given(DRIVEN, st.integers(100, 250))
+@example(Twist(1.0, 1e-5), 100)
 def test_the_arc_is_kept_and_no_step_is_faster_than_asked(twist: Twist, count: int) -> None:
     for one in drive([(twist, count)], [Thing(stands(3.0, 0.0))]):
         governed = one.governed

@@ -29,6 +29,7 @@ def test_the_corner_of_the_body() -> None:
         (Twist(-0.004, 0.004), Wish(Kind.STAND)),
         (Twist(0.5, 0.0), Wish(Kind.ARC, 0.5, 0.0)),
         (Twist(0.5, 0.25), Wish(Kind.ARC, 0.5, 0.5)),
+        (Twist(0.5, 5e-6), Wish(Kind.ARC, 0.5, 1e-5)),
         (Twist(0.5, -0.25), Wish(Kind.ARC, 0.5, -0.5)),
         # The robot's own limits: speed, and 80 % of the yaw rate of 0.8 rad/s.
         (Twist(3.0, 0.3), Wish(Kind.ARC, 1.5, 0.1)),
@@ -78,6 +79,7 @@ def test_every_arc_that_is_not_refused_can_be_laid_out() -> None:
 def test_an_arc_is_looked_along_as_far_as_the_camera_sees_but_not_round_in_a_circle() -> None:
     pose = PlanarPose(0.0, 0.0, 0.0)
     assert arc_path(pose, 0.0, 1.0, 10.0, ROBOT).length_m == pytest.approx(12.0)
+    assert arc_path(pose, 1e-5, 1.0, 10.0, ROBOT).length_m == pytest.approx(12.0)
     assert arc_path(pose, 0.1, 1.0, 10.0, ROBOT).length_m == pytest.approx(12.0)
     assert arc_path(pose, 1.0, 0.5, 10.0, ROBOT).length_m == pytest.approx(3.0)
     assert arc_path(pose, -2.0, 0.2, 10.0, ROBOT).length_m == pytest.approx(1.0)
