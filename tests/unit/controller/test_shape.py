@@ -127,6 +127,7 @@ def test_a_target_behind_is_not_chased_in_reverse() -> None:
     at = run.x_m
     run.until_rest()
     assert run.x_m == pytest.approx(at + passed.distance_m, abs=0.01)
+    assert {command.fault for command in run.commands} == {""}
 
 
 def test_emergency_brakes_harder_and_returns_to_comfort() -> None:
@@ -180,6 +181,21 @@ def test_back_from_an_emergency_comfort_is_kept_as_soon_as_it_cannot_reverse(rel
         elif a < -0.301 and shaper.v_mps > 0.0:
             assert jerk == pytest.approx(2.0, abs=0.01) or command.a_mps2 == pytest.approx(-0.3)
     assert shaper.v_mps > 0.5
+
+
+def test_the_speed_limit_is_not_overshot_when_an_emergency_ends_while_it_speeds_up() -> None:
+    """At 1.44 m/s with 0.3 m/s2, comfort's jerk would let the speed rise to 1.515."""
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    while shaper.v_mps < 1.44:
+        shaper.step(1.5, emergency=True)
+    assert shaper.a_mps2 == pytest.approx(0.3)
+    commands = [shaper.step(1.5) for _ in range(50)]
+    assert {command.fault for command in commands} == {""}
+    assert max(command.v_mps for command in commands) <= 1.5 + 1e-9
+
+
+def test_the_longest_period_and_the_laziest_chassis() -> None:
+    assert SpeedShaper(Limits(), 0.5, 2.0).step(1.0).v_mps > 0.0
 
 
 def test_a_chassis_lags_by_nothing_and_rests_unless_told_otherwise() -> None:
@@ -287,7 +303,10 @@ def test_reset_seeds_from_the_measured_speed() -> None:
     assert shaper.v_mps == 1.5
 
 
-@pytest.mark.parametrize(("period_s", "delay_s"), [(0.0, 0.0), (-0.02, 0.0), (math.nan, 0.0), (0.02, -1.0)])
+@pytest.mark.parametrize(
+    ("period_s", "delay_s"),
+    [(0.0, 0.0), (-0.02, 0.0), (math.nan, 0.0), (0.02, -1.0), (0.51, 0.0), (0.02, 2.1)],
+)
 def test_impossible_periods_are_refused(period_s: float, delay_s: float) -> None:
     with pytest.raises(ValueError, match="impossible"):
         SpeedShaper(Limits(), period_s, delay_s)
