@@ -16,6 +16,7 @@ from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
 from controller.mission import with_overrides
+from controller.punctual import PunctualChassis
 from controller.realtime import Punctuality, run_realtime
 from controller.realtime_mission import HEAD_START_S, perception_beside
 from controller.recorder import RecordingOptions
@@ -89,9 +90,10 @@ def _govern(
         link = devices.enter_context(open_commands(governor.input))
         if simulation is not None:
             devices.enter_context(simulation)
-        devices.enter_context(chassis)
+        period_ns = round(NS_PER_S / runner.control_rate_hz)
+        punctual = devices.enter_context(PunctualChassis(chassis, clock, period_ns))
         inbox = build_inbox(link, governor, console.event)
-        loop = build_governor_loop(config, options.config_path, chassis, inbox)
+        loop = build_governor_loop(config, options.config_path, punctual, inbox)
         perception = devices.enter_context(
             perception_beside(config, options.config_path, start_ns, recording)
         )
