@@ -21,18 +21,18 @@ _FLOOR_EXCESS = 1.35  # a ray that goes this much farther than the floor has fou
 
 
 def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeSpace:
-    """Nearest obstacle cell (supported) and known distance for each of 80 upright bands.
+    """Nearest obstacle cell (supported) and known distance for each of at most 80 upright bands.
 
     obstacle (h, w): cells between clearance and the robot's height; all valid ones where the floor is not
     known. Without a known mounting, space is known up to the nearest surface only.
     """
     columns = obstacle.shape[1]
-    bands = min(BANDS, columns)
-    width = columns // bands
-    used = bands * width
+    width = -(-columns // BANDS)
+    bands = -(-columns // width)  # the last one may reach beyond the image: nothing is seen there
     nearest = _nearest_m(grid, obstacle, bands, width)
-    x = (sum(grid.x[column:used:width] for column in range(width)) / np.float32(width)).astype(float)
-    half_width = 0.5 * width * float(grid.x[1] - grid.x[0])
+    step = float(grid.x[1] - grid.x[0])
+    x = float(grid.x[0]) + step * (width * np.arange(bands) + 0.5 * (width - 1))
+    half_width = 0.5 * width * step
     middle_y = 0.5 * float(grid.y[(len(grid.y) - 1) // 2] + grid.y[len(grid.y) // 2])
     mounted = math.isfinite(grid.pitch_rad)
     tilt = math.cos(grid.pitch_rad) - middle_y * math.sin(grid.pitch_rad) if mounted else 1.0
@@ -47,9 +47,10 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
 
 def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: int, width: int) -> NDArray[np.float64]:
     """(bands,) forward distance of the nearest surface that enough obstacle cells agree on, inf without."""
-    forward = np.full(obstacle.shape, np.inf, np.float32)
-    cv2.copyTo(grid.forward_m, obstacle.view(np.uint8), forward)
-    upright = np.asarray(cv2.transpose(forward), np.float32)[: bands * width].reshape(bands, -1)
+    rows, columns = obstacle.shape
+    forward = np.full((rows, bands * width), np.inf, np.float32)
+    cv2.copyTo(grid.forward_m, obstacle.view(np.uint8), forward[:, :columns])
+    upright = np.asarray(cv2.transpose(forward), np.float32).reshape(bands, -1)
     support = min(_SUPPORT, upright.shape[1])
     return np.sort(upright, axis=1)[:, support - 1].astype(float)
 
@@ -67,10 +68,11 @@ def _known_m(grid: DepthGrid, bands: int, width: int, max_depth_m: float) -> NDA
     floor_forward = floor_depth * (cos_pitch - y[rows] * sin_pitch)
     limit_m = (_FLOOR_EXCESS * floor_depth).astype(np.float32)
     lower = slice(len(grid.y) - len(rows), None)
-    seen = (grid.valid[lower] & (grid.depth_m[lower] <= limit_m[::-1, None]))[::-1, : bands * width]
+    seen = (grid.valid[lower] & (grid.depth_m[lower] <= limit_m[::-1, None]))[::-1]
     count = np.zeros((len(rows), bands), np.uint8)
     for column in range(width):
-        count += seen[:, column::width]
+        part = seen[:, column::width]
+        count[:, : part.shape[1]] += part
     hole = count < 0.5 * width
     # A single row may be lost to noise; two in a row are a hole.
     run = hole.copy()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.geometry import camera_in_floor
-from hal.types import CameraMount, PlanarPose, RgbdFrame
+from hal.types import CameraMount, Intrinsics, PlanarPose, RgbdFrame
 from tests.support.painted import MOUNT, VGA, Quad, box, drive, floor, paint, plain, record, vector, wall
 from vision.perception import Perception
 from vision.scene import FreeSpace, Scene
@@ -209,3 +209,13 @@ def test_bearings_of_a_tipped_camera_are_levelled() -> None:
     # From y = -0.7 to -1.3 at x = 4, right is positive; the image's rows differ a little in their bearing.
     assert space.bearing_tan[hit].min() == pytest.approx(0.7 / 4.0, abs=0.03)
     assert space.bearing_tan[hit].max() == pytest.approx(1.3 / 4.0, abs=0.03)
+
+
+def test_the_whole_view_is_scanned_at_848_pixels_too() -> None:
+    wide = Intrinsics(848, 480, 610.0, 610.0, 423.5, 239.5)  # 212 columns of cells do not divide into 80 bands
+    frame = paint(bare(floor() + wall(3.0)), camera_in_floor(HERE, MOUNT), wide)
+    space = eyes_on(MOUNT).perceive(frame, None, None).scene.free_space
+    edge = (wide.width - 1 - wide.cx) / wide.fx
+    assert space.bearing_tan[0] - space.half_width_tan <= -edge + 0.01
+    assert space.bearing_tan[-1] + space.half_width_tan >= edge - 0.01
+    np.testing.assert_allclose(space.nearest_m, 3.0, atol=0.1)
