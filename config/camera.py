@@ -59,8 +59,14 @@ class SimulatedCameraConfig(Section):
     height: int = Field(default=480, ge=32, le=4096)
     fx: float = Field(default=610.0, gt=0)
     fy: float = Field(default=610.0, gt=0)
-    cx: float = 319.5
-    cy: float = 239.5
+    cx: float = Field(
+        default_factory=lambda given: 0.5 * (given.get("width", 640) - 1),
+        description="the middle, if not given",
+    )
+    cy: float = Field(
+        default_factory=lambda given: 0.5 * (given.get("height", 480) - 1),
+        description="the middle, if not given",
+    )
     fps: float = Field(default=30.0, gt=0, le=300)
     depth_min_m: float = Field(default=0.3, ge=0.05, le=5)
     depth_max_m: float = Field(default=10.0, gt=0, le=65)

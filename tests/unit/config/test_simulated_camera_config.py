@@ -26,3 +26,9 @@ def test_the_default_is_like_a_d435i() -> None:
 def test_what_cannot_be_is_refused(key: str, value: object, says: str) -> None:
     with pytest.raises(ValidationError, match=says):
         SimulatedCameraConfig.model_validate({key: value})
+
+
+def test_the_optical_axis_meets_the_middle_of_any_image_unless_it_is_given() -> None:
+    small = SimulatedCameraConfig(width=320, height=240)
+    assert (small.cx, small.cy) == (159.5, 119.5)
+    assert SimulatedCameraConfig(width=320, cx=150.0).cx == 150.0
