@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import settings
+
+# How long an example takes tells of the machine and its other work, not of the code.
+settings.register_profile("treadwatch", deadline=None)
+settings.load_profile("treadwatch")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -15,8 +15,8 @@ from hal.errors import DeviceNotFound, DeviceRefused, HalError
 from hal.links.reopening import ReopeningLink, reason
 
 # Short, because the control loop waits for it; positive, because with 0 pyserial spins for ever when the
-# peer stops reading.
-_WRITE_TIMEOUT_S = 0.02
+# peer stops reading. A process that is held up by others for this long takes its port for lost, too.
+_WRITE_TIMEOUT_S = 0.05
 
 _MAX_READ = 4096
 
@@ -34,7 +34,7 @@ class SerialPortLink(ReopeningLink[serial.SerialBase]):
         self._config = config
 
     def write(self, data: bytes) -> None:
-        """Hand all of data to the system within 20 ms. Raises LinkLost; part of data may then be out."""
+        """Hand all of data to the system within 50 ms. Raises LinkLost; part of data may then be out."""
         try:
             written = self._opened().write(data)
         except _ERRORS as error:
