@@ -25,7 +25,7 @@ from config.chassis import (
     SerialLinkConfig,
 )
 from config.loader import CONFIG_DIR, describe
-from controller.build import build_can_emulator, build_pseudo_terminal, build_serial_emulator
+from controller.build_chassis import build_can_emulator, build_pseudo_terminal, build_serial_emulator
 from controller.errors import UserError
 from controller.service import StopRequest, stop_on_signals
 from hal.api import Clock

@@ -7,7 +7,6 @@ from contextlib import ExitStack
 
 from config.app import AppConfig, LockstepRunner, load_app
 from controller.build import (
-    build_base,
     build_control,
     build_path,
     build_perceiver,
@@ -15,6 +14,7 @@ from controller.build import (
     open_simulated_camera,
     surroundings,
 )
+from controller.build_chassis import build_base
 from controller.console import Console
 from controller.errors import UserError
 from controller.lockstep import run_lockstep

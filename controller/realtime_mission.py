@@ -11,7 +11,8 @@ from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner
 from config.chassis import AgilexChassisConfig, AnyChassisConfig, CanLinkConfig
-from controller.build import build_base, build_control, build_path, build_simulation
+from controller.build import build_control, build_path, build_simulation
+from controller.build_chassis import build_base
 from controller.channel import Channel, channel_sockets
 from controller.console import Console
 from controller.control import Outcome

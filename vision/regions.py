@@ -17,7 +17,6 @@ IntGrid = NDArray[np.int32]
 _LEAST_JUMP = 0.006  # 1/m
 _MOST_JUMP = 0.03
 _SPECKLE_CELLS = 6
-_NOISE_INVERSE = 0.003  # 1/m: what noise alone spreads the inverse depth of cells
 _UNIFORM = 3.46  # a uniform spread is this many standard deviations long
 _FOOT_M = 0.12
 _FOOT_PER_METRE = 0.015

@@ -30,7 +30,6 @@ from controller.bench.reel import Reel, cruise, recorded_reel, render_reel
 from controller.bench.rendering import RendererFigures, measure_renderer
 from controller.bench.report import BenchReport
 from controller.build import (
-    build_base,
     build_control,
     build_path,
     mount_of,
@@ -38,6 +37,7 @@ from controller.build import (
     open_simulated_camera,
     scenario_of,
 )
+from controller.build_chassis import build_base
 from controller.errors import UserError
 from hal.clocks import SimulatedClock
 from sim.camera import SimulatedCamera

@@ -15,7 +15,7 @@ from controller.bench.driving import TimedChassis, measure_exchange
 from controller.bench.figures import Durations
 from controller.bench.progress import progress
 from controller.bench.reel import Tick
-from controller.build import (
+from controller.build_chassis import (
     build_base,
     build_base_in_memory,
     build_pseudo_terminal,

@@ -9,13 +9,13 @@ from config.app import AppConfig, LockstepRunner
 from controller.bench.figures import Stopwatches
 from controller.bench.reel import Tick
 from controller.build import (
-    build_base,
     build_control,
     build_path,
     build_perceiver,
     build_simulation,
     open_simulated_camera,
 )
+from controller.build_chassis import build_base
 from controller.lockstep import run_lockstep
 from hal.clocks import NS_PER_S, SimulatedClock
 

@@ -19,7 +19,6 @@ import yaml
 
 from config.app import AppConfig, LockstepRunner, SimulationConfig
 from controller.build import (
-    build_base,
     build_path,
     build_perceiver,
     build_simulation,
@@ -27,6 +26,7 @@ from controller.build import (
     open_simulated_camera,
     surroundings,
 )
+from controller.build_chassis import build_base
 from controller.campaign.drive import DriveLog
 from controller.campaign.noise_mission import GIVE_UP_S
 from controller.campaign.policies import build_policy

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from config.app import load_app
 from config.loader import CONFIG_DIR
-from controller.build import build_base_in_memory
+from controller.build_chassis import build_base_in_memory
 from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint

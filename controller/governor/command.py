@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
-from controller.build import build_base, build_path, build_simulation, open_commands
+from controller.build import build_path, build_simulation, open_commands
+from controller.build_chassis import build_base
 from controller.console import Console
 from controller.control import ControlStep, Outcome
 from controller.errors import UserError

@@ -10,7 +10,7 @@ import pytest
 from config.app import load_app
 from config.chassis import AnyChassisConfig
 from config.loader import CONFIG_DIR
-from controller.build import build_serial_driver, build_serial_emulator
+from controller.build_chassis import build_serial_driver, build_serial_emulator
 from hal.links.scripted import ScriptedSerialLink, serial_pair
 from hal.types import ChassisMode, ChassisState, Setpoint
 from sim.plant import TrackedPlant

@@ -36,5 +36,6 @@ def test_only_build_names_concrete_devices() -> None:
     }
     # The bench and the evaluation measure devices and renderers one by one, outside of any program.
     assert {name for name in naming if not name.startswith(("bench/", "evaluation/", "campaign/"))} == {
-        "build.py"
+        "build.py",
+        "build_chassis.py",
     }

@@ -87,7 +87,7 @@ STEPS = {
         f"kind: {kind}" in path.read_text() for path in CONFIG_DIR.glob("robot-*.yaml")
     ),
     "config/hil-*.yaml": lambda kind: f"kind: {kind}" in read(f"config/hil-{kind}.yaml"),
-    "build.py": lambda kind: KINDS[kind].__name__ in read("controller/build.py"),
+    "build_chassis.py": lambda kind: KINDS[kind].__name__ in read("controller/build_chassis.py"),
     "emulator": lambda kind: (ROOT / "sim" / f"{kind}_emulator.py").is_file(),
     "emulator by its bytes": lambda kind: (ROOT / f"tests/unit/sim/test_{kind}_emulator.py").is_file(),
     "driver by its bytes": lambda kind: (ROOT / f"tests/unit/hal/test_{kind}_chassis.py").is_file(),

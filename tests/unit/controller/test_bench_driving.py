@@ -13,7 +13,8 @@ from config.chassis import PlantConfig
 from config.loader import CONFIG_DIR
 from controller.bench.busy_scene import OBSTACLES, busy_scene
 from controller.bench.driving import TimedChassis, measure_control, measure_exchange
-from controller.build import build_base, build_base_in_memory, build_control, build_path
+from controller.build import build_control, build_path
+from controller.build_chassis import build_base, build_base_in_memory
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
 from sim.plant import TrackedPlant
 

@@ -11,7 +11,8 @@ import yaml
 
 from config.app import AppConfig, LockstepRunner, load_app
 from config.loader import CONFIG_DIR
-from controller.build import build_base, build_path, build_perceiver, build_simulation, open_simulated_camera
+from controller.build import build_path, build_perceiver, build_simulation, open_simulated_camera
+from controller.build_chassis import build_base
 from controller.control import ControlStep
 from controller.decision import Decision
 from controller.governor.build import build_governor_loop

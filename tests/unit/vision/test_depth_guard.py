@@ -212,7 +212,9 @@ def test_bearings_of_a_tipped_camera_are_levelled() -> None:
 
 
 def test_the_whole_view_is_scanned_at_848_pixels_too() -> None:
-    wide = Intrinsics(848, 480, 610.0, 610.0, 423.5, 239.5)  # 212 columns of cells do not divide into 80 bands
+    wide = Intrinsics(
+        848, 480, 610.0, 610.0, 423.5, 239.5
+    )  # 212 columns of cells do not divide into 80 bands
     frame = paint(bare(floor() + wall(3.0)), camera_in_floor(HERE, MOUNT), wide)
     space = eyes_on(MOUNT).perceive(frame, None, None).scene.free_space
     edge = (wide.width - 1 - wide.cx) / wide.fx
