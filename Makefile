@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 
-.PHONY: run test check bench hil faults campaign-quick clean
+.PHONY: run test check golden bench hil faults campaign-quick clean
 
 run: $(VENV)/ready
 	$(BIN)/treadwatch run
@@ -17,6 +17,9 @@ check: $(VENV)/ready-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+golden: $(VENV)/ready-dev
+	$(BIN)/python -m tests.replay.golden
 
 bench: $(VENV)/ready
 	$(BIN)/treadwatch bench --json out/bench.json
