@@ -1,0 +1,233 @@
+"""Parts to bodies: what is merged, divided, attached and detached."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.support.grids import CAMERA, LEVEL_UP, X, grid_of, labelled, nearest, plate
+from vision.depth_grid import DepthGrid
+from vision.grouping import Boxes, attach, boxes, detach, gaps_m, merges, split
+from vision.regions import Regions, measure
+
+ALL = np.array
+
+
+@dataclass(frozen=True)
+class Body:
+    """Centre x, y, z; width, height, depth in metres; cells."""
+
+    x: float
+    y: float = 0.0
+    z: float = 4.0
+    width: float = 0.4
+    height: float = 1.6
+    deep: float = 0.2
+    cells: int = 200
+
+
+def regions(*bodies: Body) -> Regions:
+    """As if measured, with boxes in the image as the pinhole camera sees them."""
+    bbox = [
+        [
+            CAMERA.cx + CAMERA.fx * (b.x - b.width / 2) / b.z,
+            CAMERA.cy + CAMERA.fy * (b.y - b.height / 2) / b.z,
+            CAMERA.cx + CAMERA.fx * (b.x + b.width / 2) / b.z,
+            CAMERA.cy + CAMERA.fy * (b.y + b.height / 2) / b.z,
+        ]
+        for b in bodies
+    ]
+    return Regions(
+        ALL([b.cells for b in bodies]),
+        ALL([10 for _ in bodies]),
+        ALL(bbox),
+        ALL([[b.x, b.y, b.z] for b in bodies]),
+        ALL([[b.width, b.height, b.deep] for b in bodies]),
+        np.ones(len(bodies), np.bool_),
+    )
+
+
+def merged(
+    *bodies: Body,
+    velocity: list[tuple[float, float, float]] | None = None,
+    sigma: float = 0.05,
+    moving: list[bool] | None = None,
+    mover: list[bool] | None = None,
+) -> list[tuple[int, int]]:
+    """All move alike, and all are known as moving, unless said otherwise."""
+    count = len(bodies)
+    speeds = velocity or [(0.8, 0.0, 0.0)] * count
+    known = moving or [True] * count
+    return merges(
+        regions(*bodies),
+        np.array(speeds),
+        np.full(count, sigma),
+        np.array(mover or known),
+        np.array(known),
+    )
+
+
+PERSON = Body(0.0)
+ARM = Body(0.45, y=-0.3, width=0.3, height=0.3, cells=40)  # 0.1 m from the person's box
+
+
+def test_gaps_between_boxes_by_hand() -> None:
+    box = boxes(regions(Body(0.0), Body(0.7), Body(0.7, z=4.5), Body(0.1)))
+    first, second = ALL([0, 0, 0]), ALL([1, 2, 3])
+    # 0.7 - 0.4 across; then 0.5 - 0.2 in depth with it; overlapping boxes touch.
+    np.testing.assert_allclose(gaps_m(box, first, box, second), [0.3, np.hypot(0.3, 0.3), 0.0], atol=1e-12)
+    other = Boxes(ALL([[1.2, 0.0, 4.0]]), ALL([[1.4, 0.1, 4.1]]))
+    assert gaps_m(box, ALL([0]), other, ALL([0]))[0] == pytest.approx(1.0)
+
+
+def test_a_small_part_beside_a_mover_that_goes_alike_is_part_of_it() -> None:
+    assert merged(PERSON, ARM) == [(1, 0)]
+    assert merged(ARM, PERSON) == [(0, 1)]
+
+
+def test_a_part_too_far_away_is_not() -> None:
+    assert merged(PERSON, Body(0.75, y=-0.3, width=0.3, height=0.3, cells=40)) == []  # 0.4 m
+
+
+def test_a_part_with_another_velocity_is_not() -> None:
+    speeds = [(0.8, 0.0, 0.0), (0.2, 0.0, 0.0)]
+    assert merged(PERSON, ARM, velocity=speeds) == []
+    # Doubt in both velocities explains the rest of the difference: 0.6 <= 0.4 + 2 * 0.15.
+    assert merged(PERSON, ARM, velocity=speeds, sigma=0.15) == [(1, 0)]
+
+
+def test_only_a_mover_takes_and_only_a_suspect_is_taken() -> None:
+    assert merged(PERSON, ARM, moving=[True, False], mover=[True, True]) == [(1, 0)]
+    assert merged(PERSON, ARM, moving=[False, True], mover=[True, True]) == []  # the larger does not move
+    assert merged(PERSON, ARM, moving=[True, False], mover=[True, False]) == []
+    assert merged(PERSON, ARM, moving=[False, False], mover=[True, True]) == []
+
+
+def test_people_side_by_side_stay_two() -> None:
+    assert merged(PERSON, Body(0.6, cells=180)) == []  # 0.2 m apart, 1 m wide together
+
+
+def test_halves_of_one_persons_width_are_one() -> None:
+    left, right = Body(-0.15, width=0.25, cells=100), Body(0.15, width=0.25, cells=90)
+    assert merged(left, right) == [(1, 0)]
+
+
+def test_what_overlaps_in_the_image_by_half_is_one_even_when_large_and_somewhat_deeper() -> None:
+    wide = Body(0.0, width=1.0, cells=300)
+    assert merged(wide, Body(0.2, z=4.45, width=0.9, cells=250)) == [(1, 0)]  # 0.25 m behind
+    assert merged(wide, Body(0.2, z=4.58, width=0.9, cells=250)) == [(1, 0)]  # 0.38
+    assert merged(wide, Body(0.2, z=4.75, width=0.9, cells=250)) == []  # 0.55
+    aside = Body(0.8, z=4.2, width=0.9, cells=250)  # overlaps by less than half
+    assert merged(wide, aside) == []
+
+
+def test_without_overlap_a_part_must_be_within_a_quarter_of_a_metre() -> None:
+    below = Body(0.0, y=0.8 + 0.25 + 0.28, height=0.5, cells=50)
+    assert merged(PERSON, below) == []
+    assert merged(PERSON, Body(0.0, y=0.8 + 0.25 + 0.22, height=0.5, cells=50)) == [(1, 0)]
+
+
+def test_two_alike_are_merged_once_and_not_into_each_other() -> None:
+    same = Body(0.0, cells=100)
+    assert len(merged(same, Body(0.05, cells=100))) == 1
+
+
+def test_nothing_is_merged_into_what_has_gone_into_another_itself() -> None:
+    whole, part = Body(0.0, cells=400), Body(0.1, cells=150)
+    crumb = Body(0.15, width=0.2, cells=20)
+    pairs = merged(whole, part, crumb)
+    gone = {small for small, _ in pairs}
+    assert (1, 0) in pairs
+    assert all(large not in gone for _, large in pairs[pairs.index((1, 0)) :])
+
+
+def test_tracks_that_are_not_seen_take_no_part() -> None:
+    assert merged(PERSON, Body(0.45, y=-0.3, width=0.3, height=0.3, cells=0)) == []
+
+
+def two_people(gap_m: float, bridge: bool = True) -> tuple[DepthGrid, NDArray[np.int32]]:
+    """Two upright plates 0.45 m wide, gap_m apart, joined at the hands: one connected part."""
+    half = gap_m / 2
+    left = plate(3.0, (-half - 0.45, -half), (-0.7, 0.9))
+    right = plate(3.0, (half, half + 0.45), (-0.7, 0.9))
+    hands = plate(3.0, (-half, half), (0.2, 0.32)) if bridge else np.zeros_like(left)
+    depth_m = nearest(left, right, hands)
+    return grid_of(depth_m, LEVEL_UP, 1.0), labelled(depth_m > 0.0)
+
+
+def test_two_people_hand_in_hand_are_divided_between_them() -> None:
+    grid, labels = two_people(0.4)
+    second = split(grid, labels, 0)
+    assert second is not None
+    columns = second % labels.shape[1]
+    side = np.sign(X[columns])
+    assert (side == side[0]).mean() > 0.97  # all on one side of the middle
+    of_side = np.count_nonzero((labels > 0) & (np.sign(X) == side[0])[None, :])
+    assert len(second) >= 0.8 * of_side
+    assert 2 * len(second) <= np.count_nonzero(labels) + 1  # the smaller one
+
+
+def test_only_the_cells_of_that_track_are_divided() -> None:
+    grid, labels = two_people(0.4)
+    both = np.where(labels == 1, np.int32(2), np.int32(0)).astype(np.int32)
+    assert split(grid, both, 0) is None
+    assert split(grid, both, 1) is not None
+
+
+@pytest.mark.parametrize("width_m", [0.6, 1.4, 2.0])
+def test_a_crate_is_one_however_wide(width_m: float) -> None:
+    depth_m = plate(3.0, (-width_m / 2, width_m / 2), (-0.4, 0.6))
+    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+
+
+def test_one_person_with_arms_stretched_out_is_one() -> None:
+    body, arms = plate(3.0, (-0.2, 0.2), (-0.7, 0.9)), plate(3.0, (-0.55, 0.55), (-0.4, -0.25))
+    depth_m = nearest(body, arms)
+    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+
+
+def test_a_few_cells_are_not_divided() -> None:
+    grid, labels = two_people(0.4)
+    sparse = np.zeros_like(labels)
+    chosen = np.flatnonzero(labels)[::40]
+    assert len(chosen) < 48
+    sparse.ravel()[chosen] = 1
+    assert split(grid, sparse, 0) is None
+
+
+def test_a_small_part_that_nobody_claims_goes_to_the_mover_beside_it() -> None:
+    parts = regions(PERSON, ARM, Body(3.0, cells=30), Body(-0.45, cells=150))
+    winner = np.array([2, 0, 0, 0], np.int32)
+    mover = np.array([False, True])
+    given = attach(np.array([1, 2, 3]), parts, winner, mover)
+    # The arm; not the part 2.5 m away; not the one that is nearly as large as the mover itself.
+    np.testing.assert_array_equal(given, [2, 2, 0, 0])
+    np.testing.assert_array_equal(attach(np.array([1]), parts, winner, np.array([True, False])), winner)
+
+
+def test_the_nearest_mover_gets_the_part() -> None:
+    parts = regions(Body(-0.5), Body(0.55), Body(0.2, width=0.2, height=0.2, cells=20))
+    winner = np.array([1, 2, 0], np.int32)
+    given = attach(np.array([2]), parts, winner, np.array([True, True]))
+    np.testing.assert_array_equal(given, [1, 2, 2])  # 0.05 m away, the other one 0.2 m
+
+
+def test_parts_far_from_a_tracks_main_one_are_taken_from_it() -> None:
+    parts = regions(Body(0.0), Body(0.7, cells=50), Body(0.9, cells=50), Body(2.0))
+    winner = np.array([1, 1, 1, 2], np.int32)
+    # 0.3 m stays, 0.5 m goes; the other track's only part is its main one.
+    np.testing.assert_array_equal(detach(winner, parts, np.array([90, 40, 40, 5])), [1, 1, 0, 2])
+    # The main one is what most cells spoke for.
+    np.testing.assert_array_equal(detach(winner, parts, np.array([40, 40, 90, 5])), [0, 1, 1, 2])
+    nobody = np.zeros(4, np.int32)
+    np.testing.assert_array_equal(detach(nobody, parts, np.zeros(4, np.intp)), nobody)
+
+
+def test_what_is_measured_of_a_grid_agrees_with_its_boxes() -> None:
+    depth_m = plate(3.0, (-0.5, 0.1), (-0.4, 0.6))
+    box = boxes(measure(grid_of(depth_m), labelled(depth_m > 0.0), 1))
+    np.testing.assert_allclose(box.low_m[0], [-0.5, -0.4, 3.0], atol=0.06)
+    np.testing.assert_allclose(box.high_m[0], [0.1, 0.6, 3.0], atol=0.06)
