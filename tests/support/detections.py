@@ -1,0 +1,76 @@
+"""Detections without images: exact depth grids, a camera whose motion is known, no fragments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from config.perception import PerceptionConfig
+from hal.types import FloatArray, Pose
+from tests.support.grids import CAMERA, grid_of
+from vision.depth_grid import DepthGrid
+from vision.detection import Detection
+from vision.scene import CameraCondition, CameraHealth, EgoMotion
+from vision.tracker import Percept, Tracker
+from vision.velocities import PointMotion
+
+FRAME_NS = 33_333_333
+START_NS = 1_000_000_000
+AT_ORIGIN = Pose(np.eye(3), np.zeros(3))
+GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)
+
+
+def no_ends() -> PointMotion:
+    """The evidence of no fragments at all."""
+    none, pair, triple = np.empty(0), np.empty((0, 2)), np.empty((0, 3))
+    return PointMotion(
+        static_m=triple,
+        ray=pair,
+        lag_s=none,
+        miss_m=pair,
+        covariance=triple,
+        depth_effect=pair,
+        depth_step_m=none,
+        depth_step_sigma_m=none,
+        depth_lag_s=none,
+        static_chi2=none,
+        usable=np.empty(0, np.bool_),
+    )
+
+
+def detection(
+    grid: DepthGrid, frame: int = 0, pose: Pose = AT_ORIGIN, motion_known: bool = True, source: str = "visual"
+) -> Detection:
+    """Frame 0 begins anew, the others follow at 30 Hz with a camera that stands still."""
+    first = frame == 0
+    dt_s = 0.0 if first else FRAME_NS * 1e-9
+    return Detection(
+        captured_ns=START_NS + frame * FRAME_NS,
+        sequence=frame,
+        dt_s=dt_s,
+        camera=CAMERA,
+        grid=grid,
+        ids=np.empty(0, np.int64),
+        ends_px=np.empty((0, 2, 2), np.float32),
+        near_m=np.empty((0, 2), np.float32),
+        age_frames=np.empty(0, np.intp),
+        motion=no_ends(),
+        pose=pose,
+        pose_covariance=1e-8 * np.eye(6),
+        ego_motion=EgoMotion(AT_ORIGIN, dt_s, "none" if first else source, 0.9, 0.001, 0.0005),
+        health=GOOD,
+        restarted=first,
+        motion_known=motion_known and not first,
+    )
+
+
+def track(
+    depths_m: Sequence[FloatArray], up: FloatArray | None = None, camera_height_m: float = 1.0
+) -> list[Percept]:
+    """What the tracker makes of one exact depth grid a frame."""
+    tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
+    return [
+        tracker.step(detection(grid_of(depth_m, up, camera_height_m), frame), None)
+        for frame, depth_m in enumerate(depths_m)
+    ]

@@ -1,0 +1,121 @@
+"""Surfaces where free space was seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from config.perception import DepthNoise
+from hal.types import FloatArray, Pose
+from tests.support.detections import AT_ORIGIN
+from tests.support.grids import grid_of, nearest, no_depth, plate, wall
+from vision.arrivals import FreeMemory
+from vision.depth_grid import BoolGrid
+
+NOISE = DepthNoise(floor_m=0.005, quadratic_per_m=0.0075)
+BACK = wall(6.0)
+BODY = plate(3.0, (-0.3, 0.3), (-0.5, 0.5))
+MS = 1_000_000
+
+
+def memory(*views: tuple[int, FloatArray], pose: Pose = AT_ORIGIN) -> FreeMemory:
+    """Has seen the views: (milliseconds, depth)."""
+    kept = FreeMemory(NOISE)
+    for stamp_ms, depth_m in views:
+        kept.remember(grid_of(depth_m), pose, stamp_ms * MS)
+    return kept
+
+
+def arrived(kept: FreeMemory, depth_m: FloatArray, now_ms: int = 200, pose: Pose = AT_ORIGIN) -> BoolGrid:
+    grid = grid_of(depth_m)
+    return kept.arrived(grid, grid.valid, pose, now_ms * MS)
+
+
+def inner(depth_m: FloatArray) -> BoolGrid:
+    """Without its rim, where fewer than five of nine cells are its own at the corners."""
+    mask = depth_m > 0.0
+    return mask & np.roll(mask, 1, 0) & np.roll(mask, -1, 0) & np.roll(mask, 1, 1) & np.roll(mask, -1, 1)
+
+
+def test_what_stands_where_the_wall_was_seen_has_arrived() -> None:
+    found = arrived(memory((0, BACK)), nearest(BODY, BACK))
+    assert found[inner(BODY)].all()
+    assert not found[BODY == 0.0].any()
+
+
+def test_what_stood_there_before_has_not() -> None:
+    both = nearest(BODY, BACK)
+    assert not arrived(memory((0, both)), both).any()
+
+
+def test_what_goes_leaves_nothing_that_has_arrived() -> None:
+    assert not arrived(memory((0, nearest(BODY, BACK))), BACK).any()
+
+
+def test_where_nothing_was_measured_nothing_was_free() -> None:
+    assert not arrived(memory((0, no_depth())), BODY).any()
+
+
+def test_beyond_the_range_is_seen_through_too() -> None:
+    found = arrived(memory((0, wall(12.0))), BODY)
+    assert found[inner(BODY)].all()
+
+
+def test_a_step_within_the_noise_proves_nothing() -> None:
+    """3.5 times root 2 times 0.0075 = 0.037 in inverse depth, and 0.1 m."""
+    assert not arrived(memory((0, wall(3.5))), wall(3.2)).any()  # 0.027 apart
+    assert arrived(memory((0, wall(3.9))), wall(3.2))[
+        1:-1, 1:-1
+    ].all()  # 0.056, more than 0.037 + 0.1 / 3.2^2
+
+
+@pytest.mark.parametrize(
+    ("age_ms", "known"), [(80, False), (120, True), (280, True), (700, True), (950, False)]
+)
+def test_what_was_seen_too_lately_or_too_long_ago_does_not_count(age_ms: int, known: bool) -> None:
+    """0.2 s ago, give or take half of it, or 0.6 s."""
+    assert arrived(memory((0, BACK)), nearest(BODY, BACK), age_ms).any() == known
+
+
+def test_cells_that_are_alone_do_not_count() -> None:
+    speckled = BACK.copy()
+    speckled[20, 20] = speckled[40:42, 50:52] = 3.0
+    assert not arrived(memory((0, BACK)), speckled).any()
+
+
+def test_cells_beside_what_was_near_do_not_count() -> None:
+    """The rim of a body may be off by a cell from frame to frame."""
+    wider = plate(3.0, (-0.34, 0.34), (-0.54, 0.54))
+    assert not arrived(memory((0, nearest(BODY, BACK))), nearest(wider, BACK)).any()
+
+
+def test_only_cells_asked_for_are_told() -> None:
+    grid = grid_of(nearest(BODY, BACK))
+    left = grid.valid.copy()
+    left[:, 40:] = False
+    found = memory((0, BACK)).arrived(grid, left, AT_ORIGIN, 200 * MS)
+    assert found.any()
+    assert not found[:, 41:].any()
+
+
+def test_a_new_viewpoint_brings_nothing_new() -> None:
+    """The camera went 0.3 m to the right: the body is seen elsewhere, and what it hid is seen."""
+    moved = Pose(np.eye(3), np.array([0.3, 0.0, 0.0]))
+    shifted = plate(3.0, (-0.6, 0.0), (-0.5, 0.5))
+    kept = memory((0, nearest(BODY, BACK)))
+    assert not arrived(kept, nearest(shifted, BACK), pose=moved).any()
+    # Without its own motion the camera would be misled.
+    assert arrived(kept, nearest(shifted, BACK)).any()
+
+
+def test_cleared_nothing_is_remembered() -> None:
+    kept = memory((0, BACK))
+    kept.clear()
+    assert not arrived(kept, nearest(BODY, BACK)).any()
+
+
+def test_views_are_kept_no_closer_than_0_06_s() -> None:
+    both = nearest(BODY, BACK)
+    # The second view is too young to be kept: 0.2 s before 250 ms the wall alone was seen.
+    assert arrived(memory((0, BACK), (40, both)), both, 250).any()
+    assert not arrived(memory((0, BACK), (70, both)), both, 250).any()

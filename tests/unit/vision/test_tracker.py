@@ -1,0 +1,119 @@
+"""Tracking on exact depth grids, without any fragment: bodies as surfaces alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hal.types import FloatArray
+from tests.support.detections import FRAME_NS, track
+from tests.support.grids import nearest, no_depth, plate, wall
+from vision.scene import Obstacle
+from vision.tracker import Percept
+
+FRAME_S = FRAME_NS * 1e-9
+SPEED_MPS = 0.8
+
+
+def moving(percept: Percept) -> list[Obstacle]:
+    return [one for one in percept.scene.obstacles if one.moving]
+
+
+def way_m(frame: int) -> float:
+    return SPEED_MPS * frame * FRAME_S
+
+
+def walker(x_m: float, depth_m: float = 4.0) -> FloatArray:
+    """0.5 m wide, 1.6 m high."""
+    return plate(depth_m, (x_m - 0.25, x_m + 0.25), (-0.6, 1.0))
+
+
+def test_a_surface_alone_is_found_moving_with_its_velocity() -> None:
+    percepts = track([walker(-0.9 + way_m(k)) for k in range(30)])
+    (mover,) = moving(percepts[-1])
+    np.testing.assert_allclose(mover.velocity_mps, [SPEED_MPS, 0.0, 0.0], atol=0.12)
+    np.testing.assert_allclose(mover.position_m, [-0.9 + way_m(29), 0.2, 4.0], atol=0.06)
+    assert mover.fragments == 0
+
+
+def test_a_surface_that_stands_is_listed_from_the_third_sight_on_and_never_moves() -> None:
+    percepts = track([walker(0.3) for _ in range(20)])
+    assert [len(one.scene.obstacles) for one in percepts[:4]] == [0, 0, 1, 1]
+    assert not any(moving(one) for one in percepts)
+    (still,) = percepts[-1].scene.obstacles
+    assert still.score == 0.5
+    np.testing.assert_allclose(still.velocity_mps, 0.0, atol=0.02)
+
+
+def behind(x_m: float, pillar_m: tuple[float, float] = (0.5, 1.0)) -> FloatArray:
+    """A walker at 4 m, a wall at 6 m, and a pillar at 2.5 m from pillar_m[0] to pillar_m[1] before them."""
+    return nearest(walker(x_m), wall(6.0), plate(2.5, pillar_m, (-0.9, 0.9)))
+
+
+def test_what_is_left_to_see_of_a_mover_behind_something_does_not_drag_its_position() -> None:
+    """A curtain is drawn: of the walker the left quarter is to be seen, with its middle 0.19 m off."""
+    start_m, drawn = -0.9, 30
+    depths_m = [behind(start_m + way_m(k), (0.9, 1.0)) for k in range(drawn)]
+    for k in range(drawn, drawn + 5):
+        edge_m = start_m + way_m(k) - 0.25 + 0.125
+        depths_m.append(behind(start_m + way_m(k), (edge_m * 2.5 / 4.0, 1.0)))
+    percepts = track(depths_m)
+    before = moving(percepts[drawn - 1])[0]
+    for k in range(drawn, drawn + 5):
+        (mover,) = (one for one in percepts[k].scene.obstacles if one.id == before.id)
+        assert mover.moving
+        assert mover.unseen_s == 0.0
+        assert mover.position_m[0] == pytest.approx(start_m + way_m(k), abs=0.08)
+        assert mover.velocity_mps[0] == pytest.approx(SPEED_MPS, abs=0.1)
+
+
+def pair(frame: int, gap_m: float) -> FloatArray:
+    """A grown-up and, gap_m to the right, a child, who walk alike."""
+    x_m = -1.1 + way_m(frame)
+    grown = plate(3.0, (x_m, x_m + 0.5), (-0.9, 1.0))
+    child = plate(3.0, (x_m + 0.5 + gap_m, x_m + 0.9 + gap_m), (0.1, 1.0))
+    return nearest(grown, child)
+
+
+def test_a_pair_that_would_be_divided_again_is_not_merged() -> None:
+    percepts = track([pair(k, 0.18) for k in range(40)])
+    ids = [tuple(one.id for one in moving(percept)) for percept in percepts[15:]]
+    assert len(ids[0]) == 2
+    assert set(ids) == {ids[0]}  # the same two throughout: neither merged nor born again
+
+
+def holed(frame: int) -> FloatArray:
+    """One person in two parts: a row of depth is missing above the shoes."""
+    x_m = -0.9 + way_m(frame)
+    body = plate(3.0, (x_m - 0.25, x_m + 0.25), (-0.9, 0.6))
+    shoes = plate(3.0, (x_m - 0.25, x_m + 0.25), (0.72, 0.95))
+    return nearest(body, shoes)
+
+
+def test_shoes_parted_from_their_body_by_a_hole_become_part_of_it() -> None:
+    percepts = track([holed(k) for k in range(40)])
+    assert len(percepts[2].scene.obstacles) == 2  # at first nothing is known of them
+    for percept in percepts[20:]:
+        (person,) = percept.scene.obstacles
+        assert person.moving
+        assert person.bbox_px[3] - person.bbox_px[1] > 0.95 * (1.85 / 3.0 * 300.0)
+
+
+def test_what_is_gone_is_shown_for_a_moment_while_its_place_is_in_view_and_then_no_more() -> None:
+    depths_m = [walker(-0.9 + way_m(k)) for k in range(24)] + [no_depth()] * 8
+    percepts = track(depths_m)
+    listed = [len(one.scene.obstacles) for one in percepts[24:]]
+    # 0.15 s are four frames of 33 ms.
+    assert listed == [1, 1, 1, 1, 0, 0, 0, 0]
+    kept = percepts[24 + 3].scene.obstacles[0]
+    assert kept.unseen_s == pytest.approx(4 * FRAME_S)
+    # It goes on as it went.
+    assert kept.position_m[0] == pytest.approx(-0.9 + way_m(27), abs=0.1)
+
+
+def test_what_has_left_the_view_is_not_shown_any_longer() -> None:
+    # The right edge of the view is 160 / 300 * 4 = 2.1 m away.
+    depths_m = [walker(0.4 + way_m(k)) for k in range(75)]
+    for k, percept in enumerate(track(depths_m)):
+        if 0.4 + way_m(k) > 2.35 + 0.1:
+            assert percept.scene.obstacles == ()
