@@ -102,7 +102,7 @@ def test_the_filters_speed_must_be_four_sigmas() -> None:
 
 
 def test_what_creeps_is_static_however_sure() -> None:
-    sure = {"covariance": covariance(1e-4), "own_covariance": covariance(1e-4)}
+    sure: dict[str, Any] = {"covariance": covariance(1e-4), "own_covariance": covariance(1e-4)}
     assert not rises(by_fragments((0.20, 0.0, 0.0), 20, **sure))
     assert rises(by_fragments((0.22, 0.0, 0.0), 20, **sure))
     assert not rises(by_fragments((0.22, 0.0, 0.0), 20, **sure, distance_m=np.array([5.0])))
@@ -130,7 +130,7 @@ def test_fragments_and_surface_that_say_the_same_prove_together(direction: Speed
     """Two ends and 0.55 of the threshold: 0.16 / (0.0131 + 0.0009) = 11.4, between 8.8 and 16."""
     x, y, z = direction
     slow: Speed = (0.4 * x, 0.4 * y, 0.4 * z)
-    both = {"covariance": covariance(0.0131), "own_covariance": covariance(0.03)}
+    both: dict[str, Any] = {"covariance": covariance(0.0131), "own_covariance": covariance(0.03)}
     agrees = surface(slow, 0.02)  # 0.16 / 0.0209 = 7.7, more than 2.5 squared
     assert rises(by_fragments(slow, 2, **both, **agrees))
     assert not rises(by_fragments(slow, 1, **both, **agrees))
@@ -223,7 +223,8 @@ def test_evidence_rises_in_a_tenth_of_a_second_and_faster_with_overwhelming_proo
 def test_pace_is_limited_by_the_weaker_of_filter_and_frame() -> None:
     # 0.64 / (0.0191 + 0.0009) = 32, twice the threshold.
     for name in ("covariance", "own_covariance"):
-        seen = by_fragments(ACROSS, 40, **{name: covariance(0.0191)})
+        changes: dict[str, Any] = {name: covariance(0.0191)}
+        seen = by_fragments(ACROSS, 40, **changes)
         assert verdict(seen).evidence[0] == pytest.approx(2.0 * DT_S / 0.1)
 
 

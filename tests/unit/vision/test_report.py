@@ -1,0 +1,114 @@
+"""What tracking knows, put into obstacles and fragments."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hal.types import FloatArray, Pose
+from tests.support.detections import FRAME_NS, START_NS, detection, no_ends
+from tests.support.grids import CAMERA, grid_of, no_depth
+from vision import report
+from vision.detector import Detection
+from vision.lens import rotation_from_vector
+from vision.tracks import Tracks
+from vision.velocities import PointMotion
+
+FRAME = 30
+NOW_NS = START_NS + FRAME * FRAME_NS
+BEFORE_ME = (0.2, -0.1, 4.0)
+
+
+def tracks(*places: tuple[float, float, float], sightings: int = 3, unseen_s: float = 0.0) -> Tracks:
+    """Tracks at places (fixed frame), born ten frames ago."""
+    made = Tracks()
+    made.start(np.array(places), 0.2, 1.5, 0.0, NOW_NS - 10 * FRAME_NS)
+    made.sightings[:] = sightings
+    made.seen_ns[:] = NOW_NS - round(unseen_s * 1e9)
+    return made
+
+
+def now(pose: Pose | None = None) -> Detection:
+    seen = detection(grid_of(no_depth()), FRAME)
+    return seen if pose is None else replace(seen, pose=pose)
+
+
+def test_a_track_is_listed_from_its_third_sight_on() -> None:
+    assert report.obstacles(tracks(BEFORE_ME, sightings=2), now()) == ()
+    (one,) = report.obstacles(tracks(BEFORE_ME, sightings=3), now())
+    assert one.id == 1
+    assert one.age_s == pytest.approx(10 * FRAME_NS * 1e-9)
+    assert one.unseen_s == 0.0
+    assert one.score == 0.5
+    np.testing.assert_allclose(one.position_m, BEFORE_ME)
+
+
+@pytest.mark.parametrize(("unseen_s", "listed"), [(0.03, True), (0.14, True), (0.17, False)])
+def test_a_track_that_is_not_seen_is_listed_for_0_15_s(unseen_s: float, listed: bool) -> None:
+    found = report.obstacles(tracks(BEFORE_ME, unseen_s=unseen_s), now())
+    assert [one.unseen_s for one in found] == ([pytest.approx(unseen_s)] if listed else [])
+
+
+@pytest.mark.parametrize("place", [(2.3, 0.0, 4.0), (-2.3, 0.0, 4.0), (0.0, 1.7, 4.0), (0.0, -1.7, 4.0)])
+def test_an_unseen_track_out_of_view_is_not_listed(place: tuple[float, float, float]) -> None:
+    """The view ends 160 / 300 * 4 = 2.13 m to the sides and 1.6 m up and down."""
+    assert report.obstacles(tracks(place, unseen_s=0.03), now()) == ()
+    # Where it is seen its centre may be anywhere: a part of it is to be seen.
+    assert len(report.obstacles(tracks(place), now())) == 1
+
+
+def test_what_is_behind_the_camera_is_not_listed_even_if_it_was_just_seen() -> None:
+    assert report.obstacles(tracks((0.0, 0.0, -0.5)), now()) == ()
+
+
+def test_obstacles_are_told_in_the_axes_of_the_camera() -> None:
+    """The camera went 1 m ahead and turned right by 90 degrees: x of the fixed frame is ahead."""
+    pose = Pose(rotation_from_vector(np.array([0.0, np.pi / 2, 0.0])), np.array([0.0, 0.0, 1.0]))
+    made = tracks((3.0, 0.0, 1.5))
+    made.state[0, 3:] = [0.4, 0.0, -0.8]
+    made.covariance[0, 3:, 3:] = np.diag([0.1, 0.2, 0.3])
+    made.moving[0], made.confidence[0], made.fragments[0] = True, 0.8, 7
+    (one,) = report.obstacles(made, now(pose))
+    np.testing.assert_allclose(one.position_m, [-0.5, 0.0, 3.0], atol=1e-12)
+    np.testing.assert_allclose(one.velocity_mps, [0.8, 0.0, 0.4], atol=1e-12)
+    np.testing.assert_allclose(one.velocity_cov, np.diag([0.3, 0.2, 0.1]), atol=1e-12)
+    assert (one.moving, one.score, one.fragments) == (True, 0.8, 7)
+
+
+def ends(usable: list[bool]) -> PointMotion:
+    count = len(usable)
+    plain = no_ends()
+    values = {name: np.zeros((count, *getattr(plain, name).shape[1:])) for name in PointMotion.__slots__}
+    return PointMotion(**{**values, "usable": np.array(usable)})
+
+
+def two_fragments() -> Detection:
+    pixels = np.array([[[100.0, 60.0], [120.0, 80.0]], [[159.5, 119.5], [159.5, 119.5]]], np.float32)
+    depth = np.array([[3.0, 5.0], [2.0, np.nan]], np.float32)
+    return replace(
+        now(),
+        ids=np.array([3, 8]),
+        ends_px=pixels,
+        near_m=depth,
+        age_frames=np.array([4, 4]),
+        motion=ends([True, False, False, False]),
+    )
+
+
+def test_fragments_have_their_middle_in_space_and_no_velocity_that_was_not_measured() -> None:
+    velocity: FloatArray = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
+    covariance = np.tile(np.diag([0.01, 0.04, 0.09]), (2, 1, 1))
+    owner, moving = np.array([5, -1]), np.array([True, False])
+    told = report.fragments(two_fragments(), owner, moving, velocity, covariance)
+    np.testing.assert_array_equal(told.ids, [3, 8])
+    np.testing.assert_allclose(told.depth_m, [4.0, np.nan])
+    expected = [(110.0 - CAMERA.cx) / 300.0 * 4.0, (70.0 - CAMERA.cy) / 300.0 * 4.0, 4.0]
+    np.testing.assert_allclose(told.position_m[0], expected)
+    np.testing.assert_allclose(told.velocity_mps[0], velocity[0])
+    np.testing.assert_allclose(told.velocity_sigma_mps[0], [0.1, 0.2, 0.3])
+    assert np.isnan(told.velocity_mps[1]).all()  # neither end can be used
+    assert np.isnan(told.velocity_sigma_mps[1]).all()
+    np.testing.assert_array_equal(told.obstacle_id, owner)
+    np.testing.assert_array_equal(told.moving, moving)
