@@ -1,11 +1,17 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from config.perception import FragmentSettings, PerceptionConfig
+from config.perception import FragmentSettings, MotionSettings, PerceptionConfig
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
+from tests.support.grids import grid_of, plane
+from vision import kalman
+from vision.floor import FloorFinder
+from vision.judgement import MotionEvidence, judge
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
 from vision.perception import Perception
 from vision.scene import Scene
@@ -138,3 +144,93 @@ def test_garbage_never_makes_a_scene_that_is_not_finite(
         assert_finite(percept.scene)
         assert np.isfinite(percept.fragments.ends_px).all()
         stamp_ns += gaps_ns[k]
+
+
+@settings(deadline=None)
+@given(
+    pitch_deg=st.floats(5.0, 38.0),
+    roll_deg=st.floats(-20.0, 20.0),
+    height_m=st.floats(0.3, 2.0),
+    seed=seeds,
+)
+def test_any_floor_in_view_is_found_through_the_noise_of_a_stereo_camera(
+    pitch_deg: float, roll_deg: float, height_m: float, seed: int
+) -> None:
+    pitch, roll = math.radians(pitch_deg), math.radians(roll_deg)
+    up = np.array([-math.cos(pitch) * math.sin(roll), -math.cos(pitch) * math.cos(roll), -math.sin(pitch)])
+    depth_m = plane(up, height_m)
+    noise = np.random.default_rng(seed).normal(0.0, 0.002, depth_m.shape)
+    seen = np.divide(1.0, depth_m, out=np.zeros_like(depth_m), where=depth_m > 0.0) + noise
+    measured = np.divide(1.0, seen, out=np.zeros_like(seen), where=(depth_m > 0.0) & (seen > 0.1))
+    floor = FloorFinder().find(grid_of(measured))
+    assert floor is not None
+    assert abs(floor.camera_height_m / height_m - 1.0) < 0.05
+    assert floor.up @ up > math.cos(math.radians(2.0))
+
+
+@given(
+    seed=seeds,
+    normal=st.tuples(angles, angles, angles),
+    dt_s=st.floats(0.001, 0.5),
+    density=st.floats(0.0, 2.0),
+)
+def test_a_predicted_covariance_is_symmetric_and_positive_and_level_speed_stays(
+    seed: int, normal: tuple[float, float, float], dt_s: float, density: float
+) -> None:
+    up = np.array([normal[0], normal[1] - 1.0, normal[2]])
+    up /= np.linalg.norm(up)
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(3, 6, 6))
+    covariance = root @ root.transpose(0, 2, 1) + 0.01 * np.eye(6)
+    state = rng.normal(size=(3, 6))
+    moved, spread = kalman.predict(state, covariance, dt_s, density, up)
+    np.testing.assert_allclose(spread, spread.transpose(0, 2, 1), rtol=1e-9, atol=1e-9)
+    assert (np.linalg.eigvalsh(spread) > 0.0).all()
+    level = np.eye(3) - np.outer(up, up)
+    np.testing.assert_allclose(moved[:, 3:] @ level, state[:, 3:] @ level, atol=1e-9)
+    assert (np.abs(moved[:, 3:] @ up) <= np.abs(state[:, 3:] @ up) + 1e-12).all()
+
+
+def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
+    rng = np.random.default_rng(seed)
+
+    def covariances() -> FloatArray:
+        root = rng.normal(size=(count, 3, 3)) * rng.choice([0.0, 0.05, 1.0], (count, 1, 1))
+        result: FloatArray = root @ root.transpose(0, 2, 1)
+        return result
+
+    sight = rng.normal(size=(count, 3))
+    return MotionEvidence(
+        sight=sight / np.linalg.norm(sight, axis=1)[:, None],
+        distance_m=rng.uniform(0.0, 10.0, count),
+        velocity=rng.normal(0.0, 1.0, (count, 3)),
+        covariance=covariances(),
+        own_velocity=rng.normal(0.0, 1.0, (count, 3)),
+        own_covariance=covariances(),
+        surface_velocity=rng.normal(0.0, 1.0, (count, 3)),
+        surface_covariance=covariances(),
+        ends=rng.integers(0, 40, count),
+        agreement=rng.uniform(0.0, 1.0, count),
+        arrived=rng.integers(0, 40, count),
+        cells=rng.integers(40, 200, count),
+        size_m=rng.uniform(0.0, 4.0, count),
+        clean_s=rng.uniform(0.0, 1.0, count),
+        view_radps=rng.uniform(0.0, 1.0, count),
+        growth_mps=rng.uniform(0.0, 1.0, count),
+        trusted=trusted,
+    )
+
+
+@given(seed=seeds, count=st.integers(0, 12), trusted=st.booleans(), dt_s=st.floats(0.0, 0.2))
+def test_a_verdict_is_finite_within_bounds_and_not_raised_without_trust(
+    seed: int, count: int, trusted: bool, dt_s: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    evidence, moving = rng.uniform(0.0, 1.5, count), rng.random(count) < 0.5
+    verdict = judge(any_evidence(seed, count, trusted), evidence, moving, dt_s, MotionSettings())
+    assert ((verdict.evidence >= 0.0) & (verdict.evidence <= 1.5)).all()
+    assert ((verdict.confidence >= 0.0) & (verdict.confidence <= 1.0)).all()
+    assert not (verdict.moving & (verdict.evidence == 0.0)).any()
+    assert not (verdict.moving & ~moving & (verdict.evidence < 1.0)).any()
+    if not trusted:
+        assert (verdict.evidence <= evidence).all()
