@@ -71,7 +71,7 @@ def merged(
 
 
 PERSON = Body(0.0)
-ARM = Body(0.45, y=-0.3, width=0.3, height=0.3, cells=40)  # 0.1 m from the person's box
+ARM = Body(0.45, y=-0.3, width=0.3, height=0.3, cells=90)  # 0.1 m from the person's box
 
 
 def test_gaps_between_boxes_by_hand() -> None:
@@ -86,6 +86,11 @@ def test_gaps_between_boxes_by_hand() -> None:
 def test_a_small_part_beside_a_mover_that_goes_alike_is_part_of_it() -> None:
     assert merged(PERSON, ARM) == [(1, 0)]
     assert merged(ARM, PERSON) == [(0, 1)]
+
+
+def test_small_is_half_of_the_mover_at_most() -> None:
+    assert merged(PERSON, Body(0.6, width=0.6, cells=100)) == [(1, 0)]  # 0.1 m away, 1.1 m wide together
+    assert merged(PERSON, Body(0.6, width=0.6, cells=101)) == []
 
 
 def test_a_part_too_far_away_is_not() -> None:
@@ -113,6 +118,9 @@ def test_people_side_by_side_stay_two() -> None:
 def test_halves_of_one_persons_width_are_one() -> None:
     left, right = Body(-0.15, width=0.25, cells=100), Body(0.15, width=0.25, cells=90)
     assert merged(left, right) == [(1, 0)]
+    # 0.84 m is one person's width, 0.87 m is not.
+    assert merged(Body(-0.215, width=0.41), Body(0.215, width=0.41, cells=190)) == [(1, 0)]
+    assert merged(Body(-0.23, width=0.41), Body(0.23, width=0.41, cells=190)) == []
 
 
 def test_what_overlaps_in_the_image_by_half_is_one_even_when_large_and_somewhat_deeper() -> None:
@@ -120,8 +128,9 @@ def test_what_overlaps_in_the_image_by_half_is_one_even_when_large_and_somewhat_
     assert merged(wide, Body(0.2, z=4.45, width=0.9, cells=250)) == [(1, 0)]  # 0.25 m behind
     assert merged(wide, Body(0.2, z=4.58, width=0.9, cells=250)) == [(1, 0)]  # 0.38
     assert merged(wide, Body(0.2, z=4.75, width=0.9, cells=250)) == []  # 0.55
-    aside = Body(0.8, z=4.2, width=0.9, cells=250)  # overlaps by less than half
-    assert merged(wide, aside) == []
+    # 0.47 m of 0.9 m, and 0.43 m of it.
+    assert merged(wide, Body(0.48, width=0.9, cells=250)) == [(1, 0)]
+    assert merged(wide, Body(0.52, width=0.9, cells=250)) == []
 
 
 def test_without_overlap_a_part_must_be_within_a_quarter_of_a_metre() -> None:
@@ -170,6 +179,13 @@ def test_two_people_hand_in_hand_are_divided_between_them() -> None:
     assert 2 * len(second) <= np.count_nonzero(labels) + 1  # the smaller one
 
 
+@pytest.mark.parametrize(("share", "divided"), [(0.3, True), (0.42, False)])
+def test_a_valley_is_lower_than_a_third_of_both_sides(share: float, divided: bool) -> None:
+    left, right = plate(3.0, (-0.7, -0.25), (-0.7, 0.9)), plate(3.0, (0.25, 0.7), (-0.7, 0.9))
+    depth_m = nearest(left, right, plate(3.0, (-0.25, 0.25), (0.9 - 1.6 * share, 0.9)))
+    assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is not None) == divided
+
+
 def test_only_the_cells_of_that_track_are_divided() -> None:
     grid, labels = two_people(0.4)
     both = np.where(labels == 1, np.int32(2), np.int32(0)).astype(np.int32)
@@ -199,11 +215,11 @@ def test_a_few_cells_are_not_divided() -> None:
 
 
 def test_a_small_part_that_nobody_claims_goes_to_the_mover_beside_it() -> None:
-    parts = regions(PERSON, ARM, Body(3.0, cells=30), Body(-0.45, cells=150))
+    parts = regions(PERSON, ARM, Body(3.0, cells=30), Body(-0.45, cells=101))
     winner = np.array([2, 0, 0, 0], np.int32)
     mover = np.array([False, True])
     given = attach(np.array([1, 2, 3]), parts, winner, mover)
-    # The arm; not the part 2.5 m away; not the one that is nearly as large as the mover itself.
+    # The arm; not the part 2.5 m away; not the one that is more than half as large as the mover.
     np.testing.assert_array_equal(given, [2, 2, 0, 0])
     np.testing.assert_array_equal(attach(np.array([1]), parts, winner, np.array([True, False])), winner)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from hal.types import Pose
@@ -47,8 +48,8 @@ def test_what_moves_is_expected_where_it_goes() -> None:
 def test_nothing_is_expected_where_depth_is_another() -> None:
     grid = grid_of(wall(6.0))
     assert not masks.predict(two_surfaces(), BOTH, NO_SHIFT, grid, AT_ORIGIN).any()
-    # 0.2 m nearer is still the same surface: 0.03 + 0.25 / 9 = 0.058 against 1 / 2.8 - 1 / 3 = 0.024.
-    near = grid_of(np.where(TWO > 0, 2.8, 0.0))
+    # 0.4 m nearer is still the same surface: 0.03 + 0.25 / 9 = 0.058 against 1 / 2.6 - 1 / 3 = 0.051.
+    near = grid_of(np.where(TWO > 0, 2.6, 0.0))
     np.testing.assert_array_equal(masks.predict(two_surfaces(), BOTH, NO_SHIFT, near, AT_ORIGIN), TWO)
     nearer = grid_of(np.where(TWO > 0, 2.5, 0.0))  # 0.067
     assert not masks.predict(two_surfaces(), BOTH, NO_SHIFT, nearer, AT_ORIGIN).any()
@@ -129,15 +130,23 @@ def test_fewer_than_four_cells_are_no_claim() -> None:
     assert vote(block((10, 11), (10, 14)), mover=(True,)).winner.tolist() == [1]
 
 
-def test_a_claim_needs_a_share_of_the_part_or_of_the_track() -> None:
-    most = block((10, 30), (10, 45))  # 700 of the part's cells
-    some = block((10, 30), (45, 50))  # 100 of them: an eighth of all votes
-    elsewhere = block((40, 55), (10, 50))  # where the track's other 600 cells are
-    parts = np.where(elsewhere, np.int32(2), PART).astype(np.int32)
-    # Less than 15 % of the part's votes, and less than 30 % of its own.
-    assert vote(most, some | elsewhere, mover=(True, True), parts=parts).present[0].tolist() == [True, False]
-    # All of its own.
-    assert vote(most, some, mover=(True, True)).present[0].tolist() == [True, True]
+@pytest.mark.parametrize(
+    ("columns", "elsewhere", "claims"),
+    [
+        (5, 40, False),  # 100 of the part's 800 votes, 12.5 %, and 20 % of its own 500
+        (7, 40, True),  # 17.5 % of the part's
+        (5, 26, False),  # 28 % of its own
+        (5, 21, True),  # 32 % of its own
+    ],
+)
+def test_a_claim_needs_a_share_of_the_part_or_of_the_track(
+    columns: int, elsewhere: int, claims: bool
+) -> None:
+    other = block((40, 50), (10, 10 + elsewhere))
+    parts = np.where(other, np.int32(2), PART).astype(np.int32)
+    most, some = block((10, 30), (10, 50 - columns)), block((10, 30), (50 - columns, 50))
+    present = vote(most, some | other, mover=(True, True), parts=parts).present
+    assert present[0].tolist() == [True, claims]
 
 
 def test_of_static_tracks_the_strongest_alone_stays_beside_the_movers() -> None:

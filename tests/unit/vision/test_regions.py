@@ -239,10 +239,14 @@ def test_the_box_reaches_down_to_the_floor_that_a_body_stands_on() -> None:
     np.testing.assert_array_equal(standing.bbox_px[0, :3], unknown.bbox_px[0, :3])
 
 
-def test_what_hangs_has_no_feet() -> None:
-    depth_m = plate(4.0, (-0.3, 0.3), (-0.6, 0.6))  # ends 0.4 m above the floor
-    hanging = regions.measure(grid_of(depth_m, LEVEL_UP, 1.0), labelled(depth_m > 0.0), 1)
-    assert hanging.bbox_px[0, 3] == pytest.approx(119.5 + 300.0 * 0.6 / 4.0, abs=STEP_PX)
+@pytest.mark.parametrize(("end_m", "stands"), [(0.83, True), (0.8, False), (0.6, False)])
+def test_what_hangs_has_no_feet(end_m: float, stands: bool) -> None:
+    """Depth may be missing over 0.12 m and 0.015 m for each metre of distance: 0.18 m; it is over 0.173 m,
+    and, one cell less, over 0.227 m."""
+    depth_m = plate(4.0, (-0.3, 0.3), (-0.6, end_m))
+    measured = regions.measure(grid_of(depth_m, LEVEL_UP, 1.0), labelled(depth_m > 0.0), 1)
+    row = 194.5 if stands else 119.5 + 300.0 * end_m / 4.0
+    assert measured.bbox_px[0, 3] == pytest.approx(row, abs=0.5 if stands else STEP_PX)
 
 
 def test_feet_below_the_image_end_at_its_border() -> None:
@@ -287,10 +291,12 @@ def test_a_part_with_something_nearer_beside_it_at_a_distance_is_whole() -> None
     assert measured.whole.tolist() == [True, True]
 
 
-def test_a_part_of_which_only_a_corner_is_hidden_is_whole() -> None:
-    """A tenth of its rows."""
-    measured = beside(plate(4.0, (-0.4, 0.4), (-0.6, 0.8)), plate(2.5, (0.2, 0.5), (0.42, 0.8)))
-    assert measured.whole.tolist() == [True, True]
+@pytest.mark.parametrize(("top_m", "whole"), [(0.4, True), (0.375, False)])
+def test_a_part_of_which_only_a_corner_is_hidden_is_whole(top_m: float, whole: bool) -> None:
+    """Three of its 26 rows, and four: 15 % of them may be hidden."""
+    measured = beside(plate(4.0, (-0.4, 0.4), (-0.6, 0.8)), plate(2.5, (0.2, 0.5), (top_m, 0.8)))
+    assert measured.rows[0] == 26
+    assert measured.whole.tolist() == [whole, True]
 
 
 def test_the_end_of_a_row_does_not_hide_the_beginning_of_the_next() -> None:
@@ -315,13 +321,23 @@ def test_the_end_of_a_row_does_not_hide_the_beginning_of_the_next() -> None:
 
 def test_parts_are_parted_where_depth_jumps_and_speckles_left_out() -> None:
     depth_m = nearest(plate(3.0, (-0.6, 0.0), (-0.4, 0.4)), plate(4.0, (-0.2, 0.8), (-0.5, 0.5)))
-    depth_m[3:5, 3:5] = 2.0  # four cells
+    depth_m[3, 3:8] = 2.0  # five cells
+    depth_m[6:8, 3:6] = 2.0  # six
     grid = grid_of(depth_m)
     count, labels = regions.components(grid, grid.valid)
-    assert count == 2
-    assert not labels[3:5, 3:5].any()
-    for number in (1, 2):
+    assert count == 3
+    assert not labels[3, 3:8].any()
+    for number in (1, 2, 3):
         assert len(np.unique(depth_m[labels == number])) == 1
+
+
+@pytest.mark.parametrize(("behind_m", "count"), [(4.08, 1), (4.11, 2)])
+def test_a_jump_is_measured_in_inverse_depth(behind_m: float, count: int) -> None:
+    """0.25 - 1 / 4.08 = 0.0049, 0.25 - 1 / 4.11 = 0.0067; 0.006 is the least."""
+    depth_m = wall(4.0)
+    depth_m[:, 40:] = behind_m
+    grid = grid_of(depth_m)
+    assert regions.components(grid, grid.valid)[0] == count
 
 
 def test_a_pole_one_cell_wide_is_a_part() -> None:
