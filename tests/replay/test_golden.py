@@ -67,7 +67,7 @@ def test_each_changed_value_is_named_with_its_frame_and_its_obstacle() -> None:
         "frame 0, obstacle 1, bbox: [100, 80, 140, 200] -> [100, 80, 150, 200]"
     ]
     assert changed(0, 0, score=0.9) == ["frame 0, obstacle 1, score: 0.5 -> 0.9"]
-    assert changed(0, 0, fragments=1) == ["frame 0, obstacle 1, fragments: 10 -> 1"]
+    assert changed(0, 0, fragments=21) == ["frame 0, obstacle 1, fragments: 10 -> 21"]
     assert changed(2, 1, moving=True) == ["frame 2, obstacle 2, static -> moving"]
 
 
