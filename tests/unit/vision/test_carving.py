@@ -13,7 +13,7 @@ from hal.types import FloatArray
 from tests.support.detections import detection
 from tests.support.grids import CAMERA, COLUMNS, ROWS, grid_of, labelled, nearest, plate, wall
 from vision import carving, regions
-from vision.detector import Detection
+from vision.detection import Detection
 from vision.tracks import Tracks
 from vision.velocities import PointMotion
 

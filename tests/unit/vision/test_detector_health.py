@@ -12,7 +12,8 @@ from config.perception import FragmentSettings, PerceptionConfig
 from hal.types import Pose
 from tests.support.painted import MOUNT, QVGA, Take, box, drive, floor, record, vector, wall
 from vision import detector
-from vision.detector import Detection, Detector
+from vision.detection import Detection
+from vision.detector import Detector
 from vision.ego_motion import CameraEstimate, MotionPrior, estimate
 from vision.scene import CameraCondition
 

@@ -11,7 +11,7 @@ from hal.types import FloatArray, Pose
 from tests.support.detections import FRAME_NS, START_NS, detection, no_ends
 from tests.support.grids import CAMERA, grid_of, no_depth
 from vision import report
-from vision.detector import Detection
+from vision.detection import Detection
 from vision.lens import rotation_from_vector
 from vision.tracks import Tracks
 from vision.velocities import PointMotion
