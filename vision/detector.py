@@ -31,7 +31,7 @@ from vision.scene import CameraHealth, EgoMotion, Fragments
 from vision.velocities import PointMotion
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
-_AGREEMENT = 0.4
+_AGREEMENT = 0.45
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
 

@@ -18,6 +18,7 @@ from hal.types import FloatArray
 
 _RISE_S = 0.07
 _FASTEST = 2.5  # times, with overwhelming proof
+_MOST_A_FRAME = 0.5  # no single frame proves motion, however long ago the one before was
 _FALL_S = 0.30
 _HOLD_S = 2.0  # without new proof
 _STOP_S = 0.12  # with proof of standing still
@@ -127,7 +128,8 @@ def judge(
     falling = np.where(stands, dt_s / _STOP_S, np.where(holding, dt_s / _HOLD_S, dt_s / _FALL_S))
     strength = np.minimum(np.maximum(along, across), np.maximum(own_along, own_across)) / threshold
     pace = np.clip(np.minimum(strength, agreeing / _ENDS_ACROSS), 1.0, _FASTEST)
-    change = np.where(rising & ~stands, pace * dt_s / _RISE_S, -falling)
+    rise = np.minimum(pace * dt_s / _RISE_S, _MOST_A_FRAME)
+    change = np.where(rising & ~stands, rise, -falling)
     new_evidence = np.clip(evidence + change, 0.0, _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
     confidence = 1.0 - np.exp(-significance / _SURE_SQUARED_SIGMAS)

@@ -215,8 +215,9 @@ def test_no_proof_counts_for_a_speed_that_nothing_has() -> None:
 
 
 def rise_s(seen: MotionEvidence) -> float:
-    """How long this evidence takes from nothing to a verdict."""
-    return DT_S / float(verdict(seen).evidence[0])
+    """How long this evidence takes from nothing to a verdict, in frames too short for the limit of one frame."""
+    brief = judge(seen, np.zeros(1), np.zeros(1, np.bool_), 0.01, SETTINGS)
+    return 0.01 / float(brief.evidence[0])
 
 
 PLAIN_S = rise_s(by_fragments(ACROSS, 4))
@@ -229,9 +230,13 @@ def test_a_verdict_takes_about_a_tenth_of_a_second_of_proof() -> None:
 def test_a_verdict_comes_sooner_with_overwhelming_proof() -> None:
     """Half as many ends again: one and a half times as fast; never more than two and a half times."""
     assert rise_s(by_fragments(ACROSS, 6)) == pytest.approx(PLAIN_S / 1.5)
-    # Evidence has a ceiling, which a whole step would reach.
-    short = judge(by_fragments(ACROSS, 40), np.zeros(1), np.zeros(1, np.bool_), 0.01, SETTINGS)
-    assert 0.01 / short.evidence[0] == pytest.approx(PLAIN_S / 2.5)
+    assert rise_s(by_fragments(ACROSS, 40)) == pytest.approx(PLAIN_S / 2.5)
+
+
+def test_one_frame_alone_proves_nothing_however_long_ago_the_one_before_was() -> None:
+    slow = judge(by_fragments(ACROSS, 40), np.zeros(1), np.zeros(1, np.bool_), 0.4, SETTINGS)
+    assert slow.evidence[0] == 0.5
+    assert not slow.moving[0]
 
 
 @pytest.mark.parametrize("name", ["covariance", "own_covariance"])
