@@ -215,7 +215,7 @@ def test_no_proof_counts_for_a_speed_that_nothing_has() -> None:
 
 
 def rise_s(seen: MotionEvidence) -> float:
-    """How long this evidence takes from nothing to a verdict, in frames too short for the limit of one frame."""
+    """How long this evidence takes to a verdict, in frames too short for the limit of one frame."""
     brief = judge(seen, np.zeros(1), np.zeros(1, np.bool_), 0.01, SETTINGS)
     return 0.01 / float(brief.evidence[0])
 
@@ -251,7 +251,7 @@ def test_pace_without_fragments_is_the_plain_one() -> None:
 
 
 def test_moving_from_full_evidence_on_until_none_is_left() -> None:
-    few, step = by_fragments(ACROSS, 4), DT_S / PLAIN_S
+    few, step = by_fragments(ACROSS, 4), min(DT_S / PLAIN_S, 0.5)
     assert not verdict(few, 0.99 - step).moving[0]
     assert verdict(few, 1.01 - step).moving[0]
     assert verdict(one(), 0.2, True).moving[0]
