@@ -45,6 +45,12 @@ class Prediction(Section):
         le=5,
         description="the same, sideways, for who goes the robot's way: they do not see it and may cut in",
     )
+    oncoming_mps2: float = Field(
+        default=0.1,
+        ge=0,
+        le=5,
+        description="the same, sideways, for who has come towards the robot for a while: they see it",
+    )
     beside_mps: float = Field(
         default=0.3,
         ge=0,

@@ -11,6 +11,8 @@ from controller.decision import Reason
 # So far the front may be past the near side of something that still counts as ahead.
 ALONGSIDE_M = 0.1
 STANDING_MPS = 0.01
+# Who moves away from the path at more than one in so much leaves it: that is not going the robot's way.
+LEAVES_ASLANT = 2.0
 
 # Rules of a Reason that mean: something stands or moves in the way.
 BLOCKING_RULES = frozenset({"static", "oncoming", "leader", "crossing", "depth", "unseen", "worst case"})

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.bodies import Bodies, no_bodies
+from controller.limits import LEAVES_ASLANT
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 
@@ -84,7 +85,7 @@ def _may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     left = (bodies.xy_m[:, 1] - pose.y_m) * cos - (bodies.xy_m[:, 0] - pose.x_m) * sin
     leftward = bodies.velocity_mps[:, 1] * cos - bodies.velocity_mps[:, 0] * sin
     forward = bodies.velocity_mps[:, 0] * cos + bodies.velocity_mps[:, 1] * sin
-    comes: BoolArray = (left * leftward < 0.0) | (forward > np.abs(leftward))
+    comes: BoolArray = (left * leftward < 0.0) | (forward > LEAVES_ASLANT * np.abs(leftward))
     return comes
 
 

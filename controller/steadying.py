@@ -47,4 +47,7 @@ class SteadyVelocities:
         self._ids, self._velocity, self._variance = seen.ids[moving], velocity[moving], variance[moving]
         if not len(now):
             return seen
-        return replace(seen, velocity_mps=velocity, surprise_mps=measured - velocity)
+        # One standard deviation is what any measurement differs by: nobody has turned for that.
+        differs = measured - velocity
+        surprise = np.sign(differs) * np.maximum(np.abs(differs) - np.sqrt(spread), 0.0)
+        return replace(seen, velocity_mps=velocity, surprise_mps=surprise)

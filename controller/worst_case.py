@@ -14,7 +14,7 @@ from controller.bodies import Bodies
 from controller.contingency import Reach, Stops, gets_through, reach, room, stands_in_time, stops
 from controller.corridor import Course, Placed
 from controller.decision import Reason
-from controller.limits import ALONGSIDE_M, Limit, Motion, allowed
+from controller.limits import ALONGSIDE_M, LEAVES_ASLANT, Limit, Motion, allowed
 from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
 
@@ -24,6 +24,8 @@ _SPEEDS = 31
 # So much sooner than it would have to, the robot slows comfortably for the worst case.
 _FORESIGHT_S = 0.25
 _GOES_MPS = 0.1
+# Who has been seen for so long and comes towards the robot has seen it too.
+_SEES_S = 1.0
 _SOFT_MPS = 0.1
 
 
@@ -128,10 +130,14 @@ class WorstCase:
         prediction = self._config.prediction
         sigmas = prediction.sigmas
         # Who goes the robot's way does not see it coming and is beside it for long; who comes towards it sees
-        # it and keeps its lane; all others may have become faster or turned since they left the view.
+        # it after a while and keeps its lane; all others may have become faster or turned since they left the
+        # view.
         aslant_mps = np.maximum(np.abs(course.left_mps), _GOES_MPS)
-        unaware, comes = course.along_mps > aslant_mps, course.along_mps < -aslant_mps
+        leaves = course.left_mps * placed.d_m[:, 0] > 0.0
+        unaware = course.along_mps > np.where(leaves, LEAVES_ASLANT, 1.0) * aslant_mps
+        comes = course.along_mps < -aslant_mps
         sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
+        sideways = np.where(comes & (bodies.age_s >= _SEES_S), prediction.oncoming_mps2, sideways)
         # Turning in, one also becomes slower along the path.
         beside = placed.clear_m[:, 0] > 0.0
         along = np.where(unaware & beside, prediction.cut_in_mps2, prediction.manoeuvre_mps2)

@@ -42,8 +42,18 @@ def test_what_is_measured_well_is_followed_at_once() -> None:
     for frame in range(20, 24):
         found = steady.update(seen(frame, -1.0, 0.5, 0.03))
     assert found.velocity_mps[0, 1] > 0.35
-    # What is not followed yet is told.
-    assert found.velocity_mps[0, 1] + found.surprise_mps[0, 1] == pytest.approx(0.5)
+    # What is not followed yet is told, but for what any measurement differs by.
+    left_mps = 0.5 - found.velocity_mps[0, 1]
+    assert left_mps > 0.03
+    assert found.surprise_mps[0, 1] == pytest.approx(left_mps - 0.03)
+
+
+def test_noise_is_no_surprise() -> None:
+    steady = SteadyVelocities()
+    for frame in range(1, 60):
+        steady.update(seen(frame, -1.0, 0.0, 0.1))
+    assert steady.update(seen(60, -1.0, 0.08, 0.1)).surprise_mps[0, 1] == 0.0
+    assert steady.update(seen(61, -1.0, -0.5, 0.1)).surprise_mps[0, 1] < -0.3
 
 
 def test_who_stood_begins_anew() -> None:
