@@ -133,9 +133,10 @@ class WorstCase:
         # it after a while and keeps its lane; all others may have become faster or turned since they left the
         # view.
         aslant_mps = np.maximum(np.abs(course.left_mps), _GOES_MPS)
-        leaves = course.left_mps * placed.d_m[:, 0] > 0.0
-        unaware = course.along_mps > np.where(leaves, LEAVES_ASLANT, 1.0) * aslant_mps
+        outwards = course.left_mps * placed.d_m[:, 0] > 0.0
+        unaware = course.along_mps > np.where(outwards, LEAVES_ASLANT, 1.0) * aslant_mps
         comes = course.along_mps < -aslant_mps
+        leaves = outwards & ~unaware & (placed.clear_m[:, 0] > 0.0)
         sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
         sideways = np.where(comes & (bodies.age_s >= _SEES_S), prediction.oncoming_mps2, sideways)
         # Turning in, one also becomes slower along the path.
@@ -144,7 +145,7 @@ class WorstCase:
         return reach(
             placed,
             self.times_s,
-            since_s + np.where(comes, 0.0, bodies.unseen_s),
+            since_s + np.where(comes | leaves, 0.0, bodies.unseen_s),
             spread_mps=(
                 np.maximum(sigmas * course.sigma_along_mps, np.abs(course.surprise_along_mps)),
                 np.maximum(sigmas * course.sigma_left_mps, np.abs(course.surprise_left_mps)),

@@ -391,6 +391,20 @@ def test_who_goes_the_robots_way_beside_it_may_cut_in() -> None:
     assert Bench(config=trusting).settle(along, v_mps=1.2).target_speed_mps > careful.target_speed_mps
 
 
+def test_who_has_come_towards_it_for_a_while_keeps_its_lane() -> None:
+    """The same distance and speed, but one was not there a moment ago."""
+    known = Bench().settle(obstacle(2.0, 0.9, vx_mps=-0.8, sigma_mps=0.05, age_s=2.0), v_mps=0.9)
+    fresh = Bench().settle(obstacle(2.0, 0.9, vx_mps=-0.8, sigma_mps=0.05, age_s=0.5), v_mps=0.9)
+    assert fresh.target_speed_mps < known.target_speed_mps - 0.1
+
+
+def test_who_leaves_the_way_aslant_does_not_cut_in() -> None:
+    """Out of the way and going further from it, ahead and away, at 35 degrees; and almost along the path."""
+    leaving = Bench().settle(obstacle(2.5, 1.2, vx_mps=0.5, vy_mps=0.35, sigma_mps=0.05), v_mps=1.2)
+    beside = Bench().settle(obstacle(2.5, 1.2, vx_mps=0.6, vy_mps=0.05, sigma_mps=0.05), v_mps=1.2)
+    assert beside.target_speed_mps < leaving.target_speed_mps - 0.1
+
+
 def test_a_blind_camera_teaches_nothing() -> None:
     """A frozen picture shows the person where he was: he is reckoned with where he would be by now."""
     bench = Bench()
