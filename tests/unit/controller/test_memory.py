@@ -144,6 +144,16 @@ def test_who_walks_away_is_not() -> None:
     assert kept == []
 
 
+@pytest.mark.parametrize(("aside_mps", "kept"), [(0.1, [1]), (0.35, [])])
+def test_who_goes_along_but_leaves_aslant_is_not_either(aside_mps: float, kept: list[int]) -> None:
+    """After 4 s: who goes almost along the path could still cut in."""
+    recall = Recall()
+    recall.see(box(2.0, 2.5, 0.5, aside_mps), 0.0)
+    for _ in range(40):
+        found = recall.see(None, 0.0)
+    assert found == kept
+
+
 def test_how_long_it_was_not_seen_is_counted() -> None:
     memory, before = OutOfView(MOUNT, NEAR_M), box(2.0, 2.5, 0.0, -0.3)
     seen = replace(no_bodies(0), captured_ns=FRAME_NS)
