@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from config.loader import Section
 
@@ -27,6 +27,13 @@ class UnixInputConfig(Section):
     kind: Literal["unix"]
     path: str = Field(min_length=1, max_length=100, description="of the socket; made, and removed at the end")
     group_may_command: bool = False
+
+    @field_validator("path")
+    @classmethod
+    def _is_a_path(cls, path: str) -> str:
+        if "\0" in path:
+            raise ValueError("a path cannot hold a NUL character")
+        return path
 
 
 InputConfig = Annotated[UdpInputConfig | UnixInputConfig, Field(discriminator="kind")]

@@ -126,7 +126,7 @@ def envelope(config_path: Path) -> None:
     "--period", is_flag=True, help="Instead: the command period in real time, perception at full load."
 )
 @click.option(
-    "--seconds", type=click.FloatRange(5.0, 60.0), default=30.0, show_default=True,
+    "--seconds", type=click.IntRange(5, 60), default=30, show_default=True,
     help="With --period: how long, with ordinary scheduling and again with SCHED_FIFO.",
 )  # fmt: skip
 def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> None:

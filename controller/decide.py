@@ -8,6 +8,7 @@ and depth, here for path, range, camera and faults) and takes the least. Faster 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from config.decision import DecisionConfig
 from config.robot import Limits, Robot
@@ -174,6 +175,9 @@ class DecisionMaker:
         watched = min(limits, key=lambda limit: limit.speed_mps)
         on_way = min(way, key=lambda limit: limit.speed_mps)
         raw_mps = self._start_or_creep(watched, motion)
+        if raw_mps < watched.speed_mps:
+            sentence = f"{watched.reason.sentence}: too little to go for"
+            watched = replace(watched, reason=replace(watched.reason, sentence=sentence))
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
             self._last = watched

@@ -63,6 +63,20 @@ class Knowledge:
         """Whether any scene was taken in yet."""
         return self._captured_ns is not None
 
+    def has_taken_in(self, scene: Scene) -> bool:
+        """Whether this scene, or one after it, was looked at already."""
+        return self._captured_ns is not None and scene.captured_ns <= self._captured_ns
+
+    def go_on_from(self, before: Knowledge) -> None:
+        """Take over what does not hang on the path: who is seen, who was seen and may come back, how fast
+        they go, what hides them, and what the camera is worth."""
+        self.bodies, self._boxes = before.bodies, before._boxes
+        self._seen, self._sprawls = before._seen, before._sprawls
+        self._steady, self._memory, self._places = before._steady, before._memory, before._places
+        self._poses = before._poses
+        self.health, self.edge_tan = before.health, before.edge_tan
+        self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
+
     @property
     def sprawling(self) -> Bodies:
         """Seen, but no boxes."""

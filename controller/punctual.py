@@ -29,7 +29,9 @@ class PunctualChassis(Enclosing):
         """See hal.api.Chassis. now_ns: when the step began, within the period to which it belongs."""
         if self._first_ns is None:
             self._first_ns = now_ns
-        began_ns = now_ns - (now_ns - self._first_ns) % self._period_ns
+        # The nearest beat: the first step may itself have been a little late.
+        beats = (now_ns - self._first_ns + self._period_ns // 2) // self._period_ns
+        began_ns = self._first_ns + beats * self._period_ns
         self._clock.sleep_until_ns(began_ns + self._hold_ns)
         return self._chassis.exchange(setpoint, now_ns)
 

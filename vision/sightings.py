@@ -30,7 +30,9 @@ _JUMP_M = 0.3
 
 def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
     """Update tracks with the surfaces measured, entry k for track k; without cells they stay as predicted."""
-    seen = np.flatnonzero(measured.cells >= MIN_CELLS)
+    visible = measured.cells >= MIN_CELLS
+    tracks.clean_s[~visible] = 0.0
+    seen = np.flatnonzero(visible)
     if len(seen) == 0:
         return
     position = detection.pose.apply(measured.position_m[seen])

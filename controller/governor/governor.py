@@ -27,7 +27,7 @@ from controller.localise import PoseHistory
 from controller.path import OnPath, Path
 from controller.shape import SpeedShaper
 from hal.types import CameraMount, PlanarPose
-from vision.scene import Scene
+from vision.scene import CameraCondition, Scene
 
 # A new arc is laid out when the robot has left the old one by this, or has come this far along it.
 _OFF_M = 0.02
@@ -135,6 +135,8 @@ class SpeedGovernor:
         then = scene.robot_pose or self._poses.at(scene.captured_ns)
         if then is None or scene.captured_ns > now_ns:
             return
+        if scene.health.condition is CameraCondition.UNTRUSTWORTHY:
+            return  # the decision gets it and stops; nothing is learned of the ground
         try:
             bodies = bodies_of(scene, then, self._mount, self._decision.prediction.body_depth_m)
         except SceneError:
@@ -200,10 +202,14 @@ class SpeedGovernor:
                 return self._path
         path = arc_path(pose, *wanted, self._decision.sight.range_m, self._robot)
         on_start = OnPath(0.0, 0.0, 0.0)
+        before = self._known
         known = Knowledge(path, self._robot.body, self._mount, self._decision, _NEAR_EXTRA_M)
         for scene in self._scenes:
             assert scene.robot_pose is not None
-            known.update(scene, scene.robot_pose, on_start, self._shape.v_mps, scene.captured_ns)
+            if before is None or before.has_taken_in(scene):
+                known.update(scene, scene.robot_pose, on_start, self._shape.v_mps, scene.captured_ns)
+        if before is not None:
+            known.go_on_from(before)
         self._decide.take_path(path, known)
         self._path, self._known, self._laid_out, self._on_path = path, known, wanted, on_start
         return path

@@ -86,9 +86,10 @@ class UdpSocket(DatagramSocket):
     def _bind(self) -> socket.socket:
         try:
             found = socket.getaddrinfo(self._host, self._port, type=socket.SOCK_DGRAM)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:  # the latter from names that no resolver would take
+            reason = getattr(error, "strerror", None) or "not a host name"
             raise DeviceNotFound(
-                f"udp {self._host}: no such address ({error.strerror}); give an address of this machine"
+                f"udp {self._host}: no such address ({reason}); give an address of this machine"
             ) from error
         family, kind, protocol, _, address = found[0]
         bound = socket.socket(family, kind, protocol)

@@ -32,6 +32,7 @@ def test_the_file_that_ships_loads_and_says_every_default() -> None:
         ({"input": {"kind": "udp", "port": 80}}, "governor.input.udp.port"),
         ({"input": {"kind": "unix"}}, "governor.input.unix.path: missing key"),
         ({"input": {"kind": "unix", "path": "x" * 101}}, "governor.input.unix.path"),
+        ({"input": {"kind": "unix", "path": "a\0b"}}, "cannot hold a NUL"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, governor: object, complaint: str) -> None:

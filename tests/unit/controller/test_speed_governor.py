@@ -13,6 +13,7 @@ from config.governor import GovernorConfig
 from config.robot import Robot
 from controller.decision import Action
 from controller.governor.request import Twist
+from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 from tests.support.closed_loop import PERIOD_S, Noise, Thing, stands, walks
 from tests.support.governed import GovernedDrive, Step, always
@@ -290,3 +291,41 @@ def test_two_runs_are_alike_to_the_bit() -> None:
         return [(one.governed.v_mps, one.governed.w_radps) for one in drive.run(3.0)]
 
     assert once() == once()
+
+
+def test_nothing_is_learned_of_the_floor_from_a_camera_that_cannot_be_trusted() -> None:
+    crate = np.array([[x, y] for x in (3.9, 4.0, 4.1) for y in (-0.4, -0.3, -0.2, -0.1, 0.0)])
+    behind = np.array([[x, y] for x in np.arange(4.6, 6.4, 0.1) for y in np.arange(-0.4, 0.4, 0.1)])
+
+    def alter(scene: Scene, t_s: float) -> Scene:
+        if t_s < 4.0:
+            return scene
+        bands = len(scene.free_space.bearing_tan)
+        open_hall = replace(scene.free_space, nearest_m=np.full(bands, np.inf), known_m=np.full(bands, 10.0))
+        frozen = CameraHealth(CameraCondition.UNTRUSTWORTHY, "frozen", 0.9)
+        return replace(scene, free_space=open_hall, obstacles=(), health=frozen)
+
+    drive = GovernedDrive(always(0.6), [Thing(stands(4.2, -0.2), 0.5, 0.5, 1.0)], alter=alter)
+    ground = drive.governor._ground
+    drive.run(4.0)
+    seen = ground.blocked(crate, round(drive.t_s * NS_PER_S)).sum(), ground.free(behind).sum()
+    drive.run(4.0)
+    assert seen[0] > 0
+    assert (ground.blocked(crate, round(drive.t_s * NS_PER_S)).sum(), ground.free(behind).sum()) == seen
+
+
+def test_who_has_left_the_view_is_remembered_through_every_new_arc() -> None:
+    """Somebody slower beside the way is overtaken; out of view he may step in for 2 s at least."""
+    drive = GovernedDrive(always(0.8), [Thing(walks(4.5, 1.9, 0.35, -0.02))])
+    arcs, remembered = set(), []
+    for step in itertools.count():
+        drive.step()
+        known = drive.governor._known
+        assert known is not None
+        arcs.add(id(drive.governor._path))
+        remembered.append(len(known._memory._bodies))
+        if step > 14.0 / PERIOD_S:
+            break
+    first = remembered.index(1)
+    assert len(arcs) > 10
+    assert all(remembered[first : first + round(2.0 / PERIOD_S)])

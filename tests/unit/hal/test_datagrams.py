@@ -45,8 +45,9 @@ def test_a_port_that_is_taken_and_an_address_that_is_not_ours() -> None:
         pass
     with pytest.raises(DeviceRefused, match="an address of this machine"), UdpSocket("192.0.2.1", 7447):
         pass
-    with pytest.raises(DeviceNotFound, match="no such address"), UdpSocket("not an address", 7447):
-        pass
+    for host in ("not an address", "a..b", "x" * 64 + ".local"):
+        with pytest.raises(DeviceNotFound, match="no such address"), UdpSocket(host, 7447):
+            pass
 
 
 def test_unix_there_and_back_and_the_path_is_removed(tmp_path: Path) -> None:

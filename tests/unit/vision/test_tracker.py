@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from config.perception import PerceptionConfig
 from hal.types import FloatArray
-from tests.support.detections import FRAME_NS, track
-from tests.support.grids import nearest, no_depth, plate, wall
+from tests.support.detections import FRAME_NS, detection, track
+from tests.support.grids import grid_of, nearest, no_depth, plate, wall
 from vision.scene import Obstacle
-from vision.tracker import Percept
+from vision.tracker import Percept, Tracker
 
 FRAME_S = FRAME_NS * 1e-9
 SPEED_MPS = 0.8
@@ -117,3 +118,13 @@ def test_what_has_left_the_view_is_not_shown_any_longer() -> None:
     for k, percept in enumerate(track(depths_m)):
         if 0.4 + way_m(k) > 2.35 + 0.1:
             assert percept.scene.obstacles == ()
+
+
+def test_a_break_in_sight_begins_the_surfaces_proof_anew() -> None:
+    eyes = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
+    clean_s = []
+    for k, depth_m in enumerate([walker(-0.9 + way_m(k)) for k in range(15)] + [no_depth()] * 3):
+        eyes.step(detection(grid_of(depth_m, None, 1.0), k), None)
+        clean_s.append(float(eyes._tracks.clean_s.max()))
+    assert clean_s[14] > 0.2
+    assert clean_s[15:] == [0.0, 0.0, 0.0]
