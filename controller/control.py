@@ -4,36 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Protocol
 
 from controller.decision import Decision
+from controller.ending import Ending, Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path import OnPath, Path
 from controller.shape import SpeedShaper
 from hal.api import Chassis
-from hal.clocks import NS_PER_S
 from hal.types import ChassisMode, ChassisState, FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene
 
-# At rest within this of the path's end counts as arrived, after the chassis has come to rest too.
+# At rest within this of the path's end counts as arrived.
 ARRIVED_M = 0.05
-SETTLE_S = 0.5
-# A base that does not arm within this will not: say so instead of waiting for ever.
-ARM_TIMEOUT_S = 5.0
-
-_LATCHED = (ChassisMode.ESTOP, ChassisMode.LOST)
-
-
-class Outcome(Enum):
-    """How a drive ended."""
-
-    REACHED = "target reached"
-    STOPPED = "stopped on request"
-    BROKEN_OFF = "broken off"
-    CHASSIS_FAULT = "the chassis stopped the drive"
-    NOT_ARMED = "the chassis did not arm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +46,7 @@ class Drive(Protocol):
     @property
     def finished(self) -> bool: ...
 
-    def request_stop(self, reason: str, ending: Outcome = Outcome.STOPPED) -> None: ...
+    def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None: ...
 
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep: ...
 
@@ -100,32 +84,23 @@ class ControlLoop:
         self._shape = shape
         self._follow = follow
         self._chassis = chassis
+        self.ending = Ending(chassis)
         self._state: ChassisState | None = None
         self._progress_m = 0.0
         self._scene_ns: int | None = None
-        self._started_ns: int | None = None
-        self._resting_since_ns: int | None = None
-        self._was_armed = False
-        self.stop_reason: str | None = None
-        self._ending = Outcome.STOPPED
-        self.outcome: Outcome | None = None
 
     @property
     def finished(self) -> bool:
         """The drive has ended, one way or the other; the chassis has been told to stop."""
-        return self.outcome is not None
+        return self.ending.outcome is not None
 
-    def request_stop(self, reason: str, ending: Outcome = Outcome.STOPPED) -> None:
+    def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
         """Come to rest by the comfort profile, then end with this outcome. The first reason stays."""
-        if self.stop_reason is None:
-            self.stop_reason = reason
-            self._ending = ending
+        self.ending.request_stop(reason, outcome)
 
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep:
         """Decide on what is known, shape, send, and take in what the chassis answers."""
-        if self._started_ns is None:
-            self._started_ns = now_ns
-            self._chassis.arm(now_ns)
+        self.ending.begin(now_ns)
         self._learn(scene)
         pose = self.localiser.pose
         on_path = self.path.project(pose, self._progress_m)
@@ -136,7 +111,8 @@ class ControlLoop:
         setpoint = self._setpoint(decision, on_path, now_ns)
         self._state = self._chassis.exchange(setpoint, now_ns)
         self.localiser.add_odometry(now_ns, self._state.pose)
-        self._conclude(self._state, setpoint, now_ns)
+        arrived = self.path.length_m - on_path.s_m <= ARRIVED_M
+        self.ending.conclude(self._state, setpoint, now_ns, arrived=arrived)
         sequence = None if scene is None else scene.sequence
         return ControlStep(now_ns, pose, on_path.s_m, on_path.d_m, sequence, decision, setpoint, self._state)
 
@@ -156,7 +132,7 @@ class ControlLoop:
             # What the chassis does now is not ours to shape; whenever it obeys again, begin at rest.
             self._shape.reset()
             return Setpoint(now_ns, 0.0, 0.0, 0.0)
-        target_mps = 0.0 if self.stop_reason is not None else decision.target_speed_mps
+        target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps
         shaped = self._shape.step(
             target_mps,
             emergency=decision.emergency,
@@ -164,28 +140,3 @@ class ControlLoop:
         )
         w_radps = self._follow.step(on_path, shaped.v_mps)
         return Setpoint(now_ns, shaped.v_mps, shaped.a_mps2, w_radps)
-
-    def _conclude(self, state: ChassisState, setpoint: Setpoint, now_ns: int) -> None:
-        assert self._started_ns is not None
-        if state.mode is ChassisMode.ARMED:
-            self._was_armed = True
-        elif self._was_armed or state.mode in _LATCHED:
-            self._end(Outcome.CHASSIS_FAULT, now_ns, state.reason)
-            return
-        elif now_ns - self._started_ns > ARM_TIMEOUT_S * NS_PER_S:
-            self._end(Outcome.NOT_ARMED, now_ns, state.reason)
-            return
-        at_rest = setpoint.v_mps == 0.0 and setpoint.a_mps2 == 0.0
-        arrived = self.path.length_m - self._progress_m <= ARRIVED_M
-        if not at_rest or not (arrived or self.stop_reason is not None):
-            self._resting_since_ns = None
-            return
-        if self._resting_since_ns is None:
-            self._resting_since_ns = now_ns
-        if now_ns - self._resting_since_ns >= SETTLE_S * NS_PER_S:
-            self._end(Outcome.REACHED if arrived else self._ending, now_ns, self.stop_reason)
-
-    def _end(self, outcome: Outcome, now_ns: int, reason: str | None) -> None:
-        self.outcome = outcome
-        self.stop_reason = self.stop_reason or reason
-        self._chassis.stop(now_ns)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 from config.app import RealtimeRunner
 from controller.channel import Channel, PeerGone
-from controller.control import ControlStep, Drive, Outcome
+from controller.control import ControlStep, Drive
+from controller.ending import Outcome
 from controller.lockstep import Outside
 from controller.service import ServiceManager, StopRequest
 from hal.api import Clock

@@ -15,7 +15,7 @@ from controller.build import build_control, build_path, build_simulation
 from controller.build_chassis import build_base
 from controller.channel import Channel, channel_sockets
 from controller.console import Console
-from controller.control import Outcome
+from controller.ending import Outcome
 from controller.perception_process import perceive_forever
 from controller.punctual import PunctualChassis
 from controller.realtime import PerceptionLink, Punctuality, run_realtime
@@ -76,12 +76,12 @@ def drive_realtime(
             if link.newest is not None and not told_ready:
                 told_ready = True
                 service.ready("driving")
-            if loop.stop_reason is not None and not told_stopping:
+            if loop.ending.stop_reason is not None and not told_stopping:
                 told_stopping = True
-                service.stopping(loop.stop_reason)
+                service.stopping(loop.ending.stop_reason)
             report(console, path.length_m, moment.control, result.started_ns)
-    if loop.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
-        raise DeviceRefused(f"{describe_base(config.chassis)}: {loop.stop_reason}; nothing has moved")
+    if loop.ending.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
+        raise DeviceRefused(f"{describe_base(config.chassis)}: {loop.ending.stop_reason}; nothing has moved")
     return result
 
 

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 
-from controller.control import ControlLoop, ControlStep, Outcome
+from controller.control import ControlLoop, ControlStep
+from controller.ending import Outcome
 from controller.realtime import Punctuality
 from controller.tally import SetpointTally, TimingTally
 from hal.clocks import NS_PER_S
@@ -52,7 +53,7 @@ class MissionResult:
     def succeeded(self) -> bool:
         """Reached or stopped as asked, nothing touched, limits kept."""
         return (
-            self.loop.outcome in (Outcome.REACHED, Outcome.STOPPED)
+            self.loop.ending.outcome in (Outcome.REACHED, Outcome.STOPPED)
             and not self.contacts
             and self.setpoints.violations == 0
         )

@@ -8,7 +8,8 @@ import numpy as np
 
 from config.app import AppConfig
 from controller.console import Console
-from controller.control import ControlStep, Outcome
+from controller.control import ControlStep
+from controller.ending import Outcome
 from controller.realtime import Punctuality
 from controller.result import MissionResult
 from controller.tally import SetpointTally, mean_speed_mps
@@ -56,10 +57,10 @@ def punctuality_text(punctuality: Punctuality) -> str:
 
 
 def _mission_text(config: AppConfig, result: MissionResult) -> str:
-    outcome = result.loop.outcome
+    outcome = result.loop.ending.outcome
     ended = "given up: max_duration_s is over" if outcome is None else outcome.value
-    if outcome is not Outcome.REACHED and result.loop.stop_reason:
-        ended += f" ({result.loop.stop_reason})"
+    if outcome is not Outcome.REACHED and result.loop.ending.stop_reason:
+        ended += f" ({result.loop.ending.stop_reason})"
     length_m = 0.0 if result.last is None else result.last.progress_m
     mean = mean_speed_mps(length_m, result.duration_s)
     where = (

@@ -131,7 +131,7 @@ def measure_period(priority: int, seconds: float) -> PeriodFigures:
     began_ns = commanded_ns[0] + round(_SETTLE_S * NS_PER_S) if commanded_ns else 0
     kept = [stamp_ns for stamp_ns in commanded_ns if 0 <= stamp_ns - began_ns <= seconds * NS_PER_S]
     if len(kept) < 0.5 * seconds * NS_PER_S / PERIOD_NS:
-        raise UserError(f"only {len(kept)} commands in {seconds:g} s: {result.loop.stop_reason}")
+        raise UserError(f"only {len(kept)} commands in {seconds:g} s: {result.loop.ending.stop_reason}")
     return PeriodFigures.of(kept)
 
 

@@ -31,7 +31,8 @@ from controller.campaign.drive import DriveLog
 from controller.campaign.noise_mission import GIVE_UP_S
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
-from controller.control import SETTLE_S, ControlLoop, Outcome
+from controller.control import ControlLoop
+from controller.ending import SETTLE_S, Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.lockstep import run_lockstep
@@ -177,7 +178,7 @@ def _drive(
             if watch.given_up:
                 break
         recorder.finish()
-    if loop.outcome is Outcome.REACHED:
+    if loop.ending.outcome is Outcome.REACHED:
         log.reached_s = log.times_s[-1] - SETTLE_S - watch.armed_s
     return log
 

@@ -11,7 +11,8 @@ from config.governor import GovernorConfig, InputConfig, UdpInputConfig
 from controller.build import build_path, build_simulation, open_commands
 from controller.build_chassis import build_base
 from controller.console import Console
-from controller.control import ControlStep, Outcome
+from controller.control import ControlStep
+from controller.ending import Outcome
 from controller.errors import UserError
 from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
@@ -47,7 +48,7 @@ class Governing:
     def succeeded(self) -> bool:
         """Ended as asked, nothing touched, limits kept."""
         contacts = [] if self.simulation is None else self.simulation.referee.contacts
-        return self.loop.outcome is Outcome.STOPPED and not contacts and self.setpoints.violations == 0
+        return self.loop.ending.outcome is Outcome.STOPPED and not contacts and self.setpoints.violations == 0
 
     def take(self, step: ControlStep) -> None:
         """Account for one control step."""
@@ -116,9 +117,9 @@ def _govern(
                 told_ready = True
                 console.event(f"ready: commands are heard on {_where(governor.input)}")
                 service.ready("governing")
-            if loop.stop_reason is not None and not told_stopping:
+            if loop.ending.stop_reason is not None and not told_stopping:
                 told_stopping = True
-                service.stopping(loop.stop_reason)
+                service.stopping(loop.ending.stop_reason)
             _report(console, governing, moment.control)
     return governing
 
@@ -147,11 +148,11 @@ def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, st
 
 def _drive_text(governing: Governing) -> str:
     first, last, loop = governing.first, governing.last, governing.loop
-    ended = "ended" if loop.outcome is None else loop.outcome.value
+    ended = "ended" if loop.ending.outcome is None else loop.ending.outcome.value
     if first is None or last is None:
         return ended
     seconds = (last.now_ns - first.now_ns) / NS_PER_S
-    return f"{ended} ({loop.stop_reason}); {last.progress_m:.2f} m in {seconds:.1f} s"
+    return f"{ended} ({loop.ending.stop_reason}); {last.progress_m:.2f} m in {seconds:.1f} s"
 
 
 def _commands_text(inbox: Inbox) -> str:

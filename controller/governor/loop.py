@@ -6,18 +6,16 @@ from typing import Protocol
 
 import numpy as np
 
-from controller.control import ARM_TIMEOUT_S, SETTLE_S, ControlStep, Outcome
+from controller.control import ControlStep
 from controller.decision import Decision
+from controller.ending import Ending, Outcome
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import Asked
 from controller.localise import Localiser
 from controller.recorder import path_ahead
 from hal.api import Chassis
-from hal.clocks import NS_PER_S
 from hal.types import ChassisMode, ChassisState, FloatArray, Setpoint
 from vision.scene import Scene
-
-_LATCHED = (ChassisMode.ESTOP, ChassisMode.LOST)
 
 
 class Commands(Protocol):
@@ -42,38 +40,29 @@ class GovernorLoop:
         self._governor = governor
         self._commands = commands
         self._chassis = chassis
+        self.ending = Ending(chassis)
         self._state: ChassisState | None = None
-        self._started_ns: int | None = None
-        self._resting_since_ns: int | None = None
         self._scene_ns: int | None = None
-        self._was_armed = False
         self._travelled_m = 0.0
-        self.stop_reason: str | None = None
-        self._ending = Outcome.STOPPED
-        self.outcome: Outcome | None = None
 
     @property
     def finished(self) -> bool:
         """The drive has ended, one way or the other; the chassis has been told to stop."""
-        return self.outcome is not None
+        return self.ending.outcome is not None
 
-    def request_stop(self, reason: str, ending: Outcome = Outcome.STOPPED) -> None:
+    def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
         """Come to rest by the comfort profile, then end with this outcome. The first reason stays."""
-        if self.stop_reason is None:
-            self.stop_reason = reason
-            self._ending = ending
+        self.ending.request_stop(reason, outcome)
 
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep:
         """Take in what is asked, govern it, send, and tell the planner what came of it."""
-        if self._started_ns is None:
-            self._started_ns = now_ns
-            self._chassis.arm(now_ns)
+        self.ending.begin(now_ns)
         if scene is not None and scene.captured_ns != self._scene_ns:
             self._scene_ns = scene.captured_ns
             self.localiser.add_ego_motion(scene.captured_ns, scene.ego_motion)
         asked = self._commands.poll(now_ns)
-        if self.stop_reason is not None:
-            asked = Asked(None, self.stop_reason)
+        if self.ending.stop_reason is not None:
+            asked = Asked(None, self.ending.stop_reason)
         pose = self.localiser.pose
         obeys = self._state is not None and self._state.mode is ChassisMode.ARMED
         if not obeys:
@@ -87,7 +76,7 @@ class GovernorLoop:
         self.localiser.add_odometry(now_ns, self._state.pose)
         moved = self.localiser.pose
         self._travelled_m += float(np.hypot(moved.x_m - pose.x_m, moved.y_m - pose.y_m))
-        self._conclude(self._state, setpoint, now_ns)
+        self.ending.conclude(self._state, setpoint, now_ns, arrived=False)
         self._commands.tell(governed.v_mps, governed.w_radps, governed.decision, self._mode)
         on_path = self._governor.on_path
         sequence = None if scene is None else scene.sequence
@@ -106,27 +95,3 @@ class GovernorLoop:
         if path is None:
             return None
         return path_ahead(path, self._governor.on_path.s_m, path.pose(self._governor.on_path.s_m))
-
-    def _conclude(self, state: ChassisState, setpoint: Setpoint, now_ns: int) -> None:
-        assert self._started_ns is not None
-        if state.mode is ChassisMode.ARMED:
-            self._was_armed = True
-        elif self._was_armed or state.mode in _LATCHED:
-            self._end(Outcome.CHASSIS_FAULT, now_ns, state.reason)
-            return
-        elif now_ns - self._started_ns > ARM_TIMEOUT_S * NS_PER_S:
-            self._end(Outcome.NOT_ARMED, now_ns, state.reason)
-            return
-        at_rest = setpoint.v_mps == 0.0 and setpoint.a_mps2 == 0.0 and setpoint.w_radps == 0.0
-        if not at_rest or self.stop_reason is None:
-            self._resting_since_ns = None
-            return
-        if self._resting_since_ns is None:
-            self._resting_since_ns = now_ns
-        if now_ns - self._resting_since_ns >= SETTLE_S * NS_PER_S:
-            self._end(self._ending, now_ns, self.stop_reason)
-
-    def _end(self, outcome: Outcome, now_ns: int, reason: str | None) -> None:
-        self.outcome = outcome
-        self.stop_reason = self.stop_reason or reason
-        self._chassis.stop(now_ns)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.control import ControlStep, Outcome
+from controller.control import ControlStep
 from controller.decision import Action, Decision, Reason
+from controller.ending import Outcome
 from controller.perceive import Look
 from hal.types import RgbdFrame, Setpoint
 from tests.support.scenes import ORIGIN, chassis_state, scene
@@ -36,9 +37,9 @@ class NotingDrive:
         """No steps left."""
         return self._left <= 0
 
-    def request_stop(self, reason: str, ending: Outcome = Outcome.STOPPED) -> None:
+    def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
         """Note the reason; one more step."""
-        self.endings.append(ending)
+        self.endings.append(outcome)
         self.stop_reasons.append(reason)
         self._left = min(self._left, 1)
 

@@ -6,64 +6,28 @@ import pytest
 from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from controller.control import ControlLoop, ControlStep, Outcome
+from controller.control import ControlLoop, ControlStep
 from controller.decide import DecisionMaker
+from controller.ending import Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path import Path
 from controller.shape import SpeedShaper
-from hal.geometry import advance_pose
-from hal.types import CameraMount, ChassisMode, ChassisState, Setpoint
-from tests.support.scenes import ORIGIN, chassis_state, scene
+from hal.types import CameraMount, ChassisMode
+from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
+from tests.support.scenes import scene
 
-PERIOD_NS = 20_000_000
+PERIOD_NS = round(PERIOD_S * 1e9)
 ROBOT = Robot()
 MOUNT = CameraMount(0.45, 0.0, 0.6, 0.07)
-
-
-class ObedientChassis:
-    """Does at once what it is told; arms after a few exchanges; notes what it was told."""
-
-    def __init__(self, arms_after: int = 3) -> None:
-        self._arms_after = arms_after
-        self._pose = ORIGIN
-        self._exchanges = 0
-        self.fault: ChassisMode | None = None
-        self.armed_calls = 0
-        self.stopped_at_ns: int | None = None
-        self.sent: list[Setpoint] = []
-
-    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
-        assert setpoint is not None
-        self._exchanges += 1
-        self.sent.append(setpoint)
-        mode = ChassisMode.ARMED if self._exchanges > self._arms_after else ChassisMode.ARMING
-        if self.fault is not None:
-            mode = self.fault
-        if mode is ChassisMode.ARMED:
-            self._pose = advance_pose(self._pose, setpoint.v_mps, setpoint.w_radps, 0.02)
-        reason = "e-stop pressed" if self.fault else ""
-        return chassis_state(now_ns, mode, setpoint.v_mps, self._pose, reason, setpoint)
-
-    def arm(self, now_ns: int) -> None:
-        self.armed_calls += 1
-
-    def stop(self, now_ns: int) -> None:
-        self.stopped_at_ns = now_ns
-
-    def __enter__(self) -> "ObedientChassis":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        return None
 
 
 def loop_on(chassis: ObedientChassis, length_m: float = 3.0) -> ControlLoop:
     path = Path(PathSpec(segments=(LineSpec(kind="line", length_m=length_m),)), ROBOT)
     return ControlLoop(
         path=path,
-        decide=DecisionMaker(DecisionConfig(), ROBOT, MOUNT, 0.02),
-        shape=SpeedShaper(ROBOT.limits, 0.02),
+        decide=DecisionMaker(DecisionConfig(), ROBOT, MOUNT, PERIOD_S),
+        shape=SpeedShaper(ROBOT.limits, PERIOD_S),
         follow=PathFollower(path, ROBOT.limits),
         localiser=Localiser(path.start, MOUNT),
         chassis=chassis,
@@ -85,10 +49,10 @@ def test_a_free_way_is_driven_to_its_end_and_the_chassis_is_stopped_there() -> N
     chassis = ObedientChassis()
     loop = loop_on(chassis)
     taken = drive(loop, 2000)
-    assert loop.outcome is Outcome.REACHED
+    assert loop.ending.outcome is Outcome.REACHED
     assert taken[-1].progress_m == pytest.approx(3.0, abs=0.02)
-    assert chassis.stopped_at_ns == taken[-1].now_ns
-    assert chassis.armed_calls == 1
+    assert chassis.stopped_at_ns == [taken[-1].now_ns]
+    assert chassis.armed_at_ns == [0]
 
 
 def test_nothing_moves_before_the_chassis_is_armed() -> None:
@@ -115,15 +79,15 @@ def test_a_latched_chassis_ends_the_drive_with_its_reason() -> None:
     assert taken[-1].setpoint.v_mps > 0.2
     chassis.fault = ChassisMode.ESTOP
     drive(loop, 5, first=200)
-    assert loop.outcome is Outcome.CHASSIS_FAULT
-    assert loop.stop_reason == "e-stop pressed"
-    assert chassis.stopped_at_ns is not None
+    assert loop.ending.outcome is Outcome.CHASSIS_FAULT
+    assert loop.ending.stop_reason == "e-stop pressed"
+    assert len(chassis.stopped_at_ns) == 1
 
 
 def test_a_chassis_that_never_arms_is_given_up() -> None:
     loop = loop_on(ObedientChassis(arms_after=10**9))
     taken = drive(loop, 1000)
-    assert loop.outcome is Outcome.NOT_ARMED
+    assert loop.ending.outcome is Outcome.NOT_ARMED
     assert taken[-1].now_ns == pytest.approx(5.02e9, abs=0.05e9)
 
 
@@ -134,8 +98,8 @@ def test_a_requested_stop_is_jerk_limited_and_ends_at_rest() -> None:
     loop.request_stop("SIGTERM received")
     loop.request_stop("something later")
     taken = drive(loop, 1000, first=250)
-    assert loop.outcome is Outcome.STOPPED
-    assert loop.stop_reason == "SIGTERM received"
+    assert loop.ending.outcome is Outcome.STOPPED
+    assert loop.ending.stop_reason == "SIGTERM received"
     speeds = [step.setpoint.v_mps for step in taken]
     accelerations = [step.setpoint.a_mps2 for step in taken]
     assert speeds[0] > 0.5

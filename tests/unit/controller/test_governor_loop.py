@@ -10,54 +10,22 @@ import pytest
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.robot import Robot
-from controller.control import ARM_TIMEOUT_S, ControlStep, Outcome
+from controller.control import ControlStep
 from controller.decision import Decision
+from controller.ending import ARM_TIMEOUT_S, Outcome
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import Asked
 from controller.governor.loop import GovernorLoop
 from controller.governor.request import Twist
 from controller.localise import Localiser
-from hal.geometry import advance_pose
-from hal.types import CameraMount, ChassisMode, ChassisState, Setpoint
-from tests.support.scenes import ORIGIN, chassis_state, free_space, scene
+from hal.types import CameraMount, ChassisMode
+from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
+from tests.support.scenes import ORIGIN, free_space, scene
 
-PERIOD_NS = 20_000_000
+PERIOD_NS = round(PERIOD_S * 1e9)
 ROBOT = Robot()
 MOUNT = CameraMount(0.45, 0.0, 0.6, 0.07)
 GO = Asked(Twist(0.6, 0.1))
-
-
-class Base:
-    """Does at once what it is told; arms after some exchanges."""
-
-    def __init__(self, arms_after: int = 3) -> None:
-        self._arms_after = arms_after
-        self.pose = ORIGIN
-        self.fault: ChassisMode | None = None
-        self.exchanges = self.armed_calls = self.stops = 0
-
-    def __enter__(self) -> Base:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        return None
-
-    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
-        assert setpoint is not None
-        self.exchanges += 1
-        mode = ChassisMode.ARMED if self.exchanges > self._arms_after else ChassisMode.ARMING
-        mode = self.fault or mode
-        if mode is ChassisMode.ARMED:
-            self.pose = advance_pose(self.pose, setpoint.v_mps, setpoint.w_radps, 0.02)
-        return chassis_state(
-            now_ns, mode, setpoint.v_mps, self.pose, "pressed" if self.fault else "", setpoint
-        )
-
-    def arm(self, now_ns: int) -> None:
-        self.armed_calls += 1
-
-    def stop(self, now_ns: int) -> None:
-        self.stops += 1
 
 
 class Planner:
@@ -76,9 +44,9 @@ class Planner:
 
 class Rig:
     def __init__(self, asks: Callable[[float], Asked] = lambda _: GO, arms_after: int = 3) -> None:
-        self.base, self.planner = Base(arms_after), Planner(asks)
-        governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, 0.02)
-        self.loop = GovernorLoop(governor, self.planner, Localiser(ORIGIN, MOUNT), self.base)
+        self.chassis, self.planner = ObedientChassis(arms_after), Planner(asks)
+        governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)
+        self.loop = GovernorLoop(governor, self.planner, Localiser(ORIGIN, MOUNT), self.chassis)
         self.steps: list[ControlStep] = []
 
     def run(self, seconds: float) -> list[ControlStep]:
@@ -95,7 +63,7 @@ class Rig:
 def test_nothing_moves_before_the_base_is_armed_and_then_it_does_as_asked() -> None:
     rig = Rig(arms_after=40)
     steps = rig.run(5.0)
-    assert rig.base.armed_calls == 1
+    assert rig.chassis.armed_at_ns == [0]
     assert all(one.setpoint.v_mps == 0.0 for one in steps[:41])
     assert "the chassis is not armed (arming)" in steps[20].decision.reason.sentence
     assert steps[-1].setpoint.v_mps == pytest.approx(0.6)
@@ -120,7 +88,7 @@ def test_silence_is_a_jerk_limited_stop_and_no_end() -> None:
     assert steps[150].decision.reason.sentence == "no command for 251 ms: stop"
     assert steps[299].setpoint.v_mps == 0.0
     assert steps[-1].setpoint.v_mps == pytest.approx(0.6)
-    assert rig.base.armed_calls == 1
+    assert rig.chassis.armed_at_ns == [0]
     jerks = [abs(b.setpoint.a_mps2 - a.setpoint.a_mps2) / 0.02 for a, b in itertools.pairwise(steps)]
     assert max(jerks) <= ROBOT.limits.max_jerk_mps3 + 1e-6
 
@@ -128,16 +96,16 @@ def test_silence_is_a_jerk_limited_stop_and_no_end() -> None:
 def test_a_latched_base_ends_it_and_no_command_leads_out() -> None:
     rig = Rig()
     rig.run(3.0)
-    rig.base.fault = ChassisMode.ESTOP
+    rig.chassis.fault = ChassisMode.ESTOP
     rig.run(1.0)
-    assert (rig.loop.outcome, rig.loop.stop_reason) == (Outcome.CHASSIS_FAULT, "pressed")
-    assert (rig.base.stops, rig.base.armed_calls) == (1, 1)
+    assert (rig.loop.ending.outcome, rig.loop.ending.stop_reason) == (Outcome.CHASSIS_FAULT, "e-stop pressed")
+    assert (len(rig.chassis.stopped_at_ns), len(rig.chassis.armed_at_ns)) == (1, 1)
 
 
 def test_a_base_that_never_arms_is_given_up() -> None:
     rig = Rig(arms_after=10**9)
     steps = rig.run(ARM_TIMEOUT_S + 1.0)
-    assert rig.loop.outcome is Outcome.NOT_ARMED
+    assert rig.loop.ending.outcome is Outcome.NOT_ARMED
     assert steps[-1].now_ns == pytest.approx((ARM_TIMEOUT_S + 0.02) * 1e9, abs=3e7)
 
 
@@ -148,7 +116,7 @@ def test_a_requested_stop_comes_to_rest_whatever_is_asked_and_ends(asked: Asked)
     rig.loop.request_stop("SIGTERM received")
     rig.loop.request_stop("later", Outcome.BROKEN_OFF)
     steps = rig.run(20.0)
-    assert (rig.loop.outcome, rig.loop.stop_reason) == (Outcome.STOPPED, "SIGTERM received")
+    assert (rig.loop.ending.outcome, rig.loop.ending.stop_reason) == (Outcome.STOPPED, "SIGTERM received")
     last = steps[-1].setpoint
     assert (last.v_mps, last.a_mps2, last.w_radps) == (0.0, 0.0, 0.0)
     assert steps[-1].decision.reason.sentence == "SIGTERM received: stop"

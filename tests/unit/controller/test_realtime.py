@@ -4,7 +4,7 @@ import pytest
 
 from config.app import RealtimeRunner
 from controller.channel import Channel, channel_sockets
-from controller.control import Outcome
+from controller.ending import Outcome
 from controller.realtime import Farewell, PerceptionLink, Punctuality, SceneMessage, run_realtime
 from controller.service import ServiceManager, StopRequest
 from tests.support.drives import NotingDrive, control_step

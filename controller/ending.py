@@ -1,0 +1,81 @@
+"""How every drive begins and ends, whoever steers it: arming, a wish to stop, rest, the last zero."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from hal.api import Chassis
+from hal.clocks import NS_PER_S
+from hal.types import ChassisMode, ChassisState, Setpoint
+
+# At rest by command for this long, so that the chassis has come to rest too.
+SETTLE_S = 0.5
+# A base that does not arm within this will not: say so instead of waiting for ever.
+ARM_TIMEOUT_S = 5.0
+
+_LATCHED = (ChassisMode.ESTOP, ChassisMode.LOST)
+
+
+class Outcome(Enum):
+    """How a drive ended."""
+
+    REACHED = "target reached"
+    STOPPED = "stopped on request"
+    BROKEN_OFF = "broken off"
+    CHASSIS_FAULT = "the chassis stopped the drive"
+    NOT_ARMED = "the chassis did not arm"
+
+
+class Ending:
+    """Arms the chassis at the drive's first step, tells whether, how and why the drive is over, and stops
+    the chassis then. A chassis that latches or is lost ends every drive; only a person starts it again.
+
+    stop_reason: why the robot comes to rest, from the moment that this is asked for. outcome: how the drive
+    ended, None as long as it goes on.
+    """
+
+    def __init__(self, chassis: Chassis) -> None:
+        self.stop_reason: str | None = None
+        self.outcome: Outcome | None = None
+        self._chassis = chassis
+        self._asked_for = Outcome.STOPPED
+        self._started_ns: int | None = None
+        self._was_armed = False
+        self._resting_since_ns: int | None = None
+
+    def request_stop(self, reason: str, outcome: Outcome) -> None:
+        """Have the drive end with this outcome once the robot is at rest. The first reason stays."""
+        if self.stop_reason is None:
+            self.stop_reason = reason
+            self._asked_for = outcome
+
+    def begin(self, now_ns: int) -> None:
+        """Before each step; the first one arms the chassis."""
+        if self._started_ns is None:
+            self._started_ns = now_ns
+            self._chassis.arm(now_ns)
+
+    def conclude(self, state: ChassisState, setpoint: Setpoint, now_ns: int, *, arrived: bool) -> None:
+        """After each step, with what was sent and answered. arrived: where this drive leads to."""
+        assert self._started_ns is not None, "concluded before it began"
+        if state.mode is ChassisMode.ARMED:
+            self._was_armed = True
+        elif self._was_armed or state.mode in _LATCHED:
+            self._end(Outcome.CHASSIS_FAULT, state.reason, now_ns)
+            return
+        elif now_ns - self._started_ns > ARM_TIMEOUT_S * NS_PER_S:
+            self._end(Outcome.NOT_ARMED, state.reason, now_ns)
+            return
+        at_rest = setpoint.v_mps == 0.0 and setpoint.a_mps2 == 0.0 and setpoint.w_radps == 0.0
+        if not at_rest or not (arrived or self.stop_reason is not None):
+            self._resting_since_ns = None
+            return
+        if self._resting_since_ns is None:
+            self._resting_since_ns = now_ns
+        if now_ns - self._resting_since_ns >= SETTLE_S * NS_PER_S:
+            self._end(Outcome.REACHED if arrived else self._asked_for, None, now_ns)
+
+    def _end(self, outcome: Outcome, reason: str | None, now_ns: int) -> None:
+        self.outcome = outcome
+        self.stop_reason = self.stop_reason or reason
+        self._chassis.stop(now_ns)
