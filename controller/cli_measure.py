@@ -1,0 +1,195 @@
+"""The commands that measure: the code's speed, detection, missions by the thousand, what breaks."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from config.camera import OdometryChoice
+from controller.cli_options import (
+    BASES,
+    FILE,
+    FOLDER,
+    FOLDER_OR_FILE,
+    config_option,
+    first_seed,
+    no_progress_bar,
+    perception_mode,
+)
+
+
+@click.command()
+@click.option("--json", "json_path", type=FILE, help="Also write every figure as JSON.")
+@click.option(
+    "--frames", type=click.IntRange(min=10), default=150, show_default=True,
+    help="Length of each simulated reel.",
+)  # fmt: skip
+@click.option(
+    "--period", is_flag=True, help="Instead: the command period in real time, perception at full load."
+)
+@click.option(
+    "--seconds", type=click.IntRange(5, 60), default=30, show_default=True,
+    help="With --period: how long, with ordinary scheduling and again with SCHED_FIFO.",
+)  # fmt: skip
+def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> None:
+    """Measure speed, stage by stage.
+
+    Perception beside the bare OpenCV calls, renderer, control step, driver, lock-step runner.
+    """
+    if period:
+        from controller.bench.period import run_period_bench
+
+        run_period_bench(seconds)
+        return
+    from controller.bench.command import run_bench
+
+    run_bench(frames, json_path)
+
+
+@click.command()
+@click.argument("recordings", type=FOLDER_OR_FILE, nargs=-1)
+@click.option("--sim", "simulated", is_flag=True, help="The simulated set, with truth.")
+@click.option(
+    "--report", type=FOLDER, required=True, help="Folder for report.md, summary.json and the figures."
+)
+@click.option(
+    "--odometry", type=click.Choice(["file", "none", "groundtruth"]), default="file", show_default=True,
+    help="Recordings: prior of the camera's motion. The simulated set is run with and without.",
+)  # fmt: skip
+@click.option("--static", is_flag=True, help="Recordings: nothing moves but the camera, so all is false.")
+@click.option(
+    "--baselines", type=click.Choice(["none", "some", "all"]), default="some", show_default=True,
+    help="Simulated set: the methods of the paper's Table 1 on no, some or all sequences.",
+)  # fmt: skip
+@click.option("--only", multiple=True, metavar="NAME", help="Simulated set: this sequence; may be repeated.")
+@click.option(
+    "--workers", type=click.IntRange(1, 64), default=min(os.cpu_count() or 1, 8), show_default=True,
+    help="Processes that share the simulated set.",
+)  # fmt: skip
+@no_progress_bar
+def evaluate(
+    recordings: tuple[Path, ...],
+    simulated: bool,
+    report: Path,
+    odometry: OdometryChoice,
+    static: bool,
+    baselines: Literal["none", "some", "all"],
+    only: tuple[str, ...],
+    workers: int,
+    quiet: bool,
+) -> None:
+    """Measure detection, simulated with truth and on recordings.
+
+    Writes a report: the paper's tables and figures.
+    """
+    from controller.evaluation.evaluate import EvaluationOptions, run_evaluation
+
+    run_evaluation(
+        EvaluationOptions(recordings, simulated, report, odometry, static, baselines, only, workers, quiet)
+    )
+
+
+@click.command()
+@config_option("of robot, camera, chassis, perception and decision")
+@click.option(
+    "--missions", type=click.IntRange(min=1), default=260, show_default=True,
+    help="How many, spread evenly over the families.",
+)  # fmt: skip
+@click.option("--families", metavar="A,B,...", help="Scenario families; all of them by default.")
+@click.option("--policies", metavar="A,B,...", help="ours, paper, zones, field; all of them by default.")
+@perception_mode("noise")
+@click.option(
+    "--workers", type=click.IntRange(1, 256), default=min(os.cpu_count() or 1, 8), show_default=True,
+    help="Processes that share the missions.",
+)  # fmt: skip
+@first_seed(1)
+@click.option(
+    "--report", type=FOLDER,
+    help="Folder for missions.jsonl, summary.json, report.md and the figures.",
+)  # fmt: skip
+@click.option("--resume", is_flag=True, help="Go on with a campaign that was broken off.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, for example tcp://10.0.0.5:8786."
+)
+@click.option("--only", metavar="FAMILY:SEED", help="One mission alone.")
+@click.option("--video", is_flag=True, help="Camera mode: keep recordings and videos of what fails.")
+@no_progress_bar
+def campaign(
+    config_path: Path,
+    missions: int,
+    families: str | None,
+    policies: str | None,
+    mode: Literal["noise", "camera"],
+    workers: int,
+    seed: int,
+    report: Path | None,
+    resume: bool,
+    scheduler: str | None,
+    only: str | None,
+    video: bool,
+    quiet: bool,
+) -> None:
+    """Drive missions of every kind, several policies side by side.
+
+    Exit code 1 if ours failed.
+    """
+    from controller.campaign.command import CampaignOptions, run_campaign
+
+    options = CampaignOptions(
+        config_path, missions, _names(families), _names(policies), mode, workers, seed, report, resume,
+        scheduler, only, video, quiet,
+    )  # fmt: skip
+    sys.exit(run_campaign(options))
+
+
+def _names(text: str | None) -> tuple[str, ...]:
+    return tuple(name.strip() for name in (text or "").split(",") if name.strip())
+
+
+@click.command("stop-and-go")
+@config_option("of robot, camera, chassis, perception and decision")
+@click.option("--drives", type=click.IntRange(1, 10_000), default=8, show_default=True, help="How often.")
+@first_seed(0)
+@perception_mode("camera")
+@click.option(
+    "--report", type=FOLDER, required=True,
+    help="Folder for the recorded drives, report.md and summary.json.",
+)  # fmt: skip
+@click.option("--keep", is_flag=True, help="Camera mode: keep frames, observations and a video as well.")
+@no_progress_bar
+def stop_and_go(
+    config_path: Path,
+    drives: int,
+    seed: int,
+    mode: Literal["noise", "camera"],
+    report: Path,
+    keep: bool,
+    quiet: bool,
+) -> None:
+    """Somebody steps into the way, stands, leaves.
+
+    Measured as Nav2's collision monitor is. Exit code 1 if a target is missed.
+    """
+    from controller.campaign.stop_and_go_command import StopAndGoOptions, run_stop_and_go
+
+    sys.exit(run_stop_and_go(StopAndGoOptions(config_path, drives, seed, mode, report, keep, quiet)))
+
+
+@click.command()
+@click.option(
+    "--processes", "kind", type=BASES,
+    help="Also kill and freeze the processes of this chassis' mission, in real time (two minutes).",
+)  # fmt: skip
+@click.option("--into", type=FILE, help="Put the tables into this page, in place of the old ones.")
+def faults(kind: str | None, into: Path | None) -> None:
+    """Break things and tell what happened.
+
+    E-stop, restart, unplugging, freezing; with --processes also kill -9.
+    """
+    from controller.faults.command import FaultsOptions, run_faults
+
+    run_faults(FaultsOptions(kind, into))

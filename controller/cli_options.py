@@ -1,0 +1,86 @@
+"""Options that several commands have in common, each written once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from config.loader import CONFIG_DIR
+
+if TYPE_CHECKING:
+    from controller.result import MissionOptions
+
+FILE = click.Path(path_type=Path, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+FOLDER_OR_FILE = click.Path(path_type=Path)
+BASES = click.Choice(["agilex", "roboclaw", "roboteq", "kobuki"])
+
+Option = Callable[[Callable[..., None]], Callable[..., None]]
+
+no_progress_bar = click.option("--quiet", is_flag=True, help="No progress bar.")
+
+
+def config_option(
+    what: str, default: Path | None = CONFIG_DIR / "sim.yaml", shown: str = "the simulated warehouse"
+) -> Option:
+    """--config as config_path. what: the sections that the command reads; shown: the default in words."""
+    return click.option(
+        "--config", "config_path", type=FILE, default=default, show_default=shown, help=f"YAML {what}."
+    )
+
+
+def first_seed(default: int) -> Option:
+    """--seed of the first of many drives."""
+    return click.option(
+        "--seed", type=click.IntRange(min=0), default=default, show_default=True, help="The first seed."
+    )
+
+
+def perception_mode(default: Literal["noise", "camera"]) -> Option:
+    """--mode: what stands in for the robot's eyes."""
+    return click.option(
+        "--mode", type=click.Choice(["noise", "camera"]), default=default, show_default=True,
+        help="A noise model in place of the camera, or rendered and perceived frames.",
+    )  # fmt: skip
+
+
+def recording_options(command: Callable[..., None]) -> Callable[..., None]:
+    """--observations, --video and --quiet."""
+    return _in_this_order(
+        command,
+        click.option(
+            "--observations", type=FILE, help="Write what is seen and decided, one JSON line a frame."
+        ),
+        click.option("--video", type=FILE, help="Write an annotated video (.mp4, .webm or .avi)."),
+        click.option("--quiet", is_flag=True, help="Only the summary."),
+    )
+
+
+def mission_options(command: Callable[[MissionOptions], None]) -> Callable[..., None]:
+    """The options of a drive but --config, handed to the command as one MissionOptions."""
+
+    @wraps(command)
+    def with_options(**given: Any) -> None:
+        # Imported here: `treadwatch --help` needs no NumPy.
+        from controller.result import MissionOptions
+
+        command(MissionOptions(**given))
+
+    return _in_this_order(
+        recording_options(with_options),
+        click.option(
+            "--scenario", help="Simulation only: another world, a YAML file or the name of one that ships."
+        ),
+        click.option("--seed", type=click.IntRange(min=0), help="Simulation only: another seed."),
+    )
+
+
+def _in_this_order(command: Callable[..., None], *options: Option) -> Callable[..., None]:
+    """Click lists the option first that is applied last."""
+    for option in reversed(options):
+        command = option(command)
+    return command
