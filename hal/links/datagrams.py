@@ -6,6 +6,7 @@ import errno
 import os
 import socket
 import stat
+from abc import ABC, abstractmethod
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -23,8 +24,8 @@ _PEER_GONE = frozenset(
 )
 
 
-class DatagramSocket:
-    """hal.api.DatagramLink over one bound socket."""
+class DatagramSocket(ABC):
+    """hal.api.DatagramLink over one bound socket; what it is bound to is the subclass's."""
 
     def __init__(self) -> None:
         self._socket: socket.socket | None = None
@@ -66,8 +67,9 @@ class DatagramSocket:
             return False
         return True
 
+    @abstractmethod
     def _bind(self) -> socket.socket:
-        raise NotImplementedError
+        """A new socket that listens. Raises DeviceNotFound, DeviceRefused."""
 
 
 class UdpSocket(DatagramSocket):
