@@ -150,12 +150,13 @@ class Inbox:
 
 
 def _name(sender: Sender | None) -> str:
+    """For one line of a terminal: a socket file may have any name, line breaks and escape codes too."""
     match sender:
         case None:
             return "a sender without address"
         case (host, port, *_):
             return f"{host}:{port}"
-        case bytes():
-            return sender.decode(errors="replace").replace("\0", "@")
+        case bytes():  # an abstract socket; @ is how ss and systemd write its first byte
+            return repr("@" + sender[1:].decode(errors="backslashreplace"))
         case _:
-            return str(sender)
+            return repr(sender)

@@ -171,6 +171,24 @@ def test_clocks_that_drift_apart_do_not_become_late() -> None:
     assert talk.inbox.dropped == {}
 
 
+@pytest.mark.parametrize(
+    ("sender", "name"),
+    [
+        (b"\0planner", "'@planner'"),
+        ("/run/planner", "'/run/planner'"),
+        ("/run/two\nlines \x1b[2J", r"'/run/two\nlines \x1b[2J'"),
+        ("/run/not-utf8-\udcff", r"'/run/not-utf8-\udcff'"),
+        (b"\0\xff\x07", r"'@\\xff\x07'"),
+    ],
+)
+def test_whatever_a_socket_is_called_its_name_is_one_printable_word(sender: Sender, name: str) -> None:
+    talk = Talk()
+    talk.wire.arriving.append((b"{", sender))
+    talk.inbox.poll(0)
+    assert talk.warnings[0].startswith(f"message dropped (malformed): {name} sent not JSON")
+    assert talk.warnings[0].isprintable()
+
+
 def test_each_command_is_answered_once_to_its_sender() -> None:
     talk = Talk()
     talk.inbox.tell(0.0, 0.0, KEEP, "armed")
