@@ -1,4 +1,4 @@
-"""YAML files to frozen models. Every mistake of a file is reported at once: file, key, reason."""
+"""YAML files to frozen models. The mistakes of a file are reported together: file, key, reason."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 CONFIG_DIR = Path(__file__).resolve().parent
+# A file with more mistakes than this is another kind of file, and one line is for reading.
+_MOST_MISTAKES = 8
 
 
 class ConfigError(Exception):
@@ -50,13 +52,14 @@ def read_yaml(path: Path) -> object:
     try:
         return yaml.load(text, Loader=_UniqueKeyLoader)
     except yaml.YAMLError as error:
-        reason = " ".join(str(error).split())
-        raise ConfigError(f"{path}: is not valid YAML: {reason}") from error
+        raise ConfigError(f"{path}: is not valid YAML: {_yaml_mistake(error)}") from error
 
 
 def load(path: Path, model: type[SectionT]) -> SectionT:
     """Read path as model. Raises ConfigError with one line naming each wrong key and why."""
     content = read_yaml(path)
+    if content is None:
+        raise ConfigError(f"{path}: is empty; it must hold keys and values")
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: must hold keys and values, found {type(content).__name__}")
     try:
@@ -65,8 +68,17 @@ def load(path: Path, model: type[SectionT]) -> SectionT:
         raise ConfigError(f"{path}: {describe(error)}") from error
 
 
+def _yaml_mistake(error: yaml.YAMLError) -> str:
+    """The place and the reason; what PyYAML itself writes names the place twice and quotes the lines."""
+    if not isinstance(error, yaml.MarkedYAMLError) or error.problem is None:
+        return " ".join(str(error).split())
+    mark = error.problem_mark or error.context_mark
+    where = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: "
+    return f"{where}{error.problem}" + (f" ({error.context})" if error.context else "")
+
+
 def describe(error: ValidationError) -> str:
-    """All mistakes of a validation in one line: ``key: reason; key: reason``."""
+    """The mistakes of a validation in one line: ``key: reason; key: reason``."""
     parts = []
     for detail in error.errors(include_url=False):
         key = ".".join(str(step) for step in detail["loc"]) or "(file)"
@@ -78,6 +90,8 @@ def describe(error: ValidationError) -> str:
         elif not isinstance(detail["input"], dict | list):
             reason = f"{reason}, found {detail['input']!r}"
         parts.append(f"{key}: {reason}")
+    if len(parts) > _MOST_MISTAKES:
+        parts[_MOST_MISTAKES:] = [f"and {len(parts) - _MOST_MISTAKES} more mistakes"]
     return "; ".join(parts)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -129,12 +129,21 @@ for measuring in (bench, evaluate, campaign, stop_and_go, faults):
 def main() -> None:
     """Entry point: turns every error that a user can mend into one line and exit code 2."""
     try:
-        cli(standalone_mode=False)
-    except click.ClickException as error:
+        cli(prog_name="treadwatch", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
         error.show()
         sys.exit(2)
+    except click.UsageError as error:
+        command = "treadwatch" if error.ctx is None else error.ctx.command_path
+        _refuse(f"{error.format_message().rstrip('.')}; see `{command} --help`")
+    except click.ClickException as error:
+        _refuse(error.format_message())
     except click.Abort:
         sys.exit(130)
     except (ConfigError, HalError, UserError) as error:
-        click.echo(f"treadwatch: {' '.join(str(error).split())}", err=True)
-        sys.exit(2)
+        _refuse(str(error))
+
+
+def _refuse(mistake: str) -> NoReturn:
+    click.echo(f"treadwatch: {' '.join(mistake.split())}", err=True)
+    sys.exit(2)

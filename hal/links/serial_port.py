@@ -88,8 +88,10 @@ def _translated(error: Exception, config: SerialLinkConfig) -> HalError:
     # pyserial drops the number when the file is there but does not take a port's settings.
     if isinstance(error.__context__, termios.error) or number not in (None, errno.ENOENT):
         return DeviceRefused(f"{where}: is not a serial port that takes {config.baud} baud ({reason(error)})")
+    # pyserial's own text names the port again, and a number's meaning twice.
+    why = reason(error).rpartition(f"{config.url}: ")[2] if number is None else os.strerror(number)
     return DeviceNotFound(
-        f"{where}: cannot be opened ({reason(error)}); check the url and that the adapter is plugged in "
+        f"{where}: cannot be opened ({why}); check the url and that the adapter is plugged in "
         f"({_ports_here(_DEVICES)})"
     )
 

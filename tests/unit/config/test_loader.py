@@ -50,9 +50,17 @@ def test_every_mistake_is_named_with_its_key(tmp_path: Path) -> None:
         ("count: 1.5", "found 1.5"),
         ("count: 3\ninner: {speed_mps: .nan}", "finite"),
         ("count: 3\ncount: 4", "given twice"),
-        ("count: [3", "not valid YAML"),
-        ("- 3", "must hold keys and values"),
-        ("", "must hold keys and values"),
+        (
+            "count: [3",
+            "not valid YAML: line 1, column 10: expected ',' or ']', but got '<stream end>' (while",
+        ),
+        (
+            "a: 1\n\tb: 2",
+            "not valid YAML: line 2, column 1: found character '\\t' that cannot start any token",
+        ),
+        ("- 3", "must hold keys and values, found list"),
+        ("", "is empty; it must hold keys and values"),
+        ("\n".join(f"k{n}: 1" for n in range(12)), "; and 5 more mistakes"),
     ],
 )
 def test_wrong_content_is_refused_in_one_line(tmp_path: Path, text: str, reason: str) -> None:

@@ -96,11 +96,31 @@ def test_a_scenario_where_nothing_is_simulated() -> None:
     assert "simulates nothing" in message
 
 
-def test_an_unknown_option() -> None:
-    done = treadwatch("run", "--sed", "3")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "--sed", "3"), "No such option '--sed'"),
+        (("run", "--config", "/"), "Invalid value for '--config': File '/' is a directory"),
+        (("fly",), "No such command 'fly'"),
+        (("replay",), "Missing argument 'RECORDING'"),
+    ],
+)
+def test_a_wrong_command_line(arguments: tuple[str, ...], words: str) -> None:
+    message = refusal(*arguments)
+    assert words in message
+    assert "--help`" in message
+
+
+def test_no_command_at_all_is_answered_with_the_help() -> None:
+    done = treadwatch()
     assert done.returncode == 2
-    assert "No such option" in done.stderr
-    assert "Traceback" not in done.stderr
+    assert "Usage: treadwatch [OPTIONS] COMMAND" in done.stderr
+
+
+def test_an_empty_config() -> None:
+    assert refusal("run", "--config", "/dev/null") == (
+        "treadwatch: /dev/null: is empty; it must hold keys and values"
+    )
 
 
 @pytest.mark.parametrize("command", ["run", "replay"])

@@ -48,6 +48,7 @@ def test_a_port_that_is_not_there_is_one_clear_line(url: str, reason: str) -> No
     message = str(caught.value)
     assert message.startswith(f"serial port {url}: cannot be opened (")
     assert reason in message
+    assert message.count(url) == 1
     assert "\n" not in message
     assert caught.value.__cause__ is not None
 
