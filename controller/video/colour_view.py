@@ -54,10 +54,9 @@ class ColourView:
         if corridor is not None and moment.mount is not None:
             _draw_corridor(inside, corridor, moment.mount, moment.frame.intrinsics, placed, origin)
         _draw_fragments(inside, moment.fragments, placed, origin)
+        boxes_px = [(one, one.box_px(moment.frame.intrinsics)) for one in seen]
         boxes = [
-            (one, placed.to_panel(np.reshape(one.obstacle.bbox_px, (2, 2))) - origin)
-            for one in seen
-            if np.isfinite(one.obstacle.bbox_px).all()
+            (one, placed.to_panel(box_px) - origin) for one, box_px in boxes_px if np.isfinite(box_px).all()
         ]
         for one, corners in reversed(boxes):
             _draw_box(inside, one, draw.box(corners))

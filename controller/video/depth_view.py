@@ -59,8 +59,9 @@ class DepthView:
             view[:] = NO_DEPTH
         np.take(self._table, levels, axis=0, out=(inside := place.of(view)))
         for one in reversed(seen):
-            if np.isfinite(one.obstacle.bbox_px).all():
-                corners = placed.to_panel(np.reshape(one.obstacle.bbox_px, (2, 2))) - (place.x, place.y)
+            corners = placed.to_panel(one.box_px(moment.frame.intrinsics)) - (place.x, place.y)
+            # What is not seen now has no depth here.
+            if np.isfinite(corners).all() and not one.predicted:
                 draw.line(inside, draw.box(corners), OWN, one.thickness - 1, closed=True)
         valid = moment.scene.health.valid_depth_ratio
         if np.isfinite(valid):

@@ -11,13 +11,15 @@ from controller.video.labels import Label
 from controller.video.moment import VideoMoment
 from controller.video.style import MOVING, STATIC, Colour
 from hal.geometry import camera_in_body
-from hal.types import CameraMount, FloatArray
+from hal.types import CameraMount, FloatArray, Intrinsics
 from vision.scene import Obstacle
 
 # Without a mount the top view is the camera's own: level, standing at the origin.
 LEVEL_CAMERA = CameraMount(0.0, 0.0, 0.0, 0.0)
 # A surface seen edge-on, or one whose size is not known, is still drawn.
 _SMALLEST_M = 0.12
+# Nearer than this a projection would fill the image and say nothing.
+_NEAREST_PROJECTED_M = 0.1
 _CORNERS: FloatArray = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
@@ -51,6 +53,20 @@ class Seen:
     def predicted(self) -> bool:
         """Not seen in this frame."""
         return self.obstacle.unseen_s > 0.0
+
+    def box_px(self, camera: Intrinsics) -> FloatArray:
+        """(2, 2) opposite corners in the image, NaN where there is none.
+
+        What is not seen now has moved on since its box was measured: its predicted surface is projected.
+        """
+        if not self.predicted:
+            return np.reshape(self.obstacle.bbox_px, (2, 2))
+        x, y, z = self.obstacle.position_m
+        if not z > _NEAREST_PROJECTED_M:
+            return np.full((2, 2), np.nan)
+        half_m = 0.5 * self.obstacle.extent_m[:2]
+        corners_m = np.stack([(x, y) - half_m, (x, y) + half_m])
+        return np.asarray(corners_m / z * (camera.fx, camera.fy) + (camera.cx, camera.cy), np.float64)
 
     def describe(self) -> str:
         """Its number and distance, and its speed if it moves."""

@@ -128,6 +128,32 @@ def test_an_obstacle_that_is_only_predicted_is_dashed() -> None:
     assert 0.2 < inked_share(0.3) < 0.8
 
 
+def test_what_is_not_seen_now_is_drawn_where_it_is_predicted_to_be() -> None:
+    # Seen last at the left; a metre to the right by now. Level, so that its surface is as the box was.
+    old = build.obstacle(3, 4.0, 0.5, size_m=(0.6, 0.9))
+    now = build.obstacle(3, 4.0, -0.5, size_m=(0.6, 0.9))
+    gone = dataclasses.replace(now, bbox_px=old.bbox_px, unseen_s=0.1)
+    image = drawn(build.moment((gone,)))
+
+    def inked(u: float, v0: float, v1: float) -> bool:
+        return bool((image[round(v0) + 5 : round(v1) - 5, round(u)] == STATIC).all(axis=1).any())
+
+    assert not inked(old.bbox_px[0], old.bbox_px[1], old.bbox_px[3])
+    x, y, z = now.position_m
+    left_px = 610.0 * (x - 0.3) / z + 319.5
+    top_px, bottom_px = (610.0 * (y + half) / z + 239.5 for half in (-0.45, 0.45))
+    assert inked(left_px, top_px, bottom_px)
+
+
+@pytest.mark.parametrize("z_m", [-1.0, 0.0, math.nan])
+def test_what_is_predicted_to_be_behind_the_camera_has_no_box(z_m: float) -> None:
+    thing = dataclasses.replace(
+        build.obstacle(3, 4.0, 0.0), position_m=np.array([0.0, 0.0, z_m]), unseen_s=0.1
+    )
+    image = drawn(build.moment((thing,)))
+    assert not (image == STATIC).all(axis=2).any()
+
+
 def test_what_decides_is_framed() -> None:
     thing = build.obstacle(3, 4.0, 0.0, moving=True, size_m=(0.6, 0.9))
     u0, v0, _, v1 = (round(edge) for edge in thing.bbox_px)
