@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
+from pathlib import Path
 
 from config.app import AppConfig, LockstepRunner, load_app
 from controller.build import (
@@ -50,7 +51,7 @@ def with_overrides(config: AppConfig, options: MissionOptions) -> AppConfig:
     """The configuration with another scenario or seed. Raises UserError where nothing is simulated."""
     changes: dict[str, object] = {}
     if options.scenario is not None:
-        changes["scenario"] = options.scenario
+        changes["scenario"] = _as_typed(options.scenario)
     if options.seed is not None:
         changes["seed"] = options.seed
     if not changes:
@@ -60,6 +61,11 @@ def with_overrides(config: AppConfig, options: MissionOptions) -> AppConfig:
             f"--{' and --'.join(changes)}: {options.config_path} simulates nothing; leave the option out"
         )
     return config.model_copy(update={"simulation": config.simulation.model_copy(update=changes)})
+
+
+def _as_typed(scenario: str) -> str:
+    """A file on a command line is looked for where the shell stands, one in a YAML beside that YAML."""
+    return str(Path.cwd() / scenario) if scenario.endswith((".yaml", ".yml")) else scenario
 
 
 def drive_lockstep(

@@ -96,6 +96,15 @@ def test_a_scenario_where_nothing_is_simulated() -> None:
     assert "simulates nothing" in message
 
 
+def test_a_scenario_file_is_looked_for_where_the_shell_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert f"{tmp_path}/mine.yaml: cannot be read" in refusal("run", "--scenario", "mine.yaml")
+    (tmp_path / "mine.yaml").write_text("paths: []\n")
+    assert "mine.yaml: path: missing key" in refusal("run", "--scenario", "mine.yaml")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
