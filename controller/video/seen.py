@@ -61,11 +61,11 @@ class Seen:
         """
         if not self.predicted:
             return np.reshape(self.obstacle.bbox_px, (2, 2))
-        x, y, z = self.obstacle.position_m
+        centre_m, z = self.obstacle.position_m[:2], self.obstacle.position_m[2]
         if not z > _NEAREST_PROJECTED_M:
             return np.full((2, 2), np.nan)
         half_m = 0.5 * self.obstacle.extent_m[:2]
-        corners_m = np.stack([(x, y) - half_m, (x, y) + half_m])
+        corners_m = np.stack([centre_m - half_m, centre_m + half_m])
         return np.asarray(corners_m / z * (camera.fx, camera.fy) + (camera.cx, camera.cy), np.float64)
 
     def describe(self) -> str:

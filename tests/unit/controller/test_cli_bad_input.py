@@ -102,7 +102,7 @@ def test_a_scenario_file_is_looked_for_where_the_shell_stands(
     monkeypatch.chdir(tmp_path)
     assert f"{tmp_path}/mine.yaml: cannot be read" in refusal("run", "--scenario", "mine.yaml")
     (tmp_path / "mine.yaml").write_text("paths: []\n")
-    assert "mine.yaml: path: missing key" in refusal("run", "--scenario", "mine.yaml")
+    assert "mine.yaml: name: missing key; path: missing key" in refusal("run", "--scenario", "mine.yaml")
 
 
 @pytest.mark.parametrize(
