@@ -11,6 +11,8 @@ from controller.decision import Decision
 BAR = 24
 # A reason that holds for less than this is not worth a line of its own.
 SETTLED_S = 0.5
+# Standing for longer is worth a word.
+STUCK_S = 10.0
 # The line is renewed this often in steps of progress, not at every control step.
 STEPS_SHOWN = 10
 
@@ -25,6 +27,7 @@ class Console:
         self._said: tuple[str, int | None] | None = None
         self._heard: tuple[str, int | None] | None = None
         self._heard_at_s = 0.0
+        self._stuck_told_s = 0.0
 
     def progress(self, share: float, text: str) -> None:
         """share: 0..1 of the whole."""
@@ -44,6 +47,18 @@ class Console:
             self._said = now
             self.event(
                 f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  {decision.action.value:8}  {reason.sentence}"
+            )
+
+    def standing(self, stamp_s: float, lasted_s: float, decision: Decision) -> None:
+        """Why the robot still stands: after ten seconds, and whenever that has doubled."""
+        if lasted_s < STUCK_S:
+            self._stuck_told_s = 0.0
+        elif lasted_s >= 2.0 * self._stuck_told_s:
+            self._stuck_told_s = lasted_s
+            since_s = stamp_s - lasted_s
+            self.event(
+                f"{stamp_s:7.2f} s  standing for {lasted_s:.0f} s, since {since_s:.2f} s: "
+                f"{decision.reason.sentence}"
             )
 
     def event(self, line: str) -> None:

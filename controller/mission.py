@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from pathlib import Path
+from pathlib import Path as FilePath
 
 from config.app import AppConfig, LockstepRunner, load_app
 from controller.build import (
@@ -65,7 +65,7 @@ def with_overrides(config: AppConfig, options: MissionOptions) -> AppConfig:
 
 def _as_typed(scenario: str) -> str:
     """A file on a command line is looked for where the shell stands, one in a YAML beside that YAML."""
-    return str(Path.cwd() / scenario) if scenario.endswith((".yaml", ".yml")) else scenario
+    return str(FilePath.cwd() / scenario) if scenario.endswith((".yaml", ".yml")) else scenario
 
 
 def drive_lockstep(
@@ -105,7 +105,7 @@ def drive_lockstep(
                 result.timing.add(look.timing_ms)
                 run_recorder.saw(look)
             run_recorder.decided(step)
-            report(console, path.length_m, step, result.started_ns)
+            report(console, result, step)
             if stop:
                 loop.request_stop(f"{stop.reason} received")
         run_recorder.finish()

@@ -79,7 +79,7 @@ def drive_realtime(
             if loop.ending.stop_reason is not None and not told_stopping:
                 told_stopping = True
                 service.stopping(loop.ending.stop_reason)
-            report(console, path.length_m, moment.control, result.started_ns)
+            report(console, result, moment.control)
     if loop.ending.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
         raise DeviceRefused(f"{describe_base(config.chassis)}: {loop.ending.stop_reason}; nothing has moved")
     return result

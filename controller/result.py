@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
 from controller.control import ControlLoop, ControlStep
 from controller.ending import Outcome
 from controller.realtime import Punctuality
-from controller.tally import SetpointTally, TimingTally
+from controller.tally import SetpointTally, Standstill, TimingTally
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
@@ -38,6 +38,7 @@ class MissionResult:
     wall_s: float = math.nan
     simulation: Simulation | None = None
     punctuality: Punctuality | None = None
+    standstill: Standstill = field(default_factory=Standstill)
 
     @property
     def duration_s(self) -> float:
@@ -64,3 +65,4 @@ class MissionResult:
             self.started_ns = step.now_ns
         self.last = step
         self.setpoints.add(step.chassis.sent)
+        self.standstill.add(step.setpoint)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from config.app import AppConfig
-from controller.console import Console
+from controller.console import STUCK_S, Console
 from controller.control import ControlStep
 from controller.ending import Outcome
 from controller.realtime import Punctuality
@@ -17,19 +17,26 @@ from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
 
-def report(console: Console, length_m: float, step: ControlStep, started_ns: int) -> None:
-    """Progress, and the decision if it is a new one."""
+def report(console: Console, result: MissionResult, step: ControlStep) -> None:
+    """Progress, the decision if it is a new one, and that the robot does not get on."""
+    length_m = result.loop.path.length_m
     console.progress(
         step.progress_m / length_m,
         f"{step.progress_m:5.1f}/{length_m:.1f} m  {step.setpoint.v_mps:4.2f} m/s  "
         f"{step.decision.action.value}: {step.decision.reason.sentence}",
     )
-    console.decision((step.now_ns - started_ns) / NS_PER_S, step.decision, step.setpoint.v_mps)
+    seconds = (step.now_ns - result.started_ns) / NS_PER_S
+    console.decision(seconds, step.decision, step.setpoint.v_mps)
+    console.standing(seconds, result.standstill.lasted_s(step.now_ns), step.decision)
 
 
 def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, str]]:
     """The summary as (subject, text)."""
     rows = [("mission", _mission_text(config, result)), ("target", _target_text(result))]
+    if result.last is not None and result.loop.ending.outcome is not Outcome.REACHED:
+        stood_s = result.standstill.lasted_s(result.last.now_ns)
+        if stood_s >= STUCK_S:
+            rows.append(("standing", f"for the last {stood_s:.1f} s: {result.last.decision.reason.sentence}"))
     if result.simulation is not None:
         rows.append(("contacts", contact_text(result.simulation)))
     rows.append(("limits", limits_text(config, result.setpoints)))

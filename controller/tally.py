@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from config.robot import Limits
+from hal.clocks import NS_PER_S
 from hal.types import Setpoint
 
 TOLERANCE = 1e-6
@@ -61,6 +62,24 @@ class SetpointTally:
             return 0.0, 0.0
         dt_s = self._steps * self.period_s
         return (sent.v_mps - self._last.v_mps) / dt_s, (sent.a_mps2 - self._last.a_mps2) / dt_s
+
+
+@dataclass
+class Standstill:
+    """Since when the robot has been told to stand; None while it drives."""
+
+    since_ns: int | None = None
+
+    def add(self, setpoint: Setpoint) -> None:
+        """What one control step asked for."""
+        if setpoint.v_mps > 0.0:
+            self.since_ns = None
+        elif self.since_ns is None:
+            self.since_ns = setpoint.stamp_ns
+
+    def lasted_s(self, now_ns: int) -> float:
+        """0 while it drives."""
+        return 0.0 if self.since_ns is None else (now_ns - self.since_ns) / NS_PER_S
 
 
 @dataclass

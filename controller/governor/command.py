@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
@@ -26,7 +26,7 @@ from controller.result import MissionOptions
 from controller.scheduling import become_realtime
 from controller.service import ServiceManager, stop_on_signals
 from controller.summary import contact_text, limits_text, punctuality_text
-from controller.tally import SetpointTally, TimingTally
+from controller.tally import SetpointTally, Standstill, TimingTally
 from hal.clocks import NS_PER_S, MonotonicClock
 from sim.simulation import Simulation
 
@@ -43,6 +43,7 @@ class Governing:
     punctuality: Punctuality
     first: ControlStep | None = None
     last: ControlStep | None = None
+    standstill: Standstill = field(default_factory=Standstill)
 
     @property
     def succeeded(self) -> bool:
@@ -55,6 +56,7 @@ class Governing:
         self.first = self.first or step
         self.last = step
         self.setpoints.add(step.chassis.sent)
+        self.standstill.add(step.setpoint)
 
 
 def run_governor(options: MissionOptions) -> int:
@@ -133,6 +135,7 @@ def _report(console: Console, governing: Governing, step: ControlStep) -> None:
     seconds = (step.now_ns - governing.first.now_ns) / NS_PER_S
     console.progress(0.0, f"{step.setpoint.v_mps:4.2f} m/s  {step.decision.reason.sentence}")
     console.decision(seconds, step.decision, step.setpoint.v_mps)
+    console.standing(seconds, governing.standstill.lasted_s(step.now_ns), step.decision)
 
 
 def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, str]]:

@@ -23,6 +23,20 @@ def test_flickering_between_reasons_is_not_told(capsys: pytest.CaptureFixture[st
     assert capsys.readouterr().out == ""
 
 
+def test_a_robot_that_does_not_get_on_says_why_ever_more_rarely(capsys: pytest.CaptureFixture[str]) -> None:
+    console = Console(quiet=False)
+    for step in range(50 * 45):
+        console.standing(100.0 + step * 0.02, step * 0.02, decided("standing", 3))
+    console.standing(146.0, 0.0, decided("free"))
+    console.standing(160.0, 12.0, decided("standing", 4))
+    assert capsys.readouterr().out.splitlines() == [
+        " 110.00 s  standing for 10 s, since 100.00 s: because of standing 3",
+        " 120.00 s  standing for 20 s, since 100.00 s: because of standing 3",
+        " 140.00 s  standing for 40 s, since 100.00 s: because of standing 3",
+        " 160.00 s  standing for 12 s, since 148.00 s: because of standing 4",
+    ]
+
+
 def test_quiet_leaves_only_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
     console = Console(quiet=True)
     console.event("something")

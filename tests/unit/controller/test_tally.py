@@ -3,7 +3,7 @@ import math
 import pytest
 
 from config.robot import Limits
-from controller.tally import SetpointTally, TimingTally, mean_speed_mps
+from controller.tally import SetpointTally, Standstill, TimingTally, mean_speed_mps
 from hal.types import Setpoint
 
 MS = 1_000_000
@@ -81,3 +81,12 @@ def test_timing_gives_the_median_of_the_sum() -> None:
 def test_a_mean_speed_needs_time() -> None:
     assert mean_speed_mps(10.0, 20.0) == 0.5
     assert math.isnan(mean_speed_mps(0.0, 0.0))
+
+
+def test_standing_is_counted_from_the_first_zero_on() -> None:
+    standstill = Standstill()
+    for seconds, v_mps in ((0, 0.0), (5, 0.3), (6, 0.0), (7, 0.0)):
+        standstill.add(Setpoint(seconds * 1000 * MS, v_mps, 0.0, 0.0))
+    assert standstill.lasted_s(10_000 * MS) == 4.0
+    standstill.add(Setpoint(10_000 * MS, 0.01, 0.3, 0.0))
+    assert standstill.lasted_s(11_000 * MS) == 0.0

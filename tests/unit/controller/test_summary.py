@@ -1,0 +1,47 @@
+import pytest
+
+from config.app import load_app
+from config.loader import CONFIG_DIR
+from controller.build import build_control
+from controller.console import Console
+from controller.result import MissionResult
+from controller.summary import report, summary_rows
+from controller.tally import SetpointTally, TimingTally
+from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
+from tests.support.scenes import scene
+
+CONFIG_PATH = CONFIG_DIR / "sim.yaml"
+
+
+def drive(seconds: float, sees: bool) -> MissionResult:
+    """The first seconds of the simulated mission, with a free way in sight or nothing at all."""
+    config = load_app(CONFIG_PATH)
+    loop = build_control(config, CONFIG_PATH, ObedientChassis())
+    result = MissionResult(loop, SetpointTally(config.robot.limits, PERIOD_S), TimingTally())
+    console = Console(quiet=False)
+    for index in range(round(seconds / PERIOD_S)):
+        now_ns = round(index * PERIOD_S * 1e9)
+        step = loop.step(scene(now_ns, index, pose=loop.localiser.pose) if sees else None, now_ns)
+        result.take(step)
+        report(console, result, step)
+    return result
+
+
+def test_a_mission_that_gets_nowhere_tells_why(capsys: pytest.CaptureFixture[str]) -> None:
+    result = drive(21.0, sees=False)
+    told = [line for line in capsys.readouterr().out.splitlines() if "standing for" in line]
+    assert [line.split(":")[0].strip() for line in told] == [
+        "10.00 s  standing for 10 s, since 0.00 s",
+        "20.00 s  standing for 20 s, since 0.00 s",
+    ]
+    assert result.last is not None
+    reason = result.last.decision.reason.sentence
+    assert all(line.endswith(reason) for line in told)
+    rows = dict(summary_rows(load_app(CONFIG_PATH), result))
+    assert rows["standing"] == f"for the last 21.0 s: {reason}"
+
+
+def test_a_mission_that_gets_on_says_nothing_of_standing(capsys: pytest.CaptureFixture[str]) -> None:
+    result = drive(12.0, sees=True)
+    assert "standing" not in capsys.readouterr().out
+    assert "standing" not in dict(summary_rows(load_app(CONFIG_PATH), result))
