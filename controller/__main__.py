@@ -1,5 +1,23 @@
-"""`python -m controller` is the command `treadwatch`."""
+"""The command `treadwatch`, also as `python -m controller`.
 
-from controller.cli import main
+Imports nothing that takes time before it is ready for Ctrl-C.
+"""
 
-main()
+import sys
+
+from controller.errors import INTERRUPTED
+
+
+def main() -> None:
+    """The whole program; Ctrl-C where no command makes more of it is one line and exit code 130."""
+    try:
+        from controller.cli import main as run_command
+
+        run_command()
+    except KeyboardInterrupt:
+        sys.stderr.write("treadwatch: interrupted\n")
+        sys.exit(INTERRUPTED)
+
+
+if __name__ == "__main__":
+    main()

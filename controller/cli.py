@@ -18,7 +18,7 @@ from controller.cli_options import (
     mission_options,
     recording_options,
 )
-from controller.errors import UserError
+from controller.errors import INTERRUPTED, Interrupted, UserError
 from hal.errors import HalError
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ for measuring in (bench, evaluate, campaign, stop_and_go, faults):
 
 
 def main() -> None:
-    """Entry point: turns every error that a user can mend into one line and exit code 2."""
+    """Turns every error that a user can mend into one line and exit code 2; KeyboardInterrupt passes."""
     try:
         cli(prog_name="treadwatch", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
@@ -138,12 +138,20 @@ def main() -> None:
         _refuse(f"{error.format_message().rstrip('.')}; see `{command} --help`")
     except click.ClickException as error:
         _refuse(error.format_message())
-    except click.Abort:
-        sys.exit(130)
+    except click.Abort as error:
+        # Where something can be said of what was done, the command raises Interrupted itself.
+        raise KeyboardInterrupt from error
+    except Interrupted as error:
+        _say(f"interrupted: {error}")
+        sys.exit(INTERRUPTED)
     except (ConfigError, HalError, UserError) as error:
         _refuse(str(error))
 
 
 def _refuse(mistake: str) -> NoReturn:
-    click.echo(f"treadwatch: {' '.join(mistake.split())}", err=True)
+    _say(mistake)
     sys.exit(2)
+
+
+def _say(line: str) -> None:
+    click.echo(f"treadwatch: {' '.join(line.split())}", err=True)

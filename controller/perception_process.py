@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import socket
 import time
 from pathlib import Path as FilePath
@@ -83,8 +82,6 @@ def perceive_forever(
 
     Ends when the camera ends or the control process has gone.
     """
-    # Ctrl-C reaches the whole process group; only the control process may decide what it means.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     channel = Channel(end)
     try:
         _look_until_the_end(config, config_path, channel, start_ns, recording)

@@ -25,6 +25,7 @@ from controller.scheduling import become_realtime
 from controller.service import ServiceManager, stop_on_signals
 from controller.summary import report
 from controller.tally import SetpointTally, TimingTally
+from controller.workers import held_ctrl_c
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import DeviceRefused
 from hal.types import ChassisMode
@@ -107,7 +108,8 @@ def perception_beside(
         name="perception",
         daemon=True,
     )
-    process.start()
+    with held_ctrl_c():
+        process.start()
     # Ours must be the only open copy of the other end, or its death would not show.
     there.close()
     channel = Channel(here)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from controller.campaign.report import write_report
 from controller.campaign.store import MissionStore
 from controller.campaign.summary import Summary, why_failed
 from controller.campaign.task import Mode, Task, failed, run_task, time_ratio
-from controller.errors import UserError
+from controller.errors import Interrupted, UserError
 from controller.evaluation import markdown
 from sim.families import FAMILY_NAMES
 
@@ -64,7 +65,11 @@ def run_campaign(options: CampaignOptions) -> int:
         if left:
             tasks.append(Task(one.family, one.seed, left, options.mode, config, keep))
     began_s = time.perf_counter()
-    _run_all(options, tasks, store)
+    try:
+        _run_all(options, tasks, store)
+    except KeyboardInterrupt:
+        done = f"{len(store.rows)} drives are in {store.path}" if store.rows else "no drive was done yet"
+        raise Interrupted(f"{done}; the same command with --resume goes on") from None
     store.rewrite()
     summary = write_report(options.report, store.rows.values(), command_line(options))
     _say(summary, len(tasks), time.perf_counter() - began_s, options.report)
@@ -73,13 +78,17 @@ def run_campaign(options: CampaignOptions) -> int:
 
 def _run_all(options: CampaignOptions, tasks: list[Task], store: MissionStore) -> None:
     hidden = options.quiet or not sys.stderr.isatty()
-    with click.progressbar(length=len(tasks), label="missions", file=sys.stderr, hidden=hidden) as bar:
-        for rows in _execute(options, tasks):
+    with (
+        # Closed here, so that workers end with whatever ends this, not when the garbage is collected.
+        closing(_execute(options, tasks)) as done,
+        click.progressbar(length=len(tasks), label="missions", file=sys.stderr, hidden=hidden) as bar,
+    ):
+        for rows in done:
             store.add(rows)
             bar.update(1)
 
 
-def _execute(options: CampaignOptions, tasks: list[Task]) -> Iterator[list[Row]]:
+def _execute(options: CampaignOptions, tasks: list[Task]) -> Generator[list[Row], None, None]:
     if options.scheduler is not None:
         return run_there(tasks, options.scheduler)
     return run_here(tasks, options.workers)

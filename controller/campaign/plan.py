@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Generator, Iterator
+from concurrent.futures import Executor, Future, as_completed
 from dataclasses import dataclass
 
 from controller.campaign.judge import Row
 from controller.campaign.task import Task, run_task
 from controller.errors import UserError
+from controller.workers import worker_processes
 
-_ONE_CORE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 # As many tasks are on their way as keep every worker busy; the rest waits here and can still be dropped.
 _AHEAD = 4
 
@@ -31,18 +28,17 @@ def missions(count: int, families: tuple[str, ...], seed: int) -> list[Mission]:
     return [Mission(families[k % len(families)], seed + k // len(families)) for k in range(count)]
 
 
-def run_here(tasks: list[Task], workers: int) -> Iterator[list[Row]]:
+def run_here(tasks: list[Task], workers: int) -> Generator[list[Row], None, None]:
     """On this machine's processes; in this one if workers is 1. Rows come as they are done."""
     if workers == 1:
         for task in tasks:
             yield run_task(task)
         return
-    with _one_core_each():
-        pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
-        yield from _run(pool, tasks, workers)
+    with worker_processes(workers) as pool:
+        yield from _run(pool, tasks, workers, set())
 
 
-def run_there(tasks: list[Task], scheduler: str) -> Iterator[list[Row]]:
+def run_there(tasks: list[Task], scheduler: str) -> Generator[list[Row], None, None]:
     """On a cluster, through Dask distributed's executor. Raises UserError."""
     try:
         from distributed import Client
@@ -58,39 +54,25 @@ def run_there(tasks: list[Task], scheduler: str) -> Iterator[list[Row]]:
         ) from error
     with client:
         workers = max(len(client.scheduler_info()["workers"]), 1)
-        yield from _run(client.get_executor(pure=False), tasks, workers)
+        running: set[Future[list[Row]]] = set()
+        try:
+            yield from _run(client.get_executor(pure=False), tasks, workers, running)
+        finally:
+            for one in running:
+                one.cancel()
 
 
-def _run(pool: Executor, tasks: list[Task], workers: int) -> Iterator[list[Row]]:
+def _run(
+    pool: Executor, tasks: list[Task], workers: int, running: set[Future[list[Row]]]
+) -> Iterator[list[Row]]:
+    """running: what is on its way at any time."""
     waiting = iter(tasks)
-    running: set[Future[list[Row]]] = set()
-    try:
-        for _, task in zip(range(workers * _AHEAD), waiting, strict=False):
-            running.add(pool.submit(run_task, task))
-        while running:
-            done = next(as_completed(running))
-            running.remove(done)
-            following = next(waiting, None)
-            if following is not None:
-                running.add(pool.submit(run_task, following))
-            yield done.result()
-    finally:
-        # Dask's executor knows no cancel_futures.
-        for one in running:
-            one.cancel()
-        pool.shutdown(wait=False)
-
-
-@contextmanager
-def _one_core_each() -> Iterator[None]:
-    """NumPy's linear algebra reads these when it is imported, which a spawned worker has yet to do."""
-    before = {name: os.environ.get(name) for name in _ONE_CORE}
-    os.environ.update(dict.fromkeys(_ONE_CORE, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+    for _, task in zip(range(workers * _AHEAD), waiting, strict=False):
+        running.add(pool.submit(run_task, task))
+    while running:
+        done = next(as_completed(running))
+        running.remove(done)
+        following = next(waiting, None)
+        if following is not None:
+            running.add(pool.submit(run_task, following))
+        yield done.result()

@@ -19,29 +19,29 @@ def key_of(row: Row) -> Key:
 
 
 class MissionStore:
-    """The rows of a report folder."""
+    """The rows of a report folder, and the file that keeps them."""
 
     def __init__(self, folder: Path) -> None:
-        self._path = folder / MISSIONS
+        self.path = folder / MISSIONS
         self.rows: dict[Key, Row] = {}
 
     def begin(self, resume: bool) -> None:
         """Create the folder; rows of an earlier campaign are kept if it is resumed. Raises UserError."""
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            if self._path.exists() and not resume:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            if self.path.exists() and not resume:
                 raise UserError(
-                    f"{self._path} exists: add --resume to go on with it, or give another --report folder"
+                    f"{self.path} exists: add --resume to go on with it, or give another --report folder"
                 )
-            if resume and self._path.exists():
+            if resume and self.path.exists():
                 self._read()
                 self.rewrite()
         except OSError as error:
-            raise UserError(f"{self._path}: {error.strerror}; choose a folder that can be written") from error
+            raise UserError(f"{self.path}: {error.strerror}; choose a folder that can be written") from error
 
     def add(self, rows: Iterable[Row]) -> None:
         """Append; each line is whole or, if the machine stops in the middle of it, dropped on resuming."""
-        with self._path.open("a", encoding="utf-8") as file:
+        with self.path.open("a", encoding="utf-8") as file:
             for row in rows:
                 self.rows[key_of(row)] = row
                 file.write(json.dumps(row.as_dict()) + "\n")
@@ -50,12 +50,12 @@ class MissionStore:
         """All rows in one order, whichever worker was first."""
         self.rows = dict(sorted(self.rows.items()))
         text = "".join(json.dumps(row.as_dict()) + "\n" for row in self.rows.values())
-        part = self._path.with_suffix(".part")
+        part = self.path.with_suffix(".part")
         part.write_text(text, encoding="utf-8")
-        part.replace(self._path)
+        part.replace(self.path)
 
     def _read(self) -> None:
-        lines = self._path.read_text(encoding="utf-8").splitlines()
+        lines = self.path.read_text(encoding="utf-8").splitlines()
         for number, line in enumerate(lines, start=1):
             try:
                 row = row_of(json.loads(line))
@@ -63,7 +63,7 @@ class MissionStore:
                 if number == len(lines):
                     return
                 raise UserError(
-                    f"{self._path}: line {number} is not a row of this program ({error}); "
+                    f"{self.path}: line {number} is not a row of this program ({error}); "
                     "mend it or give another --report folder"
                 ) from error
             self.rows[key_of(row)] = row

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from typing import Literal
 
 import cv2
 
-from controller.errors import UserError
 from controller.evaluation.contestants import ALWAYS, BASELINES
 from controller.evaluation.run_sequence import SequenceRecord, run_sequence
 from controller.evaluation.sequences import Sequence
+from controller.workers import worker_processes
 
 Baselines = Literal["none", "some", "all"]
 
@@ -75,33 +71,10 @@ def run_campaign(
 
 
 def _records(tasks: tuple[Task, ...], workers: int) -> Iterator[SequenceRecord]:
-    with _one_core_each(), ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+    with worker_processes(workers) as pool:
         futures = [pool.submit(run_task, task) for task in tasks]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        except BrokenProcessPool as error:
-            raise UserError(
-                "a worker process died, most likely for want of memory; try again with --workers 1"
-            ) from error
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-
-
-@contextmanager
-def _one_core_each() -> Iterator[None]:
-    """NumPy's linear algebra reads these when it is imported, which a spawned worker has yet to do."""
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for future in as_completed(futures):
+            yield future.result()
 
 
 def run_task(task: Task) -> SequenceRecord:

@@ -11,7 +11,7 @@ import pytest
 
 from config.governor import GovernorConfig, UnixInputConfig
 from config.loader import CONFIG_DIR
-from controller.cli import main
+from controller.__main__ import main
 from controller.decision import Action, Decision, Reason
 from controller.governor.ground import _TRAVEL_M
 from controller.governor.request import MOST_BYTES, MOST_MPS, Request, Twist, answer, parse_request

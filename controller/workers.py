@@ -1,0 +1,82 @@
+"""Processes beside this one: one core each, and deaf to a terminal's Ctrl-C, which is this one's business."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+from typing import ParamSpec, TypeVar
+
+from controller.errors import UserError
+
+_ONE_CORE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
+
+
+@contextmanager
+def held_ctrl_c() -> Iterator[None]:
+    """Processes started in the block never hear SIGINT, not even while they import; this one after it.
+
+    A terminal sends it to all of them, and only the one that the user started knows what is to be done.
+    """
+    # It is started with the first process, and leaves SIGINT unblocked for that one.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def worker_processes(count: int) -> Iterator[Executor]:
+    """count processes for picklable tasks; left early, they are ended at once, whatever they are doing.
+
+    Raises UserError if one of them dies by itself.
+    """
+    with _one_core_each():
+        pool = _Pool(count, multiprocessing.get_context("spawn"))
+        try:
+            yield pool
+        except BrokenProcessPool as error:
+            raise UserError(
+                "a worker process died, most likely for want of memory; try again with --workers 1"
+            ) from error
+        except BaseException:
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
+        finally:
+            pool.shutdown()
+
+
+class _Pool(ProcessPoolExecutor):
+    """Starts a process whenever a task finds none idle."""
+
+    def submit(
+        self, task: Callable[Given, Result], /, *args: Given.args, **kwargs: Given.kwargs
+    ) -> Future[Result]:
+        with held_ctrl_c():
+            return super().submit(task, *args, **kwargs)
+
+
+@contextmanager
+def _one_core_each() -> Iterator[None]:
+    """NumPy's linear algebra reads these when it is imported, which a spawned worker has yet to do."""
+    before = {name: os.environ.get(name) for name in _ONE_CORE}
+    os.environ.update(dict.fromkeys(_ONE_CORE, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
