@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +67,17 @@ class GroundMemory:
         self._stands = np.zeros((_SIZE, _SIZE), np.bool_)
         self._hidden = np.zeros((_SIZE, _SIZE), np.bool_)
         self._seen_from_m = np.zeros((_SIZE, _SIZE))
+        # Everything that is kept of a cell, and what it is while nothing is known of that place.
+        self._unknown: tuple[tuple[NDArray[Any], float], ...] = (
+            (self._free_ns, 0),
+            (self._free_at_m, _NEVER_M),
+            (self._hits, 0),
+            (self._until_ns, 0),
+            (self._marked_ns, 0),
+            (self._stands, False),
+            (self._hidden, False),
+            (self._seen_from_m, 0.0),
+        )
         self._travelled_m = 0.0
         self._stood = True
         self._pose: PlanarPose | None = None
@@ -199,10 +211,8 @@ class GroundMemory:
         other = (self._key[index] != keys).any(axis=-1)
         new = (index[0][other], index[1][other])
         self._key[new] = keys[other]
-        self._free_ns[new] = 0
-        self._free_at_m[new] = _NEVER_M
-        self._hits[new] = 0
-        self._hidden[new] = False
+        for kept, unknown in self._unknown:
+            kept[new] = unknown
         return index
 
     @staticmethod

@@ -202,3 +202,16 @@ def test_a_scan_without_bands_is_nothing_seen() -> None:
     empty = FreeSpace(np.zeros(0), 0.01, np.zeros(0), np.zeros(0))
     robot.look(empty)
     assert not robot.free(7.0, 0.0)
+
+
+def test_a_cell_that_comes_to_hold_another_place_keeps_nothing_of_the_old_one() -> None:
+    robot = Walkabout()
+    robot.look(scan(nearest_m=1.0), times=4, standing=True)
+    lap_m = 12.8  # 128 cells of 10 cm
+    assert robot.blocked(1.45, 0.05)
+    at = robot.memory._cells(np.array([[1.45 + lap_m, 0.05]]))
+    fields = {name: field for name, field in vars(robot.memory).items() if isinstance(field, np.ndarray)}
+    kept = {name: field for name, field in fields.items() if field.shape == (128, 128)}
+    new = GroundMemory(Robot(), MOUNT, DecisionConfig())
+    differing = [name for name, field in kept.items() if field[at] != vars(new)[name][at]]
+    assert (len(kept), differing) == (8, [])
