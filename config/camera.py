@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 
 from config.loader import Section
 
-OdometryChoice = Literal["file", "none", "groundtruth"]
+# Of a recording's poses; auto: odometry.txt if the recording has one.
+OdometryChoice = Literal["auto", "file", "none", "groundtruth"]
 
 
 class ReplayCameraConfig(Section):
@@ -16,9 +17,6 @@ class ReplayCameraConfig(Section):
 
     kind: Literal["replay"] = "replay"
     folder: str = Field(min_length=1, description="the recording; relative to this file")
-    odometry: OdometryChoice = Field(
-        default="file", description="file: odometry.txt if the recording has one; groundtruth: for evaluation"
-    )
     max_pair_gap_s: float = Field(
         default=0.02, gt=0, le=1, description="colour and depth further apart than this are not one frame"
     )

@@ -14,6 +14,7 @@ from controller.cli_measure import bench, campaign, evaluate, faults, stop_and_g
 from controller.cli_options import (
     BASES,
     FOLDER_OR_FILE,
+    ODOMETRY,
     config_option,
     mission_options,
     recording_options,
@@ -60,8 +61,8 @@ def govern(options: MissionOptions) -> None:
 @cli.command()
 @click.argument("recording", type=FOLDER_OR_FILE)
 @click.option(
-    "--odometry", type=click.Choice(["file", "none", "groundtruth"]), default="file", show_default=True,
-    help="Prior of the camera's motion: odometry.txt if the recording has one, nothing, or the true poses.",
+    "--odometry", type=ODOMETRY, default="auto", show_default="odometry.txt if there is one",
+    help="Prior of the camera's motion: odometry.txt, nothing, or the true poses.",
 )  # fmt: skip
 @config_option("of robot, perception and decision", CONFIG_DIR / "replay.yaml", "the replay.yaml that ships")
 @recording_options

@@ -15,6 +15,7 @@ from controller.cli_options import (
     FILE,
     FOLDER,
     FOLDER_OR_FILE,
+    ODOMETRY,
     config_option,
     first_seed,
     no_progress_bar,
@@ -57,7 +58,7 @@ def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> 
     "--report", type=FOLDER, required=True, help="Folder for report.md, summary.json and the figures."
 )
 @click.option(
-    "--odometry", type=click.Choice(["file", "none", "groundtruth"]), default="file", show_default=True,
+    "--odometry", type=ODOMETRY, default="auto", show_default="odometry.txt if there is one",
     help="Recordings: prior of the camera's motion. The simulated set is run with and without.",
 )  # fmt: skip
 @click.option("--static", is_flag=True, help="Recordings: nothing moves but the camera, so all is false.")

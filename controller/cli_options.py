@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import click
 
+from config.camera import OdometryChoice
 from config.loader import CONFIG_DIR
 
 if TYPE_CHECKING:
@@ -20,6 +21,9 @@ FOLDER_OR_FILE = click.Path(path_type=Path)
 BASES = click.Choice(["agilex", "roboclaw", "roboteq", "kobuki"])
 
 Option = Callable[[Callable[..., None]], Callable[..., None]]
+
+# The values of config.camera.OdometryChoice.
+ODOMETRY = click.Choice(get_args(OdometryChoice))
 
 no_progress_bar = click.option("--quiet", is_flag=True, help="No progress bar.")
 

@@ -120,7 +120,11 @@ def run_replay(options: ReplayOptions) -> None:
             recorder.record(look, decision, measured_mps=v_mps, path_ahead_m=_AHEAD_M)
             console.progress(tally.frames / source.frame_count, f"frame {tally.frames}/{source.frame_count}")
             console.decision((tally.last_ns - tally.first_ns) / NS_PER_S, decision, v_mps)
-    console.summary(_summary(options, tally, [str(skip) for skip in source.skipped], source.notes))
+    prior = "none: the camera's motion is estimated from images and depth alone"
+    if odometry is not None:
+        prior = f"{odometry.path.name}: {len(odometry)} poses"
+    skipped = [str(skip) for skip in source.skipped]
+    console.summary(_summary(options, tally, prior, skipped, source.notes))
 
 
 def recorded_mount(config: ReplayConfig, recorded: CameraMount | None) -> CameraMount | None:
@@ -141,7 +145,7 @@ def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Deci
 
 
 def _summary(
-    options: ReplayOptions, tally: ReplayTally, skipped: list[str], notes: tuple[str, ...]
+    options: ReplayOptions, tally: ReplayTally, odometry: str, skipped: list[str], notes: tuple[str, ...]
 ) -> list[tuple[str, str]]:
     duration_s = (tally.last_ns - tally.first_ns) / NS_PER_S
     rows = [
@@ -149,6 +153,7 @@ def _summary(
             "recording",
             f"{options.recording}: {tally.frames} frames, {duration_s:.2f} s; {len(skipped)} skipped",
         ),
+        ("odometry", odometry),
         (
             "obstacles",
             f"{len(tally.ids)} seen, {len(tally.moving_ids)} of them moving"

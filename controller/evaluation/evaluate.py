@@ -38,7 +38,7 @@ class EvaluationOptions:
     recordings: tuple[Path, ...]
     simulated: bool
     report: Path
-    odometry: OdometryChoice = "file"
+    odometry: OdometryChoice = "auto"
     static: bool = False
     baselines: Baselines = "some"
     only: tuple[str, ...] = ()

@@ -35,12 +35,13 @@ _APART_FRAMES = 5
 class RecordingRecord:
     """One recording. moving_objects: identities that were called moving in three frames or more.
 
+    odometry: file, none or groundtruth, whichever was used.
     seconds: of recording. ms: of detect and track together, per frame. pictures: the first frame, and
     frames in which something was called moving.
     """
 
     folder: Path
-    odometry: OdometryChoice
+    odometry: str
     static: bool
     frames: int
     skipped: int
@@ -117,7 +118,7 @@ def evaluate_recording(
             on_frame()
     return RecordingRecord(
         folder,
-        odometry,
+        "none" if poses is None else ("file" if odometry == "auto" else odometry),
         static,
         len(tally.stamps_ns),
         len(source.skipped),

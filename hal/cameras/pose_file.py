@@ -15,7 +15,12 @@ from hal.clocks import NS_PER_S
 from hal.errors import BadRecording
 from hal.types import FloatArray, Pose
 
-_FILE_OF: dict[OdometryChoice, str] = {"file": "odometry.txt", "groundtruth": "groundtruth.txt"}
+_ODOMETRY = "odometry.txt"
+_FILE_OF: dict[OdometryChoice, str] = {
+    "auto": _ODOMETRY,
+    "file": _ODOMETRY,
+    "groundtruth": "groundtruth.txt",
+}
 _COLUMNS = 8
 # Files carry four digits and more: a quaternion that is further from unit length than this is
 # something else, such as Euler angles or a shifted column.
@@ -29,6 +34,7 @@ class PoseFile:
 
     def __init__(self, path: Path, max_gap_s: float = 0.2) -> None:
         """Raises BadRecording with file and line: not finite, not a unit quaternion, a time twice."""
+        self.path = path
         self._max_gap_ns = round(max_gap_s * NS_PER_S)
         rows: dict[int, FloatArray] = {}
         for number, line in content_lines(path):
@@ -75,16 +81,16 @@ class PoseFile:
 def open_odometry(folder: Path, choice: OdometryChoice) -> PoseFile | None:
     """The poses of a recording that shall serve as odometry; None for none.
 
-    "file" takes odometry.txt where the recording has one; "groundtruth" must be there when asked
-    for. Raises BadRecording.
+    "auto" takes odometry.txt where the recording has one; "file" asks for it, as "groundtruth" does for
+    groundtruth.txt, and raises BadRecording where it is not there.
     """
     if choice == "none":
         return None
     path = folder / _FILE_OF[choice]
     if not path.is_file():
-        if choice == "file":
+        if choice == "auto":
             return None
-        raise BadRecording(f"{path}: there is no such file; choose another odometry")
+        raise BadRecording(f"{path}: there is no such file; choose another odometry, or none")
     return PoseFile(path)
 
 

@@ -96,6 +96,11 @@ def test_a_scenario_where_nothing_is_simulated() -> None:
     assert "simulates nothing" in message
 
 
+def test_odometry_that_is_asked_for_and_not_there() -> None:
+    message = refusal("replay", DESK, "--odometry", "file")
+    assert "desk_rpy/odometry.txt: there is no such file; choose another odometry, or none" in message
+
+
 def test_a_scenario_file_is_looked_for_where_the_shell_stands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

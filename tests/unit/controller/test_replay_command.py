@@ -15,9 +15,12 @@ from vision.scene import EgoMotion
 DESK = Path(__file__).resolve().parents[2] / "recordings" / "desk_rpy"
 
 
-@pytest.mark.parametrize("odometry", ["none", "groundtruth"])
+@pytest.mark.parametrize(
+    ("odometry", "used"),
+    [("auto", "none: the camera's motion is estimated"), ("groundtruth", "groundtruth.txt: 33 poses")],
+)
 def test_a_real_static_scene_from_a_moving_camera(
-    odometry: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    odometry: str, used: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = ReplayOptions(
         DESK,
@@ -44,6 +47,7 @@ def test_a_real_static_scene_from_a_moving_camera(
     summary = capsys.readouterr().out
     assert "10 frames, 0.30 s; 0 skipped" in summary
     assert "0 of them moving" in summary
+    assert f"odometry    {used}" in summary
 
 
 def test_two_replays_see_the_same(tmp_path: Path) -> None:

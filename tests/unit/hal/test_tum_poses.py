@@ -101,14 +101,16 @@ def test_a_file_without_poses_is_refused(tmp_path: Path) -> None:
 
 
 def test_odometry_is_chosen_by_name(tmp_path: Path) -> None:
-    assert open_odometry(tmp_path, "file") is None
+    assert open_odometry(tmp_path, "auto") is None
     assert open_odometry(tmp_path, "none") is None
+    with pytest.raises(BadRecording, match=r"odometry\.txt: there is no such file"):
+        open_odometry(tmp_path, "file")
     with pytest.raises(BadRecording, match=r"groundtruth\.txt: there is no such file"):
         open_odometry(tmp_path, "groundtruth")
     (tmp_path / "odometry.txt").write_text("0 1 0 0 0 0 0 1\n")
     (tmp_path / "groundtruth.txt").write_text("0 2 0 0 0 0 0 1\n")
-    chosen = {name: open_odometry(tmp_path, name) for name in ("file", "groundtruth")}
-    for name, x_m in (("file", 1.0), ("groundtruth", 2.0)):
+    chosen = {name: open_odometry(tmp_path, name) for name in ("auto", "file", "groundtruth")}
+    for name, x_m in (("auto", 1.0), ("file", 1.0), ("groundtruth", 2.0)):
         file = chosen[name]
         assert file is not None
         pose = file.camera_pose(0)
