@@ -122,62 +122,18 @@ class AgilexChassisConfig(Section):
         return self
 
 
-class RoboclawChassisConfig(Section):
-    """A base with one RoboClaw for both tracks, packet serial, motor 1 left, motor 2 right.
+class _TwoChannelConfig(Section):
+    """What bases with one two-channel motor controller have in common: channel 1 left, channel 2 right.
 
     counts_per_m: encoder counts for one metre of track. slip_factor: as for AgileX.
-    timeout_ms: after so long without a packet the controller itself stops the motors (command 14,
-    steps of 100 ms); set and read back before arming. max_qpps, accel_qpps2: the fastest speed and
-    the hardest ramp that may ever be sent, in counts per second (and second).
     """
 
-    kind: Literal["roboclaw"]
     link: SerialLinkConfig
-    address: int = Field(default=0x80, ge=0x80, le=0x87)
     counts_per_m: float = Field(gt=0, le=1e7)
     track_width_m: float = Field(gt=0.05, le=5)
     slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
-    max_qpps: int = Field(gt=0, le=10_000_000)
-    accel_qpps2: int = Field(gt=0, le=100_000_000)
-    timeout_ms: int = Field(default=300, ge=100, le=2000, multiple_of=100)
     invert_left: bool = False
     invert_right: bool = False
-    command_timeout_ms: int = Field(default=200, ge=40, le=1000)
-    feedback_timeout_ms: int = Field(default=300, ge=100, le=2000)
-    status_timeout_ms: int = Field(default=1000, ge=200, le=5000)
-    arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
-
-    @property
-    def left_sign(self) -> int:
-        """Counts of motor 1 that mean ahead."""
-        return -1 if self.invert_left else 1
-
-    @property
-    def right_sign(self) -> int:
-        """Counts of motor 2 that mean ahead."""
-        return -1 if self.invert_right else 1
-
-
-class RoboteqChassisConfig(Section):
-    """A base with one two-channel Roboteq controller in closed-loop speed mode, channel 1 left, 2 right.
-
-    full_speed_mps: what a track makes at command 1000, which is MXRPM through gear and sprocket. encoder:
-    what the controller counts, a quadrature encoder (?C) or the motor's hall sensors (?CB). counts_per_m,
-    slip_factor: as for RoboClaw. watchdog_ms: after so long without a command the controller itself stops
-    the motors (RWD); set and read back before arming.
-    """
-
-    kind: Literal["roboteq"]
-    link: SerialLinkConfig
-    full_speed_mps: float = Field(gt=0, le=10)
-    counts_per_m: float = Field(gt=0, le=1e7)
-    encoder: Literal["quadrature", "hall"] = "quadrature"
-    track_width_m: float = Field(gt=0.05, le=5)
-    slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
-    watchdog_ms: int = Field(default=300, ge=100, le=2000)
-    invert_left: bool = False
-    invert_right: bool = False
-    command_period_ms: int = Field(default=20, ge=10, le=100)
     command_timeout_ms: int = Field(default=200, ge=40, le=1000)
     feedback_timeout_ms: int = Field(default=300, ge=100, le=2000)
     status_timeout_ms: int = Field(default=1000, ge=200, le=5000)
@@ -192,6 +148,37 @@ class RoboteqChassisConfig(Section):
     def right_sign(self) -> int:
         """Direction of channel 2 that means ahead."""
         return -1 if self.invert_right else 1
+
+
+class RoboclawChassisConfig(_TwoChannelConfig):
+    """A base with one RoboClaw for both tracks, packet serial, motor 1 left, motor 2 right.
+
+    timeout_ms: after so long without a packet the controller itself stops the motors (command 14,
+    steps of 100 ms); set and read back before arming. max_qpps, accel_qpps2: the fastest speed and
+    the hardest ramp that may ever be sent, in counts per second (and second).
+    """
+
+    kind: Literal["roboclaw"]
+    address: int = Field(default=0x80, ge=0x80, le=0x87)
+    max_qpps: int = Field(gt=0, le=10_000_000)
+    accel_qpps2: int = Field(gt=0, le=100_000_000)
+    timeout_ms: int = Field(default=300, ge=100, le=2000, multiple_of=100)
+
+
+class RoboteqChassisConfig(_TwoChannelConfig):
+    """A base with one two-channel Roboteq controller in closed-loop speed mode, channel 1 left, 2 right.
+
+    full_speed_mps: what a track makes at command 1000, which is MXRPM through gear and sprocket. encoder:
+    what the controller counts, a quadrature encoder (?C) or the motor's hall sensors (?CB). watchdog_ms:
+    after so long without a command the controller itself stops the motors (RWD); set and read back before
+    arming.
+    """
+
+    kind: Literal["roboteq"]
+    full_speed_mps: float = Field(gt=0, le=10)
+    encoder: Literal["quadrature", "hall"] = "quadrature"
+    watchdog_ms: int = Field(default=300, ge=100, le=2000)
+    command_period_ms: int = Field(default=20, ge=10, le=100)
 
 
 class KobukiChassisConfig(Section):

@@ -9,16 +9,16 @@ import numpy as np
 from config.perception import PerceptionConfig
 from hal.types import FloatArray, Pose
 from tests.support.grids import CAMERA, grid_of
+from tests.support.scenes import GOOD
 from vision.depth_grid import DepthGrid
 from vision.detection import Detection
-from vision.scene import CameraCondition, CameraHealth, EgoMotion
+from vision.scene import EgoMotion
 from vision.tracker import Percept, Tracker
 from vision.velocities import PointMotion
 
 FRAME_NS = 33_333_333
 START_NS = 1_000_000_000
 AT_ORIGIN = Pose(np.eye(3), np.zeros(3))
-GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)
 
 
 def no_ends() -> PointMotion:
