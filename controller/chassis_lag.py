@@ -17,10 +17,9 @@ _MOST_DRIFT = 0.1
 
 
 class ChassisLag:
-    """seconds: the estimate; prior_s: what is configured."""
+    """prior_s: what is configured, and believed until more is known."""
 
     def __init__(self, prior_s: float) -> None:
-        self._prior_s = prior_s
         self._lag_s, self._drift_share = prior_s, 0.0
         # Variances and covariance of the two; plain floats, ten times as fast as arrays of two.
         self._p_lag, self._p_both, self._p_drift = _LAG_SIGMA_S**2, 0.0, _DRIFT_SIGMA**2

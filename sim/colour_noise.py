@@ -29,7 +29,7 @@ class ColourSensor:
         smooth = np.asarray(cv2.GaussianBlur(white.astype(np.float32), (0, 0), _BLUR_PX))
         unit = smooth / smooth.std()
         self._field: NDArray[np.int16] = np.rint(unit * _NOISE_STEPS).astype(np.int16)
-        sigma = np.sqrt(_READ_GREY**2 + _SHOT_GREY * np.arange(256))
+        sigma = np.array([expected_sigma(grey) for grey in range(256)])
         self._sigma = np.rint(sigma * _SIGMA_STEPS).astype(np.uint8)
         self._noise = np.empty((*self._shape, 3), np.int16)
 

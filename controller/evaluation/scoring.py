@@ -29,7 +29,6 @@ class Hit:
     over the components that the method measures; NaN where it measures none."""
 
     object_id: int
-    detection_id: int
     distance_m: float
     speed_error_mps: float
     settled: bool
@@ -131,7 +130,7 @@ def _hit(detection: Detection, true: TrueObject, call: dict[int, Call]) -> Hit:
     difference = detection.velocity_mps - true.velocity_mps
     known = np.isfinite(difference)
     error = float(np.linalg.norm(difference[known])) if known.any() else math.nan
-    return Hit(true.id, detection.id, true.distance_m, error, call[true.id].settled)
+    return Hit(true.id, true.distance_m, error, call[true.id].settled)
 
 
 def _score_objects(

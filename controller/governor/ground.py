@@ -56,7 +56,6 @@ class GroundMemory:
     def __init__(self, robot: Robot, mount: CameraMount, config: DecisionConfig) -> None:
         self._body, self._mount = robot.body, mount
         self._near_m = config.sight.near_m
-        self._depth_m = config.prediction.body_depth_m
         self.consent_m = mount.forward_m + config.sight.near_m + 3.0 * CELL_M
         self._key = np.full((_SIZE, _SIZE, 2), np.iinfo(np.int32).min, np.int32)
         self._free_ns = np.zeros((_SIZE, _SIZE), np.int64)

@@ -12,7 +12,7 @@ import yaml
 
 from hal.cameras.tum_index import format_stamp
 from hal.errors import DeviceRefused
-from hal.types import CameraMount, Pose, RgbdFrame
+from hal.types import CameraMount, RgbdFrame
 
 # Zlib's fastest: a third of the time of the default for a tenth more bytes.
 _PNG_FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
@@ -88,22 +88,3 @@ class TumWriter:
             content["camera_pitch_deg"] = math.degrees(self._mount.pitch_rad)
             content["camera_forward_m"] = self._mount.forward_m
         (self._folder / "camera.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-
-
-def write_poses(path: Path, stamped_poses: list[tuple[int, Pose]]) -> None:
-    """odometry.txt or groundtruth.txt: ``t tx ty tz qx qy qz qw`` lines of the camera in the world."""
-    lines = ["# time in seconds, tx ty tz, qx qy qz qw: the camera optical frame in the world"]
-    for stamp_ns, pose in stamped_poses:
-        numbers = " ".join(f"{value:.9f}" for value in (*pose.translation_m, *quaternion(pose)))
-        lines.append(f"{format_stamp(stamp_ns)} {numbers}")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def quaternion(pose: Pose) -> tuple[float, float, float, float]:
-    """(qx, qy, qz, qw) of its rotation."""
-    vector, _ = cv2.Rodrigues(pose.rotation)
-    angle_rad = float(math.hypot(*vector.ravel()))
-    # sin(x / 2) / x tends to 1 / 2: no turn has no axis to divide by.
-    share = math.sin(angle_rad / 2) / angle_rad if angle_rad > 0 else 0.5
-    x, y, z = (float(value) * share for value in vector.ravel())
-    return x, y, z, math.cos(angle_rad / 2)

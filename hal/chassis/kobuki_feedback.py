@@ -61,7 +61,6 @@ class KobukiFeedback:
         self._restarted = False
         self._wanted = False
         self.bytes_heard = 0
-        self.frames_heard = 0
         self.pose_ns: int | None = None
         self.feedback_ns: int | None = None
         self.v_mps = math.nan
@@ -139,7 +138,6 @@ class KobukiFeedback:
         if told.currents_a is not None:
             self.currents_a = told.currents_a
         if told.core is not None:
-            self.frames_heard += 1
             self._count(told.core, told.inertia, now_ns)
 
     def _count(self, core: Core, inertia: Inertia | None, now_ns: int) -> None:
