@@ -29,19 +29,17 @@ from controller.build_chassis import build_can_emulator, build_pseudo_terminal, 
 from controller.errors import UserError
 from controller.service import StopRequest, stop_on_signals
 from hal.api import Clock
-from hal.clocks import MonotonicClock
+from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 from sim.plant import TrackedPlant
 from sim.simulation import Emulator
 
-_NS_PER_MS = 1_000_000
-
 # How soon an answer leaves after the question came; a real controller takes a millisecond or two.
-_TICK_NS = 2 * _NS_PER_MS
+_TICK_NS = 2 * NS_PER_MS
 
 # A process that did not run for so long was frozen, and so is the base that it plays.
-_FROZEN_NS = 200 * _NS_PER_MS
+_FROZEN_NS = 200 * NS_PER_MS
 
-_TOLD_EVERY_NS = 100 * _NS_PER_MS
+_TOLD_EVERY_NS = 100 * NS_PER_MS
 
 FAULTS: dict[str, Callable[[Emulator], None]] = {
     "estop": lambda base: base.press_estop(),
@@ -166,7 +164,7 @@ def run_in_real_time(
             emulator.freeze()
             emulator.advance_to(now_ns)
             emulator.thaw()
-            yield f"was frozen for {(now_ns - last_ns) / 1e9:.1f} s"
+            yield f"was frozen for {(now_ns - last_ns) / NS_PER_S:.1f} s"
         last_ns = now_ns
         for command in read_commands():
             fault = FAULTS.get(command)

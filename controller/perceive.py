@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from hal.api import OdometrySource
+from hal.clocks import NS_PER_MS
 from hal.types import PlanarPose, RgbdFrame
 from vision.perception import Perception
 from vision.scene import Fragments, Scene
-
-NS_PER_MS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,8 +25,9 @@ from hal.chassis.agilex_messages import (
     encode,
 )
 from hal.chassis.agilex_models import BUNKER, AgilexModel
+from hal.clocks import NS_PER_MS
 from hal.errors import LinkLost
-from sim.emulator import MS, ChassisEmulator, as_int32
+from sim.emulator import ChassisEmulator, as_int32
 from sim.plant import TrackedPlant
 
 _STANDBY, _CAN, _SERIAL, _REMOTE = 0, 1, 2, 3
@@ -63,18 +64,18 @@ class AgilexEmulator(ChassisEmulator):
         self._link = link
         self._actuators = model.actuators
         self._obeying_mode = model.obeying_mode(over_serial)
-        self._command_timeout_ns = model.base_timeout_ms * MS
+        self._command_timeout_ns = model.base_timeout_ms * NS_PER_MS
         # What must be repeated is forgotten as soon as the motion command.
         self._mode_timeout_ns = None if model.mode_period_ms is None else self._command_timeout_ns
         self._mode_heard_ns = plant.now_ns
         start_ns = plant.now_ns
         self._broadcasts = (
-            _Broadcast(20 * MS, start_ns, self._motion),
-            _Broadcast(20 * MS, start_ns, self._odometer),
-            _Broadcast(20 * MS, start_ns, self._actuators_fast),
-            _Broadcast(state_period_ms * MS, start_ns, self._state),
-            _Broadcast(100 * MS, start_ns, self._actuators_slow),
-            _Broadcast(500 * MS, start_ns, self._battery),
+            _Broadcast(20 * NS_PER_MS, start_ns, self._motion),
+            _Broadcast(20 * NS_PER_MS, start_ns, self._odometer),
+            _Broadcast(20 * NS_PER_MS, start_ns, self._actuators_fast),
+            _Broadcast(state_period_ms * NS_PER_MS, start_ns, self._state),
+            _Broadcast(100 * NS_PER_MS, start_ns, self._actuators_slow),
+            _Broadcast(500 * NS_PER_MS, start_ns, self._battery),
         )
         self.mode = _STANDBY
         self.vehicle_state = _NORMAL

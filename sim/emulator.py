@@ -5,12 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from hal.api import Closing, SerialLink
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.enclosing import Enclosing
 from hal.errors import LinkLost
 from sim.plant import TrackedPlant
 
-MS = 1_000_000
-_STEP_NS = 1 * MS
+_STEP_NS = NS_PER_MS
 
 
 class ChassisEmulator(Enclosing, ABC):
@@ -23,7 +23,7 @@ class ChassisEmulator(Enclosing, ABC):
     def __init__(self, link: Closing, plant: TrackedPlant, boot_ms: int) -> None:
         super().__init__(link)
         self._plant = plant
-        self._boot_ns = boot_ms * MS
+        self._boot_ns = boot_ms * NS_PER_MS
         self._now_ns = plant.now_ns
         self._silent_until_ns = plant.now_ns
         self._travel_zero_m = plant.track_travel_m
@@ -103,7 +103,7 @@ class MotorController(SerialEmulator):
         self._listen()
         while self._now_ns < now_ns:
             step_ns = min(_STEP_NS, now_ns - self._now_ns)
-            self._ramp(step_ns / 1e9)
+            self._ramp(step_ns / NS_PER_S)
             self._plant.command_tracks(*self._target_mps)
             self._now_ns += step_ns
             self._plant.advance_to(self._now_ns)

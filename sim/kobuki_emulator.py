@@ -11,10 +11,11 @@ from functools import reduce
 from operator import xor
 
 from hal.api import SerialLink
-from sim.emulator import MS, SerialEmulator
+from hal.clocks import NS_PER_MS
+from sim.emulator import SerialEmulator
 from sim.plant import TrackedPlant
 
-_STREAM_NS = 20 * MS
+_STREAM_NS = 20 * NS_PER_MS
 _HEADER = b"\xaa\x55"
 _HALF_BASE_MM = 115.0
 _TICKS_PER_M = 1.0 / (0.002436916871363930187454 * 0.035)
@@ -35,7 +36,7 @@ class KobukiEmulator(SerialEmulator):
         boot_ms: int = 1000,
     ) -> None:
         super().__init__(link, plant, boot_ms)
-        self._command_timeout_ns = command_timeout_ms * MS
+        self._command_timeout_ns = command_timeout_ms * NS_PER_MS
         self._stream_ns = plant.now_ns
         self._received = bytearray()
         self._extra = b""
@@ -160,7 +161,7 @@ class KobukiEmulator(SerialEmulator):
 
     def _core(self) -> bytes:
         left, right = (round(travel_m * _TICKS_PER_M) % (1 << 16) for travel_m in self._travel_m)
-        clock_ms = (self._now_ns - self._start_ns) // MS % (1 << 16)
+        clock_ms = (self._now_ns - self._start_ns) // NS_PER_MS % (1 << 16)
         return bytes((1, 15)) + struct.pack(
             "<HBBBHHbbBBBB",
             clock_ms, self.bumper, self.wheel_drop, self.cliff, left, right, 0, 0, 0,

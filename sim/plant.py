@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 from config.chassis import PlantConfig
 from hal.chassis.tracks import TrackGeometry
+from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
-
-_NS_PER_S = 1e9
 
 # Substep: 1 mm of travel at 1 m/s. Within it speeds change along the exact exponential of the lag.
 _STEP_NS = 1_000_000
@@ -93,7 +92,7 @@ class TrackedPlant:
         """Move on to now_ns; a time that has passed changes nothing."""
         while self._now_ns < now_ns:
             step_ns = min(_STEP_NS, now_ns - self._now_ns)
-            self._advance(step_ns / _NS_PER_S)
+            self._advance(step_ns / NS_PER_S)
             self._now_ns += step_ns
 
     def _advance(self, dt_s: float) -> None:

@@ -12,10 +12,11 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from hal.api import SerialLink
-from sim.emulator import MS, MotorController
+from hal.clocks import NS_PER_MS
+from sim.emulator import MotorController
 from sim.plant import TrackedPlant
 
-_GAP_NS = 10 * MS
+_GAP_NS = 10 * NS_PER_MS
 _ACK = b"\xff"
 
 # Bytes of data that a write carries. Everything else that is known is a read, which carries none.
@@ -183,7 +184,7 @@ class RoboclawEmulator(MotorController):
 
     def _ramp(self, step_s: float) -> None:
         """Move the targets along their ramps; stop the motors when the serial time-out has passed."""
-        if self.timeout_ms and self._now_ns - self._valid_ns >= self.timeout_ms * MS:
+        if self.timeout_ms and self._now_ns - self._valid_ns >= self.timeout_ms * NS_PER_MS:
             self._stop_motors()
         for track in (0, 1):
             self._towards(track, self._goal_mps[track], self._ramp_mps2[track], step_s)

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hal.api import SerialLink
-from sim.emulator import MS, MotorController, as_int32
+from hal.clocks import NS_PER_MS
+from sim.emulator import MotorController, as_int32
 from sim.plant import TrackedPlant
 
 _ESTOP_FLAG = 0x10
@@ -219,7 +220,7 @@ class RoboteqEmulator(MotorController):
 
     def _ramp(self, step_s: float) -> None:
         """Move the targets along their ramps, to rest once the watchdog has expired."""
-        if self.watchdog_ms and self._now_ns - self._fed_ns >= self.watchdog_ms * MS:
+        if self.watchdog_ms and self._now_ns - self._fed_ns >= self.watchdog_ms * NS_PER_MS:
             self._timed_out = True
         if self.fault_flags:
             # The motors are off for good: a fault that goes does not bring the old speed back.

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-NS_PER_MS = 1e6
+from hal.clocks import NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)

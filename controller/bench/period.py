@@ -24,13 +24,12 @@ from config.app import AppConfig, RealtimeRunner, load_app
 from config.camera import SimulatedCameraConfig
 from config.chassis import CanLinkConfig
 from config.loader import CONFIG_DIR
-from controller.bench.figures import NS_PER_MS
 from controller.console import Console
 from controller.errors import UserError
 from controller.realtime_mission import drive_realtime
 from controller.result import MissionOptions
 from hal.api import Clock
-from hal.clocks import NS_PER_S, MonotonicClock
+from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 
 PERIOD_NS = 20_000_000
 # Not in this list: the first commands, before the processes have settled.

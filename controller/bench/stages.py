@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from controller.bench.figures import NS_PER_MS
 from controller.bench.opencv_calls import stand_in_for_cv2
+from hal.clocks import NS_PER_MS
 
 
 @dataclass(slots=True)

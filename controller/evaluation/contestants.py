@@ -22,11 +22,11 @@ from controller.evaluation.ours import Treadwatch
 from controller.evaluation.sequences import Sequence
 from controller.evaluation.simulate import SimulatedFrame
 from controller.evaluation.types import Answer, Method
+from hal.clocks import NS_PER_MS
 from hal.types import Intrinsics
 from sim.world import World
 
 Stopwatch = Callable[[], int]
-NS_PER_MS = 1_000_000
 
 OURS = "treadwatch"
 OURS_ALONE = "treadwatch, no odometry"

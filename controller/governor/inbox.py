@@ -15,11 +15,10 @@ from config.governor import GovernorConfig
 from controller.decision import Decision
 from controller.governor.request import MessageError, Request, Twist, answer, parse_request
 from hal.api import DatagramLink
-from hal.clocks import NS_PER_S
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import LinkLost
 from hal.types import Sender
 
-_NS_PER_MS = 1_000_000
 # A flood must not keep a control step busy; what is left over waits for the next one.
 _MOST_A_POLL = 64
 # Two clocks drift apart by less than this; the fastest message so far is forgotten at this rate.
@@ -69,7 +68,7 @@ class Inbox:
         if session is None:
             if self._heard_ns is None:
                 return Asked(None, "no command yet")
-            return Asked(None, f"no command for {(now_ns - self._heard_ns) // _NS_PER_MS} ms")
+            return Asked(None, f"no command for {(now_ns - self._heard_ns) // NS_PER_MS} ms")
         steady_s = (now_ns - session.began_ns) / NS_PER_S
         if steady_s < self._config.resume_s:
             return Asked(None, f"commands have come for only {steady_s:.2f} s")

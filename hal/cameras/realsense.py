@@ -15,11 +15,10 @@ import numpy as np
 from config.camera import RealsenseCameraConfig
 from hal.api import Clock
 from hal.cameras.device_clock import DeviceClock
-from hal.clocks import NS_PER_S
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import DeviceNotFound, DeviceRefused, FrameTimeout, LinkLost
 from hal.types import GyroSamples, Intrinsics, RgbdFrame
 
-_NS_PER_MS = 1_000_000
 _GYRO_RATE_HZ = 200
 _GYRO_QUEUE = 256  # more than a second: what a stalled reader leaves behind beyond that is lost
 _USB_HINT = "use the USB 3 cable in a USB 3 port, and close other programs that hold the camera"
@@ -78,7 +77,7 @@ class RealsenseCamera:
         deadline_ns = self._clock.now_ns() + round(timeout_s * NS_PER_S)
         incomplete_before = self.incomplete
         while True:
-            remaining_ms = max(0, math.ceil((deadline_ns - self._clock.now_ns()) / _NS_PER_MS))
+            remaining_ms = max(0, math.ceil((deadline_ns - self._clock.now_ns()) / NS_PER_MS))
             arrived, frames = self._pipeline.try_wait_for_frames(remaining_ms)
             if not arrived:
                 raise self._silence(timeout_s, self.incomplete - incomplete_before)
@@ -203,7 +202,7 @@ class RealsenseCamera:
         colour = frames.get_color_frame()
         depth = self._align.process(frames).get_depth_frame()
         device_ms = colour.get_timestamp()
-        captured_ns = self._device_clock.captured_ns(round(device_ms * _NS_PER_MS), arrival_ns)
+        captured_ns = self._device_clock.captured_ns(round(device_ms * NS_PER_MS), arrival_ns)
         return RgbdFrame(
             # Copies: librealsense lends its buffers, and stops when too many are kept.
             colour=np.array(colour.get_data(), np.uint8),
@@ -224,7 +223,7 @@ class RealsenseCamera:
         rates_radps: list[tuple[float, float, float]] = []
         while sample := self._gyro_queue.poll_for_frame():
             rate = sample.as_motion_frame().get_motion_data()
-            stamps_ns.append(self._device_clock.monotonic_ns(round(sample.get_timestamp() * _NS_PER_MS)))
+            stamps_ns.append(self._device_clock.monotonic_ns(round(sample.get_timestamp() * NS_PER_MS)))
             rates_radps.append((rate.x, rate.y, rate.z))
         rates = np.array(rates_radps, np.float64).reshape(-1, 3) @ self._gyro_to_colour.T
         return GyroSamples(np.array(stamps_ns, np.int64), rates)

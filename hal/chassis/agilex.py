@@ -21,9 +21,10 @@ from hal.chassis.agilex_messages import (
     encode,
 )
 from hal.chassis.agilex_models import model_of, over_serial
-from hal.chassis.arming import NS_PER_MS, ArmingLimits
+from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero, zero
 from hal.chassis.driver import ChassisDriver
+from hal.clocks import NS_PER_MS
 from hal.types import ChassisMode, Setpoint
 
 # All that this driver ever sends: identifiers, and how many bytes at most.

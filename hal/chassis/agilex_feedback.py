@@ -21,12 +21,10 @@ from hal.chassis.agilex_models import (
     over_serial,
     track_width_of,
 )
-from hal.chassis.arming import NS_PER_MS
 from hal.chassis.disagreement import Disagreement
 from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.types import PlanarPose
-
-_NS_PER_S = 1e9
 
 # Below this the tracks stand still: two steps of the wire.
 _STANDING_MPS = 0.002
@@ -188,7 +186,7 @@ class AgilexFeedback:
         # Several at once waited somewhere: each stands for an equal part of the time since the last.
         # After a longer silence nobody knows what happened; the newest speed does not stand for all of it.
         elapsed_ns = 0 if self.motion_ns is None else min(now_ns - self.motion_ns, self._silence_ns)
-        share_s = elapsed_ns / _NS_PER_S / len(motions)
+        share_s = elapsed_ns / NS_PER_S / len(motions)
         for motion in motions:
             self._disagreement.expect(motion.v_mps * share_s)
             if self._geometry is None:
@@ -200,7 +198,7 @@ class AgilexFeedback:
     def _count(self, odometer: Odometer, now_ns: int) -> None:
         if self._geometry is None:
             return
-        elapsed_s = 0.0 if self._odometer_ns is None else (now_ns - self._odometer_ns) / _NS_PER_S
+        elapsed_s = 0.0 if self._odometer_ns is None else (now_ns - self._odometer_ns) / NS_PER_S
         self._odometer_ns = now_ns
         fastest_mps = (
             self._model.max_speed_mps + self._geometry.to_tracks(0.0, self._model.max_yaw_rate_radps)[1]

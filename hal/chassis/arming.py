@@ -13,9 +13,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.types import ChassisMode
-
-NS_PER_MS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +138,7 @@ def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     else:
         return Arming(ChassisMode.ARMED, "armed", seen.now_ns)
     if seen.now_ns - state.since_ns > limits.arming_timeout_ns:
-        waited_s = (seen.now_ns - state.since_ns) / 1e9
+        waited_s = (seen.now_ns - state.since_ns) / NS_PER_S
         cause = f"arming gave up after {waited_s:.1f} s: {waiting}" + (seen.silence and f": {seen.silence}")
         return Arming(ChassisMode.STANDBY, cause, seen.now_ns)
     return replace(state, cause=f"arming: {waiting}")

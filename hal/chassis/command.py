@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 from hal.chassis.tracks import scale_to_fit
+from hal.clocks import NS_PER_MS
 from hal.types import Setpoint
-
-NS_PER_MS = 1_000_000
 
 # A due time may be early by a quarter of the period: a loop with jitter would else miss every other one.
 _EARLY = 0.75

@@ -13,8 +13,9 @@ from typing import Protocol, Self
 
 from hal.api import Closing
 from hal.chassis import arming
-from hal.chassis.arming import NS_PER_MS, Arming, ArmingLimits, Evidence
+from hal.chassis.arming import Arming, ArmingLimits, Evidence
 from hal.chassis.command import CommandLimits, is_zero, zero
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import LinkLost
 from hal.geometry import advance_pose
 from hal.types import ChassisState, PlanarPose, Setpoint
@@ -201,4 +202,4 @@ class ChassisDriver(ABC):
         if told.pose_ns is None or math.isnan(told.v_mps):
             return told.pose
         age_ns = min(max(now_ns - told.pose_ns, 0), self._limits.feedback_timeout_ns)
-        return advance_pose(told.pose, told.v_mps, told.w_radps, age_ns / 1e9) if age_ns else told.pose
+        return advance_pose(told.pose, told.v_mps, told.w_radps, age_ns / NS_PER_S) if age_ns else told.pose

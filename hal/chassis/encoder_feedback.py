@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
+from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
-
-_NS_PER_S = 1e9
 
 # A counter step larger than this times what the motors can do is a restart or noise, not travel.
 _JUMP_RATIO = 1.5
@@ -66,7 +65,7 @@ class EncoderFeedback:
     def _count(self, left: int, right: int, asked_ns: int, now_ns: int) -> None:
         """Both counters, as answered at now_ns to what was asked at asked_ns."""
         last_ns, self.pose_ns = self.pose_ns, asked_ns
-        elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / _NS_PER_S
+        elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / NS_PER_S
         limit_m = _JUMP_RATIO * self._fastest_mps * elapsed_s + _JUMP_SLACK_M
         steps = self._counter.increments(left, right, limit_m * self._counts_per_m)
         if steps is None:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from config.chassis import KobukiChassisConfig
 from hal.api import SerialLink
-from hal.chassis.arming import NS_PER_MS, ArmingLimits
+from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.kobuki_feedback import KobukiFeedback
 from hal.chassis.kobuki_packets import FrameReader, base_control, parse
+from hal.clocks import NS_PER_MS
 from hal.types import Setpoint
 
 

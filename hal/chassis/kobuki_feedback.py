@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from config.chassis import KobukiChassisConfig
-from hal.chassis.arming import NS_PER_MS
 from hal.chassis.disagreement import Disagreement
 from hal.chassis.kobuki_packets import (
     CLOCK_BITS,
@@ -18,6 +17,7 @@ from hal.chassis.kobuki_packets import (
     Inertia,
 )
 from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry, wrapped_difference
+from hal.clocks import NS_PER_MS
 from hal.geometry import wrap_angle_rad
 from hal.types import PlanarPose
 

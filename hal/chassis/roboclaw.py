@@ -14,13 +14,14 @@ from itertools import cycle
 from config.chassis import RoboclawChassisConfig
 from hal.api import SerialLink
 from hal.chassis import roboclaw_packets as packets
-from hal.chassis.arming import NS_PER_MS, ArmingLimits
+from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.roboclaw_feedback import RoboclawFeedback
 from hal.chassis.roboclaw_packets import Request
 from hal.chassis.roboclaw_port import RoboclawPort
 from hal.chassis.tracks import TrackGeometry, scale_to_fit
+from hal.clocks import NS_PER_MS
 from hal.types import ChassisMode, Setpoint
 
 # Encoders every other turn, the status (emergency stop) every fourth, the rest in between. The time-out is

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hal.api import SerialLink
-from hal.chassis.arming import NS_PER_MS
 from hal.chassis.roboclaw_packets import Request
+from hal.clocks import NS_PER_MS
 
 # The controller drops a packet after 10 ms of silence inside it, so both sides agree again after that.
 _SILENCE_NS = 10 * NS_PER_MS

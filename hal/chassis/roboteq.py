@@ -13,12 +13,13 @@ from itertools import cycle
 from config.chassis import RoboteqChassisConfig
 from hal.api import SerialLink
 from hal.chassis import roboteq_lines as lines
-from hal.chassis.arming import NS_PER_MS, ArmingLimits
+from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.roboteq_feedback import RoboteqFeedback
 from hal.chassis.roboteq_lines import LineReader, Query, Reply
 from hal.chassis.tracks import TrackGeometry, scale_to_fit
+from hal.clocks import NS_PER_MS
 from hal.errors import LinkLost
 from hal.types import ChassisMode, Setpoint
 

@@ -14,12 +14,11 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.clocks import SimulatedClock
+from hal.clocks import NS_PER_MS, SimulatedClock
 
 WIDTH, HEIGHT, FPS = 640, 480, 30
 SERIAL = "000000000001"
 PERIOD_MS = 1000.0 / FPS
-NS_PER_MS = 1_000_000
 
 
 class FakeFrame:

@@ -9,7 +9,7 @@ import pytest
 
 from config.camera import RealsenseCameraConfig
 from hal.cameras.realsense import RealsenseCamera
-from hal.clocks import SimulatedClock
+from hal.clocks import NS_PER_MS, SimulatedClock
 from hal.errors import DeviceNotFound, DeviceRefused, FrameTimeout, LinkLost
 from hal.types import Intrinsics
 from tests.support.fake_realsense import (
@@ -23,7 +23,6 @@ from tests.support.fake_realsense import (
     framesets,
 )
 
-NS_PER_MS = 1_000_000
 LATENCY_S = 0.03
 
 
