@@ -6,6 +6,7 @@ import fcntl
 import os
 import sys
 import termios
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -19,6 +20,9 @@ from hal.types import CanFrame
 
 # Bytes that can be waited for where nobody reads: a terminal's buffer, less what it keeps free.
 _TERMINAL_HOLDS = 3_900
+
+# A busy machine may leave the kernel no core to carry bytes over for a while.
+_PATIENCE_S = 10.0
 
 
 class _Plug(Enclosing):
@@ -112,7 +116,8 @@ def _waiting(descriptor: int) -> int:
 
 
 def _await(descriptor: int, count: int) -> None:
-    for _ in range(100_000):
+    give_up_s = time.monotonic() + _PATIENCE_S
+    while time.monotonic() < give_up_s:
         if _waiting(descriptor) >= count:
             return
         os.sched_yield()
