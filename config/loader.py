@@ -8,6 +8,8 @@ from typing import TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from config.known_keys import advice
+
 CONFIG_DIR = Path(__file__).resolve().parent
 # A file with more mistakes than this is another kind of file, and one line is for reading.
 _MOST_MISTAKES = 8
@@ -65,7 +67,7 @@ def load(path: Path, model: type[SectionT]) -> SectionT:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise ConfigError(f"{path}: {describe(error)}") from error
+        raise ConfigError(f"{path}: {describe(error, model)}") from error
 
 
 def _yaml_mistake(error: yaml.YAMLError) -> str:
@@ -77,14 +79,14 @@ def _yaml_mistake(error: yaml.YAMLError) -> str:
     return f"{where}{error.problem}" + (f" ({error.context})" if error.context else "")
 
 
-def describe(error: ValidationError) -> str:
+def describe(error: ValidationError, model: type[BaseModel]) -> str:
     """The mistakes of a validation in one line: ``key: reason; key: reason``."""
     parts = []
     for detail in error.errors(include_url=False):
         key = ".".join(str(step) for step in detail["loc"]) or "(file)"
         reason = detail["msg"].removeprefix("Value error, ")
         if detail["type"] == "extra_forbidden":
-            reason = "unknown key; check its spelling against the documentation"
+            reason = f"unknown key; {advice(model, detail['loc'])}"
         elif detail["type"] == "missing":
             reason = "missing key"
         elif not isinstance(detail["input"], dict | list):

@@ -111,7 +111,7 @@ def with_wire(chassis: AnyChassisConfig, options: EmulateOptions) -> AnyChassisC
     try:
         return AgilexChassisConfig.model_validate(values | {"link": SerialLinkConfig(url=channel)})
     except ValidationError as error:
-        raise UserError(f"--channel {channel}: {describe(error)}") from error
+        raise UserError(f"--channel {channel}: {describe(error, AgilexChassisConfig)}") from error
 
 
 def can_link(link: CanLinkConfig, options: EmulateOptions) -> CanLinkConfig:
@@ -128,7 +128,7 @@ def can_link(link: CanLinkConfig, options: EmulateOptions) -> CanLinkConfig:
     try:
         return CanLinkConfig.model_validate(values)
     except ValidationError as error:
-        raise UserError(f"--channel, --interface, --port: {describe(error)}") from error
+        raise UserError(f"--channel, --interface, --port: {describe(error, CanLinkConfig)}") from error
 
 
 @contextmanager
