@@ -82,11 +82,15 @@ def _yaml_mistake(error: yaml.YAMLError) -> str:
 def describe(error: ValidationError, model: type[BaseModel]) -> str:
     """The mistakes of a validation in one line: ``key: reason; key: reason``."""
     parts = []
+    told: set[str] = set()
     for detail in error.errors(include_url=False):
         key = ".".join(str(step) for step in detail["loc"]) or "(file)"
         reason = detail["msg"].removeprefix("Value error, ")
         if detail["type"] == "extra_forbidden":
-            reason = f"unknown key; {advice(model, detail['loc'])}"
+            hint = advice(model, detail["loc"])
+            # Several keys of another kind of file: what is known is said once.
+            reason = "unknown key" if hint in told else f"unknown key; {hint}"
+            told.add(hint)
         elif detail["type"] == "missing":
             reason = "missing key"
         elif not isinstance(detail["input"], dict | list):

@@ -162,7 +162,7 @@ def _summary(
         ("decisions", ", ".join(f"{count} {action}" for action, count in sorted(tally.actions.items()))),
         (
             "camera",
-            ", ".join(f"{count} frames {condition.value}" for condition, count in tally.conditions.items()),
+            ", ".join(f"{count} {condition.value}" for condition, count in tally.conditions.items()),
         ),
         ("perception", tally.timing.line()),
     ]

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from config.app import load_app
+from config.app import load_app, load_replay
 from config.loader import CONFIG_DIR, ConfigError
 from config.scenario import load_scenario
 
@@ -50,6 +50,16 @@ def test_the_key_that_was_meant_is_named(tmp_path: Path, keys: tuple[str, ...], 
 def test_another_kind_has_other_keys(tmp_path: Path) -> None:
     said = refusal(tmp_path, "chassis", "watchdog", base="hil-roboteq.yaml")
     assert said == "chassis.roboteq.watchdog: unknown key; did you mean watchdog_ms?"
+
+
+def test_what_is_known_is_said_once(tmp_path: Path) -> None:
+    path = tmp_path / "other.yaml"
+    path.write_text("abc: 1\nxyz: 2\n")
+    with pytest.raises(ConfigError) as caught:
+        load_replay(path)
+    assert str(caught.value) == (
+        f"{path}: abc: unknown key; known here: assume_mount, decision, perception, robot; xyz: unknown key"
+    )
 
 
 def test_within_a_list(tmp_path: Path) -> None:
