@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -258,3 +259,10 @@ def kobuki_rig(kind: str) -> Iterator[Rig]:
         # A spin is said as the speed of a wheel, in mm/s.
         step_radps = 0.001 / (0.5 * WHEEL_BASE_M)
         yield Rig(chassis, emulator, plug, own_timeout_s=0.6, battery_v=16.2, wire_step_radps=step_radps)
+
+
+def check_state(state: ChassisState) -> None:
+    """Nobody consented, so nothing may be driven, whatever was heard; what is told is finite."""
+    assert state.mode is not ChassisMode.ARMED, "nobody consented"
+    assert state.sent is None or (state.sent.v_mps, state.sent.w_radps) == (0.0, 0.0)
+    assert all(math.isfinite(value) for value in (state.pose.x_m, state.pose.y_m, state.pose.heading_rad))

@@ -94,7 +94,7 @@ STEPS = {
     "rig": lambda kind: f"def {kind}_rig(" in read("tests/support/chassis_rig.py"),
     "contract": lambda kind: sum(name.startswith(f"{kind}-") for name in EMULATED) >= 2,
     "property": lambda kind: (
-        f"def test_{kind}_driver_survives_any_" in read("tests/property/test_chassis_codec_properties.py")
+        f"def test_{kind}_driver_survives_any_" in read(f"tests/property/test_{kind}_properties.py")
     ),
     "wrong device": lambda kind: f'"{kind}' in read("tests/contract/test_wrong_device.py"),
     "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/test_guard.py"),
