@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
 from collections.abc import Callable
@@ -92,3 +93,18 @@ class GovernedDrive:
         eyes.pose = self.pose
         self.steps.append(Step(self.t_s, requested, governed, self.pose, eyes.clearance()))
         self.t_s += PERIOD_S
+
+
+def rules(steps: list[Step]) -> list[str]:
+    """Each rule once, in the order in which it held."""
+    return [rule for rule, _ in itertools.groupby(one.governed.decision.reason.rule for one in steps)]
+
+
+def sentence_at_the_end(steps: list[Step]) -> str:
+    """Why it does what it does then."""
+    return steps[-1].governed.decision.reason.sentence
+
+
+def after(steps: list[Step], t_s: float) -> list[Step]:
+    """From t_s on."""
+    return [one for one in steps if one.t_s >= t_s - 1e-9]

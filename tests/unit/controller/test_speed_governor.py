@@ -9,30 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from config.governor import GovernorConfig
 from config.robot import Robot
 from controller.decision import Action
 from controller.governor.request import Twist
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 from tests.support.closed_loop import PERIOD_S, Noise, Thing, stands, walks
-from tests.support.governed import GovernedDrive, Step, always
+from tests.support.governed import GovernedDrive, Step, after, always, rules, sentence_at_the_end
 from vision.scene import CameraCondition, CameraHealth, Scene
 
 LIMITS = Robot().limits
-
-
-def rules(steps: list[Step]) -> list[str]:
-    """Each rule once, in the order in which it held."""
-    return [rule for rule, _ in itertools.groupby(one.governed.decision.reason.rule for one in steps)]
-
-
-def sentence_at_the_end(steps: list[Step]) -> str:
-    return steps[-1].governed.decision.reason.sentence
-
-
-def after(steps: list[Step], t_s: float) -> list[Step]:
-    return [one for one in steps if one.t_s >= t_s - 1e-9]
 
 
 def hardest(steps: list[Step]) -> tuple[float, float, float]:
@@ -115,67 +101,6 @@ def test_faster_than_the_robot_is_scaled_along_the_same_arc() -> None:
     assert last.v_mps == pytest.approx(LIMITS.max_speed_mps)
     assert last.w_radps == pytest.approx(0.2 * LIMITS.max_speed_mps)
     assert "asked 3.00 m/s; on this arc the robot drives 1.50 m/s" in last.decision.reason.sentence
-
-
-def test_a_turn_in_place_at_the_start_is_free_by_consent_and_jerk_limited() -> None:
-    drive = GovernedDrive(lambda t: Twist(0.0, 0.5) if t < 5.0 else Twist(0.0, 0.0))
-    steps = drive.run(9.0)
-    w = [one.governed.w_radps for one in steps]
-    assert max(w) == pytest.approx(0.5)
-    assert w[-1] == 0.0
-    assert all(one.governed.v_mps == 0.0 for one in steps)
-    corner_m = math.hypot(0.51, 0.39)
-    rates = np.diff(w) * corner_m / PERIOD_S
-    assert np.abs(rates).max() <= LIMITS.max_accel_mps2 + 1e-6
-    assert np.abs(np.diff(rates)).max() / PERIOD_S <= LIMITS.max_jerk_mps3 + 1e-3
-    assert math.hypot(steps[-1].pose.x_m, steps[-1].pose.y_m) < 1e-6
-
-
-def stop_then_turn(t: float) -> Twist:
-    return Twist(0.8, 0.0) if t < 8.0 else Twist(0.0, 0.5)
-
-
-def test_between_driving_and_turning_the_robot_stands() -> None:
-    steps = GovernedDrive(stop_then_turn).run(14.0)
-    turning = [one for one in steps if one.governed.v_mps == 0.0 and one.governed.w_radps > 0.0]
-    assert turning[0].t_s > 10.0
-    assert turning[-1].governed.w_radps == pytest.approx(0.5)
-    for one in after(steps, 8.0):
-        assert one.governed.v_mps == 0.0 or one.governed.w_radps == 0.0
-
-
-def test_turning_the_other_way_goes_through_standstill() -> None:
-    steps = GovernedDrive(lambda t: Twist(0.0, 0.5 if t < 4.0 else -0.5)).run(10.0)
-    w = np.array([one.governed.w_radps for one in steps])
-    assert w.min() == pytest.approx(-0.5)
-    assert np.abs(np.diff(w)).max() < 0.012
-
-
-def test_no_turn_in_place_beside_a_wall_that_its_corners_would_touch() -> None:
-    wall = Thing(stands(8.0, 0.7), length_m=20.0, width_m=0.2)
-    steps = GovernedDrive(stop_then_turn, [wall]).run(14.0)
-    assert all(one.governed.w_radps == 0.0 for one in steps)
-    assert rules(steps)[-1] == "turn"
-    assert "something stands 0.0 m ahead and 0.5 m to the left" in sentence_at_the_end(steps)
-    free = GovernedDrive(stop_then_turn, [Thing(stands(8.0, 1.2), length_m=20.0, width_m=0.2)]).run(14.0)
-    assert free[-1].governed.w_radps == pytest.approx(0.5)
-
-
-def test_no_turn_in_place_on_floor_that_was_seen_too_long_ago() -> None:
-    drive = GovernedDrive(stop_then_turn, config=GovernorConfig(turn_memory_s=2.0))
-    steps = drive.run(14.0)
-    assert all(one.governed.w_radps == 0.0 for one in steps)
-    assert "has not been seen within 2 s" in sentence_at_the_end(steps)
-
-
-def test_a_person_who_comes_near_stops_a_turn() -> None:
-    # They walk straight at the robot's side from ahead, where the camera sees them.
-    person = Thing(walks(5.0, 0.3, -1.0, 0.0, from_s=0.0, to_s=3.9))
-    steps = GovernedDrive(lambda _: Twist(0.0, 0.02), [person]).run(6.0)
-    assert rules(steps)[:3] == ["camera", "requested", "turn"]
-    stood = next(one for one in steps if one.governed.decision.reason.rule == "turn" and one.t_s > 1.0)
-    assert stood.clearance_m > 1.0
-    assert after(steps, stood.t_s + 0.6)[0].governed.w_radps == 0.0
 
 
 def test_floor_beside_the_view_was_seen_on_the_way() -> None:
