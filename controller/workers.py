@@ -5,12 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
-from typing import ParamSpec, TypeVar
+from types import FrameType
+from typing import NoReturn, ParamSpec, TypeVar
 
 from controller.errors import UserError
 
@@ -39,9 +41,10 @@ def held_ctrl_c() -> Iterator[None]:
 def worker_processes(count: int) -> Iterator[Executor]:
     """count processes for picklable tasks; left early, they are ended at once, whatever they are doing.
 
-    Raises UserError if one of them dies by itself.
+    SIGTERM leaves it early, too: without their parent they would wait for tasks for ever. Raises UserError
+    if one of them dies by itself.
     """
-    with _one_core_each():
+    with _one_core_each(), _sigterm_as_exit():
         pool = _Pool(count, multiprocessing.get_context("spawn"))
         try:
             yield pool
@@ -65,6 +68,20 @@ class _Pool(ProcessPoolExecutor):
     ) -> Future[Result]:
         with held_ctrl_c():
             return super().submit(task, *args, **kwargs)
+
+
+@contextmanager
+def _sigterm_as_exit() -> Iterator[None]:
+    before = signal.signal(signal.SIGTERM, _exit)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _exit(number: int, _frame: FrameType | None) -> NoReturn:
+    # What shells report for a program that a signal has ended.
+    sys.exit(128 + number)
 
 
 @contextmanager

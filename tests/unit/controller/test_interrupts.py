@@ -114,15 +114,20 @@ def test_one_that_came_meanwhile_is_not_lost() -> None:
         signal.raise_signal(signal.SIGINT)
 
 
-def test_workers_end_at_once_whatever_they_are_doing() -> None:
+@pytest.mark.parametrize(
+    ("number", "ended_by"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)]
+)
+def test_workers_end_at_once_whatever_they_are_doing(
+    number: signal.Signals, ended_by: type[BaseException]
+) -> None:
     def interrupted() -> None:
         with worker_processes(2) as pool:
             for _ in range(4):
                 pool.submit(time.sleep, 600.0)
-            raise KeyboardInterrupt
+            signal.raise_signal(number)
 
     began_s = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(ended_by):
         interrupted()
     assert multiprocessing.active_children() == []
     assert time.monotonic() - began_s < 60.0
