@@ -26,7 +26,8 @@ class ControlStep:
 
     pose: the body in the path's frame; progress_m along the path, lateral_m to its left.
     scene_sequence: which frame the decision used, None if there was none yet. ahead_m: (N, 2) the way ahead
-    in the body frame, where it is not the path that the runner knows.
+    in the body frame, where it is not the path that the runner knows. fault: why the shaper had to brake by
+    the stop profile, "" if it had not.
     """
 
     now_ns: int
@@ -38,6 +39,7 @@ class ControlStep:
     setpoint: Setpoint
     chassis: ChassisState
     ahead_m: FloatArray | None = field(default=None, compare=False)
+    fault: str = ""
 
 
 class Drive(Protocol):
@@ -108,13 +110,15 @@ class ControlLoop:
         decision = self._decide.step(
             scene, self.path, pose, on_path, self._speed_mps(), self._shape.a_mps2, now_ns
         )
-        setpoint = self._setpoint(decision, on_path, now_ns)
+        setpoint, fault = self._setpoint(decision, on_path, now_ns)
         self._state = self._chassis.exchange(setpoint, now_ns)
         self.localiser.add_odometry(now_ns, self._state.pose)
         arrived = self.path.length_m - on_path.s_m <= ARRIVED_M
         self.ending.conclude(self._state, setpoint, now_ns, arrived=arrived)
         sequence = None if scene is None else scene.sequence
-        return ControlStep(now_ns, pose, on_path.s_m, on_path.d_m, sequence, decision, setpoint, self._state)
+        return ControlStep(
+            now_ns, pose, on_path.s_m, on_path.d_m, sequence, decision, setpoint, self._state, fault=fault
+        )
 
     def _learn(self, scene: Scene | None) -> None:
         """Each scene's ego-motion corrects the yaw once."""
@@ -127,11 +131,12 @@ class ControlLoop:
         measured = self._state.v_mps if self._state is not None else math.nan
         return max(self._shape.v_mps, measured) if math.isfinite(measured) else self._shape.v_mps
 
-    def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> Setpoint:
+    def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> tuple[Setpoint, str]:
+        """What to send, and the shaper's fault."""
         if self._state is None or self._state.mode is not ChassisMode.ARMED:
             # What the chassis does now is not ours to shape; whenever it obeys again, begin at rest.
             self._shape.reset()
-            return Setpoint(now_ns, 0.0, 0.0, 0.0)
+            return Setpoint(now_ns, 0.0, 0.0, 0.0), ""
         target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps
         shaped = self._shape.step(
             target_mps,
@@ -139,4 +144,4 @@ class ControlLoop:
             distance_to_end_m=self.path.length_m - self._progress_m,
         )
         w_radps = self._follow.step(on_path, shaped.v_mps)
-        return Setpoint(now_ns, shaped.v_mps, shaped.a_mps2, w_radps)
+        return Setpoint(now_ns, shaped.v_mps, shaped.a_mps2, w_radps), shaped.fault

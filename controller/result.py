@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from controller.control import ControlLoop, ControlStep
 from controller.ending import Outcome
 from controller.realtime import Punctuality
-from controller.tally import SetpointTally, Standstill, TimingTally
+from controller.tally import SetpointTally, ShaperFaults, Standstill, TimingTally
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
@@ -39,6 +39,7 @@ class MissionResult:
     simulation: Simulation | None = None
     punctuality: Punctuality | None = None
     standstill: Standstill = field(default_factory=Standstill)
+    shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
 
     @property
     def duration_s(self) -> float:
@@ -66,3 +67,4 @@ class MissionResult:
         self.last = step
         self.setpoints.add(step.chassis.sent)
         self.standstill.add(step.setpoint)
+        self.shaper_faults.add(step.fault)

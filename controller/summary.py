@@ -40,6 +40,8 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
     if result.simulation is not None:
         rows.append(("contacts", contact_text(result.simulation)))
     rows.append(("limits", limits_text(config, result.setpoints)))
+    if result.shaper_faults.count:
+        rows.append(("shaper", result.shaper_faults.line()))
     rows.append(("perception", result.timing.line()))
     if math.isfinite(result.wall_s):
         ratio = result.duration_s / result.wall_s

@@ -65,6 +65,24 @@ class SetpointTally:
 
 
 @dataclass
+class ShaperFaults:
+    """How often the shaper had to brake by the stop profile, and why it first did."""
+
+    count: int = 0
+    first: str = ""
+
+    def add(self, fault: str) -> None:
+        """Of one control step; "" is none."""
+        if fault:
+            self.count += 1
+            self.first = self.first or fault
+
+    def line(self) -> str:
+        """For the summary."""
+        return f"braked by the stop profile in {self.count} steps; first: {self.first}"
+
+
+@dataclass
 class Standstill:
     """Since when the robot has been told to stand; None while it drives."""
 

@@ -26,7 +26,7 @@ from controller.result import MissionOptions
 from controller.scheduling import become_realtime
 from controller.service import ServiceManager, stop_on_signals
 from controller.summary import contact_text, limits_text, punctuality_text
-from controller.tally import SetpointTally, Standstill, TimingTally
+from controller.tally import SetpointTally, ShaperFaults, Standstill, TimingTally
 from hal.clocks import NS_PER_S, MonotonicClock
 from sim.simulation import Simulation
 
@@ -44,6 +44,7 @@ class Governing:
     first: ControlStep | None = None
     last: ControlStep | None = None
     standstill: Standstill = field(default_factory=Standstill)
+    shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
 
     @property
     def succeeded(self) -> bool:
@@ -57,6 +58,7 @@ class Governing:
         self.last = step
         self.setpoints.add(step.chassis.sent)
         self.standstill.add(step.setpoint)
+        self.shaper_faults.add(step.fault)
 
 
 def run_governor(options: MissionOptions) -> int:
@@ -143,6 +145,8 @@ def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, st
     if governing.simulation is not None:
         rows.append(("contacts", contact_text(governing.simulation)))
     rows.append(("limits", limits_text(config, governing.setpoints)))
+    if governing.shaper_faults.count:
+        rows.append(("shaper", governing.shaper_faults.line()))
     rows.append(("perception", governing.timing.line()))
     if governing.punctuality.late_ns:
         rows.append(("control", punctuality_text(governing.punctuality)))

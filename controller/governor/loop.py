@@ -82,7 +82,7 @@ class GovernorLoop:
         sequence = None if scene is None else scene.sequence
         return ControlStep(
             now_ns, pose, self._travelled_m, on_path.d_m, sequence, governed.decision, setpoint,
-            self._state, self._ahead(),
+            self._state, self._ahead(), governed.fault,
         )  # fmt: skip
 
     @property

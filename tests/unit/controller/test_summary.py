@@ -5,6 +5,7 @@ from config.loader import CONFIG_DIR
 from controller.build import build_control
 from controller.console import Console
 from controller.result import MissionResult
+from controller.shape import SpeedShaper
 from controller.summary import report, summary_rows
 from controller.tally import SetpointTally, TimingTally
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
@@ -39,6 +40,19 @@ def test_a_mission_that_gets_nowhere_tells_why(capsys: pytest.CaptureFixture[str
     assert all(line.endswith(reason) for line in told)
     rows = dict(summary_rows(load_app(CONFIG_PATH), result))
     assert rows["standing"] == f"for the last 21.0 s: {reason}"
+
+
+def test_a_shaper_that_had_to_brake_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = load_app(CONFIG_PATH)
+    assert "shaper" not in dict(summary_rows(config, drive(2.0, sees=True)))
+
+    def fail(*_: object) -> tuple[float, float]:
+        raise ArithmeticError("no profile")
+
+    monkeypatch.setattr(SpeedShaper, "_follow", fail)
+    rows = dict(summary_rows(config, drive(2.0, sees=True)))
+    # Armed after three exchanges: the fifth step is the first one that is shaped.
+    assert rows["shaper"] == "braked by the stop profile in 96 steps; first: ruckig: no profile"
 
 
 def test_a_mission_that_gets_on_says_nothing_of_standing(capsys: pytest.CaptureFixture[str]) -> None:
