@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,10 @@ class FaultsOptions:
 
 def run_faults(options: FaultsOptions) -> None:
     """Raises ConfigError, HalError, UserError."""
+    page = options.into
+    if page is not None and not os.access(page if page.exists() else page.parent, os.W_OK):
+        # Now, not after minutes of measuring.
+        raise UserError(f"{page}: may not be written; name a page in a folder that exists")
     trials = []
     for kind in KINDS:
         for fault in FAULTS:

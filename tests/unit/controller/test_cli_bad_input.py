@@ -96,6 +96,11 @@ def test_a_scenario_where_nothing_is_simulated() -> None:
     assert "simulates nothing" in message
 
 
+def test_a_page_that_cannot_be_written_is_told_before_anything_is_measured(tmp_path: Path) -> None:
+    page = tmp_path / "nowhere" / "results.md"
+    assert f"{page}: may not be written" in refusal("faults", "--into", page)
+
+
 def test_odometry_that_is_asked_for_and_not_there() -> None:
     message = refusal("replay", DESK, "--odometry", "file")
     assert "desk_rpy/odometry.txt: there is no such file; choose another odometry, or none" in message
