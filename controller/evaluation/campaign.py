@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from concurrent.futures import as_completed
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Literal
 
@@ -64,13 +65,14 @@ def run_campaign(
     """Records by name of the sequence; on_done as each is finished. Equal for any number of workers,
     but for the times."""
     records = []
-    for record in _records(tasks, workers):
-        on_done(record)
-        records.append(record)
+    with closing(_records(tasks, workers)) as done:
+        for record in done:
+            on_done(record)
+            records.append(record)
     return tuple(sorted(records, key=lambda record: record.name))
 
 
-def _records(tasks: tuple[Task, ...], workers: int) -> Iterator[SequenceRecord]:
+def _records(tasks: tuple[Task, ...], workers: int) -> Generator[SequenceRecord, None, None]:
     with worker_processes(workers) as pool:
         futures = [pool.submit(run_task, task) for task in tasks]
         for future in as_completed(futures):
