@@ -14,13 +14,12 @@ from typing import Self
 
 from config.robot import Limits
 from hal.api import CanLink, Chassis
-from hal.clocks import NS_PER_S
+from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.enclosing import Enclosing
 from hal.errors import LinkLost
 from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
 
 _TOLERANCE = 1e-6
-_NS_PER_MS = 1_000_000
 
 # A setpoint is sent in the step that made it; older ones come from a program that hangs somewhere.
 _MAX_AGE_S = 0.1
@@ -62,11 +61,11 @@ def objection(setpoint: Setpoint, last: Setpoint | None, limits: GuardLimits, no
         return f"not finite: {v} m/s, {a} m/s2, {w} rad/s"
     age_ns = now_ns - setpoint.stamp_ns
     if age_ns < 0:
-        return f"the command is from the future: {-age_ns / _NS_PER_MS:.3f} ms"
+        return f"the command is from the future: {-age_ns / NS_PER_MS:.3f} ms"
     if not age_ns <= limits.max_age_s * NS_PER_S:
-        return f"the command is {age_ns / _NS_PER_MS:.0f} ms old"
+        return f"the command is {age_ns / NS_PER_MS:.0f} ms old"
     if last is not None and setpoint.stamp_ns < last.stamp_ns:
-        behind_ms = (last.stamp_ns - setpoint.stamp_ns) / _NS_PER_MS
+        behind_ms = (last.stamp_ns - setpoint.stamp_ns) / NS_PER_MS
         return f"the command is {behind_ms:.0f} ms older than the one before"
     if not v >= -_TOLERANCE:
         return f"backwards: {v:.3f} m/s"
@@ -177,7 +176,7 @@ class GuardedChassis(Enclosing):
     def _objection(self, setpoint: Setpoint | None, now_ns: int) -> str:
         last_ns, self._last_ns = self._last_ns, now_ns
         if last_ns is not None and now_ns < last_ns:
-            return f"time runs backwards by {(last_ns - now_ns) / _NS_PER_MS:.0f} ms"
+            return f"time runs backwards by {(last_ns - now_ns) / NS_PER_MS:.0f} ms"
         if setpoint is None:  # asks for the stop itself
             return ""
         return objection(setpoint, self._last, self._limits, now_ns)
