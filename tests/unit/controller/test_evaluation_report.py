@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -188,28 +187,13 @@ def test_numbers_of_tables() -> None:
         table(("a", "b"), [("1",)])
 
 
-class DyingPool:
-    """Stands for a pool whose worker was killed."""
-
-    def __init__(self, *_: object) -> None:
-        pass
-
-    def __enter__(self) -> DyingPool:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def submit(self, *_: object) -> Future[SequenceRecord]:
-        future: Future[SequenceRecord] = Future()
-        future.set_exception(BrokenProcessPool("killed"))
-        return future
-
-    def shutdown(self, **_: object) -> None:
-        pass
+def killed(_: Task) -> SequenceRecord:
+    """A worker that the system ends for want of memory."""
+    signal.raise_signal(signal.SIGKILL)
+    raise AssertionError("nobody is there to raise this")
 
 
 def test_a_worker_that_died_is_told_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("controller.evaluation.campaign.ProcessPoolExecutor", DyingPool)
+    monkeypatch.setattr("controller.evaluation.campaign.run_task", killed)
     with pytest.raises(UserError, match="--workers 1"):
         run_campaign((Task(STILL, (LIDAR,)),), 2, lambda _: None)
