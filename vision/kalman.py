@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hal.types import FloatArray
 
 _VERTICAL_S = 0.1  # how long a vertical velocity lasts: limbs have one, bodies have not
+_IDENTITY = np.eye(6)
 
 
 def predict(
@@ -21,15 +24,11 @@ def predict(
 
     up (3,): what stands on the floor keeps no velocity along it; None where the floor is not known.
     """
-    move = np.eye(6)
-    move[:3, 3:] = np.eye(3) * dt_s
+    move = _blocks(1.0, dt_s, 0.0, 1.0)
     if up is not None:
-        move[3:, 3:] -= (1.0 - np.exp(-dt_s / _VERTICAL_S)) * np.outer(up, up)
-    spread = np.zeros((6, 6))
-    density = accel_density
-    spread[:3, :3] = np.eye(3) * (density * dt_s**3 / 3.0)
-    spread[:3, 3:] = spread[3:, :3] = np.eye(3) * (density * dt_s**2 / 2.0)
-    spread[3:, 3:] = np.eye(3) * (density * dt_s)
+        move[3:, 3:] -= ((1.0 - math.exp(-dt_s / _VERTICAL_S)) * up[:, None]) * up
+    between = accel_density * dt_s**2 / 2.0
+    spread = _blocks(accel_density * dt_s**3 / 3.0, between, between, accel_density * dt_s)
     return state @ move.T, move @ covariance @ move.T + spread
 
 
@@ -45,7 +44,7 @@ def update(
     innovation = measured - state[:, part]
     gain = covariance[:, :, part] @ np.linalg.inv(covariance[:, part, part] + noise)
     new_state = state + (gain @ innovation[:, :, None])[:, :, 0]
-    keep = np.eye(6) - _pad(gain, first)
+    keep = _IDENTITY - _pad(gain, first)
     # Joseph's form: stays symmetric and positive whatever the rounding.
     new_covariance = keep @ covariance @ keep.transpose(0, 2, 1) + gain @ noise @ gain.transpose(0, 2, 1)
     return new_state, new_covariance
@@ -63,6 +62,12 @@ def place(
     new_covariance[:, :3, :3] = noise
     new_covariance[:, :3, 3:] = new_covariance[:, 3:, :3] = 0.0
     return new_state, new_covariance
+
+
+def _blocks(a: float, b: float, c: float, d: float) -> FloatArray:
+    """(6, 6) [[a, b], [c, d]], each times the identity (3, 3)."""
+    blocks: FloatArray = np.array(((a, b), (c, d)))[:, None, :, None] * np.eye(3)[:, None]
+    return blocks.reshape(6, 6)
 
 
 def _pad(gain: FloatArray, first: int) -> FloatArray:

@@ -119,21 +119,25 @@ class Tracks:
     def predict(self, dt_s: float, accel_density: float, up: FloatArray | None) -> None:
         """Move every track on. up (3,): along the floor's normal nothing keeps going; None: not known."""
         if len(self) and dt_s > 0:
-            self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_density, up)
-            self.surface_state, self.surface_covariance = kalman.predict(
-                self.surface_state, self.surface_covariance, dt_s, accel_density, up
-            )
+            # Both filters at once: the calls cost more than what they compute.
+            states = np.concatenate((self.state, self.surface_state))
+            covariances = np.concatenate((self.covariance, self.surface_covariance))
+            states, covariances = kalman.predict(states, covariances, dt_s, accel_density, up)
+            count = len(self)
+            self.state, self.surface_state = states[:count], states[count:]
+            self.covariance, self.surface_covariance = covariances[:count], covariances[count:]
 
     def locate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
         """The centres of tracks index (K,) were seen at position_m (K, 3) with covariance noise (K, 3, 3)."""
         if len(index) == 0:
             return
-        self.state[index], self.covariance[index] = kalman.update(
-            self.state[index], self.covariance[index], position_m, noise, 0
-        )
-        self.surface_state[index], self.surface_covariance[index] = kalman.update(
-            self.surface_state[index], self.surface_covariance[index], position_m, noise, 0
-        )
+        states = np.concatenate((self.state[index], self.surface_state[index]))
+        covariances = np.concatenate((self.covariance[index], self.surface_covariance[index]))
+        measured, doubt = np.concatenate((position_m, position_m)), np.concatenate((noise, noise))
+        states, covariances = kalman.update(states, covariances, measured, doubt, 0)
+        count = len(index)
+        self.state[index], self.surface_state[index] = states[:count], states[count:]
+        self.covariance[index], self.surface_covariance[index] = covariances[:count], covariances[count:]
 
     def relocate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
         """As locate, where the centre says nothing of the velocity."""
