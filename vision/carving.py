@@ -16,9 +16,9 @@ from vision import obstacles, regions
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
+from vision.obstacles import FragmentVelocities
 from vision.regions import IntGrid, Regions
 from vision.tracks import Tracks
-from vision.velocities import ends_of
 
 SUSPECT_EVIDENCE = 0.3
 _COMPACT_M = 1.6
@@ -36,16 +36,18 @@ def carve(
     labels: IntGrid,
     measured: Regions,
     arrived: BoolGrid,
+    velocities: FragmentVelocities,
     config: PerceptionConfig,
 ) -> IntGrid:
     """labels (h, w), track index + 1, with suspects cut out; they are started in tracks.
 
-    measured: of labels. The same labels come back where there is nothing to cut out.
+    measured: of labels. velocities: of the fragments detected. The same labels come back where there is
+    nothing to cut out.
     """
     if len(tracks) == 0:
         return labels
     grid = detection.grid
-    evidence = arrived | _around_moving_fragments(detection, labels, config)
+    evidence = arrived | _around_moving_fragments(detection, velocities, config)
     if not evidence.any():
         return labels
     mover = tracks.moving | (tracks.evidence > 0.0)
@@ -82,17 +84,18 @@ def carve(
     return np.where(own > 0, own + first, labels).astype(np.int32)
 
 
-def _around_moving_fragments(detection: Detection, labels: IntGrid, config: PerceptionConfig) -> BoolGrid:
+def _around_moving_fragments(
+    detection: Detection, velocities: FragmentVelocities, config: PerceptionConfig
+) -> BoolGrid:
     """(h, w) cells close to fragments that move in company, at their depth."""
-    result = np.zeros(labels.shape, np.bool_)
+    result = np.zeros(detection.grid.depth_m.shape, np.bool_)
     motion = detection.motion
     candidate = obstacles.moving_candidates(motion, detection.age_frames)
     chosen = np.flatnonzero(candidate)
     if len(chosen) < _MIN_FRAGMENTS:
         return result
-    limit = config.motion.max_speed_mps
-    velocity, covariance = obstacles.fragment_velocities(ends_of(motion, chosen), limit)
-    position = 0.5 * (motion.static_m[0::2] + motion.static_m[1::2])[chosen]
+    velocity, covariance = velocities.velocity_mps[chosen], velocities.covariance[chosen]
+    position = 0.5 * (motion.static_m[2 * chosen] + motion.static_m[2 * chosen + 1])
     sigma = depth_sigma_m(position[:, 2], config.depth_noise)
     group = obstacles.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS

@@ -37,8 +37,34 @@ class BodyVelocities:
     end_chi2: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FragmentVelocities:
+    """Of N fragments: velocity_mps (N, 3) over ground, covariance (N, 3, 3), each from its two ends alone.
+    per_end (14, 2N): what every end says, see NormalEquations; then the information on the velocity along z
+    in what depth itself does, and that times the velocity. Zero where an end is not usable."""
+
+    per_end: FloatArray
+    velocity_mps: FloatArray
+    covariance: FloatArray
+
+
+def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> FragmentVelocities:
+    """Weighted least squares for the two ends of each fragment."""
+    per_end = np.empty((14, len(motion.lag_s)))
+    per_end[:12] = normal_equations(motion, motion.usable.astype(float)).table
+    known = motion.usable & (motion.depth_step_m == motion.depth_step_m)
+    root = known * motion.depth_lag_s / motion.depth_step_sigma_m
+    per_end[12] = root * root
+    per_end[13] = root * (np.where(known, motion.depth_step_m, 0.0) / motion.depth_step_sigma_m)
+    summed = per_end[:, 0::2] + per_end[:, 1::2]
+    equations = NormalEquations(summed[:12])
+    equations.add_depth(summed[12], summed[13])
+    return FragmentVelocities(per_end, *solve_velocity(equations, max_speed_mps))
+
+
 def body_velocities(
     motion: PointMotion,
+    per_end: FloatArray,
     owner: NDArray[np.intp],
     bodies: int,
     start_mps: FloatArray,
@@ -46,16 +72,14 @@ def body_velocities(
 ) -> BodyVelocities:
     """Weighted least squares for one velocity per body, robust against ends that slide or swing.
 
-    owner (2N,): body of each end, -1 for none. start_mps (G, 3): velocity to judge outliers by at first.
+    per_end (14, 2N): as in FragmentVelocities. owner (2N,): body of each end, -1 for none. start_mps (G, 3):
+    velocity to judge outliers by at first.
     """
     use = motion.usable & (owner >= 0)
     member = np.zeros((bodies, len(owner)))
     chosen = np.flatnonzero(use)
     member[owner[chosen], chosen] = 1.0
     ends = member.sum(axis=1).astype(np.intp)
-    per_end = normal_equations(motion, np.ones(len(owner))).table
-    per_end = np.concatenate((per_end, _depth_steps(motion)))
-    per_end[:, ~use] = 0.0
     share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))
     velocity = start_mps
     safe_owner = np.where(use, owner, 0)
@@ -75,14 +99,6 @@ def body_velocities(
     return BodyVelocities(velocity, covariance, ends, agree, chi2)
 
 
-def _depth_steps(motion: PointMotion) -> FloatArray:
-    """(2, 2N) information on the velocity along z in what depth itself does, and that times the velocity."""
-    known = np.isfinite(motion.depth_step_m)
-    root = np.where(known, motion.depth_lag_s / motion.depth_step_sigma_m, 0.0)
-    step = np.where(known, motion.depth_step_m, 0.0) / motion.depth_step_sigma_m
-    return np.stack((root * root, root * step))
-
-
 def _end_chi2(motion: PointMotion, trust: FloatArray, velocity: FloatArray) -> FloatArray:
     """(2N,) chi-square of each end if it moves with velocity (3, 2N). trust: see end_information."""
     x, y = motion.ray.T
@@ -92,16 +108,6 @@ def _end_chi2(motion: PointMotion, trust: FloatArray, velocity: FloatArray) -> F
     xx, xy, yy = trust
     result: FloatArray = (xx * a + xy * b) * a + (xy * a + yy * b) * b
     return result
-
-
-def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> tuple[FloatArray, FloatArray]:
-    """(N, 3) velocity over ground of each fragment from its two ends, and its covariance (N, 3, 3)."""
-    weight = motion.usable.astype(float)
-    per_end = np.concatenate((normal_equations(motion, weight).table, _depth_steps(motion) * weight))
-    summed = per_end[:, 0::2] + per_end[:, 1::2]
-    equations = NormalEquations(summed[:12])
-    equations.add_depth(summed[12], summed[13])
-    return solve_velocity(equations, max_speed_mps)
 
 
 def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:

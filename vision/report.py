@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision.detection import Detection
+from vision.obstacles import FragmentVelocities
 from vision.scene import Fragments, Obstacle
 from vision.tracks import Tracks
 
@@ -63,8 +64,7 @@ def fragments(
     detection: Detection,
     owner: NDArray[np.int64],
     moving: NDArray[np.bool_],
-    velocity: FloatArray,
-    covariance: FloatArray,
+    velocities: FragmentVelocities,
 ) -> Fragments:
     """The fragments with their owners (N,) and whether these move (N,)."""
     camera = detection.camera
@@ -76,13 +76,13 @@ def fragments(
     position[:, 2] = depth
     usable = detection.motion.usable.reshape(-1, 2)
     measured = (usable[:, 0] | usable[:, 1])[:, None]
-    sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    sigma = np.sqrt(np.diagonal(velocities.covariance, axis1=1, axis2=2))
     return Fragments(
         ids=detection.ids,
         ends_px=detection.ends_px,
         depth_m=depth,
         position_m=position,
-        velocity_mps=np.where(measured, velocity, np.nan),
+        velocity_mps=np.where(measured, velocities.velocity_mps, np.nan),
         velocity_sigma_mps=np.where(measured, sigma, np.nan),
         moving=moving,
         obstacle_id=owner,

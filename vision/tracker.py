@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
-from hal.types import FloatArray, PlanarPose
+from hal.types import PlanarPose
 from vision import carving, grouping, kalman, masks, obstacles, regions, report, sightings
 from vision.arrivals import FreeMemory
 from vision.depth_grid import BoolGrid, DepthGrid
@@ -16,6 +16,7 @@ from vision.depth_guard import free_space
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.judgement import MotionEvidence, judge
+from vision.obstacles import FragmentVelocities
 from vision.regions import IntGrid, Regions
 from vision.scene import CameraCondition, Fragments, Scene
 from vision.tracks import Tracks
@@ -70,15 +71,14 @@ class Tracker:
         self._last_ns = max(detection.captured_ns, self._last_ns or 0)
         owner = self._owners(detection.ids)
         standing = regions.standing(detection.grid, self._clearance_m)
-        limit = self._config.motion.max_speed_mps
-        velocity, covariance = obstacles.fragment_velocities(detection.motion, limit)
+        velocities = obstacles.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
         if detection.health.condition is not CameraCondition.UNTRUSTWORTHY or detection.restarted:
-            owner = self._follow(detection, standing, owner, elapsed_s)
+            owner = self._follow(detection, standing, owner, velocities, elapsed_s)
         unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
         young = tracks.sightings < report.MIN_SIGHTINGS
         tracks.keep(unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S))
         self._fragment_ids, self._fragment_owner = detection.ids, owner
-        return self._percept(detection, standing, owner, velocity, covariance, robot_pose)
+        return self._percept(detection, standing, owner, velocities, robot_pose)
 
     def _owners(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
         """(N,) track id of each fragment as of the frame before, -1 for none."""
@@ -92,23 +92,33 @@ class Tracker:
         return result
 
     def _follow(
-        self, detection: Detection, standing: BoolGrid, owner: NDArray[np.int64], elapsed_s: float
+        self,
+        detection: Detection,
+        standing: BoolGrid,
+        owner: NDArray[np.int64],
+        velocities: FragmentVelocities,
+        elapsed_s: float,
     ) -> NDArray[np.int64]:
         """Surfaces first, then velocities, then the verdict. Returns the owners of the fragments."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         arrived = self._free.arrived(grid, standing, pose, detection.captured_ns)
         self._free.remember(grid, pose, detection.captured_ns)
-        labels, measured = self._label(detection, standing, arrived, elapsed_s)
+        labels, measured = self._label(detection, standing, arrived, velocities, elapsed_s)
         sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
         owner = self._adopt(detection, labels, owner)
         arrivals = np.bincount(labels[arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
-            self._measure_velocities(detection, owner, arrivals, measured.cells)
+            self._measure_velocities(detection, owner, velocities, arrivals, measured.cells)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
         return owner
 
     def _label(
-        self, detection: Detection, standing: BoolGrid, arrived: BoolGrid, elapsed_s: float
+        self,
+        detection: Detection,
+        standing: BoolGrid,
+        arrived: BoolGrid,
+        velocities: FragmentVelocities,
+        elapsed_s: float,
     ) -> tuple[IntGrid, Regions]:
         """(h, w) track index + 1 of each cell, after births, and what the tracks' surfaces measure."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
@@ -124,7 +134,7 @@ class Tracker:
         labels = masks.divide(parts, predicted, ballot, winner)
         labels = self._births(detection, parts, measured, winner, labels)
         measured = regions.measure(grid, labels, len(tracks))
-        carved = carving.carve(tracks, detection, labels, measured, arrived, self._config)
+        carved = carving.carve(tracks, detection, labels, measured, arrived, velocities, self._config)
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))
         labels = self._regroup(detection, carved, measured)
@@ -205,6 +215,7 @@ class Tracker:
         self,
         detection: Detection,
         owner: NDArray[np.int64],
+        velocities: FragmentVelocities,
         arrivals: NDArray[np.intp],
         cells: NDArray[np.intp],
     ) -> None:
@@ -215,6 +226,7 @@ class Tracker:
         tracks.fragments = np.bincount(index[index >= 0], minlength=len(tracks)).astype(np.intp)
         body = obstacles.body_velocities(
             detection.motion,
+            velocities.per_end,
             np.repeat(index, 2),
             len(tracks),
             tracks.state[:, 3:] @ rotation,
@@ -264,8 +276,7 @@ class Tracker:
         detection: Detection,
         standing: BoolGrid,
         owner: NDArray[np.int64],
-        velocity: FloatArray,
-        covariance: FloatArray,
+        velocities: FragmentVelocities,
         robot_pose: PlanarPose | None,
     ) -> Percept:
         tracks = self._tracks
@@ -281,7 +292,7 @@ class Tracker:
         index = tracks.index_of(owner)
         moving = np.concatenate((tracks.moving, [False]))[index]
         owner = np.where(index >= 0, owner, -1)
-        return Percept(scene, report.fragments(detection, owner, moving, velocity, covariance))
+        return Percept(scene, report.fragments(detection, owner, moving, velocities))
 
     def _in_the_way(self, grid: DepthGrid, standing: BoolGrid) -> BoolGrid:
         return standing if grid.height_m is None else standing & (grid.height_m < self._body_height_m)

@@ -58,13 +58,6 @@ class PointMotion:
     usable: NDArray[np.bool_]
 
 
-def ends_of(motion: PointMotion, fragments: NDArray[np.intp]) -> PointMotion:
-    """The evidence of the ends of some fragments only; both ends lie next to each other."""
-    ends = np.repeat(2 * fragments, 2)
-    ends[1::2] += 1
-    return PointMotion(*(getattr(motion, name)[ends] for name in PointMotion.__slots__))
-
-
 def static_miss(static_m: FloatArray, ray: FloatArray) -> FloatArray:
     """(N, 2) x' Z - X and y' Z - Y: how far, in metres at its depth, a point is from where it should be."""
     return ray * static_m[:, 2:3] - static_m[:, :2]
@@ -93,6 +86,7 @@ def end_information(motion: PointMotion) -> FloatArray:
 # Where the entries of a symmetric 3x3 matrix stand in its six different ones 00, 01, 02, 11, 12, 22, and
 # which of these make its cofactors: a b - c d.
 _SYMMETRIC = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])
+_DIAGONAL = np.array([0, 3, 5])
 _COFACTORS = np.array([[3, 2, 1, 0, 1, 0], [5, 4, 4, 5, 2, 3], [4, 1, 2, 2, 0, 1], [4, 5, 3, 2, 4, 1]])
 
 
@@ -155,12 +149,12 @@ def solve_velocity(equations: NormalEquations, max_speed_mps: float) -> tuple[Fl
     What the equations leave open is bounded by max_speed_mps (the paper's V_omax), never zero.
     """
     information = equations.table[:6].copy()
-    information[[0, 3, 5]] += 1.0 / max_speed_mps**2
+    information[_DIAGONAL] += 1.0 / max_speed_mps**2
     # The inverse by its cofactors: for stacks of 3x3 matrices far faster than a general solver.
-    a, b, c, d = information[_COFACTORS]
+    a, b, c, d = information.take(_COFACTORS, axis=0)
     cofactors = a * b - c * d
     determinant = (information[:3] * cofactors[:3]).sum(axis=0)
-    inverse = (cofactors / determinant)[_SYMMETRIC].reshape(3, 3, -1)
+    inverse = (cofactors / determinant).take(_SYMMETRIC, axis=0).reshape(3, 3, -1)
     sides = equations.table[6:].reshape(2, 1, 3, -1)
     velocity, common = (inverse * sides).sum(axis=2)
     covariance = inverse + common[:, None] * common

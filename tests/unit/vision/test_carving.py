@@ -12,7 +12,7 @@ from config.perception import PerceptionConfig
 from hal.types import FloatArray
 from tests.support.detections import detection
 from tests.support.grids import CAMERA, COLUMNS, ROWS, grid_of, labelled, nearest, plate, wall
-from vision import carving, regions
+from vision import carving, obstacles, regions
 from vision.detection import Detection
 from vision.tracks import Tracks
 from vision.velocities import PointMotion
@@ -52,7 +52,8 @@ def carve(
     labels = labelled(of_track)
     measured = regions.measure(grid, labels, 1)
     looked = detection(grid, FRAME) if seen is None else replace(seen, grid=grid)
-    return labels, carving.carve(tracks, looked, labels, measured, arrived, CONFIG)
+    velocities = obstacles.fragment_velocities(looked.motion, CONFIG.motion.max_speed_mps)
+    return labels, carving.carve(tracks, looked, labels, measured, arrived, velocities, CONFIG)
 
 
 def test_what_arrived_before_a_wall_is_cut_out_as_a_suspect() -> None:
@@ -114,7 +115,9 @@ def test_without_tracks_there_is_nothing_to_cut() -> None:
     labels = np.zeros((ROWS, COLUMNS), np.int32)
     grid = grid_of(BACK)
     measured = regions.measure(grid, labels, 0)
-    assert carving.carve(Tracks(), detection(grid, FRAME), labels, measured, PERSON, CONFIG) is labels
+    looked = detection(grid, FRAME)
+    velocities = obstacles.fragment_velocities(looked.motion, CONFIG.motion.max_speed_mps)
+    assert carving.carve(Tracks(), looked, labels, measured, PERSON, velocities, CONFIG) is labels
 
 
 def fragments(columns: list[int], speed_mps: float, chi2: float) -> Detection:

@@ -13,6 +13,7 @@ from tests.support.grids import CAMERA, grid_of, no_depth
 from vision import report
 from vision.detection import Detection
 from vision.lens import rotation_from_vector
+from vision.obstacles import FragmentVelocities
 from vision.tracks import Tracks
 from vision.velocities import PointMotion
 
@@ -101,7 +102,8 @@ def test_fragments_have_their_middle_in_space_and_no_velocity_that_was_not_measu
     velocity: FloatArray = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
     covariance = np.tile(np.diag([0.01, 0.04, 0.09]), (2, 1, 1))
     owner, moving = np.array([5, -1]), np.array([True, False])
-    told = report.fragments(two_fragments(), owner, moving, velocity, covariance)
+    velocities = FragmentVelocities(np.zeros((14, 4)), velocity, covariance)
+    told = report.fragments(two_fragments(), owner, moving, velocities)
     np.testing.assert_array_equal(told.ids, [3, 8])
     np.testing.assert_allclose(told.depth_m, [4.0, np.nan])
     expected = [(110.0 - CAMERA.cx) / 300.0 * 4.0, (70.0 - CAMERA.cy) / 300.0 * 4.0, 4.0]

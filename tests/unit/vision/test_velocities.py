@@ -12,7 +12,6 @@ from vision.velocities import (
     chi2_2d,
     depth_after,
     end_information,
-    ends_of,
     lateral_after,
     normal_equations,
     solve_velocity,
@@ -175,11 +174,3 @@ def test_stacks_of_bodies_are_solved_at_once_and_as_a_general_solver_does() -> N
     common = (inverse @ doubt[:, :, None])[:, :, 0]
     np.testing.assert_allclose(velocity, (inverse @ rhs[:, :, None])[:, :, 0], rtol=1e-7)
     np.testing.assert_allclose(covariance, inverse + common[:, :, None] * common[:, None, :], rtol=1e-7)
-
-
-def test_ends_of_some_fragments() -> None:
-    motion = evidence(np.arange(18.0).reshape(6, 3), np.arange(12.0).reshape(6, 2), 1.0)
-    some = ends_of(motion, np.array([2, 0]))
-    np.testing.assert_array_equal(some.static_m, motion.static_m[[4, 5, 0, 1]])
-    np.testing.assert_array_equal(some.miss_m, motion.miss_m[[4, 5, 0, 1]])
-    assert len(some.usable) == 4
