@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from config.perception import MotionSettings
 from hal.types import FloatArray
+from vision.symmetric import inverse
 
 _RISE_S = 0.07
 _FASTEST = 2.5  # times, with overwhelming proof
@@ -217,12 +218,16 @@ def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray) -> Sp
     onto = np.eye(3) - onto_sight
     rest = velocity - value[..., None] * sight
     doubt = onto @ covariance @ onto + (onto_sight + np.eye(3) * _FLOOR_SIGMA_MPS**2)
-    across = (rest[..., None, :] @ np.linalg.solve(doubt, rest[..., :, None]))[..., 0, 0]
+    across = _squared_length(rest, doubt)
     return Split(value, variance, rest, along, across)
 
 
 def squared_sigmas(velocity: FloatArray, covariance: FloatArray) -> FloatArray:
     """(T,) squared distance of velocity (T, 3) from zero in its own standard deviations."""
-    doubt = covariance + np.eye(3) * _FLOOR_SIGMA_MPS**2
-    result: FloatArray = (velocity[:, None, :] @ np.linalg.solve(doubt, velocity[:, :, None]))[:, 0, 0]
+    return _squared_length(velocity, covariance + np.eye(3) * _FLOOR_SIGMA_MPS**2)
+
+
+def _squared_length(vector: FloatArray, covariance: FloatArray) -> FloatArray:
+    """(...,) of vector (..., 3) in sigmas of covariance (..., 3, 3)."""
+    result: FloatArray = (vector[..., None, :] @ inverse(covariance) @ vector[..., :, None])[..., 0, 0]
     return result

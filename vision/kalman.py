@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hal.types import FloatArray
+from vision.symmetric import inverse
 
 _VERTICAL_S = 0.1  # how long a vertical velocity lasts: limbs have one, bodies have not
 _IDENTITY = np.eye(6)
@@ -42,7 +43,7 @@ def update(
     """After measuring three entries from index first (0: position, 3: velocity): (T, 3) with (T, 3, 3)."""
     part = slice(first, first + 3)
     innovation = measured - state[:, part]
-    gain = covariance[:, :, part] @ np.linalg.inv(covariance[:, part, part] + noise)
+    gain = covariance[:, :, part] @ inverse(covariance[:, part, part] + noise)
     new_state = state + (gain @ innovation[:, :, None])[:, :, 0]
     keep = _IDENTITY - _pad(gain, first)
     # Joseph's form: stays symmetric and positive whatever the rounding.

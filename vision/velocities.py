@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
+from vision.symmetric import inverse_entries, whole
 
 
 def depth_after(depth_m: FloatArray, length_before: FloatArray, length_now: FloatArray) -> FloatArray:
@@ -83,11 +84,7 @@ def end_information(motion: PointMotion) -> FloatArray:
     return result
 
 
-# Where the entries of a symmetric 3x3 matrix stand in its six different ones 00, 01, 02, 11, 12, 22, and
-# which of these make its cofactors: a b - c d.
-_SYMMETRIC = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])
-_DIAGONAL = np.array([0, 3, 5])
-_COFACTORS = np.array([[3, 2, 1, 0, 1, 0], [5, 4, 4, 5, 2, 3], [4, 1, 2, 2, 0, 1], [4, 5, 3, 2, 4, 1]])
+_DIAGONAL = np.array([0, 3, 5])  # of the six entries of a symmetric 3x3 matrix
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,8 +100,7 @@ class NormalEquations:
     @property
     def matrix(self) -> FloatArray:
         """(N, 3, 3)."""
-        matrix: FloatArray = self.table[_SYMMETRIC].T.reshape(-1, 3, 3)
-        return matrix
+        return whole(self.table[:6]).transpose(2, 0, 1)
 
     @property
     def rhs(self) -> FloatArray:
@@ -150,11 +146,7 @@ def solve_velocity(equations: NormalEquations, max_speed_mps: float) -> tuple[Fl
     """
     information = equations.table[:6].copy()
     information[_DIAGONAL] += 1.0 / max_speed_mps**2
-    # The inverse by its cofactors: for stacks of 3x3 matrices far faster than a general solver.
-    a, b, c, d = information.take(_COFACTORS, axis=0)
-    cofactors = a * b - c * d
-    determinant = (information[:3] * cofactors[:3]).sum(axis=0)
-    inverse = (cofactors / determinant).take(_SYMMETRIC, axis=0).reshape(3, 3, -1)
+    inverse = whole(inverse_entries(information))
     sides = equations.table[6:].reshape(2, 1, 3, -1)
     velocity, common = (inverse * sides).sum(axis=2)
     covariance = inverse + common[:, None] * common
