@@ -28,8 +28,8 @@ _MIN_INLIER_RATIO = 0.25
 _MIN_BACKGROUND_RATIO = 0.10
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2])  # of the prior's sigma, where it decides
-_CONVERGED = 2e-5
-_STRAIGHT = 3e-4  # after a step that is no longer (rad, m) the image moves as its derivatives say
+_CONVERGED_SIGMAS = 0.2  # a step of less is nothing beside what the pose may be off anyway
+_STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivatives say, to 0.01 px
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,8 +129,8 @@ def estimate(
     ratio = found.inliers / len(use)
     if found.inliers < least or torn:
         return CameraEstimate(start, unseen.covariance, ratio, False)
-    covariance = np.linalg.inv(found.information).astype(np.float64, copy=False)
-    return CameraEstimate(found.pose, covariance, ratio, True)
+    _, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
+    return CameraEstimate(found.pose, np.asarray(covariance, np.float64), ratio, True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,13 +206,14 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
         # Six rows of the normal matrix, and in the last column the right side.
         normal = (table[:7] * weights).reshape(7, 3 * count) @ flat.T
         information = normal[:6, :6] + prior_information
-        _, solved = cv2.solve(information, (normal[:6, 6] + prior * missing)[:, None])
+        side = normal[:6, 6] + prior * missing
+        _, solved = cv2.solve(information, side[:, None])
         step = np.asarray(solved, np.float64)[:, 0]
-        length = max(map(abs, step.tolist()))
         gone = gone + step
-        if iteration >= len(_ANNEAL) and length < _CONVERGED:
+        # The step in standard deviations, squared.
+        if iteration >= len(_ANNEAL) and float(step @ side) < _CONVERGED_SIGMAS**2:
             break
-        if length > _STRAIGHT:
+        if max(map(abs, gone.tolist())) > _STRAIGHT:
             pose, gone = _moved(pose, gone), np.zeros(6)
             in_front = _linearise(view, pose, table)
             missing = _difference(pose, start)
@@ -282,7 +283,7 @@ def _shift(view: _View, start: Pose, sigma: FloatArray) -> Pose:
     across, down = median(view.seen - local[:2] / np.maximum(local[2], 0.1))
     turn = np.array([down, -across, 0.0])
     limit = 3.0 * sigma[:3]
-    return start @ Pose(rotation_from_vector(np.clip(turn, -limit, limit)), np.zeros(3))
+    return start @ Pose(rotation_from_vector(np.minimum(np.maximum(turn, -limit), limit)), np.zeros(3))
 
 
 def _difference(pose: Pose, start: Pose) -> FloatArray:
