@@ -6,6 +6,8 @@ it, so each end is moved to the most corner-like pixel close by.
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +20,14 @@ _SNAP_PX = 4
 _WINDOW_PX = 3
 _MARGIN_PX = _SNAP_PX + _WINDOW_PX + 2
 _ONES = np.ones(2 * _WINDOW_PX + 1)
+# The shortest segments, of 32 px, turn by this much when an end moves by a pixel: finer says no more.
+_ANGLE_RAD = math.radians(2.0)
 
 
 def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32]:
     """(N, 2, 2) segments of at least min_length_px that the probabilistic Hough transform finds."""
     found = cv2.HoughLinesP(
-        edges, 1.0, np.pi / 180.0, int(0.8 * min_length_px), minLineLength=min_length_px, maxLineGap=3
+        edges, 1.0, _ANGLE_RAD, int(0.8 * min_length_px), minLineLength=min_length_px, maxLineGap=3
     )
     if found is None:
         return np.empty((0, 2, 2), np.float32)
