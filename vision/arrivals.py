@@ -23,6 +23,7 @@ _MARGIN_M = 0.10
 _SIGMAS = 3.5
 _NEIGHBOURS = 5  # of a cell and its eight neighbours, this many must have arrived
 _UNKNOWN = np.float32(1e3)
+_BLOCK = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,9 +63,10 @@ class FreeMemory:
         """Keep this view, unless the last one kept is very young."""
         if self._memories and (now_ns - self._memories[-1].stamp_ns) * 1e-9 < _KEEP_EVERY_S:
             return
-        known = grid.valid | grid.beyond
-        nearest = cv2.dilate(np.where(known, grid.inverse_depth, _UNKNOWN), np.ones((3, 3), np.uint8))
-        self._memories.append(_Memory(now_ns, pose, np.asarray(nearest, np.float32)))
+        nearest = np.full(grid.inverse_depth.shape, _UNKNOWN)
+        cv2.copyTo(grid.inverse_depth, (grid.valid | grid.beyond).view(np.uint8), nearest)
+        cv2.dilate(nearest, _BLOCK, nearest)
+        self._memories.append(_Memory(now_ns, pose, nearest))
         horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))
         self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
 

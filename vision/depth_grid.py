@@ -154,9 +154,8 @@ def _view(
 
 def _inverted(values: FloatGrid, valid: BoolGrid) -> FloatGrid:
     """1 / values where valid, else 0. valid values are not small: nothing else is divided by."""
-    result: FloatGrid = np.reciprocal(np.maximum(values, np.float32(_SMALLEST)))
-    result *= valid
-    return result
+    inverted = np.reciprocal(np.maximum(values, np.float32(_SMALLEST)))
+    return np.asarray(cv2.copyTo(inverted, valid.view(np.uint8)), np.float32)
 
 
 def _smooth(inverse: FloatGrid, valid: BoolGrid) -> FloatGrid:
@@ -180,9 +179,9 @@ def _four_samples(depth: DepthImage, step: int, scale_m: float) -> DepthImage:
     second = np.minimum(np.maximum(a, b), np.maximum(c, d))
     nearer, farther = np.minimum(first, second), np.maximum(first, second)
     gap = farther - nearer
-    # 1/nearer - 1/farther <= k, without a division.
-    same = gap <= np.float32(_AGREE_INVERSE * scale_m) * nearer * farther.astype(np.float32)
+    # 1/nearer - 1/farther <= k, without a division; in one type each, or NumPy converts piece by piece.
+    reach = np.multiply(nearer, farther, dtype=np.float32) * np.float32(_AGREE_INVERSE * scale_m)
+    same = gap.astype(np.float32) <= reach
     gap >>= 1
-    gap *= same
-    nearer += gap
+    nearer += np.multiply(gap, same.view(np.uint8), dtype=np.uint16)
     return nearer

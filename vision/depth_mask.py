@@ -54,19 +54,20 @@ def surface_depth(
     """Near and far surface around pixels (N, 2), within [min_m, max_m] (the paper's 10 m)."""
     sample_m = _samples(depth, pixels) * np.float32(scale_m)
     sample_m[(sample_m < min_m) | (sample_m > max_m)] = _NO_DATA_M
-    ordered = np.sort(sample_m, axis=1)
+    # One column per point: sums over the samples then run along the memory.
+    ordered = np.ascontiguousarray(np.sort(sample_m, axis=1).T)
     valid = ordered < _NO_DATA_M
     count = _count(valid)
     # With holes around, the same share of what is valid decides.
     rank = np.minimum(_NEAR_RANK, count // 3)
-    anchor_m = ordered[np.arange(len(rank)), rank]
-    gate_m = (0.06 + 3.0 * depth_sigma_m(anchor_m.astype(float), noise)).astype(np.float32)[:, None]
-    behind_m = ordered - anchor_m[:, None]
+    anchor_m = ordered[rank, np.arange(len(rank))]
+    gate_m = (0.06 + 3.0 * depth_sigma_m(anchor_m.astype(float), noise)).astype(np.float32)
+    behind_m = ordered - anchor_m
     is_near = np.abs(behind_m) <= gate_m
     is_far = (behind_m > gate_m) & valid
     near_count, far_count = _count(is_near), _count(is_far)
-    near_m = (ordered * is_near).sum(axis=1) / np.maximum(near_count, 1).astype(float)
-    far_m = (ordered * is_far).sum(axis=1) / np.maximum(far_count, 1).astype(float)
+    near_m = _sum(ordered, is_near) / np.maximum(near_count, 1)
+    far_m = _sum(ordered, is_far) / np.maximum(far_count, 1)
     near_m[(count < _MIN_SUPPORT) | (near_count < 2)] = np.nan
     return SurfaceDepth(near_m, np.where((far_count >= 2) & (near_m == near_m), far_m, near_m))
 
@@ -83,6 +84,12 @@ def _samples(depth: DepthImage, pixels: RealArray) -> DepthImage:
 
 
 def _count(chosen: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """(N,) how many of the samples (N, 25) are chosen."""
-    result: NDArray[np.uint8] = np.add.reduce(chosen.view(np.uint8), axis=1, dtype=np.uint8)
+    """(N,) how many of the samples (25, N) are chosen."""
+    result: NDArray[np.uint8] = np.add.reduce(chosen.view(np.uint8), axis=0, dtype=np.uint8)
+    return result
+
+
+def _sum(depth_m: NDArray[np.float32], chosen: NDArray[np.bool_]) -> FloatArray:
+    """(N,) sum of the chosen ones of the samples (25, N)."""
+    result: FloatArray = np.add.reduce(depth_m * chosen, axis=0, dtype=np.float64)
     return result

@@ -132,7 +132,7 @@ def count_votes(
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:
     """(h, w) track index + 1: whole parts to their winner (P,), shared ones by the nearest vote."""
     labels = np.append(np.int32(0), winner).take(parts)
-    shared = np.append(False, (np.count_nonzero(ballot.present, axis=1) > 1) & (winner > 0))
+    shared = np.append(False, (ballot.present.sum(axis=1) > 1) & (winner > 0))
     if not shared.any():
         return labels
     count, tracks = ballot.present.shape

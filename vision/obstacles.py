@@ -121,7 +121,8 @@ def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDAr
 def cluster(
     position_m: FloatArray, velocity: FloatArray, covariance: FloatArray, depth_sigma_m: FloatArray
 ) -> NDArray[np.intp]:
-    """(M,) group of each of M moving fragments: neighbours in space that move alike are of one body."""
+    """(M,) which group each of M moving fragments belongs to, as the index of its first one: neighbours in
+    space that move alike are of one body."""
     count = len(position_m)
     if count == 0:
         return np.empty(0, np.intp)
@@ -139,4 +140,4 @@ def cluster(
         if (lowest == group).all():
             break
         group = lowest
-    return np.unique(group, return_inverse=True)[1].astype(np.intp)
+    return group

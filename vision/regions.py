@@ -67,14 +67,16 @@ def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
     kept[:, :-1] &= across <= jump
     kept[1:] &= down >= -jump
     kept[:-1] &= down <= jump
-    # Counting the cells here is a third of the work of OpenCV's own statistics.
-    _, found = cv2.connectedComponents(kept.view(np.uint8), connectivity=4)
+    # Counting the cells here is a fraction of the work of OpenCV's own statistics.
+    count, found = cv2.connectedComponents(kept.view(np.uint8), connectivity=4)
     labels: IntGrid = np.asarray(found, np.int32)
+    cells = np.flatnonzero(kept)
+    label = labels.ravel().take(cells)
     # Renumber, leaving out the speckles.
-    large = np.bincount(labels.ravel()) >= _SPECKLE_CELLS
-    large[0] = False
-    number = np.where(large, np.cumsum(large), 0).astype(np.int32)
-    return int(np.count_nonzero(large)), number.take(labels)
+    large = np.bincount(label, minlength=count) >= _SPECKLE_CELLS
+    number = (np.cumsum(large) * large).astype(np.int32)
+    labels.ravel()[cells] = number.take(label)
+    return int(number.max()), labels
 
 
 def _sorted_cells(labels: IntGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -168,12 +170,12 @@ def _foot_px(
 def _hidden_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.intp]:
     """(count,) cells at the left or right rim of each part beside which something else stands nearer."""
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    step = inverse[1:] - inverse[:-1]
-    jumps = np.flatnonzero(np.abs(step) > np.float32(_LEAST_JUMP))
-    jumps = jumps[(jumps + 1) % labels.shape[1] > 0]  # not from the end of a row to the next one
-    a, b = flat[jumps], flat[jumps + 1]
-    rim = np.where(step[jumps] > 0, a, b)[a != b]
-    return np.bincount(rim, minlength=count + 1)[1:]
+    rims = np.flatnonzero(flat[1:] != flat[:-1])
+    rims = rims[(rims + 1) % labels.shape[1] > 0]  # not from the end of a row to the next one
+    step = inverse.take(rims + 1) - inverse.take(rims)
+    farther = np.where(step > 0, flat.take(rims), flat.take(rims + 1))
+    hidden = farther[np.abs(step) > np.float32(_LEAST_JUMP)]
+    return np.bincount(hidden, minlength=count + 1)[1:]
 
 
 def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:

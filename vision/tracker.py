@@ -175,8 +175,8 @@ class Tracker:
         grid, tracks = detection.grid, self._tracks
         large = (winner == 0) & (measured.cells >= _MIN_CELLS)
         if grid.height_m is not None and large.any():
-            low = np.bincount(parts[grid.height_m < self._body_height_m], minlength=len(winner) + 1)[1:]
-            large &= low >= _MIN_CELLS // 2
+            low = parts * (grid.height_m < self._body_height_m).view(np.uint8)
+            large &= np.bincount(low.ravel(), minlength=len(winner) + 1)[1:] >= _MIN_CELLS // 2
         born = np.flatnonzero(large)
         if len(born) == 0:
             return labels
