@@ -20,7 +20,6 @@ from vision.lens import RealArray
 Depths = TypeVar("Depths", NDArray[np.float32], NDArray[np.float64])
 
 _REACH_PX = np.array((-6, -3, 0, 3, 6))
-_SAMPLES = len(_REACH_PX) ** 2
 _NEAR_RANK = 4  # the 5th nearest of 25 samples: a corner of a body still covers a fifth of them
 _MIN_SUPPORT = 4
 _NO_DATA_M = np.float32(1e6)  # sorts behind everything that is valid
@@ -73,13 +72,14 @@ def surface_depth(
 
 
 def _samples(depth: DepthImage, pixels: RealArray) -> DepthImage:
-    """(N, 25) raw depth around pixels (N, 2); samples beyond the border are taken at the border."""
+    """(N, 25) raw depth around pixels (N, 2); close to the border they lie to one side, within the image."""
     height, width = depth.shape
     centre = np.rint(pixels).astype(np.intp)
-    column = np.minimum(np.maximum(centre[:, :1] + _REACH_PX, 0), width - 1)
-    row = np.minimum(np.maximum(centre[:, 1:] + _REACH_PX, 0), height - 1)
-    index = (row * width)[:, :, None] + column[:, None, :]
-    samples: DepthImage = depth.ravel().take(index.reshape(len(pixels), _SAMPLES))
+    reach = int(_REACH_PX[-1])
+    column = np.minimum(np.maximum(centre[:, 0], reach), width - 1 - reach)
+    row = np.minimum(np.maximum(centre[:, 1], reach), height - 1 - reach)
+    around = (_REACH_PX[:, None] * width + _REACH_PX).ravel()
+    samples: DepthImage = depth.ravel().take((row * width + column)[:, None] + around)
     return samples
 
 

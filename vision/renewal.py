@@ -152,8 +152,8 @@ class Renewal:
         picked = whole[_rank_within(tile) < missing[tile]][: max(0, room[0])]
         return NewFragments(
             snapped[picked],
-            near[picked][:, [0, 4]].astype(np.float32),
-            far[picked][:, [0, 4]].astype(np.float32),
+            near[picked, ::4].astype(np.float32),
+            far[picked, ::4].astype(np.float32),
             _flow_covariance(tensor[picked], settings.pixel_sigma_px),
         )
 

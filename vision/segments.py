@@ -54,12 +54,8 @@ def snap_to_corners(
     right, bottom = int(column.max()) + _MARGIN_PX + 1, int(row.max()) + _MARGIN_PX + 1
     tensor = _structure(grey[top:bottom, left:right])
     reach = np.arange(-_SNAP_PX, _SNAP_PX + 1)
-    index = (
-        ((row - top)[:, None, None] + reach[:, None]) * (right - left)
-        + (column - left)[:, None, None]
-        + reach
-    )
-    index = index.reshape(len(centre), -1)
+    around = (reach[:, None] * (right - left) + reach).ravel()
+    index = ((row - top) * (right - left) + (column - left))[:, None] + around
     uu, uv, vv = (part.ravel().take(index) for part in tensor)
     best = smaller_eigenvalue(uu, uv, vv).argmax(axis=1)
     side = len(reach)

@@ -81,3 +81,13 @@ def test_points_at_the_rim_and_none_at_all() -> None:
     rim = np.array([[0.0, 0.0], [79.0, 59.0]])
     np.testing.assert_allclose(at_middle(flat(1500), rim).near_m, [1.5, 1.5], rtol=1e-6)
     assert at_middle(flat(1500), np.empty((0, 2))).near_m.shape == (0,)
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (79.0, 59.0), (85.0, -4.0)])
+def test_close_to_the_border_depth_is_read_within_the_image(corner: tuple[float, float]) -> None:
+    """The 13 px around the point that lie within the image, and nothing of the opposite side."""
+    depth = flat(9000)
+    depth[:13, :13] = depth[-13:, -13:] = depth[:13, -13:] = 2000
+    found = at_middle(depth, np.array([corner]))
+    np.testing.assert_allclose(found.near_m, [2.0], rtol=1e-6)
+    np.testing.assert_allclose(found.far_m, [2.0], rtol=1e-6)
