@@ -27,6 +27,7 @@ _LEAST_UPRIGHT = 0.7  # cosine: a camera held more askew than 45 degrees is not 
 _HEIGHT_M = (0.15, 2.5)
 _REFINEMENTS = 3
 _KEEP_FRAMES = 5
+_SEARCH_EVERY = 5  # frames: a floor neither comes nor goes in less
 _SIGMA_M = 0.01  # of the plane itself
 _SIGMA_PER_METRE = 0.006
 
@@ -40,10 +41,12 @@ class Floor:
 
 
 class FloorFinder:
-    """Looks for the floor in every frame; the plane of the frame before is one of the candidates."""
+    """Follows the floor from frame to frame. Every few frames, and at once when it is lost, all planes are
+    compared; that of the frame before is one of them."""
 
     def __init__(self) -> None:
         self._plane: FloatArray | None = None
+        self._unsearched = _SEARCH_EVERY
         self._missed = 0
 
     def find(self, grid: DepthGrid) -> Floor | None:
@@ -54,11 +57,26 @@ class FloorFinder:
             cells = np.stack((grid.x[::_EVERY][columns], grid.y[::_EVERY][rows], np.ones(len(rows))))
             inverse = grid.inverse_depth[::_EVERY, ::_EVERY][rows, columns].astype(float)
             least = _LEAST_SHARE * grid.valid.size / _EVERY**2
-            plane = _best_plane(cells.astype(float), inverse, self._plane, least)
+            plane = self._plane_in(cells.astype(float), inverse, least)
         self._missed = 0 if plane is not None else self._missed + 1
         if plane is not None or self._missed > _KEEP_FRAMES:
             self._plane = plane
         return None if self._plane is None else _floor(self._plane)
+
+    def _plane_in(self, cells: FloatArray, inverse: FloatArray, least_cells: float) -> FloatArray | None:
+        """(3,) the plane of the floor among cells (3, K); None: not found, or not looked for now."""
+        self._unsearched += 1
+        due = self._unsearched >= _SEARCH_EVERY
+        if self._plane is not None and not due:
+            plane = _refined(self._plane, cells, inverse, least_cells)
+            if plane is not None:
+                return plane
+        just_lost = self._plane is not None and self._missed == 0
+        if not due and not just_lost:
+            return None
+        self._unsearched = 0
+        best = _best_plane(cells, inverse, self._plane)
+        return None if best is None else _refined(best, cells, inverse, least_cells)
 
 
 def on_floor(grid: DepthGrid, floor: Floor, noise: DepthNoise) -> DepthGrid:
@@ -79,10 +97,8 @@ def on_floor(grid: DepthGrid, floor: Floor, noise: DepthNoise) -> DepthGrid:
     )
 
 
-def _best_plane(
-    cells: FloatArray, inverse: FloatArray, before: FloatArray | None, least_cells: float
-) -> FloatArray | None:
-    """(3,) a, b, c of the floor among cells (3, K) with inverse depth (K,); None: there is none."""
+def _best_plane(cells: FloatArray, inverse: FloatArray, before: FloatArray | None) -> FloatArray | None:
+    """(3,) a, b, c of what is most likely the floor of cells (3, K) with inverse depth (K,)."""
     chosen = (_picks() * len(inverse)).astype(np.intp)
     corners = cells[:, chosen].transpose(1, 2, 0)
     flat = np.abs(np.linalg.det(corners)) > 1e-4
@@ -92,13 +108,21 @@ def _best_plane(
     planes = planes[_possible(planes)]
     if len(planes) == 0:
         return None
-    best = planes[_score(planes, cells, inverse).argmax()]
+    best: FloatArray = planes[_score(planes, cells, inverse).argmax()]
+    return best
+
+
+def _refined(
+    plane: FloatArray, cells: FloatArray, inverse: FloatArray, least_cells: float
+) -> FloatArray | None:
+    """plane (3,) fitted to the cells on it; None: it is no floor."""
     for _ in range(_REFINEMENTS):
-        on_it = np.abs(best @ cells - inverse) <= _TOLERANCE
+        on_it = np.abs(plane @ cells - inverse) <= _TOLERANCE
         if np.count_nonzero(on_it) < max(3.0, least_cells):
             return None
-        best = np.linalg.lstsq(cells[:, on_it].T, inverse[on_it], rcond=None)[0]
-    return best if _possible(best[None])[0] and _score(best[None], cells, inverse)[0] > 0.0 else None
+        plane = np.asarray(np.linalg.lstsq(cells[:, on_it].T, inverse[on_it], rcond=None)[0], np.float64)
+    good = _possible(plane[None])[0] and _score(plane[None], cells, inverse)[0] > 0.0
+    return plane if good else None
 
 
 def _score(planes: FloatArray, cells: FloatArray, inverse: FloatArray) -> FloatArray:

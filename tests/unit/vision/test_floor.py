@@ -182,6 +182,40 @@ def test_a_floor_seen_again_is_kept_for_as_long_as_at_first() -> None:
     assert finder.find(wall_m) is None
 
 
+def test_a_floor_that_comes_into_view_is_found_within_five_frames() -> None:
+    finder = FloorFinder()
+    floor_m, wall_m = grid_of(plane(tilted(15.0, 0.0), 0.8)), grid_of(wall(2.0))
+    assert finder.find(wall_m) is None
+    seen = [finder.find(floor_m) for _ in range(5)]
+    assert seen[-1] is not None
+    assert seen[-1].camera_height_m == pytest.approx(0.8, rel=1e-3)
+
+
+def test_a_floor_is_followed_while_the_camera_turns() -> None:
+    """Half a degree a frame, as a hand does, and no frame without it."""
+    finder = FloorFinder()
+    for k in range(12):
+        turned_m = plane(tilted(15.0 + 0.5 * k, 0.0), 0.8)
+        seen = finder.find(grid_of(turned_m))
+        assert seen is not None
+        np.testing.assert_allclose(seen.up, found(turned_m).up, atol=1e-3)
+
+
+def test_a_larger_floor_takes_the_place_of_a_table_within_five_frames() -> None:
+    """A table at 0.4 m fills the view at first; then most of what is seen lies 0.6 m under it."""
+    finder = FloorFinder()
+    table_m, floor_m = plane(tilted(30.0, 0.0), 0.4), plane(tilted(30.0, 0.0), 1.0)
+    first = finder.find(grid_of(table_m))
+    assert first is not None
+    assert first.camera_height_m == pytest.approx(0.4, rel=1e-3)
+    seen_m = floor_m.copy()
+    seen_m[:, :24] = table_m[:, :24]
+    for _ in range(5):
+        last = finder.find(grid_of(seen_m))
+    assert last is not None
+    assert last.camera_height_m == pytest.approx(1.0, rel=1e-3)
+
+
 def test_the_same_depth_gives_the_same_floor_to_the_last_bit() -> None:
     clean_m = nearest(plane(tilted(20.0, 5.0), 1.2), wall(5.0))
     noise = np.random.default_rng(5).normal(0.0, 0.003, (4, *clean_m.shape))
