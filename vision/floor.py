@@ -27,7 +27,7 @@ _LEAST_UPRIGHT = 0.7  # cosine: a camera held more askew than 45 degrees is not 
 _HEIGHT_M = (0.15, 2.5)
 _REFINEMENTS = 3
 _KEEP_FRAMES = 5
-_SEARCH_EVERY = 5  # frames: a floor neither comes nor goes in less
+_SEARCH_EVERY = 5  # frames, while a floor is followed
 _SIGMA_M = 0.01  # of the plane itself
 _SIGMA_PER_METRE = 0.006
 
@@ -41,8 +41,9 @@ class Floor:
 
 
 class FloorFinder:
-    """Follows the floor from frame to frame. Every few frames, and at once when it is lost, all planes are
-    compared; that of the frame before is one of them."""
+    """Follows the floor from frame to frame. Every few frames, and at once when it is lost, all of the view
+    is searched for planes; that of the frame before is compared with them. Until one is found that is done in
+    every frame."""
 
     def __init__(self) -> None:
         self._plane: FloatArray | None = None
@@ -66,14 +67,13 @@ class FloorFinder:
     def _plane_in(self, cells: FloatArray, inverse: FloatArray, least_cells: float) -> FloatArray | None:
         """(3,) the plane of the floor among cells (3, K); None: not found, or not looked for now."""
         self._unsearched += 1
-        due = self._unsearched >= _SEARCH_EVERY
+        due = self._plane is None or self._unsearched >= _SEARCH_EVERY
         if self._plane is not None and not due:
             plane = _refined(self._plane, cells, inverse, least_cells)
             if plane is not None:
                 return plane
-        just_lost = self._plane is not None and self._missed == 0
-        if not due and not just_lost:
-            return None
+            if self._missed > 0:
+                return None
         self._unsearched = 0
         best = _best_plane(cells, inverse, self._plane)
         return None if best is None else _refined(best, cells, inverse, least_cells)

@@ -182,13 +182,21 @@ def test_a_floor_seen_again_is_kept_for_as_long_as_at_first() -> None:
     assert finder.find(wall_m) is None
 
 
-def test_a_floor_that_comes_into_view_is_found_within_five_frames() -> None:
+def test_a_floor_that_comes_into_view_is_found_at_once() -> None:
     finder = FloorFinder()
-    floor_m, wall_m = grid_of(plane(tilted(15.0, 0.0), 0.8)), grid_of(wall(2.0))
-    assert finder.find(wall_m) is None
-    seen = [finder.find(floor_m) for _ in range(5)]
-    assert seen[-1] is not None
-    assert seen[-1].camera_height_m == pytest.approx(0.8, rel=1e-3)
+    assert finder.find(grid_of(wall(2.0))) is None
+    assert finder.find(grid_of(wall(2.0))) is None
+    seen = finder.find(grid_of(plane(tilted(15.0, 0.0), 0.8)))
+    assert seen is not None
+    assert seen.camera_height_m == pytest.approx(0.8, rel=1e-3)
+
+
+def test_another_floor_is_found_at_once_when_the_old_one_is_lost() -> None:
+    finder = FloorFinder()
+    assert finder.find(grid_of(plane(tilted(15.0, 0.0), 0.8))) is not None
+    seen = finder.find(grid_of(plane(tilted(15.0, 0.0), 1.4)))
+    assert seen is not None
+    assert seen.camera_height_m == pytest.approx(1.4, rel=1e-3)
 
 
 def test_a_floor_is_followed_while_the_camera_turns() -> None:
