@@ -21,6 +21,7 @@ _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start 
 _INDEPENDENT_DEPTHS = 10.0  # depth noise is shared by neighbours: a body never has more looks than these
 _STATIC_END_CHI2 = 6.0
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
+_LONG_FRAMES = 8  # about as many as the window of time holds in which motion is measured
 _NEAR_M = 0.5
 _VELOCITY_GATE_MPS = 0.5
 
@@ -116,6 +117,12 @@ def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDAr
     both = (chi2 > _STATIC_END_CHI2).all(axis=1)
     result: NDArray[np.bool_] = both & (chi2.sum(axis=1) > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
     return result
+
+
+def long_static(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """(N,) fragments seen for a while, both of whose ends are where something static would be."""
+    still = (motion.usable & (motion.static_chi2 <= _STATIC_END_CHI2)).reshape(-1, 2)
+    return still[:, 0] & still[:, 1] & (age_frames >= _LONG_FRAMES)
 
 
 def cluster(

@@ -193,7 +193,7 @@ class Tracker:
         return np.where(own > 0, own, labels).astype(np.int32)
 
     def _adopt(self, detection: Detection, labels: IntGrid, owner: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(N,) fragments belong to the body whose surface they lie on."""
+        """(N,) fragments go to the body whose surface they lie on, no line on the floor to a passer-by."""
         grid, tracks = detection.grid, self._tracks
         if len(tracks) == 0 or len(owner) == 0:
             return np.full(len(owner), -1, np.int64)
@@ -209,7 +209,9 @@ class Tracker:
         agrees = (there > 0) & (gap <= gate[:, None])
         first = agrees.argmax(axis=1)
         track = there[np.arange(len(there)), first] - 1
-        return np.where(agrees.any(axis=1), tracks.ids[track], -1)
+        ids = np.where(agrees.any(axis=1), tracks.ids[track], -1)
+        still = obstacles.long_static(detection.motion, detection.age_frames)
+        return np.where(still & tracks.moving[track] & (ids != owner), -1, ids)
 
     def _measure_velocities(
         self,

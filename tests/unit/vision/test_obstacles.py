@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vision.obstacles import fragment_velocities
+from vision.obstacles import fragment_velocities, long_static
 from vision.velocities import PointMotion, static_miss
 
 NAN = float("nan")
@@ -52,3 +52,14 @@ def test_an_end_that_is_not_usable_says_nothing() -> None:
     unknown = fragment_velocities(two_ends((0.1, 0.1), (False, False)), 1.5)
     # Bounded by the greatest speed, never zero.
     np.testing.assert_allclose(unknown.covariance[0], 1.5**2 * np.eye(3))
+
+
+def test_long_static_are_those_whose_ends_have_both_lain_still_for_a_while() -> None:
+    motion = two_ends((NAN, NAN), (True, True))
+    old, young = np.array([8]), np.array([7])
+    assert not long_static(motion, old)[0]
+    still = replace(motion, static_chi2=np.array([6.0, 0.5]))
+    assert long_static(still, old)[0]
+    assert not long_static(still, young)[0]
+    assert not long_static(replace(still, static_chi2=np.array([0.5, 6.1])), old)[0]
+    assert not long_static(replace(still, usable=np.array([True, False])), old)[0]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from config.perception import PerceptionConfig
 from hal.types import FloatArray
 from tests.support.detections import FRAME_NS, detection, track
-from tests.support.grids import grid_of, nearest, no_depth, plate, wall
+from tests.support.grids import CAMERA, grid_of, nearest, no_depth, plate, wall
+from vision.detection import no_motion
 from vision.scene import Obstacle
 from vision.tracker import Percept, Tracker
 
@@ -35,6 +38,35 @@ def test_a_surface_alone_is_found_moving_with_its_velocity() -> None:
     np.testing.assert_allclose(mover.velocity_mps, [SPEED_MPS, 0.0, 0.0], atol=0.12)
     np.testing.assert_allclose(mover.position_m, [-0.9 + way_m(29), 0.2, 4.0], atol=0.06)
     assert mover.fragments == 0
+
+
+def owner_of_a_fragment(speed_mps: float, age_frames: int, static_chi2: float) -> int:
+    """Which obstacle gets a fragment that comes to lie on the only one there is, after it went so fast."""
+    tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
+    for k in range(25):
+        x_m = -0.9 + speed_mps * k * FRAME_S
+        seen = detection(grid_of(walker(x_m)), k)
+        if k == 24:
+            u = CAMERA.cx + CAMERA.fx * x_m / 4.0
+            motion = replace(no_motion(2), static_chi2=np.full(2, static_chi2), usable=np.ones(2, np.bool_))
+            seen = replace(
+                seen,
+                ids=np.array([7]),
+                ends_px=np.array([[[u, CAMERA.cy], [u, CAMERA.cy + 20.0]]], np.float32),
+                near_m=np.full((1, 2), 4.0, np.float32),
+                age_frames=np.array([age_frames], np.intp),
+                motion=motion,
+            )
+        percept = tracker.step(seen, None)
+    assert len(moving(percept)) == (speed_mps > 0.0)
+    return int(percept.fragments.obstacle_id[0])
+
+
+def test_a_line_that_has_long_lain_still_is_no_part_of_a_mover_that_comes_by() -> None:
+    assert owner_of_a_fragment(SPEED_MPS, 8, 1.0) == -1
+    assert owner_of_a_fragment(SPEED_MPS, 7, 1.0) > 0  # too young to tell
+    assert owner_of_a_fragment(SPEED_MPS, 8, 6.5) > 0  # has not lain still
+    assert owner_of_a_fragment(0.0, 8, 1.0) > 0  # what stands has such lines
 
 
 def test_a_surface_that_stands_is_listed_from_the_third_sight_on_and_never_moves() -> None:
