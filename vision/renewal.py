@@ -21,6 +21,7 @@ PART_PX = (240, 160)
 _BLOCKS = 2  # per part, one above the other: each has its own threshold of contrast
 _MARGIN_PX = 8
 _MANY_MISSING = 8  # where more than one fragment in so many is missing, all parts of a band are searched
+_FEW_MISSING = 16  # where less than one in so many is, none: a search costs as much for one as for ten
 _MIN_END_DISTANCE_PX = 12.0
 _TAKEN_PX = 6
 _LOW_SHARE = 0.4
@@ -41,6 +42,14 @@ class NewFragments:
     pixel_cov: NDArray[np.float32]
 
 
+_NOTHING_NEW = NewFragments(
+    np.empty((0, 2, 2), np.float32),
+    np.empty((0, 2), np.float32),
+    np.empty((0, 2), np.float32),
+    np.empty((0, 2, 3), np.float32),
+)
+
+
 class Renewal:
     """Decides where to look and finds segments there. Keeps when each part of the image was last visited,
     and how much contrast makes an edge in each block of it."""
@@ -56,7 +65,7 @@ class Renewal:
     ) -> NewFragments:
         """Fragments for the tiles that hold too few of ends_px (N, 2, 2), in the part of the image that was
         not visited for longest, or in the upright band of such parts where many are missing, or everywhere
-        where there are none.
+        where there are none. Nowhere while few are missing.
 
         without_depth: how many of the present ones have no depth; only a small share of all may.
         """
@@ -66,9 +75,11 @@ class Renewal:
             usual = 0.5 * (settings.canny_least + settings.canny_most)
             self._threshold = np.full((rows, columns, _BLOCKS), usual)
             self._last_visit = np.full(rows * columns, -1, np.intp)
+        room = settings.max_fragments - len(ends_px)
+        if room * _FEW_MISSING < settings.max_fragments:
+            return _NOTHING_NEW
         self._visits += 1
         counts = _tile_counts(ends_px, settings.tile_px, *grey.shape)
-        room = settings.max_fragments - len(ends_px)
         parts = rows if room * _MANY_MISSING > settings.max_fragments else 1
         chosen = np.argsort(self._last_visit, kind="stable")[: parts if len(ends_px) else None]
         self._last_visit[chosen] = self._visits

@@ -63,3 +63,19 @@ def test_no_more_than_there_is_room_for() -> None:
     config = PerceptionConfig(fragments=FragmentSettings(max_fragments=30))
     assert len(Renewal(config).find(frame, grey, present(0), 0).ends_px) == 30
     assert len(Renewal(config).find(frame, grey, present(30), 0).ends_px) == 0
+
+
+@pytest.mark.parametrize(("missing", "searched"), [(9, False), (10, True)])
+def test_while_few_are_missing_it_does_not_look(missing: int, searched: bool) -> None:
+    """One in sixteen of 160 is ten."""
+    frame, grey = picture()
+    renewal = Renewal(PerceptionConfig(fragments=FragmentSettings(max_fragments=160)))
+    new = renewal.find(frame, grey, present(160 - missing), 0)
+    assert (len(new.ends_px) > 0) == searched
+    assert new.near_m.shape == new.far_m.shape == (len(new.ends_px), 2)
+    assert new.pixel_cov.shape == (len(new.ends_px), 2, 3)
+    # A frame without a search is no visit: the next search begins at the first part.
+    first = Renewal(PerceptionConfig(fragments=FragmentSettings(max_fragments=160)))
+    if not searched:
+        after = renewal.find(frame, grey, present(140), 0)
+        np.testing.assert_array_equal(after.ends_px, first.find(frame, grey, present(140), 0).ends_px)
