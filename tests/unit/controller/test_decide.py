@@ -377,6 +377,22 @@ def test_who_comes_along_the_side_is_passed_slowly_not_waited_for() -> None:
         assert 0.3 <= decision.target_speed_mps < 0.8
 
 
+def test_what_may_be_driven_beside_somebody_may_be_started_beside_them() -> None:
+    """Whose lane is kept for the moment at 0.35 m/s: nothing that the robot would creep up to."""
+    comes = obstacle(1.6, 0.9, vx_mps=-1.0, age_s=0.6)
+    assert Bench().settle(comes, v_mps=0.0).target_speed_mps == pytest.approx(0.35)
+
+
+def test_who_has_left_the_view_is_not_waited_for_in_it() -> None:
+    """Measured as creeping into the middle, so near that only a part was in view; then the view is free."""
+    bench = Bench()
+    assert bench.settle(obstacle(1.2, -0.3, vx_mps=-0.12, vy_mps=0.08), v_mps=0.0).target_speed_mps == 0.0
+    gone_ns = bench.now_ns
+    while bench.step(bench.scene(), v_mps=0.0).action is not Action.INCREASE:
+        assert bench.now_ns < gone_ns + 400_000_000
+    assert bench.now_ns > gone_ns + 280_000_000
+
+
 def test_who_heads_into_the_way_is_waited_for() -> None:
     decision = Bench().settle(obstacle(1.6, 0.74, vx_mps=-1.0, vy_mps=-0.6, sigma_mps=0.05), v_mps=0.3)
     assert decision.target_speed_mps < 0.1
