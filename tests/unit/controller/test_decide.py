@@ -421,6 +421,20 @@ def test_who_leaves_the_way_aslant_does_not_cut_in() -> None:
     assert beside.target_speed_mps < leaving.target_speed_mps - 0.1
 
 
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "vy_mps", "differs_mps"), [(1.5, 0.9, 0.2, 0.0), (2.5, 1.2, -0.05, 0.3)]
+)
+def test_who_leaves_the_way_is_not_thought_to_have_turned_back_unseen(
+    x_m: float, y_m: float, vy_mps: float, differs_mps: float
+) -> None:
+    """Not seen for 0.6 s: whoever leaves the way goes on; whoever does not may be nearer by now."""
+    seen = obstacle(x_m, y_m, vx_mps=0.2, vy_mps=vy_mps, sigma_mps=0.05)
+    before = Bench().settle(seen, v_mps=1.2).target_speed_mps
+    after = Bench().settle(replace(seen, unseen_s=0.6), v_mps=1.2).target_speed_mps
+    assert before < 1.5
+    assert before - after == pytest.approx(differs_mps)
+
+
 def test_a_blind_camera_teaches_nothing() -> None:
     """A frozen picture shows the person where he was: he is reckoned with where he would be by now."""
     bench = Bench()
