@@ -199,7 +199,7 @@ class DecisionMaker:
         if motion.v_mps <= STANDING_MPS:
             go_mps = braking.speed_for_distance(release.go_m, self._comfort)
             if limit.reason.rule == "worst case":
-                # That is no place that it would creep up to: who keeps clear is passed, so started beside, too.
+                # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
                 go_mps = min(go_mps, self._config.prediction.beside_mps)
             least = max(least, go_mps)
         return limit.speed_mps if limit.speed_mps >= least else 0.0

@@ -80,8 +80,8 @@ class OutOfView:
         return self._bodies
 
     def _kept_out(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
-        """Who moves and is not where it was expected is at least beside that place: where it would not be
-        seen. What was measured of its velocity was wrong, but for going outwards; it may have turned since."""
+        """Who moves and is not where it was expected is at least beside that place, where it would not be
+        seen. What was measured of its velocity was wrong but for going outwards; it may have turned since."""
         if not bodies.moving.any():
             return bodies
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
