@@ -78,7 +78,7 @@ class Sight:
         side = np.abs(surface_d) - forward * free.half_width_tan
         inside = (side <= half_width + self._lateral_m) & (surface_s > s_m)
         reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
-        moving = explained_by.select(explained_by.moving).covers(points, reach_m, _AROUND_M).any(axis=1)
+        moving = explained_by.select(explained_by.moving).covers(points, reach_m, _AROUND_M)
         self.corners.look(
             bands,
             forward,
@@ -87,7 +87,7 @@ class Sight:
             half_width,
             2.0 * free.half_width_tan,
             s_m + self._corridor.front_m,
-            ~moving,
+            np.logical_not(moving.any(axis=1)),
         )
         way_s = surface_s[inside]
         if len(way_s):
