@@ -346,7 +346,7 @@ def test_it_goes_again_by_itself_a_little_after_the_way_is_free() -> None:
     while bench.step(bench.scene(), 0.0).target_speed_mps == 0.0:
         waited += 1
         assert waited < 100
-    assert 0.28 <= waited * 0.02 <= 0.6
+    assert 0.1 <= waited * 0.02 <= 0.3
     assert bench.step(bench.scene(), 0.0).stuck_since_ns is None
 
 
@@ -374,7 +374,7 @@ def test_who_comes_along_the_side_is_passed_slowly_not_waited_for() -> None:
     """0.1 m stay between a person of 0.5 m, who comes at 1 m/s, and the swept width."""
     for x_m in (4.0, 2.5, 1.6):
         decision = Bench().settle(obstacle(x_m, 0.74, vx_mps=-1.0, sigma_mps=0.05), v_mps=0.3)
-        assert 0.3 <= decision.target_speed_mps < 0.8
+        assert 0.3 <= decision.target_speed_mps < 0.85
 
 
 def test_what_may_be_driven_beside_somebody_may_be_started_beside_them() -> None:
@@ -390,7 +390,7 @@ def test_who_has_left_the_view_is_not_waited_for_in_it() -> None:
     gone_ns = bench.now_ns
     while bench.step(bench.scene(), v_mps=0.0).action is not Action.INCREASE:
         assert bench.now_ns < gone_ns + 400_000_000
-    assert bench.now_ns > gone_ns + 280_000_000
+    assert bench.now_ns > gone_ns + 100_000_000
 
 
 def test_who_heads_into_the_way_is_waited_for() -> None:
