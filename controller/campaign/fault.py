@@ -76,11 +76,15 @@ def _touches(
     accel_mps2: float,
     jerk_mps3: float,
 ) -> bool:
-    """Whether a robot that goes over to target_mps reaction_s after step start touches the body."""
+    """Whether a robot that goes over to target_mps reaction_s after step start touches the body. It begins as
+    the robot was: who is becoming faster brakes later than who is not, whoever drives."""
+    earlier = max(start - _SIGHT_STEPS, 0)
+    since_s = log.times_s[start] - log.times_s[earlier]
+    gain_mps = log.v_mps[start] - log.v_mps[earlier]
     t = np.arange(0.0, _AVOIDING_S, 0.02)
     ramp = SpeedRamps(
         log.v_mps[start],
-        0.0,
+        gain_mps / since_s if since_s > 0.0 else 0.0,
         np.array([target_mps]),
         accel_mps2=accel_mps2,
         decel_mps2=accel_mps2,
