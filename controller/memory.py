@@ -80,8 +80,8 @@ class OutOfView:
         return self._bodies
 
     def _kept_out(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
-        """Who moves and is not where it was expected is at least beside that place, where it would not be
-        seen. What was measured of its velocity was wrong but for going outwards; it may have turned since."""
+        """Who goes outwards and is not seen where it was expected is at least beside that place, where it would
+        not be seen. Who was coming may still do so, a little later than expected; but not for ever."""
         if not bodies.moving.any():
             return bodies
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
@@ -97,10 +97,12 @@ class OutOfView:
         for k in np.flatnonzero(bodies.moving & tall & (near > 0.0)).tolist():
             from_tan = float(min(inner[k] / near[k], inner[k] / far[k]))
             outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
-            if outside_m < inner[k] - _TOUCHING:
+            late_m = outside_m - inner[k]
+            comes = side[k] * float(velocity[k] @ leftward) < 0.0
+            if late_m < (_EDGE_M + _EDGE_MPS * unseen_s[k] if comes else -_TOUCHING):
                 continue
-            xy[k] += side[k] * (outside_m - inner[k]) * leftward
-            velocity[k] = side[k] * max(side[k] * float(velocity[k] @ leftward), 0.0) * leftward
+            xy[k] += side[k] * late_m * leftward
+            velocity[k] = 0.0 if comes else velocity[k]
             turned_mps = _TURNS_MPS2 * float(self._since_s[k])
             np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
             unseen_s[k] = 0.0
