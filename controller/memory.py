@@ -80,8 +80,8 @@ class OutOfView:
         return self._bodies
 
     def _kept_out(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
-        """Who goes outwards and is not seen where it was expected is at least beside that place, where it would
-        not be seen. Who was coming may still do so, a little later than expected; but not for ever."""
+        """Who goes outwards and is not seen where it was expected is at least beside that place, where it
+        would not be seen. Who was coming may still do so, a little later than expected; not for ever."""
         if not bodies.moving.any():
             return bodies
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
