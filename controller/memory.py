@@ -81,7 +81,7 @@ class OutOfView:
 
     def _kept_out(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
         """Who goes outwards and is not seen where it was expected is at least beside that place, where it
-        would not be seen. Who was coming may still do so, a little later than expected; not for ever."""
+        would not be seen; so is who was not clearly coming. Who was may still come, a little later."""
         if not bodies.moving.any():
             return bodies
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
@@ -98,11 +98,12 @@ class OutOfView:
             from_tan = float(min(inner[k] / near[k], inner[k] / far[k]))
             outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
             late_m = outside_m - inner[k]
-            comes = side[k] * float(velocity[k] @ leftward) < 0.0
+            inwards_mps = -side[k] * float(velocity[k] @ leftward)
+            comes = inwards_mps > math.sqrt(float(leftward @ covariance[k] @ leftward))
             if late_m < (_EDGE_M + _EDGE_MPS * unseen_s[k] if comes else -_TOUCHING):
                 continue
             xy[k] += side[k] * late_m * leftward
-            velocity[k] = 0.0 if comes else velocity[k]
+            velocity[k] = 0.0 if inwards_mps > 0.0 else velocity[k]
             turned_mps = _TURNS_MPS2 * float(self._since_s[k])
             np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
             unseen_s[k] = 0.0

@@ -229,6 +229,16 @@ def test_who_comes_a_little_later_than_expected_still_comes() -> None:
     assert kept.velocity_mps[0].tolist() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize(("sigma_mps", "y_m"), [(0.05, 0.34), (0.15, 0.5 * 0.74 + 0.2)])
+def test_only_who_clearly_comes_may_be_late(sigma_mps: float, y_m: float) -> None:
+    """At 0.1 m/s, known to so much."""
+    recall = Recall()
+    near_edge = replace(LEAVING, xy_m=np.array([[1.0, 0.35]]), covariance=np.eye(2)[None] * sigma_mps**2)
+    recall.recall(near_edge, 0.0, ALL_SEEN, standing=True)
+    kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)
+    assert kept.xy_m[0].tolist() == pytest.approx([0.99, y_m])
+
+
 @pytest.mark.parametrize("known_m", [0.5, float("nan")])
 def test_where_nothing_was_seen_it_may_still_be(known_m: float) -> None:
     """Not through the whole of where it was expected, or not known how far."""
