@@ -99,11 +99,12 @@ class OutOfView:
             outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
             late_m = outside_m - inner[k]
             inwards_mps = -side[k] * float(velocity[k] @ leftward)
-            comes = inwards_mps > math.sqrt(float(leftward @ covariance[k] @ leftward))
+            comes = -side[k] * _known_part(velocity[k], covariance[k], leftward) > 0.0
             if late_m < (_EDGE_M + _EDGE_MPS * unseen_s[k] if comes else -_TOUCHING):
                 continue
             xy[k] += side[k] * late_m * leftward
-            velocity[k] = 0.0 if inwards_mps > 0.0 else velocity[k]
+            if inwards_mps > 0.0:
+                velocity[k] = _known_part(velocity[k], covariance[k], forward) * forward
             turned_mps = _TURNS_MPS2 * float(self._since_s[k])
             np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
             unseen_s[k] = 0.0
@@ -137,6 +138,12 @@ def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: floa
     closed = np.flatnonzero(~(free.known_m[order] >= far_m))
     opened = order[: closed[0]] if len(closed) else order
     return float(outwards[opened[-1]]) + free.half_width_tan if len(opened) else -math.inf
+
+
+def _known_part(velocity_mps: FloatArray, covariance: FloatArray, along: FloatArray) -> float:
+    """The velocity's part along a direction (2,), 0 if that is less than its spread."""
+    part_mps = float(velocity_mps @ along)
+    return part_mps if abs(part_mps) > math.sqrt(float(along @ covariance @ along)) else 0.0
 
 
 def _may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:

@@ -214,6 +214,15 @@ def test_outwards_it_goes_on() -> None:
     assert kept.velocity_mps[0].tolist() == pytest.approx([-0.1, 0.3])
 
 
+@pytest.mark.parametrize(("sigma_mps", "along_mps"), [(0.1, 0.4), (0.5, 0.0)])
+def test_along_the_way_it_goes_on_if_that_is_known(sigma_mps: float, along_mps: float) -> None:
+    recall = Recall()
+    along = replace(LEAVING, velocity_mps=np.array([[0.4, -0.05]]), covariance=np.eye(2)[None] * sigma_mps**2)
+    recall.recall(along, 0.0, ALL_SEEN, standing=True)
+    kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)
+    assert kept.velocity_mps[0].tolist() == pytest.approx([along_mps, 0.0])
+
+
 def test_who_comes_a_little_later_than_expected_still_comes() -> None:
     """At 0.8 m/s, and for 0.3 m and a little more it may only be late; then it has not come."""
     recall = Recall()
