@@ -96,6 +96,15 @@ class Release(Section):
     """Faster again: later than slower."""
 
     delay_s: float = Field(default=0.3, ge=0, le=10, description="the way must have been free for so long")
+    far_mps: float = Field(
+        default=0.25,
+        ge=0,
+        le=5,
+        description="what allows so much more than the present speed is far above it",
+    )
+    far_delay_s: float = Field(
+        default=0.12, ge=0, le=10, description="instead of delay_s, for what is far above the present speed"
+    )
     hold_s: float = Field(
         default=2.0, ge=0, le=30, description="no increase sooner than this after a decrease began"
     )

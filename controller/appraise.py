@@ -44,6 +44,7 @@ class Appraiser:
         self._enters = Debounced(_SETTLES_S)
         self._of: Bodies | None = None
         self._watched = no_bodies(0)
+        self._remembered = np.zeros(0, np.bool_)
 
     def limits(
         self, known: Knowledge, s_m: float, motion: Motion, base_mps: float, now_s: float
@@ -51,7 +52,7 @@ class Appraiser:
         """Every limit that obstacles and depth put on the speed of a robot at s_m; base_mps: what path
         and camera allow."""
         if known.bodies is not self._of:
-            self._take_in(known.bodies)
+            self._take_in(known)
         found = self._depth(known, s_m, motion)
         found += self._standing.limits(known, s_m, motion)
         watched = self._watched
@@ -63,9 +64,10 @@ class Appraiser:
         )
         course = course_of(watched, placed.heading_rad[:, 0])
         sigma_left = course.sigma_left_mps * self._config.prediction.sigmas
-        enters = self._enters.update(
-            watched.ids, comes_in(placed, self._times_s, sigma_left), placed.clear_m[:, 0] <= 0.0, now_s
-        )
+        comes = comes_in(placed, self._times_s, sigma_left)
+        # Who is in the way is; and of who is out of sight nothing is measured that could be noise.
+        at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
+        enters = self._enters.update(watched.ids, comes, at_once, now_s)
         base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
         in_the_way, chosen_mps = self._moving.limits(
             watched, placed, course, enters, s_m, motion, base_mps, now_s
@@ -78,10 +80,12 @@ class Appraiser:
             found.append(worst)
         return found
 
-    def _take_in(self, bodies: Bodies) -> None:
+    def _take_in(self, known: Knowledge) -> None:
         """Once a scene: whose future has to be looked at, and who is gone."""
-        self._of = bodies
-        self._watched = bodies.select(bodies.moving | (bodies.age_s < self._config.prediction.confirm_s))
+        self._of = bodies = known.bodies
+        watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
+        self._watched = bodies.select(watched)
+        self._remembered = known.remembered[watched]
         self._inside.intersection_update(bodies.ids.tolist())
 
     def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:

@@ -60,16 +60,18 @@ class BlindCorners:
         half_width_m: FloatArray,
         band_tan: float,
         front_s_m: float,
+        stands: NDArray[np.bool_],
     ) -> None:
         """Surfaces of one scene in the order of their bands (P,): forward distance, path coordinates, and
-        half of the swept width there. band_tan: width of a band. front_s_m: where the robot's front is."""
+        half of the swept width there. band_tan: width of a band. front_s_m: where the robot's front is.
+        stands (P,): no face is made of what moves, people who walk one behind the other least of all."""
         beside = np.abs(d_m) - half_width_m
         for corner in self._corners:
             # Nearer than this, too little of the face is in view to be sure.
             corner.sightings -= 1 if corner.s_m - front_s_m > _SURE_M else 0
         for left in (False, True):
             side = (d_m > 0.0) == left
-            near = np.flatnonzero(side & (beside > 0.0) & (beside <= self._beside_m))
+            near = np.flatnonzero(stands & side & (beside > 0.0) & (beside <= self._beside_m))
             near = near[s_m[near] - front_s_m < _LOOK_AHEAD_M]
             for end in self._ends(near if left else near[::-1], bands, forward_m, s_m, d_m, band_tan):
                 self._note(float(s_m[end]), left, float(beside[end]))

@@ -17,14 +17,14 @@ class Debounced:
         self._otherwise_since_s: dict[int, float] = {}
 
     def update(self, ids: NDArray[np.int64], seen: BoolArray, at_once: BoolArray, now_s: float) -> BoolArray:
-        """(N,) the flags of ids at now_s; who is not among them is forgotten. at_once: where a yes needs no
-        time to settle. Somebody new begins with no."""
+        """(N,) the flags of ids at now_s; who is not among them is forgotten. at_once: where what is seen
+        needs no time to settle. Somebody new begins with no."""
         flags, since = {}, {}
         for number, yes, now in zip(ids.tolist(), seen.tolist(), at_once.tolist(), strict=True):
             flag = self._flags.get(number, False)
             if yes != flag:
                 began_s = self._otherwise_since_s.get(number, now_s)
-                if (yes and now) or now_s - began_s >= self._settle_s:
+                if now or now_s - began_s >= self._settle_s:
                     flag = yes
                 else:
                     since[number] = began_s

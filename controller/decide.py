@@ -197,7 +197,11 @@ class DecisionMaker:
         release = self._config.release
         least = release.creep_mps
         if motion.v_mps <= STANDING_MPS:
-            least = max(least, braking.speed_for_distance(release.go_m, self._comfort))
+            go_mps = braking.speed_for_distance(release.go_m, self._comfort)
+            if limit.reason.rule == "worst case":
+                # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
+                go_mps = min(go_mps, self._config.prediction.beside_mps)
+            least = max(least, go_mps)
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
     def _reason(self, watched: Limit, on_way: Limit, raw_mps: float, gated_mps: float) -> Reason:

@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from config.robot import Body
@@ -78,6 +79,11 @@ class Knowledge:
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
 
     @property
+    def remembered(self) -> NDArray[np.bool_]:
+        """(N,) which of the bodies are out of sight."""
+        return np.arange(len(self.bodies)) >= len(self._boxes)
+
+    @property
     def sprawling(self) -> Bodies:
         """Seen, but no boxes."""
         return self._seen.select(self._sprawls)
@@ -136,7 +142,8 @@ class Knowledge:
             self.edge_tan = (
                 float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
             )
-        self.bodies = boxes.joined(self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing))
+        remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, scene.free_space)
+        self.bodies = boxes.joined(remembered)
         self._boxes, self._seen, self._sprawls = boxes, seen, sprawling
         self.sight.look(scene.free_space, pose, s_m, scene.captured_ns, boxes, standing)
         self._places.append((scene.captured_ns, np.concatenate((self.sight.points_m, seen.xy_m))))

@@ -1,4 +1,8 @@
-"""Bodies that have left the camera's view but are still there: under its nose and beside its edges."""
+"""Bodies that have left the camera's view but are still there: under its nose and beside its edges.
+
+Where the view is seen through, nobody is. Who should have been there by what was measured of its velocity has
+not come in: it is reckoned with beside what is seen through, and no longer as coming.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ from controller.bodies import Bodies, no_bodies
 from controller.limits import LEAVES_ASLANT
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
+from vision.scene import FreeSpace
 
 BoolArray = NDArray[np.bool_]
 
@@ -22,6 +27,9 @@ _MOVING_KEPT_S, _MAY_COME_KEPT_S = 2.0, 6.0
 # The height of what is seen only in part is known no better.
 _UNCERTAIN_M = 0.1
 _EDGE_M, _EDGE_MPS = 0.3, 0.15
+# By so much in a second somebody unseen may have changed its velocity.
+_TURNS_MPS2 = 0.25
+_TOUCHING = 1e-6
 
 
 class OutOfView:
@@ -35,9 +43,16 @@ class OutOfView:
         self._since_s: FloatArray = np.zeros(0)
 
     def update(
-        self, before: Bodies, seen: Bodies, pose: PlanarPose, edge_tan: float, standing: bool
+        self,
+        before: Bodies,
+        seen: Bodies,
+        pose: PlanarPose,
+        edge_tan: float,
+        standing: bool,
+        free: FreeSpace,
     ) -> Bodies:
-        """What is to be reckoned with besides seen. before: what was seen in the scene before.
+        """What is to be reckoned with besides seen. before: what was seen in the scene before. free: of this
+        scene.
 
         What stood and vanishes while the robot stands has gone by itself, and so has what was part of
         something that is still seen.
@@ -60,8 +75,44 @@ class OutOfView:
         kept &= ~bodies.moving | (
             since <= np.where(_may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
         )
-        self._bodies, self._since_s = bodies.select(kept), since[kept]
+        self._since_s = since[kept]
+        self._bodies = self._kept_out(bodies.select(kept), pose, free)
         return self._bodies
+
+    def _kept_out(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
+        """Who goes outwards and is not seen where it was expected is at least beside that place, where it
+        would not be seen; so is who was not clearly coming. Who was may still come, a little later."""
+        if not bodies.moving.any():
+            return bodies
+        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+        forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
+        offset = bodies.xy_m - (pose.x_m, pose.y_m)
+        ahead, left = offset @ forward - self._mount.forward_m, offset @ leftward - self._mount.left_m
+        near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
+        tall = bodies.top_m >= self._lowest_seen_m(near) + _UNCERTAIN_M
+        side = np.where(left < 0.0, -1.0, 1.0)
+        inner = side * left - bodies.half_across_m
+        xy, velocity = bodies.xy_m.copy(), bodies.velocity_mps.copy()
+        covariance, unseen_s = bodies.covariance.copy(), bodies.unseen_s.copy()
+        for k in np.flatnonzero(bodies.moving & tall & (near > 0.0)).tolist():
+            from_tan = float(min(inner[k] / near[k], inner[k] / far[k]))
+            outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
+            late_m = outside_m - inner[k]
+            inwards_mps = -side[k] * float(velocity[k] @ leftward)
+            comes = -side[k] * _known_part(velocity[k], covariance[k], leftward) > 0.0
+            if late_m < (_EDGE_M + _EDGE_MPS * unseen_s[k] if comes else -_TOUCHING):
+                continue
+            xy[k] += side[k] * late_m * leftward
+            if inwards_mps > 0.0:
+                velocity[k] = _known_part(velocity[k], covariance[k], forward) * forward
+            turned_mps = _TURNS_MPS2 * float(self._since_s[k])
+            np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
+            unseen_s[k] = 0.0
+        return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
+
+    def _lowest_seen_m(self, ahead_m: FloatArray) -> FloatArray:
+        """(N,) height of the lower edge of the view at ahead_m (N,)."""
+        return self._mount.height_m * (1.0 - ahead_m / self._near_m)
 
     def _hidden(self, bodies: Bodies, pose: PlanarPose, edge_tan: float) -> BoolArray:
         """(N,) beside the view or below it, and not yet behind the camera by more than a robot's length."""
@@ -70,13 +121,29 @@ class OutOfView:
         ahead = dx * cos + dy * sin - self._mount.forward_m
         left = dy * cos - dx * sin - self._mount.left_m
         near_face = ahead - bodies.half_view_m
-        lowest_seen_m = self._mount.height_m * (1.0 - near_face / self._near_m)
-        below = (near_face < self._near_m) & (bodies.top_m < lowest_seen_m + _UNCERTAIN_M)
+        below = (near_face < self._near_m) & (bodies.top_m < self._lowest_seen_m(near_face) + _UNCERTAIN_M)
         # At the edge of the view it may be outside by what is not known of it.
         edge_m = edge_tan * np.maximum(ahead, 0.0) - _EDGE_M - _EDGE_MPS * bodies.unseen_s
         beside = np.abs(left) > edge_m
         hidden: BoolArray = (below | beside) & (ahead > -2.0)
         return hidden
+
+
+def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: float) -> float:
+    """How far out from from_tan on, to the left (side 1) or right (-1), all bands are seen through as far as
+    far_m; -inf if the first one is not."""
+    outwards = -side * free.bearing_tan
+    order = np.argsort(outwards)
+    order = order[outwards[order] + free.half_width_tan > from_tan - _TOUCHING]
+    closed = np.flatnonzero(~(free.known_m[order] >= far_m))
+    opened = order[: closed[0]] if len(closed) else order
+    return float(outwards[opened[-1]]) + free.half_width_tan if len(opened) else -math.inf
+
+
+def _known_part(velocity_mps: FloatArray, covariance: FloatArray, along: FloatArray) -> float:
+    """The velocity's part along a direction (2,), 0 if that is less than its spread."""
+    part_mps = float(velocity_mps @ along)
+    return part_mps if abs(part_mps) > math.sqrt(float(along @ covariance @ along)) else 0.0
 
 
 def _may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:

@@ -10,12 +10,32 @@ from controller.limits import STANDING_MPS
 from hal.clocks import NS_PER_S
 
 
+class _Least:
+    """The least of what was seen during the last delay_s; 0 until so much time has passed."""
+
+    def __init__(self, delay_s: float) -> None:
+        self._delay_ns = round(delay_s * NS_PER_S)
+        # (when, how much), growing, so the first is the least.
+        self._lately: deque[tuple[int, float]] = deque()
+
+    def update(self, value: float, now_ns: int) -> float:
+        """With value seen at now_ns."""
+        while self._lately and self._lately[-1][1] >= value:
+            self._lately.pop()
+        self._lately.append((now_ns, value))
+        while self._lately[0][0] < now_ns - self._delay_ns:
+            self._lately.popleft()
+        return self._lately[0][1]
+
+
 class ReleaseGate:
     """Passes a falling target on at once and holds a rising one back.
 
     The target rises to the least that was allowed during delay_s, so one free moment is no reason to go, nor
-    one good number a reason to go fast. After it has turned from faster to slower, it does not turn again
-    within hold_s, and then only for a gain of worth_mps: in hold_s it can turn round at most twice.
+    one good number a reason to go fast. Where that is far above the present speed, the least during
+    far_delay_s will do: before the difference is used up, there is time to look again. After it has turned
+    from faster to slower, it does not turn again within hold_s, and then only for a gain of worth_mps: in
+    hold_s it can turn round at most twice.
     """
 
     def __init__(self, config: Release) -> None:
@@ -24,8 +44,7 @@ class ReleaseGate:
         self._rising = True
         self._went_faster = True
         self._turned_ns: int | None = None
-        # Of what was allowed during delay_s: (when, how much), growing, so the first is the least.
-        self._lately: deque[tuple[int, float]] = deque()
+        self._lately, self._just_now = _Least(config.delay_s), _Least(config.far_delay_s)
 
     def step(
         self, raw_mps: float, v_mps: float, let_go_mps: float, now_ns: int, most_mps: float = math.inf
@@ -36,7 +55,9 @@ class ReleaseGate:
         any time: that is no increase. most_mps: what the path allows, for which nothing is held back.
         """
         band = self._config.dead_band_mps
-        least_mps = self._least_lately(raw_mps, now_ns)
+        least_mps, far_mps = self._lately.update(raw_mps, now_ns), self._just_now.update(raw_mps, now_ns)
+        if far_mps >= v_mps + self._config.far_mps:
+            least_mps = far_mps
         if raw_mps < self._held_mps - band or raw_mps <= 0.0:
             self._rising = False
         if raw_mps <= self._held_mps or self._rising:
@@ -49,16 +70,6 @@ class ReleaseGate:
             target_mps = min(target_mps, v_mps)
         self._note_turn(target_mps, v_mps, now_ns)
         return target_mps
-
-    def _least_lately(self, raw_mps: float, now_ns: int) -> float:
-        """The least raw target of the last delay_s; 0 until so much time has been seen."""
-        while self._lately and self._lately[-1][1] >= raw_mps:
-            self._lately.pop()
-        self._lately.append((now_ns, raw_mps))
-        since_ns = now_ns - round(self._config.delay_s * NS_PER_S)
-        while self._lately[0][0] < since_ns:
-            self._lately.popleft()
-        return self._lately[0][1]
 
     def _raise(self, least_mps: float, let_go_mps: float, now_ns: int) -> None:
         if self._may_turn(now_ns):

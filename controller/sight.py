@@ -77,6 +77,8 @@ class Sight:
         half_width = self._corridor.half_width(surface_s)
         side = np.abs(surface_d) - forward * free.half_width_tan
         inside = (side <= half_width + self._lateral_m) & (surface_s > s_m)
+        reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
+        moving = explained_by.select(explained_by.moving).covers(points, reach_m, _AROUND_M)
         self.corners.look(
             bands,
             forward,
@@ -85,8 +87,8 @@ class Sight:
             half_width,
             2.0 * free.half_width_tan,
             s_m + self._corridor.front_m,
+            np.logical_not(moving.any(axis=1)),
         )
-        reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
         way_s = surface_s[inside]
         if len(way_s):
             explained = explained_by.covers(points[inside], reach_m[inside], _AROUND_M).any(axis=1)

@@ -22,7 +22,7 @@ from hal.types import FloatArray
 _STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
 _SPEEDS = 31
 # So much sooner than it would have to, the robot slows comfortably for the worst case.
-_FORESIGHT_S = 0.25
+_FORESIGHT_S = 0.1
 _GOES_MPS = 0.1
 # Who has been seen for so long and comes towards the robot has seen it too.
 _SEES_S = 1.0

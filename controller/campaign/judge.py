@@ -6,37 +6,20 @@ import math
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from controller.campaign.contacts import Clearance
 from controller.campaign.drive import DriveLog
+from controller.campaign.fault import at_fault
 from controller.campaign.oracle import OracleTime
 from controller.campaign.stage import Stage
 from controller.campaign.view import PlanarEye
 from controller.decision import Action
-from controller.profile import SpeedRamps
-from hal.types import FloatArray, PlanarPose
-from sim.planar import separation
+from hal.types import FloatArray
 
-AT_FAULT_MPS = 0.02
 FLAP_REVERSALS, FLAP_S = 3, 2.0
-# Between two control steps two bodies come no closer to each other than this.
-_BETWEEN_STEPS_M = 0.15
-_SUBSTEPS = 4
 _STOPPED_MPS, _MOVING_AGAIN_MPS = 0.02, 0.1
 _BEFORE_STOP_S, _AFTER_STOP_S = 4.0, 2.0
 _AFTER_FAULT_S = 1.5
-_SIGHT_STEPS = 5
-_SEEN_MOVING_MPS = 0.1
-_AVOIDING_S = 15.0
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """When and with whom it began, and how fast the robot was."""
-
-    t_s: float
-    body: int
-    v_mps: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +63,10 @@ class Yardstick:
 
 def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) -> Row:
     """Everything that missions.jsonl says of a drive."""
-    clearance = _Clearance(stage, log)
+    clearance = Clearance(stage, log)
     contacts = clearance.contacts()
     case, tally = stage.case, log.setpoints
-    at_fault = [one for one in contacts if _at_fault(one, stage, log, by.eye, by.reaction_s)]
+    faulty = [one for one in contacts if at_fault(one, stage, log, by.eye, by.reaction_s)]
     return Row(
         family=case.family,
         seed=case.seed,
@@ -92,8 +75,8 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) ->
         reached=log.reached_s is not None,
         expected=case.scenario.outcome == "target" and not case.halts,
         contacts=len(contacts),
-        contacts_at_fault=len(at_fault),
-        touched=tuple(stage.world.names[one.body] for one in at_fault),
+        contacts_at_fault=len(faulty),
+        touched=tuple(stage.world.names[one.body] for one in faulty),
         time_s=None if log.reached_s is None else round(log.reached_s, 4),
         oracle_time_s=round(by.oracle.total_s, 4) if math.isfinite(by.oracle.total_s) else None,
         min_clearance_m=round(clearance.least_m, 4),
@@ -104,148 +87,6 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) ->
         false_stops=len(false_stops(stage, log)),
         flaps=flaps(log),
     )
-
-
-class _Clearance:
-    """Distances between the robot and all bodies at its height, over the whole drive."""
-
-    def __init__(self, stage: Stage, log: DriveLog) -> None:
-        self._stage, self._log = stage, log
-        self._times = np.array(log.times_s)
-        self._poses = log.pose_array()
-        self.least_m = math.inf
-        self._contacts: list[Contact] = []
-        for body in np.flatnonzero(stage.in_height).tolist():
-            self._look_at(body)
-
-    def contacts(self) -> list[Contact]:
-        """In the order of time."""
-        return sorted(self._contacts, key=lambda one: one.t_s)
-
-    def _look_at(self, body: int) -> None:
-        times, poses = self._times, self._poses
-        gap = self._gap(body, times, poses, _BETWEEN_STEPS_M)
-        close = gap < _BETWEEN_STEPS_M
-        if close.any():
-            # Look between the steps as well where something could happen there.
-            times, poses = self._between(close)
-            gap = np.append(gap, self._gap(body, times, poses, math.inf))
-            self._note(body, times, gap[-len(times) :])
-        self.least_m = min(self.least_m, float(gap.min(initial=math.inf)))
-
-    def _gap(self, body: int, times: FloatArray, poses: FloatArray, exact_below_m: float) -> FloatArray:
-        """(T,) distance; that of circles where they are further apart than what matters."""
-        robot = self._stage.robot.body
-        polygons = self._stage.world.over(times, body)
-        middle = polygons.mean(axis=1)
-        radius = np.sqrt(((polygons - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
-        reach = math.hypot(max(robot.front_m, robot.rear_m), 0.5 * robot.width_m)
-        gap = np.hypot(middle[:, 0] - poses[:, 0], middle[:, 1] - poses[:, 1]) - radius - reach
-        exact = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
-        if len(exact):
-            gap[exact] = separation(self._stage.robots(poses[exact]), polygons[exact])
-        distance: FloatArray = gap
-        return distance
-
-    def _between(self, close: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
-        wide = close.copy()
-        wide[:-1] |= close[1:]
-        wide[1:] |= close[:-1]
-        index = np.flatnonzero(wide[:-1] & wide[1:])
-        share = np.arange(_SUBSTEPS) / _SUBSTEPS
-        dt = self._times[index + 1] - self._times[index]
-        times = (self._times[index, None] + share * dt[:, None]).ravel()
-        step = self._poses[index + 1] - self._poses[index]
-        poses = (self._poses[index, None] + share[:, None] * step[:, None]).reshape(-1, 3)
-        return times, poses
-
-    def _note(self, body: int, times: FloatArray, gap: FloatArray) -> None:
-        """A contact counts when it begins; it is another one after half a second apart."""
-        speeds = np.interp(times, self._times, np.array(self._log.v_mps))
-        touching = np.flatnonzero(gap <= 0.0)
-        last_s = -math.inf
-        for k in touching.tolist():
-            fresh = times[k] > last_s + 0.5
-            last_s = float(times[k])
-            if fresh:
-                self._contacts.append(Contact(last_s, body, float(speeds[k])))
-
-
-def _at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reaction_s: float) -> bool:
-    """Whether the robot moved, and a driver who knows the whole motion of what it has once seen moving (or
-    standing, if it never moves) avoids it: with the same field of view, reaction_s and limits, by braking
-    hard, by braking comfortably, by going on, or by speeding up."""
-    if contact.v_mps <= AT_FAULT_MPS:
-        return False
-    seen = _first_seen(contact, stage, log, eye)
-    if seen is None:
-        return False
-    limits = stage.robot.limits
-    soft = (limits.max_accel_mps2, limits.max_jerk_mps3)
-    hard = (limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
-    choices = ((0.0, *hard), (0.0, *soft), (log.v_mps[seen], *soft), (limits.max_speed_mps, *soft))
-    return not all(
-        _touches(contact.body, stage, log, seen, reaction_s, target, accel, jerk)
-        for target, accel, jerk in choices
-    )
-
-
-def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
-    """The step at which what was touched could first be seen as what it is; None: not before the contact.
-
-    It takes two looks, 0.1 s apart. Somebody who stood meanwhile is seen as what it is once it moves again:
-    nobody sees in who stands that it will go on.
-    """
-    body, first, before = contact.body, None, None
-    moves = bool(stage.world.moves[body])
-    for k in range(0, len(log.times_s), _SIGHT_STEPS):
-        if log.times_s[k] >= contact.t_s:
-            break
-        polygons, velocity = stage.world.look(log.times_s[k])
-        if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
-            first = before = None
-            continue
-        if first is None:
-            seen = _in_view(body, polygons, PlanarPose(*log.poses[k]), eye)
-            first, before = (before if seen else None), (k if seen else None)
-    return first
-
-
-def _in_view(body: int, polygons: FloatArray, pose: PlanarPose, eye: PlanarEye) -> bool:
-    view = eye.look(polygons, pose)
-    column = np.flatnonzero(view.bodies == body)
-    return bool(len(column) and np.isfinite(view.forward_m[:, column[0]]).any())
-
-
-def _touches(
-    body: int,
-    stage: Stage,
-    log: DriveLog,
-    start: int,
-    reaction_s: float,
-    target_mps: float,
-    accel_mps2: float,
-    jerk_mps3: float,
-) -> bool:
-    """Whether a robot that goes over to target_mps reaction_s after step start touches the body."""
-    t = np.arange(0.0, _AVOIDING_S, 0.02)
-    ramp = SpeedRamps(
-        log.v_mps[start],
-        0.0,
-        np.array([target_mps]),
-        accel_mps2=accel_mps2,
-        decel_mps2=accel_mps2,
-        jerk_mps3=jerk_mps3,
-        latency_s=reaction_s,
-    )
-    way, speed, _ = ramp.state(t[None])
-    s = log.s_m[start] + way[0]
-    moving = (speed[0] > AT_FAULT_MPS) & (s <= stage.path.length_m)
-    if not moving.any():
-        return False
-    poses = stage.path_poses(s[moving])
-    polygons = stage.world.over(log.times_s[start] + t[moving], body)
-    return bool((separation(stage.robots(poses), polygons) <= 0.0).any())
 
 
 def flaps(log: DriveLog) -> int:

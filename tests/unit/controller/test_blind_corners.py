@@ -23,7 +23,7 @@ class Aisle:
         self.start_m, self.end_m, self.side = start_m, end_m, side
         self.face_m = HALF_WIDTH_M + beside_m
 
-    def look(self, s_m: float, times: int = 1) -> None:
+    def look(self, s_m: float, times: int = 1, stands: bool = True) -> None:
         """From s_m along a straight path."""
         right = -self.side * self.face_m
         with np.errstate(divide="ignore"):
@@ -39,6 +39,7 @@ class Aisle:
                 np.full(BANDS, HALF_WIDTH_M),
                 2.0 * EDGE_TAN / BANDS,
                 s_m + FRONT_M,
+                np.full(BANDS, stands),
             )
 
 
@@ -72,6 +73,12 @@ def test_a_rack_further_away_leaves_time_enough() -> None:
 def test_a_crate_is_no_corner() -> None:
     aisle = Aisle(4.4, 0.3, 1, start_m=3.8)
     aisle.look(1.0, times=5)
+    assert aisle.corners.nearest(1.51) is None
+
+
+def test_people_one_behind_the_other_are_no_face() -> None:
+    aisle = Aisle(5.0, 0.6, 1)
+    aisle.look(1.0, times=5, stands=False)
     assert aisle.corners.nearest(1.51) is None
 
 

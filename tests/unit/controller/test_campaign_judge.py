@@ -63,6 +63,16 @@ def test_a_contact_with_what_was_seen_coming_is_at_fault() -> None:
     assert row.contacts_at_fault == 1
 
 
+@pytest.mark.parametrize(("gain_mps2", "at_fault"), [(0.0, 1), (0.3, 0)])
+def test_the_driver_takes_over_the_robot_as_it_is(gain_mps2: float, at_fault: int) -> None:
+    """First seen at the same place and speed; but one is just becoming faster, and brakes later for that."""
+    steps = 140
+    before = [max(0.6 - gain_mps2 * 0.02 * (steps - k), 0.0) for k in range(steps)]
+    log = log_of(before + [0.6] * 300, s_m=0.6 * steps * 0.02 - sum(before) * 0.02)
+    row = judged(stage(mover(3.3, -4.3, 3.3, 4.0, 1.4, start_s=0.6), length_m=9.0), log)
+    assert (row.contacts, row.contacts_at_fault) == (1, at_fault)
+
+
 def test_nobody_sees_in_who_stands_that_it_will_go_on() -> None:
     """It comes to 1.5 m beside the path in full view, stands, and walks into the robot's side."""
     steps = (

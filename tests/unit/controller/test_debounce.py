@@ -33,6 +33,12 @@ def test_a_yes_may_need_no_time() -> None:
     assert flags.update(ONE, YES, YES, 0.0)[0]
 
 
+def test_a_no_may_need_no_time_either() -> None:
+    flags = Debounced(0.3)
+    flags.update(ONE, YES, YES, 0.0)
+    assert not flags.update(ONE, NO, YES, 0.1)[0]
+
+
 def test_each_has_its_own_and_who_is_gone_is_forgotten() -> None:
     flags = Debounced(0.0)
     both = flags.update(np.array([1, 2]), np.array([True, False]), np.array([True, False]), 0.0)

@@ -50,8 +50,29 @@ def test_a_rising_target_waits_for_a_free_way() -> None:
     gate.step(0.0)
     gate.v = 0.0
     assert gate.hold(0.0, 3.0) == 0.0
-    assert gate.hold(1.0, 0.28) == 0.0
-    assert gate.hold(1.0, 0.06) == 1.0
+    assert gate.hold(0.2, 0.28) == 0.0
+    assert gate.hold(0.2, 0.06) == 0.2
+
+
+def test_what_is_far_above_the_speed_is_waited_for_less_long() -> None:
+    gate = Gate(0.0)
+    gate.step(1.0)
+    gate.hold(0.0, 3.0)
+    gate.v = 0.0
+    assert gate.hold(0.6, 0.1) == 0.0
+    assert gate.hold(0.6, 0.06) == 0.6
+
+
+def test_far_above_the_speed_counts_the_least_of_that_time() -> None:
+    """A single frame that is not free: no more than it showed, until far_delay_s after it."""
+    gate = Gate(0.0)
+    gate.step(1.0)
+    gate.hold(0.0, 3.0)
+    gate.v = 0.0
+    gate.hold(1.5, 0.06)
+    gate.step(0.2)
+    assert gate.hold(1.5, 0.1) == 0.0
+    assert gate.hold(1.5, 0.06) == 1.5
 
 
 def test_a_break_in_the_free_way_starts_the_delay_anew() -> None:
@@ -87,8 +108,9 @@ def test_noise_cannot_turn_it_round_three_times_in_two_seconds() -> None:
     turns: list[float] = []
     last = 0
     for k in range(6000):
+        v = gate.v
         target = gate.step(float(random.uniform(0.2, 1.5)))
-        sign = 1 if target > gate.v + 0.03 else -1 if target < gate.v - 0.03 else 0
+        sign = 1 if target > v + 0.03 else -1 if target < v - 0.03 else 0
         if sign and last and sign != last:
             turns.append(k * STEP_S)
         last = sign or last

@@ -1,0 +1,101 @@
+"""Whether a contact was the driver's fault: one with the same eyes and brakes avoids it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.campaign.contacts import Contact
+from controller.campaign.drive import DriveLog
+from controller.campaign.stage import Stage
+from controller.campaign.view import PlanarEye
+from controller.profile import SpeedRamps
+from hal.types import FloatArray, PlanarPose
+from sim.planar import separation
+
+AT_FAULT_MPS = 0.02
+_SIGHT_STEPS = 5
+_SEEN_MOVING_MPS = 0.1
+_AVOIDING_S = 15.0
+
+
+def at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reaction_s: float) -> bool:
+    """Whether the robot moved, and a driver who knows the whole motion of what it has once seen moving (or
+    standing, if it never moves) avoids it: with the same field of view, reaction_s and limits, by braking
+    hard, by braking comfortably, by going on, or by speeding up."""
+    if contact.v_mps <= AT_FAULT_MPS:
+        return False
+    seen = _first_seen(contact, stage, log, eye)
+    if seen is None:
+        return False
+    limits = stage.robot.limits
+    soft = (limits.max_accel_mps2, limits.max_jerk_mps3)
+    hard = (limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
+    choices = ((0.0, *hard), (0.0, *soft), (log.v_mps[seen], *soft), (limits.max_speed_mps, *soft))
+    return not all(
+        _touches(contact.body, stage, log, seen, reaction_s, target, accel, jerk)
+        for target, accel, jerk in choices
+    )
+
+
+def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
+    """The step at which what was touched could first be seen as what it is; None: not before the contact.
+
+    It takes two looks, 0.1 s apart. Somebody who stood meanwhile is seen as what it is once it moves again:
+    nobody sees in who stands that it will go on.
+    """
+    body, first, before = contact.body, None, None
+    moves = bool(stage.world.moves[body])
+    for k in range(0, len(log.times_s), _SIGHT_STEPS):
+        if log.times_s[k] >= contact.t_s:
+            break
+        polygons, velocity = stage.world.look(log.times_s[k])
+        if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
+            first = before = None
+            continue
+        if first is None:
+            seen = _in_view(body, polygons, PlanarPose(*log.poses[k]), eye)
+            first, before = (before if seen else None), (k if seen else None)
+    return first
+
+
+def _in_view(body: int, polygons: FloatArray, pose: PlanarPose, eye: PlanarEye) -> bool:
+    view = eye.look(polygons, pose)
+    column = np.flatnonzero(view.bodies == body)
+    return bool(len(column) and np.isfinite(view.forward_m[:, column[0]]).any())
+
+
+def _touches(
+    body: int,
+    stage: Stage,
+    log: DriveLog,
+    start: int,
+    reaction_s: float,
+    target_mps: float,
+    accel_mps2: float,
+    jerk_mps3: float,
+) -> bool:
+    """Whether a robot that goes over to target_mps reaction_s after step start touches the body. It begins as
+    the robot was: who is becoming faster brakes later than who is not, whoever drives."""
+    earlier = max(start - _SIGHT_STEPS, 0)
+    since_s = log.times_s[start] - log.times_s[earlier]
+    gain_mps = log.v_mps[start] - log.v_mps[earlier]
+    t = np.arange(0.0, _AVOIDING_S, 0.02)
+    ramp = SpeedRamps(
+        log.v_mps[start],
+        gain_mps / since_s if since_s > 0.0 else 0.0,
+        np.array([target_mps]),
+        accel_mps2=accel_mps2,
+        decel_mps2=accel_mps2,
+        jerk_mps3=jerk_mps3,
+        latency_s=reaction_s,
+    )
+    way, speed, _ = ramp.state(t[None])
+    s = log.s_m[start] + way[0]
+    moving = (speed[0] > AT_FAULT_MPS) & (s <= stage.path.length_m)
+    if not moving.any():
+        return False
+    poses = stage.path_poses(s[moving])
+    polygons = stage.world.over(log.times_s[start] + t[moving], body)
+    return bool((separation(stage.robots(poses), polygons) <= 0.0).any())
