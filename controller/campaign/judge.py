@@ -198,6 +198,7 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -
     """
     body, first, before = contact.body, None, None
     moves = bool(stage.world.moves[body])
+    stage.world.foresee(np.array(log.times_s[::_SIGHT_STEPS]))
     for k in range(0, len(log.times_s), _SIGHT_STEPS):
         if log.times_s[k] >= contact.t_s:
             break
