@@ -214,8 +214,8 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -
 
 def _in_view(body: int, polygons: FloatArray, pose: PlanarPose, eye: PlanarEye) -> bool:
     view = eye.look(polygons, pose)
-    column = np.flatnonzero(view.bodies == body)
-    return bool(len(column) and np.isfinite(view.forward_m[:, column[0]]).any())
+    row = np.flatnonzero(view.bodies == body)
+    return bool(len(row) and np.isfinite(view.forward_m[row[0]]).any())
 
 
 def _touches(
