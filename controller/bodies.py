@@ -81,13 +81,19 @@ class Bodies:
 
 _arrays_of = attrgetter(*(name for name in Bodies.__slots__ if name != "captured_ns"))
 _NOBODY = Bodies(
-    0,
-    np.zeros(0, np.int64),
-    *(np.zeros((0, 2)) for _ in range(3)),
-    np.zeros((0, 2, 2)),
-    *(np.zeros(0) for _ in range(4)),
-    np.zeros(0, np.bool_),
-    *(np.zeros(0) for _ in range(2)),
+    captured_ns=0,
+    ids=np.zeros(0, np.int64),
+    xy_m=np.zeros((0, 2)),
+    velocity_mps=np.zeros((0, 2)),
+    surprise_mps=np.zeros((0, 2)),
+    covariance=np.zeros((0, 2, 2)),
+    half_view_m=np.zeros(0),
+    half_across_m=np.zeros(0),
+    view_rad=np.zeros(0),
+    top_m=np.zeros(0),
+    moving=np.zeros(0, np.bool_),
+    age_s=np.zeros(0),
+    unseen_s=np.zeros(0),
 )
 
 

@@ -96,7 +96,7 @@ class PlanarEye:
         return nearest.reshape(count, bands)
 
     def _thin_ones(self, forward: FloatArray, right: FloatArray) -> FloatArray:
-        """(M, B) for bodies that no ray has met: a pole may stand between two rays and is seen all the same."""
+        """(M, B) for bodies that no ray has met: a pole may stand between two, and is seen all the same."""
         ahead = forward.min(axis=1)
         tangent = right / np.maximum(forward, _NEAR_M)
         low, high = tangent.min(axis=1) - self.half_width_tan, tangent.max(axis=1) + self.half_width_tan
