@@ -115,37 +115,45 @@ class _Clearance:
         self._poses = log.pose_array()
         self.least_m = math.inf
         self._contacts: list[Contact] = []
-        for body in np.flatnonzero(stage.in_height).tolist():
-            self._look_at(body)
+        bodies = np.flatnonzero(stage.in_height).tolist()
+        around = {body: self._around(body, self._times, self._poses) for body in bodies}
+        # The nearest first: of the others, only what could come nearer still is looked at closely.
+        for body in sorted(bodies, key=lambda body: float(around[body][1].min(initial=math.inf))):
+            self._look_at(body, *around[body])
 
     def contacts(self) -> list[Contact]:
         """In the order of time."""
-        return sorted(self._contacts, key=lambda one: one.t_s)
+        return sorted(self._contacts, key=lambda one: (one.t_s, one.body))
 
-    def _look_at(self, body: int) -> None:
-        times, poses = self._times, self._poses
-        gap = self._gap(body, times, poses, _BETWEEN_STEPS_M)
+    def _look_at(self, body: int, polygons: FloatArray, gap: FloatArray) -> None:
+        gap = self._gap(polygons, gap, self._poses, _BETWEEN_STEPS_M)
         close = gap < _BETWEEN_STEPS_M
         if close.any():
             # Look between the steps as well where something could happen there.
             times, poses = self._between(close)
-            gap = np.append(gap, self._gap(body, times, poses, math.inf))
-            self._note(body, times, gap[-len(times) :])
+            between = self._gap(*self._around(body, times, poses), poses, math.inf)
+            self._note(body, times, between)
+            gap = np.append(gap, between)
         self.least_m = min(self.least_m, float(gap.min(initial=math.inf)))
 
-    def _gap(self, body: int, times: FloatArray, poses: FloatArray, exact_below_m: float) -> FloatArray:
-        """(T,) distance; that of circles where they are further apart than what matters."""
+    def _around(self, body: int, times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The body's polygons (T, K, 2), and (T,) the distance of circles around it and the robot."""
         robot = self._stage.robot.body
         polygons = self._stage.world.over(times, body)
         middle = polygons.mean(axis=1)
         radius = np.sqrt(((polygons - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
         reach = math.hypot(max(robot.front_m, robot.rear_m), 0.5 * robot.width_m)
         gap = np.hypot(middle[:, 0] - poses[:, 0], middle[:, 1] - poses[:, 1]) - radius - reach
+        return polygons, gap
+
+    def _gap(
+        self, polygons: FloatArray, gap: FloatArray, poses: FloatArray, exact_below_m: float
+    ) -> FloatArray:
+        """(T,) distance; that of circles, gap, where they are further apart than what matters."""
         exact = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
         if len(exact):
             gap[exact] = separation(self._stage.robots(poses[exact]), polygons[exact])
-        distance: FloatArray = gap
-        return distance
+        return gap
 
     def _between(self, close: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
         wide = close.copy()

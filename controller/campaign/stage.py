@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,8 +39,8 @@ class Stage:
         share = place - k
         h = heading[k] + share * (heading[k + 1] - heading[k])
         return PlanarPose(
-            x[k] + share * (x[k + 1] - x[k]) - d_m * float(np.sin(h)),
-            y[k] + share * (y[k + 1] - y[k]) + d_m * float(np.cos(h)),
+            x[k] + share * (x[k + 1] - x[k]) - d_m * math.sin(h),
+            y[k] + share * (y[k + 1] - y[k]) + d_m * math.cos(h),
             h,
         )
 
