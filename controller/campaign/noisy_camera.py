@@ -121,7 +121,7 @@ class NoisyCamera:
         missed = self._random.random(len(self._ids)).tolist()
         hits = view.forward_m
         rows = ((hits.min(axis=1) < np.inf) & ~self._glass[view.bodies]).nonzero()[0]
-        z = hits[rows]
+        z = hits.take(rows, 0)
         shown = z < np.inf
         x = z * self.eye.bearing_tan
         low_z, high_z = z.min(axis=1), np.where(shown, z, -np.inf).max(axis=1)
@@ -154,7 +154,7 @@ class NoisyCamera:
 
     def _judge(self, body: int, z_m: float) -> None:
         noise = self._noise
-        fast = math.hypot(*self._velocity[body]) > noise.moving_mps + noise.moving_per_m * z_m
+        fast = math.hypot(*self._velocity[body].tolist()) > noise.moving_mps + noise.moving_per_m * z_m
         step_s = self._period_s
         if fast:
             self._evidence_s[body] = min(self._evidence_s[body] + step_s, noise.rise_s + step_s)
@@ -173,7 +173,7 @@ class NoisyCamera:
         if not len(rows):
             return ()
         ahead, left = all_ahead[rows], dy[rows] * cos - dx[rows] * sin
-        wander = self._wander[rows]
+        wander = self._wander.take(rows, 0)
         sigma_m = noise.kept_by_tracker * noise.depth_sigma_1pm * ahead * ahead
         in_camera = np.empty((len(rows), 3))
         in_camera[:, 0] = ahead + sigma_m * wander[:, 0]
@@ -183,7 +183,7 @@ class NoisyCamera:
         young = noise.first_velocity_mps * np.exp(-age_s / noise.first_velocity_fades_s)
         radial = noise.radial_velocity_mps + noise.radial_velocity_per_m * ahead
         side = noise.side_velocity_mps + noise.side_velocity_per_m * ahead
-        vx, vy = self._velocity[rows].T
+        vx, vy = self._velocity.take(rows, 0).T
         velocity = np.zeros((len(rows), 3))
         velocity[:, 0] = vx * cos + vy * sin + radial * wander[:, 2]
         velocity[:, 1] = vy * cos - vx * sin + side * wander[:, 3]
@@ -193,7 +193,7 @@ class NoisyCamera:
         position, velocity = in_camera @ turn.T, velocity @ turn.T
         covariance = (turn * (sigma * sigma)[:, None, :]) @ turn.T
         extent = np.empty((len(rows), 3))
-        extent[:, 0::2], extent[:, 1] = self._extent[rows], self._height_m[rows]
+        extent[:, 0::2], extent[:, 1] = self._extent.take(rows, 0), self._height_m[rows]
         unseen_s = (t_s - self._seen_s[rows]).tolist()
         ids, moving = self._ids[rows].tolist(), self._moving[rows].tolist()
         return tuple(
@@ -216,8 +216,8 @@ class NoisyCamera:
     def _free_space(self, view: View) -> FreeSpace:
         """What the bands show: the nearest thing in the robot's height, and how far the floor is free."""
         noise, eye = self._noise, self.eye
-        nearest = view.forward_m[self._scanned[view.bodies]].min(axis=0, initial=np.inf)
-        hidden = view.forward_m[self._glass[view.bodies]].min(axis=0, initial=np.inf)
+        nearest = view.forward_m.take(self._scanned[view.bodies].nonzero()[0], 0).min(axis=0, initial=np.inf)
+        hidden = view.forward_m.take(self._glass[view.bodies].nonzero()[0], 0).min(axis=0, initial=np.inf)
         building = view.free_m <= np.minimum(nearest, eye.range_m)
         nearest = np.where(building & (hidden > view.free_m), view.free_m, nearest)
         nearest = np.where(hidden < nearest, np.inf, nearest)

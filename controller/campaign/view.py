@@ -61,14 +61,15 @@ class PlanarEye:
         near &= inside
         near[-1] = True  # the building, which is not a body
         chosen = near.nonzero()[0]
-        hits = self._hits(forward[chosen], right[chosen])
+        forward, right = forward.take(chosen, 0), right.take(chosen, 0)
+        hits = self._hits(forward, right)
         bodies, room, hits = chosen[:-1], hits[-1], hits[:-1]
         unmet = np.isinf(hits.min(axis=1)).nonzero()[0]
         if len(unmet):
-            hits[unmet] = self._thin_ones(forward[bodies[unmet]], right[bodies[unmet]])
-        free = np.minimum(hits[self._hides[bodies]].min(axis=0, initial=np.inf), room)
-        hidden = (hits > free + _TOUCHING_M) | ~self._in_frame(bodies, hits)
-        hits[hidden] = np.inf
+            hits[unmet] = self._thin_ones(forward[unmet], right[unmet])
+        hiding = hits.take(self._hides[bodies].nonzero()[0], 0)
+        free = np.minimum(hiding.min(axis=0, initial=np.inf), room)
+        np.putmask(hits, (hits > free + _TOUCHING_M) | ~self._in_frame(bodies, hits), np.inf)
         return View(bodies, hits, free)
 
     def _in_camera(self, polygons: FloatArray, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
@@ -83,16 +84,16 @@ class PlanarEye:
         off = right[:, :, None] - self.bearing_tan * forward[:, :, None]
         # Of all the pairs of a ray and an edge only a few meet: the rest is never divided.
         met = (off[:, :-1] * off[:, 1:] <= 0.0).ravel().nonzero()[0]
-        edge, band = np.divmod(met, bands)
+        edge = met // bands
         body = edge // (corners - 1)
         corner = edge + body  # each polygon has one corner more than it has edges
-        here, there = off.reshape(-1, bands)[corner, band], off.reshape(-1, bands)[corner + 1, band]
+        here, there = off.take(met + body * bands), off.take(met + (body + 1) * bands)
         drop = here - there
         share = here / np.where(np.abs(drop) < 1e-12, np.inf, drop)
-        start = forward.ravel()[corner]
-        z = start + share * (forward.ravel()[corner + 1] - start)
+        start = forward.take(corner)
+        z = start + share * (forward.take(corner + 1) - start)
         nearest = np.full(count * bands, np.inf)
-        np.minimum.at(nearest, body * bands + band, np.where(z > _NEAR_M, z, np.inf))
+        np.minimum.at(nearest, met - (edge - body) * bands, np.where(z > _NEAR_M, z, np.inf))
         return nearest.reshape(count, bands)
 
     def _thin_ones(self, forward: FloatArray, right: FloatArray) -> FloatArray:
@@ -106,7 +107,7 @@ class PlanarEye:
 
     def _in_frame(self, bodies: NDArray[np.intp], hits: FloatArray) -> NDArray[np.bool_]:
         """Whether any of its height is between the upper and the lower edge of the image."""
-        z_m, eye_m = self._world.z_m[bodies], self._mount.height_m
+        z_m, eye_m = self._world.z_m.take(bodies, 0), self._mount.height_m
         above = z_m[:, 1:] > eye_m - hits * self._down_tan
         below = z_m[:, :1] < eye_m + hits * self._up_tan
         seen: NDArray[np.bool_] = above & below & (hits < self.range_m)
