@@ -73,15 +73,16 @@ class StandingLimits:
 
     def _take_in(self, known: Knowledge, s_m: float) -> None:
         """Place what stands in a new scene, and leave out what is too far aside to matter."""
-        self._of = known.bodies
-        bodies, self._near = known.bodies.select(~known.bodies.moving), []
-        if not len(bodies):
+        self._of = bodies = known.bodies
+        self._near = []
+        standing = ~bodies.moving
+        if not standing.any():
             return
         sight, margins = self._config.sight, self._config.margins
         placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
         near = placed.clear_m[:, 0] <= margins.lateral_m + margins.graze_m
-        self._inside.difference_update(bodies.ids[~near].tolist())
-        rows = near.nonzero()[0]
+        self._inside.difference_update(bodies.ids[standing & ~near].tolist())
+        rows = (standing & near).nonzero()[0]
         if not len(rows):
             return
         stop_m = self._standing_off(known, bodies, placed)
