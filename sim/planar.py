@@ -166,6 +166,14 @@ def separation(a: FloatArray, b: FloatArray) -> FloatArray:
     return gap
 
 
+def overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
+    """(P,) where separation() is 0 or less; what a's edges keep apart is not looked at from b's."""
+    touching: NDArray[np.bool_] = _widest_gap(a, b) <= 0.0
+    left = np.flatnonzero(touching)
+    touching[left] = _widest_gap(b[left], a[left]) <= 0.0
+    return touching
+
+
 def _widest_gap(a: FloatArray, b: FloatArray) -> FloatArray:
     edges = np.roll(a, -1, axis=1) - a
     length = np.hypot(edges[..., 0], edges[..., 1])

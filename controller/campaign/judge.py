@@ -15,13 +15,14 @@ from controller.campaign.view import PlanarEye
 from controller.decision import Action
 from controller.profile import SpeedRamps
 from hal.types import FloatArray, PlanarPose
-from sim.planar import separation
+from sim.planar import overlap, separation
 
 AT_FAULT_MPS = 0.02
 FLAP_REVERSALS, FLAP_S = 3, 2.0
 # Between two control steps two bodies come no closer to each other than this.
 _BETWEEN_STEPS_M = 0.15
 _SUBSTEPS = 4
+_STRIDE, _ROUNDING_M = 10, 1e-9
 _STOPPED_MPS, _MOVING_AGAIN_MPS = 0.02, 0.1
 _BEFORE_STOP_S, _AFTER_STOP_S = 4.0, 2.0
 _AFTER_FAULT_S = 1.5
@@ -106,6 +107,12 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) ->
     )
 
 
+def _furthest(moves: FloatArray) -> FloatArray:
+    """(T,) the furthest of moves (T, K, 2)."""
+    furthest: FloatArray = np.sqrt((moves * moves).sum(axis=2).max(axis=1))
+    return furthest
+
+
 class _Clearance:
     """Distances between the robot and all bodies at its height, over the whole drive."""
 
@@ -149,10 +156,23 @@ class _Clearance:
     def _gap(
         self, polygons: FloatArray, gap: FloatArray, poses: FloatArray, exact_below_m: float
     ) -> FloatArray:
-        """(T,) distance; that of circles, gap, where they are further apart than what matters."""
-        exact = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
-        if len(exact):
-            gap[exact] = separation(self._stage.robots(poses[exact]), polygons[exact])
+        """(T,) distance; that of circles, gap, where they are further apart than what matters, and inf where
+        something else is certainly nearer."""
+        near = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
+        if not len(near):
+            return gap
+        robots, others = self._stage.robots(poses[near]), polygons[near]
+        # Every tenth step first: until the next ones, neither corner of both comes nearer than it has moved.
+        tenth = np.arange(len(near)) // _STRIDE * _STRIDE
+        sampled = separation(robots[::_STRIDE], others[::_STRIDE])
+        moved = _furthest(robots - robots[tenth]) + _furthest(others - others[tenth])
+        at_least = sampled[tenth // _STRIDE] - moved
+        matters = (
+            at_least < max(min(self.least_m, float(sampled.min())), min(exact_below_m, 2.0)) + _ROUNDING_M
+        )
+        exact = np.flatnonzero(matters)
+        gap[near] = np.inf
+        gap[near[exact]] = separation(robots[exact], others[exact])
         return gap
 
     def _between(self, close: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
@@ -254,7 +274,7 @@ def _touches(
         return False
     poses = stage.path_poses(s[moving])
     polygons = stage.world.over(log.times_s[start] + t[moving], body)
-    return bool((separation(stage.robots(poses), polygons) <= 0.0).any())
+    return bool(overlap(stage.robots(poses), polygons).any())
 
 
 def flaps(log: DriveLog) -> int:

@@ -13,7 +13,7 @@ from controller import braking
 from controller.path import Path
 from hal.types import FloatArray, PlanarPose
 from sim.families import Case
-from sim.planar import PlanarWorld, separation
+from sim.planar import PlanarWorld, overlap
 
 _TABLE_STEP_M = 0.02
 _SWEEP_STEP_M = 0.05
@@ -69,7 +69,7 @@ class Stage:
             when, where = np.nonzero(away < reach_m + radius[:, None])
             if not len(when):
                 continue
-            touch = separation(robots[where], polygons[when]) <= 0.0
+            touch = overlap(robots[where], polygons[when])
             for t, (low, high) in _runs(when[touch], where[touch]):
                 stretch = (s_m[low] - 0.5 * _SWEEP_STEP_M, s_m[high] + 0.5 * _SWEEP_STEP_M)
                 for one in [stretches[t]] if moves else stretches:
