@@ -86,11 +86,11 @@ class Sight:
             2.0 * free.half_width_tan,
             s_m + self._corridor.front_m,
         )
-        reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
         way = inside.nonzero()[0]
         way_s = surface_s[way]
         if len(way) and len(explained_by):
-            explained = explained_by.covers(points.take(way, 0), reach_m[way], _AROUND_M).any(axis=1)
+            reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward[way] ** 2
+            explained = explained_by.covers(points.take(way, 0), reach_m, _AROUND_M).any(axis=1)
             way_s = way_s[~explained]
         self._note_surface(way_s, s_m, standing)
         in_corridor = np.zeros(len(free.bearing_tan), np.bool_)
@@ -174,11 +174,11 @@ class Sight:
         bearing = right / np.maximum(forward, 1e-3)
         left_edge = free.bearing_tan[0] - free.half_width_tan
         band = np.floor((bearing - left_edge) / (2.0 * free.half_width_tan)).astype(np.intp)
-        in_view = (forward > 0.0) & (band >= 0) & (band < len(free.bearing_tan))
-        band = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
+        within = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
+        in_view = (forward > 0.0) & (band == within)
         # The far edge of a cell, so that a cell is not known for the sake of its beginning.
         far_edge = forward + 0.5 * _CELL_M
-        behind = surface_in_corridor[band] & (far_edge >= free.nearest_m[band])
-        seen = in_view & ((far_edge <= free.known_m[band]) | behind)
+        surface_m = np.where(surface_in_corridor, free.nearest_m, np.inf)
+        seen = in_view & ((far_edge <= free.known_m[within]) | (far_edge >= surface_m[within]))
         share: FloatArray = seen.sum(axis=1) / _LANES
         return share
