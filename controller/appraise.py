@@ -130,11 +130,12 @@ class Appraiser:
 
 def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:
     """The sprawling obstacle whose surface this is, if one is tracked there."""
-    if not len(known.sprawling):
+    sprawling = known.sprawling
+    if not len(sprawling):
         return None
-    placed = place(known.sprawling, known.corridor, np.zeros(1), s_m, surface_s_m - s_m + 2.0)
+    placed = place(sprawling, known.corridor, np.zeros(1), s_m, surface_s_m - s_m + 2.0)
     near_s = placed.s_m[:, 0] - placed.half_s_m[:, 0]
     far_s = placed.s_m[:, 0] + placed.half_s_m[:, 0]
     off = np.maximum(np.maximum(near_s - surface_s_m, surface_s_m - far_s), 0.0)
     best = int(off.argmin())
-    return int(known.sprawling.ids[best]) if off[best] < _SAME_SURFACE_M else None
+    return int(sprawling.ids[best]) if off[best] < _SAME_SURFACE_M else None

@@ -69,10 +69,10 @@ class BlindCorners:
         for corner in self._corners:
             # Nearer than this, too little of the face is in view to be sure.
             corner.sightings -= 1 if corner.s_m - front_s_m > _SURE_M else 0
+        close = stands & (beside > 0.0) & (beside <= self._beside_m) & (s_m - front_s_m < _LOOK_AHEAD_M)
         for left in (False, True):
             side = (d_m > 0.0) == left
-            near = np.flatnonzero(stands & side & (beside > 0.0) & (beside <= self._beside_m))
-            near = near[s_m[near] - front_s_m < _LOOK_AHEAD_M]
+            near = (side & close).nonzero()[0]
             for end in self._ends(near if left else near[::-1], bands, forward_m, s_m, d_m, band_tan):
                 self._note(float(s_m[end]), left, float(beside[end]))
         self._corners = [one for one in self._corners if one.sightings > 0 and one.s_m > front_s_m - _SAME_M]
@@ -95,21 +95,21 @@ class BlindCorners:
         band_tan: float,
     ) -> list[int]:
         """The far ends of long faces among rows, which come from the edge of the view inwards."""
-        ends: list[int] = []
         if not len(rows):
-            return ends
-        began = rows[0]
-        for here, following in zip(rows, [*rows[1:], None], strict=True):
-            if following is not None and abs(bands[following] - bands[here]) == 1:
-                flat_m = _SLACK * forward_m[here] ** 2 * band_tan / max(abs(d_m[here]), 0.1) + _STEP_ASIDE_M
-                along = s_m[following] - s_m[here]
-                if -_STEP_ASIDE_M < along < flat_m and abs(d_m[following] - d_m[here]) < _STEP_ASIDE_M:
-                    continue
-            if s_m[here] - s_m[began] >= _FACE_M and self._opens(int(here), bands, forward_m, rows):
-                ends.append(int(here))
-            if following is not None:
-                began = following
-        return ends
+            return []
+        along, aside, number = np.diff(s_m[rows]), np.diff(d_m[rows]), np.diff(bands[rows])
+        here = rows[:-1]
+        flat_m = _SLACK * forward_m[here] ** 2 * band_tan / np.maximum(np.abs(d_m[here]), 0.1) + _STEP_ASIDE_M
+        goes_on = (np.abs(number) == 1) & (along > -_STEP_ASIDE_M) & (along < flat_m)
+        goes_on &= np.abs(aside) < _STEP_ASIDE_M
+        last = [*(~goes_on).nonzero()[0].tolist(), len(rows) - 1]
+        first = [0, *(k + 1 for k in last[:-1])]
+        faces = [(int(rows[j]), int(rows[k])) for j, k in zip(first, last, strict=True)]
+        return [
+            end
+            for began, end in faces
+            if s_m[end] - s_m[began] >= _FACE_M and self._opens(end, bands, forward_m, rows)
+        ]
 
     def _opens(self, here: int, bands: IntArray, forward_m: FloatArray, rows: IntArray) -> bool:
         """Whether the view past the end goes on into the distance: what is behind the face is hidden."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,11 @@ from vision.scene import Obstacle, Scene
 _FARTHEST_M = 200.0
 _LARGEST_M = 50.0
 _FASTEST_MPS = 15.0
+# What is measured of an obstacle, in a row, and between which bounds it is possible.
+_POSITION, _EXTENT, _VELOCITY, _COVARIANCE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 18)
+_MOST = np.repeat([_FARTHEST_M, _LARGEST_M, _FASTEST_MPS, np.finfo(np.float64).max], (3, 3, 3, 9))
+_LEAST = -_MOST
+_LEAST[_EXTENT] = _LEAST[[9, 13, 17]] = 0.0  # and the variances
 
 
 class SceneError(Exception):
@@ -51,16 +57,18 @@ class Bodies:
 
     def select(self, chosen: NDArray[np.bool_]) -> Bodies:
         """Only the chosen ones."""
-        if chosen.all():
+        rows = chosen.nonzero()[0]
+        if len(rows) == len(self):
             return self
-        return Bodies(self.captured_ns, *(getattr(self, name)[chosen] for name in _ARRAYS))
+        # For a few rows, take() is ten times as fast as an index.
+        return Bodies(self.captured_ns, *[array.take(rows, 0) for array in _arrays_of(self)])
 
     def joined(self, other: Bodies) -> Bodies:
         """These and, behind them, others; the time is that of these."""
         if not len(other):
             return self
-        arrays = (np.concatenate((getattr(self, name), getattr(other, name))) for name in _ARRAYS)
-        return Bodies(self.captured_ns, *arrays)
+        pairs = zip(_arrays_of(self), _arrays_of(other), strict=True)
+        return Bodies(self.captured_ns, *[np.concatenate(pair) for pair in pairs])
 
     def covers(self, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
         """(P, N) whether floor points (P, 2) lie on a body, within reach_m (P,) along the view and side_m."""
@@ -71,27 +79,27 @@ class Bodies:
         return (along <= self.half_view_m + reach_m[:, None]) & (across <= self.half_across_m + side_m)
 
 
-_ARRAYS = tuple(name for name in Bodies.__slots__ if name != "captured_ns")
+_arrays_of = attrgetter(*(name for name in Bodies.__slots__ if name != "captured_ns"))
+_NOBODY = Bodies(
+    captured_ns=0,
+    ids=np.zeros(0, np.int64),
+    xy_m=np.zeros((0, 2)),
+    velocity_mps=np.zeros((0, 2)),
+    surprise_mps=np.zeros((0, 2)),
+    covariance=np.zeros((0, 2, 2)),
+    half_view_m=np.zeros(0),
+    half_across_m=np.zeros(0),
+    view_rad=np.zeros(0),
+    top_m=np.zeros(0),
+    moving=np.zeros(0, np.bool_),
+    age_s=np.zeros(0),
+    unseen_s=np.zeros(0),
+)
 
 
 def no_bodies(captured_ns: int) -> Bodies:
     """An empty scene's."""
-    n = np.zeros(0)
-    return Bodies(
-        captured_ns,
-        np.zeros(0, np.int64),
-        np.zeros((0, 2)),
-        np.zeros((0, 2)),
-        np.zeros((0, 2)),
-        np.zeros((0, 2, 2)),
-        n,
-        n,
-        n,
-        n,
-        np.zeros(0, np.bool_),
-        n,
-        n,
-    )
+    return Bodies(captured_ns, *_arrays_of(_NOBODY))
 
 
 def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float) -> Bodies:
@@ -102,13 +110,18 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     """
     if not scene.obstacles:
         return no_bodies(scene.captured_ns)
-    optical = np.array([one.position_m for one in scene.obstacles], np.float64)
-    extent = np.array([one.extent_m for one in scene.obstacles], np.float64)
-    speed = np.array([one.velocity_mps for one in scene.obstacles], np.float64)
-    spread = np.array([one.velocity_cov for one in scene.obstacles], np.float64)
-    age = np.array([one.age_s for one in scene.obstacles], np.float64)
-    unseen = np.array([one.unseen_s for one in scene.obstacles], np.float64)
-    _check(scene.obstacles, optical, extent, speed, spread, age, unseen)
+    measured = np.concatenate(
+        [
+            values
+            for one in scene.obstacles
+            for values in (one.position_m, one.extent_m, one.velocity_mps, one.velocity_cov.ravel())
+        ],
+        dtype=np.float64,
+    ).reshape(-1, len(_MOST))
+    seen_s = np.array([(one.age_s, one.unseen_s) for one in scene.obstacles], np.float64)
+    _check(scene.obstacles, measured, seen_s)
+    optical, extent, speed = measured[:, _POSITION], measured[:, _EXTENT], measured[:, _VELOCITY]
+    spread = measured[:, _COVARIANCE].reshape(-1, 3, 3)
     camera = camera_in_floor(pose, mount)
     floor = camera.rotation[:2]
     position = camera.apply(optical)
@@ -129,37 +142,21 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
         view_rad=np.full(len(moving), pose.heading_rad),
         top_m=position[:, 2] + extent[:, 1] / 2.0,
         moving=moving,
-        age_s=age,
-        unseen_s=unseen,
+        age_s=seen_s[:, 0],
+        unseen_s=seen_s[:, 1],
     )
 
 
-def _check(
-    obstacles: tuple[Obstacle, ...],
-    position: FloatArray,
-    extent: FloatArray,
-    velocity: FloatArray,
-    covariance: FloatArray,
-    age: FloatArray,
-    unseen: FloatArray,
-) -> None:
+def _check(obstacles: tuple[Obstacle, ...], measured: FloatArray, seen_s: FloatArray) -> None:
     """Written so that NaN fails every comparison."""
-    flat = covariance.reshape(len(obstacles), -1)
-    reasonable = (
-        (np.abs(position) <= _FARTHEST_M).all(axis=1)
-        & ((extent >= 0.0) & (extent <= _LARGEST_M)).all(axis=1)
-        & (np.abs(velocity) <= _FASTEST_MPS).all(axis=1)
-        & np.isfinite(flat).all(axis=1)
-        & (np.diagonal(covariance, axis1=1, axis2=2) >= 0.0).all(axis=1)
-        & (age >= 0.0)
-        & (unseen >= 0.0)
-    )
+    reasonable = ((measured >= _LEAST) & (measured <= _MOST)).all(axis=1) & (seen_s >= 0.0).all(axis=1)
     if reasonable.all():
         return
     k = int(reasonable.argmin())
+    position, extent, velocity = (measured[k, part] for part in (_POSITION, _EXTENT, _VELOCITY))
     raise SceneError(
-        f"obstacle {obstacles[k].id} is impossible: position {_list(position[k])} m, "
-        f"size {_list(extent[k])} m, velocity {_list(velocity[k])} m/s"
+        f"obstacle {obstacles[k].id} is impossible: position {_list(position)} m, "
+        f"size {_list(extent)} m, velocity {_list(velocity)} m/s"
     )
 
 

@@ -59,20 +59,7 @@ def stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
     the robot never reverses. Raises ValueError for a negative or unknown speed or acceleration.
     """
     _check_state(v_mps, a_mps2)
-    big_a, j = limits.decel_mps2, limits.jerk_mps3
-    if math.isinf(j):
-        return Stop(v_mps * v_mps / (2.0 * big_a), v_mps / big_a)
-    if a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * j):
-        return _standstill_while_letting_go(v_mps, a_mps2, j)
-    excess = abs(a_mps2) - big_a
-    if excess > 0.0:
-        return _bring_inside_then_stop(v_mps, a_mps2, excess / j, limits)
-    speed_at_rest_of_a = v_mps + a_mps2 * a_mps2 / (2.0 * j)
-    rest = _stop_from_steady(speed_at_rest_of_a, big_a, j)
-    return Stop(
-        rest.distance_m + a_mps2 * v_mps / j + a_mps2**3 / (3.0 * j * j),
-        rest.time_s + a_mps2 / j,
-    )
+    return Stop(*_stop(v_mps, a_mps2, limits))
 
 
 def onset_only_stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
@@ -108,9 +95,10 @@ def required_distance(
     S_n = (V + V_o) tau + S(V, a) + V_o T(V, a) + margin (motion-formulas 4.8). closing_mps is the speed of
     the obstacle itself towards the robot; what moves away counts as standing.
     """
-    whole = stop(v_mps, a_mps2, limits)
+    _check_state(v_mps, a_mps2)
+    distance_m, time_s = _stop(v_mps, a_mps2, limits)
     towards_mps = max(closing_mps, 0.0)
-    return (v_mps + towards_mps) * latency_s + whole.distance_m + towards_mps * whole.time_s + margin_m
+    return (v_mps + towards_mps) * latency_s + distance_m + towards_mps * time_s + margin_m
 
 
 def speed_for_distance(
@@ -154,7 +142,7 @@ def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float
     if not 0.0 <= end_mps <= v_mps:
         raise ValueError(f"can only slow down to a speed in 0..{v_mps} m/s, asked for {end_mps}")
     drop_mps = v_mps - end_mps
-    return 0.5 * (v_mps + end_mps) * _stop_from_steady(drop_mps, limits.decel_mps2, limits.jerk_mps3).time_s
+    return 0.5 * (v_mps + end_mps) * _steady_stop_s(drop_mps, limits.decel_mps2, limits.jerk_mps3)
 
 
 def speed_before_section(distance_m: float, section_mps: float, limits: BrakeLimits) -> float:
@@ -196,25 +184,42 @@ def _check_state(v_mps: float, a_mps2: float) -> None:
         raise ValueError(f"a stop needs a known speed >= 0 and acceleration, got {v_mps} m/s, {a_mps2} m/s2")
 
 
-def _stop_from_steady(v_mps: float, big_a: float, j: float) -> Stop:
-    """From a = 0: a trapezoid of deceleration, or a triangle when A is not reached."""
+def _stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> tuple[float, float]:
+    """Distance and time of stop(): plain numbers, of which a control step needs a dozen."""
+    big_a, j = limits.decel_mps2, limits.jerk_mps3
+    if math.isinf(j):
+        return v_mps * v_mps / (2.0 * big_a), v_mps / big_a
+    if a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * j):
+        return _standstill_while_letting_go(v_mps, a_mps2, j)
+    excess = abs(a_mps2) - big_a
+    if excess > 0.0:
+        return _bring_inside_then_stop(v_mps, a_mps2, excess / j, limits)
+    speed_at_rest_of_a = v_mps + a_mps2 * a_mps2 / (2.0 * j)
+    time_s = _steady_stop_s(speed_at_rest_of_a, big_a, j)
+    distance_m = 0.5 * speed_at_rest_of_a * time_s
+    return distance_m + a_mps2 * v_mps / j + a_mps2**3 / (3.0 * j * j), time_s + a_mps2 / j
+
+
+def _steady_stop_s(v_mps: float, big_a: float, j: float) -> float:
+    """How long from a = 0: a trapezoid of deceleration, or a triangle when A is not reached."""
     reached = v_mps * j >= big_a * big_a
-    time_s = v_mps / big_a + big_a / j if reached else 2.0 * math.sqrt(v_mps / j)
-    return Stop(0.5 * v_mps * time_s, time_s)
+    return v_mps / big_a + big_a / j if reached else 2.0 * math.sqrt(v_mps / j)
 
 
-def _standstill_while_letting_go(v_mps: float, a_mps2: float, j: float) -> Stop:
+def _standstill_while_letting_go(v_mps: float, a_mps2: float, j: float) -> tuple[float, float]:
     """Easing a < 0 off at J, the robot stands before a has gone."""
     time_s = (-a_mps2 - math.sqrt(max(a_mps2 * a_mps2 - 2.0 * j * v_mps, 0.0))) / j
-    return Stop(v_mps * time_s + a_mps2 * time_s**2 / 2.0 + j * time_s**3 / 6.0, time_s)
+    return v_mps * time_s + a_mps2 * time_s**2 / 2.0 + j * time_s**3 / 6.0, time_s
 
 
-def _bring_inside_then_stop(v_mps: float, a_mps2: float, ease_s: float, limits: BrakeLimits) -> Stop:
+def _bring_inside_then_stop(
+    v_mps: float, a_mps2: float, ease_s: float, limits: BrakeLimits
+) -> tuple[float, float]:
     j = math.copysign(limits.jerk_mps3, a_mps2)
     eased_m = v_mps * ease_s + a_mps2 * ease_s**2 / 2.0 - j * ease_s**3 / 6.0
     eased_mps = v_mps + a_mps2 * ease_s - j * ease_s**2 / 2.0
-    rest = stop(max(eased_mps, 0.0), math.copysign(limits.decel_mps2, a_mps2), limits)
-    return Stop(eased_m + rest.distance_m, ease_s + rest.time_s)
+    rest_m, rest_s = _stop(max(eased_mps, 0.0), math.copysign(limits.decel_mps2, a_mps2), limits)
+    return eased_m + rest_m, ease_s + rest_s
 
 
 def _solve_from_steady(linear_s: float, towards_mps: float, constant_m: float, limits: BrakeLimits) -> float:

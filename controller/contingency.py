@@ -30,7 +30,10 @@ class Reach:
 
     def select(self, rows: NDArray[np.bool_]) -> Reach:
         """Only these obstacles."""
-        return Reach(self.inside[rows], self.lo_m[rows], self.hi_m[rows])
+        chosen = rows.nonzero()[0]
+        if len(chosen) == len(rows):
+            return self
+        return Reach(self.inside.take(chosen, 0), self.lo_m.take(chosen, 0), self.hi_m.take(chosen, 0))
 
 
 def reach(

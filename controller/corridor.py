@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,9 @@ class Corridor:
     def half_width(self, s_m: FloatArray) -> FloatArray:
         """Half of the swept width at s_m, in metres; on bends the outer corner's, on both sides."""
         if self.straight:
-            return np.full(s_m.shape, self._half_m)
+            same = np.empty(s_m.shape)
+            same.fill(self._half_m)
+            return same
         return np.interp(s_m, self._s, self._half_width)
 
 
@@ -65,9 +68,14 @@ class Placed:
 
     def select(self, rows: NDArray[np.bool_], count: int) -> Placed:
         """Only these bodies, at the first count times."""
-        if rows.all():
-            return Placed(*(getattr(self, name)[:, :count] for name in Placed.__slots__))
-        return Placed(*(getattr(self, name)[rows, :count] for name in Placed.__slots__))
+        chosen = rows.nonzero()[0]
+        arrays = [array[:, :count] for array in _arrays_of(self)]
+        if len(chosen) < len(rows):
+            arrays = [array.take(chosen, 0) for array in arrays]
+        return Placed(*arrays)
+
+
+_arrays_of = attrgetter(*Placed.__slots__)
 
 
 def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: float, reach_m: float) -> Placed:
@@ -75,17 +83,10 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
 
     The path is looked at from a little behind near_s_m to reach_m ahead of it.
     """
-    count, steps = len(bodies), len(times_s)
-    low, high = near_s_m - _BEHIND_M, near_s_m + reach_m
-    # What stands is projected once, whatever the time.
-    standing, moving = np.flatnonzero(~bodies.moving), np.flatnonzero(bodies.moving)
-    moved = bodies.xy_m[moving, None, :] + bodies.velocity_mps[moving, None, :] * times_s[:, None]
-    points = np.concatenate((bodies.xy_m[standing], moved.reshape(-1, 2)))
-    found = np.empty((3, count, steps))
-    for values, located in zip(found, corridor.path.locate_points(points, low, high), strict=True):
-        values[standing] = located[: len(standing), None]
-        values[moving] = located[len(standing) :].reshape(-1, steps)
-    s, d, heading = found
+    ahead_m = bodies.velocity_mps[:, None, :] * times_s[:, None]
+    points = (bodies.xy_m[:, None, :] + ahead_m).reshape(-1, 2)
+    located = corridor.path.locate_points(points, near_s_m - _BEHIND_M, near_s_m + reach_m)
+    s, d, heading = (values.reshape(len(bodies), len(times_s)) for values in located)
     if corridor.straight:
         heading = heading[:, :1]
     turned = bodies.view_rad[:, None] - heading
@@ -111,9 +112,13 @@ class Course:
 
     def select(self, rows: NDArray[np.bool_]) -> Course:
         """Only these bodies."""
-        if rows.all():
+        chosen = rows.nonzero()[0]
+        if len(chosen) == len(rows):
             return self
-        return Course(*(getattr(self, name)[rows] for name in Course.__slots__))
+        return Course(*[array.take(chosen) for array in _courses_of(self)])
+
+
+_courses_of = attrgetter(*Course.__slots__)
 
 
 def course_of(bodies: Bodies, heading_rad: FloatArray) -> Course:

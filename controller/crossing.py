@@ -57,7 +57,7 @@ def find_conflicts(
 
     Leaving must be certain, the spread added: hope is no reason to go.
     """
-    clear = placed.clear_m[rows] - margin_m[rows, None]
+    clear = placed.clear_m.take(rows, 0) - margin_m[rows, None]
     likely = clear + _likely(times_s, sigma_side_mps[rows])
     certain = clear - sigma_side_mps[rows, None] * times_s
     found = []

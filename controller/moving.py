@@ -61,7 +61,7 @@ class MovingLimits:
         enters (N,): who is or is likely to come within the swept width.
         """
         ahead = placed.s_m[:, 0] + placed.half_s_m[:, 0] > s_m
-        rows = np.flatnonzero(bodies.moving & ahead & enters)
+        rows = (bodies.moving & ahead & enters).nonzero()[0]
         if not len(rows):
             self.nobody()
             return [], base_mps

@@ -185,7 +185,9 @@ class Path:
         along = dx * cos + dy * sin + self._starts[piece]
         left = dy * cos - dx * sin
         s = np.minimum(np.maximum(along, low), high)
-        return s, np.copysign(np.hypot(along - s, left), left), np.full(len(s), heading)
+        headings = np.empty(len(s))
+        headings.fill(heading)
+        return s, np.copysign(np.hypot(along - s, left), left), headings
 
     def _seen_from(
         self, s_m: FloatArray, points_m: FloatArray

@@ -36,8 +36,8 @@ class SpeedRamps:
         jerk_mps3: float,
         latency_s: float = 0.0,
     ) -> None:
-        v = np.broadcast_to(v_mps, targets_mps.shape).astype(np.float64)
-        a = np.broadcast_to(a_mps2, targets_mps.shape).astype(np.float64)
+        v, a = np.empty(targets_mps.shape), np.empty(targets_mps.shape)
+        v[:], a[:] = v_mps, a_mps2
         # Up or down, judged by the speed that remains when a has been let go of.
         sign = np.where(targets_mps >= v + a * np.abs(a) / (2.0 * jerk_mps3), 1.0, -1.0)
         start = sign * a
@@ -62,27 +62,33 @@ class SpeedRamps:
 
     def state(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance m, speed m/s and acceleration m/s^2 after t_s; t_s and all results (N, K)."""
-        held, x1, x2, x3, x4 = self._split(t_s)
+        phases = self._split(t_s)
+        _, x1, x2, x3, _ = phases
         v, a, j, peak = self._v[:, None], self._a[:, None], self._jerk[:, None], self._peak[:, None]
-        v1, v2 = self._v1[:, None], self._v2[:, None]
-        distance = (
+        speed = v + a * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0
+        acceleration = np.where(x2 + x3 > 0.0, peak - j * x3, a + j * x1)
+        return self._distance(*phases), np.maximum(speed, 0.0), acceleration
+
+    def distance(self, t_s: FloatArray) -> FloatArray:
+        """Distance m after t_s (N, K)."""
+        return self._distance(*self._split(t_s))
+
+    def _distance(
+        self, held: FloatArray, x1: FloatArray, x2: FloatArray, x3: FloatArray, x4: FloatArray
+    ) -> FloatArray:
+        v, a, j, peak = self._v[:, None], self._a[:, None], self._jerk[:, None], self._peak[:, None]
+        distance: FloatArray = (
             v * (held + x1)
             + a * x1**2 / 2.0
             + j * x1**3 / 6.0
-            + v1 * x2
+            + self._v1[:, None] * x2
             + peak * x2**2 / 2.0
-            + v2 * x3
+            + self._v2[:, None] * x3
             + peak * x3**2 / 2.0
             - j * x3**3 / 6.0
             + self._target[:, None] * x4
         )
-        speed = v + a * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0
-        acceleration = np.where(x2 + x3 > 0.0, peak - j * x3, a + j * x1)
-        return distance, np.maximum(speed, 0.0), acceleration
-
-    def distance(self, t_s: FloatArray) -> FloatArray:
-        """Distance m after t_s (N, K)."""
-        return self.state(t_s)[0]
+        return distance
 
     def _split(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """How long each phase has lasted at t_s: latency, jerk, constant, jerk back, done."""
@@ -90,8 +96,8 @@ class SpeedRamps:
         held = np.minimum(t_s, self._latency_s)
         rest = t_s - held
         x1 = np.minimum(rest, t1)
-        x2 = np.clip(rest - t1, 0.0, t2)
-        x3 = np.clip(rest - t1 - t2, 0.0, t3)
+        x2 = np.minimum(np.maximum(rest - t1, 0.0), t2)
+        x3 = np.minimum(np.maximum(rest - t1 - t2, 0.0), t3)
         return held, x1, x2, x3, np.maximum(rest - t1 - t2 - t3, 0.0)
 
 

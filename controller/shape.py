@@ -75,6 +75,7 @@ class SpeedShaper:
         self._to_end_m = math.inf
         self._v, self._a = 0.0, 0.0
         self._otg = Ruckig(1)
+        self._problem, self._trajectory = _problem_within(limits), Trajectory(1)
 
     @property
     def v_mps(self) -> float:
@@ -164,10 +165,9 @@ class SpeedShaper:
             return v, a
         if spare_m < -_OVERRUN_M or (self._a < 0.0 and self._v < let_go_mps):
             return self._ramp_to(0.0, self._active)
-        problem = self._problem(self._plan)
-        problem.control_interface = ControlInterface.Position
-        problem.target_position = [max(self._to_end_m, needed_m)]
-        return self._solve(problem)
+        self._problem.control_interface = ControlInterface.Position
+        self._problem.target_position = [max(self._to_end_m, needed_m)]
+        return self._solve(0.0, self._plan)
 
     def _ease_out(self) -> tuple[float, float]:
         """With the jerk that brings v and a to zero together: more precision would only make it creep."""
@@ -178,30 +178,21 @@ class SpeedShaper:
     def _ramp_to(self, target_mps: float, brake: BrakeLimits) -> tuple[float, float]:
         if self._v == target_mps and self._a == 0.0:
             return target_mps, 0.0
-        problem = self._problem(brake)
-        problem.control_interface = ControlInterface.Velocity
-        problem.target_velocity = [target_mps]
-        return self._solve(problem)
+        self._problem.control_interface = ControlInterface.Velocity
+        return self._solve(target_mps, brake)
 
-    def _problem(self, brake: BrakeLimits) -> InputParameter:
-        problem = InputParameter(1)
-        problem.current_position = [0.0]
+    def _solve(self, target_mps: float, brake: BrakeLimits) -> tuple[float, float]:
+        """One period on the way from the present state to target_mps."""
+        problem, trajectory = self._problem, self._trajectory
         problem.current_velocity, problem.current_acceleration = [self._v], [self._a]
-        problem.target_velocity, problem.target_acceleration = [0.0], [0.0]
-        problem.max_velocity = [self._limits.max_speed_mps]
-        problem.max_acceleration = [self._limits.max_accel_mps2]
-        problem.min_acceleration = [-brake.decel_mps2]
-        problem.max_jerk = [brake.jerk_mps3]
-        return problem
-
-    def _solve(self, problem: InputParameter) -> tuple[float, float]:
-        trajectory = Trajectory(1)
+        problem.target_velocity = [target_mps]
+        problem.min_acceleration, problem.max_jerk = [-brake.decel_mps2], [brake.jerk_mps3]
         result = self._otg.calculate(problem, trajectory)
         if result not in (Result.Working, Result.Finished):
             raise ArithmeticError(f"no profile, result {result}")
         _, velocity, acceleration = trajectory.at_time(self._period_s)
         if trajectory.duration <= self._period_s:
-            return float(problem.target_velocity[0]), 0.0
+            return target_mps, 0.0
         return float(velocity[0]), float(acceleration[0])
 
     def _check(self, v: float, a: float) -> None:
@@ -214,3 +205,11 @@ class SpeedShaper:
             and jerk <= self._active.jerk_mps3 + _TOLERANCE
         ):
             raise ArithmeticError(f"outside the limits: {v:.6f} m/s, {a:.6f} m/s2, {jerk:.6f} m/s3")
+
+
+def _problem_within(limits: Limits) -> InputParameter:
+    """What does not change from step to step: it starts at position 0 and ends without acceleration."""
+    problem = InputParameter(1)
+    problem.current_position, problem.target_acceleration = [0.0], [0.0]
+    problem.max_velocity, problem.max_acceleration = [limits.max_speed_mps], [limits.max_accel_mps2]
+    return problem

@@ -68,7 +68,7 @@ class Sight:
         standing: bool,
     ) -> None:
         """Take in one scene. pose, s_m: of the robot when it was captured. standing: it was at rest then."""
-        bands = np.flatnonzero(np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan))
+        bands = (np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan)).nonzero()[0]
         forward = free.nearest_m[bands]
         self.points_m = points = self._surface_points(forward, free.bearing_tan[bands], pose)
         surface_s, surface_d = self._corridor.path.project_points(
@@ -89,9 +89,10 @@ class Sight:
             s_m + self._corridor.front_m,
             np.logical_not(moving.any(axis=1)),
         )
-        way_s = surface_s[inside]
-        if len(way_s):
-            explained = explained_by.covers(points[inside], reach_m[inside], _AROUND_M).any(axis=1)
+        way = inside.nonzero()[0]
+        way_s = surface_s[way]
+        if len(way) and len(explained_by):
+            explained = explained_by.covers(points.take(way, 0), reach_m[way], _AROUND_M).any(axis=1)
             way_s = way_s[~explained]
         self._note_surface(way_s, s_m, standing)
         in_corridor = np.zeros(len(free.bearing_tan), np.bool_)
@@ -103,7 +104,10 @@ class Sight:
         ahead = forward + self._mount.forward_m
         left = self._mount.left_m - forward * bearing
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        return np.stack((pose.x_m + ahead * cos - left * sin, pose.y_m + ahead * sin + left * cos), axis=1)
+        points = np.empty((len(forward), 2))
+        points[:, 0] = pose.x_m + ahead * cos - left * sin
+        points[:, 1] = pose.y_m + ahead * sin + left * cos
+        return points
 
     def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
         nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
@@ -129,8 +133,8 @@ class Sight:
         surface_in_corridor: NDArray[np.bool_],
     ) -> None:
         """Mark the cells whose width was seen; then find the first one ahead that is not known."""
-        first = int(np.searchsorted(self._cells, s_m))
-        last = int(np.searchsorted(self._cells, s_m + self._sight.range_m + self._mount.forward_m))
+        first = int(self._cells.searchsorted(s_m))
+        last = int(self._cells.searchsorted(s_m + self._sight.range_m + self._mount.forward_m))
         if last > first and len(free.bearing_tan):
             seen = self._lanes_seen(free, pose, first, last, surface_in_corridor)
             self._seen_ns[first:last][seen >= self._sight.known_share] = captured_ns
@@ -139,7 +143,7 @@ class Sight:
         # Too near to be seen again: what was once seen free stays so, others' bodies are watched elsewhere.
         near = self._cells <= s_m + self._mount.forward_m + self._sight.near_m + _CELL_M
         known = fresh | (near & (self._seen_ns > _NEVER_NS)) | (self._cells <= self._consent_s_m)
-        unknown = np.flatnonzero(~known[first:])
+        unknown = (~known[first:]).nonzero()[0]
         self.known_s_m = float(self._cells[first + unknown[0]]) - 0.5 * _CELL_M if len(unknown) else math.inf
 
     def _lanes_of(self, cells: FloatArray) -> FloatArray:
@@ -172,11 +176,11 @@ class Sight:
         bearing = right / np.maximum(forward, 1e-3)
         left_edge = free.bearing_tan[0] - free.half_width_tan
         band = np.floor((bearing - left_edge) / (2.0 * free.half_width_tan)).astype(np.intp)
-        in_view = (forward > 0.0) & (band >= 0) & (band < len(free.bearing_tan))
-        band = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
+        within = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
+        in_view = (forward > 0.0) & (band == within)
         # The far edge of a cell, so that a cell is not known for the sake of its beginning.
         far_edge = forward + 0.5 * _CELL_M
-        behind = surface_in_corridor[band] & (far_edge >= free.nearest_m[band])
-        seen = in_view & ((far_edge <= free.known_m[band]) | behind)
+        surface_m = np.where(surface_in_corridor, free.nearest_m, np.inf)
+        seen = in_view & ((far_edge <= free.known_m[within]) | (far_edge >= surface_m[within]))
         share: FloatArray = seen.sum(axis=1) / _LANES
         return share

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
-from controller.bodies import Bodies, no_bodies
+from controller.bodies import Bodies
 from controller.corridor import Placed, place
 from controller.knowledge import Knowledge
 from controller.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
@@ -16,6 +18,19 @@ from hal.types import CameraMount, FloatArray
 
 _INSIDE_BODY_M = 0.05
 _NOW = np.zeros(1)
+
+
+@dataclass(frozen=True, slots=True)
+class _Near:
+    """What may stand in the corridor; lo_m, hi_m, clear_m: see corridor.Placed. stop_m: where to stand before
+    it."""
+
+    number: int
+    lo_m: float
+    hi_m: float
+    clear_m: float
+    age_s: float
+    stop_m: float
 
 
 class StandingLimits:
@@ -27,52 +42,59 @@ class StandingLimits:
         self._comfort, self._emergency = braking.comfort(limits), braking.emergency(limits)
         self._inside = inside
         self._of: Bodies | None = None
-        self._bodies = no_bodies(0)
-        self._placed: Placed | None = None
-        self._stop_m: FloatArray = np.zeros(0)
-        self._near: list[int] = []
+        self._near: list[_Near] = []
 
     def limits(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
         """For the robot at s_m."""
         if known.bodies is not self._of:
             self._take_in(known, s_m)
-        placed, margins = self._placed, self._config.margins
-        if placed is None:
-            return []
+        margins = self._config.margins
         found = []
-        for row in self._near:
-            if placed.hi_m[row, 0] <= s_m:
+        for near in self._near:
+            if near.hi_m <= s_m:
                 continue
-            number, gap_m = int(self._bodies.ids[row]), float(placed.lo_m[row, 0]) - s_m
+            number, gap_m = near.number, near.lo_m - s_m
             beside_m = margins.lateral_m + (margins.graze_m if number in self._inside else 0.0)
             if gap_m < -ALONGSIDE_M:
                 # The front has passed it already: only what the body would really touch counts.
                 beside_m = -_INSIDE_BODY_M
-            if placed.clear_m[row, 0] > beside_m:
+            if near.clear_m > beside_m:
                 self._inside.discard(number)
                 continue
             gap = Gap(gap_m, obstacle_id=number)
-            if self._may_wait(gap, motion, float(self._bodies.age_s[row])):
+            if self._may_wait(gap, motion, near.age_s):
                 continue
             self._inside.add(number)
-            stop_m, what = float(self._stop_m[row]), "stands on the path"
-            found.append(stop_before(gap, motion, self._comfort, stop_m, margins.least_m, "static", what))
+            what = "stands on the path"
+            found.append(
+                stop_before(gap, motion, self._comfort, near.stop_m, margins.least_m, "static", what)
+            )
         return found
 
     def _take_in(self, known: Knowledge, s_m: float) -> None:
         """Place what stands in a new scene, and leave out what is too far aside to matter."""
-        self._of = known.bodies
-        self._bodies = bodies = known.bodies.select(~known.bodies.moving)
-        self._placed, self._near = None, []
-        if not len(bodies):
+        self._of = bodies = known.bodies
+        self._near = []
+        standing = ~bodies.moving
+        if not standing.any():
             return
         sight, margins = self._config.sight, self._config.margins
-        self._placed = placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
+        placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
         near = placed.clear_m[:, 0] <= margins.lateral_m + margins.graze_m
-        self._near = np.flatnonzero(near).tolist()
-        self._inside.difference_update(bodies.ids[~near].tolist())
-        if self._near:
-            self._stop_m = self._standing_off(known, bodies, placed)
+        self._inside.difference_update(bodies.ids[standing & ~near].tolist())
+        rows = (standing & near).nonzero()[0]
+        if not len(rows):
+            return
+        stop_m = self._standing_off(known, bodies, placed)
+        columns = (
+            bodies.ids,
+            placed.lo_m[:, 0],
+            placed.hi_m[:, 0],
+            placed.clear_m[:, 0],
+            bodies.age_s,
+            stop_m,
+        )
+        self._near = [_Near(*of) for of in zip(*(one[rows].tolist() for one in columns), strict=True)]
 
     def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:
         """(N,) where to stand before a body: so that it is still seen, and seen to leave."""

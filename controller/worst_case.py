@@ -113,7 +113,7 @@ class WorstCase:
 
     def _greatest(self, stopping: Stops, reached: Reach, s_m: float) -> float:
         """The greatest speed whose stop stays short of everything; inf: all of them do."""
-        fails = np.flatnonzero(room(stopping, s_m, reached) < 0.0)
+        fails = (room(stopping, s_m, reached) < 0.0).nonzero()[0]
         return float(self._speeds[max(int(fails[0]) - 1, 0)]) if len(fails) else math.inf
 
     def _prepare(self, latency_s: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from hal.types import CameraMount, FloatArray, PlanarPose, Pose
 _OPTICAL_IN_BODY: FloatArray = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
+@lru_cache(maxsize=16)
 def camera_in_body(mount: CameraMount) -> Pose:
-    """The optical frame in the body frame; a positive pitch tips the view down."""
+    """The optical frame in the body frame; a positive pitch tips the view down. Not to be written to: it is
+    worked out once for each mount."""
     c, s = math.cos(mount.pitch_rad), math.sin(mount.pitch_rad)
     tip_down = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     return Pose(

@@ -7,9 +7,12 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from config.scenario import Go, Motion
 from hal.geometry import wrap_angle_rad
-from hal.types import PlanarPose
+from hal.types import FloatArray, PlanarPose
 
 _ROUNDED_CORNER_RAD = math.radians(60.0)
 _CORNER_RADIUS_M = 0.3
@@ -74,6 +77,7 @@ class Trajectory:
             self._time_s = motion.start_s + shift_s
             self._plan(motion)
         self._starts = [phase.start_s for phase in self._phases]
+        self._numbers: tuple[FloatArray, NDArray[np.bool_]] | None = None
 
     def at(self, t_s: float) -> MotionState:
         """The state at t_s; before the first step it stands at the start, after the last where it ended."""
@@ -97,6 +101,47 @@ class Trajectory:
             yaw_rate,
             phase.covered_m + gone_m,
         )
+
+    def over(self, times_s: FloatArray) -> FloatArray:
+        """(T, 5) x, y, heading, vx, vy of at() at each of times_s (T,)."""
+        phase = np.maximum(np.searchsorted(self._starts, times_s, side="right") - 1, 0)
+        numbers, rounded = self._table()
+        start, x, y, c, s, along, speed, accel, heading, yaw_rate = numbers[phase].T
+        since = np.where(np.isfinite(start), times_s - start, 0.0)
+        along = along + (speed * since + 0.5 * accel * since * since)
+        speed = speed + accel * since
+        heading = heading + yaw_rate * since
+        for k in np.flatnonzero(rounded[phase]).tolist():
+            heading[k] = _rounded_heading(self._phases[phase[k]].leg, float(along[k]), float(speed[k]))[0]
+        wrapped = (heading + math.pi) % (2.0 * math.pi) - math.pi
+        return np.stack((x + along * c, y + along * s, wrapped, speed * c, speed * s), axis=1)
+
+    def _table(self) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """The phases as numbers, (P, 10), and (P,) on which of them the heading changes with the way."""
+        if self._numbers is None:
+            rows, rounded = [], []
+            for one in self._phases:
+                leg = one.leg
+                c, s = math.cos(leg.heading_rad), math.sin(leg.heading_rad)
+                turns = one.yaw_rate_radps != 0.0 or leg.length_m == 0.0
+                heading = one.heading_rad if turns else leg.heading_rad
+                rows.append(
+                    (
+                        one.start_s,
+                        leg.x_m,
+                        leg.y_m,
+                        c,
+                        s,
+                        one.along_m,
+                        one.speed_mps,
+                        one.accel_mps2,
+                        heading,
+                        one.yaw_rate_radps,
+                    )
+                )
+                rounded.append(not turns and (leg.turn_in_rad != 0.0 or leg.turn_out_rad != 0.0))
+            self._numbers = np.array(rows), np.array(rounded)
+        return self._numbers
 
     @property
     def end_s(self) -> float:

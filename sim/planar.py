@@ -37,8 +37,9 @@ _POLE_SIDES = 8
 class PlanarWorld:
     """N bodies of a scenario on the floor.
 
-    names, z_m (N, 2) lowest and highest point, moves (N,) bool. Footprints have the same number K of corners
-    for all: shorter ones repeat their last corner.
+    names, z_m (N, 2) lowest and highest point, moves (N,) bool. end_s: when the last mover has finished its
+    plan, 0 if none moves. Footprints have the same number K of corners for all: shorter ones repeat their
+    last corner.
     """
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
@@ -52,33 +53,37 @@ class PlanarWorld:
         self.z_m = np.array([heights(spec) for spec in specs]).reshape(-1, 2)
         self._trajectories = [trajectory_of(spec, seed) for spec in specs]
         self._movers: list[int] = np.flatnonzero(self.moves).tolist()
-        still = np.array([self._state(k, 0.0) for k in range(len(specs))]).reshape(-1, 5)
-        self._still_states = still
-        self._still_polygons = self._place(still, list(range(len(specs))))
+        self._still_polygons = np.empty((len(specs), self._corners, 2))
+        for k, trajectory in enumerate(self._trajectories):
+            self._still_polygons[k] = self._place(trajectory.over(np.zeros(1)), k)
+        self.end_s = max((self._trajectories[k].end_s for k in self._movers), default=0.0)
+        self.foresee(np.zeros(1))
 
     def __len__(self) -> int:
         return len(self.names)
 
-    @property
-    def end_s(self) -> float:
-        """When the last mover has finished its plan; 0 if none moves."""
-        return max((self._trajectories[k].end_s for k in self._movers), default=0.0)
+    def foresee(self, times_s: FloatArray) -> None:
+        """Work out at once what look() will be asked for at times_s (T,): far cheaper than one by one."""
+        times_s = np.append(times_s[times_s < self.end_s], self.end_s)
+        self._foreseen_at = {t_s: k for k, t_s in enumerate(times_s.tolist())}
+        self._foreseen = self._movers_at(times_s)
 
     def look(self, t_s: float) -> tuple[FloatArray, FloatArray]:
         """Polygons (N, K, 2) and velocities (N, 2) of all bodies at t_s."""
         polygons, velocity = self._still_polygons.copy(), np.zeros((len(self), 2))
-        if len(self._movers):
-            states = np.array([self._state(k, t_s) for k in self._movers])
-            polygons[self._movers] = self._place(states, self._movers)
-            velocity[self._movers] = states[:, 3:]
+        t_s = min(t_s, self.end_s)
+        row, (outlines, speeds) = self._foreseen_at.get(t_s), self._foreseen
+        if row is None:
+            row, (outlines, speeds) = 0, self._movers_at(np.array([t_s]))
+        polygons[self._movers] = outlines[row]
+        velocity[self._movers] = speeds[row]
         return polygons, velocity
 
     def over(self, times_s: FloatArray, body: int) -> FloatArray:
         """Polygons (T, K, 2) of one body at times_s (T,)."""
         if not self.moves[body]:
             return np.broadcast_to(self._still_polygons[body], (len(times_s), self._corners, 2))
-        states = np.array([self._state(body, float(t)) for t in times_s])
-        return self._place(states, [body] * len(states))
+        return self._place(self._trajectories[body].over(times_s), body)
 
     def room_polygon(self) -> FloatArray:
         """The building's walls from the inside (4, 2)."""
@@ -86,23 +91,35 @@ class PlanarWorld:
         x0, x1, y0, y1 = room.x_min_m, room.x_max_m, room.y_min_m, room.y_max_m
         return np.array([[x1, y0], [x1, y1], [x0, y1], [x0, y0]])
 
-    def _state(self, body: int, t_s: float) -> tuple[float, float, float, float, float]:
-        state = self._trajectories[body].at(t_s)
-        return state.x_m, state.y_m, state.heading_rad, state.vx_mps, state.vy_mps
+    def _movers_at(self, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Polygons (T, M, K, 2) and velocities (T, M, 2) of the M movers."""
+        count, movers = len(times_s), len(self._movers)
+        polygons, velocity = np.empty((count, movers, self._corners, 2)), np.empty((count, movers, 2))
+        for k, body in enumerate(self._movers):
+            states = self._trajectories[body].over(times_s)
+            polygons[:, k], velocity[:, k] = self._place(states, body), states[:, 3:]
+        return polygons, velocity
 
-    def _place(self, states: FloatArray, bodies: list[int]) -> FloatArray:
-        speeds = np.hypot(states[:, 3], states[:, 4]).tolist()
-        shapes = np.array([self._shape(k, v) for k, v in zip(bodies, speeds, strict=True)])
-        shapes = shapes.reshape(-1, self._corners, 2)
+    def _place(self, states: FloatArray, body: int) -> FloatArray:
+        """The polygons (T, K, 2) of one body in states (T, 5)."""
+        shapes = self._outlines(body, states)
         cos, sin = np.cos(states[:, 2:3]), np.sin(states[:, 2:3])
         x = states[:, 0:1] + cos * shapes[..., 0] - sin * shapes[..., 1]
         y = states[:, 1:2] + sin * shapes[..., 0] + cos * shapes[..., 1]
         return np.stack((x, y), axis=2)
 
+    def _outlines(self, body: int, states: FloatArray) -> FloatArray:
+        """(T, K, 2) in the body frame; only people change theirs with their speed."""
+        if not isinstance(self._specs[body], Person):
+            return self._shape(body, 0.0)[None]
+        speeds = [round(speed, 3) for speed in np.hypot(states[:, 3], states[:, 4]).tolist()]
+        row = {speed: k for k, speed in enumerate(dict.fromkeys(speeds))}
+        shapes = np.array([self._shape(body, speed) for speed in row])
+        return shapes[[row[speed] for speed in speeds]]
+
     def _shape(self, body: int, speed_mps: float) -> FloatArray:
         """The outline (K, 2) at a speed; most of the time that is the speed of the instant before."""
         known = self._shapes[body]
-        speed_mps = round(speed_mps, 3)
         if speed_mps not in known:
             known[speed_mps] = _padded(footprint(self._specs[body], speed_mps), self._corners)
         return known[speed_mps]
@@ -147,6 +164,14 @@ def separation(a: FloatArray, b: FloatArray) -> FloatArray:
         one, other = a[apart], b[apart]
         gap[apart] = np.minimum(_corner_distance(one, other), _corner_distance(other, one))
     return gap
+
+
+def overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
+    """(P,) where separation() is 0 or less; what a's edges keep apart is not looked at from b's."""
+    touching: NDArray[np.bool_] = _widest_gap(a, b) <= 0.0
+    left = np.flatnonzero(touching)
+    touching[left] = _widest_gap(b[left], a[left]) <= 0.0
+    return touching
 
 
 def _widest_gap(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from sim.planar import separation
 # Between two control steps two bodies come no closer to each other than this.
 _BETWEEN_STEPS_M = 0.15
 _SUBSTEPS = 4
+_STRIDE, _ROUNDING_M = 10, 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,12 @@ class Contact:
     v_mps: float
 
 
+def _furthest(moves: FloatArray) -> FloatArray:
+    """(T,) the furthest of moves (T, K, 2)."""
+    furthest: FloatArray = np.sqrt((moves * moves).sum(axis=2).max(axis=1))
+    return furthest
+
+
 class Clearance:
     """Distances between the robot and all bodies at its height, over the whole drive."""
 
@@ -36,37 +43,58 @@ class Clearance:
         self._poses = log.pose_array()
         self.least_m = math.inf
         self._contacts: list[Contact] = []
-        for body in np.flatnonzero(stage.in_height).tolist():
-            self._look_at(body)
+        bodies = np.flatnonzero(stage.in_height).tolist()
+        around = {body: self._around(body, self._times, self._poses) for body in bodies}
+        # The nearest first: of the others, only what could come nearer still is looked at closely.
+        for body in sorted(bodies, key=lambda body: float(around[body][1].min(initial=math.inf))):
+            self._look_at(body, *around[body])
 
     def contacts(self) -> list[Contact]:
         """In the order of time."""
-        return sorted(self._contacts, key=lambda one: one.t_s)
+        return sorted(self._contacts, key=lambda one: (one.t_s, one.body))
 
-    def _look_at(self, body: int) -> None:
-        times, poses = self._times, self._poses
-        gap = self._gap(body, times, poses, _BETWEEN_STEPS_M)
+    def _look_at(self, body: int, polygons: FloatArray, gap: FloatArray) -> None:
+        gap = self._gap(polygons, gap, self._poses, _BETWEEN_STEPS_M)
         close = gap < _BETWEEN_STEPS_M
         if close.any():
             # Look between the steps as well where something could happen there.
             times, poses = self._between(close)
-            gap = np.append(gap, self._gap(body, times, poses, math.inf))
-            self._note(body, times, gap[-len(times) :])
+            between = self._gap(*self._around(body, times, poses), poses, math.inf)
+            self._note(body, times, between)
+            gap = np.append(gap, between)
         self.least_m = min(self.least_m, float(gap.min(initial=math.inf)))
 
-    def _gap(self, body: int, times: FloatArray, poses: FloatArray, exact_below_m: float) -> FloatArray:
-        """(T,) distance; that of circles where they are further apart than what matters."""
+    def _around(self, body: int, times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The body's polygons (T, K, 2), and (T,) the distance of circles around it and the robot."""
         robot = self._stage.robot.body
         polygons = self._stage.world.over(times, body)
         middle = polygons.mean(axis=1)
         radius = np.sqrt(((polygons - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
         reach = math.hypot(max(robot.front_m, robot.rear_m), 0.5 * robot.width_m)
         gap = np.hypot(middle[:, 0] - poses[:, 0], middle[:, 1] - poses[:, 1]) - radius - reach
-        exact = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
-        if len(exact):
-            gap[exact] = separation(self._stage.robots(poses[exact]), polygons[exact])
-        distance: FloatArray = gap
-        return distance
+        return polygons, gap
+
+    def _gap(
+        self, polygons: FloatArray, gap: FloatArray, poses: FloatArray, exact_below_m: float
+    ) -> FloatArray:
+        """(T,) distance; that of circles, gap, where they are further apart than what matters, and inf where
+        something else is certainly nearer."""
+        near = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
+        if not len(near):
+            return gap
+        robots, others = self._stage.robots(poses[near]), polygons[near]
+        # Every tenth step first: until the next ones, neither corner of both comes nearer than it has moved.
+        tenth = np.arange(len(near)) // _STRIDE * _STRIDE
+        sampled = separation(robots[::_STRIDE], others[::_STRIDE])
+        moved = _furthest(robots - robots[tenth]) + _furthest(others - others[tenth])
+        at_least = sampled[tenth // _STRIDE] - moved
+        matters = (
+            at_least < max(min(self.least_m, float(sampled.min())), min(exact_below_m, 2.0)) + _ROUNDING_M
+        )
+        exact = np.flatnonzero(matters)
+        gap[near] = np.inf
+        gap[near[exact]] = separation(robots[exact], others[exact])
+        return gap
 
     def _between(self, close: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
         wide = close.copy()

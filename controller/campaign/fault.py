@@ -12,7 +12,7 @@ from controller.campaign.stage import Stage
 from controller.campaign.view import PlanarEye
 from controller.profile import SpeedRamps
 from hal.types import FloatArray, PlanarPose
-from sim.planar import separation
+from sim.planar import overlap
 
 AT_FAULT_MPS = 0.02
 _SIGHT_STEPS = 5
@@ -47,6 +47,7 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -
     """
     body, first, before = contact.body, None, None
     moves = bool(stage.world.moves[body])
+    stage.world.foresee(np.array(log.times_s[::_SIGHT_STEPS]))
     for k in range(0, len(log.times_s), _SIGHT_STEPS):
         if log.times_s[k] >= contact.t_s:
             break
@@ -62,8 +63,8 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -
 
 def _in_view(body: int, polygons: FloatArray, pose: PlanarPose, eye: PlanarEye) -> bool:
     view = eye.look(polygons, pose)
-    column = np.flatnonzero(view.bodies == body)
-    return bool(len(column) and np.isfinite(view.forward_m[:, column[0]]).any())
+    row = np.flatnonzero(view.bodies == body)
+    return bool(len(row) and np.isfinite(view.forward_m[row[0]]).any())
 
 
 def _touches(
@@ -98,4 +99,4 @@ def _touches(
         return False
     poses = stage.path_poses(s[moving])
     polygons = stage.world.over(log.times_s[start] + t[moving], body)
-    return bool((separation(stage.robots(poses), polygons) <= 0.0).any())
+    return bool(overlap(stage.robots(poses), polygons).any())

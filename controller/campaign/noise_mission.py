@@ -22,7 +22,7 @@ from controller.path import OnPath
 from controller.shape import SpeedShaper
 from controller.tally import SetpointTally
 from hal.clocks import NS_PER_S
-from hal.types import Setpoint
+from hal.types import FloatArray, Setpoint
 from vision.scene import CameraCondition, CameraHealth, Scene
 
 # A robot that still stands so long after everything else has come to rest will stand for ever.
@@ -52,6 +52,15 @@ class _Base:
         self.v_mps += change
 
 
+def _exposures(steps: int, dt_s: float, fps: float) -> FloatArray:
+    """The times of those of so many control steps at which a frame is taken."""
+    times: list[float] = []
+    for k in range(steps):
+        if len(times) / fps <= k * dt_s + 1e-9:
+            times.append(k * dt_s)
+    return np.array(times)
+
+
 class _Eyes:
     """Frames at their times, with what goes wrong with them, and their way to the decision."""
 
@@ -64,9 +73,9 @@ class _Eyes:
         self._on_way: deque[tuple[float, Scene]] = deque()
         self.known: Scene | None = None
 
-    @property
-    def next_s(self) -> float:
-        return self._frame / self._fps
+    def due(self, t_s: float) -> bool:
+        """Whether the next frame is exposed at this control step."""
+        return self._frame / self._fps <= t_s + 1e-9
 
     def look(self, t_s: float, stage: Stage, s_m: float, d_m: float, known_s_m: float) -> None:
         """One frame."""
@@ -115,13 +124,14 @@ def drive_noise(stage: Stage, config: AppConfig, policy: Decides) -> DriveLog:
     base = _Base(simulation.plant.lag_s, simulation.plant.max_accel_mps2)
     shaper = SpeedShaper(config.robot.limits, dt_s, config.decision.chassis_delay_s)
     log = DriveLog(SetpointTally(config.robot.limits, dt_s))
+    stage.world.foresee(_exposures(len(wander) - 1, dt_s, config.camera.fps))
     length_m, end_s = stage.path.length_m, max(stage.world.end_s, 0.0)
     off_m, standing_s, lost = 0.0, 0.0, False
     for k in range(len(wander) - 1):
         t_s = k * dt_s
         off_m = keep * off_m + shake_m * wander[k]
         known_s_m = base.s_m * odometry
-        if eyes.next_s <= t_s + 1e-9:
+        if eyes.due(t_s):
             eyes.look(t_s, stage, base.s_m, off_m, known_s_m)
         now_ns = round(t_s * NS_PER_S)
         decision = policy.step(

@@ -66,13 +66,18 @@ class NoisyCamera:
     ) -> None:
         self._stage, self._noise = stage, noise or NoiseModel()
         self._period_s = 1.0 / camera.fps
+        unmoved = Pose(np.eye(3), np.zeros(3))
+        self._ego_motion = EgoMotion(unmoved, self._period_s, "none", math.nan, math.nan, math.nan)
         mount = stage.robot.camera_mount
         self._mount = mount
         self.eye = PlanarEye(stage.world, camera, mount)
         self._body = stage.robot.body
         self._random = np.random.default_rng((seed, 0xCA))
         self._glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
+        self._scanned = stage.in_height & ~self._glass
         self._to_optical = camera_in_body(mount_of(stage.robot)).rotation.T
+        low_m, high_m = stage.world.z_m.T
+        self._height_m, self._middle_m = high_m - low_m, 0.5 * (low_m + high_m) - mount.height_m
         n = len(stage.world)
         self._ids = np.zeros(n, np.int64)
         self._next_id = 1
@@ -95,9 +100,7 @@ class NoisyCamera:
             sequence=sequence,
             obstacles=self._obstacles(t_s, true_pose),
             free_space=self._free_space(view),
-            ego_motion=EgoMotion(
-                Pose(np.eye(3), np.zeros(3)), self._period_s, "none", math.nan, math.nan, math.nan
-            ),
+            ego_motion=self._ego_motion,
             health=_GOOD,
             robot_pose=known_pose,
         )
@@ -116,16 +119,17 @@ class NoisyCamera:
         """Take in what this frame shows."""
         noise = self._noise
         missed = self._random.random(len(self._ids)).tolist()
-        columns = np.flatnonzero(np.isfinite(view.forward_m).any(axis=0) & ~self._glass[view.bodies])
-        z = view.forward_m[:, columns]
-        shown = np.isfinite(z)
-        x = z * self.eye.bearing_tan[:, None]
-        low_z, high_z = z.min(axis=0), np.where(shown, z, -np.inf).max(axis=0)
-        low_x = np.where(shown, x, np.inf).min(axis=0) - low_z * self.eye.half_width_tan
-        high_x = np.where(shown, x, -np.inf).max(axis=0) + low_z * self.eye.half_width_tan
+        hits = view.forward_m
+        rows = ((hits.min(axis=1) < np.inf) & ~self._glass[view.bodies]).nonzero()[0]
+        z = hits.take(rows, 0)
+        shown = z < np.inf
+        x = z * self.eye.bearing_tan
+        low_z, high_z = z.min(axis=1), np.where(shown, z, -np.inf).max(axis=1)
+        low_x = np.where(shown, x, np.inf).min(axis=1) - low_z * self.eye.half_width_tan
+        high_x = np.where(shown, x, -np.inf).max(axis=1) + low_z * self.eye.half_width_tan
         right, forward = (0.5 * (low_x + high_x)).tolist(), (0.5 * (low_z + high_z)).tolist()
         far = (low_z / self.eye.range_m).tolist()
-        for k, body in enumerate(view.bodies[columns].tolist()):
+        for k, body in enumerate(view.bodies[rows].tolist()):
             share = noise.missed_share_at_range * (2.0 * far[k] - 1.0)
             if missed[body] < max(noise.missed_share, share):
                 continue
@@ -150,7 +154,7 @@ class NoisyCamera:
 
     def _judge(self, body: int, z_m: float) -> None:
         noise = self._noise
-        fast = math.hypot(*self._velocity[body]) > noise.moving_mps + noise.moving_per_m * z_m
+        fast = math.hypot(*self._velocity[body].tolist()) > noise.moving_mps + noise.moving_per_m * z_m
         step_s = self._period_s
         if fast:
             self._evidence_s[body] = min(self._evidence_s[body] + step_s, noise.rise_s + step_s)
@@ -165,29 +169,31 @@ class NoisyCamera:
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         dx, dy = self._centre[:, 0] - pose.x_m, self._centre[:, 1] - pose.y_m
         all_ahead = dx * cos + dy * sin - self._mount.forward_m
-        rows = np.flatnonzero((self._sightings >= noise.sightings) & (all_ahead > 0.0))
+        rows = ((self._sightings >= noise.sightings) & (all_ahead > 0.0)).nonzero()[0]
         if not len(rows):
             return ()
         ahead, left = all_ahead[rows], dy[rows] * cos - dx[rows] * sin
-        wander, z_m = self._wander[rows], self._stage.world.z_m[rows]
+        wander = self._wander.take(rows, 0)
         sigma_m = noise.kept_by_tracker * noise.depth_sigma_1pm * ahead * ahead
         in_camera = np.empty((len(rows), 3))
         in_camera[:, 0] = ahead + sigma_m * wander[:, 0]
         in_camera[:, 1] = left - self._mount.left_m + noise.side_sigma_m * wander[:, 1]
-        in_camera[:, 2] = 0.5 * (z_m[:, 0] + z_m[:, 1]) - self._mount.height_m
+        in_camera[:, 2] = self._middle_m[rows]
         age_s = t_s - self._first_s[rows]
         young = noise.first_velocity_mps * np.exp(-age_s / noise.first_velocity_fades_s)
         radial = noise.radial_velocity_mps + noise.radial_velocity_per_m * ahead
         side = noise.side_velocity_mps + noise.side_velocity_per_m * ahead
-        vx, vy = self._velocity[rows].T
+        vx, vy = self._velocity.take(rows, 0).T
         velocity = np.zeros((len(rows), 3))
         velocity[:, 0] = vx * cos + vy * sin + radial * wander[:, 2]
         velocity[:, 1] = vy * cos - vx * sin + side * wander[:, 3]
-        variance = np.stack((radial + young, side + young, 0.1 + young), axis=1) ** 2
+        sigma = np.empty((len(rows), 3))
+        sigma[:, 0], sigma[:, 1], sigma[:, 2] = radial + young, side + young, 0.1 + young
         turn = self._to_optical
         position, velocity = in_camera @ turn.T, velocity @ turn.T
-        covariance = (turn * variance[:, None, :]) @ turn.T
-        extent = np.stack((self._extent[rows, 0], z_m[:, 1] - z_m[:, 0], self._extent[rows, 1]), axis=1)
+        covariance = (turn * (sigma * sigma)[:, None, :]) @ turn.T
+        extent = np.empty((len(rows), 3))
+        extent[:, 0::2], extent[:, 1] = self._extent.take(rows, 0), self._height_m[rows]
         unseen_s = (t_s - self._seen_s[rows]).tolist()
         ids, moving = self._ids[rows].tolist(), self._moving[rows].tolist()
         return tuple(
@@ -210,12 +216,9 @@ class NoisyCamera:
     def _free_space(self, view: View) -> FreeSpace:
         """What the bands show: the nearest thing in the robot's height, and how far the floor is free."""
         noise, eye = self._noise, self.eye
-        wanted = self._stage.in_height[view.bodies] & ~self._glass[view.bodies]
-        hits = np.where(wanted, view.forward_m, np.inf)
-        nearest = hits.min(axis=1, initial=np.inf)
+        nearest = view.forward_m.take(self._scanned[view.bodies].nonzero()[0], 0).min(axis=0, initial=np.inf)
+        hidden = view.forward_m.take(self._glass[view.bodies].nonzero()[0], 0).min(axis=0, initial=np.inf)
         building = view.free_m <= np.minimum(nearest, eye.range_m)
-        glass = self._glass[view.bodies]
-        hidden = np.where(glass, view.forward_m, np.inf).min(axis=1, initial=np.inf)
         nearest = np.where(building & (hidden > view.free_m), view.free_m, nearest)
         nearest = np.where(hidden < nearest, np.inf, nearest)
         z = np.where(np.isfinite(nearest), nearest, 0.0)

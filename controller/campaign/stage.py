@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from controller import braking
 from controller.path import Path
 from hal.types import FloatArray, PlanarPose
 from sim.families import Case
-from sim.planar import PlanarWorld, separation
+from sim.planar import PlanarWorld, overlap
 
 _TABLE_STEP_M = 0.02
 _SWEEP_STEP_M = 0.05
@@ -37,8 +39,8 @@ class Stage:
         share = place - k
         h = heading[k] + share * (heading[k + 1] - heading[k])
         return PlanarPose(
-            x[k] + share * (x[k + 1] - x[k]) - d_m * float(np.sin(h)),
-            y[k] + share * (y[k + 1] - y[k]) + d_m * float(np.cos(h)),
+            x[k] + share * (x[k + 1] - x[k]) - d_m * math.sin(h),
+            y[k] + share * (y[k + 1] - y[k]) + d_m * math.cos(h),
             h,
         )
 
@@ -67,7 +69,7 @@ class Stage:
             when, where = np.nonzero(away < reach_m + radius[:, None])
             if not len(when):
                 continue
-            touch = separation(robots[where], polygons[when]) <= 0.0
+            touch = overlap(robots[where], polygons[when])
             for t, (low, high) in _runs(when[touch], where[touch]):
                 stretch = (s_m[low] - 0.5 * _SWEEP_STEP_M, s_m[high] + 0.5 * _SWEEP_STEP_M)
                 for one in [stretches[t]] if moves else stretches:

@@ -20,7 +20,7 @@ _TOUCHING_M = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """One look. bodies (M,): which ones were looked at. forward_m (B, M): where each band's ray meets each
+    """One look. bodies (M,): which ones were looked at. forward_m (M, B): where each band's ray meets each
     body, inf where it does not or is covered by something nearer. free_m (B,): where the first thing that
     hides what is behind it stands, the building included."""
 
@@ -45,28 +45,32 @@ class PlanarEye:
         self._down_tan, self._up_tan = math.tan(down), math.tan(up)
         z_m = world.z_m
         self._hides = (z_m[:, 0] < mount.height_m) & (z_m[:, 1] > mount.height_m)
-        corners = world.look(0.0)[0].shape[1]
-        room = world.room_polygon()
-        self._room = np.concatenate((room, np.repeat(room[-1:], max(corners - 4, 0), axis=0)))[None]
-        self._next = np.roll(np.arange(max(corners, 4)), -1)
-        self._bearing = self.bearing_tan[:, None, None]
+        # The outlines of all bodies and, at the end, of the building; each closed by its first corner.
+        outlines, room = world.look(0.0)[0], world.room_polygon()
+        corners = max(outlines.shape[1], 4)
+        self._outlines = np.empty((len(world) + 1, corners + 1, 2))
+        self._outlines[-1, :4], self._outlines[-1, 4:-1], self._outlines[-1, -1] = room, room[-1], room[0]
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> View:
         """polygons (N, K, 2) of all bodies now; pose of the robot."""
-        forward, right = self._in_camera(np.concatenate((polygons, self._room)), pose)
+        self._outlines[:-1, :-1], self._outlines[:-1, -1] = polygons, polygons[:, 0]
+        forward, right = self._in_camera(self._outlines, pose)
         reach = self._edge_tan * forward
         near = (forward.max(axis=1) > _NEAR_M) & (forward.min(axis=1) < self.range_m)
         inside = ((right - reach).min(axis=1) < 0.0) & ((right + reach).max(axis=1) > 0.0)
         near &= inside
         near[-1] = True  # the building, which is not a body
-        chosen = np.flatnonzero(near)
-        hits = self._hits(forward[chosen], right[chosen])
-        bodies, room, hits = chosen[:-1], hits[:, -1], hits[:, :-1]
-        hits = self._with_thin_ones(hits, forward[bodies], right[bodies])
-        hiding = np.where(self._hides[bodies], hits, np.inf)
-        free = np.minimum(hiding.min(axis=1, initial=np.inf), room)
-        covered = hits > free[:, None] + _TOUCHING_M
-        return View(bodies, np.where(covered | ~self._in_frame(bodies, hits), np.inf, hits), free)
+        chosen = near.nonzero()[0]
+        forward, right = forward.take(chosen, 0), right.take(chosen, 0)
+        hits = self._hits(forward, right)
+        bodies, room, hits = chosen[:-1], hits[-1], hits[:-1]
+        unmet = np.isinf(hits.min(axis=1)).nonzero()[0]
+        if len(unmet):
+            hits[unmet] = self._thin_ones(forward[unmet], right[unmet])
+        hiding = hits.take(self._hides[bodies].nonzero()[0], 0)
+        free = np.minimum(hiding.min(axis=0, initial=np.inf), room)
+        np.putmask(hits, (hits > free + _TOUCHING_M) | ~self._in_frame(bodies, hits), np.inf)
+        return View(bodies, hits, free)
 
     def _in_camera(self, polygons: FloatArray, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
         """Forward and right (N, K) of the camera, on the level."""
@@ -75,36 +79,36 @@ class PlanarEye:
         return dx * cos + dy * sin - self._mount.forward_m, self._mount.left_m + dx * sin - dy * cos
 
     def _hits(self, forward: FloatArray, right: FloatArray) -> FloatArray:
-        """(B, M) forward distance at which each ray first meets an edge of each polygon (M, K)."""
-        off = right - self._bearing * forward
-        after, ahead = off[..., self._next], forward[..., self._next]
+        """(M, B) forward distance at which each ray first meets an edge of each polygon (M, K + 1)."""
+        count, corners, bands = *forward.shape, len(self.bearing_tan)
+        off = right[:, :, None] - self.bearing_tan * forward[:, :, None]
         # Of all the pairs of a ray and an edge only a few meet: the rest is never divided.
-        band, body, corner = np.nonzero(off * after <= 0.0)
-        here, there = off[band, body, corner], after[band, body, corner]
+        met = (off[:, :-1] * off[:, 1:] <= 0.0).ravel().nonzero()[0]
+        edge = met // bands
+        body = edge // (corners - 1)
+        corner = edge + body  # each polygon has one corner more than it has edges
+        here, there = off.take(met + body * bands), off.take(met + (body + 1) * bands)
         drop = here - there
         share = here / np.where(np.abs(drop) < 1e-12, np.inf, drop)
-        start = forward[body, corner]
-        z = start + share * (ahead[body, corner] - start)
-        nearest = np.full(off.shape[:2], np.inf)
-        met = z > _NEAR_M
-        np.minimum.at(nearest, (band[met], body[met]), z[met])
-        return nearest
+        start = forward.take(corner)
+        z = start + share * (forward.take(corner + 1) - start)
+        nearest = np.full(count * bands, np.inf)
+        np.minimum.at(nearest, met - (edge - body) * bands, np.where(z > _NEAR_M, z, np.inf))
+        return nearest.reshape(count, bands)
 
-    def _with_thin_ones(self, hits: FloatArray, forward: FloatArray, right: FloatArray) -> FloatArray:
-        """A pole may stand between two rays, and is seen all the same."""
-        ahead = forward.min(axis=1) > _NEAR_M
+    def _thin_ones(self, forward: FloatArray, right: FloatArray) -> FloatArray:
+        """(M, B) for bodies that no ray has met: a pole may stand between two, and is seen all the same."""
+        ahead = forward.min(axis=1)
         tangent = right / np.maximum(forward, _NEAR_M)
         low, high = tangent.min(axis=1) - self.half_width_tan, tangent.max(axis=1) + self.half_width_tan
-        bearing = self.bearing_tan[:, None]
-        thin = ahead & (high - low <= 4.0 * self.half_width_tan) & ~np.isfinite(hits).any(axis=0)
-        missed = thin & (bearing > low) & (bearing < high)
-        return np.where(missed, forward.min(axis=1), hits)
+        thin = (ahead > _NEAR_M) & (high - low <= 4.0 * self.half_width_tan)
+        between = (self.bearing_tan > low[:, None]) & (self.bearing_tan < high[:, None])
+        return np.where(thin[:, None] & between, ahead[:, None], np.inf)
 
     def _in_frame(self, bodies: NDArray[np.intp], hits: FloatArray) -> NDArray[np.bool_]:
         """Whether any of its height is between the upper and the lower edge of the image."""
-        z_m, eye_m = self._world.z_m[bodies], self._mount.height_m
-        finite = np.where(np.isfinite(hits), hits, 0.0)
-        above = z_m[:, 1] > eye_m - finite * self._down_tan
-        below = z_m[:, 0] < eye_m + finite * self._up_tan
+        z_m, eye_m = self._world.z_m.take(bodies, 0), self._mount.height_m
+        above = z_m[:, 1:] > eye_m - hits * self._down_tan
+        below = z_m[:, :1] < eye_m + hits * self._up_tan
         seen: NDArray[np.bool_] = above & below & (hits < self.range_m)
         return seen

@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from config.scenario import Go, Motion, Wait
@@ -13,6 +14,7 @@ from controller.campaign.stage import Stage
 from controller.campaign.task import yardstick
 from controller.decision import Action
 from sim.faults import Faults, Window
+from sim.planar import separation
 from tests.support.campaign import CONFIG, crate, log_of, mover, stage
 
 UP, DOWN, KEEP = Action.INCREASE, Action.DECREASE, Action.KEEP
@@ -31,6 +33,19 @@ def test_clearance_is_that_of_the_nearest_pass() -> None:
     row = judged(stage(crate(4.0, 1.0), length_m=9.0), cruise(1.0, 8.0))
     assert row.min_clearance_m == pytest.approx(0.31, abs=1e-3)
     assert row.contacts == 0
+
+
+@pytest.mark.parametrize("beside_m", [-1.6, -1.3, 1.2, 1.7])
+def test_clearance_is_the_least_of_all_steps_and_bodies(beside_m: float) -> None:
+    """Most distances are never computed; none of them would have been the least."""
+    who = mover(7.0, beside_m, -3.0, beside_m + 0.2, 1.1)
+    made = stage(crate(5.0, 1.9), who, crate(2.0, -2.2, name="other"), length_m=9.0)
+    log = cruise(0.8, 9.0)
+    robots = made.robots(log.pose_array())
+    times = np.array(log.times_s)
+    least_m = min(separation(robots, made.world.over(times, body)).min() for body in range(3))
+    assert least_m > 0.16
+    assert judged(made, log).min_clearance_m == round(float(least_m), 4)
 
 
 def test_driving_into_a_crate_is_a_contact_at_fault() -> None:

@@ -23,8 +23,8 @@ def look(*bodies: BodySpec, mount: Mount = LEVEL, pose: PlanarPose = ORIGIN) -> 
 
 
 def distances(view: View, body: int = 0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    column = np.flatnonzero(view.bodies == body)
-    return view.forward_m[:, column[0]] if len(column) else np.full(80, np.inf)
+    row = np.flatnonzero(view.bodies == body)
+    return view.forward_m[row[0]] if len(row) else np.full(80, np.inf)
 
 
 def test_a_crate_ahead_is_seen_at_its_front_over_its_width() -> None:

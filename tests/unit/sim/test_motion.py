@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from config.scenario import Go, Motion, Wait
@@ -98,3 +99,20 @@ def test_velocity_and_heading_are_derivatives(corner_y: float) -> None:
         # A heading may wrap, but it never jumps.
         turn = math.remainder(after.heading_rad - before.heading_rad, 2 * math.pi)
         assert abs(turn) < 2 * h * 10.0
+
+
+@pytest.mark.parametrize("corner_y", [0.4, 3.0])
+def test_over_times_is_the_state_at_each(corner_y: float) -> None:
+    steps = go(3.0, 0.0), go(5.0, corner_y), Wait(kind="wait", duration_s=0.5), go(6.0, 0.0)
+    trajectory = Trajectory(PlanarPose(0.5, -1.0, 2.0), motion(*steps, start_s=0.4))
+    times = np.append(np.arange(-0.5, trajectory.end_s + 1.0, 0.037), trajectory.end_s)
+    states = [trajectory.at(t_s) for t_s in times.tolist()]
+    # Missions are repeated bit for bit, so this is no approximation.
+    assert trajectory.over(times).tolist() == [
+        [one.x_m, one.y_m, one.heading_rad, one.vx_mps, one.vy_mps] for one in states
+    ]
+
+
+def test_over_times_of_what_stands() -> None:
+    states = Trajectory(PlanarPose(1.0, -2.0, 0.5), None).over(np.array([-3.0, 0.0, 99.0]))
+    assert states.tolist() == [[1.0, -2.0, 0.5, 0.0, 0.0]] * 3

@@ -22,7 +22,7 @@ from config.scenario import (
     Wall,
 )
 from sim.contact import polygon_distance
-from sim.planar import PlanarWorld, separation
+from sim.planar import PlanarWorld, overlap, separation
 from sim.world import World
 
 MOTION = Motion(
@@ -77,6 +77,15 @@ def test_over_times_is_the_look_at_each() -> None:
             assert series[k] == pytest.approx(plane.look(t_s)[0][body])
 
 
+def test_what_was_foreseen_is_what_is_seen() -> None:
+    plane, plain = PlanarWorld(SCENARIO, seed=5), PlanarWorld(SCENARIO, seed=5)
+    times = np.array([0.0, 1.7, 3.3, 500.0])
+    plane.foresee(times)
+    for t_s in (*times.tolist(), 2.2):
+        for seen, expected in zip(plane.look(t_s), plain.look(t_s), strict=True):
+            assert (seen == expected).all()
+
+
 def test_end_is_when_the_last_mover_has_arrived() -> None:
     plane = PlanarWorld(SCENARIO, seed=5)
     before, after = plane.look(plane.end_s - 0.2)[1], plane.look(plane.end_s + 0.01)[1]
@@ -104,3 +113,4 @@ def test_separation_is_the_exact_distance_of_every_pair() -> None:
     assert min(exact) < -0.1
     assert max(exact) > 0.5
     assert separation(a, padded) == pytest.approx(np.array(exact), abs=1e-9)
+    assert overlap(a, padded).tolist() == [distance <= 0.0 for distance in exact]
