@@ -27,6 +27,7 @@ from vision.fragments import FragmentStore
 from vision.health import Continuity, HealthMonitor
 from vision.lens import project, rays
 from vision.renewal import Renewal
+from vision.rolling import rolling_prior
 from vision.scene import CameraHealth, EgoMotion, Fragments
 from vision.velocities import PointMotion
 
@@ -214,6 +215,8 @@ class Detector:
         settings = self._config.ego_motion
         if odometry is not None and self._odometry is not None:
             prior = odometry_prior(self._odometry.inverse() @ odometry, dt_s, settings)
+        elif self._mount is not None:
+            prior = rolling_prior(self._motion, self._motion_dt_s, dt_s, self._mount, settings)
         else:
             prior = steady_prior(self._motion, self._motion_dt_s, dt_s, settings)
         if frame.gyro is not None:

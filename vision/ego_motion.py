@@ -35,11 +35,13 @@ _STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivati
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionPrior:
     """What is known before looking: motion (the camera now in the camera before) and the standard
-    deviation (6,) of a small motion of the camera now: rotation about, translation along x, y, z."""
+    deviation (6,) of a small motion of the camera now: rotation about, translation along x, y, z.
+    binding: it is known that well, so that data which contradict it follow something large that moves."""
 
     motion: Pose
     sigma: FloatArray
     source: str
+    binding: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +75,7 @@ def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> Mo
     yaw = settings.odometry_yaw_ratio * turn_rad + settings.odometry_rotation_radps * dt_s
     tilt = settings.vibration_radps * dt_s + 0.1 * turn_rad
     way = settings.odometry_speed_ratio * way_m + settings.odometry_speed_mps * dt_s
-    return MotionPrior(motion, np.array([tilt, yaw, tilt, way, way, way]), "odometry")
+    return MotionPrior(motion, np.array([tilt, yaw, tilt, way, way, way]), "odometry", True)
 
 
 def steady_prior(last: Pose, last_dt_s: float, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
@@ -97,7 +99,7 @@ def with_gyro(
     turn = rotation_from_vector(gyro.rates_radps[inside].mean(axis=0) * dt_s)
     sigma = prior.sigma.copy()
     sigma[:3] = settings.gyro_radps * dt_s
-    return MotionPrior(Pose(turn, prior.motion.translation_m), sigma, prior.source)
+    return MotionPrior(Pose(turn, prior.motion.translation_m), sigma, prior.source, prior.binding)
 
 
 def estimate(
@@ -119,9 +121,9 @@ def estimate(
     view = _view(anchors, pixels, use, camera)
     found = _solve(view, start, prior.sigma)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
-    torn = prior.source == "odometry" and _conflict(found.pose, start, prior.sigma)
+    torn = prior.binding and _conflict(found.pose, start, prior.sigma)
     if torn:
-        # Something large moves, and the data follow it. What agrees with the odometry is the ground.
+        # Something large moves, and the data follow it. What agrees with the prior is the ground.
         found = _solve(view, start, prior.sigma * _TRUSTED_SHARE)
         least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
         # Still far from a prior that is trusted: too little of the ground is seen to overrule it.

@@ -1,0 +1,77 @@
+"""The prior of a camera on a robot that says nothing of its own motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from config.perception import EgoMotionSettings
+from hal.types import CameraMount, FloatArray, Intrinsics, Pose
+from vision.ego_motion import Anchors, MotionPrior, estimate, steady_prior
+from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
+from vision.rolling import rolling_prior
+
+CAMERA = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
+SETTINGS = EgoMotionSettings()
+IDENTITY = Pose(np.eye(3), np.zeros(3))
+DT_S = 1.0 / 30.0
+LEVEL = CameraMount(0.3, 0.0, 0.5, 0.0)
+
+
+def motion(turn: tuple[float, float, float], way: tuple[float, float, float]) -> Pose:
+    return Pose(rotation_from_vector(np.array(turn)), np.array(way))
+
+
+def test_the_robot_goes_on_ahead_and_turns_as_it_did() -> None:
+    last = motion((0.01, 0.02, -0.01), (0.03, 0.01, 0.05))
+    prior = rolling_prior(last, 0.1, 0.2, LEVEL, SETTINGS)
+    # The tilt was vibration. Across its way the camera only swings around the turning centre, 0.3 m behind.
+    np.testing.assert_allclose(vector_from_rotation(prior.motion.rotation), [0.0, 0.04, 0.0], atol=1e-12)
+    np.testing.assert_allclose(prior.motion.translation_m, [0.3 * 0.04, 0.0, 0.1], atol=1e-12)
+    assert prior.source == "none"
+
+
+def test_a_camera_that_looks_down_goes_along_the_floor() -> None:
+    tilted = CameraMount(0.3, 0.0, 0.5, math.radians(30.0))
+    last = motion((0.0, 0.0, 0.0), (0.0, -0.05, 0.05 * math.sqrt(3.0)))
+    prior = rolling_prior(last, DT_S, DT_S, tilted, SETTINGS)
+    np.testing.assert_allclose(prior.motion.translation_m, last.translation_m, atol=1e-12)
+    turned = rolling_prior(motion((0.0, 0.02, 0.0), (0.0, 0.0, 0.0)), DT_S, DT_S, tilted, SETTINGS)
+    turn = 0.02 * math.cos(math.radians(30.0))  # the part about the floor's normal
+    expected = turn * np.array([0.0, math.cos(math.radians(30.0)), 0.5])
+    np.testing.assert_allclose(vector_from_rotation(turned.motion.rotation), expected, atol=1e-12)
+
+
+def test_sigma_per_axis() -> None:
+    known = rolling_prior(IDENTITY, DT_S, DT_S, LEVEL, SETTINGS).sigma / DT_S
+    np.testing.assert_allclose(known, [0.25, 0.6, 0.25, math.hypot(0.1, 0.3 * 0.6), 0.1, 0.5])
+    # Where not even the motion before is known the speed and the turn are wider, what robots cannot do is not.
+    first = rolling_prior(motion((0.0, 0.1, 0.0), (0.0, 0.0, 1.0)), 0.0, DT_S, LEVEL, SETTINGS)
+    np.testing.assert_array_equal(first.motion.rotation, np.eye(3))
+    np.testing.assert_array_equal(first.motion.translation_m, 0.0)
+    np.testing.assert_allclose(first.sigma / DT_S, [0.25, 1.8, 0.25, math.hypot(0.1, 0.3 * 1.8), 0.1, 1.5])
+
+
+def sideways_mps(prior: MotionPrior) -> float:
+    """The robot drives 0.5 m/s ahead; two thirds of what is seen go 0.7 m/s to the right."""
+    rng = np.random.default_rng(3)
+    pixels = rng.uniform((20.0, 20.0), (620.0, 460.0), (90, 2))
+    direction = rays(pixels, CAMERA)
+    points = direction * rng.uniform(2.0, 6.0, 90)[:, None]
+    covariance = np.tile([0.02, 0.0, 0.02], (90, 1))
+    anchors = Anchors(points, direction, np.full(90, 0.02), covariance, np.ones(90, np.bool_))
+    now: FloatArray = points.copy()
+    now[:60, 0] += 0.7 * DT_S
+    now[:, 2] -= 0.5 * DT_S
+    found = estimate(anchors, project(now, CAMERA), IDENTITY, prior, CAMERA)
+    return float(found.pose.translation_m[0]) / DT_S
+
+
+def test_a_crowd_that_crosses_does_not_pass_for_the_robots_own_motion() -> None:
+    last = motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.5 * DT_S))
+    mount = CameraMount(0.0, 0.0, 0.5, 0.0)
+    assert sideways_mps(rolling_prior(last, DT_S, DT_S, mount, SETTINGS)) == pytest.approx(0.0, abs=0.1)
+    # A camera carried by hand may well have gone to the left: then the majority decides.
+    assert sideways_mps(steady_prior(last, DT_S, DT_S, SETTINGS)) == pytest.approx(-0.7, abs=0.1)
