@@ -36,8 +36,10 @@ class _Memory:
 class FreeMemory:
     """Remembers what was seen through during the last moments."""
 
-    def __init__(self, noise: DepthNoise) -> None:
+    def __init__(self, noise: DepthNoise, range_m: float) -> None:
+        """range_m: where depth ends; what was measured beyond was seen through up to there, no farther."""
         self._noise = noise
+        self._range_inverse = np.float32(1.0 / range_m)
         self._memories: list[_Memory] = []
 
     def clear(self) -> None:
@@ -64,7 +66,8 @@ class FreeMemory:
         if self._memories and (now_ns - self._memories[-1].stamp_ns) * 1e-9 < _KEEP_EVERY_S:
             return
         nearest = np.full(grid.inverse_depth.shape, _UNKNOWN)
-        cv2.copyTo(grid.inverse_depth, (grid.valid | grid.beyond).view(np.uint8), nearest)
+        cv2.copyTo(grid.inverse_depth, grid.valid.view(np.uint8), nearest)
+        nearest[grid.beyond] = self._range_inverse
         cv2.dilate(nearest, _BLOCK, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest))
         horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))

@@ -51,7 +51,7 @@ class Tracker:
         self._body_height_m = body_height_m
         self._clearance_m = clearance_m
         self._tracks = Tracks()
-        self._free = FreeMemory(config.depth_noise)
+        self._free = FreeMemory(config.depth_noise, config.max_depth_m)
         self._surfaces = masks.NO_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
         self._fragment_owner = np.empty(0, np.int64)

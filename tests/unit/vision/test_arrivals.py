@@ -15,12 +15,13 @@ from vision.depth_grid import BoolGrid
 NOISE = DepthNoise(floor_m=0.005, quadratic_per_m=0.0075)
 BACK = wall(6.0)
 BODY = plate(3.0, (-0.3, 0.3), (-0.5, 0.5))
+RANGE_M = 10.0
 MS = 1_000_000
 
 
 def memory(*views: tuple[int, FloatArray], pose: Pose = AT_ORIGIN) -> FreeMemory:
     """Has seen the views: (milliseconds, depth)."""
-    kept = FreeMemory(NOISE)
+    kept = FreeMemory(NOISE, RANGE_M)
     for stamp_ms, depth_m in views:
         kept.remember(grid_of(depth_m), pose, stamp_ms * MS)
     return kept
@@ -62,6 +63,12 @@ def test_where_nothing_was_measured_nothing_was_free() -> None:
 def test_beyond_the_range_is_seen_through_too() -> None:
     found = arrived(memory((0, wall(12.0))), BODY)
     assert found[inner(BODY)].all()
+
+
+def test_a_wall_that_comes_into_range_has_not_arrived() -> None:
+    """The robot drives 0.3 m towards it: 10.2 m was too far to be measured, 9.9 m is not."""
+    ahead = Pose(np.eye(3), np.array([0.0, 0.0, 0.3]))
+    assert not arrived(memory((0, wall(10.2))), wall(9.9), pose=ahead).any()
 
 
 def test_a_step_within_the_noise_proves_nothing() -> None:

@@ -47,7 +47,7 @@ def test_a_camera_that_looks_down_goes_along_the_floor() -> None:
 def test_sigma_per_axis() -> None:
     known = rolling_prior(IDENTITY, DT_S, DT_S, LEVEL, SETTINGS).sigma / DT_S
     np.testing.assert_allclose(known, [0.25, 0.6, 0.25, math.hypot(0.1, 0.3 * 0.6), 0.1, 0.5])
-    # Where not even the motion before is known the speed and the turn are wider, what robots cannot do is not.
+    # Where not even the motion before is known, speed and turn are wider; what robots cannot do is not.
     first = rolling_prior(motion((0.0, 0.1, 0.0), (0.0, 0.0, 1.0)), 0.0, DT_S, LEVEL, SETTINGS)
     np.testing.assert_array_equal(first.motion.rotation, np.eye(3))
     np.testing.assert_array_equal(first.motion.translation_m, 0.0)
