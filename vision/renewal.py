@@ -29,6 +29,7 @@ _CANDIDATES_PER_TILE = 4
 _SHARE_WITHOUT_DEPTH = 0.15
 _NOISE_STRUCTURE = 220.0  # what image noise of 3 grey levels adds to both eigenvalues over 7x7 px
 _LEAST_STRUCTURE = 3.0
+_STAIRS = 0.05  # of the larger eigenvalue, that the stairs of a coarsely sampled edge add to the smaller one
 _MATCH_SIGMA = 6.0  # grey levels by which two sights of the same patch differ
 
 
@@ -247,14 +248,15 @@ def _on_one_surface(
 def _flow_covariance(tensor: NDArray[np.float32], floor_px: float) -> NDArray[np.float32]:
     """(N, 2, 3) covariance of one flow step from the structure tensor (N, 2, 3): wide along an edge.
 
-    Image noise makes every direction look structured; that share is taken off first, or an end on a
+    Image noise makes every direction look structured, and so do the stairs that a strong edge has where it
+    is sampled coarsely; they wander along it as it turns. Both shares are taken off first, or an end on a
     straight edge would seem as well held along the edge as across it.
     """
     uu, uv, vv = tensor[..., 0], tensor[..., 1], tensor[..., 2]
     middle, half = 0.5 * (uu + vv), 0.5 * (uu - vv)
     radius = np.sqrt(half * half + uv * uv)
     larger = np.maximum(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
-    smaller = np.maximum(middle - radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
+    smaller = np.maximum(middle - radius - _NOISE_STRUCTURE - _STAIRS * larger, _LEAST_STRUCTURE)
     # The inverse has the same axes and the inverse eigenvalues.
     across, along = _MATCH_SIGMA**2 / larger, _MATCH_SIGMA**2 / smaller
     mean, spread = 0.5 * (across + along), 0.5 * (across - along)

@@ -79,3 +79,32 @@ def test_while_few_are_missing_it_does_not_look(missing: int, searched: bool) ->
     if not searched:
         after = renewal.find(frame, grey, present(140), 0)
         np.testing.assert_array_equal(after.ends_px, first.find(frame, grey, present(140), 0).ends_px)
+
+
+def slope() -> tuple[RgbdFrame, NDArray[np.uint8]]:
+    """An edge that falls by one pixel in 48, a little smoothed: every twelve pixels a stair, a quarter as
+    high as the edge is strong."""
+    v, u = np.mgrid[0:480, 0:640]
+    below = np.clip(v - 240 - u / 48.0, -0.5, 0.5)
+    grey = (120 + 30 * np.rint(4.0 * below)).astype(np.uint8)
+    colour = np.repeat(grey[:, :, None], 3, axis=2)
+    return RgbdFrame(colour, np.full(grey.shape, 3000, np.uint16), 0.001, 0, 0.0, 0, VGA), grey
+
+
+def sigmas_px(frame: RgbdFrame, grey: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """(2N, 2) smaller and larger standard deviation of the new ends."""
+    xx, xy, yy = Renewal(PerceptionConfig()).find(frame, grey, present(0), 0).pixel_cov.reshape(-1, 3).T
+    matrices = np.array([[xx, xy], [xy, yy]], float).transpose(2, 0, 1)
+    assert len(matrices) >= 8
+    return np.sqrt(np.linalg.eigvalsh(matrices))
+
+
+def test_the_stairs_of_an_edge_hold_no_end_along_it() -> None:
+    across, along = sigmas_px(*slope()).T
+    assert across.max() < 0.2
+    assert np.median(along) > 1.0
+
+
+def test_a_corner_holds_its_end_both_ways() -> None:
+    _, wider = sigmas_px(*picture()).T
+    assert np.median(wider) < 0.2
