@@ -28,9 +28,14 @@ _MIN_CELLS = 12
 # Limbs swing about as fast as their body goes. Where fragments disagree, some of them are limbs, and for
 # half a step it is the same ones: the disagreement is no noise that averages out from frame to frame.
 _LIMBS_MPS = 1.0
-# Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor.
-_ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85])
-_ABOVE_PX = np.array([0.0, 0.0, 0.0, 8.0, 8.0, 8.0])
+# Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor. Last,
+# beside it: an outline lies on the rim, where the cells may be those of the body behind.
+_ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85, 0.5, 0.5])
+_ABOVE_PX = np.array([0.0, 0.0, 0.0, 8.0, 8.0, 8.0, 0.0, 0.0])
+_BESIDE_PX = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -8.0, 8.0])
+_ON_IT = 6
+_SAME_DEPTH_M = 0.05
+_NEARER = 0.1  # per metre, against the depth by which a fragment is off
 _SMALL_SHARE = 0.3
 _ATTACH_M = 0.25
 
@@ -199,17 +204,22 @@ class Tracker:
             return np.full(len(owner), -1, np.int64)
         ends = detection.ends_px.astype(float)
         along = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _ALONG[:, None]
+        along[..., 0] += _BESIDE_PX
         along[..., 1] -= _ABOVE_PX
         rows, columns = grid.rows(along[..., 1].ravel()), grid.columns(along[..., 0].ravel())
         count = len(_ALONG)
         there = labels[rows, columns].reshape(-1, count)
         near = np.fmin(detection.near_m[:, 0], detection.near_m[:, 1]).astype(float)
-        gap = np.abs(grid.depth_m[rows, columns].reshape(-1, count) - near[:, None])
-        gate = 0.3 + 2.0 * depth_sigma_m(near, self._config.depth_noise)
-        agrees = (there > 0) & (gap <= gate[:, None])
-        first = agrees.argmax(axis=1)
-        track = there[np.arange(len(there)), first] - 1
-        ids = np.where(agrees.any(axis=1), tracks.ids[track], -1)
+        depth = grid.depth_m[rows, columns].reshape(-1, count)
+        gap = np.abs(depth - near[:, None])
+        sigma = depth_sigma_m(near, self._config.depth_noise)[:, None]
+        agrees = (there > 0) & (gap <= 0.3 + 2.0 * sigma)
+        # Of two bodies in one place of the image, the one at whose depth the fragment is; where noise hides
+        # the difference, the nearer one: an outline belongs to what is in front.
+        off = np.maximum(gap - _SAME_DEPTH_M - sigma, 0.0) + _NEARER * depth
+        best = np.where(agrees, off, np.inf).argmin(axis=1)
+        track = there[np.arange(len(there)), best] - 1
+        ids = np.where(agrees[:, :_ON_IT].any(axis=1), tracks.ids[track], -1)
         still = obstacles.long_static(detection.motion, detection.age_frames)
         return np.where(still & tracks.moving[track] & (ids != owner), -1, ids)
 

@@ -9,11 +9,12 @@ import pytest
 
 from config.perception import PerceptionConfig
 from hal.types import FloatArray
-from tests.support.detections import FRAME_NS, detection, track
+from tests.support.detections import FRAME_NS, detection, no_ends, track
 from tests.support.grids import CAMERA, grid_of, nearest, no_depth, plate, wall
 from vision.detection import no_motion
 from vision.scene import Obstacle
 from vision.tracker import Percept, Tracker
+from vision.velocities import PointMotion
 
 FRAME_S = FRAME_NS * 1e-9
 SPEED_MPS = 0.8
@@ -160,3 +161,42 @@ def test_a_break_in_sight_begins_the_surfaces_proof_anew() -> None:
         clean_s.append(float(eyes._tracks.clean_s.max()))
     assert clean_s[14] > 0.2
     assert clean_s[15:] == [0.0, 0.0, 0.0]
+
+
+def owner_of(left_px: float, near_m: float, before: FloatArray) -> tuple[int, Percept]:
+    """Obstacle of an upright fragment at left_px and near_m, in the third sight of before."""
+    tracker = Tracker(PerceptionConfig(), 0.8, 0.05)
+    ends = np.array([[[left_px, 60.0], [left_px, 110.0]]], np.float32)
+    motion = no_ends()
+    two = {name: np.ones((2, *getattr(motion, name).shape[1:])) for name in PointMotion.__slots__}
+    for frame in range(3):
+        seen = replace(
+            detection(grid_of(before), frame),
+            ids=np.array([7]),
+            ends_px=ends,
+            near_m=np.full((1, 2), near_m, np.float32),
+            age_frames=np.array([frame]),
+            motion=PointMotion(**{**two, "usable": np.zeros(2, np.bool_)}),
+        )
+        percept = tracker.step(seen, None)
+    return int(percept.fragments.obstacle_id[0]), percept
+
+
+# Two bodies, one 0.3 m behind the other: they meet in the image at column 159.5.
+FRONT_M, BACK_M = 2.6, 2.9
+PASSING = nearest(plate(FRONT_M, (-0.5, 0.0), (-0.9, 0.9)), plate(BACK_M, (-0.2, 0.5), (-0.9, 0.9)))
+
+
+@pytest.mark.parametrize(("near_m", "left_px"), [(FRONT_M, 166.0), (FRONT_M, 140.0), (BACK_M, 175.0)])
+def test_an_outline_belongs_to_the_body_at_whose_depth_it_is(near_m: float, left_px: float) -> None:
+    """Also where it lies on a cell of the body behind, and that is near enough to be its own."""
+    owner, percept = owner_of(left_px, near_m, PASSING)
+    (body,) = (one for one in percept.scene.obstacles if one.id == owner)
+    assert body.position_m[2] == pytest.approx(near_m, abs=0.01)
+
+
+def test_a_line_beside_a_body_is_none_of_its_outline() -> None:
+    """Within reach beside it, but not on it."""
+    alone = plate(FRONT_M, (-0.5, 0.0), (-0.9, 0.9))
+    assert owner_of(164.0, FRONT_M, alone)[0] == -1
+    assert owner_of(150.0, FRONT_M, alone)[0] >= 0
