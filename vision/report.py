@@ -28,10 +28,13 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
         & (local[:, 2] > 0.0)
         & ((unseen_s == 0.0) | ((unseen_s <= _LISTED_UNSEEN_S) & _in_view(local, detection)))
     )
+    # A mover that is out of sight is where it goes, whole, and not where its last rest was seen.
+    hidden = tracks.moving & (unseen_s > 0.0)
+    bbox = np.where(hidden[:, None], _expected_px(tracks.box_m, local, detection), tracks.bbox_px)
     result = []
     for t in np.flatnonzero(listed).tolist():
         moving = bool(tracks.moving[t])
-        u0, v0, u1, v1 = tracks.bbox_px[t].tolist()
+        u0, v0, u1, v1 = bbox[t].tolist()
         result.append(
             Obstacle(
                 id=int(tracks.ids[t]),
@@ -48,6 +51,16 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
             )
         )
     return tuple(result)
+
+
+def _expected_px(box_m: FloatArray, local_m: FloatArray, detection: Detection) -> FloatArray:
+    """(T, 4) boxes in the image, cut at its border, of bodies at local_m (T, 3) with edges box_m (T, 4)."""
+    camera = detection.camera
+    depth = np.maximum(local_m[:, 2:], 0.1)
+    u = (local_m[:, :1] + box_m[:, 0::2]) / depth * camera.fx + camera.cx
+    v = (local_m[:, 1:2] + box_m[:, 1::2]) / depth * camera.fy + camera.cy
+    u, v = np.clip(u, 0.0, camera.width), np.clip(v, 0.0, camera.height)
+    return np.stack((u[:, 0], v[:, 0], u[:, 1], v[:, 1]), axis=1)
 
 
 def _in_view(local_m: FloatArray, detection: Detection) -> NDArray[np.bool_]:

@@ -18,8 +18,9 @@ from hal.types import FloatArray, PlanarPose, Pose
 class Obstacle:
     """A thing that the robot could touch, seen by its fragments or by depth alone.
 
-    bbox_px: (u0, v0, u1, v1) in the colour image. position_m: (3,) centre of the visible surface.
-    extent_m: (3,) full size of the visible surface along x, y, z. velocity_mps: (3,) over ground
+    bbox_px: (u0, v0, u1, v1) in the colour image; of a mover out of sight where it is expected.
+    position_m: (3,) centre of the visible surface. extent_m: (3,) full size of the visible surface
+    along x, y, z. velocity_mps: (3,) over ground
     (the robot's own motion removed), along the camera axes. velocity_cov: (3, 3) (m/s)^2; wide
     while the obstacle is young, so that a first sight bounds the closing speed instead of
     calling it zero. moving: decided with hysteresis; score: 0..1, confidence in that it is a

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.types import FloatArray
+from hal.types import FloatArray, Intrinsics
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.regions import Regions
@@ -56,6 +56,8 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     tracks.seen_ns[seen] = detection.captured_ns
     tracks.sightings[seen] += 1
     tracks.bbox_px[seen] = measured.bbox_px[seen]
+    shown = seen[(measured.whole[seen] & ~sliver) | (tracks.sightings[seen] == 1)]
+    tracks.box_m[shown] = _box_m(measured, shown, detection.camera)
     tracks.extent_m[seen] = measured.extent_m[seen]
     tracks.cells[seen] = measured.cells[seen]
 
@@ -75,6 +77,15 @@ def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) 
     ahead = sight @ way / np.maximum(distance_m, 0.1)
     turn: FloatArray = np.sqrt(np.maximum(way @ way - ahead * ahead, 0.0))
     return turn / np.maximum(distance_m, 0.1)
+
+
+def _box_m(measured: Regions, seen: NDArray[np.intp], camera: Intrinsics) -> FloatArray:
+    """(K, 4) left, upper, right and lower edge of surfaces seen (K,) from their centres, at their depth."""
+    x, y, depth = measured.position_m[seen].T
+    left, top, right, bottom = measured.bbox_px[seen].T
+    across = [(u - camera.cx) / camera.fx * depth - x for u in (left, right)]
+    down = [(v - camera.cy) / camera.fy * depth - y for v in (top, bottom)]
+    return np.stack((across[0], down[0], across[1], down[1]), axis=1)
 
 
 def _centre_covariance(

@@ -21,6 +21,7 @@ _FIELDS = (
     "moving",
     "confidence",
     "bbox_px",
+    "box_m",
     "extent_m",
     "area_m2",
     "cells",
@@ -33,7 +34,8 @@ _FIELDS = (
 class Tracks:
     """state (T, 6): position and velocity; covariance (T, 6, 6); surface_state and surface_covariance: the
     same from the centres of the visible surface alone, without the fragments, as a second opinion; evidence
-    (T,) of motion; moving (T,); confidence (T,) 0..1; bbox_px (T, 4); extent_m (T, 3); area_m2 (T,):
+    (T,) of motion; moving (T,); confidence (T,) 0..1; bbox_px (T, 4); box_m (T, 4): edges
+    of the last box that showed the whole body, at its depth, from its centre; extent_m (T, 3); area_m2 (T,):
     averaged, up to a common factor; cells (T,) of the grid covered when last seen; clean_s (T,): for how long
     the surface's centre has told of the velocity without a break."""
 
@@ -50,6 +52,7 @@ class Tracks:
         self.moving = np.empty(0, np.bool_)
         self.confidence = np.empty(0)
         self.bbox_px = np.empty((0, 4))
+        self.box_m = np.empty((0, 4))
         self.extent_m = np.empty((0, 3))
         self.area_m2 = np.empty(0)
         self.cells = np.empty(0, np.intp)
@@ -98,6 +101,7 @@ class Tracks:
             "moving": np.zeros(count),
             "confidence": np.zeros(count),
             "bbox_px": np.zeros((count, 4)),
+            "box_m": np.zeros((count, 4)),
             "extent_m": np.zeros((count, 3)),
             "area_m2": np.zeros(count),
             "cells": np.zeros(count),

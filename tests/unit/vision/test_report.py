@@ -114,3 +114,26 @@ def test_fragments_have_their_middle_in_space_and_no_velocity_that_was_not_measu
     assert np.isnan(told.velocity_sigma_mps[1]).all()
     np.testing.assert_array_equal(told.obstacle_id, owner)
     np.testing.assert_array_equal(told.moving, moving)
+
+
+def test_a_mover_out_of_sight_has_its_whole_box_where_it_goes() -> None:
+    """0.6 m wide and 1.8 m high around its middle; the box it was last seen by is the rest of an arm."""
+    made = tracks((0.5, 0.0, 3.0), unseen_s=0.1)
+    made.moving[:] = True
+    made.bbox_px[:] = [10.0, 20.0, 14.0, 30.0]
+    made.box_m[:] = [-0.3, -0.9, 0.3, 0.9]
+    (one,) = report.obstacles(made, now())
+    # Focal length 300 px, middle (159.5, 119.5), image 320 x 240.
+    assert one.bbox_px == pytest.approx((159.5 + 20.0, 119.5 - 90.0, 159.5 + 80.0, 119.5 + 90.0))
+    made.state[0, 0] = -1.5
+    (one,) = report.obstacles(made, now())
+    assert one.bbox_px == pytest.approx((0.0, 29.5, 159.5 - 120.0, 209.5))  # cut at the border
+
+
+def test_what_is_seen_and_what_stands_still_keep_the_box_they_were_seen_by() -> None:
+    for moving, unseen_s in ((True, 0.0), (False, 0.1)):
+        made = tracks((0.5, 0.0, 3.0), unseen_s=unseen_s)
+        made.moving[:] = moving
+        made.bbox_px[:] = [10.0, 20.0, 14.0, 30.0]
+        (one,) = report.obstacles(made, now())
+        assert one.bbox_px == (10.0, 20.0, 14.0, 30.0)

@@ -101,6 +101,24 @@ def test_what_is_left_to_see_of_a_mover_behind_something_does_not_drag_its_posit
         assert mover.velocity_mps[0] == pytest.approx(SPEED_MPS, abs=0.1)
 
 
+def test_who_is_hidden_at_once_keeps_the_whole_box_and_goes_on() -> None:
+    """A curtain is drawn: first a quarter is left to see of the walker, then nothing."""
+    start_m, drawn = -0.9, 30
+    depths_m = [behind(start_m + way_m(k), (0.9, 1.0)) for k in range(drawn)]
+    for k in range(drawn, drawn + 3):
+        edge_m = start_m + way_m(k) - 0.25 + 0.125
+        depths_m.append(behind(start_m + way_m(k), (edge_m * 2.5 / 4.0, 1.0)))
+    depths_m += [behind(start_m + way_m(k), (-1.0, 1.0)) for k in range(drawn + 3, drawn + 6)]
+    percepts = track(depths_m)
+    before = moving(percepts[drawn - 1])[0]
+    for k in range(drawn + 3, drawn + 6):
+        (mover,) = (one for one in percepts[k].scene.obstacles if one.id == before.id)
+        assert mover.unseen_s > 0.0
+        x_m = start_m + way_m(k)
+        edges = [159.5 + (x_m - 0.25) * 75.0, 119.5 - 0.6 * 75.0, 159.5 + (x_m + 0.25) * 75.0, 194.5]
+        np.testing.assert_allclose(mover.bbox_px, edges, atol=8.0)
+
+
 def pair(frame: int, gap_m: float) -> FloatArray:
     """A grown-up and, gap_m to the right, a child, who walk alike."""
     x_m = -1.1 + way_m(frame)
