@@ -18,7 +18,6 @@ _MIN_EIGENVALUE = 1e-5
 # Eigenvalues are at hand; the other error that could be asked for would be worked out pixel by pixel.
 _FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 _EXPECTATION_PX = 2.0
-_MOST_OFF_PX = np.float32(2.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,9 +41,8 @@ def track(
     covariance (N, 3): xx, xy, yy of one flow step. An end may slide along its edge, there and back alike;
     across the edge it has to return. Therefore the miss is measured in its own sigmas.
 
-    The way back starts as far off as the way there ended off the guess, not at the point itself: a search
-    that starts at its goal proves nothing. But it starts no farther off than a search without a pyramid
-    goes: what moves in the image otherwise than the guess has it shall come back all the same.
+    The way back starts from where the guess says that the point came from, not from the point itself:
+    a search that starts at its goal proves nothing.
     """
     if len(pixels) == 0:
         return Flow(np.empty((0, 2), np.float32), np.empty(0, np.bool_))
@@ -62,8 +60,8 @@ def track(
     )
     # What all ends have in common was the guess's own error: a turn of the camera it did not know of.
     expected = guess + median((there[:, 0, :] - guess).T)
-    off = np.minimum(np.maximum(there[:, 0, :] - expected, -_MOST_OFF_PX), _MOST_OFF_PX)
-    back, back_ok, _ = search(now, before, there, (pixels + off).reshape(-1, 1, 2), maxLevel=0)
+    back_guess = there - (expected - pixels).reshape(-1, 1, 2)
+    back, back_ok, _ = search(now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1))
     end = _held(there[:, 0, :].astype(np.float32, copy=False), expected, covariance)
     miss = back[:, 0, :] - pixels
     height, width = now.shape
