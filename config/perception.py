@@ -32,7 +32,7 @@ class FragmentSettings(Section):
     max_fragments: int = Field(default=128, ge=20, le=2000)
     tile_px: int = Field(default=40, ge=16, le=160, description="cell in which fragments are counted")
     fragments_per_tile: int = Field(default=2, ge=1, le=16)
-    lk_window_px: int = Field(default=9, ge=5, le=41)
+    lk_window_px: int = Field(default=11, ge=5, le=41)
     lk_levels: int = Field(default=3, ge=0, le=6)
     forward_backward_px: float = Field(default=6.0, gt=0, le=20, description="also along an edge")
     forward_backward_sigmas: float = Field(default=3.0, gt=0, le=20)

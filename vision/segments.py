@@ -20,9 +20,9 @@ _SNAP_PX = 4
 _WINDOW_PX = 3
 _MARGIN_PX = _SNAP_PX + _WINDOW_PX + 2
 _ONES = np.ones(2 * _WINDOW_PX + 1)
-# By this much a segment of 32 px turns when an end moves by a pixel: finer says no more. Upright, level and
-# diagonal lines are met exactly.
-_ANGLE_RAD = math.pi / 100.0
+# A segment of 32 px turns by somewhat more when an end moves by a pixel: finer says no more. Upright, level
+# and diagonal lines are met exactly.
+_ANGLE_RAD = math.pi / 120.0
 
 
 def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32]:
