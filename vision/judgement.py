@@ -52,7 +52,8 @@ class MotionEvidence:
 
     sight (T, 3): unit vector from the camera; distance_m (T,). velocity (T, 3), covariance (T, 3, 3): as
     filtered. own_velocity, own_covariance: of this frame's fragments alone, from ends (T,) points of
-    which agreement (T,) agree. surface_velocity, surface_covariance: from the surface's centre alone.
+    which agreement (T,) agree; restless (T,): by these it does not stand still, whether they agree or not.
+    surface_velocity, surface_covariance: from the surface's centre alone.
     arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
     its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
     another side; growth_mps (T,): how fast its centre may wander because its visible part grows or shrinks.
@@ -69,6 +70,7 @@ class MotionEvidence:
     surface_covariance: FloatArray
     ends: NDArray[np.intp]
     agreement: FloatArray
+    restless: NDArray[np.bool_]
     arrived: NDArray[np.intp]
     cells: NDArray[np.intp]
     size_m: FloatArray
@@ -103,10 +105,12 @@ def judge(
     along, across, own_along, own_across = filtered.along, filtered.across, own.along, own.across
     agreeing = np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0)
     second = _second_opinion(seen, filtered, surface, apart)
-    by_fragments_across = (across > threshold) & (own_across > 0.5 * threshold) & (agreeing >= _ENDS_ACROSS)
+    enough = (agreeing >= _ENDS_ACROSS) | seen.restless
+    shown_across = (across > threshold) & (own_across > 0.5 * threshold)
+    by_fragments_across = shown_across & enough
     by_fragments_across &= ~second.denies_across | (agreeing >= _ENDS_ALONG)
     many = (own_along > 0.5 * threshold) & (agreeing >= _ENDS_ALONG) & ~second.denies_along
-    few = agreeing >= 2
+    few = (agreeing >= 2) | seen.restless
     shared = _SHARED_PROOF * threshold
     by_fragments_along = ((along > threshold) & many) | (
         (along > shared) & second.confirms_along & few & (own_along > _OWN_PROOF)
@@ -123,7 +127,10 @@ def judge(
     own_speed = np.sqrt(np.square(seen.own_velocity).sum(axis=1))
     own_sigma = np.sqrt(np.trace(seen.own_covariance, axis1=1, axis2=2))
     stands = (own_speed < 0.6 * least) & (own_sigma < 0.5 * least) & (agreeing >= _ENDS_ACROSS)
-    falling = np.where(stands, dt_s / _STOP_S, np.where(holding, dt_s / _HOLD_S, dt_s / _FALL_S))
+    # What one fragment alone shows is no proof, but no reason either to forget what more of them showed.
+    waiting = possible & (speed > least) & shown_across & (seen.agreement * seen.ends >= 2)
+    slowly = np.where(holding | waiting, dt_s / _HOLD_S, dt_s / _FALL_S)
+    falling = np.where(stands, dt_s / _STOP_S, slowly)
     strength = np.minimum(np.maximum(along, across), np.maximum(own_along, own_across)) / threshold
     pace = np.minimum(np.maximum(np.minimum(strength, agreeing / _ENDS_ACROSS), 1.0), _FASTEST)
     rise = np.minimum(pace * dt_s / _RISE_S, _MOST_A_FRAME)

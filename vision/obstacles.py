@@ -17,6 +17,9 @@ from vision.velocities import (
 )
 
 _ROBUST_CHI2 = 9.0
+_MEDIAN_CHI2 = 1.386  # of 2 degrees of freedom
+_SPREAD_ENDS = 6  # fewer of them do not show how widely they scatter
+_MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom
 _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
 _INDEPENDENT_DEPTHS = 10.0  # depth noise is shared by neighbours: a body never has more looks than these
 _STATIC_END_CHI2 = 6.0
@@ -29,13 +32,14 @@ _VELOCITY_GATE_MPS = 0.5
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyVelocities:
     """Of G bodies: velocity_mps (G, 3) over ground, covariance (G, 3, 3), ends (G,) how many points
-    speak, agreement (G,): share of them that agree. end_chi2 (2N,): of each end against its body."""
+    speak, agreement (G,): share of them that agree; unexplained (G,): share of them that would not be
+    where they are if the body stood still."""
 
     velocity_mps: FloatArray
     covariance: FloatArray
     ends: NDArray[np.intp]
     agreement: FloatArray
-    end_chi2: FloatArray
+    unexplained: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +91,8 @@ def body_velocities(
     used, trust = use.astype(float), end_information(motion)
     for scale in _ANNEAL:
         chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
-        weight = used / np.square(1.0 + chi2 * (1.0 / (scale * _ROBUST_CHI2)))
+        spread = _spread(chi2, chosen, owner, ends)
+        weight = used / np.square(1.0 + chi2 / (scale * _ROBUST_CHI2 * spread.take(safe_owner)))
         summed = per_end @ (member * weight).T
         equations = NormalEquations(summed[:12])
         equations.add_depth(summed[12] * share, summed[13] * share)
@@ -95,9 +100,29 @@ def body_velocities(
     chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
     agree = (member * (chi2 <= _ROBUST_CHI2)).sum(axis=1) / np.maximum(ends, 1)
     # What the model does not explain (limbs, turning, sliding) widens the result.
-    excess = (member * np.minimum(chi2, _ROBUST_CHI2)).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
+    spread = _spread(chi2, chosen, owner, ends)
+    bounded = np.minimum(chi2, _ROBUST_CHI2 * spread.take(safe_owner))
+    excess = (member * bounded).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
     covariance = covariance * np.maximum(1.0, excess)[:, None, None]
-    return BodyVelocities(velocity, covariance, ends, agree, chi2)
+    unexplained = (member * (motion.static_chi2 > _MOVED_CHI2)).sum(axis=1) / np.maximum(ends, 1)
+    return BodyVelocities(velocity, covariance, ends, agree, unexplained)
+
+
+def _spread(
+    chi2: FloatArray, chosen: NDArray[np.intp], owner: NDArray[np.intp], ends: NDArray[np.intp]
+) -> FloatArray:
+    """(G,) how much more the ends of each body scatter than their own errors make them, by the median: >= 1.
+
+    Limbs are no outliers of a rigid body: where half of the ends do not fit, the robust weights have to
+    widen until they do, or the velocity becomes that of whichever limb comes first.
+    """
+    result = np.ones(len(ends))
+    many = np.flatnonzero(ends >= _SPREAD_ENDS)
+    if len(many):
+        ordered = chi2[chosen[np.lexsort((chi2[chosen], owner[chosen]))]]
+        middle = (np.cumsum(ends) - ends + ends // 2)[many]
+        result[many] = np.maximum(1.0, ordered[middle] / _MEDIAN_CHI2)
+    return result
 
 
 def _end_chi2(motion: PointMotion, trust: FloatArray, velocity: FloatArray) -> FloatArray:

@@ -28,7 +28,8 @@ class Regions:
     """What R labelled parts of the grid measure; entries without cells have cells == 0.
 
     cells (R,). rows (R,) of the grid that they reach over. bbox_px (R, 4): u0, v0, u1, v1. position_m (R, 3):
-    centre of the visible surface. extent_m (R, 3). whole (R,): not cut by the image's border.
+    centre of the visible surface. extent_m (R, 3). wide (R,): not cut by the image's left or right border,
+    tall (R,): nor above or below.
     """
 
     cells: NDArray[np.intp]
@@ -36,7 +37,13 @@ class Regions:
     bbox_px: FloatArray
     position_m: FloatArray
     extent_m: FloatArray
-    whole: NDArray[np.bool_]
+    wide: NDArray[np.bool_]
+    tall: NDArray[np.bool_]
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """(R,) parts that are cut on no side."""
+        return self.wide & self.tall
 
 
 def standing(grid: DepthGrid, clearance_m: float) -> BoolGrid:
@@ -96,7 +103,7 @@ def _sorted_cells(labels: IntGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]
 def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     """Boxes, centres and sizes of the parts 1..count of labels (h, w); entry k - 1 is part k.
 
-    whole knows of the image's border only; see unhidden.
+    wide knows of the image's border only; see unhidden.
     """
     height, width = labels.shape
     label, flat = _sorted_cells(labels)
@@ -104,9 +111,9 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     starts, cells = ends[:-1], ends[1:] - ends[:-1]
     bbox = np.zeros((count, 4))
     position, extent = np.zeros((count, 3)), np.zeros((count, 3))
-    whole = np.zeros(count, np.bool_)
+    wide, tall = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     if len(flat) == 0:
-        return Regions(cells, cells, bbox, position, extent, whole)
+        return Regions(cells, cells, bbox, position, extent, wide, tall)
     present = np.flatnonzero(cells)
     starts, number = starts[present], cells[present]
     rows = flat // np.int32(width)
@@ -136,16 +143,18 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     size[:, 1] = (grid.y[bottom] - grid.y[top]) * depth
     size[:, 2] = _UNIFORM * spread * depth * depth
     extent[present] = size
-    whole[present] = (left > 0) & (top > 0) & (right < width - 1) & (bottom < height - 1)
-    tall = np.zeros(count, np.intp)
-    tall[present] = bottom - top + 1
-    return Regions(cells, tall, bbox, position, extent, whole)
+    wide[present] = (left > 0) & (right < width - 1)
+    tall[present] = (top > 0) & (bottom < height - 1)
+    reach = np.zeros(count, np.intp)
+    reach[present] = bottom - top + 1
+    return Regions(cells, reach, bbox, position, extent, wide, tall)
 
 
 def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
-    """regions as measured, whole only where nothing nearer hides a part, either."""
+    """regions as measured, wide only where nothing nearer hides a part, either, and where it ends at an edge
+    in depth: what was divided from its surroundings by guess has its middle where the guess put it."""
     hidden = _hidden_cells(grid, labels, len(regions.cells))
-    return replace(regions, whole=regions.whole & (hidden <= _OCCLUDED_SHARE * regions.rows))
+    return replace(regions, wide=regions.wide & (hidden <= _OCCLUDED_SHARE * regions.rows))
 
 
 def _foot_px(
@@ -168,13 +177,16 @@ def _foot_px(
 
 
 def _hidden_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.intp]:
-    """(count,) cells at the left or right rim of each part beside which something else stands nearer."""
+    """(count,) cells at the left or right rim of each part beside which something else stands nearer, or
+    another part goes on at the same depth."""
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
     rims = np.flatnonzero(flat[1:] != flat[:-1])
     rims = rims[(rims + 1) % labels.shape[1] > 0]  # not from the end of a row to the next one
+    left, right = flat.take(rims), flat.take(rims + 1)
     step = inverse.take(rims + 1) - inverse.take(rims)
-    farther = np.where(step > 0, flat.take(rims), flat.take(rims + 1))
-    hidden = farther[np.abs(step) > np.float32(_LEAST_JUMP)]
+    jumps = np.abs(step) > np.float32(_LEAST_JUMP)
+    shared = ~jumps & (left > 0) & (right > 0)
+    hidden = np.concatenate((np.where(step > 0, left, right)[jumps], left[shared], right[shared]))
     return np.bincount(hidden, minlength=count + 1)[1:]
 
 

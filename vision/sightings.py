@@ -20,6 +20,7 @@ MIN_CELLS = 6
 _CENTRE_SIGMA_M = 0.015
 _CENTRE_SHARE = 0.0125  # of its size, across the line of sight: cells at the rim come and go
 _CENTRE_DEPTH_SHARE = 0.04
+_CUT_SIGMA_M = 1.0  # in height, of what reaches beyond the image above or below
 _CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it does not average out
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
 _AREA_GAIN = 0.1
@@ -43,14 +44,14 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     change = np.abs(area_m2 - usual_m2) / usual_m2
     jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
     smooth = (
-        measured.whole[seen] & (change <= _SAME_AREA) & (jump <= _JUMP_M + 2.0 * depth_sigma_m(depth, noise))
+        measured.wide[seen] & (change <= _SAME_AREA) & (jump <= _JUMP_M + 2.0 * depth_sigma_m(depth, noise))
     )
     # What is left to see of a mover that goes behind something is not where its body is.
     sliver = tracks.moving[seen] & (area_m2 < _SLIVER * usual_m2)
     cut = ~smooth & ~sliver
     tracks.locate(seen[smooth], position[smooth], covariance[smooth])
     tracks.relocate(seen[cut], position[cut], covariance[cut])
-    tracks.clean_s[seen] = np.where(smooth, tracks.clean_s[seen] + detection.dt_s, 0.0)
+    tracks.clean_s[seen] = np.where(smooth & measured.tall[seen], tracks.clean_s[seen] + detection.dt_s, 0.0)
     tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S
     tracks.area_m2[seen] = np.where(sliver, usual_m2, usual_m2 + _AREA_GAIN * (area_m2 - usual_m2))
     tracks.seen_ns[seen] = detection.captured_ns
@@ -95,7 +96,8 @@ def _centre_covariance(
     extent, sigma = measured.extent_m[seen], depth_sigma_m(measured.position_m[seen, 2], noise)
     covariance = np.zeros((len(seen), 3, 3))
     across = _CENTRE_SIGMA_M + _CENTRE_SHARE * extent[:, :2].max(axis=1)
-    covariance[:, 0, 0] = covariance[:, 1, 1] = np.square(across)
+    covariance[:, 0, 0] = np.square(across)
+    covariance[:, 1, 1] = np.where(measured.tall[seen], np.square(across), _CUT_SIGMA_M**2)
     along = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * extent[:, 2]
     covariance[:, 2, 2] = np.square(along) + np.square(_CENTRE_NOISE * sigma)
     result: FloatArray = rotation @ covariance @ rotation.T

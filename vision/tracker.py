@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import PlanarPose
-from vision import carving, grouping, kalman, masks, obstacles, regions, report, sightings
+from vision import carving, grouping, kalman, limbs, masks, obstacles, regions, report, sightings
 from vision.arrivals import FreeMemory
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
@@ -21,13 +21,10 @@ from vision.regions import IntGrid, Regions
 from vision.scene import CameraCondition, Fragments, Scene
 from vision.tracks import Tracks
 
-_ACCEL_DENSITY = 0.2  # (m/s^2)^2 s: how briskly people start, stop and turn
+_ACCEL_DENSITY = 0.16  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
-# Limbs swing about as fast as their body goes. Where fragments disagree, some of them are limbs, and for
-# half a step it is the same ones: the disagreement is no noise that averages out from frame to frame.
-_LIMBS_MPS = 1.0
 # Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor. Last,
 # beside it: an outline lies on the rim, where the cells may be those of the body behind.
 _ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85, 0.5, 0.5])
@@ -244,13 +241,13 @@ class Tracker:
             tracks.state[:, 3:] @ rotation,
             settings.max_speed_mps,
         )
-        agreeing = body.agreement * body.ends
-        use = (agreeing >= 2) & ((body.agreement >= 0.2) | (agreeing >= 4))
+        use = limbs.believable(body)
         if use.any():
             # Windows overlap: each frame brings dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
-            noise = body.covariance[use] * (lag_s / detection.dt_s)
-            noise += np.square(_LIMBS_MPS * (1.0 - body.agreement[use]))[:, None, None] * np.eye(3)
+            going = np.where(tracks.moving, np.sqrt(np.square(tracks.state[:, 3:]).sum(axis=1)), 0.0)
+            swing = limbs.variance(body, going)[use]
+            noise = body.covariance[use] * (lag_s / detection.dt_s) + swing[:, None, None] * np.eye(3)
             tracks.state[use], tracks.covariance[use] = kalman.update(
                 tracks.state[use],
                 tracks.covariance[use],
@@ -271,6 +268,7 @@ class Tracker:
             surface_covariance=tracks.surface_covariance[:, 3:, 3:],
             ends=np.where(use, body.ends, 0),
             agreement=body.agreement,
+            restless=limbs.restless(body),
             arrived=arrivals,
             cells=cells,
             size_m=tracks.extent_m.max(axis=1),

@@ -47,6 +47,7 @@ def regions(*bodies: Body) -> Regions:
         ALL([[b.x, b.y, b.z] for b in bodies]),
         ALL([[b.width, b.height, b.deep] for b in bodies]),
         np.ones(len(bodies), np.bool_),
+        np.ones(len(bodies), np.bool_),
     )
 
 

@@ -43,6 +43,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         surface_covariance=covariance(UNKNOWN),
         ends=np.array([0]),
         agreement=np.array([0.0]),
+        restless=np.array([False]),
         arrived=np.array([0]),
         cells=np.array([100]),
         size_m=np.array([0.8]),

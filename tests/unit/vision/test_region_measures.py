@@ -61,6 +61,23 @@ def test_a_part_at_the_images_border_is_not_whole() -> None:
         assert not regions.measure(grid_of(wall(3.0)), labelled(mask), 1).whole[0]
 
 
+def test_what_is_cut_above_or_below_still_has_its_width_and_the_other_way_round() -> None:
+    tall = np.zeros((ROWS, COLUMNS), np.bool_)
+    tall[0:40, 9:20] = True
+    wide = np.zeros((ROWS, COLUMNS), np.bool_)
+    wide[45:50, 0:40] = True
+    measured = regions.measure(grid_of(wall(3.0)), labelled(tall, wide), 2)
+    assert measured.wide.tolist() == [True, False]
+    assert measured.tall.tolist() == [False, True]
+
+
+def test_what_ends_where_no_edge_in_depth_is_was_divided_by_guess() -> None:
+    """Two halves of one plate, and the same two 0.6 m apart in depth."""
+    left, right = plate(4.0, (-0.4, 0.0), (-0.6, 0.8)), plate(4.0, (0.0, 0.4), (-0.6, 0.8))
+    assert beside(left, right).wide.tolist() == [False, False]
+    assert beside(left, plate(3.4, (0.0, 0.4), (-0.6, 0.8))).wide.tolist() == [False, True]
+
+
 def test_the_box_reaches_down_to_the_floor_that_a_body_stands_on() -> None:
     """Camera 1 m up and level: the floor 4 m away is at row 119.5 + 300 / 4 = 194.5. The lowest 0.12 m
     of the body were taken for floor."""
@@ -148,6 +165,7 @@ def test_the_end_of_a_row_does_not_hide_the_beginning_of_the_next() -> None:
         measured.bbox_px,
         measured.position_m,
         measured.extent_m,
+        np.ones(2, np.bool_),
         np.ones(2, np.bool_),
     )
     assert regions.unhidden(grid, labels, inside).whole.tolist() == [True, True]

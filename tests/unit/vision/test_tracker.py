@@ -41,6 +41,14 @@ def test_a_surface_alone_is_found_moving_with_its_velocity() -> None:
     assert mover.fragments == 0
 
 
+def test_a_walker_whose_head_is_above_the_image_still_tells_how_fast_he_goes() -> None:
+    """At 2 m the image ends 0.8 m above the camera's axis; nothing else shows that he moves sideways."""
+    percepts = track([plate(2.0, (-0.65 + way_m(k), -0.15 + way_m(k)), (-1.2, 0.7)) for k in range(30)])
+    (walker,) = percepts[-1].scene.obstacles
+    assert walker.bbox_px[1] <= 0.0
+    np.testing.assert_allclose(walker.velocity_mps, [SPEED_MPS, 0.0, 0.0], atol=0.12)
+
+
 def owner_of_a_fragment(speed_mps: float, age_frames: int, static_chi2: float) -> int:
     """Which obstacle gets a fragment that comes to lie on the only one there is, after it went so fast."""
     tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
