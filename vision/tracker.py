@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from config.perception import PerceptionConfig
 from hal.types import PlanarPose
 from vision import carving, grouping, kalman, limbs, masks, obstacles, regions, report, sightings
+from vision.adoption import adopt
 from vision.arrivals import FreeMemory
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
-from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.judgement import MotionEvidence, judge
 from vision.obstacles import FragmentVelocities
@@ -25,16 +25,6 @@ _ACCEL_DENSITY = 0.16  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
-# Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor. Last,
-# beside it: an outline lies on the rim, where the cells may be those of the body behind.
-_ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85, 0.5, 0.5])
-_ABOVE_PX = np.array([0.0, 0.0, 0.0, 8.0, 8.0, 8.0, 0.0, 0.0])
-_BESIDE_PX = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -8.0, 8.0])
-_ON_IT = 6
-_SAME_DEPTH_M = 0.05
-_NEARER = 0.1  # per metre, against the depth by which a fragment is off
-_SMALL_SHARE = 0.3
-_ATTACH_M = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,7 +97,7 @@ class Tracker:
         self._free.remember(grid, pose, detection.captured_ns)
         labels, measured = self._label(detection, standing, arrived, velocities, elapsed_s)
         sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
-        owner = self._adopt(detection, labels, owner)
+        owner = adopt(tracks, detection, labels, owner, self._config.depth_noise)
         arrivals = np.bincount(labels[arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
             self._measure_velocities(detection, owner, velocities, arrivals, measured.cells)
@@ -193,32 +183,6 @@ class Tracker:
         )
         own = number[parts]
         return np.where(own > 0, own, labels).astype(np.int32)
-
-    def _adopt(self, detection: Detection, labels: IntGrid, owner: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(N,) fragments go to the body whose surface they lie on, no line on the floor to a passer-by."""
-        grid, tracks = detection.grid, self._tracks
-        if len(tracks) == 0 or len(owner) == 0:
-            return np.full(len(owner), -1, np.int64)
-        ends = detection.ends_px.astype(float)
-        along = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _ALONG[:, None]
-        along[..., 0] += _BESIDE_PX
-        along[..., 1] -= _ABOVE_PX
-        rows, columns = grid.rows(along[..., 1].ravel()), grid.columns(along[..., 0].ravel())
-        count = len(_ALONG)
-        there = labels[rows, columns].reshape(-1, count)
-        near = np.fmin(detection.near_m[:, 0], detection.near_m[:, 1]).astype(float)
-        depth = grid.depth_m[rows, columns].reshape(-1, count)
-        gap = np.abs(depth - near[:, None])
-        sigma = depth_sigma_m(near, self._config.depth_noise)[:, None]
-        agrees = (there > 0) & (gap <= 0.3 + 2.0 * sigma)
-        # Of two bodies in one place of the image, the one at whose depth the fragment is; where noise hides
-        # the difference, the nearer one: an outline belongs to what is in front.
-        off = np.maximum(gap - _SAME_DEPTH_M - sigma, 0.0) + _NEARER * depth
-        best = np.where(agrees, off, np.inf).argmin(axis=1)
-        track = there[np.arange(len(there)), best] - 1
-        ids = np.where(agrees[:, :_ON_IT].any(axis=1), tracks.ids[track], -1)
-        still = obstacles.long_static(detection.motion, detection.age_frames)
-        return np.where(still & tracks.moving[track] & (ids != owner), -1, ids)
 
     def _measure_velocities(
         self,
