@@ -21,7 +21,7 @@ class Detection:
     N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: evidence of the 2N
     ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
     the fixed frame has begun anew, what was tracked before cannot be compared. motion_known: the camera's
-    own motion is known well enough to call anything else moving.
+    own motion is known well enough to call anything else moving. reckoned: odometry says it, too.
     """
 
     captured_ns: int
@@ -40,6 +40,7 @@ class Detection:
     health: CameraHealth
     restarted: bool
     motion_known: bool
+    reckoned: bool
 
 
 def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> CameraHealth:

@@ -131,7 +131,9 @@ class Detector:
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
         known = ego.source != "none" and not blurred
-        detection = self._detection(frame, grid, dt_s, motion, result.covariance, ego, health, False, known)
+        detection = self._detection(
+            frame, grid, dt_s, motion, result.covariance, ego, health, False, known, prior.source != "none"
+        )
         self._renew(frame, grey)
         if ego.source == "none":
             self._store.break_history()
@@ -190,6 +192,7 @@ class Detector:
         health: CameraHealth,
         restarted: bool,
         motion_known: bool = False,
+        reckoned: bool = False,
     ) -> Detection:
         store = self._store
         return Detection(
@@ -209,6 +212,7 @@ class Detector:
             health,
             restarted,
             motion_known,
+            reckoned,
         )
 
     def _prior(self, frame: RgbdFrame, odometry: Pose | None, dt_s: float) -> MotionPrior:

@@ -17,7 +17,10 @@ from config.perception import MotionSettings
 from hal.types import FloatArray
 from vision.symmetric import inverse
 
-_RISE_S = 0.07
+_RISE_S = 0.06
+_RISE_ALONE_S = (
+    0.07  # without odometry an error of the camera's motion stays for some frames: one more of them
+)
 _FASTEST = 2.5  # times, with overwhelming proof
 _MOST_A_FRAME = 0.5  # no single frame proves motion, however long ago the one before was
 _FALL_S = 0.30
@@ -57,7 +60,7 @@ class MotionEvidence:
     arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
     its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
     another side; growth_mps (T,): how fast its centre may wander because its visible part grows or shrinks.
-    trusted: the camera's motion is known.
+    trusted: the camera's motion is known. reckoned: odometry says it, too, not the images alone.
     """
 
     sight: FloatArray
@@ -78,6 +81,7 @@ class MotionEvidence:
     view_radps: FloatArray
     growth_mps: FloatArray
     trusted: bool
+    reckoned: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +137,8 @@ def judge(
     falling = np.where(stands, dt_s / _STOP_S, slowly)
     strength = np.minimum(np.maximum(along, across), np.maximum(own_along, own_across)) / threshold
     pace = np.minimum(np.maximum(np.minimum(strength, agreeing / _ENDS_ACROSS), 1.0), _FASTEST)
-    rise = np.minimum(pace * dt_s / _RISE_S, _MOST_A_FRAME)
+    rise_s = _RISE_S if seen.reckoned else _RISE_ALONE_S
+    rise = np.minimum(pace * dt_s / rise_s, _MOST_A_FRAME)
     change = np.where(rising & ~stands, rise, -falling)
     new_evidence = np.minimum(np.maximum(evidence + change, 0.0), _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)

@@ -21,7 +21,7 @@ from vision.regions import IntGrid, Regions
 from vision.scene import CameraCondition, Fragments, Scene
 from vision.tracks import Tracks
 
-_ACCEL_DENSITY = 0.16  # (m/s^2)^2 s: how briskly people start, stop and turn
+_ACCEL_DENSITY = 0.14  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
@@ -240,6 +240,7 @@ class Tracker:
             growth_mps=tracks.growth_mps,
             view_radps=sightings.view_radps(detection, sight, distance),
             trusted=detection.motion_known,
+            reckoned=detection.reckoned,
         )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving

@@ -62,6 +62,7 @@ def detection(
         health=GOOD,
         restarted=first,
         motion_known=motion_known and not first,
+        reckoned=True,
     )
 
 

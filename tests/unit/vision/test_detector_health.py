@@ -60,6 +60,7 @@ def test_a_little_less_than_half_that_agree_are_enough(monkeypatch: pytest.Monke
     seen = last(odometry=False)
     assert seen.health.condition is CameraCondition.GOOD
     assert seen.motion_known
+    assert not seen.reckoned
 
 
 def test_with_odometry_the_few_that_agree_with_it_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,6 +68,7 @@ def test_with_odometry_the_few_that_agree_with_it_are_believed(monkeypatch: pyte
     seen = last(odometry=True)
     assert seen.health.condition is CameraCondition.GOOD
     assert seen.motion_known
+    assert seen.reckoned
 
 
 def test_on_odometry_alone_the_camera_is_degraded(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,6 +51,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),
         trusted=True,
+        reckoned=True,
     )
     return replace(plain, **changes)
 
@@ -234,6 +235,32 @@ def test_a_verdict_comes_sooner_with_overwhelming_proof() -> None:
     assert rise_s(by_fragments(ACROSS, 40)) == pytest.approx(PLAIN_S / 2.5)
 
 
+def test_at_thirty_hertz_two_frames_are_enough_with_odometry_and_three_are_needed_without() -> None:
+    seen, evidence, moving = by_fragments(ACROSS, 4), np.zeros(1), np.zeros(1, np.bool_)
+    frames = {}
+    for reckoned in (True, False):
+        verdict = Verdict(evidence, moving, evidence)
+        frames[reckoned] = 0
+        while not verdict.moving[0]:
+            known = replace(seen, reckoned=reckoned)
+            verdict = judge(known, verdict.evidence, verdict.moving, 1.0 / 30.0, SETTINGS)
+            frames[reckoned] += 1
+    assert frames == {True: 2, False: 3}
+
+
+def test_many_ends_that_deny_standing_still_prove_a_motion_though_they_disagree() -> None:
+    assert rises(by_fragments(ACROSS, 12, 0.1, restless=np.array([True])))
+    assert not rises(by_fragments(ACROSS, 12, 0.1))
+
+
+def test_what_was_shown_is_not_forgotten_while_one_fragment_still_shows_it() -> None:
+    half = 0.5
+    waiting = judge(by_fragments(ACROSS, 2), np.full(1, half), np.zeros(1, np.bool_), 0.03, SETTINGS)
+    assert half - 0.02 < waiting.evidence[0] < half  # two seconds for all of it
+    nothing = judge(one(ACROSS), np.full(1, half), np.zeros(1, np.bool_), 0.03, SETTINGS)
+    assert nothing.evidence[0] < half - 0.09
+
+
 def test_one_frame_alone_proves_nothing_however_long_ago_the_one_before_was() -> None:
     slow = judge(by_fragments(ACROSS, 40), np.zeros(1), np.zeros(1, np.bool_), 0.4, SETTINGS)
     assert slow.evidence[0] == 0.5
@@ -312,9 +339,11 @@ def test_confidence_by_hand() -> None:
 
 def test_tracks_are_judged_each_by_itself() -> None:
     all_of = [*EVIDENT.values(), one(ACROSS), by_fragments(ACROSS, 3)]
-    names = [name for name in MotionEvidence.__slots__ if name != "trusted"]
+    names = [name for name in MotionEvidence.__slots__ if name not in ("trusted", "reckoned")]
     together = MotionEvidence(
-        **{name: np.concatenate([getattr(seen, name) for seen in all_of]) for name in names}, trusted=True
+        **{name: np.concatenate([getattr(seen, name) for seen in all_of]) for name in names},
+        trusted=True,
+        reckoned=True,
     )
     count = len(all_of)
     joint = judge(together, np.full(count, 0.6), np.ones(count, np.bool_), DT_S, SETTINGS)
