@@ -21,6 +21,9 @@ from hal.types import FloatArray
 # Fine where stops from low speeds end, coarser for the long ones.
 _STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
 _SPEEDS = 31
+# Before a stop begins: beside what the configuration says no control period takes as long as this; and the
+# least that is looked at.
+_PERIOD_S, _LEAST_WAIT_S = 0.5, 1.0
 # So much sooner than it would have to, the robot slows comfortably for the worst case.
 _FORESIGHT_S = 0.1
 _GOES_MPS = 0.1
@@ -34,7 +37,9 @@ class WorstCase:
 
     def __init__(self, config: DecisionConfig, limits: Limits) -> None:
         self._config, self._limits = config, limits
-        longest_s = braking.stop(limits.max_speed_mps, 0.0, braking.emergency(limits)).time_s + 1.0
+        waits_s = max(config.chassis_delay_s + config.prediction.confirm_s + _PERIOD_S, _LEAST_WAIT_S)
+        stop = braking.stop(limits.max_speed_mps, 0.0, braking.emergency(limits))
+        longest_s = stop.time_s + waits_s
         self.times_s: FloatArray = np.concatenate(
             (
                 np.arange(0.0, _FINE_S, _STEP_S),
@@ -124,7 +129,8 @@ class WorstCase:
         self._foreseen = self._stops(self._speeds, 0.0, latency_s + _FORESIGHT_S)
         self._confirming = self._stops(self._speeds, 0.0, latency_s + confirm_s)
         self._at_once = self._stops(self._speeds, 0.0, latency_s)
-        self._furthest_m = float(self._foreseen.distance_m.max())
+        # Which of the two waits longer is the configuration's choice.
+        self._furthest_m = float(max(self._foreseen.distance_m.max(), self._confirming.distance_m.max()))
 
     def _reach(self, bodies: Bodies, placed: Placed, course: Course, since_s: float) -> Reach:
         prediction = self._config.prediction

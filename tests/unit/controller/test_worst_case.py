@@ -1,0 +1,53 @@
+"""The limit by what obstacles could do at worst: how far ahead it has to look."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from config.decision import DecisionConfig, Prediction
+from config.robot import Body, Limits
+from controller import braking
+from controller.corridor import Corridor, course_of, place
+from controller.limits import Limit, Motion
+from controller.worst_case import WorstCase
+from tests.support.bodies import box, line_path
+
+LIMITS = Limits()
+LATENCY_S = 0.2
+CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
+
+
+def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:
+    """For a robot at its greatest speed with lo_m of free way to something that stands on it."""
+    config = DecisionConfig(prediction=Prediction(confirm_s=confirm_s))
+    worst = WorstCase(config, LIMITS)
+    body = box(0.0, 0.0, age_s=age_s, sigma_mps=0.0)
+    at_zero_m = place(body, CORRIDOR, np.zeros(1), 0.0, 12.0).lo_m[0, 0]
+    body = box(lo_m - at_zero_m, 0.0, age_s=age_s, sigma_mps=0.0)
+    placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
+    v_mps = LIMITS.max_speed_mps
+    return worst.limit(
+        body,
+        placed,
+        course_of(body, placed.heading_rad[:, 0]),
+        np.array([True]),
+        0.0,
+        Motion(v_mps, 0.0, LATENCY_S),
+        0.0,
+        v_mps,
+    )
+
+
+@pytest.mark.parametrize("confirm_s", [1.0, 2.0])
+def test_what_is_hardly_seen_counts_from_where_it_can_still_be_confirmed_first(confirm_s: float) -> None:
+    """Until it is confirmed the robot goes on; the hard stop after that must still fit."""
+    v_mps = LIMITS.max_speed_mps
+    stop_m = braking.stop(v_mps, 0.0, braking.emergency(LIMITS)).distance_m
+    needed_m = stop_m + (LATENCY_S + confirm_s) * v_mps + DecisionConfig().margins.least_m
+    near = limit(needed_m - 0.5, age_s=0.0, confirm_s=confirm_s)
+    assert near is not None
+    assert near.speed_mps < v_mps
+    assert limit(needed_m + 0.01, age_s=0.0, confirm_s=confirm_s) is None
+    # Confirmed: nothing has to be waited for.
+    assert limit(needed_m - 0.5, age_s=5.0, confirm_s=confirm_s) is None
