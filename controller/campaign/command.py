@@ -58,6 +58,7 @@ def run_campaign(options: CampaignOptions) -> int:
     policies = options.policies or POLICY_NAMES
     store = MissionStore(options.report)
     store.begin(options.resume)
+    _check_modes(options, store)
     keep = options.report / FAILING if options.video else None
     tasks = []
     for one in missions(options.missions, families, options.seed):
@@ -110,6 +111,15 @@ def _check(options: CampaignOptions, config: AppConfig) -> None:
         raise UserError("--report: give a folder for missions.jsonl and the report (or --only FAMILY:SEED)")
     if options.video and options.mode != "camera":
         raise UserError("--video needs --mode camera: without a camera there is nothing to film")
+
+
+def _check_modes(options: CampaignOptions, store: MissionStore) -> None:
+    """A mission is known by family, seed and policy: one of another mode would pass for done."""
+    other = next((row.mode for row in store.rows.values() if row.mode != options.mode), None)
+    if other is not None:
+        raise UserError(
+            f"{store.path}: was driven with --mode {other}; go on so, or give another --report folder"
+        )
 
 
 def _mission_of(text: str) -> Mission:

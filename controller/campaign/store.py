@@ -36,6 +36,10 @@ class MissionStore:
             if resume and self.path.exists():
                 self._read()
                 self.rewrite()
+            # Found out now, and not when the first mission is over.
+            part = self.path.with_suffix(".part")
+            part.touch()
+            part.unlink()
         except OSError as error:
             raise UserError(f"{self.path}: {error.strerror}; choose a folder that can be written") from error
 

@@ -152,6 +152,24 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
         MissionStore(tmp_path / "file" / "report").begin(resume=False)
 
 
+def test_a_folder_that_takes_no_files_is_told_before_anything_is_driven() -> None:
+    with pytest.raises(UserError, match="choose a folder"):
+        MissionStore(Path("/proc/self")).begin(resume=False)
+
+
+def test_a_folder_is_left_as_it_was_until_the_first_row(tmp_path: Path) -> None:
+    MissionStore(tmp_path).begin(resume=False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_missions_of_another_mode_are_not_gone_on_with(tmp_path: Path) -> None:
+    """They would count as driven with the camera."""
+    (tmp_path / MISSIONS).write_text(json.dumps(made_row(1).as_dict()) + "\n")
+    with pytest.raises(UserError, match="driven with --mode noise") as caught:
+        campaign("--report", tmp_path, "--resume", "--mode", "camera", "--workers", "1", "--quiet")
+    assert "\n" not in str(caught.value)
+
+
 def made_row(seed: int, **changes: Any) -> Row:
     made = Row(
         "crossing_left", seed, "ours", "noise", reached=True, expected=True, contacts=0, contacts_at_fault=0,
