@@ -81,11 +81,25 @@ class ObservationFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._file is not None:
+        if self._file is None:
+            return
+        try:
             self._file.close()
+        except OSError as failure:
+            # What ended the block says more than what its end could not write.
+            if error is None:
+                raise self._failed(failure) from failure
 
     def write(self, scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> None:
-        """Append one line."""
+        """Append one line. Raises UserError: the disk is full."""
         assert self._file is not None, "ObservationFile is used inside its with block"
         line = json.dumps(observation(scene, decision, timing_ms), separators=(", ", ": "), allow_nan=False)
-        self._file.write(line + "\n")
+        try:
+            self._file.write(line + "\n")
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: OSError) -> UserError:
+        return UserError(
+            f"{self._path}: nothing more can be written ({error.strerror}); make room or name another file"
+        )

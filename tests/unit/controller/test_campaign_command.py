@@ -166,7 +166,7 @@ def test_missions_of_another_mode_are_not_gone_on_with(tmp_path: Path) -> None:
     """They would count as driven with the camera."""
     (tmp_path / MISSIONS).write_text(json.dumps(made_row(1).as_dict()) + "\n")
     with pytest.raises(UserError, match="driven with --mode noise") as caught:
-        campaign("--report", tmp_path, "--resume", "--mode", "camera", "--workers", "1", "--quiet")
+        campaign("--missions", "1", "--report", tmp_path, "--resume", "--mode", "camera", *SMALL)
     assert "\n" not in str(caught.value)
 
 

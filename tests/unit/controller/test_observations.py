@@ -69,3 +69,21 @@ def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path: Path) -> Non
         ObservationFile(tmp_path / "none" / "out.jsonl"),
     ):
         pytest.fail("must not open")
+
+
+def test_a_full_disk_is_told_in_one_line_while_writing() -> None:
+    with pytest.raises(UserError, match=r"/dev/full: .*No space left") as caught:
+        write_frames(10_000)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_full_disk_is_told_in_one_line_at_the_end() -> None:
+    with pytest.raises(UserError, match=r"/dev/full: .*No space left"):
+        write_frames(1)
+
+
+def write_frames(count: int) -> None:
+    """To a disk on which there is no room; a frame or two still fit into the buffer."""
+    with ObservationFile(Path("/dev/full")) as sink:
+        for number in range(count):
+            sink.write(scene(sequence=number), SLOW, {})
