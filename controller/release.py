@@ -11,7 +11,7 @@ from hal.clocks import NS_PER_S
 
 
 class _Least:
-    """The least of what was seen during the last delay_s; 0 until so much time has passed."""
+    """The least of what was seen during the last delay_s, or since the first look if that is less."""
 
     def __init__(self, delay_s: float) -> None:
         self._delay_ns = round(delay_s * NS_PER_S)
