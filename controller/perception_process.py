@@ -10,6 +10,7 @@ from config.app import AppConfig, RealtimeRunner
 from controller.build import build_path, build_perceiver, mount_of, open_camera, surroundings
 from controller.channel import Channel, PeerGone
 from controller.control import ControlStep
+from controller.errors import UserError
 from controller.localise import PoseHistory
 from controller.realtime import Farewell, SceneMessage
 from controller.recorder import RecordingOptions, RunRecorder, open_recorder
@@ -91,6 +92,9 @@ def perceive_forever(
         _say_farewell(channel, "the camera's stream has ended")
     except HalError as error:
         _say_farewell(channel, f"camera: {error}")
+    except UserError as error:
+        # A recording that cannot be begun or gone on with: why the robot stops is told there.
+        _say_farewell(channel, str(error))
 
 
 def _look_until_the_end(

@@ -1,12 +1,17 @@
 import dataclasses
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from config.app import load_app
+from config.loader import CONFIG_DIR
 from controller.channel import Channel, PeerGone, channel_sockets
 from controller.control import ControlStep
-from controller.perception_process import RemoteBody
+from controller.perception_process import RemoteBody, perceive_forever
+from controller.realtime import Farewell
+from controller.recorder import RecordingOptions
 from hal.types import CameraMount, PlanarPose
 from tests.support.drives import control_step
 from tests.support.scenes import chassis_state
@@ -81,3 +86,14 @@ def test_a_control_process_that_is_gone_is_noticed(ends: tuple[RemoteBody, Chann
     control.close()
     with pytest.raises(PeerGone):
         body.listen()
+
+
+def test_a_recording_that_cannot_be_written_is_told_to_the_control_process(tmp_path: Path) -> None:
+    config_path = CONFIG_DIR / "sim-realtime.yaml"
+    here, there = channel_sockets()
+    with here, there:
+        recording = RecordingOptions(observations=tmp_path / "none" / "out.jsonl")
+        perceive_forever(load_app(config_path), config_path, there, 0, recording)
+        told = Channel(here).receive()
+    assert isinstance(told, Farewell)
+    assert "observations cannot be written there" in told.reason
