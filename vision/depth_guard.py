@@ -42,7 +42,7 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
         known = _known_m(grid, bands, width, max_depth_m)
         # What stands there hides what is behind it.
         known = np.where(np.isfinite(nearest), nearest, known)
-    return FreeSpace(x / tilt, half_width, nearest, np.minimum(known, max_depth_m))
+    return FreeSpace(x / tilt, half_width / tilt, nearest, np.minimum(known, max_depth_m))
 
 
 def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: int, width: int) -> NDArray[np.float64]:

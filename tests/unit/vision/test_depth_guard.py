@@ -65,6 +65,13 @@ def outside(space: FreeSpace, columns: slice = CENTRE) -> NDArray[np.bool_]:
     return result
 
 
+def test_levelled_bands_of_a_tipped_camera_lie_side_by_side() -> None:
+    """Who looks up the band of a point counts in these widths, from the edge of the view."""
+    tipped = CameraMount(0.0, 0.0, 1.0, 0.3)
+    space = space_of(frame_of(floor(), tipped), tipped)
+    np.testing.assert_allclose(np.diff(space.bearing_tan), 2.0 * space.half_width_tan, rtol=1e-4)
+
+
 def test_bands_lie_side_by_side_across_the_view() -> None:
     space = space_of(frame_of(floor()))
     np.testing.assert_allclose(np.diff(space.bearing_tan), 2.0 * space.half_width_tan, rtol=1e-4)
