@@ -131,7 +131,10 @@ def estimate(
     ratio = found.inliers / len(use)
     if found.inliers < least or torn:
         return CameraEstimate(start, unseen.covariance, ratio, False)
-    _, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
+    # OpenCV answers zeros where there is no inverse: the least that is known would seem the most.
+    regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
+    if not regular:
+        return CameraEstimate(start, unseen.covariance, ratio, False)
     return CameraEstimate(found.pose, np.asarray(covariance, np.float64), ratio, True)
 
 

@@ -41,6 +41,8 @@ class Clearance:
         self._stage, self._log = stage, log
         self._times = np.array(log.times_s)
         self._poses = log.pose_array()
+        # Between two steps a heading is interpolated: past half a turn it goes on, and not back through zero.
+        self._poses[:, 2] = np.unwrap(self._poses[:, 2])
         self.least_m = math.inf
         self._contacts: list[Contact] = []
         bodies = np.flatnonzero(stage.in_height).tolist()

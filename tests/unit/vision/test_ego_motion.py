@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from config.perception import EgoMotionSettings
 from hal.types import FloatArray, GyroSamples, Intrinsics, Pose
+from vision import ego_motion
 from vision.ego_motion import (
     Anchors,
     CameraEstimate,
@@ -145,6 +147,19 @@ def test_with_too_few_points_only_the_prior_speaks() -> None:
     assert np.isnan(found.inlier_ratio)
     np.testing.assert_allclose(found.pose.translation_m, prior.motion.translation_m)
     np.testing.assert_allclose(found.pose.rotation, prior.motion.rotation)
+    np.testing.assert_allclose(np.diag(found.covariance), np.square(prior.sigma))
+
+
+def test_a_motion_whose_uncertainty_cannot_be_told_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve = ego_motion._solve
+
+    def singular(*given: Any) -> Any:
+        return replace(solve(*given), information=np.zeros((6, 6)))
+
+    monkeypatch.setattr(ego_motion, "_solve", singular)
+    static, prior = anchors(), odometry()
+    found = estimate(static, seen(static.points_m), IDENTITY, prior, CAMERA)
+    assert not found.visual
     np.testing.assert_allclose(np.diag(found.covariance), np.square(prior.sigma))
 
 
