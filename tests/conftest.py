@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import signal
+
 import pytest
 from hypothesis import settings
 
 # How long an example takes tells of the machine and its other work, not of the code.
 settings.register_profile("treadwatch", deadline=None)
 settings.load_profile("treadwatch")
+
+
+# Whoever starts the tests in the background of a script has them ignore Ctrl-C, and all their children.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
