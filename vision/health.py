@@ -48,7 +48,6 @@ class HealthMonitor:
     def __init__(self, config: PerceptionConfig) -> None:
         self._config = config
         self._last_ns: int | None = None
-        self._last_sequence = 0
         self._last_pixels: bytes = b""
         self._same = 0
 
@@ -83,7 +82,7 @@ class HealthMonitor:
         elif share < _POOR_DEPTH_SHARE:
             problems.append((poor, f"only {share:.0%} of the depth image holds data"))
         if continuity is not Continuity.BACKWARD:
-            self._last_ns, self._last_sequence = frame.captured_ns, frame.sequence
+            self._last_ns = frame.captured_ns
             self._last_pixels = pixels
         return FrameCheck(usable_colour, usable_depth, continuity, _verdict(problems, share))
 

@@ -18,9 +18,8 @@ from hal.types import FloatArray
 from vision.symmetric import inverse
 
 _RISE_S = 0.06
-_RISE_ALONE_S = (
-    0.07  # without odometry an error of the camera's motion stays for some frames: one more of them
-)
+# Without odometry an error of the camera's motion stays for some frames: one more of them is asked for.
+_RISE_ALONE_S = 0.07
 _FASTEST = 2.5  # times, with overwhelming proof
 _MOST_A_FRAME = 0.5  # no single frame proves motion, however long ago the one before was
 _FALL_S = 0.30

@@ -1,7 +1,7 @@
 """The visible surfaces of the tracks into their filters: where the bodies are, and how fast these centres go.
 
-A centre tells of the velocity only while the same whole surface is seen. Where it is cut by the image's
-border, hidden in part or suddenly another one, it tells of the position alone.
+A centre tells of the velocity only while the same whole surface is seen. Where it is cut at its side by the
+image's border, hidden in part or suddenly another one, it tells of the position alone.
 """
 
 from __future__ import annotations

@@ -162,7 +162,7 @@ def moment(
     commanded_mps, measured_mps = speeds_mps
     return VideoMoment(
         frame=frame(captured_ns=captured_ns),
-        scene=scene(obstacles, **scene_parts),  # type: ignore[arg-type]
+        scene=scene(obstacles, **scene_parts),  # type: ignore[arg-type]  # parts by name
         fragments=seen_fragments,
         decision=decided,
         commanded_mps=commanded_mps,

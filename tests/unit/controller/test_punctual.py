@@ -50,7 +50,7 @@ def test_held_until_a_fifth_of_the_period(began_ms: float, decided_ms: float, le
             __enter__, __exit__ = inner.__enter__, inner.__exit__
             arm, stop = inner.arm, inner.stop
 
-        punctual = PunctualChassis(Noting(), clock, 20 * MS)  # type: ignore[arg-type]
+        punctual = PunctualChassis(Noting(), clock, 20 * MS)  # type: ignore[arg-type]  # a part of one
         clock.sleep_until_ns(1000 * MS)
         punctual.exchange(None, 1000 * MS)
         assert left_at_ms == [1004.0]
