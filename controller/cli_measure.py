@@ -21,6 +21,7 @@ from controller.cli_options import (
     no_progress_bar,
     perception_mode,
 )
+from controller.errors import UserError
 
 
 @click.command()
@@ -141,14 +142,18 @@ def campaign(
     from controller.campaign.command import CampaignOptions, run_campaign
 
     options = CampaignOptions(
-        config_path, missions, _names(families), _names(policies), mode, workers, seed, report, resume,
-        scheduler, only, video, quiet,
+        config_path, missions, _names("--families", families), _names("--policies", policies), mode, workers,
+        seed, report, resume, scheduler, only, video, quiet,
     )  # fmt: skip
     sys.exit(run_campaign(options))
 
 
-def _names(text: str | None) -> tuple[str, ...]:
-    return tuple(name.strip() for name in (text or "").split(",") if name.strip())
+def _names(option: str, text: str | None) -> tuple[str, ...]:
+    """Empty if the option was not given. Raises UserError if it was, and names nothing."""
+    names = tuple(name.strip() for name in (text or "").split(",") if name.strip())
+    if text is not None and not names:
+        raise UserError(f"{option} {text!r}: names nothing; leave the option out for all of them")
+    return names
 
 
 @click.command("stop-and-go")

@@ -56,7 +56,7 @@ def run_campaign(options: CampaignOptions) -> int:
     assert options.report is not None
     families = options.families or FAMILY_NAMES
     policies = options.policies or POLICY_NAMES
-    store = MissionStore(options.report)
+    store = MissionStore(options.report, config.model_dump_json(indent=1))
     store.begin(options.resume)
     _check_modes(options, store)
     keep = options.report / FAILING if options.video else None

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from controller.campaign.judge import Row
 from controller.errors import UserError
 
 MISSIONS = "missions.jsonl"
+SETTINGS = "config.json"
 Key = tuple[str, int, str]
 
 
@@ -19,11 +21,16 @@ def key_of(row: Row) -> Key:
 
 
 class MissionStore:
-    """The rows of a report folder, and the file that keeps them."""
+    """The rows of a report folder, the file that keeps them, and beside it what they were driven with.
 
-    def __init__(self, folder: Path) -> None:
+    settings: the configuration as text.
+    """
+
+    def __init__(self, folder: Path, settings: str) -> None:
         self.path = folder / MISSIONS
         self.rows: dict[Key, Row] = {}
+        self._settings = settings
+        self._settings_path = folder / SETTINGS
 
     def begin(self, resume: bool) -> None:
         """Create the folder; rows of an earlier campaign are kept if it is resumed. Raises UserError."""
@@ -34,6 +41,7 @@ class MissionStore:
                     f"{self.path} exists: add --resume to go on with it, or give another --report folder"
                 )
             if resume and self.path.exists():
+                self._check_settings()
                 self._read()
                 self.rewrite()
             # Found out now, and not when the first mission is over.
@@ -44,19 +52,45 @@ class MissionStore:
             raise UserError(f"{self.path}: {error.strerror}; choose a folder that can be written") from error
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Append; each line is whole or, if the machine stops in the middle of it, dropped on resuming."""
-        with self.path.open("a", encoding="utf-8") as file:
-            for row in rows:
-                self.rows[key_of(row)] = row
-                file.write(json.dumps(row.as_dict()) + "\n")
+        """Append; each line is whole or, if the machine stops in the middle of it, dropped on resuming.
+
+        Raises UserError.
+        """
+        with self._told():
+            if not self.path.exists():
+                self._settings_path.write_text(self._settings, encoding="utf-8")
+            with self.path.open("a", encoding="utf-8") as file:
+                for row in rows:
+                    self.rows[key_of(row)] = row
+                    file.write(json.dumps(row.as_dict()) + "\n")
 
     def rewrite(self) -> None:
-        """All rows in one order, whichever worker was first."""
+        """All rows in one order, whichever worker was first. Raises UserError."""
         self.rows = dict(sorted(self.rows.items()))
         text = "".join(json.dumps(row.as_dict()) + "\n" for row in self.rows.values())
         part = self.path.with_suffix(".part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(self.path)
+        with self._told():
+            part.write_text(text, encoding="utf-8")
+            part.replace(self.path)
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """A disk that is full after hours is one line, and nothing is lost."""
+        try:
+            yield
+        except OSError as error:
+            raise UserError(
+                f"{self.path}: nothing more can be written ({error.strerror}); make room, then the same "
+                "command with --resume goes on"
+            ) from error
+
+    def _check_settings(self) -> None:
+        """Rows of two configurations would make one table."""
+        if self._settings_path.exists() and self._settings_path.read_text("utf-8") != self._settings:
+            raise UserError(
+                f"{self.path}: was driven with another --config (it is in {self._settings_path}); go on with "
+                "that one, or give another --report folder"
+            )
 
     def _read(self) -> None:
         lines = self.path.read_text(encoding="utf-8").splitlines()

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import importlib.util
 import json
 import math
@@ -13,7 +14,7 @@ from click.testing import CliRunner
 from config.loader import CONFIG_DIR
 from controller.campaign.judge import Row
 from controller.campaign.plan import Mission, missions, run_here
-from controller.campaign.store import MISSIONS, MissionStore
+from controller.campaign.store import MISSIONS, SETTINGS, MissionStore
 from controller.campaign.summary import summarise, totals
 from controller.campaign.task import Task, run_task
 from controller.cli import cli
@@ -60,7 +61,8 @@ def test_a_row_for_each_mission_and_policy_with_every_key(small: Path) -> None:
 
 def test_the_report_has_its_files(small: Path) -> None:
     names = {path.name for path in small.iterdir()}
-    assert names == {MISSIONS, "summary.json", "report.md", "ratio.png", "families.png", "clearance.png"}
+    pictures = {"ratio.png", "families.png", "clearance.png"}
+    assert names == {MISSIONS, SETTINGS, "summary.json", "report.md"} | pictures
     summary = json.loads((small / "summary.json").read_text())
     assert summary["policies"]["field"]["missions"] == 2
     assert summary["missions"] == 2
@@ -127,6 +129,8 @@ def test_one_mission_alone_says_how_it_went() -> None:
     [
         (("--report", "x", "--families", "crossing_lft"), "--families crossing_lft"),
         (("--report", "x", "--policies", "theirs"), "--policies theirs"),
+        (("--report", "x", "--families", " , "), "--families ' , ': names nothing"),
+        (("--report", "x", "--policies", ""), "--policies '': names nothing"),
         ((), "--report"),
         (("--only", "plain_wall"), "FAMILY:SEED"),
         (("--only", "nothing:3"), "FAMILY:SEED"),
@@ -143,22 +147,22 @@ def test_mistakes_are_told_in_one_line(arguments: tuple[str, ...], message: str)
 def test_a_row_that_is_none_is_told_with_its_line(tmp_path: Path) -> None:
     (tmp_path / MISSIONS).write_text('{"family": 3}\n{}\n')
     with pytest.raises(UserError, match="line 1 is not a row"):
-        MissionStore(tmp_path).begin(resume=True)
+        MissionStore(tmp_path, "").begin(resume=True)
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="choose a folder"):
-        MissionStore(tmp_path / "file" / "report").begin(resume=False)
+        MissionStore(tmp_path / "file" / "report", "").begin(resume=False)
 
 
 def test_a_folder_that_takes_no_files_is_told_before_anything_is_driven() -> None:
     with pytest.raises(UserError, match="choose a folder"):
-        MissionStore(Path("/proc/self")).begin(resume=False)
+        MissionStore(Path("/proc/self"), "").begin(resume=False)
 
 
 def test_a_folder_is_left_as_it_was_until_the_first_row(tmp_path: Path) -> None:
-    MissionStore(tmp_path).begin(resume=False)
+    MissionStore(tmp_path, "").begin(resume=False)
     assert not list(tmp_path.iterdir())
 
 
@@ -168,6 +172,33 @@ def test_missions_of_another_mode_are_not_gone_on_with(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="driven with --mode noise") as caught:
         campaign("--missions", "1", "--report", tmp_path, "--resume", "--mode", "camera", *SMALL)
     assert "\n" not in str(caught.value)
+
+
+def test_missions_of_another_configuration_are_not_gone_on_with(small: Path, tmp_path: Path) -> None:
+    for name in (MISSIONS, SETTINGS):
+        (tmp_path / name).write_text((small / name).read_text())
+    other = (CONFIG_DIR / "sim.yaml").read_text().replace("max_speed_mps: 1.5", "max_speed_mps: 1.2")
+    (tmp_path / "other.yaml").write_text(other)
+    with pytest.raises(UserError, match=f"another --config .*{SETTINGS}") as caught:
+        campaign("--report", tmp_path, "--resume", "--config", tmp_path / "other.yaml", *SMALL)
+    assert "\n" not in str(caught.value)
+    assert (tmp_path / MISSIONS).read_text() == (small / MISSIONS).read_text()
+
+
+def test_a_disk_that_fills_is_told_with_how_to_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = MissionStore(tmp_path, "")
+    store.begin(resume=False)
+    store.add([made_row(1)])
+    kept = store.path.read_text()
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "open", full)
+    with pytest.raises(UserError, match=r"No space left.*--resume goes on"):
+        store.add([made_row(2)])
+    monkeypatch.undo()
+    assert store.path.read_text() == kept
 
 
 def made_row(seed: int, **changes: Any) -> Row:
