@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
-from controller.build import build_path, build_simulation, open_commands
-from controller.build_chassis import build_base
+from controller.build import open_commands
 from controller.console import Console
 from controller.control import ControlStep
 from controller.ending import Outcome
@@ -18,16 +15,13 @@ from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
 from controller.mission import with_overrides
-from controller.punctual import PunctualChassis
-from controller.realtime import Punctuality, run_realtime
-from controller.realtime_mission import HEAD_START_S, perception_beside
-from controller.recorder import RecordingOptions
+from controller.realtime import Punctuality
+from controller.realtime_rig import realtime_rig
 from controller.result import MissionOptions
-from controller.scheduling import become_realtime
-from controller.service import ServiceManager, stop_on_signals
+from controller.service import ServiceManager
 from controller.summary import contact_text, limits_text, punctuality_text
 from controller.tally import SetpointTally, ShaperFaults, Standstill, TimingTally
-from hal.clocks import NS_PER_S, MonotonicClock
+from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
 
@@ -83,48 +77,22 @@ def _govern(
     options: MissionOptions,
     console: Console,
 ) -> Governing:
-    clock = MonotonicClock()
-    start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)
-    start = build_path(config, options.config_path).start
-    chassis, emulator = build_base(config, start, clock.now_ns())
-    simulation = None
-    if emulator is not None:
-        simulation = build_simulation(config, options.config_path, emulator, start_ns)
-    service = ServiceManager(os.environ, os.getpid())
-    recording = RecordingOptions(options.observations, options.video)
-    with ExitStack() as devices:
-        link = devices.enter_context(open_commands(governor.input))
-        if simulation is not None:
-            devices.enter_context(simulation)
-        period_ns = round(NS_PER_S / runner.control_rate_hz)
-        punctual = devices.enter_context(PunctualChassis(chassis, clock, period_ns))
+    with realtime_rig(config, runner, options) as rig, open_commands(governor.input) as link:
         inbox = build_inbox(link, governor, console.event)
-        loop = build_governor_loop(config, options.config_path, punctual, inbox)
-        perception = devices.enter_context(
-            perception_beside(config, options.config_path, start_ns, recording)
-        )
-        stop = devices.enter_context(stop_on_signals())
+        loop = build_governor_loop(config, options.config_path, rig.chassis, inbox)
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
-        governing = Governing(loop, inbox, setpoints, TimingTally(), simulation, Punctuality())
-        # Last, so that the processes and threads started before keep ordinary scheduling.
-        for refused in become_realtime(runner.priority):
-            console.event(f"not permitted, running without: {refused}")
-        moments = run_realtime(
-            runner, clock, simulation, perception, loop, service, stop, governing.punctuality
-        )
-        told_ready = told_stopping = False
-        for moment in moments:
-            governing.take(moment.control)
-            for message in moment.arrived:
-                governing.timing.add(message.timing_ms)
-            if perception.newest is not None and not told_ready:
-                told_ready = True
-                console.event(f"ready: commands are heard on {_where(governor.input)}")
-                service.ready("governing")
-            if loop.ending.stop_reason is not None and not told_stopping:
-                told_stopping = True
-                service.stopping(loop.ending.stop_reason)
-            _report(console, governing, moment.control)
+        governing = Governing(loop, inbox, setpoints, TimingTally(), rig.simulation, rig.punctuality)
+
+        def ready(service: ServiceManager) -> None:
+            console.event(f"ready: commands are heard on {_where(governor.input)}")
+            service.ready("governing")
+
+        with rig.under_way(loop, console, ready) as moments:
+            for moment in moments:
+                governing.take(moment.control)
+                for message in moment.arrived:
+                    governing.timing.add(message.timing_ms)
+                _report(console, governing, moment.control)
     return governing
 
 
