@@ -118,8 +118,6 @@ def speed_for_distance(
     """
     towards_mps = max(closing_mps, 0.0)
     free_m = distance_m - margin_m
-    if math.isinf(limits.jerk_mps3):
-        a_mps2 = 0.0  # it is gone at once
     if free_m <= required_distance(0.0, a_mps2, towards_mps, latency_s, limits):
         return 0.0
     if abs(a_mps2) > limits.decel_mps2:
@@ -252,9 +250,8 @@ def _bisect_speed(
     free_m: float, a_mps2: float, towards_mps: float, latency_s: float, limits: BrakeLimits
 ) -> float:
     """The rare states: the law is not one closed form, but it still grows with the speed."""
+    # Too fast: easing the acceleration off sheds a^2 / J at most, and from what is left v^2 / 2A is too far.
     low, high = 0.0, math.sqrt(2.0 * limits.decel_mps2 * free_m) + abs(a_mps2) + a_mps2**2 / limits.jerk_mps3
-    while required_distance(high, a_mps2, towards_mps, latency_s, limits) <= free_m:
-        high *= 2.0
     for _ in range(_NEWTON_STEPS):
         middle = 0.5 * (low + high)
         if required_distance(middle, a_mps2, towards_mps, latency_s, limits) <= free_m:

@@ -198,6 +198,18 @@ def test_inverse_where_the_deceleration_cannot_be_let_go_of_in_time() -> None:
     assert late == pytest.approx(0.105, abs=1e-9)
 
 
+@pytest.mark.parametrize("a", [-0.7, 0.7, -2.0])
+def test_inverse_where_the_acceleration_is_outside_the_limits(a: float) -> None:
+    """v 1 under A 0.3, J 2, as it is eased first (see above); also under an infinite jerk."""
+    limits = BrakeLimits(0.3, 2.0)
+    distance_m = braking.required_distance(1.0, a, 0.5, 0.2, limits, 0.4)
+    speed = braking.speed_for_distance(
+        distance_m, limits, a_mps2=a, closing_mps=0.5, latency_s=0.2, margin_m=0.4
+    )
+    assert speed == pytest.approx(1.0, abs=1e-9)
+    assert braking.speed_for_distance(3.75, BrakeLimits(0.3, math.inf), a_mps2=a) == pytest.approx(1.5)
+
+
 def test_inverse_where_the_formula_with_full_deceleration_has_no_root() -> None:
     """A 1, J 1, V_o 0.5, a -1: b = 0 and c = 1/6 - d: the discriminant 2 d - 1/3 is negative below 1/6 m."""
     limits = BrakeLimits(1.0, 1.0)
@@ -251,6 +263,8 @@ def test_an_unknown_state_is_refused(v: float, a: float) -> None:
         braking.stop(v, a, BrakeLimits(0.3, 0.6))
     with pytest.raises(ValueError, match="known speed"):
         braking.onset_only_stop(v, a, BrakeLimits(0.3, 0.6))
+    with pytest.raises(ValueError, match="known speed"):
+        braking.required_distance(v, a, 0.0, 0.0, BrakeLimits(0.3, 0.6))
 
 
 @pytest.mark.parametrize(
