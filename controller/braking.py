@@ -62,26 +62,6 @@ def stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
     return Stop(*_stop(v_mps, a_mps2, limits))
 
 
-def onset_only_stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
-    """The stop whose jerk is limited at its onset only: the deceleration is dropped at standstill.
-
-    The last resort of a brake, never longer than stop() from within the limits; for a = 0 the emergency
-    variant of motion-formulas 4.7. Raises ValueError as stop().
-    """
-    _check_state(v_mps, a_mps2)
-    big_a, j = limits.decel_mps2, limits.jerk_mps3
-    if math.isinf(j):
-        return stop(v_mps, a_mps2, limits)
-    start = max(a_mps2, -big_a)
-    onset_s = (start + big_a) / j
-    after_mps = v_mps + (start * start - big_a * big_a) / (2.0 * j)
-    if after_mps < 0.0:
-        onset_s = max(start + math.sqrt(start * start + 2.0 * j * v_mps), 0.0) / j
-        after_mps = 0.0
-    onset_m = v_mps * onset_s + start * onset_s**2 / 2.0 - j * onset_s**3 / 6.0
-    return Stop(onset_m + after_mps**2 / (2.0 * big_a), onset_s + after_mps / big_a)
-
-
 def required_distance(
     v_mps: float,
     a_mps2: float,

@@ -35,7 +35,7 @@ class Sight:
     """Remembers along one path what was seen of it; look() once a scene.
 
     surface_s_m: where the nearest unexplained surface stands in the corridor (path coordinate of its nearest
-    point, inf: none), steady against single frames; newest_surface_s_m: the same of the newest frame alone.
+    point, inf: none), steady against single frames.
     known_s_m: the corridor was seen free up to here. points_m (P, 2): every surface of the newest scene.
     corners: where somebody could step out from behind something.
     """
@@ -53,7 +53,7 @@ class Sight:
         self._consent_s_m = start_s_m + mount.forward_m + self._sight.near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = math.inf
-        self.surface_s_m = self.newest_surface_s_m = math.inf
+        self.surface_s_m = math.inf
         self.known_s_m = self._consent_s_m
         self.points_m: FloatArray = np.zeros((0, 2))
         self.corners = BlindCorners(config.sight)
@@ -112,7 +112,6 @@ class Sight:
     def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
         nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
         self._nearest.append(nearest)
-        self.newest_surface_s_m = nearest
         before = self.surface_s_m
         steady = sorted(self._nearest)[len(self._nearest) // 2]
         # What goes out of sight below the camera because the robot drives on is still there; what goes while

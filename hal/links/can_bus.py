@@ -103,11 +103,6 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         return super()._remedy(error)
 
 
-def open_can_link(config: CanLinkConfig) -> CanBusLink:
-    """The open bus. Raises DeviceNotFound, DeviceRefused."""
-    return CanBusLink(config).__enter__()
-
-
 def _open(config: CanLinkConfig, where: str) -> can.BusABC:
     options: dict[str, Any] = {}
     if config.interface == "udp_multicast":

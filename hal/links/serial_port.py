@@ -56,11 +56,6 @@ class SerialPortLink(ReopeningLink[serial.SerialBase]):
         device.close()
 
 
-def open_serial_link(config: SerialLinkConfig) -> SerialPortLink:
-    """The open port. Raises DeviceNotFound, DeviceRefused."""
-    return SerialPortLink(config).__enter__()
-
-
 def _open(config: SerialLinkConfig) -> serial.SerialBase:
     try:
         port: serial.SerialBase = serial.serial_for_url(

@@ -10,8 +10,8 @@ import pytest
 
 from config.chassis import SerialLinkConfig
 from hal.links.pseudo_terminal import PseudoTerminal
-from hal.links.serial_port import open_serial_link
 from tests.support.hil_missions import emulator, short_mission
+from tests.support.wires import open_serial_link
 
 
 def refusal(config: Path) -> str:

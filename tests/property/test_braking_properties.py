@@ -58,14 +58,6 @@ def test_agrees_with_ruckig_from_outside_the_limits(
     assert ours.time_s == pytest.approx(time, abs=1e-7)
 
 
-@given(speeds, shares, limit_pairs)
-def test_dropping_the_deceleration_is_never_longer(v: float, share: float, limits: BrakeLimits) -> None:
-    a = share * limits.decel_mps2
-    gentle, hard = braking.stop(v, a, limits), braking.onset_only_stop(v, a, limits)
-    assert 0.0 <= hard.distance_m <= gentle.distance_m + 1e-9
-    assert 0.0 <= hard.time_s <= gentle.time_s + 1e-9
-
-
 @given(
     distance=st.floats(0.0, 30.0),
     share=st.floats(-1.5, 1.5),

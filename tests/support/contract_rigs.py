@@ -11,7 +11,6 @@ import pytest
 
 from config.chassis import CanLinkConfig
 from hal.errors import HalError
-from hal.links.can_bus import open_can_link
 from tests.support.chassis_rig import (
     Rig,
     agilex_rig,
@@ -23,6 +22,7 @@ from tests.support.chassis_rig import (
 )
 from tests.support.page_chassis import page_rig
 from tests.support.real_base import DEFAULT_BASE, real_rig
+from tests.support.wires import open_can_link
 
 
 def _on_bus(make_link: Callable[[], CanLinkConfig]) -> AbstractContextManager[Rig]:

@@ -14,8 +14,8 @@ import yaml
 
 from config.loader import CONFIG_DIR
 from hal.errors import HalError
-from hal.links.can_bus import open_can_link
 from tests.support.chassis_rig import udp_link_config
+from tests.support.wires import open_can_link
 
 
 def short_mission(kind: str, folder: Path, length_m: float = 1.5) -> Path:

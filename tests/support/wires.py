@@ -10,10 +10,11 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from config.chassis import SerialLinkConfig
+from config.chassis import CanLinkConfig, SerialLinkConfig
 from hal.api import CanLink, Closing, SerialLink
 from hal.enclosing import Enclosing
 from hal.errors import LinkLost
+from hal.links.can_bus import CanBusLink
 from hal.links.pseudo_terminal import PseudoTerminal
 from hal.links.serial_port import SerialPortLink
 from hal.types import CanFrame
@@ -23,6 +24,16 @@ _TERMINAL_HOLDS = 3_900
 
 # A busy machine may leave the kernel no core to carry bytes over for a while.
 _PATIENCE_S = 10.0
+
+
+def open_serial_link(config: SerialLinkConfig) -> SerialPortLink:
+    """The open port, for a test that closes it itself or wants it refused."""
+    return SerialPortLink(config).__enter__()
+
+
+def open_can_link(config: CanLinkConfig) -> CanBusLink:
+    """The open bus, likewise."""
+    return CanBusLink(config).__enter__()
 
 
 class _Plug(Enclosing):

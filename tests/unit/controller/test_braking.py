@@ -104,31 +104,10 @@ def test_harder_acceleration_than_allowed_is_first_eased() -> None:
 def test_with_infinite_jerk_the_present_acceleration_is_gone_at_once(a: float) -> None:
     """Also from outside the limits, and at standstill."""
     limits = BrakeLimits(0.3, math.inf)
-    for stop in (braking.stop(1.0, a, limits), braking.onset_only_stop(1.0, a, limits)):
-        assert stop.distance_m == pytest.approx(1.0 / 0.6)
-        assert stop.time_s == pytest.approx(1.0 / 0.3)
+    stop = braking.stop(1.0, a, limits)
+    assert stop.distance_m == pytest.approx(1.0 / 0.6)
+    assert stop.time_s == pytest.approx(1.0 / 0.3)
     assert braking.stop(0.0, a, limits) == braking.Stop(0.0, 0.0)
-    assert braking.onset_only_stop(0.0, a, limits) == braking.Stop(0.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("v", "big_a", "j", "distance"),
-    [
-        (1.0, 1.0, 1.0, 0.5 + 0.5 - 1.0 / 24.0),  # 0.9583
-        (0.3, 1.0, 1.0, 2.0 / 3.0 * 0.3 * math.sqrt(0.6)),  # 0.1549: A is not reached
-    ],
-)
-def test_onset_only_stop(v: float, big_a: float, j: float, distance: float) -> None:
-    assert braking.onset_only_stop(v, 0.0, BrakeLimits(big_a, j)).distance_m == pytest.approx(distance)
-
-
-def test_onset_only_time() -> None:
-    limits = BrakeLimits(1.0, 1.0)
-    # Onset 1 s sheds 0.5 m/s, the other 0.5 m/s go at 1 m/s2.
-    assert braking.onset_only_stop(1.0, 0.0, limits).time_s == pytest.approx(1.5)
-    # Already at full deceleration: nothing but v / A.
-    assert braking.onset_only_stop(0.6, -1.0, limits).time_s == pytest.approx(0.6)
-    assert braking.onset_only_stop(0.6, -3.0, limits).distance_m == pytest.approx(0.18)
 
 
 @pytest.mark.parametrize(
@@ -261,8 +240,6 @@ def test_slowing_to_a_section() -> None:
 def test_an_unknown_state_is_refused(v: float, a: float) -> None:
     with pytest.raises(ValueError, match="known speed"):
         braking.stop(v, a, BrakeLimits(0.3, 0.6))
-    with pytest.raises(ValueError, match="known speed"):
-        braking.onset_only_stop(v, a, BrakeLimits(0.3, 0.6))
     with pytest.raises(ValueError, match="known speed"):
         braking.required_distance(v, a, 0.0, 0.0, BrakeLimits(0.3, 0.6))
 

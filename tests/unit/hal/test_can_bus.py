@@ -13,10 +13,11 @@ import pytest
 from config.chassis import CanLinkConfig
 from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
 from hal.links import reopening
-from hal.links.can_bus import CanBusLink, open_can_link
+from hal.links.can_bus import CanBusLink
 from hal.links.pseudo_terminal import PseudoTerminal
 from hal.types import CanFrame
 from tests.support.chassis_rig import can_link_config, udp_link_config
+from tests.support.wires import open_can_link
 
 FRAME = CanFrame(0x111, b"\x00\x96")
 # The kernel carries bytes through a pseudo-terminal when a core is free, which may take a while.

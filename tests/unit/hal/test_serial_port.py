@@ -14,7 +14,8 @@ from config.chassis import SerialLinkConfig
 from hal.api import SerialLink
 from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
 from hal.links.pseudo_terminal import PseudoTerminal
-from hal.links.serial_port import SerialPortLink, _ports_here, open_serial_link
+from hal.links.serial_port import SerialPortLink, _ports_here
+from tests.support.wires import open_serial_link
 
 
 def config(url: str, baud: int = 115_200) -> SerialLinkConfig:
