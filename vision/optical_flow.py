@@ -54,18 +54,15 @@ def track(
         flags=_FLAGS,
         minEigThreshold=_MIN_EIGENVALUE,
     )
-    start = pixels.reshape(-1, 1, 2)
-    there, there_ok, _ = search(
-        before, now, start, guess.reshape(-1, 1, 2).copy(), maxLevel=settings.lk_levels
-    )
+    there, there_ok, _ = search(before, now, pixels, guess.copy(), maxLevel=settings.lk_levels)
     # What all ends have in common was the guess's own error: a turn of the camera it did not know of.
-    expected = guess + median((there[:, 0, :] - guess).T)
-    back_guess = there - (expected - pixels).reshape(-1, 1, 2)
+    expected = guess + median((there - guess).T)
+    back_guess = there - (expected - pixels)
     back, back_ok, _ = search(now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1))
-    end = _held(there[:, 0, :].astype(np.float32, copy=False), expected, covariance)
-    miss = back[:, 0, :] - pixels
+    end = _held(there, expected, covariance)
+    miss = back - pixels
     height, width = now.shape
-    found = (there_ok[:, 0] == 1) & (back_ok[:, 0] == 1)
+    found = (there_ok & back_ok)[:, 0].view(np.bool_)
     found &= mahalanobis(miss, covariance) <= settings.forward_backward_sigmas**2
     near = np.abs(miss) <= settings.forward_backward_px
     inside = (end >= 2.0) & (end <= (width - 3, height - 3))
