@@ -21,6 +21,7 @@ CELL_NOISE = (
     0.4  # noise of a cell over noise of a pixel: of neighbouring pixels, so less than the count tells
 )
 _SMALLEST = 1e-6
+_FARTHEST = np.uint16(65535)
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
 
 
@@ -96,7 +97,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     depth_m = raw * np.float32(scale_m)
     beyond = depth_m > config.max_depth_m
     valid = (depth_m >= config.min_depth_m) & ~beyond
-    inverse = _smooth(_inverted(depth_m, valid), valid)
+    inverse = _smooth(raw, scale_m, _inverted(depth_m, valid), valid)
     depth_m = _inverted(inverse, valid)
     view = _view(frame.intrinsics, mount, depth_m.shape, step, offset)
     x, y = view.x, view.y
@@ -158,9 +159,15 @@ def _inverted(values: FloatGrid, valid: BoolGrid) -> FloatGrid:
     return np.asarray(cv2.copyTo(inverted, valid.view(np.uint8)), np.float32)
 
 
-def _smooth(inverse: FloatGrid, valid: BoolGrid) -> FloatGrid:
-    """Median over 5x5 cells, but a cell that differs much keeps its own: a thin pole, a rim of a body."""
-    median = np.asarray(cv2.medianBlur(inverse, 5), np.float32)
+def _smooth(raw: DepthImage, scale_m: float, inverse: FloatGrid, valid: BoolGrid) -> FloatGrid:
+    """Median over 5x5 cells, but a cell that differs much keeps its own: a thin pole, a rim of a body.
+
+    The middle one of raw depths is that of their inverses, and whole numbers are sorted faster. Without
+    data, an inverse depth of 0, is the farthest.
+    """
+    known = np.maximum(raw, (~valid).view(np.uint8) * _FARTHEST)
+    middle = np.asarray(cv2.medianBlur(known, 5), np.uint16)
+    median = _inverted(middle * np.float32(scale_m), middle < _FARTHEST)
     same = valid & (np.abs(inverse - median) <= np.float32(_AGREE_INVERSE))
     return np.asarray(cv2.copyTo(median, same.view(np.uint8), inverse), np.float32)
 
