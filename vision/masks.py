@@ -74,21 +74,28 @@ def predict(
     agrees = inside & (measured > 0) & (np.abs(measured - expected) <= gate)
     if not number.all():
         agrees &= number.take(before.owner) > 0
-    chosen = _nearest_last(np.flatnonzero(agrees), expected)
-    result.ravel()[cell.take(chosen)] = number.take(before.owner.take(chosen))
+    chosen = np.flatnonzero(agrees)
+    _write_nearest(
+        result.ravel(), cell.take(chosen), number.take(before.owner.take(chosen)), expected.take(chosen)
+    )
     return result
 
 
-def _nearest_last(chosen: NDArray[np.intp], inverse_depth: NDArray[np.float32]) -> NDArray[np.intp]:
-    """chosen (M,), the farthest first: what is written last into a cell stays there.
-
-    The bits of positive floats are ordered as the floats are, so one sort of whole numbers will do.
-    """
-    key = inverse_depth.take(chosen).view(np.uint32).astype(np.int64)
-    key <<= 32
-    key |= chosen
-    key.sort()
-    return key & 0xFFFFFFFF
+def _write_nearest(
+    into: NDArray[np.int32],
+    cell: NDArray[np.intp],
+    value: NDArray[np.int32],
+    inverse_depth: NDArray[np.float32],
+) -> None:
+    """Into each cell (M,) of into its value (M,); of those that want the same cell, the nearest one's."""
+    into[cell] = value
+    held = np.zeros(len(into), np.float32)
+    held[cell] = inverse_depth
+    # What is written last stays. Most cells are wanted once; only what is nearer than the last has to be
+    # written again, the nearest last.
+    nearer = np.flatnonzero(inverse_depth > held.take(cell))
+    nearer = nearer[np.argsort(inverse_depth.take(nearer), kind="stable")]
+    into[cell.take(nearer)] = value.take(nearer)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

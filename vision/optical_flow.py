@@ -59,10 +59,10 @@ def track(
     expected = guess + median((there - guess).T)
     back_guess = there - (expected - pixels)
     back, back_ok, _ = search(now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1))
-    end = _held(there, expected, covariance)
+    end = _held(np.asarray(there, np.float32), expected, covariance)
     miss = back - pixels
     height, width = now.shape
-    found = (there_ok & back_ok)[:, 0].view(np.bool_)
+    found = (np.asarray(there_ok) & np.asarray(back_ok))[:, 0].astype(np.bool_)
     found &= mahalanobis(miss, covariance) <= settings.forward_backward_sigmas**2
     near = np.abs(miss) <= settings.forward_backward_px
     inside = (end >= 2.0) & (end <= (width - 3, height - 3))
