@@ -89,9 +89,10 @@ def body_velocities(
     velocity = start_mps
     safe_owner = np.where(use, owner, 0)
     used, trust = use.astype(float), end_information(motion)
+    parties = _parties(chosen, owner, ends)
     for scale in _ANNEAL:
         chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
-        spread = _spread(chi2, chosen, owner, ends)
+        spread = _spread(chi2, parties)
         weight = used / np.square(1.0 + chi2 / (scale * _ROBUST_CHI2 * spread.take(safe_owner)))
         summed = per_end @ (member * weight).T
         equations = NormalEquations(summed[:12])
@@ -100,7 +101,7 @@ def body_velocities(
     chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
     agree = (member * (chi2 <= _ROBUST_CHI2)).sum(axis=1) / np.maximum(ends, 1)
     # What the model does not explain (limbs, turning, sliding) widens the result.
-    spread = _spread(chi2, chosen, owner, ends)
+    spread = _spread(chi2, parties)
     bounded = np.minimum(chi2, _ROBUST_CHI2 * spread.take(safe_owner))
     excess = (member * bounded).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
     covariance = covariance * np.maximum(1.0, excess)[:, None, None]
@@ -108,20 +109,36 @@ def body_velocities(
     return BodyVelocities(velocity, covariance, ends, agree, unexplained)
 
 
-def _spread(
-    chi2: FloatArray, chosen: NDArray[np.intp], owner: NDArray[np.intp], ends: NDArray[np.intp]
-) -> FloatArray:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Parties:
+    """Who belongs to which of G bodies, the same in every iteration. chosen (M,): the ends that speak, owner
+    (M,): body of each. many (K,): the bodies with many ends. middle (K,): where the middle end of each of
+    them stands once the ends are sorted by body, then by any value."""
+
+    bodies: int
+    chosen: NDArray[np.intp]
+    owner: NDArray[np.intp]
+    many: NDArray[np.intp]
+    middle: NDArray[np.intp]
+
+
+def _parties(chosen: NDArray[np.intp], owner: NDArray[np.intp], ends: NDArray[np.intp]) -> _Parties:
+    """ends (G,): how many of the ends chosen (M,) each body has; owner (2N,): of all ends."""
+    many = np.flatnonzero(ends >= _SPREAD_ENDS)
+    middle = (np.cumsum(ends) - ends + ends // 2)[many]
+    return _Parties(len(ends), chosen, owner[chosen], many, middle)
+
+
+def _spread(chi2: FloatArray, parties: _Parties) -> FloatArray:
     """(G,) how much more the ends of each body scatter than their own errors make them, by the median: >= 1.
 
     Limbs are no outliers of a rigid body: where half of the ends do not fit, the robust weights have to
     widen until they do, or the velocity becomes that of whichever limb comes first.
     """
-    result = np.ones(len(ends))
-    many = np.flatnonzero(ends >= _SPREAD_ENDS)
-    if len(many):
-        ordered = chi2[chosen[np.lexsort((chi2[chosen], owner[chosen]))]]
-        middle = (np.cumsum(ends) - ends + ends // 2)[many]
-        result[many] = np.maximum(1.0, ordered[middle] / _MEDIAN_CHI2)
+    result = np.ones(parties.bodies)
+    seen = chi2.take(parties.chosen)
+    ordered = seen.take(np.lexsort((seen, parties.owner)))
+    result[parties.many] = np.maximum(1.0, ordered.take(parties.middle) / _MEDIAN_CHI2)
     return result
 
 

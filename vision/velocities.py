@@ -80,11 +80,13 @@ def end_information(motion: PointMotion) -> FloatArray:
     xx, xy, yy = motion.covariance.T
     a, b = motion.depth_effect.T
     xx, xy, yy = xx + a * a, xy + a * b, yy + b * b
-    result: FloatArray = np.stack((yy, -xy, xx)) / np.maximum(xx * yy - xy * xy, 1e-18)
+    result = np.empty((3, len(xx)))
+    result[0], result[1], result[2] = yy, -xy, xx
+    result /= np.maximum(xx * yy - xy * xy, 1e-18)
     return result
 
 
-_DIAGONAL = np.array([0, 3, 5])  # of the six entries of a symmetric 3x3 matrix
+_UNIT = np.array([[1.0], [0.0], [0.0], [1.0], [0.0], [1.0]])  # entries of the symmetric identity (3, 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,9 +146,7 @@ def solve_velocity(equations: NormalEquations, max_speed_mps: float) -> tuple[Fl
 
     What the equations leave open is bounded by max_speed_mps (the paper's V_omax), never zero.
     """
-    information = equations.table[:6].copy()
-    information[_DIAGONAL] += 1.0 / max_speed_mps**2
-    inverse = whole(inverse_entries(information))
+    inverse = whole(inverse_entries(equations.table[:6] + _UNIT / max_speed_mps**2))
     sides = equations.table[6:].reshape(2, 1, 3, -1)
     velocity, common = (inverse * sides).sum(axis=2)
     covariance = inverse + common[:, None] * common
