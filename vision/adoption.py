@@ -35,14 +35,11 @@ def adopt(
     if len(tracks) == 0 or len(owner) == 0:
         return np.full(len(owner), -1, np.int64)
     ends = detection.ends_px.astype(float)
-    along = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _ALONG[:, None]
-    along[..., 0] += _BESIDE_PX
-    along[..., 1] -= _ABOVE_PX
-    rows, columns = grid.rows(along[..., 1].ravel()), grid.columns(along[..., 0].ravel())
-    count = len(_ALONG)
-    there = labels[rows, columns].reshape(-1, count)
+    u, v = (ends[:, :1, k] + (ends[:, 1:, k] - ends[:, :1, k]) * _ALONG for k in (0, 1))
+    cells = grid.rows(v - _ABOVE_PX) * labels.shape[1] + grid.columns(u + _BESIDE_PX)
+    there = labels.ravel().take(cells)
     near = np.fmin(detection.near_m[:, 0], detection.near_m[:, 1]).astype(float)
-    depth = grid.depth_m[rows, columns].reshape(-1, count)
+    depth = grid.depth_m.ravel().take(cells)
     gap = np.abs(depth - near[:, None])
     sigma = depth_sigma_m(near, noise)[:, None]
     agrees = (there > 0) & (gap <= _LEAST_GATE_M + 2.0 * sigma)
