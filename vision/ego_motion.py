@@ -103,21 +103,16 @@ def with_gyro(
 
 
 def estimate(
-    anchors: Anchors,
-    pixels: FloatArray,
-    before: Pose,
-    prior: MotionPrior,
-    camera: Intrinsics,
+    anchors: Anchors, pixels: FloatArray, before: Pose, prior: MotionPrior, camera: Intrinsics
 ) -> CameraEstimate:
     """The camera now, from where anchored points are seen now (pixels (N, 2)).
 
     before: the camera of the frame before, in the fixed frame.
     """
     start = before @ prior.motion
-    unseen = CameraEstimate(start, np.diag(np.square(prior.sigma)), float("nan"), False)
     use = np.flatnonzero(anchors.usable)
     if len(use) < _MIN_POINTS:
-        return unseen
+        return _unseen(start, prior, float("nan"))
     view = _view(anchors, pixels, use, camera)
     found = _solve(view, start, prior.sigma)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
@@ -129,13 +124,16 @@ def estimate(
         # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
         torn = _conflict(found.pose, start, prior.sigma)
     ratio = found.inliers / len(use)
-    if found.inliers < least or torn:
-        return CameraEstimate(start, unseen.covariance, ratio, False)
     # OpenCV answers zeros where there is no inverse: the least that is known would seem the most.
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
-    if not regular:
-        return CameraEstimate(start, unseen.covariance, ratio, False)
+    if found.inliers < least or torn or not regular:
+        return _unseen(start, prior, ratio)
     return CameraEstimate(found.pose, np.asarray(covariance, np.float64), ratio, True)
+
+
+def _unseen(start: Pose, prior: MotionPrior, inlier_ratio: float) -> CameraEstimate:
+    """Only the prior speaks."""
+    return CameraEstimate(start, np.diag(np.square(prior.sigma)), inlier_ratio, False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,26 +182,21 @@ def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: I
 def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
     """Iteratively reweighted Gauss-Newton from start, which is known to sigma (6,)."""
     prior = 1.0 / np.square(sigma)
-    prior_information = np.diag(prior)
-    information, inliers = prior_information, 0
+    information = prior_information = np.diag(prior)
     pose = _shift(view, start, sigma)
     count = view.seen.shape[1]
     table, weights = np.empty((8, 3, count)), np.empty((3, count))
     flat = table[:7].reshape(7, 3 * count)
-    in_front = _linearise(view, pose, table)
+    in_front, shrink = _linearise(view, pose, table)
     missing = _difference(pose, start)
     allowed = np.ones(count)
     gone = np.zeros(6)  # since the image was linearised
     for iteration in range(_ITERATIONS):
-        # Depth's share of the covariance, by Sherman and Morrison: only along the epipolar line.
-        along, squared = table[6:, 2]
-        shrink = view.depth_variance / (1.0 + view.depth_variance * squared)
-        a, b = table[6, :2]
+        a, b, along = table[6]
         chi2 = a * a + b * b - shrink * along * along
         if iteration == 0:
             doubt = np.square(table[:6, :2] * sigma[:, None, None]).sum(axis=(0, 1))
             allowed = (in_front & (chi2 <= _GATE_CHI2 * (1.0 + doubt))).astype(np.float64)
-        inliers = int(np.count_nonzero(allowed * (chi2 <= _GATE_CHI2)))
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
         weight = allowed * in_front / (scale * np.square(1.0 + chi2 * (1.0 / (_GATE_CHI2 * scale))))
         weights[:2] = weight
@@ -220,11 +213,12 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
             break
         if max(map(abs, gone.tolist())) > _STRAIGHT:
             pose, gone = _moved(pose, gone), np.zeros(6)
-            in_front = _linearise(view, pose, table)
+            in_front, shrink = _linearise(view, pose, table)
             missing = _difference(pose, start)
         else:
             missing = missing - step
             table[6] -= (step @ flat[:6]).reshape(3, count)
+    inliers = int(np.count_nonzero(allowed * (chi2 <= _GATE_CHI2)))
     return _Solution(_moved(pose, gone), information, inliers)
 
 
@@ -239,8 +233,9 @@ def _conflict(pose: Pose, start: Pose, sigma: FloatArray) -> bool:
     return float(off @ off) > _CONFLICT_CHI2
 
 
-def _linearise(view: _View, pose: Pose, table: FloatArray) -> NDArray[np.bool_]:
-    """Fill table (8, 3, N); returns which points lie in front of the camera.
+def _linearise(view: _View, pose: Pose, table: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Fill table (8, 3, N). Returns which points lie in front of the camera and what the variance of their
+    depth takes off the square of an error along the derivative by depth: (N,), (N,).
 
     Rows 0 to 5: derivative of the image by a small motion of the camera (rotation, translation); row 6:
     seen minus predicted; row 7: derivative by depth. First and second layer: across and down the image,
@@ -278,7 +273,9 @@ def _linearise(view: _View, pose: Pose, table: FloatArray) -> NDArray[np.bool_]:
     across *= own
     np.multiply(across, across[7], out=along)
     along += down * down[7]
-    return in_front
+    # Depth's share of the covariance, by Sherman and Morrison: only along the epipolar line.
+    shrink = view.depth_variance / (1.0 + view.depth_variance * along[7])
+    return in_front, shrink
 
 
 def _shift(view: _View, start: Pose, sigma: FloatArray) -> Pose:
