@@ -89,8 +89,7 @@ class FreeMemory:
         relative = memory.pose.inverse() @ pose
         there = relative.rotation.astype(np.float32) @ points
         there += relative.translation_m.astype(np.float32)[:, None]
-        cell, inside = grid.project(there)
-        inverse = np.float32(1.0) / np.maximum(there[2], np.float32(0.05))
+        cell, inside, inverse = grid.project(there)
         seen = memory.nearest_inverse.ravel().take(cell)
         sigma = np.float32(np.sqrt(2.0) * self._noise.quadratic_per_m)
         margin = np.float32(_MARGIN_M) * inverse * inverse + np.float32(_SIGMAS) * sigma

@@ -22,6 +22,7 @@ CELL_NOISE = (
 )
 _SMALLEST = 1e-6
 _FARTHEST = np.uint16(65535)
+_NEAREST_M = 0.1
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
 
 
@@ -74,16 +75,17 @@ class DepthGrid:
         result[2] = depth
         return result
 
-    def project(self, points: FloatGrid) -> tuple[NDArray[np.intp], BoolGrid]:
-        """Flat cell index (K,) of camera coordinates (3, K), and which of them fall into the grid."""
+    def project(self, points: FloatGrid) -> tuple[NDArray[np.intp], BoolGrid, FloatGrid]:
+        """Flat cell index (K,) of camera coordinates (3, K), which of them fall into the grid, and their
+        inverse depths, those of the nearest 10 cm cut off."""
         height, width = self.depth_m.shape
         x, y, z = points
-        inverse = np.reciprocal(np.maximum(z, np.float32(0.1)))
+        inverse = np.reciprocal(np.maximum(z, np.float32(_NEAREST_M)))
         column = (x * inverse - self.x[0]) * (1.0 / (self.x[1] - self.x[0])) + 0.5
         row = (y * inverse - self.y[0]) * (1.0 / (self.y[1] - self.y[0])) + 0.5
-        inside = (z > 0.1) & (column >= 0) & (row >= 0) & (column < width) & (row < height)
+        inside = (z > _NEAREST_M) & (column >= 0) & (row >= 0) & (column < width) & (row < height)
         flat = row.astype(np.int32) * width + column.astype(np.int32)
-        return np.multiply(flat, inside, dtype=np.intp), inside
+        return (flat * inside.view(np.uint8)).astype(np.intp), inside, inverse
 
 
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:

@@ -67,9 +67,8 @@ def predict(
     if shift_m.any():
         way = np.append(shift_m, [[0.0, 0.0, 0.0]], axis=0)[index] @ pose.rotation
         there += way.T.astype(np.float32).take(before.owner, axis=1)
-    cell, inside = grid.project(there)
+    cell, inside, expected = grid.project(there)
     measured = grid.inverse_depth.ravel().take(cell)
-    expected = np.float32(1.0) / np.maximum(there[2], np.float32(0.1))
     gate = np.float32(_DEPTH_GATE_INVERSE) + np.float32(_DEPTH_GATE_M) * expected * expected
     agrees = inside & (measured > 0) & (np.abs(measured - expected) <= gate)
     if not number.all():
