@@ -246,7 +246,7 @@ class Detector:
 
 
 def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:
-    variance = np.diag(result.covariance)
+    variance = result.covariance.diagonal()
     return EgoMotion(
         step,
         dt_s,
@@ -267,5 +267,6 @@ def _hint(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[n
     same = previous.ids[index] == ids
     moving[same] = previous.moving[index[same]]
     if moving.any():
-        velocity[moving] = np.nan_to_num(previous.velocity_mps[index[moving]])
+        measured = previous.velocity_mps[index[moving]]
+        velocity[moving] = np.where(measured == measured, measured, 0.0)
     return moving, velocity

@@ -8,6 +8,7 @@ therefore a person who fills half of the view cannot outvote the odometry.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -70,8 +71,8 @@ class CameraEstimate:
 
 def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
     """A prior from dead reckoning: good in translation, slipping in yaw, blind to vibration."""
-    turn_rad = float(np.linalg.norm(vector_from_rotation(motion.rotation)))
-    way_m = float(np.linalg.norm(motion.translation_m))
+    turn_rad = math.hypot(*vector_from_rotation(motion.rotation).tolist())
+    way_m = math.hypot(*motion.translation_m.tolist())
     yaw = settings.odometry_yaw_ratio * turn_rad + settings.odometry_rotation_radps * dt_s
     tilt = settings.vibration_radps * dt_s + 0.1 * turn_rad
     way = settings.odometry_speed_ratio * way_m + settings.odometry_speed_mps * dt_s

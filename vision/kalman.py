@@ -11,6 +11,10 @@ from vision.symmetric import inverse
 
 _VERTICAL_S = 0.1  # how long a vertical velocity lasts: limbs have one, bodies have not
 _IDENTITY = np.eye(6)
+# Position is moved by velocity; and where the blocks of a covariance stand.
+_BY_VELOCITY = np.eye(6, k=3)
+_OF_POSITION, _OF_VELOCITY = np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+_OF_BOTH = _BY_VELOCITY + _BY_VELOCITY.T
 
 
 def predict(
@@ -25,11 +29,12 @@ def predict(
 
     up (3,): what stands on the floor keeps no velocity along it; None where the floor is not known.
     """
-    move = _blocks(1.0, dt_s, 0.0, 1.0)
+    move = _IDENTITY + dt_s * _BY_VELOCITY
     if up is not None:
         move[3:, 3:] -= ((1.0 - math.exp(-dt_s / _VERTICAL_S)) * up[:, None]) * up
-    between = accel_density * dt_s**2 / 2.0
-    spread = _blocks(accel_density * dt_s**3 / 3.0, between, between, accel_density * dt_s)
+    spread = (accel_density * dt_s**3 / 3.0) * _OF_POSITION
+    spread += (accel_density * dt_s**2 / 2.0) * _OF_BOTH
+    spread += (accel_density * dt_s) * _OF_VELOCITY
     return state @ move.T, move @ covariance @ move.T + spread
 
 
@@ -63,12 +68,6 @@ def place(
     new_covariance[:, :3, :3] = noise
     new_covariance[:, :3, 3:] = new_covariance[:, 3:, :3] = 0.0
     return new_state, new_covariance
-
-
-def _blocks(a: float, b: float, c: float, d: float) -> FloatArray:
-    """(6, 6) [[a, b], [c, d]], each times the identity (3, 3)."""
-    blocks: FloatArray = np.array(((a, b), (c, d)))[:, None, :, None] * np.eye(3)[:, None]
-    return blocks.reshape(6, 6)
 
 
 def _pad(gain: FloatArray, first: int) -> FloatArray:

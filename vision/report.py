@@ -23,14 +23,13 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
     velocity = tracks.state[:, 3:] @ pose.rotation
     covariance = pose.rotation.T @ tracks.covariance[:, 3:, 3:] @ pose.rotation
     unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
-    listed = (
-        (tracks.sightings >= MIN_SIGHTINGS)
-        & (local[:, 2] > 0.0)
-        & ((unseen_s == 0.0) | ((unseen_s <= _LISTED_UNSEEN_S) & _in_view(local, detection)))
-    )
-    # A mover that is out of sight is where it goes, whole, and not where its last rest was seen.
-    hidden = tracks.moving & (unseen_s > 0.0)
-    bbox = np.where(hidden[:, None], _expected_px(tracks.box_m, local, detection), tracks.bbox_px)
+    listed = (tracks.sightings >= MIN_SIGHTINGS) & (local[:, 2] > 0.0) & (unseen_s <= _LISTED_UNSEEN_S)
+    bbox, unseen = tracks.bbox_px, unseen_s != 0.0
+    if unseen.any():
+        listed &= ~unseen | _in_view(local, detection)
+        # A mover that is out of sight is where it goes, whole, and not where its last rest was seen.
+        expected_px = _expected_px(tracks.box_m, local, detection)
+        bbox = np.where((tracks.moving & (unseen_s > 0.0))[:, None], expected_px, bbox)
     result = []
     for t in np.flatnonzero(listed).tolist():
         moving = bool(tracks.moving[t])
