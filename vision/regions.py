@@ -64,14 +64,16 @@ def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
     far side of a jump is taken out, so that a pole one cell wide stays whole.
     """
     inverse = grid.inverse_depth
-    across = inverse[:, 1:] - inverse[:, :-1]
+    # Cell by cell as they lie, which is faster than row by row; from the end of a row to the next is no step.
+    across = np.empty_like(inverse)
+    np.subtract(inverse.ravel()[1:], inverse.ravel()[:-1], out=across.ravel()[:-1])
+    across[:, -1] = 0.0
     down = inverse[1:] - inverse[:-1]
-    inner = np.abs(across[::2])[mask[::2, 1:] & mask[::2, :-1]]
+    inner = np.abs(across[::2, :-1][mask[::2, 1:] & mask[::2, :-1]])
     typical = float(median(inner)) if len(inner) else 0.0
     jump = np.float32(min(max(12.0 * typical, _LEAST_JUMP), _MOST_JUMP))
-    kept = mask.copy()
-    kept[:, 1:] &= across >= -jump
-    kept[:, :-1] &= across <= jump
+    kept = mask & (across <= jump)
+    kept.ravel()[1:] &= (across >= -jump).ravel()[:-1]
     kept[1:] &= down >= -jump
     kept[:-1] &= down <= jump
     # Counting the cells here is a fraction of the work of OpenCV's own statistics.
