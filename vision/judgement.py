@@ -45,6 +45,8 @@ _CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewh
 _COMPACT_M = 2.2
 _WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
 _SURE_SQUARED_SIGMAS = 30.0
+_IDENTITY = np.eye(3)
+_FLOOR = _IDENTITY * _FLOOR_SIGMA_MPS**2
 _LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them is carved out
 
 
@@ -211,10 +213,13 @@ class Split:
 def _split_all(seen: MotionEvidence) -> tuple[Split, Split, Split, Split]:
     """The velocity as filtered, of this frame's fragments, of the surface, and the first less the last: in
     one call, which costs more than what it computes."""
-    velocity = np.stack((seen.velocity, seen.own_velocity, seen.surface_velocity, seen.velocity))
-    covariance = np.stack((seen.covariance, seen.own_covariance, seen.surface_covariance, seen.covariance))
-    velocity[3] -= seen.surface_velocity
-    covariance[3] += seen.surface_covariance
+    count = len(seen.sight)
+    velocity, covariance = np.empty((4, count, 3)), np.empty((4, count, 3, 3))
+    velocity[0], covariance[0] = seen.velocity, seen.covariance
+    velocity[1], covariance[1] = seen.own_velocity, seen.own_covariance
+    velocity[2], covariance[2] = seen.surface_velocity, seen.surface_covariance
+    velocity[3] = seen.velocity - seen.surface_velocity
+    covariance[3] = seen.covariance + seen.surface_covariance
     every = split(velocity, covariance, seen.sight)
     return every[0], every[1], every[2], every[3]
 
@@ -226,16 +231,16 @@ def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray) -> Sp
     variance = (level @ covariance @ upright)[..., 0, 0]
     along = value * value / (variance + _FLOOR_SIGMA_MPS**2)
     onto_sight = upright * level
-    onto = np.eye(3) - onto_sight
+    onto = _IDENTITY - onto_sight
     rest = velocity - value[..., None] * sight
-    doubt = onto @ covariance @ onto + (onto_sight + np.eye(3) * _FLOOR_SIGMA_MPS**2)
+    doubt = onto @ covariance @ onto + (onto_sight + _FLOOR)
     across = _squared_length(rest, doubt)
     return Split(value, variance, rest, along, across)
 
 
 def squared_sigmas(velocity: FloatArray, covariance: FloatArray) -> FloatArray:
     """(T,) squared distance of velocity (T, 3) from zero in its own standard deviations."""
-    return _squared_length(velocity, covariance + np.eye(3) * _FLOOR_SIGMA_MPS**2)
+    return _squared_length(velocity, covariance + _FLOOR)
 
 
 def _squared_length(vector: FloatArray, covariance: FloatArray) -> FloatArray:
