@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision.depth_grid import DepthGrid
-from vision.order import median, quantile
+from vision.order import median, quantiles
 from vision.regions import IntGrid, Regions
 
 _CLOSE_M = 0.25
@@ -152,7 +152,7 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
     centred = points - median(points.T)
     _, axes = np.linalg.eigh(centred.T @ centred)
     along = centred @ axes[:, 1]
-    low, high = quantile(along, 0.03), quantile(along, 0.97)
+    low, high = quantiles(along, (0.03, 0.97))
     if high - low < _SINGLE_WIDTH_M:
         return None
     # A far cell stands for more surface than a near one.

@@ -6,6 +6,7 @@ np.median imports numpy.ma: 35 ms in the middle of a frame.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -23,9 +24,18 @@ def median(values: Reals) -> Reals:
     return result if values.shape[-1] % 2 else 0.5 * (ordered[..., middle - 1] + result)
 
 
-def quantile(values: RealArray, share: float) -> float:
+def quantiles(values: RealArray, shares: Sequence[float]) -> tuple[float, ...]:
     """Of values (N,), N > 0: share 0 is the smallest, 1 the largest; linear in between."""
-    ordered = np.sort(values)
+    ordered: RealArray = np.sort(values)
+    return tuple(_at(ordered, share) for share in shares)
+
+
+def quantile(values: RealArray, share: float) -> float:
+    """One of quantiles."""
+    return quantiles(values, (share,))[0]
+
+
+def _at(ordered: RealArray, share: float) -> float:
     place = share * (len(ordered) - 1)
     below = min(int(place), len(ordered) - 1)
     above = min(below + 1, len(ordered) - 1)
