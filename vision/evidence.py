@@ -88,9 +88,12 @@ def gather(
     origin = turn @ (anchor.origin - now.pose.translation_m[:, None])
     ray = np.ascontiguousarray(rays(store.ends_px.reshape(-1, 2), camera)[:, :2].T)
     # Near and far surface at once, in the middle index: (3, 2, 2N), (2, 2, 2N).
-    static = direction[:, None] * np.stack((depths.near_m, depths.far_m)) + origin[:, None]
+    surfaces = np.empty((2, len(depths.near_m)))
+    surfaces[0], surfaces[1] = depths.near_m, depths.far_m
+    static = direction[:, None] * surfaces + origin[:, None]
     miss = ray[:, None] * static[2] - static[:2]
-    sigma = np.stack((depths.sigma_m, depth_sigma_m(depths.far_m, noise)))
+    sigma = np.empty((2, len(depths.near_m)))
+    sigma[0], sigma[1] = depths.sigma_m, depth_sigma_m(depths.far_m, noise)
     effect = (ray * direction[2] - direction[:2])[:, None] * (sigma * math.sqrt(variance_scale))
     depth = static[2, 0]
     in_front = depth > 0.1

@@ -22,6 +22,7 @@ _SHARE_OF_PART = 0.15
 _SHARE_OF_TRACK = 0.30
 _DEPTH_GATE_INVERSE = 0.03  # 1/m
 _DEPTH_GATE_M = 0.25
+_NOBODY = np.zeros(1, np.int32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +66,8 @@ def predict(
     there = relative.rotation.astype(np.float32) @ before.points_m
     there += relative.translation_m.astype(np.float32)[:, None]
     if shift_m.any():
-        way = np.append(shift_m, [[0.0, 0.0, 0.0]], axis=0)[index] @ pose.rotation
+        # Of what is gone, any way will do.
+        way = shift_m[index] @ pose.rotation
         there += way.T.astype(np.float32).take(before.owner, axis=1)
     cell, inside, expected = grid.project(there)
     measured = grid.inverse_depth.ravel().take(cell)
@@ -137,8 +139,9 @@ def count_votes(
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:
     """(h, w) track index + 1: whole parts to their winner (P,), shared ones by the nearest vote."""
-    labels = np.append(np.int32(0), winner).take(parts)
-    shared = np.append(False, (ballot.present.sum(axis=1) > 1) & (winner > 0))
+    labels = np.concatenate((_NOBODY, winner)).take(parts)
+    shared = np.zeros(len(winner) + 1, np.bool_)
+    shared[1:] = (ballot.present.sum(axis=1) > 1) & (winner > 0)
     if not shared.any():
         return labels
     count, tracks = ballot.present.shape
