@@ -7,7 +7,7 @@ np.median imports numpy.ma: 35 ms in the middle of a frame.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ def median(values: Reals) -> Reals:
 
 def quantiles(values: RealArray, shares: Sequence[float]) -> tuple[float, ...]:
     """Of values (N,), N > 0: share 0 is the smallest, 1 the largest; linear in between."""
-    ordered: RealArray = np.sort(values)
+    ordered = np.sort(values)
     return tuple(_at(ordered, share) for share in shares)
 
 
@@ -35,7 +35,7 @@ def quantile(values: RealArray, share: float) -> float:
     return quantiles(values, (share,))[0]
 
 
-def _at(ordered: RealArray, share: float) -> float:
+def _at(ordered: NDArray[Any], share: float) -> float:
     place = share * (len(ordered) - 1)
     below = min(int(place), len(ordered) - 1)
     above = min(below + 1, len(ordered) - 1)
