@@ -6,6 +6,8 @@ image's border, hidden in part or suddenly another one, it tells of the position
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,8 +25,7 @@ _CENTRE_DEPTH_SHARE = 0.04
 _CUT_SIGMA_M = 1.0  # in height, of what reaches beyond the image above or below
 _CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it does not average out
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
-_AREA_GAIN = 0.1
-_AREA_MEMORY_S = 0.33  # what that gain comes to at 30 frames a second
+_AREA_MEMORY_S = 0.32  # a tenth of what is new each frame at 30 a second
 _SLIVER = 0.4  # of its usual surface
 _JUMP_M = 0.3
 
@@ -53,7 +54,8 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     tracks.relocate(seen[cut], position[cut], covariance[cut])
     tracks.clean_s[seen] = np.where(smooth & measured.tall[seen], tracks.clean_s[seen] + detection.dt_s, 0.0)
     tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S
-    tracks.area_m2[seen] = np.where(sliver, usual_m2, usual_m2 + _AREA_GAIN * (area_m2 - usual_m2))
+    gain = -math.expm1(-detection.dt_s / _AREA_MEMORY_S)
+    tracks.area_m2[seen] = np.where(sliver, usual_m2, usual_m2 + gain * (area_m2 - usual_m2))
     tracks.seen_ns[seen] = detection.captured_ns
     tracks.sightings[seen] += 1
     tracks.bbox_px[seen] = measured.bbox_px[seen]

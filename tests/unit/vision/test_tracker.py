@@ -109,6 +109,19 @@ def test_what_is_left_to_see_of_a_mover_behind_something_does_not_drag_its_posit
         assert mover.velocity_mps[0] == pytest.approx(SPEED_MPS, abs=0.1)
 
 
+@pytest.mark.parametrize("every", [1, 3, 6])
+def test_who_came_out_from_behind_something_tells_how_fast_he_goes_at_any_frame_rate(every: int) -> None:
+    """At 30, 10 and 5 frames a second. A quarter of him is seen first, and for 1.2 s all of him."""
+    tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
+    for k in range(0, 43, every):
+        x_m = -0.5 + way_m(k)
+        curtain = plate(2.5, (-1.0, (x_m + 0.125) * 2.5 / 4.0), (-0.9, 0.9)) if k < 6 else no_depth()
+        seen = detection(grid_of(nearest(walker(x_m), curtain)), k)
+        percept = tracker.step(replace(seen, dt_s=every * seen.dt_s), None)
+    (mover,) = moving(percept)
+    np.testing.assert_allclose(mover.velocity_mps, [SPEED_MPS, 0.0, 0.0], atol=0.2)
+
+
 def test_who_is_hidden_at_once_keeps_the_whole_box_and_goes_on() -> None:
     """A curtain is drawn: first a quarter is left to see of the walker, then nothing."""
     start_m, drawn = -0.9, 30
