@@ -17,13 +17,17 @@ _STATIC_SCORE = 0.5
 
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
-    """The tracks seen often enough, in the camera axes of the detection."""
+    """The tracks seen often enough, in the camera axes of the detection.
+
+    What moves has been seen in two places: there is no need to wait for a third look.
+    """
     pose = detection.pose
     local = (tracks.state[:, :3] - pose.translation_m) @ pose.rotation
     velocity = tracks.state[:, 3:] @ pose.rotation
     covariance = pose.rotation.T @ tracks.covariance[:, 3:, 3:] @ pose.rotation
     unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
-    listed = (tracks.sightings >= MIN_SIGHTINGS) & (local[:, 2] > 0.0) & (unseen_s <= _LISTED_UNSEEN_S)
+    known = (tracks.sightings >= MIN_SIGHTINGS) | tracks.moving
+    listed = known & (local[:, 2] > 0.0) & (unseen_s <= _LISTED_UNSEEN_S)
     bbox, unseen = tracks.bbox_px, unseen_s != 0.0
     if unseen.any():
         listed &= ~unseen | _in_view(local, detection)
