@@ -42,6 +42,7 @@ _MUCH_SHARE = 0.2
 _IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
 _CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
 _CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewhat longer
+_CLEAN_LOOKS = 2.5  # three of them, where frames are few
 _COMPACT_M = 2.2
 _WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
 _SURE_SQUARED_SIGMAS = 30.0
@@ -121,7 +122,7 @@ def judge(
         (along > shared) & second.confirms_along & few & (own_along > _OWN_PROOF)
     )
     by_fragments_across |= (across > shared) & second.confirms_across & few & (own_across > _OWN_PROOF)
-    by_surface = _by_surface(seen, surface.along, surface.across, threshold, least)
+    by_surface = _by_surface(seen, surface.along, surface.across, threshold, least, dt_s)
     has_arrived = (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells)
     by_arrival = has_arrived & (significance > 0.5 * threshold)
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
@@ -153,6 +154,7 @@ def _by_surface(
     across: FloatArray,
     threshold: float,
     least_mps: FloatArray,
+    dt_s: float,
 ) -> NDArray[np.bool_]:
     """(T,) whether the centre of a whole, compact surface moves too long and too clearly for an accident.
 
@@ -161,8 +163,9 @@ def _by_surface(
     speed proves nothing.
     """
     speed = np.sqrt(np.square(seen.surface_velocity).sum(axis=1))
-    clear = ((across > threshold) & (seen.clean_s >= _CLEAN_ACROSS_S)) | (
-        (along > threshold) & (seen.clean_s >= _CLEAN_ALONG_S)
+    looks_s = _CLEAN_LOOKS * dt_s
+    clear = ((across > threshold) & (seen.clean_s >= max(_CLEAN_ACROSS_S, looks_s))) | (
+        (along > threshold) & (seen.clean_s >= max(_CLEAN_ALONG_S, looks_s))
     )
     wander = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps
     result: NDArray[np.bool_] = clear & (seen.size_m <= _COMPACT_M) & (speed > least_mps + wander)

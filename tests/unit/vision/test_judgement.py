@@ -156,6 +156,17 @@ def test_a_surface_seen_long_enough_without_a_break_proves_by_itself() -> None:
     assert not rises(by_surface(ALONG, 0.45))  # noise of depth is shared by neighbours: longer
 
 
+@pytest.mark.parametrize(("looks", "proves"), [(2, False), (3, True)])
+@pytest.mark.parametrize("velocity", [ACROSS, ALONG])
+def test_a_surface_proves_only_after_three_looks_however_few_frames_there_are(
+    velocity: Speed, looks: int, proves: bool
+) -> None:
+    dt_s = 0.4
+    seen = by_surface(velocity, looks * dt_s)
+    rising = judge(seen, np.array([0.0]), np.array([False]), dt_s, SETTINGS).evidence[0] > 0.0
+    assert rising == proves
+
+
 def test_a_surface_proves_only_if_it_is_compact() -> None:
     assert rises(by_surface(ACROSS, 1.0, size_m=np.array([2.1])))
     assert not rises(by_surface(ACROSS, 1.0, size_m=np.array([2.3])))
