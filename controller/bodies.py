@@ -32,16 +32,18 @@ class SceneError(Exception):
 class Bodies:
     """N boxes at captured_ns.
 
-    ids (N,). xy_m (N, 2) centre. velocity_mps (N, 2) over ground, 0 for what stands. surprise_mps (N, 2) by
-    how much the newest measurement differs from that. covariance (N, 2, 2) of the velocity. half_view_m,
-    half_across_m (N,) half sizes along and across view_rad (N,), the direction it was seen in. top_m (N,)
-    height. moving (N,). age_s, unseen_s (N,) since they were seen first and last, at captured_ns.
+    ids (N,). xy_m (N, 2) centre. velocity_mps (N, 2) over ground, 0 for what stands; measured_mps (N, 2) as
+    perception says, whether it stands or moves. surprise_mps (N, 2) by how much the newest measurement
+    differs from velocity_mps. covariance (N, 2, 2) of the velocity. half_view_m, half_across_m (N,) half
+    sizes along and across view_rad (N,), the direction it was seen in. top_m (N,) height. moving (N,).
+    age_s, unseen_s (N,) since they were seen first and last, at captured_ns.
     """
 
     captured_ns: int
     ids: NDArray[np.int64]
     xy_m: FloatArray
     velocity_mps: FloatArray
+    measured_mps: FloatArray
     surprise_mps: FloatArray
     covariance: FloatArray
     half_view_m: FloatArray
@@ -85,6 +87,7 @@ _NOBODY = Bodies(
     ids=np.zeros(0, np.int64),
     xy_m=np.zeros((0, 2)),
     velocity_mps=np.zeros((0, 2)),
+    measured_mps=np.zeros((0, 2)),
     surprise_mps=np.zeros((0, 2)),
     covariance=np.zeros((0, 2, 2)),
     half_view_m=np.zeros(0),
@@ -135,6 +138,7 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
         ids=np.array([one.id for one in scene.obstacles], np.int64),
         xy_m=position[:, :2] + (half_view - extent[:, 2] / 2.0)[:, None] * forward,
         velocity_mps=np.where(moving[:, None], velocity, 0.0),
+        measured_mps=velocity,
         surprise_mps=np.zeros_like(velocity),
         covariance=covariance,
         half_view_m=half_view,

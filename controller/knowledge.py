@@ -136,12 +136,13 @@ class Knowledge:
             return str(error)
         s_m = self.corridor.path.project(pose, on_path.s_m).s_m
         sprawling = ~seen.moving & (np.maximum(seen.half_view_m, seen.half_across_m) > _SPRAWLING_M)
-        boxes = self._steady.update(self._recognise(seen.select(~sprawling)))
-        standing = v_mps <= STANDING_MPS
         if len(scene.free_space.bearing_tan):
             self.edge_tan = (
                 float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
             )
+        boxes = self._steady.update(self._recognise(seen.select(~sprawling)))
+        boxes = self._memory.leaving(boxes, pose, self.edge_tan)
+        standing = v_mps <= STANDING_MPS
         remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, scene.free_space)
         self.bodies = boxes.joined(remembered)
         self._boxes, self._seen, self._sprawls = boxes, seen, sprawling

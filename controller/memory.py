@@ -1,5 +1,9 @@
 """Bodies that have left the camera's view but are still there: under its nose and beside its edges.
 
+A verdict on what stands or moves takes some frames, and of who leaves the view there are no more: who was
+clearly measured as coming counts as moving then. And who comes into view where somebody is expected may be
+somebody else: two people walk side by side, and one of them alone is seen.
+
 Where the view is seen through, nobody is. Who should have been there by what was measured of its velocity has
 not come in: it is reckoned with beside what is seen through, and no longer as coming.
 """
@@ -30,6 +34,11 @@ _EDGE_M, _EDGE_MPS = 0.3, 0.15
 # By so much in a second somebody unseen may have changed its velocity.
 _TURNS_MPS2 = 0.25
 _TOUCHING = 1e-6
+# Noise makes whatever stands beside the view creep now and then, and each time the robot would slow down: so
+# much is no noise.
+_CLEAR_SIGMAS, _CLEAR_MPS = 3.0, 0.2
+# Two velocities that differ by so much are of two.
+_APART_SIGMAS = 2.0
 
 
 class OutOfView:
@@ -41,6 +50,18 @@ class OutOfView:
         self._mount, self._near_m = mount, near_m
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
+
+    def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
+        """The bodies of a scene, those of them moving as measured that perception only expects beside the
+        view, and that came towards the robot's axis by then."""
+        out = (seen.unseen_s > 0.0) & ~seen.moving & (seen.age_s >= _SETTLED_S)
+        if not out.any():
+            return seen
+        leaves = out & self._hidden(seen, pose, edge_tan) & _clearly_comes(seen, pose)
+        if not leaves.any():
+            return seen
+        velocity = np.where(leaves[:, None], seen.measured_mps, seen.velocity_mps)
+        return replace(seen, velocity_mps=velocity, moving=seen.moving | leaves)
 
     def update(
         self,
@@ -70,7 +91,8 @@ class OutOfView:
             xy_m=bodies.xy_m + bodies.velocity_mps * dt_s,
             unseen_s=bodies.unseen_s + dt_s,
         )
-        part = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M).any(axis=1)
+        there = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
+        part = (there & (_alike(bodies, seen) | ~bodies.moving[:, None])).any(axis=1)
         kept = self._hidden(bodies, pose, edge_tan) & ~part & _missing(bodies.ids, seen.ids)
         kept &= ~bodies.moving | (
             since <= np.where(_may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
@@ -154,6 +176,26 @@ def _may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     forward = bodies.velocity_mps[:, 0] * cos + bodies.velocity_mps[:, 1] * sin
     comes: BoolArray = (left * leftward < 0.0) | (forward > LEAVES_ASLANT * np.abs(leftward))
     return comes
+
+
+def _clearly_comes(bodies: Bodies, pose: PlanarPose) -> BoolArray:
+    """(N,) who was measured, beyond what noise explains, on a way towards the robot's axis."""
+    leftward = np.array([-math.sin(pose.heading_rad), math.cos(pose.heading_rad)])
+    side = np.sign((bodies.xy_m - (pose.x_m, pose.y_m)) @ leftward)
+    inwards_mps = -side * (bodies.measured_mps @ leftward)
+    sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
+    return np.asarray(inwards_mps > np.maximum(_CLEAR_SIGMAS * sigma_mps, _CLEAR_MPS))
+
+
+def _alike(bodies: Bodies, seen: Bodies) -> BoolArray:
+    """(N, M) whether the velocities of M that are seen could be those of these N; not while they are young:
+    then they could be anybody's."""
+    spread = np.diagonal(bodies.covariance, axis1=1, axis2=2)[:, None]
+    seen_spread = np.diagonal(seen.covariance, axis1=1, axis2=2)
+    differs = bodies.velocity_mps[:, None] - seen.measured_mps
+    same = np.all(differs**2 <= _APART_SIGMAS**2 * (spread + seen_spread), axis=2)
+    # Not at the age that knowledge.py gives to whatever stands where something stood.
+    return np.asarray(same & (seen.age_s > _SETTLED_S))
 
 
 def _missing(ids: NDArray[np.int64], among: NDArray[np.int64]) -> BoolArray:

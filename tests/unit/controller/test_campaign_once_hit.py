@@ -1,0 +1,23 @@
+"""Missions that once ended in a contact at fault, each with what was wrong."""
+
+from __future__ import annotations
+
+import pytest
+
+from controller.campaign.task import Task, run_task
+from tests.support.campaign import CONFIG
+
+
+@pytest.mark.parametrize(
+    ("family", "seed"),
+    [
+        # Began to walk at the edge of the view, left it before the verdict, and was remembered as standing.
+        ("crossing_left", 50021),
+        # Out of view, and forgotten when somebody else came into view where it was expected.
+        ("crowd_junction", 50052),
+    ],
+)
+def test_nobody_is_touched_any_more(family: str, seed: int) -> None:
+    (row,) = run_task(Task(family, seed, ("ours",), "noise", CONFIG))
+    assert row.reached
+    assert row.contacts_at_fault == 0

@@ -1,0 +1,100 @@
+"""Who leaves the view without a verdict, and who comes into it where somebody else was expected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.bodies import Bodies, no_bodies
+from controller.memory import OutOfView
+from hal.types import CameraMount, PlanarPose
+from tests.support.bodies import box
+from vision.scene import FreeSpace
+
+NEAR_M, EDGE = 1.3, 0.5
+HERE = PlanarPose(0.0, 0.0, 0.0)
+FRAME_NS = 100_000_000
+NOTHING_SEEN = FreeSpace(np.zeros(1), EDGE, np.full(1, np.inf), np.zeros(1))
+# On the left edge of the view, 4 m ahead of the camera.
+AT_EDGE = box(4.4, 2.1, sigma_mps=0.1)
+
+
+def memory() -> OutOfView:
+    return OutOfView(CameraMount(0.4, 0.0, 0.60, 0.0), NEAR_M)
+
+
+def measured(bodies: Bodies, left_mps: float, unseen_s: float = 0.1) -> Bodies:
+    """Standing by the verdict, whatever was measured."""
+    return replace(bodies, measured_mps=np.array([[0.05, left_mps]]), unseen_s=np.array([unseen_s]))
+
+
+def test_who_is_clearly_coming_when_it_leaves_the_view_moves() -> None:
+    """A verdict takes some frames, of which there are no more."""
+    found = memory().leaving(measured(AT_EDGE, -0.35), HERE, EDGE)
+    assert found.moving.tolist() == [True]
+    assert found.velocity_mps[0].tolist() == [0.05, -0.35]
+
+
+def test_on_the_right_as_on_the_left() -> None:
+    mirrored = measured(replace(AT_EDGE, xy_m=AT_EDGE.xy_m * (1, -1)), 0.35)
+    assert memory().leaving(mirrored, HERE, EDGE).moving.tolist() == [True]
+
+
+@pytest.mark.parametrize(
+    "bodies",
+    [
+        pytest.param(measured(AT_EDGE, -0.29), id="noise may be as much"),
+        pytest.param(measured(replace(AT_EDGE, covariance=np.zeros((1, 2, 2))), -0.19), id="hardly moves"),
+        pytest.param(measured(AT_EDGE, 0.35), id="walks away"),
+        pytest.param(measured(AT_EDGE, -0.35, unseen_s=0.0), id="is still seen"),
+        pytest.param(measured(box(4.4, 0.5), -0.35), id="only missed in the middle of the view"),
+        pytest.param(measured(replace(AT_EDGE, age_s=np.array([0.4])), -0.35), id="was hardly seen"),
+    ],
+)
+def test_all_others_stay_what_perception_says(bodies: Bodies) -> None:
+    found = memory().leaving(bodies, HERE, EDGE)
+    assert found.moving.tolist() == [False]
+    assert found.velocity_mps[0].tolist() == [0.0, 0.0]
+
+
+def test_who_moves_keeps_its_averaged_velocity() -> None:
+    walker = replace(box(4.4, 2.1, 0.0, -0.5), measured_mps=np.array([[0.0, -0.9]]), unseen_s=np.array([0.1]))
+    both = walker.joined(replace(measured(AT_EDGE, -0.35), ids=np.array([2])))
+    found = memory().leaving(both, HERE, EDGE)
+    assert found.velocity_mps.tolist() == [[0.0, -0.5], [0.05, -0.35]]
+
+
+def kept_beside(newcomer: Bodies, remembered: Bodies) -> list[int]:
+    """The ids of who is still reckoned with, after a newcomer came into view where it was expected."""
+    view = memory()
+    view.update(remembered, no_bodies(FRAME_NS), HERE, EDGE, True, NOTHING_SEEN)
+    newcomer = replace(newcomer, captured_ns=2 * FRAME_NS)
+    kept = view.update(no_bodies(FRAME_NS), newcomer, HERE, EDGE, True, NOTHING_SEEN)
+    return [int(one) for one in kept.ids]
+
+
+EXPECTED = box(2.5, 1.2, 0.0, -0.5, sigma_mps=0.1)
+
+
+def test_who_comes_into_view_as_expected_is_the_one_that_was_expected() -> None:
+    assert kept_beside(box(2.5, 1.1, 0.0, -0.7, number=2, age_s=0.6), EXPECTED) == []
+
+
+@pytest.mark.parametrize(
+    "newcomer",
+    [
+        pytest.param(box(2.5, 1.1, 0.0, -1.0, number=2, age_s=0.6), id="goes twice as fast"),
+        pytest.param(box(2.5, 1.1, 0.4, -0.5, number=2, age_s=0.6), id="goes elsewhere"),
+        pytest.param(box(2.5, 1.1, number=2), id="stands"),
+        pytest.param(box(2.5, 1.1, 0.0, -0.5, number=2, age_s=0.5), id="too young to tell"),
+    ],
+)
+def test_somebody_else_in_its_place_does_not_make_it_forgotten(newcomer: Bodies) -> None:
+    """Two walk one behind the other: when one of them is seen again, the other is still there."""
+    assert kept_beside(newcomer, EXPECTED) == [1]
+
+
+def test_what_stands_is_part_of_whatever_is_seen_in_its_place() -> None:
+    assert kept_beside(box(2.5, 1.1, 0.0, -1.0, number=2), box(2.5, 1.2)) == []
