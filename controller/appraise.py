@@ -16,7 +16,7 @@ from controller.crossing import comes_in
 from controller.debounce import Debounced
 from controller.decision import Reason
 from controller.knowledge import Knowledge
-from controller.limits import Gap, Limit, Motion, allowed, stop_before
+from controller.limits import UNSEEN_SIGMAS, Gap, Limit, Motion, allowed, stop_before
 from controller.moving import MovingLimits
 from controller.standing import StandingLimits
 from controller.worst_case import WorstCase
@@ -64,7 +64,8 @@ class Appraiser:
         )
         course = course_of(watched, placed.heading_rad[:, 0])
         sigma_left = course.sigma_left_mps * self._config.prediction.sigmas
-        comes = comes_in(placed, self._times_s, sigma_left)
+        unsure_m = np.where(self._remembered, UNSEEN_SIGMAS * course.sigma_left_mps * watched.unseen_s, 0.0)
+        comes = comes_in(placed, self._times_s, sigma_left, unsure_m)
         # Who is in the way is; and of who is out of sight nothing is measured that could be noise.
         at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
         enters = self._enters.update(watched.ids, comes, at_once, now_s)

@@ -45,18 +45,20 @@ def reach(
     manoeuvre_mps2: tuple[FloatArray, FloatArray],
     most_mps: float,
     margin_m: float,
+    unsure_m: tuple[FloatArray | float, FloatArray | float] = (0.0, 0.0),
 ) -> Reach:
-    """Grow the bodies by what they could do in times_s (K,) from now; they were seen since_s (N,) ago.
+    """Grow the bodies by what they could do in times_s (K,) from now; they were placed since_s (N,) ago.
 
-    spread_mps: by how much their velocities may be other than thought, manoeuvre_mps2: by how much they may
-    change them; each along the path and across it, (N,). speed_mps (N,) measured speed, most_mps the top
-    speed of any obstacle.
+    unsure_m: how well that place was known, along the path and across it, (N,). spread_mps: by how much their
+    velocities may be other than thought, manoeuvre_mps2: by how much they may change them; each along the
+    path and across it, (N,). speed_mps (N,) measured speed, most_mps the top speed of any obstacle.
     """
     t = times_s + since_s[:, None]
     furthest = (most_mps + speed_mps)[:, None] * t
     along, across = (
-        np.minimum(spread[:, None] * t + 0.5 * change[:, None] * t * t, furthest)
-        for spread, change in zip(spread_mps, manoeuvre_mps2, strict=True)
+        np.reshape(unsure, (-1, 1))
+        + np.minimum(spread[:, None] * t + 0.5 * change[:, None] * t * t, furthest)
+        for unsure, spread, change in zip(unsure_m, spread_mps, manoeuvre_mps2, strict=True)
     )
     inside = placed.clear_m - across <= 0.0
     # Once in the way it may stay there: what it could block only grows.

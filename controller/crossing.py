@@ -34,14 +34,18 @@ class Conflict:
     hi_out_m: float
 
 
-def comes_in(placed: Placed, times_s: FloatArray, sigma_side_mps: FloatArray) -> NDArray[np.bool_]:
+def comes_in(
+    placed: Placed, times_s: FloatArray, sigma_side_mps: FloatArray, unsure_m: FloatArray | float = 0.0
+) -> NDArray[np.bool_]:
     """(N,) which bodies are, or are likely to come, within the swept width. times_s (K,) begins at 0 = now.
 
     Likely: with the spread of the sideways velocity taken off, so that nobody is braked for because of noise.
-    What an unlikely entry could do is watched by controller/contingency.py.
+    What an unlikely entry could do is watched by controller/contingency.py. unsure_m (N,): so much nearer to
+    the way they may be than where they are placed.
     """
-    found: NDArray[np.bool_] = (placed.clear_m[:, 0] <= 0.0) | (
-        (placed.clear_m + _likely(times_s, sigma_side_mps)).min(axis=1) <= 0.0
+    clear = placed.clear_m - np.reshape(unsure_m, (-1, 1))
+    found: NDArray[np.bool_] = (clear[:, 0] <= 0.0) | (
+        (clear + _likely(times_s, sigma_side_mps)).min(axis=1) <= 0.0
     )
     return found
 

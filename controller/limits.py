@@ -13,6 +13,9 @@ ALONGSIDE_M = 0.1
 STANDING_MPS = 0.01
 # Who moves away from the path at more than one in so much leaves it: that is not going the robot's way.
 LEAVES_ASLANT = 2.0
+# Where somebody out of sight is reckoned to be, no further look corrects: so many standard deviations of its
+# velocity may add up.
+UNSEEN_SIGMAS = 2.0
 
 # Rules of a Reason that mean: something stands or moves in the way.
 BLOCKING_RULES = frozenset({"static", "oncoming", "leader", "crossing", "depth", "unseen", "worst case"})

@@ -14,7 +14,7 @@ from controller.bodies import Bodies
 from controller.contingency import Reach, Stops, gets_through, reach, room, stands_in_time, stops
 from controller.corridor import Course, Placed
 from controller.decision import Reason
-from controller.limits import ALONGSIDE_M, LEAVES_ASLANT, Limit, Motion, allowed
+from controller.limits import ALONGSIDE_M, LEAVES_ASLANT, UNSEEN_SIGMAS, Limit, Motion, allowed
 from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
 
@@ -67,7 +67,8 @@ class WorstCase:
         as it was measured leads into the way. chosen_mps: what is driven if nothing happens; where that gets
         through whatever they do, the robot need not be able to stop.
         """
-        rows = placed.lo_m[:, 0] > s_m - ALONGSIDE_M
+        unsure_m = UNSEEN_SIGMAS * course.sigma_along_mps * bodies.unseen_s
+        rows = placed.lo_m[:, 0] + unsure_m > s_m - ALONGSIDE_M
         if not rows.any():
             return None
         bodies, placed = bodies.select(rows), placed.select(rows, len(self.times_s))
@@ -148,6 +149,7 @@ class WorstCase:
         # Turning in, one also becomes slower along the path.
         beside = placed.clear_m[:, 0] > 0.0
         along = np.where(unaware & beside, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
+        unsure_s = np.where(leaves, 0.0, UNSEEN_SIGMAS * bodies.unseen_s)
         return reach(
             placed,
             self.times_s,
@@ -163,6 +165,7 @@ class WorstCase:
             ),
             most_mps=self._limits.max_obstacle_speed_mps,
             margin_m=self._config.margins.least_m,
+            unsure_m=(unsure_s * course.sigma_along_mps, unsure_s * course.sigma_left_mps),
         )
 
     def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:

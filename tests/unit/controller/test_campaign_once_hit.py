@@ -15,6 +15,8 @@ from tests.support.campaign import CONFIG
         ("crossing_left", 50021),
         # Out of view, and forgotten when somebody else came into view where it was expected.
         ("crowd_junction", 50052),
+        # The camera froze: reckoned for 3 s with a velocity that was off by two standard deviations.
+        ("camera_frozen", 7201),
     ],
 )
 def test_nobody_is_touched_any_more(family: str, seed: int) -> None:

@@ -72,6 +72,20 @@ def test_it_does_not_become_faster_than_obstacles_are() -> None:
     assert slow.inside[0, 16]
 
 
+def test_how_well_its_place_was_known_counts_from_the_first_moment() -> None:
+    body = box(5.0, 1.65, 0.01, 0.0)
+    placed, none = place(body, CORRIDOR, TIMES, 0.0, 12.0), np.zeros(1)
+
+    def unsure(along_m: float, across_m: float) -> Reach:
+        at = (np.array([along_m]), np.array([across_m]))
+        return reach(placed, TIMES, none, (none, none), none, (none, none), 1.5, 0.2, unsure_m=at)
+
+    assert not unsure(0.0, 0.9).inside.any()
+    assert unsure(0.0, 1.1).inside.all()
+    assert unsure(0.5, 1.1).lo_m[0, 0] == pytest.approx(unsure(0.0, 1.1).lo_m[0, 0] - 0.5)
+    assert unsure(0.5, 1.1).hi_m[0, -1] == pytest.approx(unsure(0.0, 1.1).hi_m[0, -1] + 0.5)
+
+
 def test_the_age_of_the_scene_counts() -> None:
     fresh = reached(box(5.0, 1.65, 0.01, 0.0), sigma_mps=0.5)
     old = reached(box(5.0, 1.65, 0.01, 0.0), sigma_mps=0.5, since_s=1.0)

@@ -1,6 +1,8 @@
-"""The limit by what obstacles could do at worst: how far ahead it has to look."""
+"""The limit by what obstacles could do at worst: how far ahead it has to look, and for how long aside."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,3 +53,35 @@ def test_what_is_hardly_seen_counts_from_where_it_can_still_be_confirmed_first(c
     assert limit(needed_m + 0.01, age_s=0.0, confirm_s=confirm_s) is None
     # Confirmed: nothing has to be waited for.
     assert limit(needed_m - 0.5, age_s=5.0, confirm_s=confirm_s) is None
+
+
+def beside(x_m: float, unseen_s: float) -> Limit | None:
+    """For a robot at 0 that drives 0.5 m/s, its front at 0.5 m; somebody comes towards it along its left
+    side, 0.75 m clear, and has not been seen for so long."""
+    worst = WorstCase(DecisionConfig(), LIMITS)
+    body = replace(box(x_m, 0.4 + 0.25 + 0.75, -0.9, 0.0, sigma_mps=0.15), unseen_s=np.array([unseen_s]))
+    placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
+    return worst.limit(
+        body,
+        placed,
+        course_of(body, placed.heading_rad[:, 0]),
+        np.array([True]),
+        0.0,
+        Motion(0.5, 0.0, LATENCY_S),
+        0.0,
+        0.5,
+    )
+
+
+def test_who_is_out_of_sight_is_where_it_is_reckoned_only_as_well_as_its_speed_was_known() -> None:
+    """In 2 s twice 0.15 m/s may add up to 0.6 m of those 0.75."""
+    assert beside(2.0, 0.0) is None
+    found = beside(2.0, 2.0)
+    assert found is not None
+    assert found.speed_mps < 0.5
+
+
+def test_who_is_reckoned_to_be_beside_the_robot_may_still_be_ahead_of_it() -> None:
+    """Its near side 0.2 m behind the robot's front."""
+    assert beside(0.5, 0.0) is None
+    assert beside(0.5, 2.2) is not None
