@@ -93,7 +93,6 @@ class SpeedShaper:
         self._v, self._a = min(max(known, 0.0), self._limits.max_speed_mps), 0.0
         self._active, self._to_end_m = self._comfort, math.inf
         self._lag.restart()
-        self._stepped_m = 0.0
 
     def step(
         self, target_speed_mps: float, *, emergency: bool = False, distance_to_end_m: float = math.inf
@@ -115,8 +114,6 @@ class SpeedShaper:
         except (RuckigError, ArithmeticError) as error:
             fault = f"ruckig: {' '.join(str(error).split())[:200]}"
             v, a = stop_step(self._v, self._a, self._active, self._period_s)
-        if v < _TINY and abs(a) < _TINY:
-            v, a = 0.0, 0.0
         self._stepped_m = 0.5 * (self._v + v) * self._period_s
         self._to_end_m -= self._stepped_m
         self._v, self._a = max(v, 0.0), a

@@ -194,6 +194,29 @@ def test_the_speed_limit_is_not_overshot_when_an_emergency_ends_while_it_speeds_
     assert max(command.v_mps for command in commands) <= 1.5 + 1e-9
 
 
+def test_comfort_is_back_at_once_after_an_emergency_at_the_top_speed() -> None:
+    """An obstacle that was none, at v_max and a = 0: the stop after it begins at comfort's jerk."""
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(400):
+        shaper.step(1.5)
+    shaper.step(1.5, emergency=True)
+    assert shaper.step(0.0).a_mps2 == pytest.approx(-0.6 * PERIOD_S)
+
+
+@pytest.mark.parametrize(("below_mps", "spare_m"), [(0.3, 0.004), (0.36, 0.006), (0.4, 0.01), (0.42, 0.012)])
+def test_near_the_end_too_an_emergency_is_let_go_of_at_its_own_jerk(below_mps: float, spare_m: float) -> None:
+    """At -0.7 the plan's jerk of 0.54 would need 0.45 m/s to let go before standstill."""
+    shaper = SpeedShaper(Limits(), PERIOD_S)
+    for _ in range(300):
+        shaper.step(1.0)
+    while shaper.v_mps > below_mps:
+        shaper.step(0.0, emergency=True)
+    plan = braking.BrakeLimits(0.97 * 0.3, 0.9 * 0.6)
+    to_end_m = braking.stop(shaper.v_mps, shaper.a_mps2, plan).distance_m + spare_m
+    command = shaper.step(1.5, distance_to_end_m=to_end_m)
+    assert command.a_mps2 == pytest.approx(-0.7 + 2.0 * PERIOD_S)
+
+
 def test_the_longest_period_and_the_laziest_chassis() -> None:
     assert SpeedShaper(Limits(), 0.5, 2.0).step(1.0).v_mps > 0.0
 
