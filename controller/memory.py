@@ -91,12 +91,14 @@ class OutOfView:
             xy_m=bodies.xy_m + bodies.velocity_mps * dt_s,
             unseen_s=bodies.unseen_s + dt_s,
         )
-        there = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
-        part = (there & (_alike(bodies, seen) | ~bodies.moving[:, None])).any(axis=1)
-        kept = self._hidden(bodies, pose, edge_tan) & ~part & _missing(bodies.ids, seen.ids)
-        kept &= ~bodies.moving | (
-            since <= np.where(_may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
-        )
+        part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
+        kept = self._hidden(bodies, pose, edge_tan) & _missing(bodies.ids, seen.ids)
+        if bodies.moving.any():
+            part_of &= _alike(bodies, seen) | ~bodies.moving[:, None]
+            kept &= ~bodies.moving | (
+                since <= np.where(_may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
+            )
+        kept &= ~part_of.any(axis=1)
         self._since_s = since[kept]
         self._bodies = self._kept_out(bodies.select(kept), pose, free)
         return self._bodies

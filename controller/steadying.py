@@ -34,6 +34,9 @@ class SteadyVelocities:
         """The bodies with averaged velocities; the rest of what was measured is their surprise_mps."""
         dt_s = max((seen.captured_ns - self._captured_ns) / NS_PER_S, 1e-3)
         self._captured_ns = seen.captured_ns
+        if not seen.moving.any():
+            self._ids = self._ids[:0]
+            return seen
         measured = seen.velocity_mps
         spread = np.diagonal(seen.covariance, axis1=1, axis2=2)
         velocity, variance = measured.copy(), spread.copy()
