@@ -186,9 +186,12 @@ class DecisionMaker:
         reason = self._reason(watched, on_way, raw_mps, gated_mps)
         self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
-        return Decision(
-            self._action(target_mps, motion.v_mps), target_mps, reason, self._emergency, self._stuck_since_ns
-        )
+        action = self._action(target_mps, motion.v_mps)
+        closing = motion.a_mps2 < 0.0 or reason.distance_m <= _AT_END_M
+        if action is Action.INCREASE and reason.rule == "target" and closing:
+            # The shaper is closing in on the end: what the slack leaves over is no wish to go faster.
+            action = Action.KEEP
+        return Decision(action, target_mps, reason, self._emergency, self._stuck_since_ns)
 
     def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
         """No creeping up to what blocks the way, and no start for a way that is hardly free."""

@@ -495,3 +495,17 @@ def test_a_slow_section_is_a_reason() -> None:
     decision = bench.step(bench.scene(x_m=3.5), 0.4, x_m=3.5, path=slow)
     assert decision.reason.rule == "section"
     assert decision.target_speed_mps == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "v_mps", "a_mps2", "action"),
+    [(29.6, 0.3, 0.0, Action.INCREASE), (29.985, 0.04, -0.17, Action.KEEP), (29.985, 0.0, 0.0, Action.KEEP)],
+)
+def test_closing_in_on_the_target_is_no_wish_to_go_faster(
+    x_m: float, v_mps: float, a_mps2: float, action: Action
+) -> None:
+    """What the slack allows beyond what the shaper drives."""
+    bench = Bench()
+    decision = bench.step(bench.scene(x_m=x_m), v_mps, a_mps2, x_m=x_m)
+    assert decision.reason.rule == "target"
+    assert decision.action is action
