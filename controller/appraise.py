@@ -64,8 +64,7 @@ class Appraiser:
         )
         course = course_of(watched, placed.heading_rad[:, 0])
         sigma_left = course.sigma_left_mps * self._config.prediction.sigmas
-        unsure_m = np.where(self._remembered, UNSEEN_SIGMAS * course.sigma_left_mps * watched.unseen_s, 0.0)
-        comes = comes_in(placed, self._times_s, sigma_left, unsure_m)
+        comes = comes_in(placed, self._times_s, sigma_left)
         # Who is in the way is; and of who is out of sight nothing is measured that could be noise.
         at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
         enters = self._enters.update(watched.ids, comes, at_once, now_s)
@@ -74,6 +73,11 @@ class Appraiser:
             watched, placed, course, enters, s_m, motion, base_mps, now_s
         )
         found += in_the_way
+        # Who is out of sight on a way towards the robot's may be nearer than where it is reckoned.
+        unsure_mps = UNSEEN_SIGMAS * course.sigma_left_mps
+        inwards = -np.sign(placed.d_m[:, 0]) * course.left_mps > unsure_mps
+        nearer = comes_in(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
+        enters |= self._remembered & inwards & nearer
         worst = self._worst_case.limit(
             watched, placed, course, enters, s_m, motion, known.since_s, chosen_mps
         )

@@ -50,17 +50,26 @@ class OutOfView:
         self._mount, self._near_m = mount, near_m
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
+        # How those that stand by the verdict were measured when they were last seen, of whom clearly came.
+        self._coming: dict[int, FloatArray] = {}
 
     def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
-        """The bodies of a scene, those of them moving as measured that perception only expects beside the
-        view, and that came towards the robot's axis by then."""
-        out = (seen.unseen_s > 0.0) & ~seen.moving & (seen.age_s >= _SETTLED_S)
-        if not out.any():
+        """The bodies of a scene, those of them moving that perception only expects beside the view, and that
+        came towards the robot's axis when they were last seen; as they were measured then."""
+        settled = ~seen.moving & (seen.age_s >= _SETTLED_S)
+        out = settled & (seen.unseen_s > 0.0)
+        comes = settled & ~out & _clearly_comes(seen, pose)
+        if not self._coming and not comes.any():
             return seen
-        leaves = out & self._hidden(seen, pose, edge_tan) & _clearly_comes(seen, pose)
+        ids, before = seen.ids.tolist(), self._coming
+        self._coming = {ids[k]: seen.measured_mps[k] for k in np.flatnonzero(comes).tolist()}
+        self._coming |= {ids[k]: before[ids[k]] for k in np.flatnonzero(out).tolist() if ids[k] in before}
+        came = np.array([one in self._coming for one in ids], np.bool_)
+        leaves = out & came & self._hidden(seen, pose, edge_tan)
         if not leaves.any():
             return seen
-        velocity = np.where(leaves[:, None], seen.measured_mps, seen.velocity_mps)
+        velocity = seen.velocity_mps.copy()
+        velocity[leaves] = [self._coming[ids[k]] for k in np.flatnonzero(leaves).tolist()]
         return replace(seen, velocity_mps=velocity, moving=seen.moving | leaves)
 
     def update(

@@ -25,44 +25,66 @@ def memory() -> OutOfView:
     return OutOfView(CameraMount(0.4, 0.0, 0.60, 0.0), NEAR_M)
 
 
-def measured(bodies: Bodies, left_mps: float, unseen_s: float = 0.1) -> Bodies:
+def measured(bodies: Bodies, left_mps: float, unseen_s: float = 0.0) -> Bodies:
     """Standing by the verdict, whatever was measured."""
     return replace(bodies, measured_mps=np.array([[0.05, left_mps]]), unseen_s=np.array([unseen_s]))
 
 
+def expected(bodies: Bodies, left_mps: float = 0.0) -> Bodies:
+    """No longer seen: what perception says of it now is no measurement."""
+    return measured(bodies, left_mps, unseen_s=0.1)
+
+
+def after(*scenes: Bodies) -> Bodies:
+    """The bodies of the last of some scenes."""
+    view = memory()
+    return [view.leaving(scene, HERE, EDGE) for scene in scenes][-1]
+
+
 def test_who_is_clearly_coming_when_it_leaves_the_view_moves() -> None:
     """A verdict takes some frames, of which there are no more."""
-    found = memory().leaving(measured(AT_EDGE, -0.35), HERE, EDGE)
+    found = after(measured(AT_EDGE, -0.35), expected(AT_EDGE), expected(AT_EDGE))
     assert found.moving.tolist() == [True]
     assert found.velocity_mps[0].tolist() == [0.05, -0.35]
 
 
 def test_on_the_right_as_on_the_left() -> None:
-    mirrored = measured(replace(AT_EDGE, xy_m=AT_EDGE.xy_m * (1, -1)), 0.35)
-    assert memory().leaving(mirrored, HERE, EDGE).moving.tolist() == [True]
+    mirrored = replace(AT_EDGE, xy_m=AT_EDGE.xy_m * (1, -1))
+    assert after(measured(mirrored, 0.35), expected(mirrored)).moving.tolist() == [True]
+
+
+AHEAD, YOUNG = box(4.4, 0.5), replace(AT_EDGE, age_s=np.array([0.4]))
+EXACT = replace(AT_EDGE, covariance=np.zeros((1, 2, 2)))
 
 
 @pytest.mark.parametrize(
-    "bodies",
+    "scenes",
     [
-        pytest.param(measured(AT_EDGE, -0.29), id="noise may be as much"),
-        pytest.param(measured(replace(AT_EDGE, covariance=np.zeros((1, 2, 2))), -0.19), id="hardly moves"),
-        pytest.param(measured(AT_EDGE, 0.35), id="walks away"),
-        pytest.param(measured(AT_EDGE, -0.35, unseen_s=0.0), id="is still seen"),
-        pytest.param(measured(box(4.4, 0.5), -0.35), id="only missed in the middle of the view"),
-        pytest.param(measured(replace(AT_EDGE, age_s=np.array([0.4])), -0.35), id="was hardly seen"),
+        pytest.param((measured(AT_EDGE, -0.29), expected(AT_EDGE)), id="noise may be as much"),
+        pytest.param((measured(EXACT, -0.19), expected(EXACT)), id="hardly moves"),
+        pytest.param((measured(AT_EDGE, 0.35), expected(AT_EDGE)), id="walks away"),
+        pytest.param((measured(AT_EDGE, -0.35),), id="is still seen"),
+        pytest.param((measured(AHEAD, -0.35), expected(AHEAD)), id="only missed in the middle of the view"),
+        pytest.param((measured(YOUNG, -0.35), expected(YOUNG)), id="was hardly seen"),
+        pytest.param(
+            (measured(AT_EDGE, 0.0), expected(AT_EDGE, -0.35)), id="what is not seen proves nothing"
+        ),
+        pytest.param(
+            (measured(AT_EDGE, -0.35), measured(AT_EDGE, 0.0), expected(AT_EDGE)),
+            id="stood when it was seen last",
+        ),
     ],
 )
-def test_all_others_stay_what_perception_says(bodies: Bodies) -> None:
-    found = memory().leaving(bodies, HERE, EDGE)
+def test_all_others_stay_what_perception_says(scenes: tuple[Bodies, ...]) -> None:
+    found = after(*scenes)
     assert found.moving.tolist() == [False]
     assert found.velocity_mps[0].tolist() == [0.0, 0.0]
 
 
 def test_who_moves_keeps_its_averaged_velocity() -> None:
     walker = replace(box(4.4, 2.1, 0.0, -0.5), measured_mps=np.array([[0.0, -0.9]]), unseen_s=np.array([0.1]))
-    both = walker.joined(replace(measured(AT_EDGE, -0.35), ids=np.array([2])))
-    found = memory().leaving(both, HERE, EDGE)
+    second = replace(AT_EDGE, ids=np.array([2]))
+    found = after(walker.joined(measured(second, -0.35)), walker.joined(expected(second)))
     assert found.velocity_mps.tolist() == [[0.0, -0.5], [0.05, -0.35]]
 
 
