@@ -2,8 +2,9 @@
 
 Fragments: the body's velocity over ground differs from zero by many sigmas, and most of its fragments
 agree with it. Across the line of sight that is enough; along it, where a few sliding ends can feign a
-change of length, the body's own depth must not contradict. Arrivals: the body stands where free space
-was seen.
+change of length, the body's own depth must not contradict. Unrest: nearly all of many fragments deny that
+the body stands still, though as limbs do they agree on no velocity. Arrivals: the body stands where free
+space was seen.
 """
 
 from __future__ import annotations
@@ -127,14 +128,17 @@ def judge(
     by_arrival = has_arrived & (significance > 0.5 * threshold)
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
     possible = (speed <= _IMPLAUSIBLE * settings.max_speed_mps) & (seen.size_m <= _LARGEST_M)
-    evident = by_fragments_across | by_fragments_along | by_arrival | by_surface
+    by_unrest = seen.restless & (seen.ends >= _ENDS_ALONG) & (significance > 0.5 * threshold)
+    evident = by_unrest | by_fragments_across | by_fragments_along | by_arrival | by_surface
     rising = possible & ((evident & (speed > least)) | much) & seen.trusted
     holding = moving & (speed > 0.6 * least) & ((significance > 4.0) | has_arrived)
     own_speed = np.sqrt(np.square(seen.own_velocity).sum(axis=1))
     own_sigma = np.sqrt(np.trace(seen.own_covariance, axis1=1, axis2=2))
     stands = (own_speed < 0.6 * least) & (own_sigma < 0.5 * least) & (agreeing >= _ENDS_ACROSS)
-    # What one fragment alone shows is no proof, but no reason either to forget what more of them showed.
+    # What one fragment alone shows is no proof, but no reason either to forget what more of them showed. Nor
+    # is it one that limbs do not agree, where hardly any of them stands still.
     waiting = possible & (speed > least) & shown_across & (seen.agreement * seen.ends >= 2)
+    waiting |= seen.restless & ~moving
     slowly = np.where(holding | waiting, dt_s / _HOLD_S, dt_s / _FALL_S)
     falling = np.where(stands, dt_s / _STOP_S, slowly)
     strength = np.minimum(np.maximum(along, across), np.maximum(own_along, own_across)) / threshold

@@ -318,6 +318,22 @@ def test_what_does_not_move_yet_is_not_held() -> None:
     assert verdict(one(ACROSS), 0.5, False).evidence[0] == pytest.approx(0.5 - DT_S / 0.3)
 
 
+def test_unrest_of_many_ends_proves_what_the_filter_says_by_half() -> None:
+    """Limbs: none agrees with another, and hardly any stands still. 0.64 / 0.0759 = 8.4, more than 8."""
+    half = {"covariance": covariance(0.075), "ends": np.array([8]), "restless": np.array([True])}
+    assert rises(one(ALONG, **half))
+    assert not rises(one(ALONG, **{**half, "restless": np.array([False])}))
+    assert not rises(one(ALONG, **{**half, "ends": np.array([7])}))
+    assert not rises(one(ALONG, **{**half, "covariance": covariance(0.085)}))  # 7.4
+    assert not rises(one((0.0, 0.0, -0.2), **half, trusted=False))
+
+
+def test_a_restless_suspect_is_not_forgotten() -> None:
+    restless = one(restless=np.array([True]))
+    assert verdict(restless, 0.3).evidence[0] == pytest.approx(0.3 - DT_S / 2.0)
+    assert verdict(one(), 0.3).evidence[0] == pytest.approx(0.3 - DT_S / 0.3)
+
+
 def test_an_arrival_holds_a_doubtful_mover() -> None:
     seen = one(ACROSS, covariance=covariance(0.2), arrived=np.array([10]))
     assert verdict(seen, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 2.0)
