@@ -13,6 +13,7 @@ from vision.tracks import Tracks
 
 MIN_SIGHTINGS = 3
 _LISTED_UNSEEN_S = 0.15  # a track is remembered for longer, but no longer shown as seen
+_WAY_SIGMA_M = 0.06
 _STATIC_SCORE = 0.5
 
 
@@ -25,15 +26,19 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
     local = (tracks.state[:, :3] - pose.translation_m) @ pose.rotation
     velocity = tracks.state[:, 3:] @ pose.rotation
     covariance = pose.rotation.T @ tracks.covariance[:, 3:, 3:] @ pose.rotation
-    unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
+    unseen_s: FloatArray = np.multiply(detection.captured_ns - tracks.seen_ns, 1e-9, dtype=np.float64)
     known = (tracks.sightings >= MIN_SIGHTINGS) | tracks.moving
-    listed = known & (local[:, 2] > 0.0) & (unseen_s <= _LISTED_UNSEEN_S)
+    listed = known & (local[:, 2] > 0.0) & _expected(tracks, unseen_s)
     bbox, unseen = tracks.bbox_px, unseen_s != 0.0
+    # A mover that is out of sight, but for a sliver, is where it goes, whole, and not where its rest is seen.
+    whole = tracks.moving & (unseen | tracks.sliver)
     if unseen.any():
         listed &= ~unseen | _in_view(local, detection)
-        # A mover that is out of sight is where it goes, whole, and not where its last rest was seen.
-        expected_px = _expected_px(tracks.box_m, local, detection)
-        bbox = np.where((tracks.moving & (unseen_s > 0.0))[:, None], expected_px, bbox)
+    if whole.any():
+        expected_px, rest = _expected_px(tracks.box_m, local, detection), ~unseen
+        expected_px[rest, :2] = np.minimum(expected_px[rest, :2], bbox[rest, :2])
+        expected_px[rest, 2:] = np.maximum(expected_px[rest, 2:], bbox[rest, 2:])
+        bbox = np.where(whole[:, None], expected_px, bbox)
     result = []
     for t in np.flatnonzero(listed).tolist():
         moving = bool(tracks.moving[t])
@@ -54,6 +59,14 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
             )
         )
     return tuple(result)
+
+
+def _expected(tracks: Tracks, unseen_s: FloatArray) -> NDArray[np.bool_]:
+    """(T,) of which it is known well enough where they went since they were seen unseen_s (T,) ago."""
+    sigma_mps = np.sqrt(np.trace(tracks.covariance[:, 3:, 3:], axis1=1, axis2=2))
+    known = ~tracks.moving | (sigma_mps * unseen_s <= _WAY_SIGMA_M)
+    result: NDArray[np.bool_] = (unseen_s <= _LISTED_UNSEEN_S) & known
+    return result
 
 
 def _expected_px(box_m: FloatArray, local_m: FloatArray, detection: Detection) -> FloatArray:

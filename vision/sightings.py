@@ -50,6 +50,7 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     # What is left to see of a mover that goes behind something is not where its body is.
     sliver = tracks.moving[seen] & (area_m2 < _SLIVER * usual_m2)
     cut = ~smooth & ~sliver
+    tracks.sliver[seen] = sliver & ~_at_border(measured.bbox_px[seen], detection)
     tracks.locate(seen[smooth], position[smooth], covariance[smooth])
     tracks.relocate(seen[cut], position[cut], covariance[cut])
     tracks.clean_s[seen] = np.where(smooth & measured.tall[seen], tracks.clean_s[seen] + detection.dt_s, 0.0)
@@ -89,6 +90,15 @@ def _box_m(measured: Regions, seen: NDArray[np.intp], camera: Intrinsics) -> Flo
     across = [(u - camera.cx) / camera.fx * depth - x for u in (left, right)]
     down = [(v - camera.cy) / camera.fy * depth - y for v in (top, bottom)]
     return np.stack((across[0], down[0], across[1], down[1]), axis=1)
+
+
+def _at_border(bbox_px: FloatArray, detection: Detection) -> NDArray[np.bool_]:
+    """(K,) boxes (K, 4) that reach the left or right border of the image: their rest is outside of it."""
+    step_px = detection.grid.step_px
+    result: NDArray[np.bool_] = (bbox_px[:, 0] <= step_px) | (
+        bbox_px[:, 2] >= detection.camera.width - step_px
+    )
+    return result
 
 
 def _centre_covariance(

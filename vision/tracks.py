@@ -28,6 +28,7 @@ _FIELDS = (
     "fragments",
     "clean_s",
     "growth_mps",
+    "sliver",
 )
 
 
@@ -37,7 +38,8 @@ class Tracks:
     (T,) of motion; moving (T,); confidence (T,) 0..1; bbox_px (T, 4); box_m (T, 4): edges
     of the last box that showed the whole body, at its depth, from its centre; extent_m (T, 3); area_m2 (T,):
     averaged, up to a common factor; cells (T,) of the grid covered when last seen; clean_s (T,): for how long
-    the surface's centre has told of the velocity without a break."""
+    the surface's centre has told of the velocity without a break; sliver (T,): a mover of which hardly
+    anything was left to see."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -59,6 +61,7 @@ class Tracks:
         self.fragments = np.empty(0, np.intp)
         self.clean_s = np.empty(0)
         self.growth_mps = np.empty(0)
+        self.sliver = np.empty(0, np.bool_)
         self._next_id = 1
 
     def __len__(self) -> int:
@@ -108,6 +111,7 @@ class Tracks:
             "fragments": np.zeros(count),
             "clean_s": np.zeros(count),
             "growth_mps": np.zeros(count),
+            "sliver": np.zeros(count),
         }
         self._next_id += count
         for name in _FIELDS:

@@ -127,6 +127,7 @@ def test_a_mover_out_of_sight_has_its_whole_box_where_it_goes() -> None:
     """0.6 m wide and 1.8 m high around its middle; the box it was last seen by is the rest of an arm."""
     made = tracks((0.5, 0.0, 3.0), unseen_s=0.1)
     made.moving[:] = True
+    made.covariance[:, 3:, 3:] = 0.01 * np.eye(3)
     made.bbox_px[:] = [10.0, 20.0, 14.0, 30.0]
     made.box_m[:] = [-0.3, -0.9, 0.3, 0.9]
     (one,) = report.obstacles(made, now())
@@ -135,6 +136,25 @@ def test_a_mover_out_of_sight_has_its_whole_box_where_it_goes() -> None:
     made.state[0, 0] = -1.5
     (one,) = report.obstacles(made, now())
     assert one.bbox_px == pytest.approx((0.0, 29.5, 159.5 - 120.0, 209.5))  # cut at the border
+
+
+def test_a_mover_out_of_sight_is_listed_while_it_is_known_where_it_goes() -> None:
+    made = tracks((0.5, 0.0, 3.0), unseen_s=0.1)
+    made.moving[:] = True
+    for sigma_mps, listed in ((0.34, 1), (0.36, 0)):  # times sqrt(3) times 0.1 s: up to 0.06 m
+        made.covariance[:, 3:, 3:] = sigma_mps**2 * np.eye(3)
+        assert len(report.obstacles(made, now())) == listed
+    made.moving[:] = False  # what stands is where it was
+    assert len(report.obstacles(made, now())) == 1
+
+
+def test_a_mover_of_which_a_sliver_is_left_to_see_has_its_whole_box_and_the_sliver() -> None:
+    made = tracks((0.5, 0.0, 3.0))
+    made.moving[:], made.sliver[:] = True, True
+    made.bbox_px[:] = [170.0, 40.0, 190.0, 60.0]
+    made.box_m[:] = [-0.3, -0.9, 0.3, 0.9]
+    (one,) = report.obstacles(made, now())
+    assert one.bbox_px == pytest.approx((170.0, 29.5, 239.5, 209.5))
 
 
 def test_what_is_seen_and_what_stands_still_keep_the_box_they_were_seen_by() -> None:
