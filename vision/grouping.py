@@ -14,11 +14,15 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision.depth_grid import DepthGrid
-from vision.order import median, quantiles
+from vision.order import median, quantile, quantiles
 from vision.regions import IntGrid, Regions
 
 _CLOSE_M = 0.25
 _APART_M = 0.40
+_SAME_DEPTH_M = 0.30
+_SAMPLES = 24
+_LEAST_SAMPLES = 3
+_NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
 _SMALL_SHARE = 0.5
 _SAME_VELOCITY_MPS = 0.4
 _SINGLE_WIDTH_M = 0.85
@@ -50,10 +54,60 @@ def gaps_m(a: Boxes, first: NDArray[np.intp], b: Boxes, second: NDArray[np.intp]
     return result
 
 
-def detach(winner: NDArray[np.int32], parts: Regions, votes: NDArray[np.intp]) -> NDArray[np.int32]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Bodies:
+    """Where T bodies are expected, in the camera frame. centre_m (T, 3), extent_m (T, 3): of what was seen of
+    them last; box_m (T, 4): edges of the whole ones from their centres, left, upper, right, lower; sigma_m
+    (T,): of depth there."""
+
+    centre_m: FloatArray
+    extent_m: FloatArray
+    box_m: FloatArray
+    sigma_m: FloatArray
+
+
+def expected_in(
+    grid: DepthGrid, parts: Regions, winner: NDArray[np.int32], votes: NDArray[np.intp], bodies: Bodies
+) -> NDArray[np.bool_]:
+    """(P, T) which parts are what is seen of a body on the other side of something nearer that divides it.
+
+    winner (P,), votes (P,): as in a Ballot; the part with the most votes is what is surely the body's. The
+    rest of it is no farther away than the whole makes room for, and it is at its depth.
+    """
+    half = 0.5 * bodies.extent_m[:, :2]
+    room = np.maximum(bodies.box_m[:, 2:] - bodies.box_m[:, :2] - half, half) + _CLOSE_M
+    offset = parts.position_m[:, None] - bodies.centre_m
+    inside = (np.abs(offset[..., :2]) <= room).all(axis=2) & (parts.cells > 0)[:, None]
+    inside &= np.abs(offset[..., 2]) <= _SAME_DEPTH_M + bodies.sigma_m
+    main = np.full(len(bodies.sigma_m) + 1, -1, np.intp)
+    fewest_first = np.argsort(votes)
+    main[winner[fewest_first]] = fewest_first
+    part, track = np.nonzero(inside & (main[1:] >= 0))
+    result = np.zeros_like(inside)
+    result[part, track] = _parted(grid, parts, part, main[track + 1])
+    return result
+
+
+def _parted(
+    grid: DepthGrid, parts: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """(K,) whether something nearer stands between the middles of parts one[k] and other[k] in the image."""
+    middle = 0.5 * (parts.bbox_px[:, :2] + parts.bbox_px[:, 2:])
+    along = np.linspace(0.0, 1.0, _SAMPLES)[:, None, None]
+    line = middle[one] + (middle[other] - middle[one]) * along
+    inverse = grid.inverse_depth[grid.rows(line[..., 1]), grid.columns(line[..., 0])]
+    depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
+    nearer = inverse > 1.0 / np.maximum(depth, 0.1) + _NEARER_INVERSE
+    result: NDArray[np.bool_] = np.count_nonzero(nearer, axis=0) >= _LEAST_SAMPLES
+    return result
+
+
+def detach(
+    winner: NDArray[np.int32], parts: Regions, votes: NDArray[np.intp], expected: NDArray[np.bool_]
+) -> NDArray[np.int32]:
     """winner (P,), track index + 1 of each part or 0, without the parts far from the track's main one.
 
-    votes (P,): how many cells spoke for the winner.
+    votes (P,): how many cells spoke for the winner. expected (P, T): parts that stay with it all the same.
     """
     owned = np.flatnonzero(winner > 0)
     if len(owned) == 0:
@@ -63,22 +117,28 @@ def detach(winner: NDArray[np.int32], parts: Regions, votes: NDArray[np.intp]) -
     is_main = np.concatenate(([True], track[1:] != track[:-1]))
     main = order[np.maximum.accumulate(np.where(is_main, np.arange(len(order)), 0))]
     box = boxes(parts)
-    far = gaps_m(box, order, box, main) > _APART_M
+    far = (gaps_m(box, order, box, main) > _APART_M) & ~expected[order, track - 1]
     result = winner.copy()
     result[order[far]] = 0
     return result
 
 
 def attach(
-    new_parts: NDArray[np.intp], parts: Regions, winner: NDArray[np.int32], mover: NDArray[np.bool_]
+    new_parts: NDArray[np.intp],
+    parts: Regions,
+    winner: NDArray[np.int32],
+    mover: NDArray[np.bool_],
+    expected: NDArray[np.bool_],
 ) -> NDArray[np.int32]:
-    """winner (P,) with new parts (indices) given to the mover that they are small beside and close to."""
+    """winner (P,) with new parts (indices) given to the mover that they are small beside and close to, or to
+    the one that is expected there (P, T)."""
     of_mover = np.flatnonzero((winner > 0) & np.concatenate(([False], mover))[winner])
     if len(of_mover) == 0 or len(new_parts) == 0:
         return winner
     box = boxes(parts)
     a, b = np.repeat(new_parts, len(of_mover)), np.tile(of_mover, len(new_parts))
     gap = gaps_m(box, a, box, b)
+    gap[expected[a, winner[b] - 1]] = 0.0
     gap[parts.cells[a] > _SMALL_SHARE * parts.cells[b]] = np.inf
     gap = gap.reshape(len(new_parts), len(of_mover))
     best = gap.argmin(axis=1)
@@ -143,7 +203,7 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
     """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one.
 
     The cells are laid along the line on which they spread most (seen from above). Two people leave a
-    valley in between; a crate, however wide, does not.
+    valley in between; a crate, however wide, does not, and where something nearer fills it, it is none.
     """
     cells = np.flatnonzero(labels.ravel() == track + 1)
     if len(cells) < 2 * _MIN_CELLS:
@@ -171,5 +231,21 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
         return None
     if abs(median(along[second]) - median(along[~second])) < _PAIR_DISTANCE_M:
         return None
+    if _hidden_between(grid, cells[second], cells[~second]):
+        return None
     cut_off: NDArray[np.intp] = cells[second]
     return cut_off
+
+
+def _hidden_between(grid: DepthGrid, one: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
+    """Whether something nearer fills most of the image between two groups of flat cells: then the valley
+    there is what hides the middle of one body."""
+    width = grid.depth_m.shape[1]
+    left, right = (one, other) if median(one % width) < median(other % width) else (other, one)
+    first, last = int(quantile(left % width, 0.9)) + 1, int(quantile(right % width, 0.1))
+    top, last_row = quantiles(np.concatenate((one, other)) // width, (0.25, 0.75))
+    inverse = grid.inverse_depth
+    between = inverse[int(top) : int(last_row) + 1, first:last]
+    nearest = max(float(median(inverse.ravel()[one])), float(median(inverse.ravel()[other])))
+    nearer = between > nearest + _NEARER_INVERSE
+    return last > first and bool(np.count_nonzero(nearer) >= 0.5 * nearer.size)

@@ -21,6 +21,7 @@ _UNIFORM = 3.46  # a uniform spread is this many standard deviations long
 _FOOT_M = 0.12
 _FOOT_PER_METRE = 0.015
 _OCCLUDED_SHARE = 0.15
+_GAP_CELLS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +30,7 @@ class Regions:
 
     cells (R,). rows (R,) of the grid that they reach over. bbox_px (R, 4): u0, v0, u1, v1. position_m (R, 3):
     centre of the visible surface. extent_m (R, 3). wide (R,): not cut by the image's left or right border,
-    tall (R,): nor above or below.
+    tall (R,): nor above or below. overlapped (R,): by something nearer, seen from its side.
     """
 
     cells: NDArray[np.intp]
@@ -39,11 +40,12 @@ class Regions:
     extent_m: FloatArray
     wide: NDArray[np.bool_]
     tall: NDArray[np.bool_]
+    overlapped: NDArray[np.bool_]
 
     @property
     def whole(self) -> NDArray[np.bool_]:
-        """(R,) parts that are cut on no side."""
-        return self.wide & self.tall
+        """(R,) parts that are cut on no side, and of which nothing nearer hides any."""
+        return self.wide & self.tall & ~self.overlapped
 
 
 def standing(grid: DepthGrid, clearance_m: float) -> BoolGrid:
@@ -113,9 +115,9 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     starts, cells = ends[:-1], ends[1:] - ends[:-1]
     bbox = np.zeros((count, 4))
     position, extent = np.zeros((count, 3)), np.zeros((count, 3))
-    wide, tall = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    wide, tall, nothing = np.zeros((3, count), np.bool_)
     if len(flat) == 0:
-        return Regions(cells, cells, bbox, position, extent, wide, tall)
+        return Regions(cells, cells, bbox, position, extent, wide, tall, nothing)
     present = np.flatnonzero(cells)
     starts, number = starts[present], cells[present]
     rows = flat // np.int32(width)
@@ -149,14 +151,19 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     tall[present] = (top > 0) & (bottom < height - 1)
     reach = np.zeros(count, np.intp)
     reach[present] = bottom - top + 1
-    return Regions(cells, reach, bbox, position, extent, wide, tall)
+    return Regions(cells, reach, bbox, position, extent, wide, tall, nothing)
 
 
 def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
     """regions as measured, wide only where nothing nearer hides a part, either, and where it ends at an edge
     in depth: what was divided from its surroundings by guess has its middle where the guess put it."""
     hidden = _hidden_cells(grid, labels, len(regions.cells))
-    return replace(regions, wide=regions.wide & (hidden <= _OCCLUDED_SHARE * regions.rows))
+    overlapped = _overlapped_cells(grid, labels, len(regions.cells))
+    return replace(
+        regions,
+        wide=regions.wide & (hidden <= _OCCLUDED_SHARE * regions.rows),
+        overlapped=overlapped > _OCCLUDED_SHARE * regions.rows,
+    )
 
 
 def _foot_px(
@@ -190,6 +197,25 @@ def _hidden_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.in
     shared = ~jumps & (left > 0) & (right > 0)
     hidden = np.concatenate((np.where(step > 0, left, right)[jumps], left[shared], right[shared]))
     return np.bincount(hidden, minlength=count + 1)[1:]
+
+
+def _overlapped_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.intp]:
+    """(count,) cells at the left or right rim of each part that end at another part, which is nearer.
+
+    Beside what stands nearer a stereo camera measures nothing, and the far side of a jump is of no part: what
+    comes after that gap is the neighbour.
+    """
+    inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
+    owned = np.flatnonzero(flat)
+    first, second = owned[:-1], owned[1:]
+    apart = second - first
+    near = (apart <= _GAP_CELLS + 1) & (second % labels.shape[1] >= apart)  # not from one row to the next
+    rims = np.flatnonzero(near & (flat.take(first) != flat.take(second)))
+    first, second = first.take(rims), second.take(rims)
+    step = inverse.take(second) - inverse.take(first)
+    farther = np.where(step > 0.0, flat.take(first), flat.take(second))
+    jumps = np.abs(step) > np.float32(_LEAST_JUMP)
+    return np.bincount(farther[jumps], minlength=count + 1)[1:]
 
 
 def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:

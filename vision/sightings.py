@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.types import FloatArray, Intrinsics
+from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
+from vision.grouping import Bodies
 from vision.regions import Regions
 from vision.tracks import Tracks
 
@@ -64,6 +65,13 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     tracks.box_m[shown] = _box_m(measured, shown, detection.camera)
     tracks.extent_m[seen] = measured.extent_m[seen]
     tracks.cells[seen] = measured.cells[seen]
+
+
+def bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> Bodies:
+    """Where the bodies of tracks are expected by a camera at pose."""
+    centre_m = pose.inverse().apply(tracks.state[:, :3])
+    sigma_m: FloatArray = np.asarray(depth_sigma_m(np.maximum(centre_m[:, 2], 0.0), noise), np.float64)
+    return Bodies(centre_m, tracks.extent_m, tracks.box_m, sigma_m)
 
 
 def up(detection: Detection) -> FloatArray | None:

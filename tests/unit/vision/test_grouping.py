@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from tests.support.grids import CAMERA, LEVEL_UP, X, grid_of, labelled, nearest, plate
 from vision.depth_grid import DepthGrid
-from vision.grouping import Boxes, attach, boxes, detach, gaps_m, merges, split
+from vision.grouping import Bodies, Boxes, attach, boxes, detach, expected_in, gaps_m, merges, split
 from vision.regions import Regions, measure
 
 ALL = np.array
+NOWHERE = np.zeros((4, 2), np.bool_)  # no track is expected in any of four parts
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ def regions(*bodies: Body) -> Regions:
         ALL([[b.width, b.height, b.deep] for b in bodies]),
         np.ones(len(bodies), np.bool_),
         np.ones(len(bodies), np.bool_),
+        np.zeros(len(bodies), np.bool_),
     )
 
 
@@ -219,16 +221,18 @@ def test_a_small_part_that_nobody_claims_goes_to_the_mover_beside_it() -> None:
     parts = regions(PERSON, ARM, Body(3.0, cells=30), Body(-0.45, cells=101))
     winner = np.array([2, 0, 0, 0], np.int32)
     mover = np.array([False, True])
-    given = attach(np.array([1, 2, 3]), parts, winner, mover)
+    given = attach(np.array([1, 2, 3]), parts, winner, mover, NOWHERE)
     # The arm; not the part 2.5 m away; not the one that is more than half as large as the mover.
     np.testing.assert_array_equal(given, [2, 2, 0, 0])
-    np.testing.assert_array_equal(attach(np.array([1]), parts, winner, np.array([True, False])), winner)
+    np.testing.assert_array_equal(
+        attach(np.array([1]), parts, winner, np.array([True, False]), NOWHERE), winner
+    )
 
 
 def test_the_nearest_mover_gets_the_part() -> None:
     parts = regions(Body(-0.5), Body(0.55), Body(0.2, width=0.2, height=0.2, cells=20))
     winner = np.array([1, 2, 0], np.int32)
-    given = attach(np.array([2]), parts, winner, np.array([True, True]))
+    given = attach(np.array([2]), parts, winner, np.array([True, True]), NOWHERE[:3])
     np.testing.assert_array_equal(given, [1, 2, 2])  # 0.05 m away, the other one 0.2 m
 
 
@@ -236,11 +240,11 @@ def test_parts_far_from_a_tracks_main_one_are_taken_from_it() -> None:
     parts = regions(Body(0.0), Body(0.7, cells=50), Body(0.9, cells=50), Body(2.0))
     winner = np.array([1, 1, 1, 2], np.int32)
     # 0.3 m stays, 0.5 m goes; the other track's only part is its main one.
-    np.testing.assert_array_equal(detach(winner, parts, np.array([90, 40, 40, 5])), [1, 1, 0, 2])
+    np.testing.assert_array_equal(detach(winner, parts, np.array([90, 40, 40, 5]), NOWHERE), [1, 1, 0, 2])
     # The main one is what most cells spoke for.
-    np.testing.assert_array_equal(detach(winner, parts, np.array([40, 40, 90, 5])), [0, 1, 1, 2])
+    np.testing.assert_array_equal(detach(winner, parts, np.array([40, 40, 90, 5]), NOWHERE), [0, 1, 1, 2])
     nobody = np.zeros(4, np.int32)
-    np.testing.assert_array_equal(detach(nobody, parts, np.zeros(4, np.intp)), nobody)
+    np.testing.assert_array_equal(detach(nobody, parts, np.zeros(4, np.intp), NOWHERE), nobody)
 
 
 def test_what_is_measured_of_a_grid_agrees_with_its_boxes() -> None:
@@ -248,3 +252,51 @@ def test_what_is_measured_of_a_grid_agrees_with_its_boxes() -> None:
     box = boxes(measure(grid_of(depth_m), labelled(depth_m > 0.0), 1))
     np.testing.assert_allclose(box.low_m[0], [-0.5, -0.4, 3.0], atol=0.06)
     np.testing.assert_allclose(box.high_m[0], [0.1, 0.6, 3.0], atol=0.06)
+
+
+def test_a_part_in_which_its_mover_is_expected_stays_or_comes_however_far() -> None:
+    parts = regions(Body(0.0), Body(0.9, cells=50))
+    there = np.array([[False], [True]])
+    winner, votes = np.array([1, 1], np.int32), np.array([90, 40])
+    np.testing.assert_array_equal(detach(winner, parts, votes, there), [1, 1])
+    np.testing.assert_array_equal(detach(winner, parts, votes, NOWHERE[:2, :1]), [1, 0])
+    new, mover = np.array([1, 0], np.int32), np.array([True])
+    np.testing.assert_array_equal(attach(np.array([1]), parts, new, mover, there), [1, 1])
+    np.testing.assert_array_equal(attach(np.array([1]), parts, new, mover, NOWHERE[:2, :1]), [1, 0])
+
+
+def behind(middle_m: float | None, part_x: float = 0.6, part_z: float = 4.0, width_m: float = 1.2) -> bool:
+    """Whether a part at part_x is expected to be of a body width_m wide, 4 m away, that is seen from -0.6 to
+    -0.2 m, with somebody 2 m away in front of its middle or nobody."""
+    left, right = Body(-0.4), Body(part_x, z=part_z, width=0.2, cells=50)
+    visible = [plate(b.z, (b.x - b.width / 2, b.x + b.width / 2), (-0.8, 0.8)) for b in (left, right)]
+    if middle_m is not None:
+        visible.append(plate(2.0, (middle_m - 0.1, middle_m + 0.1), (-0.8, 0.8)))
+    body = Bodies(
+        np.array([[-0.4, 0.0, 4.0]]),
+        np.array([[0.4, 1.6, 0.2]]),
+        np.array([[-width_m / 2, -0.8, width_m / 2, 0.8]]),
+        np.array([0.1]),
+    )
+    winner, votes = np.array([1, 0], np.int32), np.array([90, 0])
+    expected = expected_in(grid_of(nearest(*visible)), regions(left, right), winner, votes, body)
+    return bool(expected[1, 0])
+
+
+def test_a_body_is_expected_on_the_other_side_of_what_hides_its_middle() -> None:
+    assert behind(0.0)
+    assert not behind(None)  # nothing divides the two: they are two
+    assert not behind(
+        0.0, width_m=0.8
+    )  # there is no room for it: 0.6 + 0.25 m from the middle of what is seen
+    assert not behind(0.0, part_z=4.5)  # nor is that at its depth
+
+
+def test_one_body_behind_somebody_is_not_divided() -> None:
+    """1.3 m wide; what hides its middle, and leaves a foot's breadth of it, makes no two of it."""
+    whole, foot = plate(4.0, (-0.65, 0.65), (-0.6, 0.8)), plate(4.0, (-0.3, 0.3), (0.7, 0.8))
+    somebody = plate(2.0, (-0.15, 0.15), (-0.5, 0.35))
+    two = nearest(plate(4.0, (-0.65, -0.3), (-0.6, 0.8)), plate(4.0, (0.3, 0.65), (-0.6, 0.8)), foot)
+    hidden = nearest(whole, somebody)
+    assert split(grid_of(two), labelled(two > 0.0), 0) is not None
+    assert split(grid_of(hidden), labelled(hidden == 4.0), 0) is None

@@ -150,6 +150,19 @@ def test_a_part_of_which_only_a_corner_is_hidden_is_whole(top_m: float, whole: b
     assert measured.whole.tolist() == [whole, True]
 
 
+def test_what_a_stereo_camera_does_not_see_beside_something_nearer_is_hidden_by_it() -> None:
+    """Three cells without a depth between the two, and four."""
+    far, near = plate(4.0, (-0.8, 0.0), (-0.6, 0.8)), plate(2.5, (0.0, 0.4), (-0.8, 0.8))
+    for gap, whole in ((3, False), (4, True)):
+        seen = np.where(near > 0.0, 0.0, far)
+        last = int(np.flatnonzero(seen.any(axis=0))[-1])
+        first = int(np.flatnonzero(near.any(axis=0))[0])
+        seen[:, max(first - gap, 0) : last + 1] = 0.0
+        measured = beside(seen, near)
+        assert measured.wide.tolist() == [True, True]
+        assert measured.whole.tolist() == [whole, True]
+
+
 def test_the_end_of_a_row_does_not_hide_the_beginning_of_the_next() -> None:
     far = np.zeros((ROWS, COLUMNS))
     far[10:40, COLUMNS - 8 :] = 5.0
@@ -167,6 +180,7 @@ def test_the_end_of_a_row_does_not_hide_the_beginning_of_the_next() -> None:
         measured.extent_m,
         np.ones(2, np.bool_),
         np.ones(2, np.bool_),
+        np.zeros(2, np.bool_),
     )
     assert regions.unhidden(grid, labels, inside).whole.tolist() == [True, True]
 
