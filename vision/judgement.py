@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from config.perception import MotionSettings
 from hal.types import FloatArray
-from vision.symmetric import inverse
+from vision.line_of_sight import Split, split, squared_sigmas
 
 _RISE_S = 0.06
 # Without odometry an error of the camera's motion stays for some frames: one more of them is asked for.
@@ -25,6 +25,7 @@ _FASTEST = 2.5  # times, with overwhelming proof
 _MOST_A_FRAME = 0.5  # no single frame proves motion, however long ago the one before was
 _FALL_S = 0.30
 _HOLD_S = 2.0  # without new proof
+_HOLDING_SQUARED_SIGMAS = 4.0
 _STOP_S = 0.12  # with proof of standing still
 _MAX_EVIDENCE = 1.5
 _ENDS_ACROSS = 4
@@ -35,7 +36,6 @@ _CONFIRMING_SIGMAS = 2.5
 _OWN_PROOF = 3.0
 _SHARED_PROOF = 0.55  # of the threshold, where fragments and surface say the same
 _SPEED_PER_METRE = 0.02
-_FLOOR_SIGMA_MPS = 0.03
 _ARRIVED_CELLS = 8
 _ARRIVED_SHARE = 0.05
 _MUCH_CELLS = 20
@@ -47,8 +47,6 @@ _CLEAN_LOOKS = 2.5  # three of them, where frames are few
 _COMPACT_M = 2.2
 _WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
 _SURE_SQUARED_SIGMAS = 30.0
-_IDENTITY = np.eye(3)
-_FLOOR = _IDENTITY * _FLOOR_SIGMA_MPS**2
 _LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them is carved out
 
 
@@ -96,6 +94,24 @@ class Verdict:
     confidence: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reading:
+    """What the rules ask of T tracks. threshold: squared sigmas. speed_mps (T,) as filtered; least_mps (T,):
+    what is slower counts as static; significance (T,): squared sigmas of the filter's velocity; agreeing
+    (T,): ends that agree, 0 where they are too small a share. The velocity as filtered, of this frame's
+    fragments and of the surface; apart: the first less the last."""
+
+    threshold: float
+    speed_mps: FloatArray
+    least_mps: FloatArray
+    significance: FloatArray
+    agreeing: FloatArray
+    filtered: Split
+    own: Split
+    surface: Split
+    apart: Split
+
+
 def judge(
     seen: MotionEvidence,
     evidence: FloatArray,
@@ -104,75 +120,135 @@ def judge(
     settings: MotionSettings,
 ) -> Verdict:
     """Raise or lower the evidence of each track, and decide."""
-    threshold = settings.sigmas**2
-    speed = np.sqrt(np.square(seen.velocity).sum(axis=1))
-    least = settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m
-    significance = squared_sigmas(seen.velocity, seen.covariance)
-    filtered, own, surface, apart = _split_all(seen)
-    along, across, own_along, own_across = filtered.along, filtered.across, own.along, own.across
-    agreeing = np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0)
-    second = _second_opinion(seen, filtered, surface, apart)
-    enough = (agreeing >= _ENDS_ACROSS) | seen.restless
-    shown_across = (across > threshold) & (own_across > 0.5 * threshold)
-    by_fragments_across = shown_across & enough
-    by_fragments_across &= ~second.denies_across | (agreeing >= _ENDS_ALONG)
-    many = (own_along > 0.5 * threshold) & (agreeing >= _ENDS_ALONG) & ~second.denies_along
-    few = (agreeing >= 2) | seen.restless
-    shared = _SHARED_PROOF * threshold
-    by_fragments_along = ((along > threshold) & many) | (
-        (along > shared) & second.confirms_along & few & (own_along > _OWN_PROOF)
+    read = _read(seen, settings)
+    possible = (read.speed_mps <= _IMPLAUSIBLE * settings.max_speed_mps) & (seen.size_m <= _LARGEST_M)
+    evident = (
+        _by_fragments(seen, read)
+        | _by_unrest(seen, read)
+        | _by_arrival(seen, read)
+        | _by_surface(seen, read, dt_s)
     )
-    by_fragments_across |= (across > shared) & second.confirms_across & few & (own_across > _OWN_PROOF)
-    by_surface = _by_surface(seen, surface.along, surface.across, threshold, least, dt_s)
-    has_arrived = (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells)
-    by_arrival = has_arrived & (significance > 0.5 * threshold)
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
-    possible = (speed <= _IMPLAUSIBLE * settings.max_speed_mps) & (seen.size_m <= _LARGEST_M)
-    by_unrest = seen.restless & (seen.ends >= _ENDS_ALONG) & (significance > 0.5 * threshold)
-    evident = by_unrest | by_fragments_across | by_fragments_along | by_arrival | by_surface
-    rising = possible & ((evident & (speed > least)) | much) & seen.trusted
-    holding = moving & (speed > 0.6 * least) & ((significance > 4.0) | has_arrived)
-    own_speed = np.sqrt(np.square(seen.own_velocity).sum(axis=1))
-    own_sigma = np.sqrt(np.trace(seen.own_covariance, axis1=1, axis2=2))
-    stands = (own_speed < 0.6 * least) & (own_sigma < 0.5 * least) & (agreeing >= _ENDS_ACROSS)
-    # What one fragment alone shows is no proof, but no reason either to forget what more of them showed. Nor
-    # is it one that limbs do not agree, where hardly any of them stands still.
-    waiting = possible & (speed > least) & shown_across & (seen.agreement * seen.ends >= 2)
-    waiting |= seen.restless & ~moving
-    slowly = np.where(holding | waiting, dt_s / _HOLD_S, dt_s / _FALL_S)
-    falling = np.where(stands, dt_s / _STOP_S, slowly)
-    strength = np.minimum(np.maximum(along, across), np.maximum(own_along, own_across)) / threshold
-    pace = np.minimum(np.maximum(np.minimum(strength, agreeing / _ENDS_ACROSS), 1.0), _FASTEST)
-    rise_s = _RISE_S if seen.reckoned else _RISE_ALONE_S
-    rise = np.minimum(pace * dt_s / rise_s, _MOST_A_FRAME)
-    change = np.where(rising & ~stands, rise, -falling)
+    rising = possible & ((evident & (read.speed_mps > read.least_mps)) | much) & seen.trusted
+    stands = _stands(seen, read)
+    kept = _holds(seen, read, moving) | (possible & _waits(seen, read)) | (seen.restless & ~moving)
+    falling = np.where(stands, dt_s / _STOP_S, np.where(kept, dt_s / _HOLD_S, dt_s / _FALL_S))
+    change = np.where(rising & ~stands, _rise(seen, read, dt_s), -falling)
     new_evidence = np.minimum(np.maximum(evidence + change, 0.0), _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
-    confidence = 1.0 - np.exp(-significance / _SURE_SQUARED_SIGMAS)
+    confidence = 1.0 - np.exp(-read.significance / _SURE_SQUARED_SIGMAS)
     return Verdict(new_evidence, new_moving, confidence)
 
 
-def _by_surface(
-    seen: MotionEvidence,
-    along: FloatArray,
-    across: FloatArray,
-    threshold: float,
-    least_mps: FloatArray,
-    dt_s: float,
-) -> NDArray[np.bool_]:
+def _read(seen: MotionEvidence, settings: MotionSettings) -> _Reading:
+    return _Reading(
+        settings.sigmas**2,
+        np.sqrt(np.square(seen.velocity).sum(axis=1)),
+        settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m,
+        squared_sigmas(seen.velocity, seen.covariance),
+        np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0),
+        *_split_all(seen),
+    )
+
+
+def _by_fragments(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
+    """(T,) whether filter and fragments show a velocity that the surface does not deny, or that it shares."""
+    second = _second_opinion(read)
+    many = read.agreeing >= _ENDS_ALONG
+    across = _shown_across(read) & ((read.agreeing >= _ENDS_ACROSS) | seen.restless)
+    across &= ~second.denies_across | many
+    along = (read.filtered.along > read.threshold) & (read.own.along > 0.5 * read.threshold)
+    along &= many & ~second.denies_along
+    few = (read.agreeing >= 2) | seen.restless
+    less = _SHARED_PROOF * read.threshold
+    shared = (read.filtered.along > less) & second.confirms_along & (read.own.along > _OWN_PROOF)
+    shared |= (read.filtered.across > less) & second.confirms_across & (read.own.across > _OWN_PROOF)
+    result: NDArray[np.bool_] = across | along | (shared & few)
+    return result
+
+
+def _shown_across(read: _Reading) -> NDArray[np.bool_]:
+    """(T,) whether filter and fragments say that it goes across the line of sight, however few these are."""
+    result: NDArray[np.bool_] = (read.filtered.across > read.threshold) & (
+        read.own.across > 0.5 * read.threshold
+    )
+    return result
+
+
+def _by_unrest(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
+    """(T,) whether many ends, by whatever each of them does, bear out the filter's velocity."""
+    result: NDArray[np.bool_] = (
+        seen.restless & (seen.ends >= _ENDS_ALONG) & (read.significance > 0.5 * read.threshold)
+    )
+    return result
+
+
+def _has_arrived(seen: MotionEvidence) -> NDArray[np.bool_]:
+    """(T,) whether some of the surface is where free space was seen."""
+    result: NDArray[np.bool_] = (seen.arrived >= _ARRIVED_CELLS) & (
+        seen.arrived >= _ARRIVED_SHARE * seen.cells
+    )
+    return result
+
+
+def _by_arrival(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
+    """(T,) whether what has arrived bears out the filter's velocity."""
+    result: NDArray[np.bool_] = _has_arrived(seen) & (read.significance > 0.5 * read.threshold)
+    return result
+
+
+def _holds(seen: MotionEvidence, read: _Reading, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(T,) movers that still go, though nothing new proves it."""
+    result: NDArray[np.bool_] = (
+        moving
+        & (read.speed_mps > 0.6 * read.least_mps)
+        & ((read.significance > _HOLDING_SQUARED_SIGMAS) | _has_arrived(seen))
+    )
+    return result
+
+
+def _waits(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
+    """(T,) what one fragment alone shows is no proof, but no reason either to forget what more of them
+    showed."""
+    result: NDArray[np.bool_] = (
+        (read.speed_mps > read.least_mps) & _shown_across(read) & (seen.agreement * seen.ends >= 2)
+    )
+    return result
+
+
+def _stands(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
+    """(T,) whether this frame's fragments are sure that it stands."""
+    speed = np.sqrt(np.square(seen.own_velocity).sum(axis=1))
+    sigma = np.sqrt(np.trace(seen.own_covariance, axis1=1, axis2=2))
+    result: NDArray[np.bool_] = (
+        (speed < 0.6 * read.least_mps) & (sigma < 0.5 * read.least_mps) & (read.agreeing >= _ENDS_ACROSS)
+    )
+    return result
+
+
+def _rise(seen: MotionEvidence, read: _Reading, dt_s: float) -> FloatArray:
+    """(T,) by how much one more frame of proof raises the evidence: the faster, the stronger it is."""
+    by_filter = np.maximum(read.filtered.along, read.filtered.across)
+    strength = np.minimum(by_filter, np.maximum(read.own.along, read.own.across)) / read.threshold
+    pace = np.minimum(np.maximum(np.minimum(strength, read.agreeing / _ENDS_ACROSS), 1.0), _FASTEST)
+    result: FloatArray = np.minimum(
+        pace * dt_s / (_RISE_S if seen.reckoned else _RISE_ALONE_S), _MOST_A_FRAME
+    )
+    return result
+
+
+def _by_surface(seen: MotionEvidence, read: _Reading, dt_s: float) -> NDArray[np.bool_]:
     """(T,) whether the centre of a whole, compact surface moves too long and too clearly for an accident.
 
-    along, across (T,): its squared sigmas. A new viewpoint shows other sides of a thing that stands still,
-    so its centre wanders with the view, and it wanders while more and more of it comes to be seen: that much
-    speed proves nothing.
+    A new viewpoint shows other sides of a thing that stands still, so its centre wanders with the view, and
+    it wanders while more and more of it comes to be seen: that much speed proves nothing.
     """
     speed = np.sqrt(np.square(seen.surface_velocity).sum(axis=1))
     looks_s = _CLEAN_LOOKS * dt_s
-    clear = ((across > threshold) & (seen.clean_s >= max(_CLEAN_ACROSS_S, looks_s))) | (
-        (along > threshold) & (seen.clean_s >= max(_CLEAN_ALONG_S, looks_s))
-    )
+    clear = (read.surface.across > read.threshold) & (seen.clean_s >= max(_CLEAN_ACROSS_S, looks_s))
+    clear |= (read.surface.along > read.threshold) & (seen.clean_s >= max(_CLEAN_ALONG_S, looks_s))
     wander = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps
-    result: NDArray[np.bool_] = clear & (seen.size_m <= _COMPACT_M) & (speed > least_mps + wander)
+    result: NDArray[np.bool_] = clear & (seen.size_m <= _COMPACT_M) & (speed > read.least_mps + wander)
     return result
 
 
@@ -186,35 +262,18 @@ class _SecondOpinion:
     confirms_across: NDArray[np.bool_]
 
 
-def _second_opinion(seen: MotionEvidence, fragments: Split, surface: Split, apart: Split) -> _SecondOpinion:
-    """fragments, surface: of the two velocities; apart: of the one less the other."""
-    limit = _CONTRADICTION_SIGMAS**2
-    denies_along = np.square(apart.value) > limit * apart.variance
+def _second_opinion(read: _Reading) -> _SecondOpinion:
+    surface, fragments = read.surface, read.filtered
+    denied, least = _CONTRADICTION_SIGMAS**2, _CONFIRMING_SIGMAS**2
+    denies_along = np.square(read.apart.value) > denied * read.apart.variance
     same_way = surface.value * fragments.value > 0
-    least = _CONFIRMING_SIGMAS**2
     same_side = (fragments.rest * surface.rest).sum(axis=1) > 0
     return _SecondOpinion(
         denies_along,
-        apart.across > limit,
+        read.apart.across > denied,
         (surface.along > least) & same_way & ~denies_along,
         (surface.across > least) & same_side,
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Split:
-    """A velocity along the line of sight and across. value, variance (..., T): the component along it; rest
-    (..., T, 3): what is left. along, across (..., T): squared distance from zero in sigmas, of either."""
-
-    value: FloatArray
-    variance: FloatArray
-    rest: FloatArray
-    along: FloatArray
-    across: FloatArray
-
-    def __getitem__(self, k: int) -> Split:
-        """Of the first axis, entry k."""
-        return Split(self.value[k], self.variance[k], self.rest[k], self.along[k], self.across[k])
 
 
 def _split_all(seen: MotionEvidence) -> tuple[Split, Split, Split, Split]:
@@ -229,28 +288,3 @@ def _split_all(seen: MotionEvidence) -> tuple[Split, Split, Split, Split]:
     covariance[3] = seen.covariance + seen.surface_covariance
     every = split(velocity, covariance, seen.sight)
     return every[0], every[1], every[2], every[3]
-
-
-def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray) -> Split:
-    """Of velocity (..., T, 3) with covariance (..., T, 3, 3), seen along sight (T, 3)."""
-    upright, level = sight[:, :, None], sight[:, None, :]
-    value = (velocity * sight).sum(axis=-1)
-    variance = (level @ covariance @ upright)[..., 0, 0]
-    along = value * value / (variance + _FLOOR_SIGMA_MPS**2)
-    onto_sight = upright * level
-    onto = _IDENTITY - onto_sight
-    rest = velocity - value[..., None] * sight
-    doubt = onto @ covariance @ onto + (onto_sight + _FLOOR)
-    across = _squared_length(rest, doubt)
-    return Split(value, variance, rest, along, across)
-
-
-def squared_sigmas(velocity: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(T,) squared distance of velocity (T, 3) from zero in its own standard deviations."""
-    return _squared_length(velocity, covariance + _FLOOR)
-
-
-def _squared_length(vector: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(...,) of vector (..., 3) in sigmas of covariance (..., 3, 3)."""
-    result: FloatArray = (vector[..., None, :] @ inverse(covariance) @ vector[..., :, None])[..., 0, 0]
-    return result

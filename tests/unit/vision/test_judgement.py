@@ -14,7 +14,8 @@ import pytest
 
 from config.perception import MotionSettings
 from hal.types import FloatArray
-from vision.judgement import MotionEvidence, Verdict, judge, split, squared_sigmas
+from vision.judgement import MotionEvidence, Verdict, judge
+from vision.line_of_sight import split, squared_sigmas
 
 SETTINGS = MotionSettings(max_speed_mps=1.5, min_speed_mps=0.15, sigmas=4.0)
 DT_S = 0.05
