@@ -2,7 +2,7 @@
 
 Cells that have arrived, and cells around fragments that no static surface explains, are cut out and
 become tracks of their own. They are suspects only: without further evidence they go, and their cells
-fall back to what is around them.
+fall back to what is around them. A mover that has grown over what it walks along is cut back the same way.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def carve(
         measured.extent_m[:, 2]
         <= _COMPACT_M + 2.0 * depth_sigma_m(measured.position_m[:, 2], config.depth_noise)
     )
-    large = np.append(False, ~mover & ~compact)
+    labels = _cut_back(tracks, detection, labels, tracks.moving & ~compact, evidence, config)
+    large = np.zeros(len(tracks) + 1, np.bool_)
+    large[1 : len(mover) + 1] = ~mover & ~compact
     inside = large.take(labels)
     seeds = evidence & inside
     if not seeds.any():
@@ -74,14 +76,38 @@ def carve(
     own = number.take(parts)
     suspects = regions.measure(grid, own, len(keep))
     first = len(tracks)
-    tracks.start(
-        detection.pose.apply(suspects.position_m),
-        0.2,
-        config.motion.max_speed_mps,
-        SUSPECT_EVIDENCE,
-        detection.captured_ns,
-    )
+    _start(tracks, detection, suspects, SUSPECT_EVIDENCE, config)
     return np.where(own > 0, own + first, labels).astype(np.int32)
+
+
+def _cut_back(
+    tracks: Tracks,
+    detection: Detection,
+    labels: IntGrid,
+    overgrown: NDArray[np.bool_],
+    evidence: BoolGrid,
+    config: PerceptionConfig,
+) -> IntGrid:
+    """labels (h, w) where movers that have grown larger than any body, over furniture they walk along, keep
+    only what evidence (h, w) is of. The rest of each begins as a track that stands."""
+    for track in np.flatnonzero(overgrown).tolist():
+        own = labels == track + 1
+        widened = np.asarray(cv2.dilate((evidence & own).view(np.uint8), _BLOCK), np.uint8)
+        kept = widened.view(np.bool_) & own
+        rest = own & ~kept
+        if min(np.count_nonzero(kept), np.count_nonzero(rest)) < _MIN_CELLS:
+            continue
+        one = regions.measure(detection.grid, rest.astype(np.int32), 1)
+        _start(tracks, detection, one, 0.0, config)
+        labels = np.where(rest, np.int32(len(tracks)), labels)
+    return labels
+
+
+def _start(
+    tracks: Tracks, detection: Detection, measured: Regions, evidence: float, config: PerceptionConfig
+) -> None:
+    position_m = detection.pose.apply(measured.position_m)
+    tracks.start(position_m, 0.2, config.motion.max_speed_mps, evidence, detection.captured_ns)
 
 
 def _around_moving_fragments(

@@ -86,10 +86,32 @@ def test_a_few_cells_are_no_suspect() -> None:
     assert len(tracks) == 1
 
 
-@pytest.mark.parametrize(("moving", "evidence"), [(True, 1.0), (False, 0.2)])
-def test_nothing_is_cut_out_of_movers_and_suspects(moving: bool, evidence: float) -> None:
-    before, after = carve(one_track(moving, evidence), PERSON)
+def test_nothing_is_cut_out_of_suspects() -> None:
+    before, after = carve(one_track(False, 0.2), PERSON)
     assert after is before
+
+
+def test_a_mover_grown_over_a_wall_keeps_what_there_is_evidence_of() -> None:
+    tracks = one_track(True, 1.0)
+    before, after = carve(tracks, PERSON)
+    assert (after[PERSON] == 1).all()
+    assert np.count_nonzero(after == 1) <= np.count_nonzero(block((19, 51), (29, 43)))  # one cell around
+    assert (after[(before == 1) & (after != 1)] == 2).all()
+    assert tracks.moving.tolist() == [True, False]
+    assert tracks.evidence.tolist() == [1.0, 0.0]  # the wall has to prove its motion itself
+
+
+def test_a_mover_as_large_as_a_body_is_not_cut_back() -> None:
+    body = plate(4.0, (-0.7, 0.7), (-0.8, 0.8))
+    before, after = carve(one_track(True, 1.0), PERSON, body, body > 0.0)
+    assert after is before
+
+
+def test_a_mover_without_evidence_in_this_frame_is_not_cut_back() -> None:
+    tracks = one_track(True, 1.0)
+    _, after = carve(tracks, block((20, 21), (30, 31)))  # nine with those around: too few to go on with
+    assert (after == 1).all()
+    assert len(tracks) == 1
 
 
 def test_nothing_is_cut_out_of_something_compact() -> None:
