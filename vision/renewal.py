@@ -146,7 +146,10 @@ class Renewal:
         wanted = (lengths_px(snapped) >= _MIN_END_DISTANCE_PX) & _not_taken(snapped, ends_px, grey.shape)
         snapped, tensor = snapped[wanted], tensor[wanted]
         shares = np.array([0.0, 0.25, 0.5, 0.75, 1.0], np.float32)
-        along = snapped[:, :1] + (snapped[:, 1:] - snapped[:, :1]) * shares[:, None]
+        along = np.empty((len(snapped), len(shares), 2), np.float32)
+        for k in (0, 1):
+            begin, end = snapped[:, :1, k], snapped[:, 1:, k]
+            along[..., k] = begin + (end - begin) * shares
         surface = surface_depth(
             frame.depth,
             frame.depth_scale_m,

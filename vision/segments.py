@@ -59,10 +59,15 @@ def snap_to_corners(
     uu, uv, vv = (part.ravel().take(index) for part in tensor)
     best = smaller_eigenvalue(uu, uv, vv).argmax(axis=1)
     side = len(reach)
-    snapped = np.stack((column + best % side - _SNAP_PX, row + best // side - _SNAP_PX), axis=1)
-    each = np.arange(len(best))
-    at_best = np.stack((uu[each, best], uv[each, best], vv[each, best]), axis=1)
-    return snapped.astype(np.float32).reshape(-1, 2, 2), at_best.reshape(-1, 2, 3)
+    down = best // side
+    snapped = np.empty((len(best), 2), np.float32)
+    snapped[:, 0] = column + (best - down * side) - _SNAP_PX
+    snapped[:, 1] = row + down - _SNAP_PX
+    at_best = np.empty((len(best), 3), np.float32)
+    place = np.arange(len(best)) * around.size + best
+    for entry, part in enumerate((uu, uv, vv)):
+        part.take(place, out=at_best[:, entry])
+    return snapped.reshape(-1, 2, 2), at_best.reshape(-1, 2, 3)
 
 
 def _structure(grey: GreyImage) -> tuple[FloatImage, FloatImage, FloatImage]:
