@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
+from hal.types import FloatArray
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.obstacles import long_static
@@ -49,5 +50,6 @@ def adopt(
     best = np.where(agrees, off, np.inf).argmin(axis=1)
     track = there[np.arange(len(there)), best] - 1
     ids = np.where(agrees[:, :_ON_IT].any(axis=1), tracks.ids[track], -1)
-    still = long_static(detection.motion, detection.age_frames)
+    age_s: FloatArray = np.multiply(detection.age_frames, detection.dt_s, dtype=np.float64)
+    still = long_static(detection.motion, age_s)
     return np.where(still & tracks.moving[track] & (ids != owner), -1, ids)

@@ -24,7 +24,7 @@ _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start 
 _INDEPENDENT_DEPTHS = 10.0  # depth noise is shared by neighbours: a body never has more looks than these
 _STATIC_END_CHI2 = 6.0
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
-_LONG_FRAMES = 8  # about as many as the window of time holds in which motion is measured
+_LONG_S = 0.26  # about the window of time in which motion is measured
 _NEAR_M = 0.5
 _VELOCITY_GATE_MPS = 0.5
 
@@ -161,10 +161,11 @@ def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDAr
     return result
 
 
-def long_static(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(N,) fragments seen for a while, both of whose ends are where something static would be."""
+def long_static(motion: PointMotion, age_s: FloatArray) -> NDArray[np.bool_]:
+    """(N,) fragments seen for a while, age_s (N,), both of whose ends are where something static would be."""
     still = (motion.usable & (motion.static_chi2 <= _STATIC_END_CHI2)).reshape(-1, 2)
-    return still[:, 0] & still[:, 1] & (age_frames >= _LONG_FRAMES)
+    result: NDArray[np.bool_] = still[:, 0] & still[:, 1] & (age_s >= _LONG_S)
+    return result
 
 
 def cluster(

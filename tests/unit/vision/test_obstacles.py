@@ -57,7 +57,7 @@ def test_an_end_that_is_not_usable_says_nothing() -> None:
 
 def test_long_static_are_those_whose_ends_have_both_lain_still_for_a_while() -> None:
     motion = two_ends((NAN, NAN), (True, True))
-    old, young = np.array([8]), np.array([7])
+    old, young = np.array([0.27]), np.array([0.24])
     assert not long_static(motion, old)[0]
     still = replace(motion, static_chi2=np.array([6.0, 0.5]))
     assert long_static(still, old)[0]

@@ -49,8 +49,11 @@ def test_a_walker_whose_head_is_above_the_image_still_tells_how_fast_he_goes() -
     np.testing.assert_allclose(walker.velocity_mps, [SPEED_MPS, 0.0, 0.0], atol=0.12)
 
 
-def owner_of_a_fragment(speed_mps: float, age_frames: int, static_chi2: float) -> int:
-    """Which obstacle gets a fragment that comes to lie on the only one there is, after it went so fast."""
+def owner_of_a_fragment(speed_mps: float, age_frames: int, static_chi2: float, dt_s: float = FRAME_S) -> int:
+    """Which obstacle gets a fragment that comes to lie on the only one there is, after it went so fast.
+
+    dt_s: between the frames that the fragment has been seen in.
+    """
     tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
     for k in range(25):
         x_m = -0.9 + speed_mps * k * FRAME_S
@@ -64,6 +67,7 @@ def owner_of_a_fragment(speed_mps: float, age_frames: int, static_chi2: float) -
                 ends_px=np.array([[[u, CAMERA.cy], [u, CAMERA.cy + 20.0]]], np.float32),
                 near_m=np.full((1, 2), 4.0, np.float32),
                 age_frames=np.array([age_frames], np.intp),
+                dt_s=dt_s,
                 motion=motion,
             )
         percept = tracker.step(seen, None)
@@ -76,6 +80,13 @@ def test_a_line_that_has_long_lain_still_is_no_part_of_a_mover_that_comes_by() -
     assert owner_of_a_fragment(SPEED_MPS, 7, 1.0) > 0  # too young to tell
     assert owner_of_a_fragment(SPEED_MPS, 8, 6.5) > 0  # has not lain still
     assert owner_of_a_fragment(0.0, 8, 1.0) > 0  # what stands has such lines
+
+
+def test_how_long_a_line_has_lain_still_is_a_matter_of_time_not_of_frames() -> None:
+    assert owner_of_a_fragment(SPEED_MPS, 2, 1.0, 0.2) == -1
+    assert owner_of_a_fragment(SPEED_MPS, 1, 1.0, 0.2) > 0
+    assert owner_of_a_fragment(SPEED_MPS, 16, 1.0, 1.0 / 60.0) == -1
+    assert owner_of_a_fragment(SPEED_MPS, 15, 1.0, 1.0 / 60.0) > 0
 
 
 def test_a_surface_that_stands_is_listed_from_the_third_sight_on_and_never_moves() -> None:
