@@ -18,17 +18,13 @@ _STATIC_SCORE = 0.5
 
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
-    """The tracks seen often enough, in the camera axes of the detection.
-
-    What moves has been seen in two places: there is no need to wait for a third look.
-    """
+    """The tracks seen often enough, in the camera axes of the detection."""
     pose = detection.pose
     local = (tracks.state[:, :3] - pose.translation_m) @ pose.rotation
     velocity = tracks.state[:, 3:] @ pose.rotation
     covariance = pose.rotation.T @ tracks.covariance[:, 3:, 3:] @ pose.rotation
     unseen_s: FloatArray = np.multiply(detection.captured_ns - tracks.seen_ns, 1e-9, dtype=np.float64)
-    known = (tracks.sightings >= MIN_SIGHTINGS) | tracks.moving
-    listed = known & (local[:, 2] > 0.0) & _expected(tracks, unseen_s)
+    listed = (tracks.sightings >= MIN_SIGHTINGS) & (local[:, 2] > 0.0) & _expected(tracks, unseen_s)
     bbox, unseen = tracks.bbox_px, unseen_s != 0.0
     # A mover that is out of sight, but for a sliver, is where it goes, whole, and not where its rest is seen.
     whole = tracks.moving & (unseen | tracks.sliver)

@@ -46,13 +46,6 @@ def test_a_track_is_listed_from_its_third_sight_on() -> None:
     np.testing.assert_allclose(one.position_m, BEFORE_ME)
 
 
-def test_a_mover_is_listed_as_soon_as_it_is_known_for_one() -> None:
-    made = tracks(BEFORE_ME, sightings=2)
-    made.moving[0] = True
-    (one,) = report.obstacles(made, now())
-    assert one.moving
-
-
 @pytest.mark.parametrize(("unseen_s", "listed"), [(0.03, True), (0.14, True), (0.17, False)])
 def test_a_track_that_is_not_seen_is_listed_for_0_15_s(unseen_s: float, listed: bool) -> None:
     found = report.obstacles(tracks(BEFORE_ME, unseen_s=unseen_s), now())
