@@ -1,0 +1,168 @@
+"""What cannot be relied on leads to a stop that says why."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.decide import Action, Decision
+from controller.path import OnPath
+from hal.types import PlanarPose
+from tests.support.deciding import AGE_NS, PATH, STEP_NS, Bench, obstacle
+from vision.scene import CameraCondition, CameraHealth, Obstacle
+
+
+def stops(decision: Decision, rule: str, word: str) -> bool:
+    return (
+        decision.target_speed_mps == 0.0
+        and decision.action is Action.DECREASE
+        and decision.reason.rule == rule
+        and word in decision.reason.sentence
+    )
+
+
+def test_no_scene_no_motion() -> None:
+    assert stops(Bench().step(None), "camera", "no scene yet")
+
+
+def test_a_stale_scene_stops() -> None:
+    bench = Bench()
+    scene = bench.scene()
+    assert bench.step(scene).target_speed_mps > 0.0
+    for _ in range(13):
+        decision = bench.step(scene)
+    assert stops(decision, "camera", "0.34 s old")
+    assert bench.step(bench.scene()).reason.rule != "camera"
+
+
+def test_an_untrustworthy_camera_stops() -> None:
+    bench = Bench()
+    bench.settle()
+    blind = CameraHealth(CameraCondition.UNTRUSTWORTHY, "lens covered", 0.0)
+    assert stops(bench.step(bench.scene(health=blind)), "camera", "lens covered")
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        replace(obstacle(5.0, 0.0), position_m=np.array([math.nan, 0.0, 3.0])),
+        replace(obstacle(5.0, 0.0), velocity_mps=np.array([0.0, math.inf, 3.0])),
+        replace(obstacle(5.0, 0.0), extent_m=np.array([1e9, 1.0, 1.0])),
+    ],
+)
+def test_an_impossible_obstacle_stops(broken: Obstacle) -> None:
+    bench = Bench()
+    bench.settle()
+    assert stops(bench.step(bench.scene(broken)), "camera", "obstacle 5 is impossible")
+
+
+def test_scenes_out_of_order_stop() -> None:
+    bench = Bench()
+    old = bench.scene(age_ns=AGE_NS + 40_000_000)
+    bench.step(bench.scene())
+    assert stops(bench.step(old), "camera", "went back by 0.040 s")
+
+
+def test_a_scene_from_the_future_stops() -> None:
+    bench = Bench()
+    assert stops(bench.step(bench.scene(age_ns=-100_000_000)), "camera", "from the future")
+
+
+def test_time_going_backwards_stops() -> None:
+    bench = Bench()
+    bench.settle()
+    bench.now_ns -= 500_000_000
+    assert stops(bench.step(bench.scene()), "fault", "time went back by 0.480 s")
+
+
+@pytest.mark.parametrize(
+    ("x_m", "d_m", "v_mps", "a_mps2", "word"),
+    [
+        (math.nan, 0.0, 1.0, 0.0, "where the robot is"),
+        (1.0, 0.8, 1.0, 0.0, "0.80 m beside its path"),
+        (1.0, 0.0, -0.2, 0.0, "moves backwards at 0.20 m/s"),
+        (1.0, 0.0, 1.0, math.inf, "how fast"),
+        (1.0, 0.0, math.nan, 0.0, "how fast"),
+    ],
+)
+def test_an_unknown_state_stops(x_m: float, d_m: float, v_mps: float, a_mps2: float, word: str) -> None:
+    bench = Bench()
+    bench.settle()
+    decision = bench.step(bench.scene(), v_mps, a_mps2, x_m=x_m, d_m=d_m)
+    assert decision.target_speed_mps == 0.0
+    assert decision.reason.rule == "fault"
+    assert word in decision.reason.sentence
+
+
+def test_without_a_pose_in_the_scene_the_own_history_serves() -> None:
+    bench = Bench()
+    for _ in range(10):
+        bench.step(replace(bench.scene(obstacle(5.0, 0.0)), robot_pose=None), 1.5)
+    assert bench.step(replace(bench.scene(obstacle(5.0, 0.0)), robot_pose=None), 1.5).reason.distance_m == (
+        pytest.approx(4.39)
+    )
+
+
+def test_a_blind_camera_teaches_nothing() -> None:
+    """A frozen picture shows the person where he was: he is reckoned with where he would be by now."""
+    bench = Bench()
+    person = obstacle(7.0, 0.0, vx_mps=-1.0)
+    for _ in range(20):
+        bench.step(bench.scene(person), 0.5)
+    blind = CameraHealth(CameraCondition.UNTRUSTWORTHY, "frozen", 0.9)
+    for _ in range(100):
+        decision = bench.step(bench.scene(person, health=blind), 0.5)
+    assert decision.target_speed_mps == 0.0
+    assert decision.emergency
+    seen = bench.step(bench.scene(obstacle(5.0, 0.0, vx_mps=-1.0)), 0.5)
+    assert seen.target_speed_mps < 0.5
+
+
+def test_the_pose_and_the_place_on_the_path_are_each_needed() -> None:
+    nowhere = PlanarPose(math.nan, 0.0, 0.0)
+    for pose, on_path, word in (
+        (nowhere, OnPath(1.0, 0.0, 0.0), "where the robot is is not known"),
+        (PlanarPose(1.0, 0.0, 0.0), OnPath(1.0, math.nan, 0.0), "where the robot is on its path"),
+    ):
+        bench = Bench()
+        bench.settle()
+        bench.now_ns += STEP_NS
+        decision = bench.maker.step(bench.scene(), PATH, pose, on_path, 1.0, 0.0, bench.now_ns)
+        assert stops(decision, "fault", word)
+
+
+def test_rolling_back_a_little_is_standing() -> None:
+    """Less than 0.05 m/s backwards: noise of encoders, or the ground gives."""
+    decision = Bench().settle(v_mps=-0.04)
+    assert decision.reason.rule == "free"
+    assert decision.target_speed_mps == 1.5
+
+
+def test_the_first_scene_lets_the_robot_go_at_once() -> None:
+    bench = Bench()
+    for _ in range(50):
+        assert bench.step(None, 0.0).target_speed_mps == 0.0
+    assert bench.step(bench.scene(), 0.0).target_speed_mps == 1.5
+
+
+@pytest.mark.parametrize("v_mps", [1.0, math.nan])
+def test_after_a_fault_the_speed_comes_back_as_after_an_obstacle(v_mps: float) -> None:
+    bench = Bench()
+    bench.settle(v_mps=1.0)
+    assert bench.step(bench.scene(), v_mps, d_m=0.0 if math.isnan(v_mps) else 0.8).reason.rule == "fault"
+    decision = bench.step(bench.scene(), 1.0)
+    assert decision.reason.rule != "fault"
+    assert decision.target_speed_mps <= 1.0
+
+
+def test_a_fault_ends_being_stuck() -> None:
+    bench = Bench()
+    for _ in range(10):
+        before = bench.step(bench.scene(obstacle(1.2, 0.0)), 0.0)
+    assert bench.step(bench.scene(obstacle(1.2, 0.0)), 0.0, d_m=0.8).stuck_since_ns is None
+    after = bench.step(bench.scene(obstacle(1.2, 0.0)), 0.0)
+    assert before.stuck_since_ns is not None
+    assert after.stuck_since_ns == bench.now_ns
