@@ -64,12 +64,16 @@ def test_what_may_be_driven_beside_somebody_may_be_started_beside_them() -> None
 
 
 def test_hard_braking_lasts_until_the_speed_is_what_is_allowed() -> None:
-    """Too near at 1.5 m/s; at 1.2 m/s comfort would do again, but 1.2 is still more than what is allowed."""
+    """1.39 m ahead: comfort keeps 0.45 m from 0.62 m/s on, and 0.2 m from 0.72 m/s: only beyond that it is
+    too late for comfort."""
+    crate = obstacle(2.0, 0.0)
+    assert not Bench().settle(crate, v_mps=0.69).emergency
     bench = Bench()
-    assert bench.settle(obstacle(4.0, 0.0), v_mps=1.5).emergency
-    allowed = bench.step(bench.scene(obstacle(4.0, 0.0)), 1.5).target_speed_mps
-    assert bench.step(bench.scene(obstacle(4.0, 0.0)), allowed + 0.1).emergency
-    assert not bench.step(bench.scene(obstacle(4.0, 0.0)), allowed + 0.03).emergency
+    assert bench.settle(crate, v_mps=0.9).emergency
+    braking = bench.step(bench.scene(crate), 0.69)
+    assert braking.target_speed_mps == pytest.approx(0.623, abs=0.002)
+    assert braking.emergency
+    assert not bench.step(bench.scene(crate), 0.66).emergency
 
 
 def test_who_stands_does_not_brake_hard() -> None:
