@@ -108,13 +108,10 @@ class DecisionMaker:
         v = v_mps if math.isfinite(v_mps) else 0.0
         self._gate.step(0.0, v, 0.0, now_ns)
         self._stuck_since_ns = None
-        moving = abs(v) > STANDING_MPS
-        return Decision(
-            Action.DECREASE if moving else Action.KEEP,
-            0.0,
-            Reason("fault", f"{fault}: stop"),
-            self._emergency,
-        )
+        reason = Reason("fault", f"{fault}: stop")
+        self._last = Limit(0.0, reason)
+        action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
+        return Decision(action, 0.0, reason, self._emergency)
 
     def _knowledge(self, path: Path, on_path: OnPath) -> Knowledge:
         if self._known is None or path is not self._path:

@@ -105,6 +105,17 @@ def test_the_target_is_reported_when_it_is_near() -> None:
     assert decision.reason.rule == "target"
     assert decision.action is Action.KEEP
     assert decision.reason.distance_m == pytest.approx(1.5)
+    # A comfort stop from 0.9 m/s: v^2 / 0.6 + 0.25 v.
+    assert decision.reason.required_m == pytest.approx(1.575)
+    assert decision.reason.margin_m == pytest.approx(-0.075)
+
+
+def test_beyond_the_target_it_is_not_ahead() -> None:
+    bench = Bench()
+    decision = bench.step(bench.scene(x_m=30.1), 0.1, x_m=30.1)
+    assert decision.target_speed_mps == 0.0
+    assert decision.reason.sentence.startswith("the target is 0.00 m ahead")
+    assert decision.reason.distance_m == pytest.approx(-0.1)
 
 
 def test_a_slow_section_is_a_reason() -> None:

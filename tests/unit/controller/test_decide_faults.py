@@ -83,6 +83,7 @@ def test_time_going_backwards_stops() -> None:
     [
         (math.nan, 0.0, 1.0, 0.0, "where the robot is"),
         (1.0, 0.8, 1.0, 0.0, "0.80 m beside its path"),
+        (1.0, -0.8, 1.0, 0.0, "0.80 m beside its path"),
         (1.0, 0.0, -0.2, 0.0, "moves backwards at 0.20 m/s"),
         (1.0, 0.0, 1.0, math.inf, "how fast"),
         (1.0, 0.0, math.nan, 0.0, "how fast"),
@@ -148,14 +149,49 @@ def test_the_first_scene_lets_the_robot_go_at_once() -> None:
     assert bench.step(bench.scene(), 0.0).target_speed_mps == 1.5
 
 
-@pytest.mark.parametrize("v_mps", [1.0, math.nan])
-def test_after_a_fault_the_speed_comes_back_as_after_an_obstacle(v_mps: float) -> None:
+@pytest.mark.parametrize(("v_mps", "d_m"), [(math.nan, 0.0), (1.0, 0.8), (1.0, -0.8)])
+def test_after_a_fault_the_speed_comes_back_as_after_an_obstacle(v_mps: float, d_m: float) -> None:
     bench = Bench()
     bench.settle(v_mps=1.0)
-    assert bench.step(bench.scene(), v_mps, d_m=0.0 if math.isnan(v_mps) else 0.8).reason.rule == "fault"
+    fault = bench.step(bench.scene(), v_mps, d_m=d_m).reason
+    assert fault.rule == "fault"
     decision = bench.step(bench.scene(), 1.0)
-    assert decision.reason.rule != "fault"
-    assert decision.target_speed_mps <= 1.0
+    assert decision.target_speed_mps == 0.0
+    assert decision.reason.rule == "release"
+    assert decision.reason.sentence == f"not yet faster after: {fault.sentence}"
+
+
+def test_a_fault_at_rest_is_no_turn_to_slower() -> None:
+    """It goes again after delay_s, not after hold_s."""
+    bench = Bench()
+    bench.settle(v_mps=0.0)
+    fault = bench.step(bench.scene(), math.nan)
+    assert fault.action is Action.KEEP
+    for _ in range(16):
+        decision = bench.step(bench.scene(), 0.0)
+    assert decision.target_speed_mps == 1.5
+
+
+def test_rolling_back_is_slowed_down() -> None:
+    bench = Bench()
+    bench.settle()
+    assert bench.step(bench.scene(), -0.2).action is Action.DECREASE
+
+
+def test_the_same_moment_twice_is_no_fault() -> None:
+    bench = Bench()
+    bench.settle()
+    bench.now_ns -= STEP_NS
+    assert bench.step(bench.scene()).reason.rule == "free"
+
+
+def test_who_waits_for_the_camera_is_not_stuck() -> None:
+    bench = Bench()
+    scene = bench.scene()
+    for _ in range(20):
+        decision = bench.step(scene, 0.0)
+    assert decision.reason.rule == "camera"
+    assert decision.stuck_since_ns is None
 
 
 def test_a_fault_ends_being_stuck() -> None:

@@ -59,8 +59,9 @@ def test_it_does_not_creep_up_to_what_blocks_the_way() -> None:
 
 def test_what_may_be_driven_beside_somebody_may_be_started_beside_them() -> None:
     """Whose lane is kept for the moment at 0.35 m/s: nothing that the robot would creep up to."""
-    comes = obstacle(1.6, 0.9, vx_mps=-1.0, age_s=0.6)
-    assert Bench().settle(comes, v_mps=0.0).target_speed_mps == pytest.approx(0.35)
+    decision = Bench().settle(obstacle(1.6, 0.9, vx_mps=-1.0, age_s=0.6), v_mps=0.0)
+    assert decision.target_speed_mps == pytest.approx(0.35)
+    assert decision.stuck_since_ns is None
 
 
 def test_hard_braking_lasts_until_the_speed_is_what_is_allowed() -> None:
@@ -79,6 +80,7 @@ def test_hard_braking_lasts_until_the_speed_is_what_is_allowed() -> None:
 def test_who_stands_does_not_brake_hard() -> None:
     assert Bench().settle(obstacle(0.9, 0.0), v_mps=0.2).emergency
     assert not Bench().settle(obstacle(0.9, 0.0), v_mps=0.0).emergency
+    assert not Bench().settle(obstacle(1.2, 0.0, vx_mps=-1.0), v_mps=0.0).emergency
 
 
 def test_held_back_it_says_by_what() -> None:
@@ -180,3 +182,40 @@ def test_the_range_is_for_the_emergency_stop_or_for_comfort(caps: bool) -> None:
     v, tau = decision.target_speed_mps, 0.22 + 0.08
     distance_m = v * v / (2 * a) + (a / (2 * j) + tau + 1.5 / a) * v + 1.5 * (tau + a / j) + 0.2
     assert distance_m == pytest.approx(7.94)
+
+
+def test_hard_braking_lasts_on_a_slow_section_too() -> None:
+    """What it braked for has gone, but 0.9 m/s are still more than the section allows."""
+    slow = Path(PathSpec(segments=(LineSpec(kind="line", length_m=30.0, max_speed_mps=0.4),)), Robot())
+    bench = Bench()
+    for _ in range(20):
+        assert bench.step(bench.scene(obstacle(1.6, 0.0)), 0.9, path=slow).target_speed_mps < 0.9
+    assert bench.step(bench.scene(), 0.9, path=slow).emergency
+    assert not bench.step(bench.scene(), 0.42, path=slow).emergency
+
+
+def test_what_is_braked_away_needs_no_release_until_it_is_let_go_of() -> None:
+    """Within hold_s nothing turns round; but at -0.3 m/s2 letting go, at 0.6 m/s3, leaves 0.9 - 0.075 m/s."""
+    bench = Bench()
+    bench.settle(v_mps=1.2)
+    bench.settle(obstacle(2.5, 0.0), v_mps=1.2)
+    for _ in range(20):
+        decision = bench.step(bench.scene(), 0.9, -0.3)
+    assert decision.target_speed_mps == pytest.approx(0.825)
+
+
+def test_whether_it_can_pass_first_is_reckoned_at_the_speed_that_the_section_allows() -> None:
+    crosses = obstacle(1.4, 2.6, vy_mps=-0.55)
+    slow = Path(PathSpec(segments=(LineSpec(kind="line", length_m=30.0, max_speed_mps=0.35),)), Robot())
+    assert Bench().settle(crosses, v_mps=1.5).target_speed_mps == 1.5
+    bench = Bench()
+    for _ in range(20):
+        decision = bench.step(bench.scene(crosses), 0.35, path=slow)
+    assert decision.reason.obstacle_id == 5
+    assert decision.target_speed_mps < 0.35
+
+
+def test_the_last_of_a_stop_is_still_slowing_down() -> None:
+    """Within the band of keep, but not yet at rest."""
+    assert Bench().settle(obstacle(1.2, 0.0), v_mps=0.025).action is Action.DECREASE
+    assert Bench().settle(obstacle(1.2, 0.0), v_mps=0.0).action is Action.KEEP
