@@ -217,5 +217,5 @@ def test_whether_it_can_pass_first_is_reckoned_at_the_speed_that_the_section_all
 
 def test_the_last_of_a_stop_is_still_slowing_down() -> None:
     """Within the band of keep, but not yet at rest."""
-    assert Bench().settle(obstacle(1.2, 0.0), v_mps=0.025).action is Action.DECREASE
-    assert Bench().settle(obstacle(1.2, 0.0), v_mps=0.0).action is Action.KEEP
+    assert Bench().settle(obstacle(0.9, 0.0), v_mps=0.025).action is Action.DECREASE
+    assert Bench().settle(obstacle(0.9, 0.0), v_mps=0.0).action is Action.KEEP
