@@ -83,7 +83,7 @@ def test_time_going_backwards_stops() -> None:
     [
         (math.nan, 0.0, 1.0, 0.0, "where the robot is"),
         (1.0, 0.8, 1.0, 0.0, "0.80 m beside its path"),
-        (1.0, -0.8, 1.0, 0.0, "0.80 m beside its path"),
+        (1.0, -0.8, 1.0, 0.0, "is 0.80 m beside its path"),
         (1.0, 0.0, -0.2, 0.0, "moves backwards at 0.20 m/s"),
         (1.0, 0.0, 1.0, math.inf, "how fast"),
         (1.0, 0.0, math.nan, 0.0, "how fast"),
