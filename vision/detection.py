@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.types import FloatArray, Intrinsics, Pose
+from hal.types import Intrinsics, Pose
 from vision.depth_grid import DepthGrid
 from vision.health import worsened
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
@@ -35,7 +35,6 @@ class Detection:
     age_frames: NDArray[np.intp]
     motion: PointMotion
     pose: Pose
-    pose_covariance: FloatArray
     ego_motion: EgoMotion
     health: CameraHealth
     restarted: bool

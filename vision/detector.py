@@ -132,7 +132,7 @@ class Detector:
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
         known = ego.source != "none" and not blurred
         detection = self._detection(
-            frame, grid, dt_s, motion, result.covariance, ego, health, False, known, prior.source != "none"
+            frame, grid, dt_s, motion, ego, health, False, known, prior.source != "none"
         )
         self._renew(frame, grey)
         if ego.source == "none":
@@ -171,7 +171,7 @@ class Detector:
         ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
         self._renew(frame, grey)
         motion = no_motion(2 * len(self._store))
-        detection = self._detection(frame, grid, 0.0, motion, np.eye(6), ego, health, True)
+        detection = self._detection(frame, grid, 0.0, motion, ego, health, True)
         self._commit(frame, grey, odometry)
         return detection
 
@@ -179,7 +179,7 @@ class Detector:
         """Nothing can be followed through this frame; the fragments wait for the next good one."""
         ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
         motion = no_motion(2 * len(self._store))
-        return self._detection(frame, grid, 0.0, motion, np.eye(6), ego, health, False)
+        return self._detection(frame, grid, 0.0, motion, ego, health, False)
 
     def _detection(
         self,
@@ -187,7 +187,6 @@ class Detector:
         grid: DepthGrid,
         dt_s: float,
         motion: PointMotion,
-        covariance: FloatArray,
         ego: EgoMotion,
         health: CameraHealth,
         restarted: bool,
@@ -207,7 +206,6 @@ class Detector:
             store.age_frames.copy(),
             motion,
             self._pose,
-            covariance,
             ego,
             health,
             restarted,

@@ -57,7 +57,6 @@ def detection(
         age_frames=np.empty(0, np.intp),
         motion=no_ends(),
         pose=pose,
-        pose_covariance=1e-8 * np.eye(6),
         ego_motion=EgoMotion(AT_ORIGIN, dt_s, "none" if first else source, 0.9, 0.001, 0.0005),
         health=GOOD,
         restarted=first,
