@@ -10,6 +10,7 @@ import pytest
 from config.decision import DecisionConfig, Prediction
 from config.robot import Body, Limits
 from controller import braking
+from controller.bodies import Bodies
 from controller.corridor import Corridor, course_of, place
 from controller.limits import Limit, Motion
 from controller.worst_case import WorstCase
@@ -20,6 +21,14 @@ LATENCY_S = 0.2
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 
 
+def asked(worst: WorstCase, body: Bodies, v_mps: float) -> Limit | None:
+    """Of a robot at 0 that drives v_mps and would go on so."""
+    placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
+    course = course_of(body, placed.heading_rad[:, 0])
+    motion = Motion(v_mps, 0.0, LATENCY_S)
+    return worst.limit(body, placed, course, np.array([True]), 0.0, motion, 0.0, v_mps)
+
+
 def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:
     """For a robot at its greatest speed with lo_m of free way to something that stands on it."""
     config = DecisionConfig(prediction=Prediction(confirm_s=confirm_s))
@@ -27,18 +36,7 @@ def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:
     body = box(0.0, 0.0, age_s=age_s, sigma_mps=0.0)
     at_zero_m = place(body, CORRIDOR, np.zeros(1), 0.0, 12.0).lo_m[0, 0]
     body = box(lo_m - at_zero_m, 0.0, age_s=age_s, sigma_mps=0.0)
-    placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
-    v_mps = LIMITS.max_speed_mps
-    return worst.limit(
-        body,
-        placed,
-        course_of(body, placed.heading_rad[:, 0]),
-        np.array([True]),
-        0.0,
-        Motion(v_mps, 0.0, LATENCY_S),
-        0.0,
-        v_mps,
-    )
+    return asked(worst, body, LIMITS.max_speed_mps)
 
 
 @pytest.mark.parametrize("confirm_s", [1.0, 2.0])
@@ -60,17 +58,7 @@ def beside(x_m: float, unseen_s: float) -> Limit | None:
     side, 0.75 m clear, and has not been seen for so long."""
     worst = WorstCase(DecisionConfig(), LIMITS)
     body = replace(box(x_m, 0.4 + 0.25 + 0.75, -0.9, 0.0, sigma_mps=0.15), unseen_s=np.array([unseen_s]))
-    placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
-    return worst.limit(
-        body,
-        placed,
-        course_of(body, placed.heading_rad[:, 0]),
-        np.array([True]),
-        0.0,
-        Motion(0.5, 0.0, LATENCY_S),
-        0.0,
-        0.5,
-    )
+    return asked(worst, body, 0.5)
 
 
 def test_who_is_out_of_sight_is_where_it_is_reckoned_only_as_well_as_its_speed_was_known() -> None:
