@@ -65,7 +65,8 @@ class WorstCase:
 
         placed: the bodies, since_s after their scene; its first times are times_s. enters (N,): whose motion
         as it was measured leads into the way. chosen_mps: what is driven if nothing happens; where that gets
-        through whatever they do, the robot need not be able to stop.
+        through whatever they do, the robot need not be able to stop. A robot that slows down to chosen_mps
+        anyway may still have to do so harder than it would: the limit is urgent then.
         """
         unsure_m = UNSEEN_SIGMAS * course.sigma_along_mps * bodies.unseen_s
         rows = placed.lo_m[:, 0] + unsure_m > s_m - ALONGSIDE_M
@@ -78,7 +79,7 @@ class WorstCase:
             return None
         young = bodies.age_s < self._config.prediction.confirm_s
         speed = self._speed(reached, young, enters[rows], s_m)
-        if speed >= min(chosen_mps, self._limits.max_speed_mps):
+        if speed >= min(chosen_mps, self._limits.max_speed_mps) and speed >= motion.v_mps:
             return None
         go = comfortable(self._limits, motion, np.array([chosen_mps]))
         if gets_through(go, s_m, self.times_s, reached):

@@ -21,12 +21,15 @@ LATENCY_S = 0.2
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 
 
-def asked(worst: WorstCase, body: Bodies, v_mps: float) -> Limit | None:
-    """Of a robot at 0 that drives v_mps and would go on so."""
+def asked(
+    worst: WorstCase, body: Bodies, v_mps: float, chosen_mps: float | None = None
+) -> Limit | None:
+    """Of a robot at 0 that drives v_mps, and would go on so if nothing else is chosen."""
     placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
     course = course_of(body, placed.heading_rad[:, 0])
     motion = Motion(v_mps, 0.0, LATENCY_S)
-    return worst.limit(body, placed, course, np.array([True]), 0.0, motion, 0.0, v_mps)
+    chosen_mps = v_mps if chosen_mps is None else chosen_mps
+    return worst.limit(body, placed, course, np.array([True]), 0.0, motion, 0.0, chosen_mps)
 
 
 def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:
@@ -73,3 +76,13 @@ def test_who_is_reckoned_to_be_beside_the_robot_may_still_be_ahead_of_it() -> No
     """Its near side 0.2 m behind the robot's front."""
     assert beside(0.5, 0.0) is None
     assert beside(0.5, 2.2) is not None
+
+
+def test_a_robot_that_stops_anyway_may_still_have_to_brake_harder() -> None:
+    """Somebody 1 m ahead of the front steps in; by comfort it would take 2.2 m from 1 m/s."""
+    worst = WorstCase(DecisionConfig(), LIMITS)
+    near = asked(worst, box(1.75, 0.8, 0.0, -0.8), 1.0, chosen_mps=0.0)
+    assert near is not None
+    assert near.urgent
+    # Where the stop that is driven anyway suffices, there is nothing to add.
+    assert asked(worst, box(6.0, 0.8, 0.0, -0.8), 1.0, chosen_mps=0.0) is None
