@@ -58,7 +58,10 @@ class Prediction(Section):
         description="past somebody near whose measured motion keeps clear of the swept width",
     )
     leader_decel_mps2: float = Field(
-        default=1.0, gt=0, le=10, description="how hard an obstacle driving ahead may brake"
+        default=0.35,
+        gt=0,
+        le=10,
+        description="how hard a leader is expected to brake; should it brake harder, so does the robot",
     )
     confirm_s: float = Field(
         default=0.15, ge=0, le=2, description="age before an obstacle counts, while there is room to wait"

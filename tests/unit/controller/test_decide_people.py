@@ -23,9 +23,18 @@ def test_an_oncoming_person_counts_with_closing_speed() -> None:
 
 
 def test_a_leader_is_followed() -> None:
-    decision = Bench().settle(obstacle(3.5, 0.0, vx_mps=0.8), v_mps=1.0)
+    decision = Bench().settle(obstacle(3.0, 0.0, vx_mps=0.8), v_mps=1.0)
     assert decision.reason.rule == "leader"
     assert 0.6 < decision.target_speed_mps < 1.2
+
+
+def test_a_leader_is_expected_to_brake_about_as_hard_as_the_robot_does() -> None:
+    """At its speed it is followed at 2 m; when it has stopped there, the robot brakes hard."""
+    behind = Bench().settle(obstacle(2.6, 0.0, vx_mps=1.0, sigma_mps=0.0), v_mps=1.0)
+    assert behind.action is not Action.DECREASE
+    stopped = Bench().settle(obstacle(2.6, 0.0), v_mps=1.0)
+    assert stopped.action is Action.DECREASE
+    assert stopped.emergency
 
 
 def test_a_crossing_person_is_given_way_by_slowing_a_little() -> None:
