@@ -6,14 +6,12 @@ from enum import Enum
 
 from hal.api import Chassis
 from hal.clocks import NS_PER_S
-from hal.types import ChassisMode, ChassisState, Setpoint
+from hal.types import LATCHED_MODES, ChassisMode, ChassisState, Setpoint
 
 # At rest by command for this long, so that the chassis has come to rest too.
 SETTLE_S = 0.5
 # A base that does not arm within this will not: say so instead of waiting for ever.
 ARM_TIMEOUT_S = 5.0
-
-_LATCHED = (ChassisMode.ESTOP, ChassisMode.LOST)
 
 
 class Outcome(Enum):
@@ -60,7 +58,7 @@ class Ending:
         assert self._started_ns is not None, "concluded before it began"
         if state.mode is ChassisMode.ARMED:
             self._was_armed = True
-        elif self._was_armed or state.mode in _LATCHED:
+        elif self._was_armed or state.mode in LATCHED_MODES:
             self._end(Outcome.CHASSIS_FAULT, state.reason, now_ns)
             return
         elif now_ns - self._started_ns > ARM_TIMEOUT_S * NS_PER_S:

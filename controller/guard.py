@@ -17,7 +17,7 @@ from hal.api import CanLink, Chassis
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.enclosing import Enclosing
 from hal.errors import LinkLost
-from hal.types import CanFrame, ChassisMode, ChassisState, Setpoint
+from hal.types import LATCHED_MODES, CanFrame, ChassisMode, ChassisState, Setpoint
 
 _TOLERANCE = 1e-6
 
@@ -190,7 +190,7 @@ class GuardedChassis(Enclosing):
             return state
         refusal = f"; arming refused: {self._refusal}" if self._refusal else ""
         reason = f"output guard: {self._violation}{refusal}"
-        if state.mode in (ChassisMode.ESTOP, ChassisMode.LOST):
+        if state.mode in LATCHED_MODES:
             return replace(state, reason=f"{reason}; {state.reason}")
         return replace(state, mode=ChassisMode.ESTOP, reason=reason)
 

@@ -65,6 +65,6 @@ class MissionResult:
         if self.last is None:
             self.started_ns = step.now_ns
         self.last = step
-        self.setpoints.add(step.chassis.sent)
+        self.setpoints.add(step.chassis.sent, step.chassis.mode)
         self.standstill.add(step.setpoint)
         self.shaper_faults.add(step.fault)

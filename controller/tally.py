@@ -9,7 +9,7 @@ import numpy as np
 
 from config.robot import Limits
 from hal.clocks import NS_PER_S
-from hal.types import Setpoint
+from hal.types import LATCHED_MODES, ChassisMode, Setpoint
 
 TOLERANCE = 1e-6
 
@@ -36,9 +36,15 @@ class SetpointTally:
     _last: Setpoint | None = None
     _steps: int = 0
 
-    def add(self, sent: Setpoint | None) -> None:
-        """What one control step sent, as the driver reports it; None and repeats of the last are nothing."""
+    def add(self, sent: Setpoint | None, mode: ChassisMode = ChassisMode.ARMED) -> None:
+        """What one control step sent, as the driver reports it; None and repeats of the last are nothing.
+
+        Nor is the zero of a driver that has latched: it stands for no profile, but for the base's own stop.
+        """
         self._steps += 1
+        if mode in LATCHED_MODES:
+            self._last = None
+            return
         if sent is None or (self._last is not None and sent.stamp_ns == self._last.stamp_ns):
             return
         self.count += 1

@@ -132,6 +132,10 @@ class ChassisMode(Enum):
     LOST = "lost"
 
 
+# Only a person's consent leads out of these.
+LATCHED_MODES = frozenset({ChassisMode.ESTOP, ChassisMode.LOST})
+
+
 @dataclass(frozen=True, slots=True)
 class ChassisState:
     """What is known of the chassis after one exchange.

@@ -174,7 +174,7 @@ def _drive(
             armed = moment.control.chassis.mode is ChassisMode.ARMED
             watch.step(t_s, armed)
             log.add(t_s, simulation.body_pose, watch.s_m, watch.v_mps, moment.control.decision)
-            log.setpoints.add(moment.control.chassis.sent)
+            log.setpoints.add(moment.control.chassis.sent, moment.control.chassis.mode)
             if watch.given_up:
                 break
         recorder.finish()

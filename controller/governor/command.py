@@ -50,7 +50,7 @@ class Governing:
         """Account for one control step."""
         self.first = self.first or step
         self.last = step
-        self.setpoints.add(step.chassis.sent)
+        self.setpoints.add(step.chassis.sent, step.chassis.mode)
         self.standstill.add(step.setpoint)
         self.shaper_faults.add(step.fault)
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from hal.clocks import NS_PER_MS, NS_PER_S
-from hal.types import ChassisMode
+from hal.types import LATCHED_MODES, ChassisMode
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class Arming:
     @property
     def latched(self) -> bool:
         """True where only arm() leads out."""
-        return self.mode in (ChassisMode.ESTOP, ChassisMode.LOST)
+        return self.mode in LATCHED_MODES
 
 
 def step(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:

@@ -29,10 +29,10 @@ def test_a_leader_is_followed() -> None:
 
 
 def test_a_leader_is_expected_to_brake_about_as_hard_as_the_robot_does() -> None:
-    """At its speed it is followed at 2 m; when it has stopped there, the robot brakes hard."""
-    behind = Bench().settle(obstacle(2.6, 0.0, vx_mps=1.0, sigma_mps=0.0), v_mps=1.0)
+    """At its speed it is followed 1.6 m behind; when it has stopped there, the robot brakes hard."""
+    behind = Bench().settle(obstacle(2.2, 0.0, vx_mps=1.0, sigma_mps=0.0), v_mps=1.0)
     assert behind.action is not Action.DECREASE
-    stopped = Bench().settle(obstacle(2.6, 0.0), v_mps=1.0)
+    stopped = Bench().settle(obstacle(2.2, 0.0), v_mps=1.0)
     assert stopped.action is Action.DECREASE
     assert stopped.emergency
 

@@ -4,7 +4,7 @@ import pytest
 
 from config.robot import Limits
 from controller.tally import SetpointTally, Standstill, TimingTally, mean_speed_mps
-from hal.types import Setpoint
+from hal.types import ChassisMode, Setpoint
 
 MS = 1_000_000
 LIMITS = Limits()
@@ -63,6 +63,16 @@ def test_what_was_not_sent_and_what_was_sent_before_count_nothing() -> None:
     for sent in (None, point, point):
         tally.add(sent)
     assert tally.count == 1
+
+
+@pytest.mark.parametrize("mode", [ChassisMode.LOST, ChassisMode.ESTOP])
+def test_the_zero_of_a_latched_driver_is_no_jump_of_the_profile(mode: ChassisMode) -> None:
+    tally = tally_of((0.8, 0.0))
+    tally.add(Setpoint(20 * MS, 0.0, 0.0, 0.0), mode)
+    tally.add(Setpoint(40 * MS, 0.0, 0.0, 0.0))
+    assert (tally.count, tally.violations) == (2, 0)
+    tally.add(Setpoint(60 * MS, 0.8, 0.0, 0.0))
+    assert tally.violations == 1
 
 
 def test_braking_beyond_comfort_is_told_apart() -> None:

@@ -21,9 +21,7 @@ LATENCY_S = 0.2
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 
 
-def asked(
-    worst: WorstCase, body: Bodies, v_mps: float, chosen_mps: float | None = None
-) -> Limit | None:
+def asked(worst: WorstCase, body: Bodies, v_mps: float, chosen_mps: float | None = None) -> Limit | None:
     """Of a robot at 0 that drives v_mps, and would go on so if nothing else is chosen."""
     placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
     course = course_of(body, placed.heading_rad[:, 0])
