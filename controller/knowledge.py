@@ -14,7 +14,7 @@ from controller.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.corridor import Corridor
 from controller.limits import STANDING_MPS
 from controller.localise import PoseHistory
-from controller.memory import OutOfView
+from controller.memory import SETTLED_S, OutOfView
 from controller.path import OnPath, Path
 from controller.sight import Sight
 from controller.steadying import SteadyVelocities
@@ -27,7 +27,6 @@ from vision.scene import CameraCondition, CameraHealth, Scene
 _SPRAWLING_M = 0.8
 _BEFORE_NS = 200_000_000
 _SAME_PLACE_M = 0.25
-_SETTLED_S = 0.5
 _FUTURE_S = 0.005
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
@@ -156,10 +155,10 @@ class Knowledge:
         """What stands where something stood before is no newcomer, whatever number it has now."""
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
-        if not self._places or not (bodies.age_s < _SETTLED_S).any():
+        if not self._places or not (bodies.age_s < SETTLED_S).any():
             return bodies
         captured_ns, points = self._places[0]
         if captured_ns > bodies.captured_ns - _BEFORE_NS:
             return bodies
         there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
-        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, _SETTLED_S), bodies.age_s))
+        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, SETTLED_S), bodies.age_s))

@@ -26,7 +26,7 @@ BoolArray = NDArray[np.bool_]
 
 _SAME_PLACE_M = 0.25
 # What was seen for less than this is not believed once it is gone.
-_SETTLED_S = 0.5
+SETTLED_S = 0.5
 _MOVING_KEPT_S, _MAY_COME_KEPT_S = 2.0, 6.0
 # The height of what is seen only in part is known no better.
 _UNCERTAIN_M = 0.1
@@ -56,7 +56,8 @@ class OutOfView:
     def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
         """The bodies of a scene, those of them moving that perception only expects beside the view, and that
         came towards the robot's axis when they were last seen; as they were measured then."""
-        settled = ~seen.moving & (seen.age_s >= _SETTLED_S)
+        # Of what only stands where something stood, the velocity was hardly measured.
+        settled = ~seen.moving & (seen.age_s > SETTLED_S)
         out = settled & (seen.unseen_s > 0.0)
         comes = settled & ~out & _clearly_comes(seen, pose)
         if not self._coming and not comes.any():
@@ -89,7 +90,7 @@ class OutOfView:
         """
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
         gone = _missing(before.ids, seen.ids)
-        gone &= before.moving | ((before.age_s >= _SETTLED_S) & (not standing))
+        gone &= before.moving | ((before.age_s >= SETTLED_S) & (not standing))
         if not len(self._since_s) and not gone.any():
             return no_bodies(seen.captured_ns)
         since = np.concatenate((self._since_s, np.zeros(int(gone.sum())))) + dt_s
@@ -206,7 +207,7 @@ def _alike(bodies: Bodies, seen: Bodies) -> BoolArray:
     differs = bodies.velocity_mps[:, None] - seen.measured_mps
     same = np.all(differs**2 <= _APART_SIGMAS**2 * (spread + seen_spread), axis=2)
     # Not at the age that knowledge.py gives to whatever stands where something stood.
-    return np.asarray(same & (seen.age_s > _SETTLED_S))
+    return np.asarray(same & (seen.age_s > SETTLED_S))
 
 
 def _missing(ids: NDArray[np.int64], among: NDArray[np.int64]) -> BoolArray:

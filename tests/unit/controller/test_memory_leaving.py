@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.bodies import Bodies, no_bodies
-from controller.memory import OutOfView
+from controller.memory import SETTLED_S, OutOfView
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
 from vision.scene import FreeSpace
@@ -54,6 +54,7 @@ def test_on_the_right_as_on_the_left() -> None:
 
 
 AHEAD, YOUNG = box(4.4, 0.5), replace(AT_EDGE, age_s=np.array([0.4]))
+KNOWN = replace(AT_EDGE, age_s=np.array([SETTLED_S]))
 EXACT = replace(AT_EDGE, covariance=np.zeros((1, 2, 2)))
 
 
@@ -66,6 +67,7 @@ EXACT = replace(AT_EDGE, covariance=np.zeros((1, 2, 2)))
         pytest.param((measured(AT_EDGE, -0.35),), id="is still seen"),
         pytest.param((measured(AHEAD, -0.35), expected(AHEAD)), id="only missed in the middle of the view"),
         pytest.param((measured(YOUNG, -0.35), expected(YOUNG)), id="was hardly seen"),
+        pytest.param((measured(KNOWN, -0.35), expected(KNOWN)), id="only its place was seen for long"),
         pytest.param(
             (measured(AT_EDGE, 0.0), expected(AT_EDGE, -0.35)), id="what is not seen proves nothing"
         ),
