@@ -24,7 +24,9 @@ _SPEEDS = 31
 _DRIVES_AHEAD_MPS = 0.1
 # Slower than this, arriving as it leaves is no better than waiting at the line.
 _WORTH_ARRIVING_MPS = 0.3
-_AVERAGE = 0.1
+# Nor is slowing down for who leaves later than this: most change their velocity before, and a stop remains.
+_FORESEEN_S = 4.0
+_AVERAGE = 0.2
 # A choice that was made is kept unless this much time would be lost or gained.
 _STICKY_S = 0.5
 
@@ -151,7 +153,8 @@ class MovingLimits:
         choice = choices(conflict, ramps, self._speeds, s_m, margins.least_m, margins.crossing_s, enter_s)
         if conflict.in_s <= 0.0 or conflict.hi_in_m <= s_m:
             choice = Choice(choice.yield_mps, math.inf)
-        if choice.yield_mps < min(stays.speed_mps, _WORTH_ARRIVING_MPS):
+        worth_mps = _WORTH_ARRIVING_MPS if conflict.out_s <= _FORESEEN_S else math.inf
+        if choice.yield_mps < min(stays.speed_mps, worth_mps):
             return Choice(stays.speed_mps, choice.first_mps), stays
         sentence = (
             f"obstacle {number} crosses {max(conflict.lo_in_m - s_m, 0.0):.1f} m ahead until "

@@ -44,6 +44,13 @@ def test_a_crossing_person_is_given_way_by_slowing_a_little() -> None:
     assert 0.5 < decision.target_speed_mps < 1.4
 
 
+def test_who_leaves_in_many_seconds_is_approached_like_who_stands() -> None:
+    """To arrive as it leaves, 0.5 m/s would do; a stop before it is still possible from twice as much."""
+    decision = Bench().settle(obstacle(4.0, 0.5, vy_mps=-0.3, sigma_mps=0.05), v_mps=0.8)
+    assert decision.reason.sentence.startswith("obstacle 5 is on the path 3.4 m ahead")
+    assert decision.target_speed_mps > 1.0
+
+
 def test_the_robot_passes_first_when_there_is_time() -> None:
     decision = Bench().settle(obstacle(3.0, 4.5, vy_mps=-0.6), v_mps=1.5)
     assert decision.target_speed_mps == 1.5
