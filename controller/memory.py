@@ -31,6 +31,8 @@ _MOVING_KEPT_S, _MAY_COME_KEPT_S = 2.0, 6.0
 # The height of what is seen only in part is known no better.
 _UNCERTAIN_M = 0.1
 _EDGE_M, _EDGE_MPS = 0.3, 0.15
+# So far from the middle of the view stays whoever has not been seen to come in.
+_MIDDLE_M = 0.1
 # By so much in a second somebody unseen may have changed its velocity.
 _TURNS_MPS2 = 0.25
 _TOUCHING = 1e-6
@@ -135,6 +137,9 @@ class OutOfView:
             inwards_mps = -side[k] * float(velocity[k] @ leftward)
             comes = -side[k] * _known_part(velocity[k], covariance[k], leftward) > 0.0
             if late_m < (_EDGE_M + _EDGE_MPS * unseen_s[k] if comes else -_TOUCHING):
+                if comes:
+                    # Nobody has passed before the robot unseen: it is still to come.
+                    xy[k] += side[k] * max(_MIDDLE_M - float(side[k] * left[k]), 0.0) * leftward
                 continue
             xy[k] += side[k] * late_m * leftward
             if inwards_mps > 0.0:
