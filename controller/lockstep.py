@@ -8,7 +8,7 @@ a robot.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -57,13 +57,18 @@ def run_lockstep(
     camera: ScheduledCamera,
     perceiver: Looking,
     loop: Drive,
+    late_by: Callable[[float], float] = lambda _: 0.0,
 ) -> Iterator[Moment]:
-    """Step until the loop has finished or max_duration_s is over; yields after each control step."""
+    """Step until the loop has finished or max_duration_s is over; yields after each control step.
+
+    late_by: how many seconds later than it should what was exposed at this time, in seconds, becomes known;
+    none overtakes another.
+    """
     period_ns = round(NS_PER_S / config.control_rate_hz)
     latency_ns = round(config.perception_latency_s * NS_PER_S)
     control_ns = clock.now_ns()
     give_up_ns = control_ns + round(config.max_duration_s * NS_PER_S)
-    on_its_way: deque[Scene] = deque()
+    on_its_way: deque[tuple[int, Scene]] = deque()
     known: Scene | None = None
     looks: list[Look] = []
     while not loop.finished and control_ns < give_up_ns:
@@ -71,12 +76,14 @@ def run_lockstep(
             clock.sleep_until_ns(camera.next_capture_ns)
             outside.advance_to(camera.next_capture_ns)
             looks.append(perceiver.look(camera.read(timeout_s=0.0)))
-            on_its_way.append(looks[-1].scene)
+            scene = looks[-1].scene
+            late_ns = round(late_by(scene.captured_ns / NS_PER_S) * NS_PER_S)
+            on_its_way.append((scene.captured_ns + latency_ns + late_ns, scene))
             continue
         clock.sleep_until_ns(control_ns)
         outside.advance_to(control_ns)
-        while on_its_way and on_its_way[0].captured_ns + latency_ns <= control_ns:
-            known = on_its_way.popleft()
+        while on_its_way and on_its_way[0][0] <= control_ns:
+            known = on_its_way.popleft()[1]
         yield Moment(tuple(looks), loop.step(known, control_ns))
         looks.clear()
         control_ns += period_ns

@@ -33,6 +33,10 @@ class Faults:
     feedback_lost_s: float | None = None
     glass: tuple[str, ...] = ()
 
+    def late_by(self, t_s: float) -> float:
+        """Seconds by which the scene of a frame exposed at t_s comes later."""
+        return self.late_by_s if self.late is not None and self.late.holds(t_s) else 0.0
+
     def strikes(self, t_s: float, after_s: float) -> bool:
         """Whether something that must lead to a stop holds at t_s, or did within after_s before it."""
         windows = [one for one in (self.silent, self.frozen, self.late) if one is not None]

@@ -107,17 +107,13 @@ def scenario_yaml(stage: Stage) -> str:
 
 
 def _with_world(config: AppConfig, stage: Stage, scenario: FilePath) -> AppConfig:
-    """The configuration in this world, with this mission's slip and lateness."""
+    """The configuration in this world, with this mission's slip."""
     assert isinstance(config.runner, LockstepRunner), "checked by controller/campaign/command.py"
     faults = stage.case.faults
     simulation = config.simulation or SimulationConfig(scenario=str(scenario))
     plant = simulation.plant.model_copy(update={"slip_factor": 1.0 / (1.0 - faults.yaw_slip)})
     changed = {"scenario": str(scenario), "seed": stage.case.seed, "plant": plant}
-    late_s = faults.late_by_s if faults.late is not None else 0.0
-    runner = {
-        "perception_latency_s": config.runner.perception_latency_s + late_s,
-        "max_duration_s": stage.case.scenario.duration_s,
-    }
+    runner = {"max_duration_s": stage.case.scenario.duration_s}
     return config.model_copy(
         update={
             "simulation": simulation.model_copy(update=changed),
@@ -163,7 +159,9 @@ def _drive(
             camera.writer = devices.enter_context(TumWriter(keep / "recording", mount))
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         watch = _Watch(stage, simulation, log)
-        for moment in run_lockstep(config.runner, clock, simulation, camera, perceiver, loop):
+        for moment in run_lockstep(
+            config.runner, clock, simulation, camera, perceiver, loop, stage.case.faults.late_by
+        ):
             for look in moment.looks:
                 recorder.saw(look)
             recorder.decided(moment.control)

@@ -89,8 +89,7 @@ class _Eyes:
             self._same = 0
             scene = self._camera.look(t_s, self._frame, stage.pose(s_m, d_m), stage.pose(known_s_m, d_m))
         self._last = scene
-        late_s = faults.late_by_s if faults.late is not None and faults.late.holds(t_s) else 0.0
-        self._on_way.append((t_s + self._latency_s + late_s, scene))
+        self._on_way.append((t_s + self._latency_s + faults.late_by(t_s), scene))
 
     def _frozen(self, last: Scene, t_s: float) -> Scene:
         """The same picture with a new stamp, as vision/health.py sees it."""

@@ -1,6 +1,7 @@
 from config.app import LockstepRunner
 from controller.lockstep import run_lockstep
 from hal.clocks import SimulatedClock
+from sim.faults import Faults, Window
 from tests.support.drives import NotingDrive, NotingOutside, PlainEyes, TickingCamera
 
 MS = 1_000_000
@@ -19,6 +20,16 @@ def test_a_scene_is_known_only_after_its_latency() -> None:
     # Frame 0 is exposed at 0 and known at 60 ms; frame 1 at 30, known at 90, so first at the step at 100.
     assert [sequence for _, sequence in loop.seen] == [None, None, None, 0, 0, 1, 2]
     assert [now_ns // MS for now_ns, _ in loop.seen] == [0, 20, 40, 60, 80, 100, 120]
+
+
+def test_late_scenes_come_late_and_none_overtakes_another() -> None:
+    runner = LockstepRunner(kind="lockstep", control_rate_hz=50, perception_latency_s=0.0)
+    loop, camera = NotingDrive(6), TickingCamera(20 * MS)
+    late = Faults(late=Window(0.02, 0.03), late_by_s=0.05)
+    run = run_lockstep(runner, SimulatedClock(), NotingOutside(), camera, PlainEyes(), loop, late.late_by)
+    assert len(list(run)) == 6
+    # Frame 1, exposed at 20 ms, is known at 70: at the step at 80, together with those that came after it.
+    assert [sequence for _, sequence in loop.seen] == [0, 0, 0, 0, 4, 5]
 
 
 def test_the_outside_moves_on_before_every_exposure_and_every_step() -> None:
