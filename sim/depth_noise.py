@@ -6,6 +6,8 @@ gives a standard deviation that grows with the square of the distance, as real o
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ DEPTH_SCALE_M = 0.001
 # Standard deviation of inverse depth: sigma_z = z^2 * this.
 SIGMA_PER_M: dict[str, float] = {"realsense": 0.0075, "paper": 0.0005, "none": 0.0}
 
+ScalarT = TypeVar("ScalarT", bound=np.generic)
+
 _BASELINE_M = 0.050
 # Spread of the noise along u and v, measured on a real RealSense (plane residuals at 0.8 to 1.4 m: the
 # correlation falls to 0.9 after one pixel, 0.65 and 0.35 after five), as a broad and a fine part.
@@ -28,6 +32,7 @@ _FINE_SHARE = 0.08  # of the variance
 _HOLE_BLOB_PX = (2.5, 2.0)
 _MARGIN_PX = 96  # the noise field is larger than the image by this much: room to shift it
 _TOLERATED_SHIFT_PX = 1.0  # disparity steps below this are slanted surfaces, not edges
+_BAND_ROWS = 96  # worked on at a time: what so many rows need stays in the processor's cache
 
 
 class DepthSensor:
@@ -50,6 +55,7 @@ class DepthSensor:
         self._holes = _hole_field(generator, padded, config.hole_ratio)
         self._columns = np.arange(shape[1], dtype=np.float32)[None, :]
         self._noisy: Float32Image = np.empty(shape, np.float32)
+        self._seen_at: Float32Image = np.empty(shape, np.float32)
         self._windows = np.empty(shape, np.float32), np.empty(shape, np.float32)
 
     def measure(self, inverse_depth: Float32Image, frame: int) -> DepthImage:
@@ -57,38 +63,46 @@ class DepthSensor:
 
         inverse_depth (H, W) in 1/m, 0: nothing there. frame: running number of the exposure.
         """
-        noisy = self._noisy
-        if self._sigma > 0.0:
-            np.add(inverse_depth, self._cut(self._noise, frame, 0), out=noisy)
-            np.add(noisy, self._cut(self._noise, frame + 1, 0), out=noisy)
-        else:
-            np.copyto(noisy, inverse_depth)
-        # What leaves the range becomes infinitely far and then zero.
+        depth = np.empty(self._shape, np.uint16)
         config = self._config
-        lost = (
-            (noisy < 1.0 / config.depth_max_m) | (noisy > 1.0 / config.depth_min_m) | (inverse_depth == 0.0)
-        )
-        if config.hole_ratio > 0.0:
-            lost |= self._cut(self._holes, frame, 1)
-        if config.depth_edges:
-            lost |= self.shadows(inverse_depth)
-        noisy[lost] = np.inf
-        return np.asarray(np.rint((1.0 / DEPTH_SCALE_M) / noisy), dtype=np.uint16)
+        noises = [self._cut(self._noise, frame + k, 0) for k in (0, 1)] if self._sigma > 0.0 else []
+        holes = self._cut(self._holes, frame, 1) if config.hole_ratio > 0.0 else None
+        for first in range(0, self._shape[0], _BAND_ROWS):
+            rows = slice(first, first + _BAND_ROWS)
+            exact = inverse_depth[rows]
+            noisy = self._noisy[: len(exact)]
+            np.copyto(noisy, exact)
+            for noise in noises:
+                cv2.add(noisy, noise[rows], dst=noisy)
+            lost = noisy < 1.0 / config.depth_max_m
+            lost |= noisy > 1.0 / config.depth_min_m
+            lost |= exact == 0.0
+            if holes is not None:
+                lost |= holes[rows]
+            if config.depth_edges:
+                lost |= self.shadows(exact)
+            # What leaves the range becomes infinitely far and then zero.
+            noisy[lost] = np.inf
+            np.divide(1.0 / DEPTH_SCALE_M, noisy, out=noisy)
+            np.copyto(depth[rows], np.rint(noisy, out=noisy), casting="unsafe")
+        return depth
 
     def shadows(self, inverse_depth: Float32Image) -> NDArray[np.bool_]:
-        """What the left infrared camera sees and the right one does not (H, W): the band of background
-        to the left of every nearer thing, as wide as the difference of their disparities."""
-        seen_at = self._columns - np.float32(self._disparity_px_m) * inverse_depth
+        """What the left infrared camera sees and the right one does not, in whole rows (R, W): the band of
+        background to the left of every nearer thing, as wide as the difference of their disparities."""
+        count = len(inverse_depth)
+        seen_at = np.multiply(inverse_depth, np.float32(self._disparity_px_m), out=self._seen_at[:count])
+        np.subtract(self._columns, seen_at, out=seen_at)
         # The smallest of all to the right, as far as a shadow can reach: windows that double.
         nearest, reach = seen_at, 1
-        wider, spare = self._windows
+        wider, spare = (window[:count] for window in self._windows)
         while reach <= self._widest_px:
             cv2.min(nearest[:, :-reach], nearest[:, reach:], dst=wider[:, :-reach])
             wider[:, -reach:] = nearest[:, -reach:]
             nearest, wider, spare, reach = wider, spare, wider, 2 * reach
-        return seen_at > nearest + np.float32(_TOLERATED_SHIFT_PX)
+        return seen_at > np.add(nearest, np.float32(_TOLERATED_SHIFT_PX), out=wider)
 
-    def _cut(self, field: NDArray[np.generic], frame: int, stream: int) -> NDArray[np.generic]:
+    def _cut(self, field: NDArray[ScalarT], frame: int, stream: int) -> NDArray[ScalarT]:
         """The field at a shift drawn for this frame."""
         generator = np.random.default_rng((self._seed, 102 + stream, frame))
         top, left = (int(shift) for shift in generator.integers(_MARGIN_PX, size=2))
