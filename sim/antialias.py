@@ -27,9 +27,10 @@ def smooth_edges(
     upright = np.abs(lines[0]) >= np.abs(lines[1])
     width = labels.shape[1]
     pixels = colour.reshape(-1, 4).view(np.uint32)[:, 0]
-    across = np.flatnonzero(labels[:, 1:] != labels[:, :-1])
-    across = _contrasting(pixels, across + across // (width - 1), 1)
-    down = _contrasting(pixels, np.flatnonzero(labels[1:] != labels[:-1]), width)
+    flat = labels.reshape(-1)
+    across = np.flatnonzero(flat[1:] != flat[:-1])
+    across = _contrasting(pixels, across[(across + 1) % width != 0], 1)
+    down = _contrasting(pixels, np.flatnonzero(flat[width:] != flat[:-width]), width)
     # An edge of the other direction never cuts: its slope is taken away.
     columns = _blend(pixels, labels, inverse_depth, lines, np.where(upright, lines[0], 0.0), across, 1)
     rows = _blend(pixels, labels, inverse_depth, lines, np.where(upright, 0.0, lines[1]), down, width)

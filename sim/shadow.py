@@ -31,6 +31,7 @@ class ShadowCaster:
         # Away from the light.
         self._drift = -0.06 * np.array([math.cos(azimuth), math.sin(azimuth)])
         self._blot = _soft_blot()
+        self._still: dict[int, FloatArray] = {}
 
     def cast(
         self,
@@ -42,17 +43,17 @@ class ShadowCaster:
         camera: Pose,
     ) -> None:
         """Multiply the shadows of bodies into colour, where labels show the floor."""
-        near = [state for state in bodies if self._may_show(state, camera)]
+        near = self._near(bodies, camera)
         if not near:
             return
-        corners = np.array([self._patch(state) for state in near])
+        corners = np.array([self._patch_of(state) for state in near])
         corners = (corners - camera.translation_m) @ camera.rotation
-        spans = convert(corners, self._intrinsics)
         k = self._intrinsics
+        bounds = convert(corners, k).bounds
         to_ray = np.array([[1 / k.fx, 0, -k.cx / k.fx], [0, 1 / k.fy, -k.cy / k.fy], [0, 0, 1]])
         to_blot = np.diag([_SIDE_PX, _SIDE_PX, 1.0]) @ np.linalg.inv(texture_frames(corners)) @ to_ray
         on_floor = _floor_faces(drawn, geometry)
-        for (u0, v0, u1, v1), matrix in zip(spans.bounds.tolist(), to_blot, strict=True):
+        for (u0, v0, u1, v1), matrix in zip(bounds.tolist(), to_blot, strict=True):
             if u1 <= u0:
                 continue
             floor = on_floor[labels[v0:v1, u0:u1]]
@@ -64,11 +65,22 @@ class ShadowCaster:
             lit = colour[v0:v1, u0:u1]
             cv2.copyTo(cv2.multiply(lit, shade, scale=1.0 / 255.0), floor, lit)
 
-    def _may_show(self, state: BodyState, camera: Pose) -> bool:
-        ahead = camera.rotation[:2, 2]
-        away = np.array([state.pose.x_m, state.pose.y_m]) - camera.translation_m[:2]
-        reach = state.reach_m + _MARGIN_M
-        return state.z_m[0] < _HIGH_M and -reach < float(away @ ahead) < _FAR_M + reach
+    def _near(self, bodies: tuple[BodyState, ...], camera: Pose) -> list[BodyState]:
+        """Those whose shadow may be seen."""
+        low = [state for state in bodies if state.z_m[0] < _HIGH_M]
+        places = np.array([(state.pose.x_m, state.pose.y_m) for state in low]).reshape(-1, 2)
+        reaches = np.array([state.reach_m for state in low]) + _MARGIN_M
+        ahead = (places - camera.translation_m[:2]) @ camera.rotation[:2, 2]
+        return [low[k] for k in np.flatnonzero((ahead > -reaches) & (ahead < _FAR_M + reaches)).tolist()]
+
+    def _patch_of(self, state: BodyState) -> FloatArray:
+        """As _patch; what never moves is asked once."""
+        if state.moves:
+            return self._patch(state)
+        patch = self._still.get(state.id)
+        if patch is None:
+            patch = self._still[state.id] = self._patch(state)
+        return patch
 
     def _patch(self, state: BodyState) -> FloatArray:
         """The shadow's rectangle (4, 3) on the floor, clockwise from above as the first corner says."""

@@ -82,6 +82,7 @@ class World:
         fixed = join([faces for _, faces in parts])
         swung = [(body.id, faces) for body in self._movers for faces in body.model.parts]
         moving = join([faces for _, faces in swung])
+        self._last_poses: dict[int, tuple[MotionState, FloatArray, FloatArray]] = {}
         self._compile(fixed, moving)
         self._still_count = len(fixed)
         owners = [id_ for id_, faces in (*parts, *swung) for _ in range(len(faces))]
@@ -116,15 +117,22 @@ class World:
         return tuple(still.get(body.id) or _state(body, t_s) for body in self._bodies)
 
     def _part_poses(self, t_s: float) -> tuple[FloatArray, FloatArray]:
-        rotations, translations = [], []
-        for body in self._movers:
-            state = body.trajectory.at(t_s)
-            outer = body_in_floor(PlanarPose(state.x_m, state.y_m, state.heading_rad))
-            for part in body.model.pose_parts(state):
-                pose = outer @ part
-                rotations.append(pose.rotation)
-                translations.append(pose.translation_m)
-        return np.array(rotations), np.array(translations)
+        poses = [self._poses_of(body, t_s) for body in self._movers]
+        rotations, translations = zip(*poses, strict=True)
+        return np.concatenate(rotations), np.concatenate(translations)
+
+    def _poses_of(self, body: _Body, t_s: float) -> tuple[FloatArray, FloatArray]:
+        """Rotations (K, 3, 3) and translations (K, 3) of a mover's parts."""
+        state = body.trajectory.at(t_s)
+        last = self._last_poses.get(body.id)
+        if last is not None and last[0] == state:  # it stands
+            return last[1:]
+        outer = body_in_floor(PlanarPose(state.x_m, state.y_m, state.heading_rad))
+        poses = [outer @ part for part in body.model.pose_parts(state)]
+        rotations = np.array([pose.rotation for pose in poses])
+        translations = np.array([pose.translation_m for pose in poses])
+        self._last_poses[body.id] = state, rotations, translations
+        return rotations, translations
 
 
 def trajectory_of(spec: BodySpec, seed: int) -> Trajectory:

@@ -98,6 +98,16 @@ def test_geometry_is_a_function_of_time_alone() -> None:
     assert np.array_equal(second.geometry(3.3).corners_m, later.corners_m)
 
 
+def test_who_stands_is_posed_as_if_asked_for_the_first_time() -> None:
+    scenario = load_scenario("warehouse")
+    one = World(scenario, seed=1)
+    # Before they start, on their way, in between, again, and long after they have arrived.
+    for t_s in (0.0, 0.1, 4.0, 14.0, 14.1, 4.0, 0.0, 88.0, 89.0, 14.0):
+        assert (
+            one.geometry(t_s).corners_m.tobytes() == World(scenario, seed=1).geometry(t_s).corners_m.tobytes()
+        )
+
+
 def test_footprint_and_velocity_go_with_the_body() -> None:
     walker = world(Person(kind="person", name="p", motion=WALK, **AT))
     before, after = walker.bodies(2.5)[0], walker.bodies(2.501)[0]
