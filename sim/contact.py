@@ -76,7 +76,7 @@ def polygon_distance(a: FloatArray, b: FloatArray) -> float:
 
 def _separation(a: FloatArray, b: FloatArray) -> float:
     """The largest gap over the directions of a's outward normals; negative: overlap in all of them."""
-    edges = np.roll(a, -1, axis=0) - a
+    edges = _sides(a)
     normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     gaps = (b @ normals.T).min(axis=0) - (a * normals).sum(axis=1)
@@ -85,11 +85,16 @@ def _separation(a: FloatArray, b: FloatArray) -> float:
 
 def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
     """The shortest way from any corner (K, 2) to any edge of polygon (L, 2)."""
-    edge = np.roll(polygon, -1, axis=0) - polygon
+    edge = _sides(polygon)
     to_corner = corners[:, None] - polygon[None]
     share = np.clip((to_corner * edge).sum(axis=2) / (edge * edge).sum(axis=1), 0.0, 1.0)
     away = to_corner - share[:, :, None] * edge
     return float(np.sqrt((away * away).sum(axis=2).min()))
+
+
+def _sides(polygon: FloatArray) -> FloatArray:
+    """From each corner (K, 2) to the next."""
+    return np.concatenate([polygon[1:], polygon[:1]]) - polygon
 
 
 def _room_clearance(world: World, robot: FloatArray) -> float:
