@@ -38,7 +38,7 @@ _TURNS_MPS2 = 0.25
 _TOUCHING = 1e-6
 # Noise makes whatever stands beside the view creep now and then, and each time the robot would slow down: so
 # much is no noise.
-_CLEAR_SIGMAS, _CLEAR_MPS = 3.0, 0.2
+_CLEAR_SIGMAS, _CLEAR_MPS = 3.3, 0.2
 # Two velocities that differ by so much are of two.
 _APART_SIGMAS = 2.0
 

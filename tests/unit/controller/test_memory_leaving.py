@@ -61,7 +61,7 @@ EXACT = replace(AT_EDGE, covariance=np.zeros((1, 2, 2)))
 @pytest.mark.parametrize(
     "scenes",
     [
-        pytest.param((measured(AT_EDGE, -0.29), expected(AT_EDGE)), id="noise may be as much"),
+        pytest.param((measured(AT_EDGE, -0.32), expected(AT_EDGE)), id="noise may be as much"),
         pytest.param((measured(EXACT, -0.19), expected(EXACT)), id="hardly moves"),
         pytest.param((measured(AT_EDGE, 0.35), expected(AT_EDGE)), id="walks away"),
         pytest.param((measured(AT_EDGE, -0.35),), id="is still seen"),
