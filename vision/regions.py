@@ -22,6 +22,7 @@ _FOOT_M = 0.12
 _FOOT_PER_METRE = 0.015
 _OCCLUDED_SHARE = 0.15
 _GAP_CELLS = 3
+_RIM = 8  # of the width of a part, this share is its rim
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,7 +144,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     )
     bbox[present] = box
     size = np.empty((len(present), 3))
-    size[:, 0] = (grid.x[right] - grid.x[left]) * depth
+    size[:, 0] = _width_m(grid, columns, inverse, starts, number, left, right)
     size[:, 1] = (grid.y[bottom] - grid.y[top]) * depth
     size[:, 2] = _UNIFORM * spread * depth * depth
     extent[present] = size
@@ -152,6 +153,27 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     reach = np.zeros(count, np.intp)
     reach[present] = bottom - top + 1
     return Regions(cells, reach, bbox, position, extent, wide, tall, nothing)
+
+
+def _width_m(
+    grid: DepthGrid,
+    columns: IntGrid,
+    inverse: NDArray[np.floating],
+    starts: NDArray[np.intp],
+    number: NDArray[np.intp],
+    left: IntGrid,
+    right: IntGrid,
+) -> FloatArray:
+    """(R,) from the left to the right rim of parts, each at its own depth: whoever looks along a side of a
+    body would take it for wider, at the depth of its middle, than it is."""
+    rim = (right - left) // _RIM
+    low, high = columns <= np.repeat(left + rim, number), columns >= np.repeat(right - rim, number)
+    ends_m = [
+        x * np.add.reduceat(of, starts, dtype=np.intp) / np.add.reduceat(np.where(of, inverse, 0.0), starts)
+        for x, of in ((grid.x[left], low), (grid.x[right], high))
+    ]
+    width: FloatArray = np.maximum(ends_m[1] - ends_m[0], 0.0)
+    return width
 
 
 def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:

@@ -51,6 +51,19 @@ def test_parts_are_measured_where_they_are() -> None:
     assert found.whole.tolist() == [False, False, True]
 
 
+def test_who_looks_along_the_side_of_a_box_does_not_take_it_for_wider() -> None:
+    """Its front from 0.1 to 0.3 m at 2 m; before that its side, which goes back to 4 m."""
+    depth, labels = flat(8.0), np.zeros(SHAPE, np.int32)
+    for column in range(18, 31):
+        bearing = (column - 15.5) * 0.01
+        depth[6:18, column] = max(0.1 / bearing, 2.0)
+        labels[6:18, column] = 1
+    found = measure(grid_of(depth), labels, 1)
+    assert found.extent_m[0, 0] == pytest.approx(0.29 - 0.1, abs=0.02)
+    mirrored = measure(grid_of(depth[:, ::-1].copy()), labels[:, ::-1].copy(), 1)
+    assert mirrored.extent_m[0, 0] == pytest.approx(found.extent_m[0, 0], abs=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_labels_that_do_not_fit_into_the_sort_are_measured_alike(seed: int) -> None:
     rng = np.random.default_rng(seed)
