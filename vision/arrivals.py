@@ -21,6 +21,8 @@ _KEEP_EVERY_S = 0.06
 _LOOK_BACK_S = (0.2, 0.6)
 _MARGIN_M = 0.10
 _SIGMAS = 3.5
+# Of a cell over that of a pixel: a median over 25 cells of four samples each, of noise that neighbours share.
+_CELL_NOISE = 0.55
 _NEIGHBOURS = 5  # of a cell and its eight neighbours, this many must have arrived
 _UNKNOWN = np.float32(1e3)
 _BLOCK = np.ones((3, 3), np.uint8)
@@ -91,7 +93,7 @@ class FreeMemory:
         there += relative.translation_m.astype(np.float32)[:, None]
         cell, inside, inverse = grid.project(there)
         seen = memory.nearest_inverse.ravel().take(cell)
-        sigma = np.float32(np.sqrt(2.0) * self._noise.quadratic_per_m)
+        sigma = np.float32(np.sqrt(2.0) * _CELL_NOISE * self._noise.quadratic_per_m)
         margin = np.float32(_MARGIN_M) * inverse * inverse + np.float32(_SIGMAS) * sigma
         result: NDArray[np.bool_] = inside & (inverse - seen > margin)
         return result

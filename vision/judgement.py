@@ -40,6 +40,7 @@ _ARRIVED_CELLS = 8
 _ARRIVED_SHARE = 0.05
 _MUCH_CELLS = 20
 _MUCH_SHARE = 0.2
+_KNOWN_SPEED = 2.0  # of the least speed: with less doubt than this, a slow mover has stopped
 _IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
 _CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
 _CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewhat longer
@@ -129,7 +130,11 @@ def judge(
         | _by_surface(seen, read, dt_s)
     )
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
-    rising = possible & ((evident & (read.speed_mps > read.least_mps)) | much) & seen.trusted
+    fast = read.speed_mps > read.least_mps
+    # Where a mover has stopped was free space until a moment ago: no proof that it still goes.
+    sigma_mps = np.sqrt(np.trace(seen.covariance, axis1=1, axis2=2))
+    stopped = moving & ~fast & (sigma_mps < _KNOWN_SPEED * read.least_mps)
+    rising = possible & ((evident & fast) | (much & ~stopped)) & seen.trusted
     stands = _stands(seen, read)
     kept = _holds(seen, read, moving) | (possible & _waits(seen, read)) | (seen.restless & ~moving)
     falling = np.where(stands, dt_s / _STOP_S, np.where(kept, dt_s / _HOLD_S, dt_s / _FALL_S))

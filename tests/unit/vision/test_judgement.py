@@ -149,6 +149,17 @@ def test_much_that_has_come_needs_no_speed() -> None:
     assert not rises(one(STILL, arrived=np.array([20]), cells=np.array([110])))
 
 
+def test_much_that_came_before_it_stopped_is_no_proof_that_it_still_goes() -> None:
+    came = one(STILL, arrived=np.array([60]))
+    assert verdict(came, 1.0, True).evidence[0] < 1.0
+    slow = one((0.2, 0.0, 0.0), arrived=np.array([60]))
+    assert verdict(slow, 1.0, True).evidence[0] < 1.0
+    assert verdict(one((0.22, 0.0, 0.0), arrived=np.array([60])), 1.0, True).evidence[0] > 1.0
+    # A speed that is not known is not slow: 0.44 m/s in all, twice the least speed of 0.21 m/s.
+    assert verdict(replace(came, covariance=covariance(0.065)), 1.0, True).evidence[0] > 1.0
+    assert verdict(replace(came, covariance=covariance(0.055)), 1.0, True).evidence[0] < 1.0
+
+
 EVIDENT = {
     "fragments across": by_fragments(ACROSS, 20),
     "fragments along": by_fragments(ALONG, 20),
