@@ -20,6 +20,9 @@ from vision.regions import IntGrid, spread_labels
 _LEAST_VOTES = 4
 _SHARE_OF_PART = 0.15
 _SHARE_OF_TRACK = 0.30
+_CAME_CELLS = 20
+_CAME_SHARE = 0.3
+_LEAVING_SHARE = 0.75  # of what stands: a larger part is the thing itself
 _DEPTH_GATE_INVERSE = 0.03  # 1/m
 _DEPTH_GATE_M = 0.25
 _NOBODY = np.zeros(1, np.int32)
@@ -135,6 +138,26 @@ def count_votes(
     best = np.where(present, votes, -1).argmax(axis=1)
     claimed = present[each, best]
     return Ballot(present, ((best + 1) * claimed).astype(np.int32), votes[each, best] * claimed)
+
+
+def release(
+    ballot: Ballot, cells: NDArray[np.intp], arrived: NDArray[np.intp], mover: NDArray[np.bool_]
+) -> Ballot:
+    """ballot without what stands for parts that have come while the rest of it was there: somebody who stood
+    beside furniture, as one part with it, has left it.
+
+    cells (P,) of the parts; arrived (P,): those where free space was seen. mover (T,): keep what is theirs.
+    """
+    came = (arrived >= _CAME_CELLS) & (arrived >= _CAME_SHARE * cells)
+    if not came.any():
+        return ballot
+    whole = cells @ ballot.present
+    left = ballot.present & ~mover & came[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
+    present = ballot.present & ~left
+    changed = left.any(axis=1)
+    others = np.where(present.any(axis=1), present.argmax(axis=1) + 1, 0)
+    winner = np.where(changed, others, ballot.winner).astype(np.int32)
+    return Ballot(present, winner, np.where(changed, 0, ballot.votes))
 
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:

@@ -121,6 +121,8 @@ class Tracker:
         count, parts = regions.components(grid, standing)
         measured = regions.measure(grid, parts, count)
         ballot = masks.count_votes(parts, count, predicted, len(tracks), mover)
+        came = np.bincount(parts[arrived], minlength=count + 1)[1:]
+        ballot = masks.release(ballot, measured.cells, came, mover)
         bodies = sightings.bodies(tracks, pose, self._config.depth_noise)
         expected = mover & grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)

@@ -190,3 +190,50 @@ def test_a_part_taken_from_its_winner_belongs_to_nobody() -> None:
     expected = labelled(block((10, 30), (10, 30)), block((10, 30), (30, 50)))
     ballot = masks.count_votes(PART, 1, expected, 2, np.array([True, True]))
     assert not masks.divide(PART, expected, ballot, np.zeros(1, np.int32)).any()
+
+
+# Somebody who stood at a table, as one part with it, and the table; both are track 0's. A mover is track 1.
+CELLS = np.array([200, 300])
+MOVES = np.array([False, True])
+
+
+def ballot(*present: tuple[bool, bool]) -> masks.Ballot:
+    table = np.array(present)
+    return masks.Ballot(table, (table.argmax(axis=1) + 1).astype(np.int32), np.array([150, 290]))
+
+
+@pytest.mark.parametrize(("came", "winner"), [(60, 0), (59, 1)])
+def test_a_part_that_came_leaves_the_track_of_what_was_there(came: int, winner: int) -> None:
+    """Three tenths of it."""
+    left = masks.release(ballot((True, False), (True, False)), CELLS, np.array([came, 0]), MOVES)
+    np.testing.assert_array_equal(left.winner, [winner, 1])
+    np.testing.assert_array_equal(left.present, [[winner == 1, False], [True, False]])
+
+
+@pytest.mark.parametrize(("came", "winner"), [(20, 0), (19, 1)])
+def test_a_few_cells_that_came_prove_nothing(came: int, winner: int) -> None:
+    left = masks.release(
+        ballot((True, False), (True, False)), np.array([30, 300]), np.array([came, 0]), MOVES
+    )
+    np.testing.assert_array_equal(left.winner, [winner, 1])
+
+
+def test_a_part_that_came_is_the_movers_alone_who_has_a_claim_to_it() -> None:
+    left = masks.release(ballot((True, True), (True, False)), CELLS, np.array([60, 0]), MOVES)
+    np.testing.assert_array_equal(left.winner, [2, 1])
+    np.testing.assert_array_equal(left.present, [[False, True], [True, False]])
+
+
+@pytest.mark.parametrize(("cells", "winner"), [(301, 1), (300, 0)])
+def test_what_came_almost_whole_is_that_track_itself(cells: int, winner: int) -> None:
+    """Three quarters of it, and more, may have come."""
+    sizes = np.array([cells, 100])
+    left = masks.release(ballot((True, False), (True, False)), sizes, np.array([290, 0]), MOVES)
+    np.testing.assert_array_equal(left.winner, [winner, 1])
+
+
+def test_a_mover_keeps_what_came() -> None:
+    before = ballot((False, True), (False, True))
+    left = masks.release(before, CELLS, np.array([200, 0]), MOVES)
+    np.testing.assert_array_equal(left.present, before.present)
+    np.testing.assert_array_equal(left.winner, before.winner)

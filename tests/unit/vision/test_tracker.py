@@ -98,6 +98,20 @@ def test_a_surface_that_stands_is_listed_from_the_third_sight_on_and_never_moves
     np.testing.assert_allclose(still.velocity_mps, 0.0, atol=0.02)
 
 
+def test_who_leaves_the_table_that_he_stood_at_is_the_mover_and_not_the_table() -> None:
+    """They touched, one connected part; 0.37 s after his first step he is 0.29 m away from it."""
+    stood, steps = 12, 11
+    depths_m = [
+        nearest(walker(-0.25 - max(way_m(k - stood), 0.0)), plate(4.0, (0.0, 1.0), (-0.6, 1.0)), wall(6.0))
+        for k in range(stood + steps + 1)
+    ]
+    percepts = track(depths_m)
+    assert not any(moving(one) for one in percepts[:stood])
+    (mover,) = moving(percepts[-1])
+    assert 0.4 < mover.extent_m[0] < 0.6
+    np.testing.assert_allclose(mover.position_m[0], -0.25 - way_m(steps), atol=0.03)
+
+
 def behind(x_m: float, pillar_m: tuple[float, float] = (0.5, 1.0)) -> FloatArray:
     """A walker at 4 m, a wall at 6 m, and a pillar at 2.5 m from pillar_m[0] to pillar_m[1] before them."""
     return nearest(walker(x_m), wall(6.0), plate(2.5, pillar_m, (-0.9, 0.9)))
