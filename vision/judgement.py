@@ -62,6 +62,7 @@ class MotionEvidence:
     arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
     its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
     another side; growth_mps (T,): how fast its centre may wander because its visible part grows or shrinks.
+    goes (T,): its centre really goes about as fast as the velocity says.
     trusted: the camera's motion is known. reckoned: odometry says it, too, not the images alone.
     """
 
@@ -82,6 +83,7 @@ class MotionEvidence:
     clean_s: FloatArray
     view_radps: FloatArray
     growth_mps: FloatArray
+    goes: NDArray[np.bool_]
     trusted: bool
     reckoned: bool
 
@@ -207,7 +209,7 @@ def _holds(seen: MotionEvidence, read: _Reading, moving: NDArray[np.bool_]) -> N
     result: NDArray[np.bool_] = (
         moving
         & (read.speed_mps > 0.6 * read.least_mps)
-        & ((read.significance > _HOLDING_SQUARED_SIGMAS) | _has_arrived(seen))
+        & ((seen.goes & (read.significance > _HOLDING_SQUARED_SIGMAS)) | _has_arrived(seen))
     )
     return result
 

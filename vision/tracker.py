@@ -243,6 +243,7 @@ class Tracker:
             clean_s=tracks.clean_s,
             growth_mps=tracks.growth_mps,
             view_radps=sightings.view_radps(detection, sight, distance),
+            goes=tracks.goes(detection.dt_s),
             trusted=detection.motion_known,
             reckoned=detection.reckoned,
         )

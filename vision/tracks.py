@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision import kalman
 
+_TRAIL_S = 0.3
+_GOING_SHARE = 0.4
 _FIELDS = (
     "ids",
     "state",
@@ -29,6 +33,7 @@ _FIELDS = (
     "clean_s",
     "growth_mps",
     "sliver",
+    "trailing_m",
 )
 
 
@@ -39,7 +44,8 @@ class Tracks:
     of the last box that showed the whole body, at its depth, from its centre; extent_m (T, 3); area_m2 (T,):
     averaged, up to a common factor; cells (T,) of the grid covered when last seen; clean_s (T,): for how long
     the surface's centre has told of the velocity without a break; sliver (T,): a mover of which hardly
-    anything was left to see."""
+    anything was left to see; trailing_m (T, 3): where the centre was
+    of late, averaged."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -62,6 +68,7 @@ class Tracks:
         self.clean_s = np.empty(0)
         self.growth_mps = np.empty(0)
         self.sliver = np.empty(0, np.bool_)
+        self.trailing_m = np.empty((0, 3))
         self._next_id = 1
 
     def __len__(self) -> int:
@@ -112,6 +119,7 @@ class Tracks:
             "clean_s": np.zeros(count),
             "growth_mps": np.zeros(count),
             "sliver": np.zeros(count),
+            "trailing_m": position_m,
         }
         self._next_id += count
         for name in _FIELDS:
@@ -134,6 +142,14 @@ class Tracks:
             count = len(self)
             self.state, self.surface_state = states[:count], states[count:]
             self.covariance, self.surface_covariance = covariances[:count], covariances[count:]
+
+    def goes(self, dt_s: float) -> NDArray[np.bool_]:
+        """(T,) whether the centres, dt_s on, really go about as fast as the velocities say."""
+        self.trailing_m += -math.expm1(-dt_s / _TRAIL_S) * (self.state[:, :3] - self.trailing_m)
+        velocity, behind_s = self.state[:, 3:], dt_s / math.expm1(dt_s / _TRAIL_S)
+        way = ((self.state[:, :3] - self.trailing_m) * velocity).sum(axis=1) / behind_s
+        result: NDArray[np.bool_] = way > _GOING_SHARE * np.square(velocity).sum(axis=1)
+        return result
 
     def locate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
         """The centres of tracks index (K,) were seen at position_m (K, 3) with covariance noise (K, 3, 3)."""

@@ -218,6 +218,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         clean_s=rng.uniform(0.0, 1.0, count),
         view_radps=rng.uniform(0.0, 1.0, count),
         growth_mps=rng.uniform(0.0, 1.0, count),
+        goes=rng.random(count) < 0.5,
         trusted=trusted,
         reckoned=bool(rng.random() < 0.5),
     )

@@ -49,6 +49,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         clean_s=np.array([0.0]),
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),
+        goes=np.array([True]),
         trusted=True,
         reckoned=True,
     )

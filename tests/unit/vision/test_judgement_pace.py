@@ -104,6 +104,14 @@ def test_a_mover_that_is_slow_or_doubtful_is_not_held(seen: MotionEvidence) -> N
     assert verdict(seen, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 0.3)
 
 
+def test_a_mover_whose_centre_does_not_go_is_not_held() -> None:
+    """Its place in the grid has fallen to the wall that it went by, its velocity goes on."""
+    stays = one(ACROSS, goes=np.array([False]))
+    assert verdict(stays, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 0.3)
+    came = replace(stays, arrived=np.array([10]), covariance=covariance(0.2))
+    assert verdict(came, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 2.0)
+
+
 def test_what_does_not_move_yet_is_not_held() -> None:
     assert verdict(one(ACROSS), 0.5, False).evidence[0] == pytest.approx(0.5 - DT_S / 0.3)
 

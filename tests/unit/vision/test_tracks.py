@@ -1,0 +1,32 @@
+"""Whether tracks go where their filters say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vision.tracks import Tracks
+
+
+@pytest.mark.parametrize("dt_s", [1.0 / 30.0, 0.2])
+def test_a_centre_goes_that_has_gone_about_as_fast_as_its_velocity_says(dt_s: float) -> None:
+    """A walker, one of whom less and less is seen, the corner of a wall taken for him, and who goes back."""
+    speeds_mps = np.array([1.0, 0.5, 0.3, -1.0])
+    tracks = Tracks()
+    tracks.start(np.zeros((4, 3)), 0.1, 1.5, 0.0, 0)
+    tracks.state[:, 3] = 1.0
+    for _ in range(round(1.0 / dt_s)):
+        tracks.state[:, 0] += speeds_mps * dt_s
+        goes = tracks.goes(dt_s)
+    np.testing.assert_array_equal(goes, [True, True, False, False])
+
+
+def test_what_the_trail_knows_goes_with_its_track() -> None:
+    tracks = Tracks()
+    tracks.start(np.zeros((2, 3)), 0.1, 1.5, 0.0, 0)
+    tracks.state[:, 3] = [0.0, 1.0]
+    for _ in range(10):
+        tracks.state[1, 0] += 0.05
+        tracks.goes(0.05)
+    tracks.keep(np.array([False, True]))
+    assert tracks.goes(0.05).tolist() == [True]
