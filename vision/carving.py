@@ -22,6 +22,8 @@ from vision.tracks import Tracks
 
 SUSPECT_EVIDENCE = 0.3
 _COMPACT_M = 1.6
+_BODY_M = 0.85
+_CALM_S = 0.9  # for so long, what has come to rest is where free space was seen
 _MIN_CELLS = 12
 _AROUND_M = 0.2
 _MIN_FRAGMENTS = 2
@@ -51,14 +53,17 @@ def carve(
     if not evidence.any():
         return labels
     mover = tracks.moving | (tracks.evidence > 0.0)
+    # Where the lines of something wider than a body stand while a part of it arrives, somebody touches it.
+    touched = tracks.stands & (tracks.calm_s >= _CALM_S) & (measured.extent_m[:, 0] > _BODY_M)
     compact = (measured.extent_m[:, 0] <= _COMPACT_M) & (
         measured.extent_m[:, 2]
         <= _COMPACT_M + 2.0 * depth_sigma_m(measured.position_m[:, 2], config.depth_noise)
     )
+    searched = ~mover & (~compact | touched)
     labels = _cut_back(tracks, detection, labels, tracks.moving & ~compact, evidence, config)
-    large = np.zeros(len(tracks) + 1, np.bool_)
-    large[1 : len(mover) + 1] = ~mover & ~compact
-    inside = large.take(labels)
+    chosen = np.zeros(len(tracks) + 1, np.bool_)
+    chosen[1 : len(searched) + 1] = searched
+    inside = chosen.take(labels)
     seeds = evidence & inside
     if not seeds.any():
         return labels

@@ -249,7 +249,8 @@ class Tracker:
         )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
-        tracks.confidence = verdict.confidence
+        tracks.confidence, tracks.stands = verdict.confidence, verdict.stands
+        tracks.calm_s = np.where(tracks.evidence > 0.0, 0.0, tracks.calm_s + detection.dt_s)
 
     def _percept(
         self,

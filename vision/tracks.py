@@ -34,6 +34,8 @@ _FIELDS = (
     "growth_mps",
     "sliver",
     "trailing_m",
+    "stands",
+    "calm_s",
 )
 
 
@@ -44,8 +46,8 @@ class Tracks:
     of the last box that showed the whole body, at its depth, from its centre; extent_m (T, 3); area_m2 (T,):
     averaged, up to a common factor; cells (T,) of the grid covered when last seen; clean_s (T,): for how long
     the surface's centre has told of the velocity without a break; sliver (T,): a mover of which hardly
-    anything was left to see; trailing_m (T, 3): where the centre was
-    of late, averaged."""
+    anything was left to see; trailing_m (T, 3): where the centre was of late, averaged; stands (T,): its
+    fragments are sure of it; calm_s (T,): since when there has been no evidence, inf if there never was."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -69,6 +71,8 @@ class Tracks:
         self.growth_mps = np.empty(0)
         self.sliver = np.empty(0, np.bool_)
         self.trailing_m = np.empty((0, 3))
+        self.stands = np.empty(0, np.bool_)
+        self.calm_s = np.empty(0)
         self._next_id = 1
 
     def __len__(self) -> int:
@@ -120,6 +124,8 @@ class Tracks:
             "growth_mps": np.zeros(count),
             "sliver": np.zeros(count),
             "trailing_m": position_m,
+            "stands": np.zeros(count),
+            "calm_s": np.full(count, np.inf),
         }
         self._next_id += count
         for name in _FIELDS:

@@ -12,6 +12,7 @@ from tests.support.judging import (
     ACROSS,
     DT_S,
     SETTINGS,
+    STILL,
     by_fragments,
     by_surface,
     covariance,
@@ -45,7 +46,7 @@ def test_at_thirty_hertz_two_frames_are_enough_with_odometry_and_three_are_neede
     seen, evidence, moving = by_fragments(ACROSS, 4), np.zeros(1), np.zeros(1, np.bool_)
     frames = {}
     for reckoned in (True, False):
-        verdict = Verdict(evidence, moving, evidence)
+        verdict = Verdict(evidence, moving, evidence, moving)
         frames[reckoned] = 0
         while not verdict.moving[0]:
             known = replace(seen, reckoned=reckoned)
@@ -137,6 +138,13 @@ def test_fragments_that_stand_still_end_a_motion_fastest() -> None:
         {"own_velocity": np.array([[0.13, 0.0, 0.0]])},  # more than 0.6 of 0.21
     ):
         assert verdict(replace(stopped, **changes), 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 2.0)
+
+
+def test_a_verdict_tells_who_stands_for_sure() -> None:
+    stands = {"own_velocity": np.zeros((1, 3)), "own_covariance": covariance(0.0025)}
+    seen = one(STILL, **stands, ends=np.array([4]), agreement=np.array([1.0]))
+    assert verdict(seen).stands[0]
+    assert not verdict(replace(seen, ends=np.array([3]))).stands[0]
 
 
 def test_fragments_that_stand_still_overrule_every_other_proof() -> None:
