@@ -55,7 +55,7 @@ class Tracker:
         if detection.restarted:
             tracks.clear()
             self._surfaces = masks.NO_SURFACES
-        if detection.restarted or detection.ego_motion.source == "none":
+        if detection.restarted or not detection.motion_known:
             self._free.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
         elapsed_s = min(max(elapsed_s, 0.0), self._config.max_gap_s)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from config.perception import PerceptionConfig
-from hal.types import FloatArray
-from tests.support.detections import FRAME_NS, detection, no_ends, track
+from hal.types import FloatArray, Pose
+from tests.support.detections import AT_ORIGIN, FRAME_NS, detection, no_ends, track
 from tests.support.grids import CAMERA, grid_of, nearest, no_depth, plate, wall
 from vision.detection import no_motion
 from vision.scene import Obstacle
@@ -110,6 +110,16 @@ def test_who_leaves_the_table_that_he_stood_at_is_the_mover_and_not_the_table() 
     (mover,) = moving(percepts[-1])
     assert 0.4 < mover.extent_m[0] < 0.6
     np.testing.assert_allclose(mover.position_m[0], -0.25 - way_m(steps), atol=0.03)
+
+
+def test_what_was_seen_before_the_cameras_motion_got_lost_proves_nothing() -> None:
+    """For three frames its motion is not known; where it then believes to be is half a metre off."""
+    tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
+    grid, off = grid_of(nearest(walker(0.3), wall(6.0))), Pose(np.eye(3), np.array([0.0, 0.0, -0.5]))
+    for k in range(30):
+        lost = 12 <= k < 15
+        percept = tracker.step(detection(grid, k, AT_ORIGIN if k < 12 else off, motion_known=not lost), None)
+        assert not moving(percept)
 
 
 def behind(x_m: float, pillar_m: tuple[float, float] = (0.5, 1.0)) -> FloatArray:
