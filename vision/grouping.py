@@ -155,7 +155,8 @@ def merges(
     mover: NDArray[np.bool_],
     moving: NDArray[np.bool_],
 ) -> list[tuple[int, int]]:
-    """Pairs (small, large) of tracks that are one body: a suspect or mover beside a larger mover.
+    """Pairs (small, large) of tracks that may be one body: a suspect or mover beside a larger mover, the
+    closest pairs first. A track may be beside several.
 
     velocity (T, 3) and velocity_sigma (T,) of the tracks.
     """
@@ -175,20 +176,33 @@ def merges(
         | (overlap >= _OVERLAP)
     )
     reach = np.where(overlap >= _OVERLAP, _APART_M, _CLOSE_M)
+    gap = gaps_m(box, a, box, b)
     one = (
         (a != b)
         & (regions.cells[a] <= regions.cells[b])
-        & (gaps_m(box, a, box, b) <= reach)
+        & (gap <= reach)
         & alike
         & fits
         & ~((regions.cells[a] == regions.cells[b]) & (a < b))
     )
-    result, gone = [], set()
-    for part, whole in zip(a[one].tolist(), b[one].tolist(), strict=True):
-        if part not in gone and whole not in gone:
-            result.append((part, whole))
-            gone.add(part)
-    return result
+    a, b = a[one], b[one]
+    away = np.abs(regions.position_m[a, 2] - regions.position_m[b, 2])
+    closest_first = np.lexsort((away, gap[one]))
+    return list(zip(a[closest_first].tolist(), b[closest_first].tolist(), strict=True))
+
+
+def join(grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]]) -> tuple[IntGrid, list[int]]:
+    """labels (h, w), track index + 1, with the small track of a pair given to the large one, and which small
+    ones have gone so. Two that would be divided again stay two, and the small one may be part of another."""
+    gone: list[int] = []
+    for small, large in pairs:
+        if small in gone or large in gone:
+            continue
+        joined = np.where(labels == small + 1, np.int32(large + 1), labels)
+        if split(grid, joined, large) is None:
+            labels = joined
+            gone.append(small)
+    return labels, gone
 
 
 def _overlaps(a: FloatArray, b: FloatArray) -> FloatArray:

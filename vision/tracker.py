@@ -146,11 +146,8 @@ class Tracker:
         sigma = np.sqrt(np.trace(tracks.covariance[:, 3:, 3:], axis1=1, axis2=2))
         mover = tracks.moving | (tracks.evidence > 0.0)
         pairs = grouping.merges(measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
-        for small, large in pairs:
-            joined = np.where(labels == small + 1, np.int32(large + 1), labels)
-            if grouping.split(grid, joined, large) is None:
-                labels = joined
-                tracks.seen_ns[small] = 0
+        labels, gone = grouping.join(grid, labels, pairs)
+        tracks.seen_ns[gone] = 0
         for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
             second = grouping.split(grid, labels, track)
             if second is not None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tests.support.grids import CAMERA, LEVEL_UP, X, grid_of, labelled, nearest, plate
 from vision.depth_grid import DepthGrid
-from vision.grouping import Bodies, Boxes, attach, boxes, detach, expected_in, gaps_m, merges, split
+from vision.grouping import Bodies, Boxes, attach, boxes, detach, expected_in, gaps_m, join, merges, split
 from vision.regions import Regions, measure
 
 ALL = np.array
@@ -147,13 +147,13 @@ def test_two_alike_are_merged_once_and_not_into_each_other() -> None:
     assert len(merged(same, Body(0.05, cells=100))) == 1
 
 
-def test_nothing_is_merged_into_what_has_gone_into_another_itself() -> None:
-    whole, part = Body(0.0, cells=400), Body(0.1, cells=150)
-    crumb = Body(0.15, width=0.2, cells=20)
-    pairs = merged(whole, part, crumb)
-    gone = {small for small, _ in pairs}
-    assert (1, 0) in pairs
-    assert all(large not in gone for _, large in pairs[pairs.index((1, 0)) :])
+def test_of_two_that_a_part_may_belong_to_the_closer_one_comes_first() -> None:
+    front, back = Body(0.0, z=3.6, width=0.6, deep=0.6, cells=900), Body(0.0, z=4.1)
+    shank = Body(0.3, y=0.5, z=4.15, width=0.15, height=0.5, cells=60)
+    assert merged(front, back, shank) == [(2, 1), (1, 0), (2, 0)]  # gaps of 0.03, 0.1 and 0.15 m
+    # Both touch it: the one at whose depth it is.
+    deep = Body(0.0, z=3.8, width=0.6, deep=0.8, cells=900)
+    assert merged(deep, Body(0.1, z=4.1, width=0.4), shank)[0] == (2, 1)
 
 
 def test_tracks_that_are_not_seen_take_no_part() -> None:
@@ -187,6 +187,17 @@ def test_a_valley_is_lower_than_a_third_of_both_sides(share: float, divided: boo
     left, right = plate(3.0, (-0.7, -0.25), (-0.7, 0.9)), plate(3.0, (0.25, 0.7), (-0.7, 0.9))
     depth_m = nearest(left, right, plate(3.0, (-0.25, 0.25), (0.9 - 1.6 * share, 0.9)))
     assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is not None) == divided
+
+
+def test_a_part_that_would_be_divided_from_one_goes_to_the_next() -> None:
+    grid, labels = two_people(0.4)
+    labels = np.where(labels == 0, 0, np.where(X < 0.0, 1, 2)[None, :]).astype(np.int32)
+    labels[-labels.shape[0] // 2 :][labels[-labels.shape[0] // 2 :] == 2] = 3  # the right one's legs
+    joined, gone = join(grid, labels, [(1, 0), (2, 1)])
+    assert gone == [2]
+    np.testing.assert_array_equal(joined, np.where(labels == 3, 2, labels))
+    # Nothing goes where nothing is left.
+    assert join(grid, labels, [(2, 1), (2, 0), (1, 2)])[1] == [2]
 
 
 def test_only_the_cells_of_that_track_are_divided() -> None:
