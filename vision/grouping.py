@@ -25,6 +25,7 @@ _LEAST_SAMPLES = 3
 _NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
 _SMALL_SHARE = 0.5
 _SAME_VELOCITY_MPS = 0.4
+_ALIKE_SIGMAS = 2.0  # a shank that stands, or swings, on a body that goes
 _SINGLE_WIDTH_M = 0.85
 _PAIR_DISTANCE_M = 0.5
 _VALLEY = 0.35
@@ -167,7 +168,7 @@ def merges(
     box = boxes(regions)
     a, b = np.repeat(small, len(large)), np.tile(large, len(small))
     difference = np.sqrt(np.square(velocity[a] - velocity[b]).sum(axis=1))
-    alike = difference <= _SAME_VELOCITY_MPS + velocity_sigma[a] + velocity_sigma[b]
+    alike = difference <= _SAME_VELOCITY_MPS + _ALIKE_SIGMAS * np.hypot(velocity_sigma[a], velocity_sigma[b])
     width = np.maximum(box.high_m[a, 0], box.high_m[b, 0]) - np.minimum(box.low_m[a, 0], box.low_m[b, 0])
     overlap = _overlaps(regions.bbox_px[a], regions.bbox_px[b])
     fits = (

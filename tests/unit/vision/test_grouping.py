@@ -103,8 +103,9 @@ def test_a_part_too_far_away_is_not() -> None:
 def test_a_part_with_another_velocity_is_not() -> None:
     speeds = [(0.8, 0.0, 0.0), (0.2, 0.0, 0.0)]
     assert merged(PERSON, ARM, velocity=speeds) == []
-    # Doubt in both velocities explains the rest of the difference: 0.6 <= 0.4 + 2 * 0.15.
-    assert merged(PERSON, ARM, velocity=speeds, sigma=0.15) == [(1, 0)]
+    # Two sigmas of the difference explain the rest of it: 0.6 <= 0.4 + 2 * 0.071 * sqrt(2).
+    assert merged(PERSON, ARM, velocity=speeds, sigma=0.069) == []
+    assert merged(PERSON, ARM, velocity=speeds, sigma=0.072) == [(1, 0)]
 
 
 def test_only_a_mover_takes_and_only_a_suspect_is_taken() -> None:
