@@ -45,6 +45,7 @@ _IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
 _CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
 _CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewhat longer
 _CLEAN_LOOKS = 2.5  # three of them, where frames are few
+_EVEN_CELLS = 48  # fewer lie on two or three patches of depth noise, and go to and fro with these
 _COMPACT_M = 2.2
 _WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
 _SURE_SQUARED_SIGMAS = 30.0
@@ -249,12 +250,14 @@ def _by_surface(seen: MotionEvidence, read: _Reading, dt_s: float) -> NDArray[np
     """(T,) whether the centre of a whole, compact surface moves too long and too clearly for an accident.
 
     A new viewpoint shows other sides of a thing that stands still, so its centre wanders with the view, and
-    it wanders while more and more of it comes to be seen: that much speed proves nothing.
+    it wanders while more and more of it comes to be seen: that much speed proves nothing. Nor does a few
+    cells' way along the line of sight: a wall seen through a chair has not many more.
     """
     speed = np.sqrt(np.square(seen.surface_velocity).sum(axis=1))
     looks_s = _CLEAN_LOOKS * dt_s
     clear = (read.surface.across > read.threshold) & (seen.clean_s >= max(_CLEAN_ACROSS_S, looks_s))
-    clear |= (read.surface.along > read.threshold) & (seen.clean_s >= max(_CLEAN_ALONG_S, looks_s))
+    even = seen.cells >= _EVEN_CELLS
+    clear |= even & (read.surface.along > read.threshold) & (seen.clean_s >= max(_CLEAN_ALONG_S, looks_s))
     wander = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps
     result: NDArray[np.bool_] = clear & (seen.size_m <= _COMPACT_M) & (speed > read.least_mps + wander)
     return result

@@ -123,6 +123,12 @@ def test_a_surface_proves_only_beyond_its_doubt() -> None:
     assert not rises(by_surface(ACROSS, 1.0, **surface(ACROSS, 0.042)))
 
 
+def test_a_surface_of_a_few_cells_proves_nothing_along_the_line_of_sight() -> None:
+    assert rises(by_surface(ALONG, 1.0, cells=np.array([48])))
+    assert not rises(by_surface(ALONG, 1.0, cells=np.array([47])))
+    assert rises(by_surface(ACROSS, 1.0, cells=np.array([20])))
+
+
 def test_a_new_viewpoint_makes_the_middle_of_a_static_surface_wander() -> None:
     # 0.21 + 0.5 * 1.4 rad/s * 0.8 m = 0.77, with 1.6 rad/s 0.85: faster than 0.8 m/s
     assert rises(by_surface(ACROSS, 1.0, view_radps=np.array([1.4])))
