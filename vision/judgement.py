@@ -30,6 +30,7 @@ _STOP_S = 0.12  # with proof of standing still
 _MAX_EVIDENCE = 1.5
 _ENDS_ACROSS = 4
 _ENDS_ALONG = 8
+_LEVEL_SHARE = 0.5  # of the threshold: with less than that, what goes up or down needs as many ends as along
 _MIN_AGREEMENT = 0.18
 _CONTRADICTION_SIGMAS = 2.5
 _CONFIRMING_SIGMAS = 2.5
@@ -63,8 +64,9 @@ class MotionEvidence:
     arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
     its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
     another side; growth_mps (T,): how fast its centre may wander because its visible part grows or shrinks.
-    goes (T,): its centre really goes about as fast as the velocity says.
-    trusted: the camera's motion is known. reckoned: odometry says it, too, not the images alone.
+    goes (T,): its centre really goes about as fast as the velocity says. up (3,): the floor's normal, None
+    where it is not known. trusted: the camera's motion is known. reckoned: odometry says it, too, not the
+    images alone.
     """
 
     sight: FloatArray
@@ -85,6 +87,7 @@ class MotionEvidence:
     view_radps: FloatArray
     growth_mps: FloatArray
     goes: NDArray[np.bool_]
+    up: FloatArray | None
     trusted: bool
     reckoned: bool
 
@@ -166,6 +169,7 @@ def _by_fragments(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     many = read.agreeing >= _ENDS_ALONG
     across = _shown_across(read) & ((read.agreeing >= _ENDS_ACROSS) | seen.restless)
     across &= ~second.denies_across | many
+    across &= (read.filtered.level > _LEVEL_SHARE * read.threshold) | many | seen.restless
     along = (read.filtered.along > read.threshold) & (read.own.along > 0.5 * read.threshold)
     along &= many & ~second.denies_along
     few = (read.agreeing >= 2) | seen.restless
@@ -297,5 +301,5 @@ def _split_all(seen: MotionEvidence) -> tuple[Split, Split, Split, Split]:
     velocity[2], covariance[2] = seen.surface_velocity, seen.surface_covariance
     velocity[3] = seen.velocity - seen.surface_velocity
     covariance[3] = seen.covariance + seen.surface_covariance
-    every = split(velocity, covariance, seen.sight)
+    every = split(velocity, covariance, seen.sight, seen.up)
     return every[0], every[1], every[2], every[3]

@@ -1,6 +1,7 @@
 """Velocities along the line of sight and across it, in their own standard deviations.
 
 The two are known very differently: across from the image, along from depth and from changes of length.
+A camera that pitches feigns what goes up and down in the image, but nothing that goes level across it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from hal.types import FloatArray
 from vision.symmetric import inverse
 
 _FLOOR_SIGMA_MPS = 0.03
+_LEAST_LEVEL = 1e-6  # straight up or down nothing is level
 _IDENTITY = np.eye(3)
 _FLOOR = _IDENTITY * _FLOOR_SIGMA_MPS**2
 
@@ -20,31 +22,49 @@ _FLOOR = _IDENTITY * _FLOOR_SIGMA_MPS**2
 @dataclass(frozen=True, slots=True, eq=False)
 class Split:
     """A velocity along the line of sight and across. value, variance (..., T): the component along it; rest
-    (..., T, 3): what is left. along, across (..., T): squared distance from zero in sigmas, of either."""
+    (..., T, 3): what is left. along, across (..., T): squared distance from zero in sigmas, of either; level
+    (..., T): of what goes across and level, the same as across where the floor is not known."""
 
     value: FloatArray
     variance: FloatArray
     rest: FloatArray
     along: FloatArray
     across: FloatArray
+    level: FloatArray
 
     def __getitem__(self, k: int) -> Split:
         """Of the first axis, entry k."""
-        return Split(self.value[k], self.variance[k], self.rest[k], self.along[k], self.across[k])
+        return Split(
+            self.value[k], self.variance[k], self.rest[k], self.along[k], self.across[k], self.level[k]
+        )
 
 
-def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray) -> Split:
-    """Of velocity (..., T, 3) with covariance (..., T, 3, 3), seen along sight (T, 3)."""
-    upright, level = sight[:, :, None], sight[:, None, :]
-    value = (velocity * sight).sum(axis=-1)
-    variance = (level @ covariance @ upright)[..., 0, 0]
+def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray | None) -> Split:
+    """Of velocity (..., T, 3) with covariance (..., T, 3, 3), seen along sight (T, 3). up (3,): the floor's
+    normal, None where the floor is not known."""
+    value, variance = _component(velocity, covariance, sight)
     along = value * value / (variance + _FLOOR_SIGMA_MPS**2)
-    onto_sight = upright * level
+    onto_sight = sight[:, :, None] * sight[:, None, :]
     onto = _IDENTITY - onto_sight
     rest = velocity - value[..., None] * sight
     doubt = onto @ covariance @ onto + (onto_sight + _FLOOR)
     across = _squared_length(rest, doubt)
-    return Split(value, variance, rest, along, across)
+    if up is None:
+        return Split(value, variance, rest, along, across, across)
+    aside = np.cross(sight, up)
+    aside /= np.maximum(np.sqrt(np.square(aside).sum(axis=1)), _LEAST_LEVEL)[:, None]
+    sideways, sideways_variance = _component(velocity, covariance, aside)
+    level = sideways * sideways / (sideways_variance + _FLOOR_SIGMA_MPS**2)
+    return Split(value, variance, rest, along, across, level)
+
+
+def _component(
+    velocity: FloatArray, covariance: FloatArray, direction: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(..., T) of velocity (..., T, 3) in direction (T, 3), and its variance."""
+    value: FloatArray = (velocity * direction).sum(axis=-1)
+    variance: FloatArray = (direction[:, None, :] @ covariance @ direction[:, :, None])[..., 0, 0]
+    return value, variance
 
 
 def squared_sigmas(velocity: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -239,6 +239,7 @@ class Tracker:
             size_m=tracks.extent_m.max(axis=1),
             clean_s=tracks.clean_s,
             growth_mps=tracks.growth_mps,
+            up=sightings.up(detection),
             view_radps=sightings.view_radps(detection, sight, distance),
             goes=tracks.goes(detection.dt_s),
             trusted=detection.motion_known,

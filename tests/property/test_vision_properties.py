@@ -219,6 +219,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         view_radps=rng.uniform(0.0, 1.0, count),
         growth_mps=rng.uniform(0.0, 1.0, count),
         goes=rng.random(count) < 0.5,
+        up=np.array([0.0, -1.0, 0.0]) if rng.random() < 0.5 else None,
         trusted=trusted,
         reckoned=bool(rng.random() < 0.5),
     )

@@ -1,7 +1,7 @@
 """Evidence of motion made by hand, and the verdict on it.
 
-The camera looks along z, the track is 3 m away. Settings: 4 sigmas (16 squared), slowest speed 0.15 m/s and
-0.02 m/s for each metre of distance, 0.21 m/s at 3 m.
+The camera looks along z and is level, the track is 3 m away. Settings: 4 sigmas (16 squared), slowest
+speed 0.15 m/s and 0.02 m/s for each metre of distance, 0.21 m/s at 3 m.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ UNKNOWN = 9.0
 ACROSS = (0.8, 0.0, 0.0)
 ALONG = (0.0, 0.0, -0.8)
 STILL = (0.0, 0.0, 0.0)
+UPWARDS = (0.0, -0.8, 0.0)
+LEVEL_UP = np.array([0.0, -1.0, 0.0])
 Speed = tuple[float, float, float]
 
 
@@ -50,6 +52,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),
         goes=np.array([True]),
+        up=LEVEL_UP,
         trusted=True,
         reckoned=True,
     )

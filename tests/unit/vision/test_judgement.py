@@ -12,8 +12,10 @@ from tests.support.judging import (
     ACROSS,
     ALONG,
     DT_S,
+    LEVEL_UP,
     SETTINGS,
     STILL,
+    UPWARDS,
     Speed,
     by_fragments,
     by_surface,
@@ -61,6 +63,16 @@ def test_what_creeps_is_static_however_sure() -> None:
     assert not rises(by_fragments((0.20, 0.0, 0.0), 20, **sure))
     assert rises(by_fragments((0.22, 0.0, 0.0), 20, **sure))
     assert not rises(by_fragments((0.22, 0.0, 0.0), 20, **sure, distance_m=np.array([5.0])))
+
+
+def test_up_and_down_eight_ends_must_agree_for_a_pitching_camera_feigns_it() -> None:
+    assert not rises(by_fragments(UPWARDS, ends=7))
+    assert rises(by_fragments(UPWARDS, ends=8))
+    # With half of the proof in what goes level, or nearly all ends against standing still, four will do.
+    assert rises(by_fragments((0.32, -0.8, 0.0), ends=4))  # 9.4 squared sigmas
+    assert not rises(by_fragments((0.28, -0.8, 0.0), ends=4))  # 7.2
+    assert rises(by_fragments(UPWARDS, ends=4, restless=np.array([True])))
+    assert rises(by_fragments(UPWARDS, ends=4, up=None))  # where the floor is not known, nor is level
 
 
 def test_a_surface_that_contradicts_denies_a_motion_across_unless_many_ends_agree() -> None:
@@ -208,9 +220,10 @@ def test_unrest_of_many_ends_proves_what_the_filter_says_by_half() -> None:
 
 def test_tracks_are_judged_each_by_itself() -> None:
     all_of = [*EVIDENT.values(), one(ACROSS), by_fragments(ACROSS, 3)]
-    names = [name for name in MotionEvidence.__slots__ if name not in ("trusted", "reckoned")]
+    names = [name for name in MotionEvidence.__slots__ if name not in ("up", "trusted", "reckoned")]
     together = MotionEvidence(
         **{name: np.concatenate([getattr(seen, name) for seen in all_of]) for name in names},
+        up=LEVEL_UP,
         trusted=True,
         reckoned=True,
     )
