@@ -27,6 +27,8 @@ _WORTH_ARRIVING_MPS = 0.3
 # Nor is slowing down for who leaves later than this: most change their velocity before, and a stop remains.
 _FORESEEN_S = 4.0
 _AVERAGE = 0.2
+# Who will be beside the robot so soon is waited for before a start.
+_PASSES_S = 2.0
 # A choice that was made is kept unless this much time would be lost or gained.
 _STICKY_S = 0.5
 
@@ -63,12 +65,17 @@ class MovingLimits:
         enters (N,): who is or is likely to come within the swept width.
         """
         ahead = placed.s_m[:, 0] + placed.half_s_m[:, 0] > s_m
+        # Nobody starts while somebody is about to walk into his side, or on the way along it with hardly a
+        # hand's breadth between; who drives is past before that.
+        standing = motion.v_mps <= STANDING_MPS
+        behind_m = math.inf if standing else ALONGSIDE_M
+        if standing:
+            passes = placed.lo_m[:, 0] - s_m <= -course.along_mps * _PASSES_S
+            enters = enters | (passes & (placed.clear_m[:, 0] <= self._config.margins.lateral_m))
         rows = (bodies.moving & ahead & enters).nonzero()[0]
         if not len(rows):
             self.nobody()
             return [], base_mps
-        # Nobody starts while somebody is about to walk into his side; who drives is past before that.
-        behind_m = math.inf if motion.v_mps <= STANDING_MPS else ALONGSIDE_M
         conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, course, rows, now_s)
         if not conflicts:
             return [], base_mps

@@ -162,3 +162,14 @@ def test_nobody_is_started_into() -> None:
     """A person beside the nose of a robot at rest walks into where its side would be."""
     walks_in = obstacle(0.9, 1.6, vy_mps=-0.7, sigma_mps=0.05)
     assert Bench().settle(walks_in, v_mps=0.0).target_speed_mps == 0.0
+
+
+def test_nobody_is_started_past_with_hardly_a_hand_between() -> None:
+    """Somebody leaves along the side of a robot at rest: 5 cm clear of it he is waited for, 50 cm clear not.
+
+    Driving, the robot would be past him.
+    """
+    close, wide = (obstacle(0.8, y_m, -0.3, 0.3, sigma_mps=0.05) for y_m in (0.70, 1.15))
+    assert Bench().settle(close, v_mps=0.0).target_speed_mps == 0.0
+    assert Bench().settle(wide, v_mps=0.0).target_speed_mps > 0.0
+    assert Bench().settle(close, v_mps=0.3).target_speed_mps > 0.0
