@@ -21,7 +21,7 @@ from vision.regions import IntGrid, Regions
 from vision.scene import CameraCondition, Fragments, Scene
 from vision.tracks import Tracks
 
-_ACCEL_DENSITY = 0.13  # (m/s^2)^2 s: how briskly people start, stop and turn
+_ACCEL_DENSITY = 0.12  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
