@@ -1,7 +1,7 @@
 """The lock-step runner: one thread, simulated time, the same bytes every time.
 
 Each instant has the same order: the outside moves on, then the camera exposes, then the control
-steps. A scene becomes known to the control perception_latency_s after its exposure, as it would on
+steps. A scene becomes known to the control perception_latency_s after its exposure, or later, as it would on
 a robot.
 """
 

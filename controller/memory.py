@@ -100,7 +100,7 @@ class OutOfView:
         bodies = replace(
             bodies,
             captured_ns=seen.captured_ns,
-            xy_m=bodies.xy_m + bodies.velocity_mps * dt_s,
+            xy_m=self._gone_on(bodies, dt_s, pose),
             unseen_s=bodies.unseen_s + dt_s,
         )
         part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
@@ -114,6 +114,22 @@ class OutOfView:
         self._since_s = since[kept]
         self._bodies = self._kept_out(bodies.select(kept), pose, free)
         return self._bodies
+
+    def _gone_on(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:
+        """(N, 2) where they are dt_s later if they go on as they did. Nobody has passed ahead of the robot
+        unseen: who comes is still on the side where it was."""
+        way = bodies.velocity_mps * dt_s
+        forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
+        leftward = np.array([-forward[1], forward[0]])
+        offset = bodies.xy_m - (pose.x_m, pose.y_m)
+        left = offset @ leftward - self._mount.left_m
+        side = np.where(left < 0.0, -1.0, 1.0)
+        ahead = offset @ forward - self._mount.forward_m - bodies.half_view_m > 0.0
+        sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
+        comes = bodies.moving & ahead & (-side * (bodies.velocity_mps @ leftward) > sigma_mps)
+        past_m = np.where(comes, np.maximum(_MIDDLE_M - side * (left + way @ leftward), 0.0), 0.0)
+        xy: FloatArray = bodies.xy_m + way + (side * past_m)[:, None] * leftward
+        return xy
 
     def _kept_out(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
         """Who goes outwards and is not seen where it was expected is at least beside that place, where it
@@ -137,9 +153,6 @@ class OutOfView:
             inwards_mps = -side[k] * float(velocity[k] @ leftward)
             comes = -side[k] * _known_part(velocity[k], covariance[k], leftward) > 0.0
             if late_m < (_EDGE_M + _EDGE_MPS * unseen_s[k] if comes else -_TOUCHING):
-                if comes:
-                    # Nobody has passed before the robot unseen: it is still to come.
-                    xy[k] += side[k] * max(_MIDDLE_M - float(side[k] * left[k]), 0.0) * leftward
                 continue
             xy[k] += side[k] * late_m * leftward
             if inwards_mps > 0.0:

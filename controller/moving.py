@@ -27,7 +27,7 @@ _WORTH_ARRIVING_MPS = 0.3
 # Nor is slowing down for who leaves later than this: most change their velocity before, and a stop remains.
 _FORESEEN_S = 4.0
 _AVERAGE = 0.2
-# Who will be beside the robot so soon is waited for before a start.
+# Who is beside the robot, or will be so soon, is waited for before a start.
 _PASSES_S = 2.0
 # A choice that was made is kept unless this much time would be lost or gained.
 _STICKY_S = 0.5
@@ -70,7 +70,7 @@ class MovingLimits:
         standing = motion.v_mps <= STANDING_MPS
         behind_m = math.inf if standing else ALONGSIDE_M
         if standing:
-            passes = placed.lo_m[:, 0] - s_m <= -course.along_mps * _PASSES_S
+            passes = placed.lo_m[:, 0] - s_m <= np.maximum(-course.along_mps, 0.0) * _PASSES_S
             enters = enters | (passes & (placed.clear_m[:, 0] <= self._config.margins.lateral_m))
         rows = (bodies.moving & ahead & enters).nonzero()[0]
         if not len(rows):

@@ -42,8 +42,8 @@ class SetpointTally:
         Nor is the zero of a driver that has latched: it stands for no profile, but for the base's own stop.
         """
         self._steps += 1
-        if mode in LATCHED_MODES:
-            self._last = None
+        if mode in LATCHED_MODES and (sent is None or sent.v_mps == 0.0):
+            self._last, self._steps = sent or self._last, 0
             return
         if sent is None or (self._last is not None and sent.stamp_ns == self._last.stamp_ns):
             return

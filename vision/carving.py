@@ -1,4 +1,4 @@
-"""Movers that connected depth hides in something large: a person close to a wall is one part with it.
+"""Movers that connected depth hides in something larger: a person close to a wall is one part with it.
 
 Cells that have arrived, and cells around fragments that no static surface explains, are cut out and
 become tracks of their own. They are suspects only: without further evidence they go, and their cells

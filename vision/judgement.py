@@ -1,10 +1,10 @@
 """Moving or static, with hysteresis: a verdict needs consistent evidence over time, of several kinds.
 
 Fragments: the body's velocity over ground differs from zero by many sigmas, and most of its fragments
-agree with it. Across the line of sight that is enough; along it, where a few sliding ends can feign a
-change of length, the body's own depth must not contradict. Unrest: nearly all of many fragments deny that
-the body stands still, though as limbs do they agree on no velocity. Arrivals: the body stands where free
-space was seen.
+agree with it. Level and across the line of sight that is enough; along it, where a few sliding ends can
+feign a change of length, the body's own depth must not contradict. Unrest: nearly all of many fragments
+deny that the body stands still, though as limbs do they agree on no velocity. Arrivals: the body stands
+where free space was seen.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from config.perception import MotionSettings
 from hal.types import FloatArray
-from vision.line_of_sight import Split, split, squared_sigmas
+from vision.line_of_sight import Split, second_opinion, split, squared_sigmas
 
 _RISE_S = 0.06
 # Without odometry an error of the camera's motion stays for some frames: one more of them is asked for.
@@ -32,8 +32,6 @@ _ENDS_ACROSS = 4
 _ENDS_ALONG = 8
 _LEVEL_SHARE = 0.5  # of the threshold: with less than that, what goes up or down needs as many ends as along
 _MIN_AGREEMENT = 0.18
-_CONTRADICTION_SIGMAS = 2.5
-_CONFIRMING_SIGMAS = 2.5
 _OWN_PROOF = 3.0
 _SHARED_PROOF = 0.55  # of the threshold, where fragments and surface say the same
 _SPEED_PER_METRE = 0.02
@@ -165,7 +163,7 @@ def _read(seen: MotionEvidence, settings: MotionSettings) -> _Reading:
 
 def _by_fragments(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     """(T,) whether filter and fragments show a velocity that the surface does not deny, or that it shares."""
-    second = _second_opinion(read)
+    second = second_opinion(read.filtered, read.surface, read.apart)
     many = read.agreeing >= _ENDS_ALONG
     across = _shown_across(read) & ((read.agreeing >= _ENDS_ACROSS) | seen.restless)
     across &= ~second.denies_across | many
@@ -265,30 +263,6 @@ def _by_surface(seen: MotionEvidence, read: _Reading, dt_s: float) -> NDArray[np
     wander = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps
     result: NDArray[np.bool_] = clear & (seen.size_m <= _COMPACT_M) & (speed > read.least_mps + wander)
     return result
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _SecondOpinion:
-    """What the surface's centre says of the fragments' speed, along the line of sight and across: (T,)."""
-
-    denies_along: NDArray[np.bool_]
-    denies_across: NDArray[np.bool_]
-    confirms_along: NDArray[np.bool_]
-    confirms_across: NDArray[np.bool_]
-
-
-def _second_opinion(read: _Reading) -> _SecondOpinion:
-    surface, fragments = read.surface, read.filtered
-    denied, least = _CONTRADICTION_SIGMAS**2, _CONFIRMING_SIGMAS**2
-    denies_along = np.square(read.apart.value) > denied * read.apart.variance
-    same_way = surface.value * fragments.value > 0
-    same_side = (fragments.rest * surface.rest).sum(axis=1) > 0
-    return _SecondOpinion(
-        denies_along,
-        read.apart.across > denied,
-        (surface.along > least) & same_way & ~denies_along,
-        (surface.across > least) & same_side,
-    )
 
 
 def _split_all(seen: MotionEvidence) -> tuple[Split, Split, Split, Split]:

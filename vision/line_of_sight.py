@@ -9,11 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision.symmetric import inverse
 
 _FLOOR_SIGMA_MPS = 0.03
+_CONTRADICTION_SIGMAS = 2.5
+_CONFIRMING_SIGMAS = 2.5
 _LEAST_LEVEL = 1e-6  # straight up or down nothing is level
 _IDENTITY = np.eye(3)
 _FLOOR = _IDENTITY * _FLOOR_SIGMA_MPS**2
@@ -76,3 +79,27 @@ def _squared_length(vector: FloatArray, covariance: FloatArray) -> FloatArray:
     """(...,) of vector (..., 3) in sigmas of covariance (..., 3, 3)."""
     result: FloatArray = (vector[..., None, :] @ inverse(covariance) @ vector[..., :, None])[..., 0, 0]
     return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SecondOpinion:
+    """What a body's surface says of its fragments' speed, along the line of sight and across: (T,)."""
+
+    denies_along: NDArray[np.bool_]
+    denies_across: NDArray[np.bool_]
+    confirms_along: NDArray[np.bool_]
+    confirms_across: NDArray[np.bool_]
+
+
+def second_opinion(fragments: Split, surface: Split, apart: Split) -> SecondOpinion:
+    """Of the velocities of T bodies by their fragments and by their surfaces; apart: their difference."""
+    denied, least = _CONTRADICTION_SIGMAS**2, _CONFIRMING_SIGMAS**2
+    denies_along = np.square(apart.value) > denied * apart.variance
+    same_way = surface.value * fragments.value > 0
+    same_side = (fragments.rest * surface.rest).sum(axis=1) > 0
+    return SecondOpinion(
+        denies_along,
+        apart.across > denied,
+        (surface.along > least) & same_way & ~denies_along,
+        (surface.across > least) & same_side,
+    )

@@ -2,8 +2,8 @@
 
 Connected depth alone would merge a person with the wall that he passes. So every track keeps the cells
 it covered; moved on by its velocity and by the camera's motion they vote for the connected parts that
-they fall into. A part that only one track votes for is that track's, whole; a part that a mover shares
-is divided by the nearest vote.
+they fall into. A part that only one track votes for is that track's, whole, unless it has come while the
+rest of that track stood; a part that a mover shares is divided by the nearest vote.
 """
 
 from __future__ import annotations
@@ -151,13 +151,16 @@ def release(
     came = (arrived >= _CAME_CELLS) & (arrived >= _CAME_SHARE * cells)
     if not came.any():
         return ballot
-    whole = cells @ ballot.present
-    left = ballot.present & ~mover & came[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
+    whole, rest = cells @ ballot.present, (cells * ~came) @ ballot.present
+    leaves = ~mover & (rest > 0)
+    left = ballot.present & leaves & came[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
     present = ballot.present & ~left
-    changed = left.any(axis=1)
+    won = np.flatnonzero(ballot.winner)
+    lost = np.zeros(len(cells), np.bool_)
+    lost[won] = left[won, ballot.winner[won] - 1]
     others = np.where(present.any(axis=1), present.argmax(axis=1) + 1, 0)
-    winner = np.where(changed, others, ballot.winner).astype(np.int32)
-    return Ballot(present, winner, np.where(changed, 0, ballot.votes))
+    winner = np.where(lost, others, ballot.winner).astype(np.int32)
+    return Ballot(present, winner, np.where(lost, 0, ballot.votes))
 
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:

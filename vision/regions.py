@@ -22,7 +22,7 @@ _FOOT_M = 0.12
 _FOOT_PER_METRE = 0.015
 _OCCLUDED_SHARE = 0.15
 _GAP_CELLS = 3
-_RIM = 8  # of the width of a part, this share is its rim
+_RIM = 8  # one in so many columns of a part is its rim, on either side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,7 +172,8 @@ def _width_m(
         x * np.add.reduceat(of, starts, dtype=np.intp) / np.add.reduceat(np.where(of, inverse, 0.0), starts)
         for x, of in ((grid.x[left], low), (grid.x[right], high))
     ]
-    width: FloatArray = np.maximum(ends_m[1] - ends_m[0], 0.0)
+    # What goes back and outwards has its far end on the inner rim.
+    width: FloatArray = np.abs(ends_m[1] - ends_m[0])
     return width
 
 

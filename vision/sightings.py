@@ -48,9 +48,9 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     smooth = (
         measured.wide[seen] & (change <= _SAME_AREA) & (jump <= _JUMP_M + 2.0 * depth_sigma_m(depth, noise))
     )
+    smooth &= detection.motion_known  # else the camera's own error would be theirs
     # What is left to see of a mover that goes behind something is not where its body is.
     sliver = tracks.moving[seen] & (area_m2 < _SLIVER * usual_m2)
-    smooth &= detection.motion_known  # the camera's own error would be theirs
     cut = ~smooth & ~sliver
     tracks.sliver[seen] = sliver & ~_at_border(measured.bbox_px[seen], detection)
     tracks.locate(seen[smooth], position[smooth], covariance[smooth])

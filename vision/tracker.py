@@ -94,7 +94,8 @@ class Tracker:
         """Surfaces first, then velocities, then the verdict. Returns the owners of the fragments."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         arrived = self._free.arrived(grid, standing, pose, detection.captured_ns)
-        self._free.remember(grid, pose, detection.captured_ns)
+        if detection.motion_known or detection.restarted:
+            self._free.remember(grid, pose, detection.captured_ns)
         labels, measured = self._label(detection, standing, arrived, velocities, elapsed_s)
         sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
         owner = adopt(tracks, detection, labels, owner, self._config.depth_noise)

@@ -238,16 +238,19 @@ def test_who_comes_a_little_later_than_expected_still_comes() -> None:
     assert kept.velocity_mps[0].tolist() == [0.0, 0.0]
 
 
-def test_nobody_has_passed_before_the_robot_unseen() -> None:
+@pytest.mark.parametrize("speed_mps", [0.8, 1.3])
+def test_nobody_has_passed_before_the_robot_unseen(speed_mps: float) -> None:
     """Long unseen, it may be late by more than the view is wide there: it stays this side of the middle."""
     recall = Recall()
-    coming = replace(LEAVING, xy_m=np.array([[1.0, 2.9]]), velocity_mps=np.array([[0.0, -0.8]]))
-    recall.recall(coming, 0.0, ALL_SEEN)
+    far = replace(
+        LEAVING, xy_m=np.array([[1.0, 3.5 * speed_mps]]), velocity_mps=np.array([[0.0, -speed_mps]])
+    )
+    recall.recall(far, 0.0, ALL_SEEN)
     for _ in range(45):
         kept = recall.recall(None, 0.0, ALL_SEEN, standing=True)
     assert kept.ids.tolist() == [1]
     assert kept.xy_m[0].tolist() == pytest.approx([1.0, 0.1])
-    assert kept.velocity_mps[0].tolist() == pytest.approx([0.0, -0.8])
+    assert kept.velocity_mps[0].tolist() == pytest.approx([0.0, -speed_mps])
 
 
 @pytest.mark.parametrize(("sigma_mps", "y_m"), [(0.05, 0.34), (0.15, 0.5 * 0.74 + 0.2)])

@@ -75,6 +75,20 @@ def test_the_zero_of_a_latched_driver_is_no_jump_of_the_profile(mode: ChassisMod
     assert tally.violations == 1
 
 
+@pytest.mark.parametrize("mode", [ChassisMode.LOST, ChassisMode.ESTOP])
+def test_a_latched_driver_that_drives_is_judged(mode: ChassisMode) -> None:
+    tally = tally_of((0.8, 0.0))
+    tally.add(Setpoint(20 * MS, -0.8, 0.0, 0.0), mode)
+    assert (tally.violations, tally.reversals) == (1, 1)
+
+
+def test_the_first_command_after_a_latch_is_judged() -> None:
+    tally = tally_of((0.8, 0.0))
+    tally.add(Setpoint(20 * MS, 0.0, 0.0, 0.0), ChassisMode.LOST)
+    tally.add(Setpoint(40 * MS, 0.8, 0.0, 0.0))
+    assert tally.violations == 1
+
+
 def test_braking_beyond_comfort_is_told_apart() -> None:
     assert tally_of((1.0, -0.3), (0.99, -0.31)).emergency_count == 1
 

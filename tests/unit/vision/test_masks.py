@@ -237,3 +237,20 @@ def test_a_mover_keeps_what_came() -> None:
     left = masks.release(before, CELLS, np.array([200, 0]), MOVES)
     np.testing.assert_array_equal(left.present, before.present)
     np.testing.assert_array_equal(left.winner, before.winner)
+
+
+def test_what_came_in_two_parts_has_left_nothing_behind() -> None:
+    """Nothing of the track stood there before: it is the track itself."""
+    before = ballot((True, False), (True, False))
+    left = masks.release(before, np.array([200, 200]), np.array([150, 150]), MOVES)
+    np.testing.assert_array_equal(left.present, before.present)
+    np.testing.assert_array_equal(left.winner, [1, 1])
+
+
+def test_a_mover_who_had_won_the_part_keeps_its_votes() -> None:
+    before = masks.Ballot(
+        np.array([[True, True], [True, False]]), np.array([2, 1], np.int32), np.array([150, 290])
+    )
+    left = masks.release(before, CELLS, np.array([60, 0]), MOVES)
+    np.testing.assert_array_equal(left.winner, [2, 1])
+    np.testing.assert_array_equal(left.votes, [150, 290])

@@ -64,6 +64,16 @@ def test_who_looks_along_the_side_of_a_box_does_not_take_it_for_wider() -> None:
     assert mirrored.extent_m[0, 0] == pytest.approx(found.extent_m[0, 0], abs=1e-6)
 
 
+def test_what_goes_back_and_outwards_is_as_wide_as_its_ends_are_apart() -> None:
+    """Columns 30 down to 26, from 0.29 m aside at 2 m to 0.42 m at 4 m."""
+    depth, labels = flat(8.0), np.zeros(SHAPE, np.int32)
+    for column in range(26, 31):
+        depth[6:18, column] = 2.0 + 0.5 * (30 - column)
+        labels[6:18, column] = 1
+    found = measure(grid_of(depth), labels, 1)
+    assert found.extent_m[0, 0] == pytest.approx(0.105 * 4.0 - 0.145 * 2.0, abs=1e-3)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_labels_that_do_not_fit_into_the_sort_are_measured_alike(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -112,14 +112,17 @@ def test_who_leaves_the_table_that_he_stood_at_is_the_mover_and_not_the_table() 
     np.testing.assert_allclose(mover.position_m[0], -0.25 - way_m(steps), atol=0.03)
 
 
-def test_what_was_seen_before_the_cameras_motion_got_lost_proves_nothing() -> None:
-    """For three frames its motion is not known; where it then believes to be is half a metre off."""
+@pytest.mark.parametrize(("off_m", "comes_back"), [(-0.5, False), (0.6, True)])
+def test_what_was_seen_before_and_while_the_cameras_motion_was_lost_proves_nothing(
+    off_m: float, comes_back: bool
+) -> None:
+    """For three frames its motion is not known; where it believes to be is off, and stays so or not."""
     tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
-    grid, off = grid_of(nearest(walker(0.3), wall(6.0))), Pose(np.eye(3), np.array([0.0, 0.0, -0.5]))
+    grid, off = grid_of(nearest(walker(0.3), wall(6.0))), Pose(np.eye(3), np.array([0.0, 0.0, off_m]))
     for k in range(30):
         lost = 12 <= k < 15
-        percept = tracker.step(detection(grid, k, AT_ORIGIN if k < 12 else off, motion_known=not lost), None)
-        assert not moving(percept)
+        pose = AT_ORIGIN if k < 12 or (comes_back and not lost) else off
+        assert not moving(tracker.step(detection(grid, k, pose, motion_known=not lost), None))
 
 
 def behind(x_m: float, pillar_m: tuple[float, float] = (0.5, 1.0)) -> FloatArray:
