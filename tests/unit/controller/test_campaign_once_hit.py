@@ -17,6 +17,10 @@ from tests.support.campaign import CONFIG
         ("crowd_junction", 50052),
         # The camera froze: reckoned for 3 s with a velocity that was off by two standard deviations.
         ("camera_frozen", 7201),
+        # Came into view right ahead of a robot that was asked to stop anyway, and did so by comfort.
+        ("crowd_junction", 90004),
+        # Out of view, slower than measured, and thought to have passed before the robot unseen.
+        ("crossing_right", 95002),
     ],
 )
 def test_nobody_is_touched_any_more(family: str, seed: int) -> None:
