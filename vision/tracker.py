@@ -242,7 +242,7 @@ class Tracker:
             growth_mps=tracks.growth_mps,
             up=sightings.up(detection),
             view_radps=sightings.view_radps(detection, sight, distance),
-            goes=tracks.goes(detection.dt_s),
+            goes=tracks.follow_trails(detection.dt_s),
             trusted=detection.motion_known,
             reckoned=detection.reckoned,
         )

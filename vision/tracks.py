@@ -149,8 +149,9 @@ class Tracks:
             self.state, self.surface_state = states[:count], states[count:]
             self.covariance, self.surface_covariance = covariances[:count], covariances[count:]
 
-    def goes(self, dt_s: float) -> NDArray[np.bool_]:
-        """(T,) whether the centres, dt_s on, really go about as fast as the velocities say."""
+    def follow_trails(self, dt_s: float) -> NDArray[np.bool_]:
+        """Take in where the centres are, dt_s on; (T,) whether they really go about as fast as the velocities
+        say. Once a frame."""
         self.trailing_m += -math.expm1(-dt_s / _TRAIL_S) * (self.state[:, :3] - self.trailing_m)
         velocity, behind_s = self.state[:, 3:], dt_s / math.expm1(dt_s / _TRAIL_S)
         way = ((self.state[:, :3] - self.trailing_m) * velocity).sum(axis=1) / behind_s

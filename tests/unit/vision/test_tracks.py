@@ -17,7 +17,7 @@ def test_a_centre_goes_that_has_gone_about_as_fast_as_its_velocity_says(dt_s: fl
     tracks.state[:, 3] = 1.0
     for _ in range(round(1.0 / dt_s)):
         tracks.state[:, 0] += speeds_mps * dt_s
-        goes = tracks.goes(dt_s)
+        goes = tracks.follow_trails(dt_s)
     np.testing.assert_array_equal(goes, [True, True, False, False])
 
 
@@ -27,6 +27,6 @@ def test_what_the_trail_knows_goes_with_its_track() -> None:
     tracks.state[:, 3] = [0.0, 1.0]
     for _ in range(10):
         tracks.state[1, 0] += 0.05
-        tracks.goes(0.05)
+        tracks.follow_trails(0.05)
     tracks.keep(np.array([False, True]))
-    assert tracks.goes(0.05).tolist() == [True]
+    assert tracks.follow_trails(0.05).tolist() == [True]
