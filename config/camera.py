@@ -13,7 +13,7 @@ OdometryChoice = Literal["auto", "file", "none", "groundtruth"]
 
 
 class ReplayCameraConfig(Section):
-    """A recording: a TUM RGB-D folder (rgb.txt, depth.txt, camera.yaml) or a ROS bag."""
+    """A recording, played in its own time: a TUM folder (rgb.txt, depth.txt, camera.yaml) or a ROS bag."""
 
     kind: Literal["replay"] = "replay"
     folder: str = Field(min_length=1, description="the recording; relative to this file")

@@ -31,6 +31,7 @@ from hal.api import Chassis, Clock, DatagramLink, FrameSource, OdometrySource
 from hal.cameras.bag_file import is_bag
 from hal.cameras.bag_replay import BagReplay
 from hal.cameras.bag_topics import WantedTopics
+from hal.cameras.paced_recording import PacedRecording
 from hal.cameras.pose_file import open_odometry
 from hal.cameras.pose_track import PoseTrack
 from hal.cameras.realsense import RealsenseCamera
@@ -119,12 +120,16 @@ def open_camera(
         case RealsenseCameraConfig() as camera:
             return RealsenseCamera(camera, clock)
         case ReplayCameraConfig() as camera:
-            recording = resolve(camera.folder, config_path)
-            if is_bag(recording):
-                return BagReplay(recording, "none", max_pair_gap_s=camera.max_pair_gap_s)
-            return TumReplay(recording, camera.max_pair_gap_s, camera.read_ahead)
+            return PacedRecording(_recording(camera, config_path), clock)
         case unknown:
             assert_never(unknown)
+
+
+def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> FrameSource:
+    path = resolve(camera.folder, config_path)
+    if is_bag(path):
+        return BagReplay(path, "none", max_pair_gap_s=camera.max_pair_gap_s)
+    return TumReplay(path, camera.max_pair_gap_s, camera.read_ahead)
 
 
 def open_simulated_camera(

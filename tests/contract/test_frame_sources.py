@@ -18,6 +18,7 @@ from config.path import LineSpec, PathSpec
 from config.scenario import Scenario
 from hal.api import Clock, FrameSource
 from hal.cameras.bag_replay import BagReplay
+from hal.cameras.paced_recording import PacedRecording
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
 from hal.clocks import SimulatedClock
@@ -63,6 +64,11 @@ def realsense(folder: Path) -> Case:
     return Case(RealsenseCamera(RealsenseCameraConfig(), clock, vendor), clock)
 
 
+def paced_recording(folder: Path) -> Case:
+    clock = SimulatedClock()
+    return Case(PacedRecording(TumReplay(write_recording(folder, FRAMES + 5)), clock), clock)
+
+
 def simulated(folder: Path) -> Case:
     clock = SimulatedClock()
     config = SimulatedCameraConfig(width=64, height=48, fx=60.0, fy=60.0, cx=31.5, cy=23.5)
@@ -72,7 +78,7 @@ def simulated(folder: Path) -> Case:
 
 
 HALL = Scenario(name="hall", path=PathSpec(segments=(LineSpec(kind="line", length_m=10.0),)))
-LIVE = [realsense, simulated]
+LIVE = [realsense, simulated, paced_recording]
 ENDING = [small_recording, small_recording_without_thread, small_ros_bag]
 SOURCES = [*LIVE, *ENDING, real_recording]
 
@@ -89,7 +95,7 @@ def case(request: pytest.FixtureRequest, tmp_path: Path) -> Case:
 
 @pytest.fixture(params=LIVE, ids=lambda source: source.__name__)
 def live(request: pytest.FixtureRequest, tmp_path: Path) -> Case:
-    """Is late when asked too early, and never ends."""
+    """Is late when asked too early."""
     return make(request, tmp_path)
 
 
