@@ -38,7 +38,9 @@ _TURNS_MPS2 = 0.25
 _TOUCHING = 1e-6
 # Noise makes whatever stands beside the view creep now and then, and each time the robot would slow down: so
 # much is no noise.
-_CLEAR_SIGMAS, _CLEAR_MPS = 3.3, 0.2
+_CLEAR_SIGMAS, _CLEAR_MPS = 3.5, 0.2
+# So certainly it goes that it will not be found where it was seen last.
+_CERTAIN_SIGMAS = 5.0
 # Two velocities that differ by so much are of two.
 _APART_SIGMAS = 2.0
 
@@ -96,7 +98,7 @@ class OutOfView:
         if not len(self._since_s) and not gone.any():
             return no_bodies(seen.captured_ns)
         since = np.concatenate((self._since_s, np.zeros(int(gone.sum())))) + dt_s
-        bodies = self._bodies.joined(before.select(gone))
+        bodies = self._bodies.joined(_as_measured(before.select(gone)))
         bodies = replace(
             bodies,
             captured_ns=seen.captured_ns,
@@ -215,6 +217,19 @@ def _clearly_comes(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     inwards_mps = -side * (bodies.measured_mps @ leftward)
     sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
     return np.asarray(inwards_mps > np.maximum(_CLEAR_SIGMAS * sigma_mps, _CLEAR_MPS))
+
+
+def _as_measured(bodies: Bodies) -> Bodies:
+    """With the velocity that was measured for who stands by the verdict alone, which takes some frames. Thought
+    to stand where it is not seen, it would be waited for without end."""
+    squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
+    # Along its way: v' C v / v'v is the variance there.
+    variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
+    goes = ~bodies.moving & (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
+    if not goes.any():
+        return bodies
+    velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
+    return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)
 
 
 def _alike(bodies: Bodies, seen: Bodies) -> BoolArray:
