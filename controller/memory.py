@@ -220,8 +220,8 @@ def _clearly_comes(bodies: Bodies, pose: PlanarPose) -> BoolArray:
 
 
 def _as_measured(bodies: Bodies) -> Bodies:
-    """With the velocity that was measured for who stands by the verdict alone, which takes some frames. Thought
-    to stand where it is not seen, it would be waited for without end."""
+    """With the velocity that was measured for who stands by the verdict alone, which takes some frames.
+    Thought to stand where it is not seen, it would be waited for without end."""
     squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
     # Along its way: v' C v / v'v is the variance there.
     variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
