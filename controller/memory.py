@@ -39,8 +39,9 @@ _TOUCHING = 1e-6
 # Noise makes whatever stands beside the view creep now and then, and each time the robot would slow down: so
 # much is no noise.
 _CLEAR_SIGMAS, _CLEAR_MPS = 3.5, 0.2
-# So certainly it goes that it will not be found where it was seen last.
-_CERTAIN_SIGMAS = 5.0
+# So certainly it goes that it will not be found where it was seen last. Who has been looked at for longer
+# stands by a verdict that had time: what sinks below the view may well seem to move.
+_CERTAIN_SIGMAS, _NO_VERDICT_S = 5.0, 1.0
 # Two velocities that differ by so much are of two.
 _APART_SIGMAS = 2.0
 
@@ -225,7 +226,8 @@ def _as_measured(bodies: Bodies) -> Bodies:
     squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
     # Along its way: v' C v / v'v is the variance there.
     variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
-    goes = ~bodies.moving & (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
+    goes = ~bodies.moving & (bodies.age_s < _NO_VERDICT_S)
+    goes &= (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
     if not goes.any():
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
