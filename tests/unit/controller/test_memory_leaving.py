@@ -53,6 +53,17 @@ def test_on_the_right_as_on_the_left() -> None:
     assert after(measured(mirrored, 0.4), expected(mirrored)).moving.tolist() == [True]
 
 
+def narrow(bodies: Bodies) -> Bodies:
+    """What is still in view of somebody at its edge."""
+    return replace(bodies, half_across_m=np.array([0.03]))
+
+
+def test_nobody_was_never_wider_than_the_end_of_a_rack() -> None:
+    coming = measured(narrow(AT_EDGE), -0.4)
+    assert after(coming, expected(narrow(AT_EDGE))).moving.tolist() == [False]
+    assert after(AT_EDGE, coming, expected(narrow(AT_EDGE))).moving.tolist() == [True]
+
+
 AHEAD, YOUNG = box(4.4, 0.5), replace(AT_EDGE, age_s=np.array([0.4]))
 KNOWN = replace(AT_EDGE, age_s=np.array([SETTLED_S]))
 EXACT = replace(AT_EDGE, covariance=np.zeros((1, 2, 2)))
