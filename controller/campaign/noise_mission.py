@@ -20,6 +20,7 @@ from controller.campaign.stage import Stage
 from controller.control import ARRIVED_M, Decides
 from controller.path import OnPath
 from controller.shape import SpeedShaper
+from controller.situation import Situation
 from controller.tally import SetpointTally
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray, Setpoint
@@ -134,13 +135,15 @@ def drive_noise(stage: Stage, config: AppConfig, policy: Decides) -> DriveLog:
             eyes.look(t_s, stage, base.s_m, off_m, known_s_m)
         now_ns = round(t_s * NS_PER_S)
         decision = policy.step(
-            eyes.arrived(t_s),
-            stage.path,
-            stage.pose(known_s_m, off_m),
-            OnPath(known_s_m, off_m, 0.0),
-            max(shaper.v_mps, base.v_mps),
-            shaper.a_mps2,
-            now_ns,
+            Situation(
+                eyes.arrived(t_s),
+                stage.path,
+                stage.pose(known_s_m, off_m),
+                OnPath(known_s_m, off_m, 0.0),
+                max(shaper.v_mps, base.v_mps),
+                shaper.a_mps2,
+                now_ns,
+            )
         )
         log.add(t_s, stage.pose(base.s_m, off_m), base.s_m, base.v_mps, decision)
         if faults.feedback_lost_s is not None and t_s >= faults.feedback_lost_s + _FEEDBACK_TIMEOUT_S:
