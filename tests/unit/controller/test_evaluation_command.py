@@ -64,6 +64,11 @@ def test_only_without_sim(tmp_path: Path) -> None:
         run_evaluation(EvaluationOptions((DESK,), False, tmp_path, only=("walk-plain",)))
 
 
+def test_static_without_a_recording(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="--static says that nothing moves in the recordings"):
+        run_evaluation(EvaluationOptions((), True, tmp_path, static=True))
+
+
 def test_a_bad_recording_is_told_before_anything_is_written(tmp_path: Path) -> None:
     with pytest.raises(BadRecording, match="no such folder"):
         run_evaluation(EvaluationOptions((DESK, tmp_path / "none"), False, tmp_path / "out"))
