@@ -103,6 +103,7 @@ def test_the_fastest_speed_holds_for_each_track() -> None:
     bench = Bench(max_qpps=10_000)
     bench.arm()
     twists = [(s.sent.v_mps, s.sent.w_radps) for s in (bench.step(0.5, 1.0) for _ in range(4)) if s.sent]
+    assert twists
     for v_mps, w_radps in twists:
         assert v_mps + 0.5 * w_radps * 0.555 * 1.1 == pytest.approx(0.5)
         assert w_radps == pytest.approx(2.0 * v_mps)
