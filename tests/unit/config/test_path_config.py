@@ -17,7 +17,7 @@ def read(tmp_path: Path, text: str) -> PathSpec:
     return load(file, PathSpec)
 
 
-def test_a_whole_path(tmp_path: Path) -> None:
+def test_every_key_of_a_path_is_read(tmp_path: Path) -> None:
     spec = read(
         tmp_path,
         """

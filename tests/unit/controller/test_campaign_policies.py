@@ -68,7 +68,7 @@ def test_the_paper_waits_for_a_first_scene() -> None:
         (FRONT + 0.09 + 5.0, 1.0, "free"),
     ],
 )
-def test_nav2_zones(x_m: float, expected: float, rule: str) -> None:
+def test_nav2_slows_by_the_zone_that_four_points_are_in(x_m: float, expected: float, rule: str) -> None:
     assert ZoneMonitor(ROBOT, stage()).limit(wall_of_points(x_m), 1.0, 0.0) == (expected, rule)
 
 

@@ -27,7 +27,7 @@ def chart() -> tuple[Image, Chart]:
         (13.0, 37.0, [15.0, 20.0, 25.0, 30.0, 35.0]),
     ],
 )
-def test_round_ticks(low: float, high: float, ticks: list[float]) -> None:
+def test_ticks_are_round_numbers_within_the_axis(low: float, high: float, ticks: list[float]) -> None:
     assert round_ticks(low, high) == pytest.approx(ticks)
 
 

@@ -20,7 +20,7 @@ from hal.errors import BadRecording
 DESK = Path(__file__).parents[2] / "recordings" / "desk_rpy"
 
 
-def test_recording_report(tmp_path: Path) -> None:
+def test_a_recording_without_truth_is_reported_by_what_is_called_moving(tmp_path: Path) -> None:
     result = CliRunner().invoke(
         cli, ["evaluate", str(DESK), "--static", "--odometry", "none", "--report", str(tmp_path / "out")]
     )
