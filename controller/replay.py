@@ -28,6 +28,7 @@ from controller.perceive import Look
 from controller.recorder import RecordingOptions, open_recorder
 from controller.situation import Situation
 from controller.tally import TimingTally
+from hal.cameras.bag_topics import WantedTopics
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
 from hal.geometry import camera_in_body
@@ -49,6 +50,7 @@ class ReplayOptions:
     observations: FilePath | None = None
     video: FilePath | None = None
     quiet: bool = False
+    topics: WantedTopics = field(default_factory=WantedTopics)
 
 
 @dataclass
@@ -98,7 +100,7 @@ def run_replay(options: ReplayOptions) -> None:
     """Every frame through detect, track and decide. Raises ConfigError, HalError, UserError."""
     config = load_replay(options.config_path)
     console = Console(options.quiet)
-    source, odometry = open_replay(options.recording, options.odometry)
+    source, odometry = open_replay(options.recording, options.odometry, options.topics)
     mount = recorded_mount(config, source.mount)
     perceiver = build_replay_perceiver(config, mount, odometry, time.perf_counter_ns)
     decide = build_replay_decision(config, mount)
@@ -123,7 +125,7 @@ def run_replay(options: ReplayOptions) -> None:
             console.decision((tally.last_ns - tally.first_ns) / NS_PER_S, decision, v_mps)
     prior = "none: the camera's motion is estimated from images and depth alone"
     if odometry is not None:
-        prior = f"{odometry.path.name}: {len(odometry)} poses"
+        prior = f"{odometry.name}: {len(odometry)} poses"
     skipped = [str(skip) for skip in source.skipped]
     console.summary(_summary(options, tally, prior, skipped, source.notes))
 

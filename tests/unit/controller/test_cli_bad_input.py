@@ -172,6 +172,17 @@ def test_a_recording_that_is_not_there() -> None:
     assert "nowhere" in refusal("replay", "nowhere")
 
 
+def test_a_bag_that_is_none(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_text("these are notes")
+    message = refusal("replay", tmp_path / "run.mcap")
+    assert "run.mcap: cannot be read as a ROS bag" in message
+    assert "ros2 bag info" in message
+
+
+def test_topics_of_a_folder() -> None:
+    assert "is no ROS bag, so it has no topics" in refusal("replay", DESK, "--depth-topic", "/depth")
+
+
 def test_a_recording_without_its_calibration(recording: Path) -> None:
     (recording / "camera.yaml").unlink()
     assert "camera.yaml" in refusal("replay", recording)
