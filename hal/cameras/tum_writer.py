@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TextIO
@@ -47,10 +48,11 @@ class TumWriter:
         self._depth_index.close()
 
     def write(self, frame: RgbdFrame) -> None:
-        """Add one frame under its captured_ns. Raises ValueError if it does not fit those before."""
+        """Add one frame under its captured_ns. Raises ValueError if it does not fit those before,
+        DeviceRefused if the disk is full."""
         if self._first is None:
             self._first = frame
-            self._write_calibration(frame)
+            self._to_disk("camera.yaml", lambda: self._write_calibration(frame))
         if (frame.intrinsics, frame.depth_scale_m) != (self._first.intrinsics, self._first.depth_scale_m):
             raise ValueError("a recording has one camera: intrinsics or depth scale changed")
         if frame.captured_ns <= self._last_ns:
@@ -63,7 +65,13 @@ class TumWriter:
     def _image(self, index: TextIO, file: str, image: cv2.typing.MatLike, stamp: str) -> None:
         if not cv2.imwrite(str(self._folder / file), image, _PNG_FAST):
             raise DeviceRefused(f"{self._folder / file}: cannot be written; is the disk full?")
-        index.write(f"{stamp} {file}\n")
+        self._to_disk(file, lambda: index.write(f"{stamp} {file}\n"))
+
+    def _to_disk(self, file: str, write: Callable[[], object]) -> None:
+        try:
+            write()
+        except OSError as error:
+            raise DeviceRefused(f"{self._folder / file}: cannot be written ({error.strerror})") from error
 
     def _index(self, name: str, heading: str) -> TextIO:
         # A line at a time reaches the disk, so a recording that ends abruptly can still be read.
