@@ -81,7 +81,7 @@ def replay(
 ) -> None:
     """Look at a recording as the robot would.
 
-    A TUM RGB-D folder, or a ROS bag (.bag, .db3, .mcap; also those of RealSense viewers).
+    A TUM RGB-D folder, or a ROS bag (.bag, .db3, .mcap), also that of a RealSense viewer.
     """
     from controller.replay import ReplayOptions, run_replay
     from hal.cameras.bag_topics import WantedTopics

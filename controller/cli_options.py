@@ -93,6 +93,9 @@ def mission_options(command: Callable[[MissionOptions], None]) -> Callable[..., 
             "--scenario", help="Simulation only: another world, a YAML file or the name of one that ships."
         ),
         click.option("--seed", type=click.IntRange(min=0), help="Simulation only: another seed."),
+        click.option(
+            "--record", type=FOLDER, help="Write the frames and the odometry, for `treadwatch replay`."
+        ),
     )
 
 

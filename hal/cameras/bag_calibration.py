@@ -8,23 +8,30 @@ import numpy as np
 from pydantic import ValidationError
 
 from config.recording import RecordingCamera
-from hal.cameras.bag_file import BagFile
+from hal.cameras.bag_file import BagFile, Topic
+from hal.cameras.bag_realsense import TRANSFORM, depth_unit_topic, reference_of, stream_of
 from hal.cameras.bag_topics import BagTopics
-from hal.cameras.bag_transforms import TF_STATIC, StaticTransforms, frame_name
+from hal.cameras.bag_transforms import StaticTransforms, frame_name
 from hal.errors import BadRecording
 from hal.types import Pose
 
-_DEPTH_FACTOR = 1000.0
-_BROWN = ("plumb_bob", "rational_polynomial")
+_TF_STATIC = "/tf_static"
+_PER_METRE = 1000.0
+_BROWN = ("plumb_bob", "rational_polynomial", "Brown Conrady")
 _COEFFICIENTS = 5
 
 
 def read_transforms(bag: BagFile) -> StaticTransforms:
-    """All of /tf_static. Raises BadRecording."""
+    """All of /tf_static, and those of RealSense streams. Raises BadRecording."""
     transforms = StaticTransforms()
-    for topic, message in bag.messages((TF_STATIC,)):
+    own = [topic.name for topic in bag.topics if topic.kind == TRANSFORM and reference_of(topic.name)]
+    for topic, message in bag.messages((_TF_STATIC, *own)):
         try:
-            transforms.add(message)
+            if (streams := reference_of(topic)) is not None:
+                transforms.add(*streams, message)
+                continue
+            for one in message.transforms:
+                transforms.add(frame_name(one.header.frame_id), frame_name(one.child_frame_id), one.transform)
         except ValueError as error:
             raise BadRecording(f"{bag.path}: {topic}: {error}") from error
     return transforms
@@ -44,18 +51,19 @@ def read_calibration(
         zip(("fx", "fy", "cx", "cy"), _pinhole(colour, topics.rectified), strict=True),
         width=int(colour.width),
         height=int(colour.height),
-        depth_factor=_DEPTH_FACTOR,
+        depth_factor=_depth_factor(bag, topics),
         distortion=() if topics.rectified else _distortion(bag, topics.colour_info, colour),
     )
-    frame = frame_name(colour.header.frame_id)
+    frame = _frame_of(colour, topics.colour)
     notes: tuple[str, ...] = ()
     depth = None if topics.depth_info is None else bag.first(topics.depth_info)
-    if depth is not None and not _registered(topics, colour, depth):
-        apart = transforms.find(frame, frame_name(depth.header.frame_id))
+    depth_frame = frame if depth is None else _frame_of(depth, topics.depth)
+    if depth is not None and not topics.says_registered and depth_frame != frame:
+        apart = transforms.find(frame, depth_frame)
         if apart is None:
             notes = (
-                f"no transform from {depth.header.frame_id} to {frame} was recorded: depth and colour are "
-                "taken as seen from one place",
+                f"no transform from {depth_frame} to {frame} was recorded: depth and colour are taken as "
+                "seen from one place",
             )
         values |= _depth_camera(depth, apart or Pose(np.eye(3), np.zeros(3)))
     try:
@@ -67,8 +75,22 @@ def read_calibration(
         ) from error
 
 
-def _registered(topics: BagTopics, colour: Any, depth: Any) -> bool:
-    return topics.says_registered or frame_name(depth.header.frame_id) == frame_name(colour.header.frame_id)
+def _frame_of(info: Any, images: Topic) -> str:
+    """The frame that a camera_info names; RealSense streams of a .bag are frames themselves."""
+    return frame_name(info.header.frame_id) or stream_of(images.name) or images.name
+
+
+def _depth_factor(bag: BagFile, topics: BagTopics) -> float:
+    """Units a metre: millimetres (REP 118), unless a RealSense says otherwise."""
+    stream = stream_of(topics.depth.name)
+    option = None if stream is None else bag.first(depth_unit_topic(stream))
+    if option is None:
+        return _PER_METRE
+    try:
+        # A float of 32 bits: a thousandth comes as 0.0010000000475.
+        return round(1.0 / float(option.data), 3)
+    except (ValueError, ZeroDivisionError) as error:
+        raise BadRecording(f"{bag.path}: {topics.depth.name}: its depth unit is {option.data!r}") from error
 
 
 def _pinhole(info: Any, rectified: bool) -> tuple[float, float, float, float]:

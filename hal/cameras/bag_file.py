@@ -1,7 +1,6 @@
 """A ROS bag as a file: its topics and its messages, of ROS 1 (.bag) and ROS 2 (.db3, .mcap) alike.
 
-The one module that imports rosbags (Apache-2.0, extra "ros"), and only when a bag is opened. RealSense
-viewers write .db3 as well (librealsense 2.59).
+The one module that imports rosbags (Apache-2.0, extra "ros"), and only when a bag is opened.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
+from hal.cameras.bag_realsense import message_of
 from hal.clocks import NS_PER_S
 from hal.errors import BadRecording, DeviceNotFound
 
@@ -21,7 +21,9 @@ _METADATA = "metadata.yaml"
 
 def is_bag(path: Path) -> bool:
     """Whether a path names a bag: a file with one of its suffixes, or a folder that ROS 2 has written."""
-    return (path / _METADATA).is_file() or (path.suffix in _SUFFIXES and not path.is_dir())
+    if path.is_dir():
+        return (path / _METADATA).is_file() and not (path / "rgb.txt").exists()
+    return path.suffix in _SUFFIXES
 
 
 class Topic(NamedTuple):
@@ -86,6 +88,8 @@ class BagFile:
         while True:
             try:
                 connection, _, data = next(found)
+                if not self._reader.is2:
+                    data = message_of(connection.topic, connection.msgtype, data)
                 message = self._reader.deserialize(data, connection.msgtype)
             except StopIteration:
                 return

@@ -8,7 +8,7 @@ import numpy as np
 
 from hal.cameras.bag_file import BagFile
 from hal.cameras.bag_transforms import StaticTransforms, frame_name
-from hal.cameras.pose_track import PoseTrack, rotation_matrix
+from hal.cameras.pose_track import PoseTrack, quaternion_of, rotation_matrix
 from hal.clocks import NS_PER_S
 from hal.errors import BadRecording
 from hal.types import FloatArray
@@ -47,7 +47,7 @@ def read_odometry(bag: BagFile, topic: str, camera: str, transforms: StaticTrans
     poses = np.stack([rows[one] for one in stamps_ns])
     # A camera that is bolted on turns as its base does: the constant turn between them is on the right.
     positions = np.stack([rotation_matrix(pose[3:]) @ mount.translation_m + pose[:3] for pose in poses])
-    return PoseTrack(topic, stamps_ns, positions, _turned(poses[:, 3:], _quaternion(mount.rotation)))
+    return PoseTrack(topic, stamps_ns, positions, _turned(poses[:, 3:], quaternion_of(mount.rotation)))
 
 
 def _turned(first: FloatArray, then: FloatArray) -> FloatArray:
@@ -63,18 +63,3 @@ def _turned(first: FloatArray, then: FloatArray) -> FloatArray:
         ),
         axis=1,
     )
-
-
-def _quaternion(rotation: FloatArray) -> FloatArray:
-    """(4,) of a rotation matrix: the greatest eigenvector of Bar-Itzhack's matrix, without a case by case."""
-    r = rotation
-    k = np.array(
-        [
-            [r[0, 0] - r[1, 1] - r[2, 2], 0.0, 0.0, 0.0],
-            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0.0, 0.0],
-            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0.0],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
-        ]
-    )
-    vectors: FloatArray = np.linalg.eigh(k / 3.0).eigenvectors
-    return vectors[:, -1]

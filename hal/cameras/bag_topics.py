@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hal.cameras.bag_file import Topic
+from hal.cameras.bag_realsense import info_topic, stream_of
 from hal.errors import BadRecording
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -116,8 +117,10 @@ def _depth_rank(topic: Topic) -> int | None:
 
 def _info_of(topic: Topic, infos: set[str]) -> str | None:
     """As image_transport finds it: beside the images."""
-    name = base_name(topic.name).rsplit("/", 1)[0] + "/camera_info"
-    return name if name in infos else None
+    beside = base_name(topic.name).rsplit("/", 1)[0] + "/camera_info"
+    stream = stream_of(topic.name)
+    places = [beside] if stream is None else [beside, info_topic(stream)]
+    return next((place for place in places if place in infos), None)
 
 
 def _names(topics: Sequence[Topic]) -> str:

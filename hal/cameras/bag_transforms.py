@@ -1,4 +1,4 @@
-"""The tree of frames that a bag's /tf_static spans."""
+"""The tree of frames that a bag's transforms span."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import numpy as np
 from hal.cameras.pose_track import rotation_matrix
 from hal.types import Pose
 
-TF_STATIC = "/tf_static"
-
 
 class StaticTransforms:
     """Where frames stand in each other."""
@@ -19,18 +17,16 @@ class StaticTransforms:
     def __init__(self) -> None:
         self._seen_from: dict[str, dict[str, Pose]] = {}
 
-    def add(self, message: Any) -> None:
-        """A tf2_msgs TFMessage. Raises ValueError for a transform that is none."""
-        for one in message.transforms:
-            t, q = one.transform.translation, one.transform.rotation
-            quaternion, origin_m = np.array([q.x, q.y, q.z, q.w]), np.array([t.x, t.y, t.z])
-            length = float(np.linalg.norm(quaternion))
-            parent, child = frame_name(one.header.frame_id), frame_name(one.child_frame_id)
-            if not (length > 0.0 and np.isfinite(length) and np.isfinite(origin_m).all()):
-                raise ValueError(f"the transform from {parent} to {child} is impossible")
-            pose = Pose(rotation_matrix(quaternion / length), origin_m)
-            self._seen_from.setdefault(parent, {})[child] = pose
-            self._seen_from.setdefault(child, {})[parent] = pose.inverse()
+    def add(self, parent: str, child: str, transform: Any) -> None:
+        """transform: a geometry_msgs Transform, child in parent. Raises ValueError for one that is none."""
+        t, q = transform.translation, transform.rotation
+        quaternion, origin_m = np.array([q.x, q.y, q.z, q.w]), np.array([t.x, t.y, t.z])
+        length = float(np.linalg.norm(quaternion))
+        if not (length > 0.0 and np.isfinite(length) and np.isfinite(origin_m).all()):
+            raise ValueError(f"the transform from {parent} to {child} is impossible")
+        pose = Pose(rotation_matrix(quaternion / length), origin_m)
+        self._seen_from.setdefault(parent, {})[child] = pose
+        self._seen_from.setdefault(child, {})[parent] = pose.inverse()
 
     def find(self, outer: str, inner: str) -> Pose | None:
         """The inner frame as the outer one sees it, over whatever lies between; None: they are not linked."""

@@ -73,6 +73,21 @@ def rotation_matrix(quaternion: FloatArray) -> FloatArray:
     )
 
 
+def quaternion_of(rotation: FloatArray) -> FloatArray:
+    """(3, 3) -> (qx, qy, qz, qw): the greatest eigenvector of Bar-Itzhack's matrix, good at every angle."""
+    r = rotation
+    k = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], 0.0, 0.0, 0.0],
+            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0.0, 0.0],
+            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0.0],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
+        ]
+    )
+    vectors: FloatArray = np.linalg.eigh(k / 3.0).eigenvectors
+    return vectors[:, -1]
+
+
 def _slerp(start: FloatArray, end: FloatArray, share: float) -> FloatArray:
     """Shoemake's spherical interpolation of unit quaternions, the short way round."""
     cosine = float(start @ end)

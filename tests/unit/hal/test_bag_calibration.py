@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hal.cameras.bag_calibration import read_transforms
+from hal.cameras.bag_file import BagFile
 from hal.cameras.bag_replay import BagReplay
 from hal.cameras.bag_topics import WantedTopics
 from hal.errors import BadRecording
@@ -28,6 +30,7 @@ from tests.support.bags import (
 )
 from tests.support.recordings import SMALL, START_NS, small_frame
 
+RECORDINGS = Path(__file__).resolve().parents[2] / "recordings"
 FRAMES = [small_frame(number) for number in range(4)]
 
 
@@ -130,3 +133,36 @@ def test_the_topics_that_are_asked_for_are_taken(tmp_path: Path) -> None:
     assert replay.notes[0] == f"colour is {rear.colour}, depth {rear.depth}"
     with pytest.raises(BadRecording, match="--depth-topic /left: there is none"):
         BagReplay(path, wanted=WantedTopics(rear.colour, "/left"))
+
+
+@pytest.mark.parametrize(
+    ("file", "depth", "colour"),
+    [
+        ("realsense-2.59.db3", "Depth", "Color"),
+        ("realsense-2.55.bag", "/device_0/sensor_0/Depth_0", "/device_0/sensor_1/Color_0"),
+    ],
+)
+def test_realsense_bags_say_where_depth_stands_in_colour(file: str, depth: str, colour: str) -> None:
+    """As it was given to the recorder: turned by 0.02 rad, moved by (15, 2, 3) mm."""
+    with BagFile(RECORDINGS / file) as bag:
+        pose = read_transforms(bag).find(colour, depth)
+    assert pose is not None
+    assert pose.translation_m == pytest.approx([0.015, 0.002, 0.003], abs=1e-6)
+    turned = [[0.9998, -0.02, 0.0], [0.02, 0.9998, 0.0], [0.0, 0.0, 1.0]]
+    assert pose.rotation == pytest.approx(np.array(turned), abs=1e-5)
+
+
+def test_a_realsense_with_a_finer_depth_unit_is_believed(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        renamed = {
+            ALIGNED: "/device_0/sensor_0/Depth_0/image/data",
+            ALIGNED_INFO: "/device_0/sensor_0/Depth_0/image/camera_info",
+        }
+        unit = ros.make("std_msgs/msg/String", data="0.000100")
+        return [
+            ("/device_0/sensor_0/option/Depth_Units/value", START_NS, unit),
+            *((renamed.get(topic, topic), t, one) for topic, t, one in camera_entries(ros, FRAMES)),
+        ]
+
+    frame = read_all(BagReplay(write_bag(tmp_path, "mcap", entries)))[0]
+    assert frame.depth_scale_m == 0.0001

@@ -60,9 +60,10 @@ def test_the_file_inside_the_folder_is_a_bag_as_well(tmp_path: Path) -> None:
     assert len(read_all(BagReplay(file))) == 4
 
 
-def test_what_a_realsense_viewer_records_is_read() -> None:
-    """Four frames of librealsense 2.59's recorder: depth from a camera of its own, 3 mm further back."""
-    replay = BagReplay(RECORDINGS / "realsense.db3")
+@pytest.mark.parametrize("file", ["realsense-2.59.db3", "realsense-2.55.bag"])
+def test_what_a_realsense_viewer_records_is_read(file: str) -> None:
+    """Four frames of librealsense's own recorder: depth from a camera of its own, 3 mm further back."""
+    replay = BagReplay(RECORDINGS / file)
     frames = read_all(replay)
     assert [frame.colour[0, 0].tolist() for frame in frames] == [[10, 20, 30 + n] for n in range(4)]
     assert [np.unique(frame.depth).tolist() for frame in frames] == [[1003 + n] for n in range(4)]
