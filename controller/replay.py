@@ -26,6 +26,7 @@ from controller.decision import Decision
 from controller.path import OnPath, Path
 from controller.perceive import Look
 from controller.recorder import RecordingOptions, open_recorder
+from controller.situation import Situation
 from controller.tally import TimingTally
 from hal.cameras.bag_topics import WantedTopics
 from hal.clocks import NS_PER_S
@@ -143,7 +144,7 @@ _AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
 def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Decision:
     """As for a robot that stands at the start of a straight path and drives v_mps."""
     on_path = OnPath(0.0, 0.0, 0.0)
-    return decide.step(look.scene, path, _STANDING, on_path, v_mps, 0.0, look.scene.captured_ns)
+    return decide.step(Situation(look.scene, path, _STANDING, on_path, v_mps, 0.0, look.scene.captured_ns))
 
 
 def _summary(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TextIO
@@ -57,7 +59,8 @@ class TumWriter:
         """
         if self._first is None:
             self._first = frame
-            self._write_calibration(frame)
+            with self._told("camera.yaml"):
+                self._write_calibration(frame)
         if (frame.intrinsics, frame.depth_scale_m) != (self._first.intrinsics, self._first.depth_scale_m):
             raise ValueError("a recording has one camera: intrinsics or depth scale changed")
         if frame.captured_ns <= self._last_ns:
@@ -67,12 +70,22 @@ class TumWriter:
         self._image(self._colour_index, f"rgb/{stamp}.png", frame.colour, stamp)
         self._image(self._depth_index, f"depth/{stamp}.png", frame.depth, stamp)
         if odometry is not None:
-            self._pose(odometry, stamp)
+            with self._told("odometry.txt"):
+                self._pose(odometry, stamp)
 
     def _image(self, index: TextIO, file: str, image: cv2.typing.MatLike, stamp: str) -> None:
         if not cv2.imwrite(str(self._folder / file), image, _PNG_FAST):
             raise DeviceRefused(f"{self._folder / file}: cannot be written; is the disk full?")
-        index.write(f"{stamp} {file}\n")
+        with self._told(file):
+            index.write(f"{stamp} {file}\n")
+
+    @contextmanager
+    def _told(self, file: str) -> Iterator[None]:
+        """A disk that is full is a device that refuses."""
+        try:
+            yield
+        except OSError as error:
+            raise DeviceRefused(f"{self._folder / file}: cannot be written ({error.strerror})") from error
 
     def _pose(self, pose: Pose, stamp: str) -> None:
         if self._odometry is None:
