@@ -125,7 +125,7 @@ class Tracker:
         came = np.bincount(parts[arrived], minlength=count + 1)[1:]
         ballot = masks.release(ballot, measured.cells, came, mover)
         bodies = sightings.bodies(tracks, pose, self._config.depth_noise)
-        expected = mover & grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies)
+        expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
         winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, mover, expected)
         labels = masks.divide(parts, predicted, ballot, winner)
@@ -144,7 +144,7 @@ class Tracker:
         tracks, grid = self._tracks, detection.grid
         if not tracks.moving.any():
             return labels
-        sigma = np.sqrt(np.trace(tracks.covariance[:, 3:, 3:], axis1=1, axis2=2))
+        sigma = np.sqrt(tracks.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
         mover = tracks.moving | (tracks.evidence > 0.0)
         pairs = grouping.merges(measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
         labels, gone = grouping.join(grid, labels, pairs)
