@@ -93,8 +93,8 @@ class Tracks:
         """(N,) index of each track id, -1 where there is none (any more)."""
         if len(self) == 0:
             return np.full(len(ids), -1, np.intp)
-        place = np.minimum(np.searchsorted(self.ids, ids), len(self) - 1)
-        return np.where(self.ids[place] == ids, place, -1).astype(np.intp)
+        place = np.minimum(self.ids.searchsorted(ids), len(self) - 1)
+        return np.where(self.ids[place] == ids, place, -1)
 
     def start(
         self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
