@@ -157,7 +157,7 @@ def _view(
 
 def _inverted(values: FloatGrid, valid: BoolGrid) -> FloatGrid:
     """1 / values where valid, else 0. valid values are not small: nothing else is divided by."""
-    inverted = np.reciprocal(np.maximum(values, np.float32(_SMALLEST)))
+    inverted = np.float32(1.0) / np.maximum(values, np.float32(_SMALLEST))
     return np.asarray(cv2.copyTo(inverted, valid.view(np.uint8)), np.float32)
 
 

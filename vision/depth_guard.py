@@ -81,7 +81,7 @@ def _known_m(grid: DepthGrid, bands: int, width: int, max_depth_m: float) -> NDA
     first = np.where(run.any(axis=0), run.argmax(axis=0), len(rows))
     # Where even the uppermost ray meets the floor, nothing beyond that was looked at.
     horizon_m = max_depth_m if len(rows) < len(grid.y) else floor_forward[-1]
-    reach = np.append(floor_forward, horizon_m)
+    reach = np.concatenate((floor_forward, (horizon_m,)))
     # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known.
     return np.where(first == 0, 0.0, np.minimum(reach[np.minimum(first, len(rows))], max_depth_m)).astype(
         float

@@ -86,7 +86,7 @@ def gather(
     turn = now.pose.rotation.T
     direction = turn @ anchor.direction
     origin = turn @ (anchor.origin - now.pose.translation_m[:, None])
-    ray = np.ascontiguousarray(rays(store.ends_px.reshape(-1, 2), camera)[:, :2].T)
+    ray = rays(store.ends_px.reshape(-1, 2), camera).T[:2]
     # Near and far surface at once, in the middle index: (3, 2, 2N), (2, 2, 2N).
     surfaces = np.empty((2, len(depths.near_m)))
     surfaces[0], surfaces[1] = depths.near_m, depths.far_m

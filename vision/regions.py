@@ -229,16 +229,16 @@ def _overlapped_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[n
     comes after that gap is the neighbour.
     """
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    owned = np.flatnonzero(flat)
-    first, second = owned[:-1], owned[1:]
+    owned = np.flatnonzero(flat > 0)
+    label = flat.take(owned)
+    rims = np.flatnonzero(label[1:] != label[:-1])
+    first, second = owned.take(rims), owned.take(rims + 1)
     apart = second - first
     near = (apart <= _GAP_CELLS + 1) & (second % labels.shape[1] >= apart)  # not from one row to the next
-    rims = np.flatnonzero(near & (flat.take(first) != flat.take(second)))
-    first, second = first.take(rims), second.take(rims)
     step = inverse.take(second) - inverse.take(first)
-    farther = np.where(step > 0.0, flat.take(first), flat.take(second))
+    farther = np.where(step > 0.0, label.take(rims), label.take(rims + 1))
     jumps = np.abs(step) > np.float32(_LEAST_JUMP)
-    return np.bincount(farther[jumps], minlength=count + 1)[1:]
+    return np.bincount(farther[near & jumps], minlength=count + 1)[1:]
 
 
 def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:
@@ -257,5 +257,5 @@ def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:
     table = np.zeros(int(nearest.max()) + 1, np.int32)
     table[nearest[owned]] = inner[owned]
     result = labels.copy()
-    result[box] = np.where(mask[box] & ~owned, table[nearest], inner)
+    result[box] = np.where(mask[box] & ~owned, table.take(nearest), inner)
     return result
