@@ -74,15 +74,14 @@ def _known_m(grid: DepthGrid, bands: int, width: int, max_depth_m: float) -> NDA
         part = seen[:, column::width]
         count[:, : part.shape[1]] += part
     hole = count < 0.5 * width
-    # A single row may be lost to noise; two in a row are a hole.
-    run = hole.copy()
+    # A single row may be lost to noise; two in a row are a hole. After the last row one is sure.
+    run = np.ones((len(rows) + 1, bands), np.bool_)
+    run[:-1] = hole
     for shift in range(1, _HOLE_ROWS):
-        run[:-shift] &= hole[shift:]
-    first = np.where(run.any(axis=0), run.argmax(axis=0), len(rows))
+        run[: len(rows) - shift] &= hole[shift:]
+    first = run.argmax(axis=0)
     # Where even the uppermost ray meets the floor, nothing beyond that was looked at.
     horizon_m = max_depth_m if len(rows) < len(grid.y) else floor_forward[-1]
     reach = np.concatenate((floor_forward, (horizon_m,)))
     # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known.
-    return np.where(first == 0, 0.0, np.minimum(reach[np.minimum(first, len(rows))], max_depth_m)).astype(
-        float
-    )
+    return np.where(first == 0, 0.0, np.minimum(reach[first], max_depth_m)).astype(float)

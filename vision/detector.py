@@ -149,7 +149,8 @@ class Detector:
         return grid
 
     def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
-        without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
+        missing = np.isnan(self._store.near_m)
+        without_depth = int(np.count_nonzero(missing[:, 0] & missing[:, 1]))
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 

@@ -130,12 +130,9 @@ def count_votes(
     present = votes >= np.maximum(least, _LEAST_VOTES)
     # Of the static tracks the strongest stays.
     static_votes = np.where(mover, 0, votes) * present
-    strongest = static_votes.argmax(axis=1)
-    each = np.arange(count)
-    keep_static = np.zeros_like(present)
-    keep_static[each, strongest] = static_votes[each, strongest] > 0
-    present &= mover | keep_static
-    best = np.where(present, votes, -1).argmax(axis=1)
+    strongest = static_votes.argmax(axis=1)[:, None] == np.arange(tracks)
+    present &= mover | (strongest & (static_votes > 0))
+    best, each = np.where(present, votes, -1).argmax(axis=1), np.arange(count)
     claimed = present[each, best]
     return Ballot(present, ((best + 1) * claimed).astype(np.int32), votes[each, best] * claimed)
 

@@ -155,9 +155,10 @@ def _end_chi2(motion: PointMotion, trust: FloatArray, velocity: FloatArray) -> F
 
 def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(N,) fragments that no static surface explains: both ends miss, at either depth of a silhouette."""
-    chi2 = np.where(motion.usable, motion.static_chi2, 0.0).reshape(-1, 2)
-    both = (chi2 > _STATIC_END_CHI2).all(axis=1)
-    result: NDArray[np.bool_] = both & (chi2.sum(axis=1) > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
+    chi2 = np.where(motion.usable, motion.static_chi2, 0.0)
+    one, other = chi2[0::2], chi2[1::2]
+    both = (one > _STATIC_END_CHI2) & (other > _STATIC_END_CHI2)
+    result: NDArray[np.bool_] = both & (one + other > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
     return result
 
 

@@ -91,12 +91,12 @@ def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
     return int(number.max()), labels
 
 
-def _sorted_cells(labels: IntGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Labelled cells in the order of their labels, then row by row: label and flat index of each."""
+def _sorted_cells(labels: IntGrid, count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Cells labelled 1..count in the order of their labels, then row by row: label and flat index of each."""
     flat = np.flatnonzero(labels > 0)
     label = labels.ravel().take(flat)
     bits = labels.size.bit_length()
-    if int(label.max(initial=0)).bit_length() + bits > 31:
+    if count.bit_length() + bits > 31:
         order = np.argsort(label, kind="stable")
         return label[order], flat[order].astype(np.int32)
     # One number holds both: sorting numbers is faster than finding an order and following it.
@@ -111,8 +111,8 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     wide knows of the image's border only; see unhidden.
     """
     height, width = labels.shape
-    label, flat = _sorted_cells(labels)
-    ends = np.searchsorted(label, np.arange(count + 1), side="right")
+    label, flat = _sorted_cells(labels, count)
+    ends = label.searchsorted(np.arange(count + 1), side="right")
     starts, cells = ends[:-1], ends[1:] - ends[:-1]
     bbox = np.zeros((count, 4))
     position, extent = np.zeros((count, 3)), np.zeros((count, 3))
@@ -167,11 +167,12 @@ def _width_m(
     """(R,) from the left to the right rim of parts, each at its own depth: whoever looks along a side of a
     body would take it for wider, at the depth of its middle, than it is."""
     rim = (right - left) // _RIM
-    low, high = columns <= np.repeat(left + rim, number), columns >= np.repeat(right - rim, number)
-    ends_m = [
-        x * np.add.reduceat(of, starts, dtype=np.intp) / np.add.reduceat(np.where(of, inverse, 0.0), starts)
-        for x, of in ((grid.x[left], low), (grid.x[right], high))
-    ]
+    low, high = columns <= (left + rim).repeat(number), columns >= (right - rim).repeat(number)
+    ends_m = []
+    for x, of in ((grid.x[left], low), (grid.x[right], high)):
+        share = of.astype(np.float32)
+        cells = np.add.reduceat(share, starts).astype(np.intp)
+        ends_m.append(x * cells / np.add.reduceat(inverse * share, starts))
     # What goes back and outwards has its far end on the inner rim.
     width: FloatArray = np.abs(ends_m[1] - ends_m[0])
     return width
