@@ -47,11 +47,14 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
 
 def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: int, width: int) -> NDArray[np.float64]:
     """(bands,) forward distance of the nearest surface that enough obstacle cells agree on, inf without."""
-    rows, columns = obstacle.shape
-    forward = np.full((rows, bands * width), np.inf, np.float32)
-    cv2.copyTo(grid.forward_m, obstacle.view(np.uint8), forward[:, :columns])
+    mask, columns = obstacle.view(np.uint8), obstacle.shape[1]
+    support = min(_SUPPORT, len(obstacle) * width)
+    _, top, _, height = cv2.boundingRect(mask)  # the rows in which something stands
+    forward = np.full((max(height, support), bands * width), np.inf, np.float32)
+    if height > 0:
+        rows = slice(top, top + height)
+        cv2.copyTo(grid.forward_m[rows], mask[rows], forward[:height, :columns])
     upright = np.asarray(cv2.transpose(forward), np.float32).reshape(bands, -1)
-    support = min(_SUPPORT, upright.shape[1])
     return np.sort(upright, axis=1)[:, support - 1].astype(float)
 
 

@@ -261,8 +261,7 @@ def _hint(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[n
     moving, velocity = np.zeros(len(ids), np.bool_), np.zeros((len(ids), 3))
     if previous is None or len(previous.ids) == 0:
         return moving, velocity
-    index = np.searchsorted(previous.ids, ids)
-    index = np.minimum(index, len(previous.ids) - 1)
+    index = np.minimum(previous.ids.searchsorted(ids), len(previous.ids) - 1)
     same = previous.ids[index] == ids
     moving[same] = previous.moving[index[same]]
     if moving.any():

@@ -114,11 +114,12 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     label, flat = _sorted_cells(labels, count)
     ends = label.searchsorted(np.arange(count + 1), side="right")
     starts, cells = ends[:-1], ends[1:] - ends[:-1]
-    bbox = np.zeros((count, 4))
-    position, extent = np.zeros((count, 3)), np.zeros((count, 3))
+    # Box, centre and size of each, in this order.
+    table, reach = np.zeros((10, count)), np.zeros(count, np.intp)
     wide, tall, nothing = np.zeros((3, count), np.bool_)
+    result = Regions(cells, reach, table[:4].T, table[4:7].T, table[7:].T, wide, tall, nothing)
     if len(flat) == 0:
-        return Regions(cells, cells, bbox, position, extent, wide, tall, nothing)
+        return result
     present = np.flatnonzero(cells)
     starts, number = starts[present], cells[present]
     rows = flat // np.int32(width)
@@ -128,31 +129,24 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     inverse = grid.inverse_depth.ravel().take(flat)
     mean_inverse = np.add.reduceat(inverse, starts) / number
     spread = np.sqrt(np.maximum(np.add.reduceat(inverse * inverse, starts) / number - mean_inverse**2, 0.0))
-    depth = 1.0 / mean_inverse
-    centre = np.empty((len(present), 3))
-    centre[:, 0] = np.add.reduceat(grid.x.take(columns), starts) / number * depth
-    centre[:, 1] = np.add.reduceat(grid.y.take(rows), starts) / number * depth
-    centre[:, 2] = depth
-    position[present] = centre
-    step, half = grid.step_px, 0.5 * grid.step_px
-    box = np.empty((len(present), 4))
-    box[:, 0] = left * step + (grid.offset_px - half)
-    box[:, 1] = top * step + (grid.offset_px - half)
-    box[:, 2] = right * step + (grid.offset_px + half)
-    box[:, 3] = np.maximum(
-        bottom * step + (grid.offset_px + half), _foot_px(grid, bottom, centre[:, 0] / depth, depth)
-    )
-    bbox[present] = box
-    size = np.empty((len(present), 3))
-    size[:, 0] = _width_m(grid, columns, inverse, starts, number, left, right)
-    size[:, 1] = (grid.y[bottom] - grid.y[top]) * depth
-    size[:, 2] = _UNIFORM * spread * depth * depth
-    extent[present] = size
+    found = np.empty((10, len(present)))
+    box, centre, size = found[:4], found[4:7], found[7:]
+    depth = centre[2] = 1.0 / mean_inverse
+    centre[0] = np.add.reduceat(grid.x.take(columns), starts) / number * depth
+    centre[1] = np.add.reduceat(grid.y.take(rows), starts) / number * depth
+    box[0], box[1], box[2], box[3] = left, top, right, bottom
+    box *= grid.step_px
+    box[:2] += grid.offset_px - 0.5 * grid.step_px
+    box[2:] += grid.offset_px + 0.5 * grid.step_px
+    box[3] = np.maximum(box[3], _foot_px(grid, bottom, centre[0] / depth, depth))
+    size[0] = _width_m(grid, columns, inverse, starts, number, left, right)
+    size[1] = (grid.y[bottom] - grid.y[top]) * depth
+    size[2] = _UNIFORM * spread * depth * depth
+    table[:, present] = found
     wide[present] = (left > 0) & (right < width - 1)
     tall[present] = (top > 0) & (bottom < height - 1)
-    reach = np.zeros(count, np.intp)
     reach[present] = bottom - top + 1
-    return Regions(cells, reach, bbox, position, extent, wide, tall, nothing)
+    return result
 
 
 def _width_m(

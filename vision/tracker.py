@@ -78,7 +78,7 @@ class Tracker:
         known, owner = self._fragment_ids, self._fragment_owner
         result = np.full(len(ids), -1, np.int64)
         if len(known):
-            place = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+            place = np.minimum(known.searchsorted(ids), len(known) - 1)
             same = known[place] == ids
             result[same] = owner[place[same]]
         result[self._tracks.index_of(result) < 0] = -1
