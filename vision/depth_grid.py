@@ -63,6 +63,11 @@ class DepthGrid:
         clipped: NDArray[np.intp] = np.minimum(np.maximum(index, 0), self.depth_m.shape[0] - 1)
         return clipped
 
+    def cells(self, pixels_u: FloatArray, pixels_v: FloatArray) -> NDArray[np.intp]:
+        """Flat grid cells of image points, clipped to the grid."""
+        flat: NDArray[np.intp] = self.rows(pixels_v) * self.depth_m.shape[1] + self.columns(pixels_u)
+        return flat
+
     def points(self, cells: NDArray[np.intp]) -> FloatGrid:
         """(3, K) camera coordinates of flat cell indices (K,)."""
         rows = cells // self.depth_m.shape[1]

@@ -163,14 +163,14 @@ def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: I
     """Of the points use (M,)."""
     count = len(use)
     lines = np.empty((3, 2 * count))
-    lines[:, :count] = anchors.points_m[use].T
-    lines[:, count:] = anchors.range_m[use].T
+    lines[:, :count] = anchors.points_m.T.take(use, axis=1)
+    lines[:, count:] = anchors.range_m.T.take(use, axis=1)
     seen = np.empty((2, count))
-    u, v = pixels[use].T
+    u, v = pixels.T.take(use, axis=1)
     seen[0] = (u - camera.cx) / camera.fx
     seen[1] = (v - camera.cy) / camera.fy
     # The inverse of Cholesky's factor.
-    xx, xy, yy = anchors.pixel_cov[use].T
+    xx, xy, yy = anchors.pixel_cov.T.take(use, axis=1)
     first = np.sqrt(xx)
     low = xy / first
     second = np.sqrt(np.maximum(yy - low * low, 1e-6))

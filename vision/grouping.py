@@ -20,7 +20,7 @@ from vision.regions import IntGrid, Regions
 _CLOSE_M = 0.25
 _APART_M = 0.40
 _SAME_DEPTH_M = 0.30
-_ALONG = np.linspace(0.0, 1.0, 24)[:, None, None]  # from one part to another
+_ALONG = np.linspace(0.0, 1.0, 24)[:, None]  # from one part to another
 _LEAST_SAMPLES = 3
 _NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
 _SMALL_SHARE = 0.5
@@ -103,8 +103,8 @@ def _parted(
 ) -> NDArray[np.bool_]:
     """(K,) whether something nearer stands between the middles of parts one[k] and other[k] in the image."""
     middle = 0.5 * (parts.bbox_px[:, :2] + parts.bbox_px[:, 2:])
-    line = middle[one] + (middle[other] - middle[one]) * _ALONG
-    inverse = grid.inverse_depth[grid.rows(line[..., 1]), grid.columns(line[..., 0])]
+    u, v = (k[one] + (k[other] - k[one]) * _ALONG for k in middle.T)
+    inverse = grid.inverse_depth.ravel().take(grid.cells(u, v))
     depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
     nearer = inverse > 1.0 / np.maximum(depth, 0.1) + _NEARER_INVERSE
     result: NDArray[np.bool_] = nearer.sum(axis=0) >= _LEAST_SAMPLES
