@@ -146,7 +146,7 @@ def release(
     cells (P,) of the parts; arrived (P,): those where free space was seen. mover (T,): keep what is theirs.
     """
     came = (arrived >= _CAME_CELLS) & (arrived >= _CAME_SHARE * cells)
-    if not came.any():
+    if not (came.any() and ballot.present.any()):
         return ballot
     whole, rest = cells @ ballot.present, (cells * ~came) @ ballot.present
     leaves = ~mover & (rest > 0)
