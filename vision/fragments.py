@@ -160,5 +160,5 @@ class FragmentStore:
         """What the history holds of each fragment in its frame slot (N,)."""
         rows = self._history.reshape(6, -1, 2).take(slot * self._history.shape[2] + self._place, axis=1)
         rows = rows.reshape(6, -1)
-        origin = self._origins.take(np.repeat(slot, 2), axis=1)
+        origin = self._origins.take(slot.repeat(2), axis=1)
         return AnchorEnds(rows[:3], origin, rows[3], rows[4], rows[5], lag, lag_s)
