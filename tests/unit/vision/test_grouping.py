@@ -207,7 +207,13 @@ def test_a_part_in_which_its_mover_is_expected_stays_or_comes_however_far() -> N
     np.testing.assert_array_equal(attach(np.array([1]), parts, new, mover, NOWHERE[:2, :1]), [1, 0])
 
 
-def behind(middle_m: float | None, part_x: float = 0.6, part_z: float = 4.0, width_m: float = 1.2) -> bool:
+def behind(
+    middle_m: float | None,
+    part_x: float = 0.6,
+    part_z: float = 4.0,
+    width_m: float = 1.2,
+    moves: bool = True,
+) -> bool:
     """Whether a part at part_x is expected to be of a body width_m wide, 4 m away, that is seen from -0.6 to
     -0.2 m, with somebody 2 m away in front of its middle or nobody."""
     left, right = Body(-0.4), Body(part_x, z=part_z, width=0.2, cells=50)
@@ -221,7 +227,8 @@ def behind(middle_m: float | None, part_x: float = 0.6, part_z: float = 4.0, wid
         np.array([0.1]),
     )
     winner, votes = np.array([1, 0], np.int32), np.array([90, 0])
-    expected = expected_in(grid_of(nearest(*visible)), regions(left, right), winner, votes, body)
+    grid, mover = grid_of(nearest(*visible)), np.array([moves])
+    expected = expected_in(grid, regions(left, right), winner, votes, body, mover)
     return bool(expected[1, 0])
 
 
@@ -232,3 +239,4 @@ def test_a_body_is_expected_on_the_other_side_of_what_hides_its_middle() -> None
         0.0, width_m=0.8
     )  # there is no room for it: 0.6 + 0.25 m from the middle of what is seen
     assert not behind(0.0, part_z=4.5)  # nor is that at its depth
+    assert not behind(0.0, moves=False)
