@@ -87,13 +87,3 @@ def test_one_body_behind_somebody_is_not_divided() -> None:
     hidden = nearest(whole, somebody)
     assert split(grid_of(two), labelled(two > 0.0), 0) is not None
     assert split(grid_of(hidden), labelled(hidden == 4.0), 0) is None
-
-
-def test_one_body_behind_somebody_is_not_divided() -> None:
-    """1.3 m wide; what hides its middle, and leaves a foot's breadth of it, makes no two of it."""
-    whole, foot = plate(4.0, (-0.65, 0.65), (-0.6, 0.8)), plate(4.0, (-0.3, 0.3), (0.7, 0.8))
-    somebody = plate(2.0, (-0.15, 0.15), (-0.5, 0.35))
-    two = nearest(plate(4.0, (-0.65, -0.3), (-0.6, 0.8)), plate(4.0, (0.3, 0.65), (-0.6, 0.8)), foot)
-    hidden = nearest(whole, somebody)
-    assert split(grid_of(two), labelled(two > 0.0), 0) is not None
-    assert split(grid_of(hidden), labelled(hidden == 4.0), 0) is None
