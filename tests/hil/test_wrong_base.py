@@ -58,7 +58,7 @@ def test_a_wrong_model_and_a_model_without_that_port(tmp_path: Path) -> None:
     right = config.read_text()
     config.write_text(right.replace("model: bunker", "model: hunter"))
     said = refusal(config)
-    assert "chassis.agilex.model: Input should be 'bunker', 'bunker_mini'" in said
+    assert "chassis.model: Input should be 'bunker', 'bunker_mini'" in said
     assert said.endswith("found 'hunter'")
     config.write_text(right.replace("model: bunker", "model: tracer"))
     assert "tracer cannot be driven over a serial port" in refusal(config)
