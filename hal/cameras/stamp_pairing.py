@@ -6,7 +6,11 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Generic, NamedTuple, TypeVar
 
+from hal.clocks import NS_PER_S
+
 Item = TypeVar("Item")
+
+_PATIENCE_NS = 2 * NS_PER_S
 
 
 class Stamped(NamedTuple, Generic[Item]):
@@ -56,7 +60,8 @@ class StampPairing(Generic[Item]):
         colours, depths = self.colour.waiting, self.depth.waiting
         while colours:
             stamp_ns = colours[0].stamp_ns
-            if not ended and not (depths and depths[-1].stamp_ns >= stamp_ns):
+            certain = ended or _waited(colours) or (depths and depths[-1].stamp_ns >= stamp_ns)
+            if not certain:
                 return
             while len(depths) > 1 and abs(depths[1].stamp_ns - stamp_ns) < abs(depths[0].stamp_ns - stamp_ns):
                 self.depth.drop()
@@ -64,5 +69,10 @@ class StampPairing(Generic[Item]):
                 yield colours.popleft(), depths.popleft()
             else:
                 self.colour.drop()
-        while ended and depths:
+        while depths and (ended or _waited(depths)):
             self.depth.drop()
+
+
+def _waited(stream: deque[Stamped[Item]]) -> bool:
+    """Whether the oldest one need not be waited with any longer: the other stream may have ended."""
+    return stream[-1].stamp_ns - stream[0].stamp_ns > _PATIENCE_NS

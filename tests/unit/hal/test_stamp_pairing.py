@@ -50,6 +50,17 @@ def test_a_pair_is_given_as_soon_as_it_is_certain() -> None:
     assert (colour.item, depth.item) == ("picture", "early")
 
 
+def test_where_one_stream_has_ended_the_other_does_not_pile_up() -> None:
+    for ended in ("colour", "depth"):
+        pairing: StampPairing[None] = StampPairing(GAP)
+        stream = pairing.depth if ended == "colour" else pairing.colour
+        for number in range(300):
+            stream.add(number * 33_333_333, None)
+            assert list(pairing.pairs(ended=False)) == []
+            assert len(stream.waiting) <= 62
+        assert stream.unpaired + len(stream.waiting) == 300
+
+
 @given(STAMPS, STAMPS)
 def test_pairs_are_near_grow_and_nothing_is_lost(colour: list[int], depth: list[int]) -> None:
     pairs, pairing = paired(colour, depth)
