@@ -156,5 +156,6 @@ def resolve(path: str, relative_to: Path) -> Path:
     if given.is_absolute():
         return given
     beside = relative_to.parent / given
+    shipped = CONFIG_DIR / given
     # os.path, not Path.exists(): that one raises for a name too long and a folder that may not be read.
-    return beside if os.path.exists(beside) else CONFIG_DIR / given
+    return shipped if os.path.exists(shipped) and not os.path.exists(beside) else beside

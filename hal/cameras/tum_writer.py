@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -33,7 +34,7 @@ class TumWriter:
 
     def __enter__(self) -> Self:
         """Raises DeviceRefused if the folder holds a recording already or cannot be made."""
-        if (self._folder / "rgb.txt").exists():
+        if os.path.exists(self._folder / "rgb.txt"):
             raise DeviceRefused(f"{self._folder}: holds a recording already; choose another folder")
         try:
             for name in ("rgb", "depth"):

@@ -114,6 +114,7 @@ def test_a_named_file_is_found_beside_the_yaml_first_then_among_those_that_ship(
     main = tmp_path / "main.yaml"
     (tmp_path / "near.yaml").touch()
     assert resolve("near.yaml", main) == tmp_path / "near.yaml"
-    assert resolve("far.yaml", main) == CONFIG_DIR / "far.yaml"
+    assert resolve("sim.yaml", main) == CONFIG_DIR / "sim.yaml"
+    assert resolve("none.yaml", main) == tmp_path / "none.yaml", "what is nowhere is missed beside the YAML"
     assert resolve("/abs/a.yaml", main) == Path("/abs/a.yaml")
-    assert resolve("a" * 5000, main) == CONFIG_DIR / ("a" * 5000), "no file can be called so"
+    assert resolve("a" * 5000, main) == tmp_path / ("a" * 5000), "no file can be called so"
