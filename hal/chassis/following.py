@@ -19,6 +19,11 @@ _JUDGED_M = 0.3
 _JUDGED_NS = NS_PER_S
 _LEAST_SHARE = 0.05
 
+# How far a turn may be from the commanded one, and the share of all turning either way that may come on top:
+# lag, where one bend follows another, and slip.
+_TURN_SLACK_RAD = 0.6
+_TURN_RATIO = 0.5
+
 
 class Following:
     """sentence: "" while the base follows, and as long as too little was commanded to tell."""
@@ -29,6 +34,7 @@ class Following:
         self._pose: PlanarPose | None = None
         self._last_ns = self._since_ns = 0
         self._commanded_m = self._told_m = 0.0
+        self._commanded_rad = self._turning_rad = self._told_rad = 0.0
 
     def step(self, pose: PlanarPose, now_ns: int) -> None:
         """What the base has told since the last step, beside what it was ordered since."""
@@ -39,22 +45,34 @@ class Following:
             self._restart(now_ns)
             return
         self._commanded_m += (abs(self._ordered.v_mps) + _ARM_M * abs(self._ordered.w_radps)) * elapsed_s
+        self._commanded_rad += self._ordered.w_radps * elapsed_s
+        self._turning_rad += abs(self._ordered.w_radps) * elapsed_s
         turn_rad = wrap_angle_rad(pose.heading_rad - before.heading_rad)
+        self._told_rad += turn_rad
         self._told_m += math.hypot(pose.x_m - before.x_m, pose.y_m - before.y_m) + _ARM_M * abs(turn_rad)
         if self._commanded_m < _JUDGED_M or now_ns - self._since_ns < _JUDGED_NS:
             return
-        if self._told_m < _LEAST_SHARE * self._commanded_m:
-            self.sentence = (
-                f"the base does not follow: it tells of {self._told_m:.2f} m in the "
-                f"{(now_ns - self._since_ns) / NS_PER_S:.1f} s in which {self._commanded_m:.2f} m were "
-                "commanded; are its tracks free and its encoders connected?"
-            )
+        self.sentence = self._judged((now_ns - self._since_ns) / NS_PER_S)
         self._restart(now_ns)
 
     def ordered(self, command: Setpoint) -> None:
         """What the base is told from now on; zero ends the comparison."""
         self._ordered = command
 
+    def _judged(self, seconds: float) -> str:
+        apart_rad = abs(self._told_rad - self._commanded_rad)
+        if self._told_m < _LEAST_SHARE * self._commanded_m:
+            told, commanded = f"{self._told_m:.2f} m", f"{self._commanded_m:.2f} m"
+        elif apart_rad > _TURN_SLACK_RAD + _TURN_RATIO * self._turning_rad:
+            told, commanded = f"{self._told_rad:.2f} rad", f"{self._commanded_rad:.2f} rad"
+        else:
+            return ""
+        return (
+            f"the base does not follow: it tells of {told} in the {seconds:.1f} s in which {commanded} were "
+            "commanded; are its tracks free and its encoders connected?"
+        )
+
     def _restart(self, now_ns: int) -> None:
         self._since_ns = now_ns
         self._commanded_m = self._told_m = 0.0
+        self._commanded_rad = self._turning_rad = self._told_rad = 0.0

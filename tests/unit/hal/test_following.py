@@ -1,5 +1,7 @@
 """A base that tells of no motion while it is told to move."""
 
+import math
+
 import pytest
 
 from config.chassis import PlantConfig
@@ -37,6 +39,34 @@ def test_the_sentence_says_what_was_told_and_what_commanded() -> None:
         "the base does not follow: it tells of 0.00 m in the 1.0 s in which 0.50 m were commanded; "
         "are its tracks free and its encoders connected?"
     )
+
+
+def test_one_dead_encoder_is_a_turn_that_nobody_commanded() -> None:
+    following, width_m = Following(), 0.5
+    for period in range(100):
+        told_m = 0.4 * period / 50  # of the right track; the left one is not counted any more
+        heading_rad = told_m / width_m
+        following.step(PlanarPose(0.25 * math.sin(heading_rad), 0.0, heading_rad), period * PERIOD_NS)
+        following.ordered(Setpoint(period * PERIOD_NS, 0.4, 0.0, 0.0))
+    assert following.sentence == (
+        "the base does not follow: it tells of 0.80 rad in the 1.0 s in which 0.00 rad were commanded; "
+        "are its tracks free and its encoders connected?"
+    )
+
+
+@pytest.mark.parametrize("lag_s", [0.05, 0.3, 0.6])
+@pytest.mark.parametrize("w_radps", [0.4, 0.8, 1.2])
+def test_bends_one_way_and_the_other_are_followed(lag_s: float, w_radps: float) -> None:
+    """The yaw rate steps, as where arcs without a blend meet."""
+    following, plant = Following(), TrackedPlant(PlantConfig(lag_s=lag_s, slip_factor=1.3))
+    for period in range(1000):
+        now_ns = period * PERIOD_NS
+        plant.advance_to(now_ns)
+        following.step(plant.pose, now_ns)
+        assert following.sentence == ""
+        turn = w_radps if period // 70 % 2 else -w_radps
+        plant.command(0.5, turn)
+        following.ordered(Setpoint(now_ns, 0.5, 0.0, turn))
 
 
 def test_zero_ends_it() -> None:
