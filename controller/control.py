@@ -109,7 +109,7 @@ class ControlLoop:
         self.localiser.add_odometry(now_ns, self._state.pose)
         to_go_m = self.path.length_m - on_path.s_m
         if to_go_m < -PASSED_M:
-            self.request_stop(f"the target lies {100 * -to_go_m:.0f} cm behind", Outcome.BROKEN_OFF)
+            self.request_stop("went past the target", Outcome.BROKEN_OFF)
         arrived = -PASSED_M <= to_go_m <= ARRIVED_M
         self.ending.conclude(self._state, setpoint, now_ns, arrived=arrived)
         sequence = None if scene is None else scene.sequence
