@@ -14,6 +14,7 @@ from vision.adoption import adopt
 from vision.arrivals import FreeMemory
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
+from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.judgement import MotionEvidence, judge
 from vision.obstacles import FragmentVelocities
@@ -226,6 +227,7 @@ class Tracker:
         seen = MotionEvidence(
             sight=sight / np.maximum(distance, 0.1)[:, None],
             distance_m=distance,
+            depth_sigma_m=np.asarray(depth_sigma_m(distance, self._config.depth_noise), np.float64),
             velocity=tracks.state[:, 3:],
             covariance=tracks.covariance[:, 3:, 3:],
             own_velocity=body.velocity_mps @ rotation.T,

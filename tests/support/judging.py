@@ -36,6 +36,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
     plain = MotionEvidence(
         sight=np.array([[0.0, 0.0, 1.0]]),
         distance_m=np.array([3.0]),
+        depth_sigma_m=np.array([0.0725]),
         velocity=np.array([velocity]),
         covariance=covariance(SURE),
         own_velocity=np.zeros((1, 3)),

@@ -111,8 +111,15 @@ def test_fragments_and_surface_that_say_the_same_prove_together(direction: Speed
 def test_a_surface_seen_long_enough_without_a_break_proves_by_itself() -> None:
     assert rises(by_surface(ACROSS, 0.25))
     assert not rises(by_surface(ACROSS, 0.2))
-    assert rises(by_surface(ALONG, 0.5))
-    assert not rises(by_surface(ALONG, 0.45))  # noise of depth is shared by neighbours: longer
+    deep = {"depth_sigma_m": np.array([0.19])}
+    assert rises(by_surface(ALONG, 0.5, **deep))
+    assert not rises(by_surface(ALONG, 0.45, **deep))  # noise of depth is shared by neighbours: longer
+
+
+def test_along_the_line_of_sight_a_way_far_beyond_the_noise_of_depth_proves_as_soon_as_across() -> None:
+    assert rises(by_surface(ALONG, 0.3, depth_sigma_m=np.array([0.059])))  # 0.24 m, more than 4 sigmas
+    assert not rises(by_surface(ALONG, 0.3, depth_sigma_m=np.array([0.061])))
+    assert not rises(by_surface(ALONG, 0.2, depth_sigma_m=np.array([0.01])))
 
 
 @pytest.mark.parametrize(("looks", "proves"), [(2, False), (3, True)])
