@@ -32,6 +32,9 @@ _ENDS_ACROSS = 4
 _ENDS_ALONG = 8
 _LEVEL_SHARE = 0.5  # of the threshold: with less than that, what goes up or down needs as many ends as along
 _MIN_AGREEMENT = 0.18
+_UNREST_SHARE = 0.5  # of the threshold
+_LASTING_UNREST_S = 0.4
+_LIKELY_SHARE = 0.25
 _OWN_PROOF = 3.0
 _SHARED_PROOF = 0.55  # of the threshold, where fragments and surface say the same
 _SPEED_PER_METRE = 0.02
@@ -59,7 +62,7 @@ class MotionEvidence:
     sight (T, 3): unit vector from the camera; distance_m (T,); depth_sigma_m (T,): of one pixel's depth
     there. velocity (T, 3), covariance (T, 3, 3): as filtered. own_velocity, own_covariance: of this
     frame's fragments alone, from ends (T,) points of which agreement (T,) agree; restless (T,): by these it
-    does not stand still, whether they agree or not.
+    does not stand still, whether they agree or not; unrest_s (T,): for how long it has not.
     surface_velocity, surface_covariance: from the surface's centre alone.
     arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
     its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
@@ -81,6 +84,7 @@ class MotionEvidence:
     ends: NDArray[np.intp]
     agreement: FloatArray
     restless: NDArray[np.bool_]
+    unrest_s: FloatArray
     arrived: NDArray[np.intp]
     cells: NDArray[np.intp]
     size_m: FloatArray
@@ -190,9 +194,14 @@ def _shown_across(read: _Reading) -> NDArray[np.bool_]:
 
 
 def _by_unrest(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
-    """(T,) whether many ends, by whatever each of them does, bear out the filter's velocity."""
+    """(T,) whether many ends, by whatever each of them does, bear out the filter's velocity.
+
+    That of a slow body with swinging limbs never becomes clear. Where its ends have denied for longer than
+    any limb swings one way, it need only be likely.
+    """
+    share = np.where(seen.unrest_s >= _LASTING_UNREST_S, _LIKELY_SHARE, _UNREST_SHARE)
     result: NDArray[np.bool_] = (
-        seen.restless & (seen.ends >= _ENDS_ALONG) & (read.significance > 0.5 * read.threshold)
+        seen.restless & (seen.ends >= _ENDS_ALONG) & (read.significance > share * read.threshold)
     )
     return result
 

@@ -222,6 +222,9 @@ class Tracker:
                 rotation @ noise @ rotation.T,
                 3,
             )
+        restless = limbs.restless(body)
+        longer = np.where(restless, detection.dt_s, -detection.dt_s)
+        tracks.unrest_s = np.maximum(tracks.unrest_s + longer, 0.0)
         sight = tracks.state[:, :3] - detection.pose.translation_m
         distance = np.sqrt(np.square(sight).sum(axis=1))
         seen = MotionEvidence(
@@ -236,7 +239,8 @@ class Tracker:
             surface_covariance=tracks.surface_covariance[:, 3:, 3:],
             ends=np.where(use, body.ends, 0),
             agreement=body.agreement,
-            restless=limbs.restless(body),
+            restless=restless,
+            unrest_s=tracks.unrest_s,
             arrived=arrivals,
             cells=cells,
             size_m=tracks.extent_m.max(axis=1),

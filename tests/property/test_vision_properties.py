@@ -213,6 +213,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         ends=rng.integers(0, 40, count),
         agreement=rng.uniform(0.0, 1.0, count),
         restless=rng.random(count) < 0.5,
+        unrest_s=rng.uniform(0.0, 1.0, count),
         arrived=rng.integers(0, 40, count),
         cells=rng.integers(40, 200, count),
         size_m=rng.uniform(0.0, 4.0, count),

@@ -46,6 +46,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         ends=np.array([0]),
         agreement=np.array([0.0]),
         restless=np.array([False]),
+        unrest_s=np.array([0.0]),
         arrived=np.array([0]),
         cells=np.array([100]),
         size_m=np.array([0.8]),
