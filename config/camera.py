@@ -13,7 +13,7 @@ OdometryChoice = Literal["auto", "file", "none", "groundtruth"]
 
 
 class ReplayCameraConfig(Section):
-    """A recording in a TUM RGB-D folder (rgb.txt, depth.txt, camera.yaml)."""
+    """A recording, played in its own time: a TUM folder (rgb.txt, depth.txt, camera.yaml) or a ROS bag."""
 
     kind: Literal["replay"] = "replay"
     folder: str = Field(min_length=1, description="the recording; relative to this file")
@@ -21,7 +21,7 @@ class ReplayCameraConfig(Section):
         default=0.02, gt=0, le=1, description="colour and depth further apart than this are not one frame"
     )
     read_ahead: int = Field(
-        default=2, ge=0, le=64, description="frames decoded in advance; 0: when asked for"
+        default=2, ge=0, le=64, description="folders: frames decoded in advance; 0: when asked for"
     )
 
 

@@ -1,4 +1,4 @@
-"""Which key was meant: the keys that a section knows, for messages about one that it does not."""
+"""Which key was meant: pydantic's place of a mistake as its author wrote it, and the keys a section knows."""
 
 from __future__ import annotations
 
@@ -17,19 +17,38 @@ def advice(model: type[BaseModel], place: Sequence[int | str]) -> str:
     return f"did you mean {close[0]}?" if close else f"known here: {', '.join(known)}"
 
 
+def written(model: type[BaseModel], place: Sequence[int | str], *, last_is_key: bool) -> str:
+    """place as keys with dots between, as in the file: without the tags of unions, which pydantic puts in.
+
+    last_is_key: the last step is what somebody wrote, known or not.
+    """
+    sections, keys = {model}, []
+    for number, step in enumerate(place, start=1):
+        known = isinstance(step, int) or any(step in section.model_fields for section in sections)
+        if known or (last_is_key and number == len(place)):
+            keys.append(str(step))
+        sections = _within(sections, step)
+    return ".".join(keys)
+
+
 def _known_at(model: type[BaseModel], steps: Sequence[int | str]) -> set[str]:
     sections = {model}
     for step in steps:
-        inner = {
-            found
-            for section in sections
-            if (field := section.model_fields.get(str(step))) is not None
-            for found in _sections_in(field.annotation)
-        }
-        # Neither the place in a list nor the tag of a union is a key; the tag is what `kind` says.
-        tagged = {section for section in sections if _is_tagged(section, step)}
-        sections = inner or tagged or sections
+        sections = _within(sections, step)
     return {key for section in sections for key in section.model_fields}
+
+
+def _within(sections: set[type[BaseModel]], step: int | str) -> set[type[BaseModel]]:
+    """The sections that one step leads to. Neither the place in a list nor the tag of a union is a key; the
+    tag is what `kind` says."""
+    inner = {
+        found
+        for section in sections
+        if (field := section.model_fields.get(str(step))) is not None
+        for found in _sections_in(field.annotation)
+    }
+    tagged = {section for section in sections if _is_tagged(section, step)}
+    return inner or tagged or sections
 
 
 def _sections_in(annotation: object) -> Iterator[type[BaseModel]]:

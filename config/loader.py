@@ -8,7 +8,7 @@ from typing import TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from config.known_keys import advice
+from config.known_keys import advice, written
 
 CONFIG_DIR = Path(__file__).resolve().parent
 # A file with more mistakes than this is another kind of file, and one line is for reading.
@@ -84,9 +84,12 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     parts = []
     told: set[str] = set()
     for detail in error.errors(include_url=False):
-        key = ".".join(str(step) for step in detail["loc"]) or "(file)"
+        if detail["type"] == "default_factory_not_called":
+            continue  # a default that follows from a key that is wrong itself
+        unknown = detail["type"] == "extra_forbidden"
+        key = written(model, detail["loc"], last_is_key=unknown)
         reason = detail["msg"].removeprefix("Value error, ")
-        if detail["type"] == "extra_forbidden":
+        if unknown:
             hint = advice(model, detail["loc"])
             # Several keys of another kind of file: what is known is said once.
             reason = "unknown key" if hint in told else f"unknown key; {hint}"
@@ -95,7 +98,7 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
             reason = "missing key"
         elif not isinstance(detail["input"], dict | list):
             reason = f"{reason}, found {detail['input']!r}"
-        parts.append(f"{key}: {reason}")
+        parts.append(f"{key}: {reason}" if key else reason)
     if len(parts) > _MOST_MISTAKES:
         parts[_MOST_MISTAKES:] = [f"and {len(parts) - _MOST_MISTAKES} more mistakes"]
     return "; ".join(parts)

@@ -13,8 +13,8 @@ from config.loader import Section
 class Body(Section):
     """Outer size. The turning centre (origin of the body frame) lies rear_m ahead of the tail."""
 
-    width_m: float = Field(default=0.78, gt=0, le=5)
-    length_m: float = Field(default=1.02, gt=0, le=10)
+    width_m: float = Field(default=0.78, ge=0.05, le=5)
+    length_m: float = Field(default=1.02, ge=0.05, le=10)
     rear_m: float = Field(default=0.51, gt=0, le=10)
     height_m: float = Field(default=0.80, gt=0, le=5)
     clearance_m: float = Field(

@@ -28,9 +28,16 @@ from controller.perceive import Perceiver
 from controller.recorder import Surroundings
 from controller.shape import SpeedShaper
 from hal.api import Chassis, Clock, DatagramLink, FrameSource, OdometrySource
-from hal.cameras.pose_file import PoseFile, open_odometry
+from hal.cameras.bag_file import is_bag
+from hal.cameras.bag_replay import BagReplay
+from hal.cameras.bag_topics import WantedTopics
+from hal.cameras.paced_recording import PacedRecording
+from hal.cameras.pose_file import open_odometry
+from hal.cameras.pose_track import PoseTrack
 from hal.cameras.realsense import RealsenseCamera
+from hal.cameras.recording import Recording
 from hal.cameras.tum_replay import TumReplay
+from hal.errors import BadRecording
 from hal.links.datagrams import UdpSocket, UnixSocket
 from hal.types import CameraMount, PlanarPose
 from sim.camera import SimulatedCamera
@@ -113,9 +120,16 @@ def open_camera(
         case RealsenseCameraConfig() as camera:
             return RealsenseCamera(camera, clock)
         case ReplayCameraConfig() as camera:
-            return TumReplay(resolve(camera.folder, config_path), camera.max_pair_gap_s, camera.read_ahead)
+            return PacedRecording(_recording(camera, config_path), clock)
         case unknown:
             assert_never(unknown)
+
+
+def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> FrameSource:
+    path = resolve(camera.folder, config_path)
+    if is_bag(path):
+        return BagReplay(path, "none", max_pair_gap_s=camera.max_pair_gap_s)
+    return TumReplay(path, camera.max_pair_gap_s, camera.read_ahead)
 
 
 def open_simulated_camera(
@@ -173,9 +187,21 @@ def open_commands(config: InputConfig) -> DatagramLink:
             assert_never(unknown)
 
 
-def open_replay(folder: FilePath, odometry: OdometryChoice) -> tuple[TumReplay, PoseFile | None]:
-    """A recording, not yet entered, and its odometry. Raises BadRecording."""
-    return TumReplay(folder), open_odometry(folder, odometry)
+def open_replay(
+    path: FilePath, odometry: OdometryChoice, wanted: WantedTopics | None = None
+) -> tuple[Recording, PoseTrack | None]:
+    """A recording, not yet entered, and its odometry: a folder, or a ROS bag. wanted: of a bag's topics.
+
+    Raises BadRecording, and DeviceNotFound for a bag without the package that reads it.
+    """
+    if is_bag(path):
+        bag = BagReplay(path, odometry, wanted or WantedTopics())
+        return bag, bag.odometry
+    if wanted is not None and wanted != WantedTopics():
+        raise BadRecording(
+            f"{path}: is no ROS bag, so it has no topics; leave out --colour-topic and the like"
+        )
+    return TumReplay(path), open_odometry(path, odometry)
 
 
 def build_replay_perceiver(

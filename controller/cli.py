@@ -18,6 +18,7 @@ from controller.cli_options import (
     config_option,
     mission_options,
     recording_options,
+    topic_options,
 )
 from controller.errors import INTERRUPTED, Interrupted, UserError
 from hal.errors import HalError
@@ -61,23 +62,32 @@ def govern(options: MissionOptions) -> None:
 @cli.command()
 @click.argument("recording", type=FOLDER_OR_FILE)
 @click.option(
-    "--odometry", type=ODOMETRY, default="auto", show_default="odometry.txt if there is one",
-    help="Prior of the camera's motion: odometry.txt, nothing, or the true poses.",
+    "--odometry", type=ODOMETRY, default="auto", show_default="what was recorded, if anything",
+    help="Prior of the camera's motion: odometry.txt or a bag's topic, nothing, or the true poses.",
 )  # fmt: skip
+@topic_options
 @config_option("of robot, perception and decision", CONFIG_DIR / "replay.yaml", "the replay.yaml that ships")
 @recording_options
 def replay(
     recording: Path,
     odometry: OdometryChoice,
+    colour_topic: str | None,
+    depth_topic: str | None,
+    odometry_topic: str | None,
     config_path: Path,
     observations: Path | None,
     video: Path | None,
     quiet: bool,
 ) -> None:
-    """Look at a recording as the robot would: a TUM RGB-D folder."""
-    from controller.replay import ReplayOptions, run_replay
+    """Look at a recording as the robot would.
 
-    run_replay(ReplayOptions(recording, odometry, config_path, observations, video, quiet))
+    A TUM RGB-D folder, or a ROS bag (.bag, .db3, .mcap), also that of a RealSense viewer.
+    """
+    from controller.replay import ReplayOptions, run_replay
+    from hal.cameras.bag_topics import WantedTopics
+
+    topics = WantedTopics(colour_topic, depth_topic, odometry_topic)
+    run_replay(ReplayOptions(recording, odometry, config_path, observations, video, quiet, topics))
 
 
 @cli.command()

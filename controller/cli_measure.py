@@ -43,6 +43,8 @@ def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> 
     Perception beside the bare OpenCV calls, renderer, control step, driver, lock-step runner.
     """
     if period:
+        if json_path is not None:
+            raise UserError("--json goes with the stages, not with --period, which only prints its table")
         from controller.bench.period import run_period_bench
 
         run_period_bench(seconds)

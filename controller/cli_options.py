@@ -64,6 +64,19 @@ def recording_options(command: Callable[..., None]) -> Callable[..., None]:
     )
 
 
+def topic_options(command: Callable[..., None]) -> Callable[..., None]:
+    """--colour-topic, --depth-topic and --odometry-topic."""
+    return _in_this_order(
+        command,
+        *(
+            click.option(
+                f"--{what}-topic", metavar="TOPIC", help=f"Of a bag: its {what}, if it is not found."
+            )
+            for what in ("colour", "depth", "odometry")
+        ),
+    )
+
+
 def mission_options(command: Callable[[MissionOptions], None]) -> Callable[..., None]:
     """The options of a drive but --config, handed to the command as one MissionOptions."""
 
@@ -80,6 +93,9 @@ def mission_options(command: Callable[[MissionOptions], None]) -> Callable[..., 
             "--scenario", help="Simulation only: another world, a YAML file or the name of one that ships."
         ),
         click.option("--seed", type=click.IntRange(min=0), help="Simulation only: another seed."),
+        click.option(
+            "--record", type=FOLDER, help="Write the frames and the odometry, for `treadwatch replay`."
+        ),
     )
 
 

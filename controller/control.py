@@ -12,6 +12,7 @@ from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path import OnPath, Path
 from controller.shape import SpeedShaper
+from controller.situation import Situation
 from hal.api import Chassis
 from hal.types import ChassisMode, ChassisState, FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene
@@ -56,16 +57,7 @@ class Drive(Protocol):
 class Decides(Protocol):
     """What a drive is decided by; DecisionMaker is ours, a campaign compares it with others."""
 
-    def step(
-        self,
-        scene: Scene | None,
-        path: Path,
-        pose: PlanarPose,
-        on_path: OnPath,
-        v_mps: float,
-        a_mps2: float,
-        now_ns: int,
-    ) -> Decision: ...
+    def step(self, at: Situation) -> Decision: ...
 
 
 class ControlLoop:
@@ -108,7 +100,7 @@ class ControlLoop:
         on_path = self.path.project(pose, self._progress_m)
         self._progress_m = on_path.s_m
         decision = self._decide.step(
-            scene, self.path, pose, on_path, self._speed_mps(), self._shape.a_mps2, now_ns
+            Situation(scene, self.path, pose, on_path, self._speed_mps(), self._shape.a_mps2, now_ns)
         )
         setpoint, fault = self._setpoint(decision, on_path, now_ns)
         self._state = self._chassis.exchange(setpoint, now_ns)

@@ -49,19 +49,16 @@ class Corridor:
 class Placed:
     """N bodies at K times in path coordinates, each (N, K).
 
-    s_m, d_m: centre. heading_rad: of the path there. half_s_m, half_d_m: half sizes along and across the
-    path. half_width_m: of the swept corridor there. lo_m, hi_m: between these positions of the robot's
-    turning centre, the robot's length and the body's overlap along the path. clear_m: free floor between the
-    body's side and the swept corridor; negative: inside it. (On a straight path heading and half sizes are
-    (N, 1): they do not change.)
+    s_m, d_m: centre. heading_rad: of the path there. half_s_m: half size along the path. lo_m, hi_m: between
+    these positions of the robot's turning centre, the robot's length and the body's overlap along the path.
+    clear_m: free floor between the body's side and the swept corridor; negative: inside it. (On a straight
+    path heading and half size are (N, 1): they do not change.)
     """
 
     s_m: FloatArray
     d_m: FloatArray
     heading_rad: FloatArray
     half_s_m: FloatArray
-    half_d_m: FloatArray
-    half_width_m: FloatArray
     lo_m: FloatArray
     hi_m: FloatArray
     clear_m: FloatArray
@@ -93,9 +90,8 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
     cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
     along, across = bodies.half_view_m[:, None], bodies.half_across_m[:, None]
     half_s, half_d = cos * along + sin * across, sin * along + cos * across
-    half_width = corridor.half_width(s)
     lo, hi = s - half_s - corridor.front_m, s + half_s + corridor.rear_m
-    return Placed(s, d, heading, half_s, half_d, half_width, lo, hi, np.abs(d) - half_d - half_width)
+    return Placed(s, d, heading, half_s, lo, hi, np.abs(d) - half_d - corridor.half_width(s))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,7 +23,8 @@ _MOST_SPREAD_M = 0.5
 @dataclass(frozen=True, slots=True)
 class Conflict:
     """row: of the body. in_s, out_s: from now; out_s is inf where it does not leave within the horizon.
-    lo_*, hi_*: positions of the robot that it blocks then."""
+    lo_in_m to hi_in_m: positions of the robot that it blocks when it enters; lo_out_m: from where on it does
+    when it leaves, or at the horizon."""
 
     row: int
     in_s: float
@@ -31,7 +32,6 @@ class Conflict:
     lo_in_m: float
     lo_out_m: float
     hi_in_m: float
-    hi_out_m: float
 
 
 def comes_in(
@@ -110,7 +110,6 @@ def _conflict(placed: Placed, times_s: FloatArray, row: int, in_s: float, out_s:
         float(np.interp(in_s, times_s, lo)),
         float(np.interp(end_s, times_s, lo)),
         float(np.interp(in_s, times_s, hi)),
-        float(np.interp(end_s, times_s, hi)),
     )
 
 

@@ -19,9 +19,10 @@ from controller.knowledge import Knowledge
 from controller.limits import BLOCKING_RULES, STANDING_MPS, Limit, Motion, allowed
 from controller.path import OnPath, Path
 from controller.release import ReleaseGate
+from controller.situation import Situation
 from hal.clocks import NS_PER_S
-from hal.types import CameraMount, PlanarPose
-from vision.scene import CameraCondition, Scene
+from hal.types import CameraMount
+from vision.scene import CameraCondition
 
 __all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
 
@@ -33,10 +34,7 @@ _AT_END_M = 0.02
 
 
 class DecisionMaker:
-    """One decision a control step. Keeps what hysteresis and memory need; calls no clock.
-
-    Poses, the path and scene.robot_pose are in one frame. v_mps, a_mps2: commanded (or measured, if more).
-    """
+    """One decision a control step. Keeps what hysteresis and memory need; calls no clock."""
 
     def __init__(self, config: DecisionConfig, robot: Robot, mount: CameraMount, period_s: float) -> None:
         self._config, self._robot, self._mount = config, robot, mount
@@ -56,28 +54,19 @@ class DecisionMaker:
         """Go on along another path, of which this is known already; what hysteresis needs is kept."""
         self._path, self._known = path, known
 
-    def step(
-        self,
-        scene: Scene | None,
-        path: Path,
-        pose: PlanarPose,
-        on_path: OnPath,
-        v_mps: float,
-        a_mps2: float,
-        now_ns: int,
-    ) -> Decision:
-        """The decision for now_ns. scene: the newest there is, in every step until a newer one comes."""
-        fault = self._input_fault(pose, on_path, v_mps, a_mps2, now_ns)
+    def step(self, at: Situation) -> Decision:
+        """The decision for at.now_ns."""
+        fault = self._input_fault(at)
         if fault:
-            return self._halt(fault, v_mps, now_ns)
-        v_mps = max(v_mps, 0.0)
+            return self._halt(fault, at.v_mps, at.now_ns)
+        path, on_path, v_mps, now_ns = at.path, at.on_path, max(at.v_mps, 0.0), at.now_ns
         known = self._knowledge(path, on_path)
-        known.update(scene, pose, on_path, v_mps, now_ns)
+        known.update(at.scene, at.pose, on_path, v_mps, now_ns)
         if not known.has_seen:
             # Nothing was decided yet: the first scene that shows a free way lets the robot go at once.
             reason = Reason("camera", f"{known.fault}: stop")
             return Decision(self._action(0.0, v_mps), 0.0, reason)
-        motion = Motion(v_mps, a_mps2, self._latency_s)
+        motion = Motion(v_mps, at.a_mps2, self._latency_s)
         way = self._path_limits(path, on_path, motion)
         limits = self._camera_limits(known)
         base_mps = min(limit.speed_mps for limit in (*way, *limits))
@@ -85,9 +74,8 @@ class DecisionMaker:
             limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(way, limits, motion, now_ns)
 
-    def _input_fault(
-        self, pose: PlanarPose, on_path: OnPath, v_mps: float, a_mps2: float, now_ns: int
-    ) -> str:
+    def _input_fault(self, at: Situation) -> str:
+        pose, on_path, v_mps, now_ns = at.pose, at.on_path, at.v_mps, at.now_ns
         before, self._now_ns = self._now_ns, now_ns
         if before is not None and now_ns < before:
             return f"time went back by {(before - now_ns) / NS_PER_S:.3f} s"
@@ -95,7 +83,7 @@ class DecisionMaker:
             return "where the robot is is not known"
         if not math.isfinite(on_path.s_m + on_path.d_m + on_path.heading_rad):
             return "where the robot is on its path is not known"
-        if not (math.isfinite(v_mps) and math.isfinite(a_mps2)):
+        if not (math.isfinite(v_mps) and math.isfinite(at.a_mps2)):
             return "how fast the robot is is not known"
         if v_mps < _BACKWARDS_MPS:
             return f"the robot moves backwards at {-v_mps:.2f} m/s"

@@ -39,6 +39,11 @@ _TOUCHING = 1e-6
 # Noise makes whatever stands beside the view creep now and then, and each time the robot would slow down: so
 # much is no noise.
 _CLEAR_SIGMAS, _CLEAR_MPS = 3.3, 0.2
+# Nobody is as narrow as this, and ends of racks are: half of the greatest width that was seen.
+_NOBODY_HALF_M = 0.1
+# So certainly it goes that it will not be found where it was seen last. Who has been looked at for longer
+# stands by a verdict that had time: what sinks below the view may well seem to move.
+_CERTAIN_SIGMAS, _NO_VERDICT_S = 5.0, 1.0
 # Two velocities that differ by so much are of two.
 _APART_SIGMAS = 2.0
 
@@ -54,12 +59,13 @@ class OutOfView:
         self._since_s: FloatArray = np.zeros(0)
         # How those that stand by the verdict were measured when they were last seen, of whom clearly came.
         self._coming: dict[int, FloatArray] = {}
+        self._widest_half_m: dict[int, float] = {}
 
     def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
         """The bodies of a scene, those of them moving that perception only expects beside the view, and that
         came towards the robot's axis when they were last seen; as they were measured then."""
         # Of what only stands where something stood, the velocity was hardly measured.
-        settled = ~seen.moving & (seen.age_s > SETTLED_S)
+        settled = ~seen.moving & (seen.age_s > SETTLED_S) & self._wide_enough(seen)
         out = settled & (seen.unseen_s > 0.0)
         comes = settled & ~out & _clearly_comes(seen, pose)
         if not self._coming and not comes.any():
@@ -74,6 +80,16 @@ class OutOfView:
         velocity = seen.velocity_mps.copy()
         velocity[leaves] = [self._coming[ids[k]] for k in np.flatnonzero(leaves).tolist()]
         return replace(seen, velocity_mps=velocity, moving=seen.moving | leaves)
+
+    def _wide_enough(self, seen: Bodies) -> BoolArray:
+        """(N,) who was somebody's width at some time; at the edge of the view, everybody gets narrow."""
+        ids, before = seen.ids.tolist(), self._widest_half_m
+        widths = [
+            max(half_m, before.get(one, 0.0))
+            for one, half_m in zip(ids, seen.half_across_m.tolist(), strict=True)
+        ]
+        self._widest_half_m = dict(zip(ids, widths, strict=True))
+        return np.array(widths) > _NOBODY_HALF_M
 
     def update(
         self,
@@ -96,7 +112,7 @@ class OutOfView:
         if not len(self._since_s) and not gone.any():
             return no_bodies(seen.captured_ns)
         since = np.concatenate((self._since_s, np.zeros(int(gone.sum())))) + dt_s
-        bodies = self._bodies.joined(before.select(gone))
+        bodies = self._bodies.joined(_as_measured(before.select(gone)))
         bodies = replace(
             bodies,
             captured_ns=seen.captured_ns,
@@ -215,6 +231,20 @@ def _clearly_comes(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     inwards_mps = -side * (bodies.measured_mps @ leftward)
     sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
     return np.asarray(inwards_mps > np.maximum(_CLEAR_SIGMAS * sigma_mps, _CLEAR_MPS))
+
+
+def _as_measured(bodies: Bodies) -> Bodies:
+    """With the velocity that was measured for who stands by the verdict alone, which takes some frames.
+    Thought to stand where it is not seen, it would be waited for without end."""
+    squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
+    # Along its way: v' C v / v'v is the variance there.
+    variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
+    goes = ~bodies.moving & (bodies.age_s < _NO_VERDICT_S)
+    goes &= (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
+    if not goes.any():
+        return bodies
+    velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
+    return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)
 
 
 def _alike(bodies: Bodies, seen: Bodies) -> BoolArray:

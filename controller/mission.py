@@ -81,7 +81,7 @@ def drive_lockstep(
         config, options.config_path, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
     )
     # Time is simulated, so durations measured on this machine stay out of what must be repeatable.
-    recording = RecordingOptions(options.observations, options.video, timed=False)
+    recording = RecordingOptions(options.observations, options.video, options.record, timed=False)
     with ExitStack() as devices:
         devices.enter_context(simulation)
         devices.enter_context(chassis)

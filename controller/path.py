@@ -224,19 +224,6 @@ class Path:
             )
 
 
-def compose(outer: PlanarPose, inner: PlanarPose) -> PlanarPose:
-    """A pose given in the frame that stands at outer, in the frame that outer is given in.
-
-    compose(path.start, odometry_pose) puts dead reckoning that began at the path's start on the path.
-    """
-    c, s = math.cos(outer.heading_rad), math.sin(outer.heading_rad)
-    return PlanarPose(
-        outer.x_m + c * inner.x_m - s * inner.y_m,
-        outer.y_m + s * inner.x_m + c * inner.y_m,
-        wrap_angle_rad(outer.heading_rad + inner.heading_rad),
-    )
-
-
 def _check_bends(spec: PathSpec, robot: Robot) -> None:
     """The inner track must not run backwards, and the yaw rate must leave a speed to drive the bend with."""
     slow_m = _SLOWEST_BEND_MPS / (robot.limits.max_yaw_rate_radps * YAW_RATE_FOR_THE_BEND)

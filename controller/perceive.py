@@ -7,19 +7,20 @@ from dataclasses import dataclass
 
 from hal.api import OdometrySource
 from hal.clocks import NS_PER_MS
-from hal.types import PlanarPose, RgbdFrame
+from hal.types import PlanarPose, Pose, RgbdFrame
 from vision.perception import Perception
 from vision.scene import Fragments, Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """A frame and what was seen in it."""
+    """A frame and what was seen in it. camera_pose: by the odometry of its time, if there was one."""
 
     frame: RgbdFrame
     scene: Scene
     fragments: Fragments
     timing_ms: dict[str, float]
+    camera_pose: Pose | None = None
 
 
 class Perceiver:
@@ -49,4 +50,4 @@ class Perceiver:
             "detect": (detected_ns - started_ns) / NS_PER_MS,
             "track": (tracked_ns - detected_ns) / NS_PER_MS,
         }
-        return Look(frame, percept.scene, percept.fragments, timing_ms)
+        return Look(frame, percept.scene, percept.fragments, timing_ms, camera_pose)

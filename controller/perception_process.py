@@ -109,17 +109,21 @@ def _look_until_the_end(
     ):
         perceiver = build_perceiver(config, body, body.body_pose, time.perf_counter_ns)
         run_recorder = RunRecorder(recorder, build_path(config, config_path))
-        while True:
-            try:
-                look = perceiver.look(camera.read(timeout_s))
-            except FrameTimeout:
-                # The scene ages and the robot stops; the camera may come back.
-                body.listen()
-                continue
-            channel.send(SceneMessage(look.scene, look.timing_ms))
-            run_recorder.saw(look)
-            for step in body.take_steps():
-                run_recorder.decided(step)
+        try:
+            while True:
+                try:
+                    look = perceiver.look(camera.read(timeout_s))
+                except FrameTimeout:
+                    # The scene ages and the robot stops; the camera may come back.
+                    body.listen()
+                    continue
+                channel.send(SceneMessage(look.scene, look.timing_ms))
+                run_recorder.saw(look)
+                for step in body.take_steps():
+                    run_recorder.decided(step)
+        except (PeerGone, EndOfStream):
+            run_recorder.finish()
+            raise
 
 
 def _say_farewell(channel: Channel, reason: str) -> None:

@@ -64,7 +64,7 @@ class RealtimeRig:
         on_ready is called once, when the first scene has come.
         """
         service = ServiceManager(os.environ, os.getpid())
-        recording = RecordingOptions(self.options.observations, self.options.video)
+        recording = RecordingOptions(self.options.observations, self.options.video, self.options.record)
         with (
             perception_beside(self.config, self.options.config_path, self.start_ns, recording) as link,
             stop_on_signals() as stop,

@@ -1,4 +1,4 @@
-"""What is kept of a run or a replay: observations as JSON lines, and an annotated video."""
+"""What is kept of a run or a replay: observations as JSON lines, an annotated video, and the frames."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ import numpy as np
 from config.robot import Body
 from controller.control import ControlStep
 from controller.decision import Decision
+from controller.frame_recorder import FrameRecorder
 from controller.observations import ObservationFile
 from controller.path import Path
 from controller.perceive import Look
 from controller.video.compose import Composer
 from controller.video.moment import VideoMoment
 from controller.video.writer import VideoWriter
+from hal.cameras.tum_writer import TumWriter
 from hal.geometry import body_in_floor
 from hal.types import CameraMount, FloatArray, PlanarPose
 
@@ -28,10 +30,12 @@ PATH_STEP_M = 0.25
 
 @dataclass(frozen=True, slots=True)
 class RecordingOptions:
-    """Files to write; None: not wanted. timed: write the measured durations (not where time is simulated)."""
+    """Files to write, and a folder for the frames; None: not wanted. timed: time is not simulated, so write
+    the measured durations, and leave out frames rather than wait for them to be written."""
 
     observations: FilePath | None = None
     video: FilePath | None = None
+    frames: FilePath | None = None
     timed: bool = True
 
 
@@ -54,11 +58,13 @@ class Recorder:
         self,
         observations: ObservationFile | None,
         video: VideoWriter | None,
+        frames: FrameRecorder | None,
         surroundings: Surroundings,
         timed: bool,
     ) -> None:
         self._observations = observations
         self._video = video
+        self._frames = frames
         self._composer = Composer(surroundings.top_speed_mps, surroundings.range_m)
         self._surroundings = surroundings
         self._timed = timed
@@ -74,6 +80,8 @@ class Recorder:
         """One frame. path_ahead_m: (N, 2) in the body frame."""
         if self._observations is not None:
             self._observations.write(look.scene, decision, look.timing_ms if self._timed else {})
+        if self._frames is not None:
+            self._frames.write(look.frame, look.camera_pose)
         if self._video is not None:
             around = self._surroundings
             moment = VideoMoment(
@@ -93,14 +101,17 @@ class Recorder:
 
 @contextmanager
 def open_recorder(options: RecordingOptions, surroundings: Surroundings) -> Iterator[Recorder]:
-    """A recorder whose files are complete when the block ends. Raises VideoError, UserError."""
+    """A recorder whose files are complete when the block ends. Raises VideoError, UserError, HalError."""
     with ExitStack() as files:
-        observations = video = None
+        observations = video = frames = None
         if options.observations is not None:
             observations = files.enter_context(ObservationFile(options.observations))
         if options.video is not None:
             video = files.enter_context(VideoWriter(options.video, surroundings.fps))
-        yield Recorder(observations, video, surroundings, options.timed)
+        if options.frames is not None:
+            writer = files.enter_context(TumWriter(options.frames, surroundings.mount))
+            frames = files.enter_context(FrameRecorder(writer, options.frames, may_drop=options.timed))
+        yield Recorder(observations, video, frames, surroundings, options.timed)
 
 
 class RunRecorder:

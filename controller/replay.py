@@ -26,7 +26,9 @@ from controller.decision import Decision
 from controller.path import OnPath, Path
 from controller.perceive import Look
 from controller.recorder import RecordingOptions, open_recorder
+from controller.situation import Situation
 from controller.tally import TimingTally
+from hal.cameras.bag_topics import WantedTopics
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
 from hal.geometry import camera_in_body
@@ -48,6 +50,7 @@ class ReplayOptions:
     observations: FilePath | None = None
     video: FilePath | None = None
     quiet: bool = False
+    topics: WantedTopics = field(default_factory=WantedTopics)
 
 
 @dataclass
@@ -97,7 +100,7 @@ def run_replay(options: ReplayOptions) -> None:
     """Every frame through detect, track and decide. Raises ConfigError, HalError, UserError."""
     config = load_replay(options.config_path)
     console = Console(options.quiet)
-    source, odometry = open_replay(options.recording, options.odometry)
+    source, odometry = open_replay(options.recording, options.odometry, options.topics)
     mount = recorded_mount(config, source.mount)
     perceiver = build_replay_perceiver(config, mount, odometry, time.perf_counter_ns)
     decide = build_replay_decision(config, mount)
@@ -122,7 +125,7 @@ def run_replay(options: ReplayOptions) -> None:
             console.decision((tally.last_ns - tally.first_ns) / NS_PER_S, decision, v_mps)
     prior = "none: the camera's motion is estimated from images and depth alone"
     if odometry is not None:
-        prior = f"{odometry.path.name}: {len(odometry)} poses"
+        prior = f"{odometry.name}: {len(odometry)} poses"
     skipped = [str(skip) for skip in source.skipped]
     console.summary(_summary(options, tally, prior, skipped, source.notes))
 
@@ -141,7 +144,7 @@ _AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
 def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Decision:
     """As for a robot that stands at the start of a straight path and drives v_mps."""
     on_path = OnPath(0.0, 0.0, 0.0)
-    return decide.step(look.scene, path, _STANDING, on_path, v_mps, 0.0, look.scene.captured_ns)
+    return decide.step(Situation(look.scene, path, _STANDING, on_path, v_mps, 0.0, look.scene.captured_ns))
 
 
 def _summary(

@@ -23,6 +23,7 @@ class MissionOptions:
     seed: int | None = None
     observations: FilePath | None = None
     video: FilePath | None = None
+    record: FilePath | None = None
     quiet: bool = False
 
 

@@ -32,10 +32,6 @@ class ServiceManager:
         """The loop runs and the devices answer (Type=notify waits for this)."""
         self._send(f"READY=1\nSTATUS={status}")
 
-    def status(self, status: str) -> None:
-        """One line for `systemctl status`."""
-        self._send(f"STATUS={status}")
-
     def stopping(self, status: str) -> None:
         """The stop has begun."""
         self._send(f"STOPPING=1\nSTATUS={status}")

@@ -32,7 +32,7 @@ _FINE_SHARE = 0.08  # of the variance
 _HOLE_BLOB_PX = (2.5, 2.0)
 _MARGIN_PX = 96  # the noise field is larger than the image by this much: room to shift it
 _TOLERATED_SHIFT_PX = 1.0  # disparity steps below this are slanted surfaces, not edges
-_BAND_ROWS = 96  # worked on at a time: what so many rows need stays in the processor's cache
+BAND_ROWS = 96  # worked on at a time: what so many rows need stays in the processor's cache
 
 
 class DepthSensor:
@@ -54,9 +54,10 @@ class DepthSensor:
         self._noise = (unit * (self._sigma / np.sqrt(2.0))).astype(np.float32)
         self._holes = _hole_field(generator, padded, config.hole_ratio)
         self._columns = np.arange(shape[1], dtype=np.float32)[None, :]
-        self._noisy: Float32Image = np.empty(shape, np.float32)
-        self._seen_at: Float32Image = np.empty(shape, np.float32)
-        self._windows = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        band = (BAND_ROWS, shape[1])
+        self._noisy: Float32Image = np.empty(band, np.float32)
+        self._seen_at: Float32Image = np.empty(band, np.float32)
+        self._windows = np.empty(band, np.float32), np.empty(band, np.float32)
 
     def measure(self, inverse_depth: Float32Image, frame: int) -> DepthImage:
         """The depth image (H, W) uint16 in millimetres, 0 where nothing was measured.
@@ -67,8 +68,8 @@ class DepthSensor:
         config = self._config
         noises = [self._cut(self._noise, frame + k, 0) for k in (0, 1)] if self._sigma > 0.0 else []
         holes = self._cut(self._holes, frame, 1) if config.hole_ratio > 0.0 else None
-        for first in range(0, self._shape[0], _BAND_ROWS):
-            rows = slice(first, first + _BAND_ROWS)
+        for first in range(0, self._shape[0], BAND_ROWS):
+            rows = slice(first, first + BAND_ROWS)
             exact = inverse_depth[rows]
             noisy = self._noisy[: len(exact)]
             np.copyto(noisy, exact)
@@ -88,8 +89,9 @@ class DepthSensor:
         return depth
 
     def shadows(self, inverse_depth: Float32Image) -> NDArray[np.bool_]:
-        """What the left infrared camera sees and the right one does not, in whole rows (R, W): the band of
-        background to the left of every nearer thing, as wide as the difference of their disparities."""
+        """What the left infrared camera sees and the right one does not, in whole rows (R, W), at most
+        BAND_ROWS of them: the strip of background to the left of every nearer thing, as wide as the
+        difference of their disparities."""
         count = len(inverse_depth)
         seen_at = np.multiply(inverse_depth, np.float32(self._disparity_px_m), out=self._seen_at[:count])
         np.subtract(self._columns, seen_at, out=seen_at)

@@ -21,7 +21,7 @@ class BodyTruth:
 
     bbox_px: (u0, v0, u1, v1) around its visible pixels, u1 and v1 exclusive. visible_px of them;
     visible_ratio: of those that it would have in this image if nothing stood before it. position_m (3,):
-    mean of its visible surface points; nearest_m: smallest z among them; velocity_mps (3,): over ground.
+    mean of its visible surface points; velocity_mps (3,): over ground.
     """
 
     state: BodyState
@@ -29,7 +29,6 @@ class BodyTruth:
     visible_px: int
     visible_ratio: float
     position_m: FloatArray
-    nearest_m: float
     velocity_mps: FloatArray
 
 
@@ -64,7 +63,6 @@ class GroundTruth:
                     visible_px=len(u),
                     visible_ratio=len(u) / self._pixels_alone(picture, state.id),
                     position_m=surface.mean(axis=0),
-                    nearest_m=float(surface[:, 2].min()),
                     velocity_mps=velocity @ picture.camera.rotation,
                 )
             )

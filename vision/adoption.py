@@ -37,7 +37,7 @@ def adopt(
         return np.full(len(owner), -1, np.int64)
     ends = detection.ends_px.astype(float)
     u, v = (ends[:, :1, k] + (ends[:, 1:, k] - ends[:, :1, k]) * _ALONG for k in (0, 1))
-    cells = grid.rows(v - _ABOVE_PX) * labels.shape[1] + grid.columns(u + _BESIDE_PX)
+    cells = grid.cells(u + _BESIDE_PX, v - _ABOVE_PX)
     there = labels.ravel().take(cells)
     near = np.fmin(detection.near_m[:, 0], detection.near_m[:, 1]).astype(float)
     depth = grid.depth_m.ravel().take(cells)

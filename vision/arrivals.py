@@ -50,18 +50,19 @@ class FreeMemory:
 
     def arrived(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> BoolGrid:
         """(h, w) cells of mask whose surface stands in space that was seen free."""
-        result = np.zeros(mask.shape, np.uint8)
+        result = np.zeros(mask.shape, np.bool_)
         cells = np.flatnonzero(mask)
-        memories = [m for m in (self._memory_of(now_ns, s) for s in _LOOK_BACK_S) if m is not None]
-        if len(cells) == 0 or not memories:
-            return result.astype(np.bool_)
         points = grid.points(cells)
-        for memory in memories:
-            result.ravel()[cells] |= self._free_then(grid, points, pose, memory)
-        if result.any():
-            count = cv2.boxFilter(result, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
-            result &= np.asarray(count >= _NEIGHBOURS, np.uint8)
-        return result.astype(np.bool_)
+        came = np.zeros(len(cells), np.bool_)
+        for memory in (self._memory_of(now_ns, wanted_s) for wanted_s in _LOOK_BACK_S):
+            if memory is not None:
+                came |= self._free_then(grid, points, pose, memory)
+        if not came.any():
+            return result
+        result.ravel()[cells] = came
+        block, outside = (3, 3), cv2.BORDER_CONSTANT
+        count = cv2.boxFilter(result.view(np.uint8), -1, block, normalize=False, borderType=outside)
+        return result & (np.asarray(count) >= _NEIGHBOURS)
 
     def remember(self, grid: DepthGrid, pose: Pose, now_ns: int) -> None:
         """Keep this view, unless the last one kept is very young."""

@@ -44,4 +44,6 @@ def find_contours(edges: GreyImage, min_length_px: float) -> Contours:
     step = (lengths / pieces)[owner]
     first = starts[owner] + (rank * step).astype(np.intp)
     last = starts[owner] + np.minimum(((rank + 1) * step).astype(np.intp), lengths[owner] - 1)
-    return Contours(points[np.stack((first, last), axis=1)].astype(np.float32), remaining)
+    ends_px = np.empty((len(owner), 2, 2), np.float32)
+    ends_px[:, 0], ends_px[:, 1] = points[first], points[last]
+    return Contours(ends_px, remaining)

@@ -20,7 +20,6 @@ BoolGrid = NDArray[np.bool_]
 CELL_NOISE = (
     0.4  # noise of a cell over noise of a pixel: of neighbouring pixels, so less than the count tells
 )
-_SMALLEST = 1e-6
 _FARTHEST = np.uint16(65535)
 _NEAREST_M = 0.1
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
@@ -63,6 +62,11 @@ class DepthGrid:
         index = np.rint((pixels_v - self.offset_px) / self.step_px).astype(np.intp)
         clipped: NDArray[np.intp] = np.minimum(np.maximum(index, 0), self.depth_m.shape[0] - 1)
         return clipped
+
+    def cells(self, pixels_u: FloatArray, pixels_v: FloatArray) -> NDArray[np.intp]:
+        """Flat grid cells of image points, clipped to the grid."""
+        flat: NDArray[np.intp] = self.rows(pixels_v) * self.depth_m.shape[1] + self.columns(pixels_u)
+        return flat
 
     def points(self, cells: NDArray[np.intp]) -> FloatGrid:
         """(3, K) camera coordinates of flat cell indices (K,)."""
@@ -156,8 +160,9 @@ def _view(
 
 
 def _inverted(values: FloatGrid, valid: BoolGrid) -> FloatGrid:
-    """1 / values where valid, else 0. valid values are not small: nothing else is divided by."""
-    inverted = np.reciprocal(np.maximum(values, np.float32(_SMALLEST)))
+    """1 / values where valid, else 0. valid values are not zero; what comes of the others is left out."""
+    with np.errstate(divide="ignore"):
+        inverted = np.float32(1.0) / values
     return np.asarray(cv2.copyTo(inverted, valid.view(np.uint8)), np.float32)
 
 

@@ -47,11 +47,14 @@ def free_space(grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float) -> FreeS
 
 def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: int, width: int) -> NDArray[np.float64]:
     """(bands,) forward distance of the nearest surface that enough obstacle cells agree on, inf without."""
-    rows, columns = obstacle.shape
-    forward = np.full((rows, bands * width), np.inf, np.float32)
-    cv2.copyTo(grid.forward_m, obstacle.view(np.uint8), forward[:, :columns])
+    mask, columns = obstacle.view(np.uint8), obstacle.shape[1]
+    support = min(_SUPPORT, len(obstacle) * width)
+    _, top, _, height = cv2.boundingRect(mask)  # the rows in which something stands
+    forward = np.full((max(height, support), bands * width), np.inf, np.float32)
+    if height > 0:
+        rows = slice(top, top + height)
+        cv2.copyTo(grid.forward_m[rows], mask[rows], forward[:height, :columns])
     upright = np.asarray(cv2.transpose(forward), np.float32).reshape(bands, -1)
-    support = min(_SUPPORT, upright.shape[1])
     return np.sort(upright, axis=1)[:, support - 1].astype(float)
 
 
@@ -74,15 +77,14 @@ def _known_m(grid: DepthGrid, bands: int, width: int, max_depth_m: float) -> NDA
         part = seen[:, column::width]
         count[:, : part.shape[1]] += part
     hole = count < 0.5 * width
-    # A single row may be lost to noise; two in a row are a hole.
-    run = hole.copy()
+    # A single row may be lost to noise; two in a row are a hole. After the last row one is sure.
+    run = np.ones((len(rows) + 1, bands), np.bool_)
+    run[:-1] = hole
     for shift in range(1, _HOLE_ROWS):
-        run[:-shift] &= hole[shift:]
-    first = np.where(run.any(axis=0), run.argmax(axis=0), len(rows))
+        run[: len(rows) - shift] &= hole[shift:]
+    first = run.argmax(axis=0)
     # Where even the uppermost ray meets the floor, nothing beyond that was looked at.
     horizon_m = max_depth_m if len(rows) < len(grid.y) else floor_forward[-1]
-    reach = np.append(floor_forward, horizon_m)
+    reach = np.concatenate((floor_forward, (horizon_m,)))
     # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known.
-    return np.where(first == 0, 0.0, np.minimum(reach[np.minimum(first, len(rows))], max_depth_m)).astype(
-        float
-    )
+    return np.where(first == 0, 0.0, np.minimum(reach[first], max_depth_m)).astype(float)

@@ -149,7 +149,8 @@ class Detector:
         return grid
 
     def _renew(self, frame: RgbdFrame, grey: GreyImage) -> None:
-        without_depth = int(np.count_nonzero(np.isnan(self._store.near_m).all(axis=1)))
+        missing = np.isnan(self._store.near_m)
+        without_depth = int(np.count_nonzero(missing[:, 0] & missing[:, 1]))
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
@@ -260,8 +261,7 @@ def _hint(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[n
     moving, velocity = np.zeros(len(ids), np.bool_), np.zeros((len(ids), 3))
     if previous is None or len(previous.ids) == 0:
         return moving, velocity
-    index = np.searchsorted(previous.ids, ids)
-    index = np.minimum(index, len(previous.ids) - 1)
+    index = np.minimum(previous.ids.searchsorted(ids), len(previous.ids) - 1)
     same = previous.ids[index] == ids
     moving[same] = previous.moving[index[same]]
     if moving.any():

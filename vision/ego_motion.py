@@ -30,6 +30,7 @@ _MIN_BACKGROUND_RATIO = 0.10
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2])  # of the prior's sigma, where it decides
 _CONVERGED_SIGMAS = 0.2  # a step of less is nothing beside what the pose may be off anyway
+_IDENTITY = np.eye(6)
 _STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivatives say, to 0.01 px
 
 
@@ -162,14 +163,14 @@ def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: I
     """Of the points use (M,)."""
     count = len(use)
     lines = np.empty((3, 2 * count))
-    lines[:, :count] = anchors.points_m[use].T
-    lines[:, count:] = anchors.range_m[use].T
+    lines[:, :count] = anchors.points_m.T.take(use, axis=1)
+    lines[:, count:] = anchors.range_m.T.take(use, axis=1)
     seen = np.empty((2, count))
-    u, v = pixels[use].T
+    u, v = pixels.T.take(use, axis=1)
     seen[0] = (u - camera.cx) / camera.fx
     seen[1] = (v - camera.cy) / camera.fy
     # The inverse of Cholesky's factor.
-    xx, xy, yy = anchors.pixel_cov[use].T
+    xx, xy, yy = anchors.pixel_cov.T.take(use, axis=1)
     first = np.sqrt(xx)
     low = xy / first
     second = np.sqrt(np.maximum(yy - low * low, 1e-6))
@@ -183,7 +184,7 @@ def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: I
 def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
     """Iteratively reweighted Gauss-Newton from start, which is known to sigma (6,)."""
     prior = 1.0 / np.square(sigma)
-    information = prior_information = np.diag(prior)
+    information = prior_information = _IDENTITY * prior
     pose = _shift(view, start, sigma)
     count = view.seen.shape[1]
     table, weights = np.empty((8, 3, count)), np.empty((3, count))
@@ -196,7 +197,7 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
         a, b, along = table[6]
         chi2 = a * a + b * b - shrink * along * along
         if iteration == 0:
-            doubt = np.square(table[:6, :2] * sigma[:, None, None]).sum(axis=(0, 1))
+            doubt = np.square(table[:6, :2] * sigma[:, None, None]).reshape(12, count).sum(axis=0)
             allowed = (in_front & (chi2 <= _GATE_CHI2 * (1.0 + doubt))).astype(np.float64)
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
         weight = allowed * in_front / (scale * np.square(1.0 + chi2 * (1.0 / (_GATE_CHI2 * scale))))

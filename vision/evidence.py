@@ -66,7 +66,7 @@ def static_points(
         anchor.direction.T,
         depths.sigma_m,
         pixel_cov.reshape(-1, 3).astype(float),
-        ~(depths.mixed | np.repeat(moving, 2)),
+        ~(depths.mixed | moving.repeat(2)),
     )
 
 
@@ -86,7 +86,7 @@ def gather(
     turn = now.pose.rotation.T
     direction = turn @ anchor.direction
     origin = turn @ (anchor.origin - now.pose.translation_m[:, None])
-    ray = np.ascontiguousarray(rays(store.ends_px.reshape(-1, 2), camera)[:, :2].T)
+    ray = rays(store.ends_px.reshape(-1, 2), camera).T[:2]
     # Near and far surface at once, in the middle index: (3, 2, 2N), (2, 2, 2N).
     surfaces = np.empty((2, len(depths.near_m)))
     surfaces[0], surfaces[1] = depths.near_m, depths.far_m
@@ -101,24 +101,22 @@ def gather(
     per_pixel = np.array([[1.0 / camera.fx**2], [1.0 / (camera.fx * camera.fy)], [1.0 / camera.fy**2]])
     covariance = _pixel_covariance(store, anchor, depths.mixed) * (per_pixel * (variance_scale * squared))
     covariance[::2] += _pose_variance(now.covariance, squared)
-    behind = np.square(static[2, 1] / np.maximum(depth, 0.1))
-    chi2 = np.minimum(
-        chi2_2d(miss[:, 0].T, covariance.T, effect[:, 0].T),
-        chi2_2d(miss[:, 1].T, (covariance * behind).T, effect[:, 1].T),
-    )
+    doubt = np.empty((3, 2, len(depth)))
+    doubt[:, 0], doubt[:, 1] = covariance, covariance * np.square(static[2, 1] / np.maximum(depth, 0.1))
+    chi2 = chi2_2d(miss.reshape(2, -1).T, doubt.reshape(3, -1).T, effect.reshape(2, -1).T)
     depth_now = store.near_m.ravel().astype(float)
     sigma_now = depth_sigma_m(np.where(np.isnan(depth_now), 1.0, depth_now), noise)
     return PointMotion(
         static_m=static[:, 0].T,
         ray=ray.T,
-        lag_s=np.repeat(anchor.lag_s, 2),
+        lag_s=anchor.lag_s.repeat(2),
         miss_m=miss[:, 0].T,
         covariance=covariance.T,
         depth_effect=effect[:, 0].T,
         depth_step_m=depth_now - depth,
         depth_step_sigma_m=np.hypot(depths.sigma_m, sigma_now),
         depth_lag_s=_depth_lag_s(anchor),
-        static_chi2=chi2,
+        static_chi2=chi2.reshape(2, -1).min(axis=0),
         usable=depths.known & in_front & np.isfinite(miss[0, 0] + miss[1, 0]),
     )
 
@@ -131,7 +129,7 @@ def observed_variance_scale(
     Blur, a rolling shutter, depth beside its colour: no table knows them, the background shows them. The
     lower third of the ends decides, so that movers not yet known as such have no say.
     """
-    settled = motion.usable & np.repeat((age_frames >= _SETTLED_FRAMES) & ~moving, 2)
+    settled = motion.usable & ((age_frames >= _SETTLED_FRAMES) & ~moving).repeat(2)
     chi2 = motion.static_chi2[settled]
     if len(chi2) < _LEAST_ENDS:
         return before
@@ -165,8 +163,8 @@ def _depth_lag_s(anchor: AnchorEnds) -> FloatArray:
     """(2N,) how long before now the averaged depth of the anchors was measured, on average."""
     looks = anchor.looks
     late_frames = np.where(looks < _MOST_LOOKS, 0.5 * (looks - 1.0), _SETTLED_LATE_FRAMES)
-    frame_s = np.repeat(anchor.lag_s / anchor.lag_frames, 2)
-    return np.repeat(anchor.lag_s, 2) + late_frames * frame_s
+    frame_s = (anchor.lag_s / anchor.lag_frames).repeat(2)
+    return anchor.lag_s.repeat(2) + late_frames * frame_s
 
 
 def _pixel_covariance(store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[np.bool_]) -> FloatArray:
@@ -176,7 +174,7 @@ def _pixel_covariance(store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[n
     where the outline of one crosses a line of another: it slides along the fragment when either moves.
     Across the fragment it is held as well as any.
     """
-    steps = np.repeat(np.maximum(1.0, _STEPS_SHARE * anchor.lag_frames), 2)
+    steps = np.maximum(1.0, _STEPS_SHARE * anchor.lag_frames).repeat(2)
     result: FloatArray = store.pixel_cov.reshape(-1, 3).T * steps
     ends = np.flatnonzero(mixed)
     both = store.ends_px[ends // 2].astype(float)

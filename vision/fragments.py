@@ -74,15 +74,16 @@ class FragmentStore:
         """Drop all but the chosen fragments."""
         if chosen.all():
             return
-        self.ids = self.ids[chosen]
-        self.ends_px = self.ends_px[chosen]
-        self.near_m = self.near_m[chosen]
-        self.far_m = self.far_m[chosen]
-        self.depth_m = self.depth_m[chosen]
-        self.looks = self.looks[chosen]
-        self.age_frames = self.age_frames[chosen]
-        self.pixel_cov = self.pixel_cov[chosen]
-        self._place = self._place[chosen]
+        kept = np.flatnonzero(chosen)  # a choice by index is several times as fast
+        self.ids = self.ids.take(kept)
+        self.ends_px = self.ends_px.take(kept, axis=0)
+        self.near_m = self.near_m.take(kept, axis=0)
+        self.far_m = self.far_m.take(kept, axis=0)
+        self.depth_m = self.depth_m.take(kept, axis=0)
+        self.looks = self.looks.take(kept, axis=0)
+        self.age_frames = self.age_frames.take(kept)
+        self.pixel_cov = self.pixel_cov.take(kept, axis=0)
+        self._place = self._place.take(kept)
 
     def add(
         self,
@@ -125,10 +126,10 @@ class FragmentStore:
         self._comparable = min(self._comparable + 1, HISTORY)
         frame, place = self._history[:, self._head], self._place
         direction = pose.rotation @ rays(self.ends_px.reshape(-1, 2), camera).T
-        frame[:3, place] = direction.reshape(3, -1, 2)
-        frame[3, place] = self.depth_m
-        frame[4, place] = self.far_m
-        frame[5, place] = self.looks
+        ends = np.empty((6, len(place), 2))
+        ends[:3] = direction.reshape(3, -1, 2)
+        ends[3], ends[4], ends[5] = self.depth_m, self.far_m, self.looks
+        frame[:, place] = ends
         self._stamps_ns[self._head] = stamp_ns
         self._origins[:, self._head] = pose.translation_m
         self.age_frames += 1
@@ -159,5 +160,5 @@ class FragmentStore:
         """What the history holds of each fragment in its frame slot (N,)."""
         rows = self._history.reshape(6, -1, 2).take(slot * self._history.shape[2] + self._place, axis=1)
         rows = rows.reshape(6, -1)
-        origin = self._origins.take(np.repeat(slot, 2), axis=1)
+        origin = self._origins.take(slot.repeat(2), axis=1)
         return AnchorEnds(rows[:3], origin, rows[3], rows[4], rows[5], lag, lag_s)

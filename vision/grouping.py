@@ -20,7 +20,7 @@ from vision.regions import IntGrid, Regions
 _CLOSE_M = 0.25
 _APART_M = 0.40
 _SAME_DEPTH_M = 0.30
-_SAMPLES = 24
+_ALONG = np.linspace(0.0, 1.0, 24)[:, None]  # from one part to another
 _LEAST_SAMPLES = 3
 _NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
 _SMALL_SHARE = 0.5
@@ -54,9 +54,10 @@ def boxes(regions: Regions) -> Boxes:
 
 
 def gaps_m(a: Boxes, first: NDArray[np.intp], b: Boxes, second: NDArray[np.intp]) -> FloatArray:
-    """(K,) distance between box first[k] of a and box second[k] of b, 0 where they touch."""
+    """(K,) distance between box first[k] of a and box second[k] of b, 0 where they touch; or of any shape
+    that first and second are broadcast to."""
     gap = np.maximum(a.low_m[first] - b.high_m[second], b.low_m[second] - a.high_m[first])
-    result: FloatArray = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=1))
+    result: FloatArray = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=-1))
     return result
 
 
@@ -73,23 +74,31 @@ class Bodies:
 
 
 def expected_in(
-    grid: DepthGrid, parts: Regions, winner: NDArray[np.int32], votes: NDArray[np.intp], bodies: Bodies
+    grid: DepthGrid,
+    parts: Regions,
+    winner: NDArray[np.int32],
+    votes: NDArray[np.intp],
+    bodies: Bodies,
+    mover: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """(P, T) which parts are what is seen of a body on the other side of something nearer that divides it.
+    """(P, T) which parts are what is seen of a mover on the other side of something nearer that divides it.
 
     winner (P,), votes (P,): as in a Ballot; the part with the most votes is what is surely the body's. The
-    rest of it is no farther away than the whole makes room for, and it is at its depth.
+    rest of it is no farther away than the whole makes room for, and it is at its depth. mover (T,): of the
+    others nothing is expected.
     """
+    result = np.zeros((len(parts.cells), len(mover)), np.bool_)
+    if not mover.any():
+        return result
     half = 0.5 * bodies.extent_m[:, :2]
     room = np.maximum(bodies.box_m[:, 2:] - bodies.box_m[:, :2] - half, half) + _CLOSE_M
     offset = parts.position_m[:, None] - bodies.centre_m
-    inside = (np.abs(offset[..., :2]) <= room).all(axis=2) & (parts.cells > 0)[:, None]
+    inside = (np.abs(offset[..., :2]) <= room).all(axis=2) & (parts.cells > 0)[:, None] & mover
     inside &= np.abs(offset[..., 2]) <= _SAME_DEPTH_M + bodies.sigma_m
     main = np.full(len(bodies.sigma_m) + 1, -1, np.intp)
     fewest_first = np.argsort(votes)
     main[winner[fewest_first]] = fewest_first
     part, track = np.nonzero(inside & (main[1:] >= 0))
-    result = np.zeros_like(inside)
     result[part, track] = _parted(grid, parts, part, main[track + 1])
     return result
 
@@ -99,12 +108,11 @@ def _parted(
 ) -> NDArray[np.bool_]:
     """(K,) whether something nearer stands between the middles of parts one[k] and other[k] in the image."""
     middle = 0.5 * (parts.bbox_px[:, :2] + parts.bbox_px[:, 2:])
-    along = np.linspace(0.0, 1.0, _SAMPLES)[:, None, None]
-    line = middle[one] + (middle[other] - middle[one]) * along
-    inverse = grid.inverse_depth[grid.rows(line[..., 1]), grid.columns(line[..., 0])]
+    u, v = (k[one] + (k[other] - k[one]) * _ALONG for k in middle.T)
+    inverse = grid.inverse_depth.ravel().take(grid.cells(u, v))
     depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
     nearer = inverse > 1.0 / np.maximum(depth, 0.1) + _NEARER_INVERSE
-    result: NDArray[np.bool_] = np.count_nonzero(nearer, axis=0) >= _LEAST_SAMPLES
+    result: NDArray[np.bool_] = nearer.sum(axis=0) >= _LEAST_SAMPLES
     return result
 
 
@@ -122,6 +130,8 @@ def detach(
     order = owned[np.lexsort((-votes[owned], winner[owned]))]
     track = winner[order]
     is_main = np.concatenate(([True], track[1:] != track[:-1]))
+    if is_main.all():
+        return winner
     main = order[np.maximum.accumulate(np.where(is_main, np.arange(len(order)), 0))]
     box = boxes(parts)
     gap = gaps_m(box, order, box, main)
@@ -146,11 +156,10 @@ def attach(
     if len(of_mover) == 0 or len(new_parts) == 0:
         return winner
     box = boxes(parts)
-    a, b = np.repeat(new_parts, len(of_mover)), np.tile(of_mover, len(new_parts))
+    a, b = new_parts[:, None], of_mover
     gap = gaps_m(box, a, box, b)
     gap[expected[a, winner[b] - 1]] = 0.0
     gap[parts.cells[a] > _SMALL_SHARE * parts.cells[b]] = np.inf
-    gap = gap.reshape(len(new_parts), len(of_mover))
     best = gap.argmin(axis=1)
     close = gap[np.arange(len(new_parts)), best] <= _CLOSE_M
     result = winner.copy()
@@ -171,34 +180,26 @@ def merges(
 
     velocity (T, 3) and velocity_sigma (T,) of the tracks.
     """
-    small = np.flatnonzero(mover & (regions.cells > 0))
-    large = np.flatnonzero(moving & (regions.cells > 0))
-    if len(small) == 0 or len(large) == 0:
+    cells, seen = regions.cells, regions.cells > 0
+    # Of two that are as large, the later one counts as the smaller.
+    smaller = (cells[:, None] < cells) | (
+        (cells[:, None] == cells) & np.tri(len(cells), k=-1, dtype=np.bool_)
+    )
+    a, b = np.nonzero((mover & seen)[:, None] & (moving & seen) & smaller)
+    if len(a) == 0:
         return []
     box = boxes(regions)
-    a, b = np.repeat(small, len(large)), np.tile(large, len(small))
     difference = np.sqrt(np.square(velocity[a] - velocity[b]).sum(axis=1))
     alike = difference <= _SAME_VELOCITY_MPS + _ALIKE_SIGMAS * np.hypot(velocity_sigma[a], velocity_sigma[b])
     width = np.maximum(box.high_m[a, 0], box.high_m[b, 0]) - np.minimum(box.low_m[a, 0], box.low_m[b, 0])
     overlap = _overlaps(regions.bbox_px[a], regions.bbox_px[b])
-    fits = (
-        (regions.cells[a] <= _SMALL_SHARE * regions.cells[b])
-        | (width <= _SINGLE_WIDTH_M)
-        | (overlap >= _OVERLAP)
-    )
+    fits = (cells[a] <= _SMALL_SHARE * cells[b]) | (width <= _SINGLE_WIDTH_M) | (overlap >= _OVERLAP)
     reach = np.where(overlap >= _OVERLAP, _APART_M, _CLOSE_M)
     known = np.maximum(velocity_sigma[a], velocity_sigma[b]) <= _CARRIED_SIGMA_MPS
     carried = known & (difference <= _CARRIED_MPS) & _stacked(regions.bbox_px[a], regions.bbox_px[b])
     reach = np.where(carried, _CARRIED_M, reach)
     gap = gaps_m(box, a, box, b)
-    one = (
-        (a != b)
-        & (regions.cells[a] <= regions.cells[b])
-        & (gap <= reach)
-        & alike
-        & fits
-        & ~((regions.cells[a] == regions.cells[b]) & (a < b))
-    )
+    one = (gap <= reach) & alike & fits
     a, b = a[one], b[one]
     away = np.abs(regions.position_m[a, 2] - regions.position_m[b, 2])
     closest_first = np.lexsort((away, gap[one]))
@@ -246,6 +247,8 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
     if len(cells) < 2 * _MIN_CELLS:
         return None
     points = grid.points(cells)[::2].T.astype(float)
+    if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < _SINGLE_WIDTH_M:
+        return None  # as is most, whichever line they are laid along
     centred = points - median(points.T)
     _, axes = np.linalg.eigh(centred.T @ centred)
     along = centred @ axes[:, 1]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from config.perception import MotionSettings
 from hal.types import FloatArray
-from vision.line_of_sight import Split, second_opinion, split, squared_sigmas
+from vision.line_of_sight import Split, second_opinion, split
 
 _RISE_S = 0.06
 # Without odometry an error of the camera's motion stays for some frames: one more of them is asked for.
@@ -110,15 +110,17 @@ class Verdict:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Reading:
     """What the rules ask of T tracks. threshold: squared sigmas. speed_mps (T,) as filtered; least_mps (T,):
-    what is slower counts as static; significance (T,): squared sigmas of the filter's velocity; agreeing
-    (T,): ends that agree, 0 where they are too small a share. The velocity as filtered, of this frame's
+    what is slower counts as static; agreeing (T,): ends that agree, 0 where they are too small a share;
+    shown_across (T,): filter and fragments say that it goes across the line of sight, however few these are;
+    arrived (T,): some of the surface is where free space was seen. The velocity as filtered, of this frame's
     fragments and of the surface; apart: the first less the last."""
 
     threshold: float
     speed_mps: FloatArray
     least_mps: FloatArray
-    significance: FloatArray
     agreeing: FloatArray
+    shown_across: NDArray[np.bool_]
+    arrived: NDArray[np.bool_]
     filtered: Split
     own: Split
     surface: Split
@@ -136,15 +138,12 @@ def judge(
     read = _read(seen, settings)
     possible = (read.speed_mps <= _IMPLAUSIBLE * settings.max_speed_mps) & (seen.size_m <= _LARGEST_M)
     evident = (
-        _by_fragments(seen, read)
-        | _by_unrest(seen, read)
-        | _by_arrival(seen, read)
-        | _by_surface(seen, read, dt_s)
+        _by_fragments(seen, read) | _by_unrest(seen, read) | _by_arrival(read) | _by_surface(seen, read, dt_s)
     )
     much = (seen.arrived >= _MUCH_CELLS) & (seen.arrived >= _MUCH_SHARE * seen.cells)
     fast = read.speed_mps > read.least_mps
     # Where a mover has stopped was free space until a moment ago: no proof that it still goes.
-    sigma_mps = np.sqrt(np.trace(seen.covariance, axis1=1, axis2=2))
+    sigma_mps = np.sqrt(seen.covariance.trace(axis1=1, axis2=2))
     stopped = moving & ~fast & (sigma_mps < _KNOWN_SPEED * read.least_mps)
     rising = possible & ((evident & fast) | (much & ~stopped)) & seen.trusted
     stands = _stands(seen, read)
@@ -153,18 +152,24 @@ def judge(
     change = np.where(rising & ~stands, _rise(seen, read, dt_s), -falling)
     new_evidence = np.minimum(np.maximum(evidence + change, 0.0), _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
-    confidence = 1.0 - np.exp(-read.significance / _SURE_SQUARED_SIGMAS)
+    confidence = 1.0 - np.exp(-read.filtered.total / _SURE_SQUARED_SIGMAS)
     return Verdict(new_evidence, new_moving, confidence, stands)
 
 
 def _read(seen: MotionEvidence, settings: MotionSettings) -> _Reading:
+    threshold = settings.sigmas**2
+    filtered, own, surface, apart = _split_all(seen)
     return _Reading(
-        settings.sigmas**2,
+        threshold,
         np.sqrt(np.square(seen.velocity).sum(axis=1)),
         settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m,
-        squared_sigmas(seen.velocity, seen.covariance),
         np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0),
-        *_split_all(seen),
+        (filtered.across > threshold) & (own.across > 0.5 * threshold),
+        (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells),
+        filtered,
+        own,
+        surface,
+        apart,
     )
 
 
@@ -172,7 +177,7 @@ def _by_fragments(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     """(T,) whether filter and fragments show a velocity that the surface does not deny, or that it shares."""
     second = second_opinion(read.filtered, read.surface, read.apart)
     many = read.agreeing >= _ENDS_ALONG
-    across = _shown_across(read) & ((read.agreeing >= _ENDS_ACROSS) | seen.restless)
+    across = read.shown_across & ((read.agreeing >= _ENDS_ACROSS) | seen.restless)
     across &= ~second.denies_across | many
     across &= (read.filtered.level > _LEVEL_SHARE * read.threshold) | many | seen.restless
     along = (read.filtered.along > read.threshold) & (read.own.along > 0.5 * read.threshold)
@@ -185,14 +190,6 @@ def _by_fragments(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     return result
 
 
-def _shown_across(read: _Reading) -> NDArray[np.bool_]:
-    """(T,) whether filter and fragments say that it goes across the line of sight, however few these are."""
-    result: NDArray[np.bool_] = (read.filtered.across > read.threshold) & (
-        read.own.across > 0.5 * read.threshold
-    )
-    return result
-
-
 def _by_unrest(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     """(T,) whether many ends, by whatever each of them does, bear out the filter's velocity.
 
@@ -201,22 +198,14 @@ def _by_unrest(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     """
     share = np.where(seen.unrest_s >= _LASTING_UNREST_S, _LIKELY_SHARE, _UNREST_SHARE)
     result: NDArray[np.bool_] = (
-        seen.restless & (seen.ends >= _ENDS_ALONG) & (read.significance > share * read.threshold)
+        seen.restless & (seen.ends >= _ENDS_ALONG) & (read.filtered.total > share * read.threshold)
     )
     return result
 
 
-def _has_arrived(seen: MotionEvidence) -> NDArray[np.bool_]:
-    """(T,) whether some of the surface is where free space was seen."""
-    result: NDArray[np.bool_] = (seen.arrived >= _ARRIVED_CELLS) & (
-        seen.arrived >= _ARRIVED_SHARE * seen.cells
-    )
-    return result
-
-
-def _by_arrival(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
+def _by_arrival(read: _Reading) -> NDArray[np.bool_]:
     """(T,) whether what has arrived bears out the filter's velocity."""
-    result: NDArray[np.bool_] = _has_arrived(seen) & (read.significance > 0.5 * read.threshold)
+    result: NDArray[np.bool_] = read.arrived & (read.filtered.total > 0.5 * read.threshold)
     return result
 
 
@@ -225,7 +214,7 @@ def _holds(seen: MotionEvidence, read: _Reading, moving: NDArray[np.bool_]) -> N
     result: NDArray[np.bool_] = (
         moving
         & (read.speed_mps > 0.6 * read.least_mps)
-        & ((seen.goes & (read.significance > _HOLDING_SQUARED_SIGMAS)) | _has_arrived(seen))
+        & ((seen.goes & (read.filtered.total > _HOLDING_SQUARED_SIGMAS)) | read.arrived)
     )
     return result
 
@@ -234,7 +223,7 @@ def _waits(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     """(T,) what one fragment alone shows is no proof, but no reason either to forget what more of them
     showed."""
     result: NDArray[np.bool_] = (
-        (read.speed_mps > read.least_mps) & _shown_across(read) & (seen.agreement * seen.ends >= 2)
+        (read.speed_mps > read.least_mps) & read.shown_across & (seen.agreement * seen.ends >= 2)
     )
     return result
 
@@ -242,7 +231,7 @@ def _waits(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
 def _stands(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     """(T,) whether this frame's fragments are sure that it stands."""
     speed = np.sqrt(np.square(seen.own_velocity).sum(axis=1))
-    sigma = np.sqrt(np.trace(seen.own_covariance, axis1=1, axis2=2))
+    sigma = np.sqrt(seen.own_covariance.trace(axis1=1, axis2=2))
     result: NDArray[np.bool_] = (
         (speed < 0.6 * read.least_mps) & (sigma < 0.5 * read.least_mps) & (read.agreeing >= _ENDS_ACROSS)
     )

@@ -16,10 +16,12 @@ RealArray = NDArray[np.float32] | NDArray[np.float64]
 
 def rays(pixels: RealArray, camera: Intrinsics) -> FloatArray:
     """(N, 3) points at z = 1 m behind pixels (N, 2)."""
-    result = np.ones((len(pixels), 3))
-    result[:, 0] = (pixels[:, 0] - camera.cx) / camera.fx
-    result[:, 1] = (pixels[:, 1] - camera.cy) / camera.fy
-    return result
+    # Coordinate by coordinate, as those who turn or scale the rays read them.
+    result = np.empty((3, len(pixels)))
+    result[0] = (pixels[:, 0] - camera.cx) / camera.fx
+    result[1] = (pixels[:, 1] - camera.cy) / camera.fy
+    result[2] = 1.0
+    return result.T
 
 
 def project(points_m: FloatArray, camera: Intrinsics) -> FloatArray:

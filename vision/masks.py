@@ -104,10 +104,11 @@ def _write_nearest(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ballot:
-    """present (P, T): the tracks that a part may belong to. winner (P,): track index + 1 with the most
-    votes, 0 for none. votes (P,): the winner's."""
+    """present (P, T): the tracks that a part may belong to. cast (P, T): votes for each. winner (P,): track
+    index + 1 of the one with the most, 0 for none. votes (P,): the winner's."""
 
     present: NDArray[np.bool_]
+    cast: NDArray[np.intp]
     winner: NDArray[np.int32]
     votes: NDArray[np.intp]
 
@@ -120,24 +121,26 @@ def count_votes(
     mover (T,): tracks that move, or may: only these divide a part; of the static ones the strongest stays.
     """
     if tracks == 0 or count == 0:
-        nobody = np.zeros(count, np.int32)
-        return Ballot(np.zeros((count, tracks), np.bool_), nobody, nobody.astype(np.intp))
+        nobody, cast = np.zeros(count, np.int32), np.zeros((count, tracks), np.intp)
+        return Ballot(cast.astype(np.bool_), cast, nobody, nobody.astype(np.intp))
     ballots = np.flatnonzero((parts > 0) & (predicted > 0))
-    cast = parts.ravel().take(ballots) * tracks + predicted.ravel().take(ballots) - (tracks + 1)
-    votes = np.bincount(cast, minlength=count * tracks).reshape(count, tracks)
+    pair = parts.ravel().take(ballots) * tracks + predicted.ravel().take(ballots) - (tracks + 1)
+    votes = np.bincount(pair, minlength=count * tracks).reshape(count, tracks)
     total, own = votes.sum(axis=1)[:, None], votes.sum(axis=0)
     least = np.minimum(_SHARE_OF_PART * total, _SHARE_OF_TRACK * own)
     present = votes >= np.maximum(least, _LEAST_VOTES)
     # Of the static tracks the strongest stays.
     static_votes = np.where(mover, 0, votes) * present
-    strongest = static_votes.argmax(axis=1)
-    each = np.arange(count)
-    keep_static = np.zeros_like(present)
-    keep_static[each, strongest] = static_votes[each, strongest] > 0
-    present &= mover | keep_static
-    best = np.where(present, votes, -1).argmax(axis=1)
+    strongest = static_votes.argmax(axis=1)[:, None] == np.arange(tracks)
+    present &= mover | (strongest & (static_votes > 0))
+    return elect(present, votes)
+
+
+def elect(present: NDArray[np.bool_], cast: NDArray[np.intp]) -> Ballot:
+    """The ballot of P parts, each for the one with the most votes, cast (P, T), of those present."""
+    best, each = np.where(present, cast, -1).argmax(axis=1), np.arange(len(cast))
     claimed = present[each, best]
-    return Ballot(present, ((best + 1) * claimed).astype(np.int32), votes[each, best] * claimed)
+    return Ballot(present, cast, ((best + 1) * claimed).astype(np.int32), cast[each, best] * claimed)
 
 
 def release(
@@ -149,18 +152,12 @@ def release(
     cells (P,) of the parts; arrived (P,): those where free space was seen. mover (T,): keep what is theirs.
     """
     came = (arrived >= _CAME_CELLS) & (arrived >= _CAME_SHARE * cells)
-    if not came.any():
+    if not (came.any() and ballot.present.any()):
         return ballot
     whole, rest = cells @ ballot.present, (cells * ~came) @ ballot.present
     leaves = ~mover & (rest > 0)
     left = ballot.present & leaves & came[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
-    present = ballot.present & ~left
-    won = np.flatnonzero(ballot.winner)
-    lost = np.zeros(len(cells), np.bool_)
-    lost[won] = left[won, ballot.winner[won] - 1]
-    others = np.where(present.any(axis=1), present.argmax(axis=1) + 1, 0)
-    winner = np.where(lost, others, ballot.winner).astype(np.int32)
-    return Ballot(present, winner, np.where(lost, 0, ballot.votes))
+    return elect(ballot.present & ~left, ballot.cast)
 
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:

@@ -99,13 +99,13 @@ def body_velocities(
         equations.add_depth(summed[12] * share, summed[13] * share)
         velocity, covariance = solve_velocity(equations, max_speed_mps)
     chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
-    agree = (member * (chi2 <= _ROBUST_CHI2)).sum(axis=1) / np.maximum(ends, 1)
+    agree = member @ (chi2 <= _ROBUST_CHI2) / np.maximum(ends, 1)
     # What the model does not explain (limbs, turning, sliding) widens the result.
     spread = _spread(chi2, parties)
     bounded = np.minimum(chi2, _ROBUST_CHI2 * spread.take(safe_owner))
     excess = (member * bounded).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
     covariance = covariance * np.maximum(1.0, excess)[:, None, None]
-    unexplained = (member * (motion.static_chi2 > _MOVED_CHI2)).sum(axis=1) / np.maximum(ends, 1)
+    unexplained = member @ (motion.static_chi2 > _MOVED_CHI2) / np.maximum(ends, 1)
     return BodyVelocities(velocity, covariance, ends, agree, unexplained)
 
 
@@ -155,9 +155,10 @@ def _end_chi2(motion: PointMotion, trust: FloatArray, velocity: FloatArray) -> F
 
 def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(N,) fragments that no static surface explains: both ends miss, at either depth of a silhouette."""
-    chi2 = np.where(motion.usable, motion.static_chi2, 0.0).reshape(-1, 2)
-    both = (chi2 > _STATIC_END_CHI2).all(axis=1)
-    result: NDArray[np.bool_] = both & (chi2.sum(axis=1) > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
+    chi2 = np.where(motion.usable, motion.static_chi2, 0.0)
+    one, other = chi2[0::2], chi2[1::2]
+    both = (one > _STATIC_END_CHI2) & (other > _STATIC_END_CHI2)
+    result: NDArray[np.bool_] = both & (one + other > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
     return result
 
 

@@ -65,9 +65,9 @@ def track(
     found = (np.asarray(there_ok) & np.asarray(back_ok))[:, 0].astype(np.bool_)
     found &= mahalanobis(miss, covariance) <= settings.forward_backward_sigmas**2
     near = np.abs(miss) <= settings.forward_backward_px
-    inside = (end >= 2.0) & (end <= (width - 3, height - 3))
-    near &= inside
     found &= near[:, 0] & near[:, 1]
+    u, v = end.T
+    found &= (u >= 2.0) & (u <= width - 3) & (v >= 2.0) & (v <= height - 3)
     return Flow(end, found)
 
 

@@ -91,12 +91,12 @@ def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
     return int(number.max()), labels
 
 
-def _sorted_cells(labels: IntGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Labelled cells in the order of their labels, then row by row: label and flat index of each."""
+def _sorted_cells(labels: IntGrid, count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Cells labelled 1..count in the order of their labels, then row by row: label and flat index of each."""
     flat = np.flatnonzero(labels > 0)
     label = labels.ravel().take(flat)
     bits = labels.size.bit_length()
-    if int(label.max(initial=0)).bit_length() + bits > 31:
+    if count.bit_length() + bits > 31:
         order = np.argsort(label, kind="stable")
         return label[order], flat[order].astype(np.int32)
     # One number holds both: sorting numbers is faster than finding an order and following it.
@@ -111,14 +111,15 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     wide knows of the image's border only; see unhidden.
     """
     height, width = labels.shape
-    label, flat = _sorted_cells(labels)
-    ends = np.searchsorted(label, np.arange(count + 1), side="right")
+    label, flat = _sorted_cells(labels, count)
+    ends = label.searchsorted(np.arange(count + 1), side="right")
     starts, cells = ends[:-1], ends[1:] - ends[:-1]
-    bbox = np.zeros((count, 4))
-    position, extent = np.zeros((count, 3)), np.zeros((count, 3))
+    # Box, centre and size of each, in this order.
+    table, reach = np.zeros((10, count)), np.zeros(count, np.intp)
     wide, tall, nothing = np.zeros((3, count), np.bool_)
+    result = Regions(cells, reach, table[:4].T, table[4:7].T, table[7:].T, wide, tall, nothing)
     if len(flat) == 0:
-        return Regions(cells, cells, bbox, position, extent, wide, tall, nothing)
+        return result
     present = np.flatnonzero(cells)
     starts, number = starts[present], cells[present]
     rows = flat // np.int32(width)
@@ -128,31 +129,24 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     inverse = grid.inverse_depth.ravel().take(flat)
     mean_inverse = np.add.reduceat(inverse, starts) / number
     spread = np.sqrt(np.maximum(np.add.reduceat(inverse * inverse, starts) / number - mean_inverse**2, 0.0))
-    depth = 1.0 / mean_inverse
-    centre = np.empty((len(present), 3))
-    centre[:, 0] = np.add.reduceat(grid.x.take(columns), starts) / number * depth
-    centre[:, 1] = np.add.reduceat(grid.y.take(rows), starts) / number * depth
-    centre[:, 2] = depth
-    position[present] = centre
-    step, half = grid.step_px, 0.5 * grid.step_px
-    box = np.empty((len(present), 4))
-    box[:, 0] = left * step + (grid.offset_px - half)
-    box[:, 1] = top * step + (grid.offset_px - half)
-    box[:, 2] = right * step + (grid.offset_px + half)
-    box[:, 3] = np.maximum(
-        bottom * step + (grid.offset_px + half), _foot_px(grid, bottom, centre[:, 0] / depth, depth)
-    )
-    bbox[present] = box
-    size = np.empty((len(present), 3))
-    size[:, 0] = _width_m(grid, columns, inverse, starts, number, left, right)
-    size[:, 1] = (grid.y[bottom] - grid.y[top]) * depth
-    size[:, 2] = _UNIFORM * spread * depth * depth
-    extent[present] = size
+    found = np.empty((10, len(present)))
+    box, centre, size = found[:4], found[4:7], found[7:]
+    depth = centre[2] = 1.0 / mean_inverse
+    centre[0] = np.add.reduceat(grid.x.take(columns), starts) / number * depth
+    centre[1] = np.add.reduceat(grid.y.take(rows), starts) / number * depth
+    box[0], box[1], box[2], box[3] = left, top, right, bottom
+    box *= grid.step_px
+    box[:2] += grid.offset_px - 0.5 * grid.step_px
+    box[2:] += grid.offset_px + 0.5 * grid.step_px
+    box[3] = np.maximum(box[3], _foot_px(grid, bottom, centre[0] / depth, depth))
+    size[0] = _width_m(grid, columns, inverse, starts, number, left, right)
+    size[1] = (grid.y[bottom] - grid.y[top]) * depth
+    size[2] = _UNIFORM * spread * depth * depth
+    table[:, present] = found
     wide[present] = (left > 0) & (right < width - 1)
     tall[present] = (top > 0) & (bottom < height - 1)
-    reach = np.zeros(count, np.intp)
     reach[present] = bottom - top + 1
-    return Regions(cells, reach, bbox, position, extent, wide, tall, nothing)
+    return result
 
 
 def _width_m(
@@ -167,11 +161,12 @@ def _width_m(
     """(R,) from the left to the right rim of parts, each at its own depth: whoever looks along a side of a
     body would take it for wider, at the depth of its middle, than it is."""
     rim = (right - left) // _RIM
-    low, high = columns <= np.repeat(left + rim, number), columns >= np.repeat(right - rim, number)
-    ends_m = [
-        x * np.add.reduceat(of, starts, dtype=np.intp) / np.add.reduceat(np.where(of, inverse, 0.0), starts)
-        for x, of in ((grid.x[left], low), (grid.x[right], high))
-    ]
+    low, high = columns <= (left + rim).repeat(number), columns >= (right - rim).repeat(number)
+    ends_m = []
+    for x, of in ((grid.x[left], low), (grid.x[right], high)):
+        share = of.astype(np.float32)
+        cells = np.add.reduceat(share, starts).astype(np.intp)
+        ends_m.append(x * cells / np.add.reduceat(inverse * share, starts))
     # What goes back and outwards has its far end on the inner rim.
     width: FloatArray = np.abs(ends_m[1] - ends_m[0])
     return width
@@ -229,16 +224,16 @@ def _overlapped_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[n
     comes after that gap is the neighbour.
     """
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    owned = np.flatnonzero(flat)
-    first, second = owned[:-1], owned[1:]
+    owned = np.flatnonzero(flat > 0)
+    label = flat.take(owned)
+    rims = np.flatnonzero(label[1:] != label[:-1])
+    first, second = owned.take(rims), owned.take(rims + 1)
     apart = second - first
     near = (apart <= _GAP_CELLS + 1) & (second % labels.shape[1] >= apart)  # not from one row to the next
-    rims = np.flatnonzero(near & (flat.take(first) != flat.take(second)))
-    first, second = first.take(rims), second.take(rims)
     step = inverse.take(second) - inverse.take(first)
-    farther = np.where(step > 0.0, flat.take(first), flat.take(second))
+    farther = np.where(step > 0.0, label.take(rims), label.take(rims + 1))
     jumps = np.abs(step) > np.float32(_LEAST_JUMP)
-    return np.bincount(farther[jumps], minlength=count + 1)[1:]
+    return np.bincount(farther[near & jumps], minlength=count + 1)[1:]
 
 
 def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:
@@ -257,5 +252,5 @@ def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:
     table = np.zeros(int(nearest.max()) + 1, np.int32)
     table[nearest[owned]] = inner[owned]
     result = labels.copy()
-    result[box] = np.where(mask[box] & ~owned, table[nearest], inner)
+    result[box] = np.where(mask[box] & ~owned, table.take(nearest), inner)
     return result

@@ -265,5 +265,7 @@ def _flow_covariance(tensor: NDArray[np.float32], floor_px: float) -> NDArray[np
     mean, spread = 0.5 * (across + along), 0.5 * (across - along)
     scale = spread / np.maximum(radius, 1e-6)
     floor = floor_px**2
-    parts = (mean + scale * half + floor, scale * uv, mean - scale * half + floor)
-    return np.stack(parts, axis=-1).astype(np.float32)
+    result = np.empty(tensor.shape, np.float32)
+    result[..., 0], result[..., 2] = mean + scale * half + floor, mean - scale * half + floor
+    result[..., 1] = scale * uv
+    return result

@@ -99,11 +99,12 @@ def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) 
 
 def _box_m(measured: Regions, seen: NDArray[np.intp], camera: Intrinsics) -> FloatArray:
     """(K, 4) left, upper, right and lower edge of surfaces seen (K,) from their centres, at their depth."""
-    x, y, depth = measured.position_m[seen].T
-    left, top, right, bottom = measured.bbox_px[seen].T
-    across = [(u - camera.cx) / camera.fx * depth - x for u in (left, right)]
-    down = [(v - camera.cy) / camera.fy * depth - y for v in (top, bottom)]
-    return np.stack((across[0], down[0], across[1], down[1]), axis=1)
+    centre_m = measured.position_m[seen]
+    middle_px = np.array([camera.cx, camera.cy, camera.cx, camera.cy])
+    focal_px = np.array([camera.fx, camera.fy, camera.fx, camera.fy])
+    edges_m: FloatArray = (measured.bbox_px[seen] - middle_px) / focal_px * centre_m[:, 2:]
+    edges_m -= centre_m.take((0, 1, 0, 1), axis=1)
+    return edges_m
 
 
 def _at_border(bbox_px: FloatArray, detection: Detection) -> NDArray[np.bool_]:

@@ -26,6 +26,7 @@ _ACCEL_DENSITY = 0.12  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
+_IDENTITY = np.eye(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +79,7 @@ class Tracker:
         known, owner = self._fragment_ids, self._fragment_owner
         result = np.full(len(ids), -1, np.int64)
         if len(known):
-            place = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+            place = np.minimum(known.searchsorted(ids), len(known) - 1)
             same = known[place] == ids
             result[same] = owner[place[same]]
         result[self._tracks.index_of(result) < 0] = -1
@@ -126,7 +127,7 @@ class Tracker:
         came = np.bincount(parts[arrived], minlength=count + 1)[1:]
         ballot = masks.release(ballot, measured.cells, came, mover)
         bodies = sightings.bodies(tracks, pose, self._config.depth_noise)
-        expected = mover & grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies)
+        expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
         winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, mover, expected)
         labels = masks.divide(parts, predicted, ballot, winner)
@@ -145,7 +146,7 @@ class Tracker:
         tracks, grid = self._tracks, detection.grid
         if not tracks.moving.any():
             return labels
-        sigma = np.sqrt(np.trace(tracks.covariance[:, 3:, 3:], axis1=1, axis2=2))
+        sigma = np.sqrt(tracks.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
         mover = tracks.moving | (tracks.evidence > 0.0)
         pairs = grouping.merges(measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
         labels, gone = grouping.join(grid, labels, pairs)
@@ -170,8 +171,9 @@ class Tracker:
         grid, tracks = detection.grid, self._tracks
         large = (winner == 0) & (measured.cells >= _MIN_CELLS)
         if grid.height_m is not None and large.any():
-            low = parts * (grid.height_m < self._body_height_m).view(np.uint8)
-            large &= np.bincount(low.ravel(), minlength=len(winner) + 1)[1:] >= _MIN_CELLS // 2
+            low = np.flatnonzero((parts > 0) & (grid.height_m < self._body_height_m))
+            reach = np.bincount(parts.ravel().take(low), minlength=len(winner) + 1)[1:]
+            large &= reach >= _MIN_CELLS // 2
         born = np.flatnonzero(large)
         if len(born) == 0:
             return labels
@@ -214,7 +216,7 @@ class Tracker:
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
             going = np.where(tracks.moving, np.sqrt(np.square(tracks.state[:, 3:]).sum(axis=1)), 0.0)
             swing = limbs.variance(body, going)[use]
-            noise = body.covariance[use] * (lag_s / detection.dt_s) + swing[:, None, None] * np.eye(3)
+            noise = body.covariance[use] * (lag_s / detection.dt_s) + swing[:, None, None] * _IDENTITY
             tracks.state[use], tracks.covariance[use] = kalman.update(
                 tracks.state[use],
                 tracks.covariance[use],

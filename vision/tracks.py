@@ -96,45 +96,32 @@ class Tracks:
         """(N,) index of each track id, -1 where there is none (any more)."""
         if len(self) == 0:
             return np.full(len(ids), -1, np.intp)
-        place = np.minimum(np.searchsorted(self.ids, ids), len(self) - 1)
-        return np.where(self.ids[place] == ids, place, -1).astype(np.intp)
+        place = np.minimum(self.ids.searchsorted(ids), len(self) - 1)
+        return np.where(self.ids[place] == ids, place, -1)
 
     def start(
         self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
     ) -> None:
         """Begin tracks at positions (K, 3) with unknown velocity: bounded by max_speed_mps, not zero."""
         count = len(position_m)
-        spread = np.diag([sigma_m**2] * 3 + [max_speed_mps**2] * 3)
-        new: dict[str, object] = {
+        given: dict[str, object] = {
             "ids": np.arange(self._next_id, self._next_id + count),
-            "state": np.concatenate((position_m, np.zeros((count, 3))), axis=1),
-            "covariance": np.tile(spread, (count, 1, 1)),
-            "surface_state": np.concatenate((position_m, np.zeros((count, 3))), axis=1),
-            "surface_covariance": np.tile(spread, (count, 1, 1)),
-            "born_ns": np.full(count, now_ns),
-            "seen_ns": np.full(count, now_ns),
-            "sightings": np.zeros(count),
-            "evidence": np.full(count, evidence),
-            "moving": np.zeros(count),
-            "confidence": np.zeros(count),
-            "bbox_px": np.zeros((count, 4)),
-            "box_m": np.zeros((count, 4)),
-            "extent_m": np.zeros((count, 3)),
-            "area_m2": np.zeros(count),
-            "cells": np.zeros(count),
-            "fragments": np.zeros(count),
-            "clean_s": np.zeros(count),
-            "growth_mps": np.zeros(count),
-            "sliver": np.zeros(count),
+            "born_ns": now_ns,
+            "seen_ns": now_ns,
+            "evidence": evidence,
             "trailing_m": position_m,
-            "stands": np.zeros(count),
-            "calm_s": np.full(count, np.inf),
-            "unrest_s": np.zeros(count),
+            "calm_s": np.inf,
         }
+        given["state"] = given["surface_state"] = np.concatenate((position_m, np.zeros((count, 3))), axis=1)
+        spread = np.diag([sigma_m**2] * 3 + [max_speed_mps**2] * 3)
+        given["covariance"] = given["surface_covariance"] = spread
         self._next_id += count
         for name in _FIELDS:
             old = getattr(self, name)
-            setattr(self, name, np.concatenate((old, np.asarray(new[name], old.dtype))))
+            new = np.zeros((count, *old.shape[1:]), old.dtype)
+            if name in given:
+                new[...] = given[name]
+            setattr(self, name, np.concatenate((old, new)))
 
     def twin(self, track: int, evidence: float, now_ns: int) -> None:
         """Begin a track with the velocity of another one that it was taken for a part of. It has to prove

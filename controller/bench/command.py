@@ -76,7 +76,12 @@ def run_bench(frames: int, json_path: FilePath | None) -> None:
     for line in report.lines():
         click.echo(line)
     if json_path is not None:
-        json_path.write_text(report.to_text(), encoding="utf-8")
+        try:
+            json_path.write_text(report.to_text(), encoding="utf-8")
+        except OSError as error:
+            raise UserError(
+                f"{json_path}: cannot be written ({error.strerror}); choose another --json"
+            ) from error
         click.echo(f"every figure: {json_path}")
 
 

@@ -33,12 +33,15 @@ from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
 from controller.control import ControlLoop
 from controller.ending import SETTLE_S, Outcome
+from controller.errors import UserError
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.lockstep import run_lockstep
+from controller.path import Path
 from controller.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.shape import SpeedShaper
 from controller.tally import SetpointTally
+from hal.api import Chassis
 from hal.cameras.tum_writer import TumWriter
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import ChassisMode, PlanarPose, RgbdFrame
@@ -135,28 +138,16 @@ def _drive(
         config, scenario, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
     )
     camera = SpoiledCamera(true_camera, stage.case.faults, _glass_ids(stage))
-    mount, period_s = mount_of(config), 1.0 / config.runner.control_rate_hz
-    loop = ControlLoop(
-        path=path,
-        decide=build_policy(policy, config, stage),
-        shape=SpeedShaper(config.robot.limits, period_s, config.decision.chassis_delay_s),
-        follow=PathFollower(path, config.robot.limits, config.decision.chassis_delay_s),
-        localiser=Localiser(path.start, mount),
-        chassis=chassis,
-    )
-    options = _NO_RECORDING
-    if keep is not None:
-        keep.mkdir(parents=True, exist_ok=True)
-        (keep / "scenario.yaml").write_text(scenario_yaml(stage), encoding="utf-8")
-        options = RecordingOptions(keep / "observations.jsonl", keep / "video.mp4", timed=False)
-    log = DriveLog(SetpointTally(config.robot.limits, period_s))
+    loop = _control_loop(stage, config, policy, path, chassis)
+    options = _NO_RECORDING if keep is None else recording_in(keep, stage)
+    log = DriveLog(SetpointTally(config.robot.limits, 1.0 / config.runner.control_rate_hz))
     with ExitStack() as devices:
         devices.enter_context(simulation)
         devices.enter_context(chassis)
         devices.enter_context(true_camera)
         recorder = RunRecorder(devices.enter_context(open_recorder(options, surroundings(config))), path)
         if keep is not None:
-            camera.writer = devices.enter_context(TumWriter(keep / "recording", mount))
+            camera.writer = devices.enter_context(TumWriter(keep / "recording", mount_of(config)))
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         watch = _Watch(stage, simulation, log)
         for moment in run_lockstep(
@@ -179,6 +170,29 @@ def _drive(
     if loop.ending.outcome is Outcome.REACHED:
         log.reached_s = log.times_s[-1] - SETTLE_S - watch.armed_s
     return log
+
+
+def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chassis: Chassis) -> ControlLoop:
+    """As controller.build has it, with this policy in place of the decision."""
+    limits, delay_s = config.robot.limits, config.decision.chassis_delay_s
+    return ControlLoop(
+        path=path,
+        decide=build_policy(policy, config, stage),
+        shape=SpeedShaper(limits, 1.0 / config.runner.control_rate_hz, delay_s),
+        follow=PathFollower(path, limits, delay_s),
+        localiser=Localiser(path.start, mount_of(config)),
+        chassis=chassis,
+    )
+
+
+def recording_in(folder: FilePath, stage: Stage) -> RecordingOptions:
+    """Makes the folder, with the mission's world in it; what is seen goes there. Raises UserError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "scenario.yaml").write_text(scenario_yaml(stage), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another --report") from error
+    return RecordingOptions(folder / "observations.jsonl", folder / "video.mp4", timed=False)
 
 
 def _glass_ids(stage: Stage) -> tuple[int, ...]:

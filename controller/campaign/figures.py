@@ -66,7 +66,7 @@ def _distribution(
 
 
 def family_figure(summary: Summary) -> Image:
-    """Median time over the oracle's of each family, by policy."""
+    """Median time over the oracle's of each family, by policy; an arrow: longer than shown, or never."""
     families = list(summary.families)
     width = max(_WIDTH, 60 + 46 * len(families))
     image = blank(width, _HEIGHT)
@@ -74,8 +74,8 @@ def family_figure(summary: Summary) -> Image:
     chart = Chart(
         image,
         Rect(0, 0, width, _HEIGHT),
-        "Median time by family (numbered as in the report)",
-        Axis("family", 0.0, max(len(families), 1), ticks=ticks),
+        "Median time by family",
+        Axis("family, numbered as in the report", 0.0, max(len(families), 1), ticks=ticks),
         Axis("time / oracle's time", 0.9, _MOST_RATIO),
     )
     policies = list(summary.policies)
@@ -86,5 +86,5 @@ def family_figure(summary: Summary) -> Image:
         left = np.arange(len(families), dtype=np.float64) + (0.1 + bar * number)
         chart.bars(left, left + 0.9 * bar, heights, _COLOURS.get(policy, GREY), policy)
     chart.level(1.1, GREY, "1.10")
-    chart.legend("upper right")
+    chart.key()
     return image

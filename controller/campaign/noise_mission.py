@@ -18,8 +18,10 @@ from controller.campaign.drive import DriveLog
 from controller.campaign.noisy_camera import NoisyCamera
 from controller.campaign.stage import Stage
 from controller.control import ARRIVED_M, Decides
+from controller.decision import Decision
 from controller.path import OnPath
 from controller.shape import SpeedShaper
+from controller.situation import Situation
 from controller.tally import SetpointTally
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray, Setpoint
@@ -108,59 +110,103 @@ class _Eyes:
 
 def drive_noise(stage: Stage, config: AppConfig, policy: Decides) -> DriveLog:
     """One drive from rest at the start until rest at the target, or until nothing more will happen."""
-    assert isinstance(config.camera, SimulatedCameraConfig)
-    assert isinstance(config.runner, LockstepRunner)
-    simulation = config.simulation or SimulationConfig(scenario=stage.case.family)
-    faults, scenario, seed = stage.case.faults, stage.case.scenario, stage.case.seed
-    dt_s = 1.0 / config.runner.control_rate_hz
-    random = np.random.default_rng((seed, 0xB0))
-    odometry = 1.0 + faults.distance_slip + _ODOMETRY_SIGMA * float(random.standard_normal())
-    wander = random.standard_normal(math.ceil(scenario.duration_s / dt_s) + 1).tolist()
+    return _NoiseDrive(stage, config, policy).run()
+
+
+class _NoiseDrive:
+    """One robot with its errors: odometry that is off by a share, a path kept to a centimetre or two."""
+
+    def __init__(self, stage: Stage, config: AppConfig, policy: Decides) -> None:
+        assert isinstance(config.camera, SimulatedCameraConfig)
+        assert isinstance(config.runner, LockstepRunner)
+        plant = (config.simulation or SimulationConfig(scenario=stage.case.family)).plant
+        seed, fps = stage.case.seed, config.camera.fps
+        self._stage, self._policy, self._faults = stage, policy, stage.case.faults
+        self._dt_s = 1.0 / config.runner.control_rate_hz
+        random = np.random.default_rng((seed, 0xB0))
+        self._odometry = 1.0 + self._faults.distance_slip + _ODOMETRY_SIGMA * float(random.standard_normal())
+        steps = math.ceil(stage.case.scenario.duration_s / self._dt_s)
+        self._off_m = _off_path_m(random.standard_normal(steps + 1)[:-1], self._dt_s)
+        self._eyes = _Eyes(
+            NoisyCamera(stage, config.camera, seed), stage, fps, config.runner.perception_latency_s
+        )
+        self._base = _Base(plant.lag_s, plant.max_accel_mps2)
+        self._shaper = SpeedShaper(config.robot.limits, self._dt_s, config.decision.chassis_delay_s)
+        self._log = DriveLog(SetpointTally(config.robot.limits, self._dt_s))
+        self._standing_s = 0.0
+        stage.world.foresee(_exposures(steps, self._dt_s, fps))
+
+    def run(self) -> DriveLog:
+        """All control steps until the drive is over."""
+        for k, off_m in enumerate(self._off_m):
+            t_s = k * self._dt_s
+            decision = self._decide(t_s, off_m)
+            self._log.add(
+                t_s, self._stage.pose(self._base.s_m, off_m), self._base.s_m, self._base.v_mps, decision
+            )
+            self._move(t_s, decision)
+            if self._is_over(t_s):
+                break
+        return self._log
+
+    @property
+    def _known_s_m(self) -> float:
+        """How far it believes to have come."""
+        return self._base.s_m * self._odometry
+
+    def _decide(self, t_s: float, off_m: float) -> Decision:
+        known_s_m = self._known_s_m
+        if self._eyes.due(t_s):
+            self._eyes.look(t_s, self._stage, self._base.s_m, off_m, known_s_m)
+        return self._policy.step(
+            Situation(
+                self._eyes.arrived(t_s),
+                self._stage.path,
+                self._stage.pose(known_s_m, off_m),
+                OnPath(known_s_m, off_m, 0.0),
+                max(self._shaper.v_mps, self._base.v_mps),
+                self._shaper.a_mps2,
+                round(t_s * NS_PER_S),
+            )
+        )
+
+    def _move(self, t_s: float, decision: Decision) -> None:
+        if self._has_lost_feedback(t_s):
+            # The driver has stopped the base (hal/chassis/arming.py); only consent would lead on.
+            self._base.advance(0.0, self._dt_s)
+            return
+        shaped = self._shaper.step(
+            decision.target_speed_mps,
+            emergency=decision.emergency,
+            distance_to_end_m=self._stage.path.length_m - self._known_s_m,
+        )
+        self._log.setpoints.add(Setpoint(round(t_s * NS_PER_S), shaped.v_mps, shaped.a_mps2, 0.0))
+        self._base.advance(shaped.v_mps, self._dt_s)
+
+    def _has_lost_feedback(self, t_s: float) -> bool:
+        lost_s = self._faults.feedback_lost_s
+        return lost_s is not None and t_s >= lost_s + _FEEDBACK_TIMEOUT_S
+
+    def _is_over(self, t_s: float) -> bool:
+        """At rest, and on the target, stopped for good, or given up."""
+        if self._base.v_mps >= _STANDING_MPS:
+            self._standing_s = 0.0
+            return False
+        self._standing_s += self._dt_s
+        if self._has_lost_feedback(t_s):
+            return True
+        if self._shaper.v_mps == 0.0 and self._stage.path.length_m - self._known_s_m <= ARRIVED_M:
+            self._log.reached_s = t_s + self._dt_s
+            return True
+        return self._standing_s >= GIVE_UP_S and t_s > max(self._stage.world.end_s, 0.0) + GIVE_UP_S
+
+
+def _off_path_m(white: FloatArray, dt_s: float) -> list[float]:
+    """How far to the left of its path the robot is at each control step: white noise (N,), made slow."""
     keep = math.exp(-dt_s / _OFF_PATH_S)
     shake_m = _OFF_PATH_SIGMA_M * math.sqrt(1.0 - keep * keep)
-    camera = NoisyCamera(stage, config.camera, seed)
-    eyes = _Eyes(camera, stage, config.camera.fps, config.runner.perception_latency_s)
-    base = _Base(simulation.plant.lag_s, simulation.plant.max_accel_mps2)
-    shaper = SpeedShaper(config.robot.limits, dt_s, config.decision.chassis_delay_s)
-    log = DriveLog(SetpointTally(config.robot.limits, dt_s))
-    stage.world.foresee(_exposures(len(wander) - 1, dt_s, config.camera.fps))
-    length_m, end_s = stage.path.length_m, max(stage.world.end_s, 0.0)
-    off_m, standing_s, lost = 0.0, 0.0, False
-    for k in range(len(wander) - 1):
-        t_s = k * dt_s
-        off_m = keep * off_m + shake_m * wander[k]
-        known_s_m = base.s_m * odometry
-        if eyes.due(t_s):
-            eyes.look(t_s, stage, base.s_m, off_m, known_s_m)
-        now_ns = round(t_s * NS_PER_S)
-        decision = policy.step(
-            eyes.arrived(t_s),
-            stage.path,
-            stage.pose(known_s_m, off_m),
-            OnPath(known_s_m, off_m, 0.0),
-            max(shaper.v_mps, base.v_mps),
-            shaper.a_mps2,
-            now_ns,
-        )
-        log.add(t_s, stage.pose(base.s_m, off_m), base.s_m, base.v_mps, decision)
-        if faults.feedback_lost_s is not None and t_s >= faults.feedback_lost_s + _FEEDBACK_TIMEOUT_S:
-            # The driver has stopped the base (hal/chassis/arming.py); only consent would lead on.
-            base.advance(0.0, dt_s)
-            lost = True
-        else:
-            shaped = shaper.step(
-                decision.target_speed_mps,
-                emergency=decision.emergency,
-                distance_to_end_m=length_m - known_s_m,
-            )
-            log.setpoints.add(Setpoint(now_ns, shaped.v_mps, shaped.a_mps2, 0.0))
-            base.advance(shaped.v_mps, dt_s)
-        standing_s = standing_s + dt_s if base.v_mps < _STANDING_MPS else 0.0
-        if standing_s == 0.0:
-            continue
-        if not lost and shaper.v_mps == 0.0 and length_m - base.s_m * odometry <= ARRIVED_M:
-            log.reached_s = t_s + dt_s
-            return log
-        if lost or (standing_s >= GIVE_UP_S and t_s > end_s + GIVE_UP_S):
-            return log
-    return log
+    off_m, found = 0.0, []
+    for value in white.tolist():
+        off_m = keep * off_m + shake_m * value
+        found.append(off_m)
+    return found

@@ -71,7 +71,6 @@ class NoisyCamera:
         mount = stage.robot.camera_mount
         self._mount = mount
         self.eye = PlanarEye(stage.world, camera, mount)
-        self._body = stage.robot.body
         self._random = np.random.default_rng((seed, 0xCA))
         self._glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
         self._scanned = stage.in_height & ~self._glass

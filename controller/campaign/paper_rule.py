@@ -14,8 +14,8 @@ from controller.bodies import Bodies, bodies_of
 from controller.campaign.rivals import decision, free_speed
 from controller.corridor import Corridor, course_of, place
 from controller.decision import Decision
-from controller.path import OnPath, Path
-from hal.types import CameraMount, PlanarPose
+from controller.situation import Situation
+from hal.types import CameraMount
 from vision.scene import Scene
 
 _LOOK_M = 14.0
@@ -31,30 +31,23 @@ class PaperRule:
         self._scene: Scene | None = None
         self._bodies: Bodies | None = None
 
-    def step(
-        self,
-        scene: Scene | None,
-        path: Path,
-        pose: PlanarPose,
-        on_path: OnPath,
-        v_mps: float,
-        a_mps2: float,
-        now_ns: int,
-    ) -> Decision:
-        if scene is None:
-            return decision("paper", "nothing seen yet", 0.0, v_mps)
+    def step(self, at: Situation) -> Decision:
+        """Stop for the first thing that is within its S_n, or drive as the path allows."""
+        if at.scene is None:
+            return decision("paper", "nothing seen yet", 0.0, at.v_mps)
         if self._corridor is None:
-            self._corridor = Corridor(path, self._robot.body)
-        if scene is not self._scene:
-            self._scene = scene
-            self._bodies = bodies_of(scene, scene.robot_pose or pose, self._mount, 0.0)
+            self._corridor = Corridor(at.path, self._robot.body)
+        if at.scene is not self._scene:
+            self._scene = at.scene
+            self._bodies = bodies_of(at.scene, at.scene.robot_pose or at.pose, self._mount, 0.0)
         assert self._bodies is not None
-        for distance_m, closing_mps in self._inside(self._bodies, self._corridor, on_path.s_m):
-            needed_m = self.detection_distance(v_mps, closing_mps)
+        for distance_m, closing_mps in self._inside(self._bodies, self._corridor, at.on_path.s_m):
+            needed_m = self.detection_distance(at.v_mps, closing_mps)
             if distance_m <= needed_m:
                 sentence = f"something is {distance_m:.1f} m ahead, S_n is {needed_m:.1f} m"
-                return decision("paper", sentence, 0.0, v_mps)
-        return decision("paper", "nothing within S_n", free_speed(path, on_path, self._robot.limits), v_mps)
+                return decision("paper", sentence, 0.0, at.v_mps)
+        free_mps = free_speed(at.path, at.on_path, self._robot.limits)
+        return decision("paper", "nothing within S_n", free_mps, at.v_mps)
 
     def detection_distance(self, v_mps: float, closing_mps: float) -> float:
         """S_n, and a hand's breadth without which a robot at rest would touch what it stands before."""

@@ -25,7 +25,6 @@ class PlanarScanner:
 
     def __init__(self, stage: Stage) -> None:
         self._world: PlanarWorld = stage.world
-        self._stage = stage
         self._front_m = stage.robot.body.front_m
         z_m = self._world.z_m
         self._at_height = (z_m[:, 0] <= SCAN_HEIGHT_M) & (z_m[:, 1] > SCAN_HEIGHT_M)

@@ -16,10 +16,9 @@ from controller.campaign.planar_scan import PlanarScanner
 from controller.campaign.rivals import decision, free_speed
 from controller.campaign.stage import Stage
 from controller.decision import Decision
-from controller.path import OnPath, Path
+from controller.situation import Situation
 from hal.clocks import NS_PER_S
-from hal.types import FloatArray, PlanarPose
-from vision.scene import Scene
+from hal.types import FloatArray
 
 RESPONSE_S = 0.2
 TOLERANCE_M = 0.1
@@ -40,40 +39,30 @@ class ProtectiveField:
         self._stopped = False
         self._free_since_s: float | None = None
 
-    def step(
-        self,
-        scene: Scene | None,
-        path: Path,
-        pose: PlanarPose,
-        on_path: OnPath,
-        v_mps: float,
-        a_mps2: float,
-        now_ns: int,
-    ) -> Decision:
-        t_s = now_ns / NS_PER_S
-        points = self._scanner.points(pose, t_s)
-        clear = not self._intruded(
-            points, path, pose, on_path, max(v_mps, _RESTART_MPS if self._stopped else 0.0)
-        )
-        if not clear:
+    def step(self, at: Situation) -> Decision:
+        """Stop while anything is in the field; go on some time after it has become free."""
+        t_s = at.now_ns / NS_PER_S
+        field_mps = max(at.v_mps, _RESTART_MPS if self._stopped else 0.0)
+        if self._intruded(self._scanner.points(at.pose, t_s), at, field_mps):
             self._stopped, self._free_since_s = True, None
         elif self._stopped:
             self._free_since_s = t_s if self._free_since_s is None else self._free_since_s
             self._stopped = t_s - self._free_since_s < RESTART_S
         if self._stopped:
-            return decision("field", "protective field", 0.0, v_mps, hard=True)
-        return decision("field", "field free", free_speed(path, on_path, self._robot.limits), v_mps)
+            return decision("field", "protective field", 0.0, at.v_mps, hard=True)
+        free_mps = free_speed(at.path, at.on_path, self._robot.limits)
+        return decision("field", "field free", free_mps, at.v_mps)
 
     def length(self, v_mps: float) -> float:
         """S_L from the front, in metres."""
         stop_m = braking.stop(v_mps, 0.0, self._brake).distance_m
         return stop_m + RESPONSE_S * v_mps + TOLERANCE_M + GROUND_CLEARANCE_M
 
-    def _intruded(
-        self, points: FloatArray, path: Path, pose: PlanarPose, on_path: OnPath, v_mps: float
-    ) -> bool:
-        """Whether anything is in the field, which follows the path as the steering angle's field would."""
-        body = self._robot.body
+    def _intruded(self, points: FloatArray, at: Situation, v_mps: float) -> bool:
+        """Whether anything is in the field for v_mps, which follows the path as the steering angle's would.
+
+        points (P, 2): in the body frame."""
+        body, pose, s_m = self._robot.body, at.pose, at.on_path.s_m
         reach = body.front_m + self.length(v_mps)
         near = (points[:, 0] > -body.rear_m) & (np.hypot(points[:, 0], points[:, 1]) < reach + 1.0)
         if not near.any():
@@ -81,7 +70,7 @@ class ProtectiveField:
         cos, sin = np.cos(pose.heading_rad), np.sin(pose.heading_rad)
         x, y = points[near, 0], points[near, 1]
         floor = np.stack((pose.x_m + cos * x - sin * y, pose.y_m + sin * x + cos * y), axis=1)
-        s, d = path.project_points(floor, on_path.s_m - 1.0, on_path.s_m + reach + 1.0)
-        ahead = s - on_path.s_m
+        s, d = at.path.project_points(floor, s_m - 1.0, s_m + reach + 1.0)
+        ahead = s - s_m
         inside = (ahead > 0.0) & (ahead < reach) & (np.abs(d) < 0.5 * body.width_m + _SIDE_M)
         return int(np.count_nonzero(inside)) >= _POINTS

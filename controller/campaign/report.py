@@ -46,16 +46,21 @@ def report_lines(summary: Summary, command: str) -> list[str]:
     lines += markdown.section(
         "Policies",
         """Time is that of the drive over that of the oracle, which knows all motions in advance; a drive that
-        hit something or did not arrive counts as one that never does. A contact is at fault when the robot
-        moved faster than 0.02 m/s and a driver with the same field of view and reaction avoids it.""",
+        did not arrive, or was at fault in a contact, counts as one that never does. A contact is at fault
+        when the robot moved faster than 0.02 m/s and a driver with the same field of view and reaction
+        avoids it.""",
     )
     lines += markdown.table(_HEAD, [[name, *_cells(one)] for name, one in summary.policies.items()])
     lines += markdown.picture("Time over the oracle's", "ratio.png")
     lines += markdown.picture("Smallest clearance", "clearance.png")
-    lines += markdown.section("Families")
+    lines += markdown.section(
+        "Families",
+        """An arrow above a bar: the median drive took longer than the figure shows, or never arrived. No bar:
+        there is no time to compare, since something stands in the way for good, or it is below the axis.""",
+    )
     lines += markdown.picture("Median time by family", "families.png")
-    for family, by_policy in summary.families.items():
-        lines += [f"### {family}", ""]
+    for number, (family, by_policy) in enumerate(summary.families.items(), start=1):
+        lines += [f"### {number}. {family}", ""]
         lines += markdown.table(_HEAD, [[name, *_cells(one)] for name, one in by_policy.items()])
     lines += markdown.section(
         "What failed", "Each can be driven again alone: `treadwatch campaign --only FAMILY:SEED`."

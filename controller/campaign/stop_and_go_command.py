@@ -70,6 +70,8 @@ def run_stop_and_go(options: StopAndGoOptions) -> int:
     config = load_app(options.config_path)
     if config.camera.kind != "simulated" or not isinstance(config.runner, LockstepRunner):
         raise UserError(f"{options.config_path}: needs camera.kind 'simulated' and runner.kind 'lockstep'")
+    if options.keep and options.mode != "camera":
+        raise UserError("--keep needs --mode camera: without a camera there are no frames to keep")
     folder = options.report / "drives"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -80,7 +80,7 @@ def failed(row: Row) -> bool:
 def time_ratio(row: Row) -> float:
     """Time over the oracle's; NaN where not even the oracle arrives or nobody should.
 
-    Infinite where the drive did not arrive, and where it hit something on its way: whoever drives through
+    Infinite where the drive did not arrive, and where it was at fault in a contact: whoever drives through
     people is not fast.
     """
     if row.oracle_time_s is None or not row.expected:

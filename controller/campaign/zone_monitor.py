@@ -17,10 +17,9 @@ from controller.campaign.planar_scan import PlanarScanner
 from controller.campaign.rivals import decision, free_speed
 from controller.campaign.stage import Stage
 from controller.decision import Decision
-from controller.path import OnPath, Path
+from controller.situation import Situation
 from hal.clocks import NS_PER_S
-from hal.types import FloatArray, PlanarPose
-from vision.scene import Scene
+from hal.types import FloatArray
 
 _STOP_BEYOND_M, _SLOW_BEYOND_M = 0.08, 0.18
 _SLOWDOWN_RATIO = 0.3
@@ -35,21 +34,13 @@ class ZoneMonitor:
         self._robot = robot
         self._scanner = PlanarScanner(stage)
 
-    def step(
-        self,
-        scene: Scene | None,
-        path: Path,
-        pose: PlanarPose,
-        on_path: OnPath,
-        v_mps: float,
-        a_mps2: float,
-        now_ns: int,
-    ) -> Decision:
-        points = self._scanner.points(pose, now_ns / NS_PER_S)
-        wanted = free_speed(path, on_path, self._robot.limits)
-        curvature = path.curvature(on_path.s_m)
+    def step(self, at: Situation) -> Decision:
+        """The speed that the zones leave, braked for as hard as it takes."""
+        points = self._scanner.points(at.pose, at.now_ns / NS_PER_S)
+        wanted = free_speed(at.path, at.on_path, self._robot.limits)
+        curvature = at.path.curvature(at.on_path.s_m)
         target, rule = self.limit(points, wanted, curvature)
-        return decision("zones", rule, target, v_mps, hard=target < wanted)
+        return decision("zones", rule, target, at.v_mps, hard=target < wanted)
 
     def limit(self, points: FloatArray, wanted_mps: float, curvature_1pm: float) -> tuple[float, str]:
         """The speed that the three polygons leave of wanted_mps, and which of them it is."""

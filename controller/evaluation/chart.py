@@ -1,7 +1,7 @@
 """Charts for a report, drawn with OpenCV: axes with round ticks, lines, markers, bars, a legend.
 
 One Chart owns a rectangle of a picture. Data coordinates go in, anti-aliased strokes come out; what is not
-finite is left out. Colours are those of Okabe and Ito (2008) on white.
+known is left out. Colours are those of Okabe and Ito (2008) on white.
 """
 
 from __future__ import annotations
@@ -147,12 +147,15 @@ class Chart:
         colour: Colour,
         label: str | None = None,
     ) -> None:
-        """Upright bars from the lower end of the axis."""
+        """Upright bars from the lower end of the axis, with an arrow above the frame if they go on."""
         base = np.full(len(height), self._y.low)
         tops, feet = self.to_px(left, height), self.to_px(right, base)
         for (u0, v0), (u1, v1) in zip(self._inside(tops), feet, strict=True):
             if np.isfinite([u0, v0, u1, v1]).all() and v1 - v0 >= 0.5:
                 draw.area(self._image, draw.box((u0, v0, u1, v1)), colour)
+        for u0, u1, beyond in zip(tops[:, 0], feet[:, 0], np.asarray(height) > self._y.high, strict=True):
+            if beyond:
+                self._arrow_up(0.5 * (u0 + u1), colour)
         self._remember(label, colour, True, None, False)
 
     def level(self, value: float, colour: Colour, label: str) -> None:
@@ -213,6 +216,10 @@ class Chart:
         high = (self.plot.right - 1, self.plot.bottom - 1)
         held: FloatArray = np.clip(points, low, high)
         return held
+
+    def _arrow_up(self, u: float, colour: Colour) -> None:
+        base = self.plot.y - 3.0
+        draw.area(self._image, np.array([[u - 6.0, base], [u, base - 9.0], [u + 6.0, base]]), colour)
 
     def _markers(self, points: FloatArray, colour: Colour, marker: Marker) -> None:
         for point in points[np.isfinite(points).all(axis=1)]:

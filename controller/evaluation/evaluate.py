@@ -52,6 +52,8 @@ def run_evaluation(options: EvaluationOptions) -> None:
         raise UserError("there is nothing to evaluate; give recordings, or --sim for the simulated set")
     if options.only and not options.simulated:
         raise UserError("--only chooses among the simulated sequences; give --sim with it")
+    if options.static and not options.recordings:
+        raise UserError("--static says that nothing moves in the recordings; give recordings with it")
     chosen = choose(options.only)
     for folder in options.recordings:
         open_replay(folder, options.odometry)  # a mistake is told now, not after minutes

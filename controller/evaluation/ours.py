@@ -11,7 +11,7 @@ from config.robot import Body
 from controller.evaluation.types import CALLED_MOVING, Answer, Detection
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.perception import Perception
-from vision.scene import Fragments, Obstacle, Scene
+from vision.scene import Fragments, Obstacle
 
 # Half of the scale belongs to each verdict.
 _ROOM = 1.0 - CALLED_MOVING
@@ -19,16 +19,15 @@ _DOUBT_SPEED_MPS = 0.1  # a speed of this size says as much against rest as one 
 
 
 class Treadwatch:
-    """vision.perception as a Method; keeps the last scene for the pictures."""
+    """vision.perception as a Method; keeps the last fragments for the pictures."""
 
     def __init__(self, config: PerceptionConfig, mount: CameraMount | None, body: Body) -> None:
         self._perception = Perception(config, mount, body.height_m, body.clearance_m)
-        self.scene: Scene | None = None
         self.fragments: Fragments | None = None
 
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
         percept = self._perception.perceive(frame, odometry, None)
-        self.scene, self.fragments = percept.scene, percept.fragments
+        self.fragments = percept.fragments
         return Answer(tuple(detection_of(obstacle) for obstacle in percept.scene.obstacles))
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from controller.evaluation.chart import BLUE, GREEN, INK, ORANGE, SOFT_INK, blank
 from controller.evaluation.run_sequence import Snapshot
+from controller.evaluation.scoring import FrameScore
 from controller.evaluation.types import CALLED_MOVING, Box, Detection
 from controller.video import draw, text
 from controller.video.depth_view import colour_table
@@ -21,6 +22,7 @@ from vision.scene import Fragments
 _MISSED = bgr("E02424")
 _FOUND = GREEN
 _CLAIMED = ORANGE
+_UNJUDGED = BLUE  # true and moving, but new, small, hidden or far: it may be found and need not be
 _DEPTH_RANGE_M = 10.0
 _GAP, _HEAD = 12, 40
 _CELL = (480, 360)
@@ -31,7 +33,7 @@ def scene_depth_result(snapshots: Sequence[Snapshot]) -> Image:
     """Fig. 6: one row a snapshot; what the camera saw, its depth, what was made of it."""
     width, height = _CELL
     image = blank(3 * width + 4 * _GAP, _HEAD + len(snapshots) * (height + _GAP))
-    for column, title in enumerate(("Scene", "Depth as a picture", "Result")):
+    for column, title in enumerate(("Scene", "Depth: near is bright, black is none", "Result")):
         text.put(image, title, _GAP + column * (width + _GAP), 27, INK, 19, text.BOLD)
     for row, snapshot in enumerate(snapshots):
         cells = (snapshot.colour, depth_picture(snapshot.depth_m), result_picture(snapshot))
@@ -64,11 +66,10 @@ def result_picture(snapshot: Snapshot) -> Image:
 def failure_picture(snapshot: Snapshot) -> Image:
     """A frame with what is true and what was claimed, and a sentence beneath."""
     image = snapshot.colour.copy()
-    missed = set(snapshot.score.missed)
     labels = []
     for true in snapshot.truth.objects:
         if _has_box(true.box):
-            colour = _MISSED if true.id in missed else _FOUND
+            colour = _colour_of(true.id, snapshot.score)
             draw.dashed(image, _closed(true.box), colour, 2, 7.0)
             words = f"{true.kind} {true.distance_m:.1f} m, {true.speed_mps:.1f} m/s"
             labels.append(_box_label(words, true.box, colour))
@@ -78,6 +79,12 @@ def failure_picture(snapshot: Snapshot) -> Image:
             labels.append(_label(one, _CLAIMED))
     draw_labels(image, labels, size=14)
     return _with_caption(image, f"{snapshot.sequence}, frame {snapshot.index}", describe_faults(snapshot))
+
+
+def _colour_of(identity: int, score: FrameScore) -> Colour:
+    if identity in score.missed_settled:
+        return _MISSED
+    return _FOUND if any(hit.object_id == identity for hit in score.hits) else _UNJUDGED
 
 
 def describe_faults(snapshot: Snapshot) -> str:
@@ -93,14 +100,23 @@ def describe_faults(snapshot: Snapshot) -> str:
 
 def _with_caption(image: ColourImage, title: str, words: str) -> Image:
     height, width = image.shape[:2]
-    picture = blank(width, height + 58)
+    picture = blank(width, height + 82)
     picture[:height] = image
-    x = text.put(picture, title, 10, height + 23, INK, 16, text.BOLD)
-    for meaning, colour in (("true, found", _FOUND), ("missed", _MISSED), ("called moving", _CLAIMED)):
-        picture[height + 12 : height + 24, x + 18 : x + 30] = colour
-        x = text.put(picture, meaning, x + 36, height + 23, SOFT_INK, 14)
-    text.put(picture, text.fit(words, width - 20, 15), 10, height + 47, SOFT_INK, 15)
+    text.put(picture, title, 10, height + 23, INK, 16, text.BOLD)
+    text.put(picture, text.fit(words, width - 20, 15), 10, height + 46, SOFT_INK, 15)
+    x = -8
+    for meaning, colour in _KEY:
+        picture[height + 58 : height + 70, x + 18 : x + 30] = colour
+        x = text.put(picture, meaning, x + 36, height + 69, SOFT_INK, 14)
     return picture
+
+
+_KEY = (
+    ("true, found", _FOUND),
+    ("true, missed", _MISSED),
+    ("true, not judged", _UNJUDGED),
+    ("called moving", _CLAIMED),
+)
 
 
 def _draw_fragments(image: Image, fragments: Fragments) -> None:

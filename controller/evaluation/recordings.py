@@ -143,5 +143,5 @@ def _snapshot(name: str, index: int, look: Look) -> Snapshot:
         FrameTruth(stamp_s, ()),
         tuple(detection_of(obstacle) for obstacle in look.scene.obstacles),
         look.fragments,
-        FrameScore(stamp_s, (), (), (), (), ()),
+        FrameScore((), (), (), (), ()),
     )

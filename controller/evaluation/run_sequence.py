@@ -63,7 +63,6 @@ class SequenceRecord:
 
     name: str
     split: str
-    static: bool
     truths: tuple[FrameTruth, ...]
     methods: dict[str, MethodRecord]
     endpoint: EndpointErrors
@@ -129,7 +128,6 @@ class _Recorder:
         return SequenceRecord(
             self._sequence.name,
             self._sequence.split,
-            self._sequence.static,
             tuple(self._truths),
             records,
             self._endpoint,

@@ -40,7 +40,6 @@ class FrameScore:
     missed_settled; wrong: ids of detections that are no moving object; duplicates: ids of
     further detections of something that does move."""
 
-    stamp_s: float
     hits: tuple[Hit, ...]
     missed: tuple[int, ...]
     missed_settled: tuple[int, ...]
@@ -117,7 +116,6 @@ def _score_frame(truth: FrameTruth, call: dict[int, Call], detections: list[Dete
     may_move = [bool(row.any()) for row in np.isfinite(costs(rest, excused))]
     missed = tuple(true.id for true in eligible if true.id not in seen)
     return FrameScore(
-        truth.stamp_s,
         hits,
         missed,
         tuple(identity for identity in missed if call[identity].settled),

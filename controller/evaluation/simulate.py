@@ -12,7 +12,6 @@ from controller.evaluation.types import FrameTruth
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import Pose, RgbdFrame
 from sim.camera import SimulatedCamera
-from sim.render import Picture
 from sim.world import BodyState, World
 
 
@@ -20,7 +19,7 @@ from sim.world import BodyState, World
 class SimulatedFrame:
     """odometry: the camera by dead reckoning. camera: where it truly is, on the floor's axes.
 
-    picture is valid until the next frame, everything else stays. bodies: all of them, still or not.
+    bodies: all of them, still or not.
     """
 
     frame: RgbdFrame
@@ -28,7 +27,6 @@ class SimulatedFrame:
     camera: Pose
     truth: FrameTruth
     images: TrueImages
-    picture: Picture
     bodies: tuple[BodyState, ...]
 
 
@@ -50,6 +48,5 @@ def simulate(sequence: Sequence, teller: TruthTeller, world: World) -> Iterator[
                 picture.camera,
                 teller.frame(picture),
                 teller.images(picture),
-                picture,
                 world.bodies(picture.t_s),
             )

@@ -26,6 +26,7 @@ from controller.limits import Limit, Motion
 from controller.localise import PoseHistory
 from controller.path import OnPath, Path
 from controller.shape import SpeedShaper
+from controller.situation import Situation
 from hal.types import CameraMount, PlanarPose
 from vision.scene import CameraCondition, Scene
 
@@ -120,7 +121,7 @@ class SpeedGovernor:
         if known_pose:
             self._look(scene, pose, now_ns)
         self._choose_motion(wish)
-        decision = self._decided(scene, wish, pose, measured_mps, now_ns)
+        decision = self._decided(scene, pose, measured_mps, now_ns)
         decision = self._as_asked(decision, wish, requested)
         return self._command(decision)
 
@@ -158,17 +159,15 @@ class SpeedGovernor:
         elif stands:
             self._motion = Wish(Kind.STAND)
 
-    def _decided(
-        self, scene: Scene | None, wish: Wish, pose: PlanarPose, measured_mps: float, now_ns: int
-    ) -> Decision:
+    def _decided(self, scene: Scene | None, pose: PlanarPose, measured_mps: float, now_ns: int) -> Decision:
         """The mission's decision along the present motion, before it is compared with what is asked."""
         turns = self._motion.kind is Kind.TURN
         v_mps = 0.0 if turns else self._speed_mps(measured_mps)
         a_mps2 = 0.0 if turns else self._shape.a_mps2
-        path = self._arc(pose, now_ns)
+        path = self._arc(pose)
         if scene is not None and self._scenes and scene.captured_ns == self._scenes[-1].captured_ns:
             scene = self._scenes[-1]
-        decision = self._decide.step(scene, path, pose, self._on_path, v_mps, a_mps2, now_ns)
+        decision = self._decide.step(Situation(scene, path, pose, self._on_path, v_mps, a_mps2, now_ns))
         if turns:
             return self._turn(decision, pose, now_ns)
         if self._motion.kind is Kind.ARC and decision.reason.rule != "fault":
@@ -187,7 +186,7 @@ class SpeedGovernor:
         """Along the arc, from where it was laid out."""
         return self._ground.consent_m + _NEAR_EXTRA_M
 
-    def _arc(self, pose: PlanarPose, now_ns: int) -> Path:
+    def _arc(self, pose: PlanarPose) -> Path:
         """The arc of the present motion; straight ahead where it is none. Laid out anew where it no longer
         fits: what was seen lately is then looked at again, along the new arc."""
         arc = self._motion.kind is Kind.ARC

@@ -24,27 +24,46 @@ class ImageError(Exception):
 
 def read_colour(path: Path, width: int, height: int) -> ColourImage:
     """(height, width, 3) uint8, BGR. Raises ImageError."""
-    image = _decode(path, width, height)
+    return decode_colour(_contents(path), width, height)
+
+
+def read_depth(path: Path, width: int, height: int) -> DepthImage:
+    """(height, width) uint16, as stored. Raises ImageError."""
+    return decode_depth(_contents(path), width, height)
+
+
+def decode_colour(data: bytes, width: int, height: int) -> ColourImage:
+    """Of a whole PNG or JPEG file: (height, width, 3) uint8, BGR. Raises ImageError."""
+    image = _decode(data, width, height)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
         raise ImageError(f"is {_describe(image)}, a colour image has 8 bits and 3 channels")
     return image.astype(np.uint8, copy=False)
 
 
-def read_depth(path: Path, width: int, height: int) -> DepthImage:
-    """(height, width) uint16, as stored. Raises ImageError."""
-    image = _decode(path, width, height)
+def decode_depth(data: bytes, width: int, height: int) -> DepthImage:
+    """Of a whole PNG file: (height, width) uint16, as stored. Raises ImageError."""
+    image = _decode(data, width, height)
     if image.dtype != np.uint16 or image.ndim != 2:
         raise ImageError(f"is {_describe(image)}, a depth image has 16 bits and 1 channel")
     return image.astype(np.uint16, copy=False)
 
 
-def _decode(path: Path, width: int, height: int) -> NDArray[Any]:
+def require_size(found_width: int, found_height: int, width: int, height: int) -> None:
+    """Raises ImageError where an image is not as large as its calibration says."""
+    if (found_width, found_height) != (width, height):
+        raise ImageError(f"is {found_width}x{found_height}, its calibration says {width}x{height}")
+
+
+def _contents(path: Path) -> bytes:
     try:
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise ImageError(f"cannot be read ({error.strerror})") from error
     except ValueError as error:  # a NUL byte in the name
         raise ImageError("has a name that no file can have") from error
+
+
+def _decode(data: bytes, width: int, height: int) -> NDArray[Any]:
     _require_whole(data, width, height)
     # From memory: the file is read once, and OpenCV is never handed the path of a damaged file,
     # about which it would write to standard error and possibly return half an image.
@@ -54,7 +73,7 @@ def _decode(path: Path, width: int, height: int) -> NDArray[Any]:
         raise ImageError(f"is damaged: it cannot be decoded ({error.err})") from error
     if image is None:
         raise ImageError("is damaged: its pixels cannot be decoded")
-    _require_size(image.shape[1], image.shape[0], width, height)
+    require_size(image.shape[1], image.shape[0], width, height)
     return image
 
 
@@ -85,16 +104,11 @@ def _require_whole_png(data: bytes, width: int, height: int) -> None:
         kind = data[at + 4 : at + 8]
         if kind == b"IHDR" and length >= _PNG_HEADER.size:
             found_width, found_height = _PNG_HEADER.unpack_from(data, at + 8)
-            _require_size(found_width, found_height, width, height)
+            require_size(found_width, found_height, width, height)
         if kind == b"IEND":
             return
         at = end
     raise ImageError("is cut off: its end is missing")
-
-
-def _require_size(found_width: int, found_height: int, width: int, height: int) -> None:
-    if (found_width, found_height) != (width, height):
-        raise ImageError(f"is {found_width}x{found_height}, camera.yaml says {width}x{height}")
 
 
 def _describe(image: NDArray[Any]) -> str:

@@ -9,21 +9,11 @@ from decimal import Decimal, InvalidOperation
 from itertools import pairwise
 from pathlib import Path
 
+from hal.cameras.recording import SkippedFrame
 from hal.errors import BadRecording
 
 # Times must fit the int64 of captured_ns.
 _MAX_STAMP_S = Decimal(2**63 - 1).scaleb(-9)
-
-
-@dataclass(frozen=True, slots=True)
-class SkippedFrame:
-    """What could not be used, and why. file: an image of the recording, or ``index.txt:line``."""
-
-    file: str
-    reason: str
-
-    def __str__(self) -> str:
-        return f"{self.file}: {self.reason}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,13 +15,17 @@ from typing import Self
 
 from hal.cameras.calibration import RecordingCalibration
 from hal.cameras.image_file import ImageError, read_colour, read_depth
-from hal.cameras.tum_index import ImageIndex, IndexEntry, SkippedFrame, associate, read_index
+from hal.cameras.recording import SkippedFrame
+from hal.cameras.tum_index import ImageIndex, IndexEntry, associate, read_index
 from hal.clocks import NS_PER_S
 from hal.errors import BadRecording, DeviceRefused, EndOfStream
 from hal.types import CameraMount, Intrinsics, RgbdFrame
 
 _NEEDED = ("rgb.txt", "depth.txt", "camera.yaml")
-_FORMAT_HINT = "a recording is a folder with rgb.txt, depth.txt, camera.yaml and the images they name"
+_FORMAT_HINT = (
+    "a recording is a folder with rgb.txt, depth.txt, camera.yaml and the images they name, or a ROS bag "
+    "(.bag, .db3, .mcap, or the folder around it)"
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TextIO
@@ -10,9 +12,10 @@ from typing import Self, TextIO
 import cv2
 import yaml
 
+from hal.cameras.pose_track import quaternion_of
 from hal.cameras.tum_index import format_stamp
 from hal.errors import DeviceRefused
-from hal.types import CameraMount, RgbdFrame
+from hal.types import CameraMount, Pose, RgbdFrame
 
 # Zlib's fastest: a third of the time of the default for a tenth more bytes.
 _PNG_FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
@@ -26,6 +29,7 @@ class TumWriter:
         self._mount = mount
         self._first: RgbdFrame | None = None
         self._last_ns = -1
+        self._odometry: TextIO | None = None
 
     def __enter__(self) -> Self:
         """Raises DeviceRefused if the folder holds a recording already or cannot be made."""
@@ -45,12 +49,18 @@ class TumWriter:
     ) -> None:
         self._colour_index.close()
         self._depth_index.close()
+        if self._odometry is not None:
+            self._odometry.close()
 
-    def write(self, frame: RgbdFrame) -> None:
-        """Add one frame under its captured_ns. Raises ValueError if it does not fit those before."""
+    def write(self, frame: RgbdFrame, odometry: Pose | None = None) -> None:
+        """Add one frame under its captured_ns. odometry: the camera by dead reckoning then, for odometry.txt.
+
+        Raises ValueError if it does not fit those before, DeviceRefused if it cannot be written.
+        """
         if self._first is None:
             self._first = frame
-            self._write_calibration(frame)
+            with self._told("camera.yaml"):
+                self._write_calibration(frame)
         if (frame.intrinsics, frame.depth_scale_m) != (self._first.intrinsics, self._first.depth_scale_m):
             raise ValueError("a recording has one camera: intrinsics or depth scale changed")
         if frame.captured_ns <= self._last_ns:
@@ -59,11 +69,29 @@ class TumWriter:
         stamp = format_stamp(frame.captured_ns)
         self._image(self._colour_index, f"rgb/{stamp}.png", frame.colour, stamp)
         self._image(self._depth_index, f"depth/{stamp}.png", frame.depth, stamp)
+        if odometry is not None:
+            with self._told("odometry.txt"):
+                self._pose(odometry, stamp)
 
     def _image(self, index: TextIO, file: str, image: cv2.typing.MatLike, stamp: str) -> None:
         if not cv2.imwrite(str(self._folder / file), image, _PNG_FAST):
             raise DeviceRefused(f"{self._folder / file}: cannot be written; is the disk full?")
-        index.write(f"{stamp} {file}\n")
+        with self._told(file):
+            index.write(f"{stamp} {file}\n")
+
+    @contextmanager
+    def _told(self, file: str) -> Iterator[None]:
+        """A disk that is full is a device that refuses."""
+        try:
+            yield
+        except OSError as error:
+            raise DeviceRefused(f"{self._folder / file}: cannot be written ({error.strerror})") from error
+
+    def _pose(self, pose: Pose, stamp: str) -> None:
+        if self._odometry is None:
+            self._odometry = self._index("odometry.txt", "# camera: time tx ty tz qx qy qz qw")
+        values = (*pose.translation_m.tolist(), *quaternion_of(pose.rotation).tolist())
+        self._odometry.write(f"{stamp} {' '.join(f'{value:.9f}' for value in values)}\n")
 
     def _index(self, name: str, heading: str) -> TextIO:
         # A line at a time reaches the disk, so a recording that ends abruptly can still be read.

@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from hal.types import ChassisMode, ChassisState
-from tests.support.chassis_rig import MS, Rig, agilex_rig, can_link_config
+from tests.support.chassis_rig import MS, Rig
 from tests.support.contract_rigs import EMULATED, open_real
 
 REAL = "real base"
@@ -291,15 +291,3 @@ def test_a_command_that_is_no_number_latches(rig: Rig, bad: float) -> None:
     rig.run(0.5, 0.5)
     rig.step(bad)
     assert_latched(rig, ChassisMode.ESTOP, "not finite")
-
-
-def test_two_lives_alike_to_the_bit() -> None:
-    """Same steps, same states: what lock-step simulation rests on."""
-
-    def life() -> list[str]:
-        with agilex_rig("bus", can_link_config()) as rig:
-            rig.run(0.2)
-            rig.arm()
-            return [repr(rig.step(0.004 * k, 0.002 * k)) for k in range(150)]
-
-    assert life() == life()

@@ -1,4 +1,4 @@
-"""What every FrameSource promises, asked of each: a recording, the simulated camera, a RealSense.
+"""What every FrameSource promises, asked of each: recordings, the simulated camera, a RealSense.
 
 A new camera is not done before it stands here.
 """
@@ -17,6 +17,8 @@ from config.camera import RealsenseCameraConfig, SimulatedCameraConfig
 from config.path import LineSpec, PathSpec
 from config.scenario import Scenario
 from hal.api import Clock, FrameSource
+from hal.cameras.bag_replay import BagReplay
+from hal.cameras.paced_recording import PacedRecording
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
 from hal.clocks import SimulatedClock
@@ -24,6 +26,7 @@ from hal.errors import EndOfStream, FrameTimeout
 from hal.types import CameraMount, Intrinsics, PlanarPose, RgbdFrame
 from sim.camera import SimulatedCamera
 from sim.world import World
+from tests.support.bags import small_bag
 from tests.support.fake_realsense import FakeRealsense, framesets
 from tests.support.recordings import DESK_RPY, write_recording
 
@@ -47,6 +50,10 @@ def small_recording_without_thread(folder: Path) -> Case:
     return Case(TumReplay(write_recording(folder, FRAMES), read_ahead=0), SimulatedClock())
 
 
+def small_ros_bag(folder: Path) -> Case:
+    return Case(BagReplay(small_bag(folder, count=FRAMES)), SimulatedClock())
+
+
 def real_recording(folder: Path) -> Case:
     return Case(TumReplay(DESK_RPY), SimulatedClock())
 
@@ -55,6 +62,11 @@ def realsense(folder: Path) -> Case:
     clock = SimulatedClock()
     vendor = FakeRealsense(clock, list(framesets(0, FRAMES + 5)))
     return Case(RealsenseCamera(RealsenseCameraConfig(), clock, vendor), clock)
+
+
+def paced_recording(folder: Path) -> Case:
+    clock = SimulatedClock()
+    return Case(PacedRecording(TumReplay(write_recording(folder, FRAMES + 5)), clock), clock)
 
 
 def simulated(folder: Path) -> Case:
@@ -66,8 +78,8 @@ def simulated(folder: Path) -> Case:
 
 
 HALL = Scenario(name="hall", path=PathSpec(segments=(LineSpec(kind="line", length_m=10.0),)))
-LIVE = [realsense, simulated]
-ENDING = [small_recording, small_recording_without_thread]
+LIVE = [realsense, simulated, paced_recording]
+ENDING = [small_recording, small_recording_without_thread, small_ros_bag]
 SOURCES = [*LIVE, *ENDING, real_recording]
 
 
@@ -83,7 +95,7 @@ def case(request: pytest.FixtureRequest, tmp_path: Path) -> Case:
 
 @pytest.fixture(params=LIVE, ids=lambda source: source.__name__)
 def live(request: pytest.FixtureRequest, tmp_path: Path) -> Case:
-    """Is late when asked too early, and never ends."""
+    """Is late when asked too early."""
     return make(request, tmp_path)
 
 

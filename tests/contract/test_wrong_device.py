@@ -56,7 +56,7 @@ def test_another_kind_of_base_answers(kind: str, other: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_nobody_answers(kind: str) -> None:
+def test_a_line_where_nobody_answers_is_told(kind: str) -> None:
     state = try_to_arm(kind, serial_pair()[0], None)
     assert state.reason.startswith(GIVES_UP)
     assert "not one byte came; check port, power" in state.reason

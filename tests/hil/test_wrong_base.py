@@ -58,13 +58,13 @@ def test_a_wrong_model_and_a_model_without_that_port(tmp_path: Path) -> None:
     right = config.read_text()
     config.write_text(right.replace("model: bunker", "model: hunter"))
     said = refusal(config)
-    assert "chassis.agilex.model: Input should be 'bunker', 'bunker_mini'" in said
+    assert "chassis.model: Input should be 'bunker', 'bunker_mini'" in said
     assert said.endswith("found 'hunter'")
     config.write_text(right.replace("model: bunker", "model: tracer"))
     assert "tracer cannot be driven over a serial port" in refusal(config)
 
 
-def test_nobody_answers(tmp_path: Path) -> None:
+def test_a_port_where_nobody_answers_is_refused_in_one_line(tmp_path: Path) -> None:
     with PseudoTerminal() as terminal:
         said = refusal(with_port(short_mission("roboteq", tmp_path), terminal.path))
     assert said.startswith(
@@ -74,7 +74,9 @@ def test_nobody_answers(tmp_path: Path) -> None:
     assert said.endswith("nothing has moved")
 
 
-def test_another_protocol_answers(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+def test_a_base_that_speaks_another_protocol_is_refused_in_one_line(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     if not request.config.getoption("--hil"):
         pytest.skip("a quarter of a minute; with --hil")
     config = short_mission("kobuki", tmp_path)

@@ -14,6 +14,7 @@ from config.robot import Robot
 from controller.decide import DecisionMaker
 from controller.path import OnPath, Path
 from controller.shape import SpeedShaper
+from controller.situation import Situation
 from hal.types import CameraMount, PlanarPose
 from tests.support.scenes import STILL, free_space
 from vision.scene import CameraCondition, CameraHealth, Obstacle, Scene
@@ -103,7 +104,7 @@ def test_limits_hold_and_reasons_are_given_for_any_sequence(
             now_ns += tick * PERIOD_NS
             pose = PlanarPose(x, beside, 0.0)
             decision = maker.step(
-                scene, PATH, pose, OnPath(x, beside, 0.0), shaper.v_mps, shaper.a_mps2, now_ns
+                Situation(scene, PATH, pose, OnPath(x, beside, 0.0), shaper.v_mps, shaper.a_mps2, now_ns)
             )
             assert 0.0 <= decision.target_speed_mps <= limits.max_speed_mps
             assert decision.reason.rule

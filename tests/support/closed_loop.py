@@ -16,6 +16,7 @@ from controller.decide import Action, Decision, DecisionMaker
 from controller.follow import PathFollower
 from controller.path import Path
 from controller.shape import SpeedShaper
+from controller.situation import Situation
 from hal.clocks import NS_PER_S
 from hal.geometry import advance_pose, camera_in_floor
 from hal.types import CameraMount, FloatArray, PlanarPose, Pose
@@ -152,7 +153,7 @@ class Mission:
         self.s = on_path.s_m
         now_ns = round(self.t * NS_PER_S)
         decision = self.decide.step(
-            self._scene, self.path, self.pose, on_path, self.shape.v_mps, self.shape.a_mps2, now_ns
+            Situation(self._scene, self.path, self.pose, on_path, self.shape.v_mps, self.shape.a_mps2, now_ns)
         )
         shaped = self.shape.step(
             decision.target_speed_mps,

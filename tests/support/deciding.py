@@ -11,6 +11,7 @@ from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from controller.decide import Decision, DecisionMaker
 from controller.path import OnPath, Path
+from controller.situation import Situation
 from hal.geometry import camera_in_floor
 from hal.types import CameraMount, PlanarPose
 from tests.support.scenes import GOOD, STILL, free_space
@@ -87,9 +88,8 @@ class Bench:
         path: Path = PATH,
     ) -> Decision:
         self.now_ns += STEP_NS
-        return self.maker.step(
-            scene, path, PlanarPose(x_m, d_m, 0.0), OnPath(x_m, d_m, 0.0), v_mps, a_mps2, self.now_ns
-        )
+        pose, on_path = PlanarPose(x_m, d_m, 0.0), OnPath(x_m, d_m, 0.0)
+        return self.maker.step(Situation(scene, path, pose, on_path, v_mps, a_mps2, self.now_ns))
 
     def settle(
         self, *obstacles: Obstacle, v_mps: float = 1.0, x_m: float = 0.0, free: FreeSpace | None = None

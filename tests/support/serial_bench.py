@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from typing import Generic, TypeVar
 
 from config.chassis import PlantConfig
@@ -56,6 +57,12 @@ class SerialBench(Generic[EmulatorT]):
         self.chassis.arm(self.now_ns)
         state = self.run(self.periods)
         assert state.mode is ChassisMode.ARMED, state.reason
+
+
+def every(nth: int, change: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
+    """For ScriptedSerialLink.hear_through: each nth message is changed, the others pass."""
+    numbers = count(1)
+    return lambda data: change(data) if next(numbers) % nth == 0 else data
 
 
 def first_known(states: list[ChassisState]) -> int:

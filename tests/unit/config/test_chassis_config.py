@@ -130,7 +130,7 @@ def test_one_line_takes_an_agilex_base_to_its_serial_port(tmp_path: Path) -> Non
     assert chassis.link == SerialLinkConfig(url="/dev/ttyUSB0", baud=115_200)
 
 
-def test_mirrored_motors(tmp_path: Path) -> None:
+def test_a_mirrored_motor_counts_backwards(tmp_path: Path) -> None:
     text = ROBOCLAW.replace("accel_qpps2: 20000", "accel_qpps2: 20000, invert_right: true")
     chassis = read(tmp_path, text)
     assert isinstance(chassis, RoboclawChassisConfig)

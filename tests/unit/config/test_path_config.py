@@ -17,7 +17,7 @@ def read(tmp_path: Path, text: str) -> PathSpec:
     return load(file, PathSpec)
 
 
-def test_a_whole_path(tmp_path: Path) -> None:
+def test_every_key_of_a_path_is_read(tmp_path: Path) -> None:
     spec = read(
         tmp_path,
         """
@@ -40,11 +40,11 @@ segments:
     ("segments", "said"),
     [
         ("[]", "segments must hold at least one line or arc"),
-        ("[{kind: line, length_m: 0}]", "segments.0.line.length_m: Input should be greater than 0, found 0"),
-        ("[{kind: line, length_m: .nan}]", "segments.0.line.length_m"),
-        ("[{kind: line, length_m: '3'}]", "segments.0.line.length_m: Input should be a valid number"),
-        ("[{kind: line}]", "segments.0.line.length_m: missing key"),
-        ("[{kind: line, length_m: 1, speed: 2}]", "segments.0.line.speed: unknown key"),
+        ("[{kind: line, length_m: 0}]", "segments.0.length_m: Input should be greater than 0, found 0"),
+        ("[{kind: line, length_m: .nan}]", "segments.0.length_m"),
+        ("[{kind: line, length_m: '3'}]", "segments.0.length_m: Input should be a valid number"),
+        ("[{kind: line}]", "segments.0.length_m: missing key"),
+        ("[{kind: line, length_m: 1, speed: 2}]", "segments.0.speed: unknown key"),
         ("[{kind: bow, length_m: 1}]", "'bow'"),
         ("[{kind: arc, radius_m: -1, angle_deg: 90}]", "radius_m: Input should be greater than 0"),
         ("[{kind: arc, radius_m: 1, angle_deg: 0}]", "angle_deg must not be zero; write a line instead"),

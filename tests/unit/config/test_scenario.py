@@ -43,25 +43,25 @@ def test_the_default_mission_ships() -> None:
 @pytest.mark.parametrize(
     ("wrong", "key", "reason"),
     [
-        (GOOD.replace("x_m: 3.0", "x_mm: 3.0"), "bodies.0.crate.x_mm", "unknown key"),
+        (GOOD.replace("x_m: 3.0", "x_mm: 3.0"), "bodies.0.x_mm", "unknown key"),
         (GOOD.replace("kind: crate", "kind: tree"), "bodies.0", "tree"),
         (GOOD.replace("kind: crate, ", ""), "bodies.0", "kind"),
-        (GOOD.replace("x_m: 3.0, ", ""), "bodies.0.crate.x_m", "missing key"),
-        (GOOD.replace("x_m: 3.0", "x_m: three"), "bodies.0.crate.x_m", "'three'"),
-        (GOOD.replace("x_m: 3.0", "x_m: .nan"), "bodies.0.crate.x_m", "finite"),
-        (GOOD.replace("y_m: 1.0", "y_m: 1.0, width_m: -1"), "bodies.0.crate.width_m", "greater than 0"),
-        (GOOD.replace("y_m: 1.0", "y_m: 1.0, texture: fancy"), "bodies.0.crate.texture", "'fancy'"),
+        (GOOD.replace("x_m: 3.0, ", ""), "bodies.0.x_m", "missing key"),
+        (GOOD.replace("x_m: 3.0", "x_m: three"), "bodies.0.x_m", "'three'"),
+        (GOOD.replace("x_m: 3.0", "x_m: .nan"), "bodies.0.x_m", "finite"),
+        (GOOD.replace("y_m: 1.0", "y_m: 1.0, width_m: -1"), "bodies.0.width_m", "greater than 0"),
+        (GOOD.replace("y_m: 1.0", "y_m: 1.0, texture: fancy"), "bodies.0.texture", "'fancy'"),
         (GOOD + "  - {kind: pole, name: crate, x_m: 1.0, y_m: 1.0}\n", "crate", "given twice"),
         (GOOD + "room: {x_min_m: 9.0, x_max_m: 1.0}\n", "room", "smaller"),
         (GOOD + "outcome: lost\n", "outcome", "'lost'"),
         (
             GOOD.replace("y_m: 1.0", "y_m: 1.0, motion: {steps: []}"),
-            "bodies.0.crate.motion.steps",
+            "bodies.0.motion.steps",
             "at least 1",
         ),
         (
             GOOD.replace("y_m: 1.0", "y_m: 1.0, motion: {steps: [{kind: go, x_m: 1.0, y_m: 1.0}]}"),
-            "bodies.0.crate.motion.steps.0.go.speed_mps",
+            "bodies.0.motion.steps.0.speed_mps",
             "missing key",
         ),
         (

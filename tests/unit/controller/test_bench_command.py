@@ -128,6 +128,26 @@ def test_what_cannot_be_written_is_told_before_measuring(
         command.run_bench(10, tmp_path / "file" / "bench.json")
 
 
+def test_a_disk_that_fills_up_while_measuring_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "bench.json"
+
+    def pretend(plan: command.Plan) -> BenchReport:
+        target.mkdir()
+        return report()
+
+    monkeypatch.setattr(command, "measure_all", pretend)
+    with pytest.raises(UserError, match=r"bench\.json: cannot be written \(Is a directory\)"):
+        command.run_bench(10, target)
+
+
+def test_the_period_is_not_written_as_json(tmp_path: Path) -> None:
+    result = CliRunner().invoke(cli, ["bench", "--period", "--json", str(tmp_path / "bench.json")])
+    assert isinstance(result.exception, UserError)
+    assert "--json goes with the stages" in str(result.exception)
+
+
 def test_a_target_without_permission_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("controller.bench.command.os.access", lambda path, mode: False)
     with pytest.raises(UserError, match=r"bench\.json: may not be written"):

@@ -28,7 +28,7 @@ def test_nothing_measured_is_not_zero() -> None:
         Durations.of([])
 
 
-def test_json_of_durations() -> None:
+def test_durations_are_written_in_milliseconds() -> None:
     assert Durations.of([1_234_567]).as_json() == {"count": 1, "median_ms": 1.2346, "p99_ms": 1.2346}
 
 

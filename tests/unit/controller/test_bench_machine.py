@@ -25,7 +25,7 @@ def test_the_machine_is_described() -> None:
         ("processor\t: 0\n", platform.machine()),
     ],
 )
-def test_cpu_name(tmp_path: Path, text: str, name: str) -> None:
+def test_the_cpu_is_named_as_the_kernel_names_it(tmp_path: Path, text: str, name: str) -> None:
     cpuinfo = tmp_path / "cpuinfo"
     cpuinfo.write_text(text)
     assert cpu_name(cpuinfo) == name

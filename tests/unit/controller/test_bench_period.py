@@ -16,7 +16,7 @@ from hal.clocks import SimulatedClock
 MS = 1_000_000
 
 
-def test_figures_of_periods() -> None:
+def test_one_late_command_shows_in_the_worst_period_and_not_in_the_median() -> None:
     stamps_ns, now_ns = [], 0
     for k in range(200):
         stamps_ns.append(now_ns)
@@ -65,7 +65,7 @@ def test_perception_never_waits_and_the_path_lasts() -> None:
     assert config.robot.limits.max_speed_mps * 40.0 < 20.0, "the path of the warehouse is longer"
 
 
-def test_the_command(request: pytest.FixtureRequest) -> None:
+def test_the_command_measures_both_kinds_of_scheduling(request: pytest.FixtureRequest) -> None:
     if not request.config.getoption("--hil"):
         pytest.skip("half a minute; with --hil")
     command = [sys.executable, "-m", "controller", "bench", "--period", "--seconds", "5"]

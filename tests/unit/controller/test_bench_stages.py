@@ -183,5 +183,5 @@ def test_summary_of_a_group_adds_up_each_frame_before_the_median() -> None:
     assert summary["a"] == StageFigures(2.0, 10.0, 0.0)
 
 
-def test_stage_json() -> None:
+def test_a_stage_is_written_as_calls_and_milliseconds() -> None:
     assert StageFigures(1.5, 0.123456, 2.0).as_json() == {"calls": 1.5, "own_ms": 0.1235, "opencv_ms": 2.0}

@@ -70,7 +70,7 @@ def test_points_on_a_body() -> None:
     assert bodies.covers(points, reach, side_m=0.1)[:, 0].tolist() == [True, True, False, True, False]
 
 
-def test_select_and_join() -> None:
+def test_selected_bodies_keep_their_order_and_joined_ones_follow() -> None:
     bodies = bodies_of(scene(seen(number=1), seen(number=2), seen(number=3)), POSE, MOUNT, 0.5)
     some = bodies.select(np.array([True, False, True]))
     assert some.ids.tolist() == [1, 3]

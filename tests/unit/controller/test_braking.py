@@ -57,7 +57,7 @@ def test_stop_that_was_already_begun() -> None:
     assert stop.distance_m == pytest.approx((0.5 + 0.125) / 2 * 0.75 + 0.5**3 / 6.0)
 
 
-def test_ease_out_alone() -> None:
+def test_a_deceleration_that_fades_just_in_time_is_all_of_the_stop() -> None:
     """v = a^2 / 2J exactly: the deceleration fades to nothing at standstill."""
     stop = braking.stop(0.125, -0.5, BrakeLimits(0.5, 1.0))
     assert stop.time_s == pytest.approx(0.5)

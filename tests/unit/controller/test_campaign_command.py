@@ -68,7 +68,7 @@ def test_the_report_has_its_files(small: Path) -> None:
     assert summary["missions"] == 2
     text = (small / "report.md").read_text()
     assert "--missions 2 --mode noise --seed 3" in text
-    assert "### plain_wall" in text
+    assert ". plain_wall\n" in text
 
 
 def test_a_campaign_broken_off_is_resumed_without_losing_a_row(small: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from controller.campaign.noisy_camera import NoiseModel, NoisyCamera, mount_of
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
 from controller.decision import Decision
-from controller.path import OnPath, Path
+from controller.situation import Situation
 from hal.geometry import camera_in_floor
 from hal.types import PlanarPose
 from sim.faults import Faults, Window
@@ -146,18 +146,9 @@ class Spy:
         self.seen: list[tuple[float, Scene | None]] = []
         self._inner = build_policy("zones", CONFIG, stage())
 
-    def step(
-        self,
-        scene: Scene | None,
-        path: Path,
-        pose: PlanarPose,
-        on_path: OnPath,
-        v_mps: float,
-        a_mps2: float,
-        now_ns: int,
-    ) -> Decision:
-        self.seen.append((now_ns * 1e-9, scene))
-        return self._inner.step(scene, path, pose, on_path, v_mps, a_mps2, now_ns)
+    def step(self, at: Situation) -> Decision:
+        self.seen.append((at.now_ns * 1e-9, at.scene))
+        return self._inner.step(at)
 
 
 def ages(spy: Spy) -> dict[float, float]:

@@ -1,4 +1,4 @@
-"""Missions that once ended in a contact at fault, each with what was wrong."""
+"""Missions that once ended in a contact at fault, or not at all, each with what was wrong."""
 
 from __future__ import annotations
 
@@ -27,3 +27,10 @@ def test_nobody_is_touched_any_more(family: str, seed: int) -> None:
     (row,) = run_task(Task(family, seed, ("ours",), "noise", CONFIG))
     assert row.reached
     assert row.contacts_at_fault == 0
+
+
+def test_nobody_is_waited_for_who_has_walked_on() -> None:
+    """It walked through the blind place before the nose, was seen too shortly for the verdict that it
+    moves, and was remembered as standing there for ever."""
+    (row,) = run_task(Task("crowd_junction", 400015, ("ours",), "noise", CONFIG))
+    assert row.reached

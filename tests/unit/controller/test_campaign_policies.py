@@ -13,6 +13,7 @@ from controller.campaign.protective_field import ProtectiveField
 from controller.campaign.zone_monitor import ZoneMonitor
 from controller.decision import Action, Decision
 from controller.path import OnPath
+from controller.situation import Situation
 from hal.types import FloatArray, PlanarPose
 from tests.support import scenes
 from tests.support.campaign import CONFIG, crate, stage
@@ -38,7 +39,7 @@ def test_the_papers_detection_distance() -> None:
 def paper(scene: Scene | None, v_mps: float) -> Decision:
     made = stage(length_m=20.0)
     return PaperRule(ROBOT, mount_of(ROBOT)).step(
-        scene, made.path, START, OnPath(0.0, 0.0, 0.0), v_mps, 0.0, 0
+        Situation(scene, made.path, START, OnPath(0.0, 0.0, 0.0), v_mps, 0.0, 0)
     )
 
 
@@ -67,7 +68,7 @@ def test_the_paper_waits_for_a_first_scene() -> None:
         (FRONT + 0.09 + 5.0, 1.0, "free"),
     ],
 )
-def test_nav2_zones(x_m: float, expected: float, rule: str) -> None:
+def test_nav2_slows_by_the_zone_that_four_points_are_in(x_m: float, expected: float, rule: str) -> None:
     assert ZoneMonitor(ROBOT, stage()).limit(wall_of_points(x_m), 1.0, 0.0) == (expected, rule)
 
 
@@ -114,9 +115,8 @@ def test_the_protective_field_stops_and_restarts_two_seconds_after_it_is_free() 
     field = ProtectiveField(ROBOT, made)
 
     def step(s_m: float, v_mps: float, t_s: float) -> Decision:
-        return field.step(
-            None, made.path, PlanarPose(s_m, 0.0, 0.0), OnPath(s_m, 0.0, 0.0), v_mps, 0.0, round(t_s * 1e9)
-        )
+        pose, on_path = PlanarPose(s_m, 0.0, 0.0), OnPath(s_m, 0.0, 0.0)
+        return field.step(Situation(None, made.path, pose, on_path, v_mps, 0.0, round(t_s * 1e9)))
 
     # The crate's near side is 0.1 m inside the field of 1 m/s, and outside that of 0.5 m/s.
     assert step(0.0, 0.5, 0.0).target_speed_mps > 0.0

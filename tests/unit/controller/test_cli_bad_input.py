@@ -69,6 +69,20 @@ def test_parts_that_do_not_fit_together(tmp_path: Path) -> None:
     )
 
 
+def test_what_follows_from_a_wrong_value_is_not_told_as_well(tmp_path: Path) -> None:
+    config = changed_config(tmp_path, camera={"kind": "simulated", "width": 7})
+    assert refusal("run", "--config", config) == (
+        f"treadwatch: {config}: camera.width: Input should be greater than or equal to 32, found 7"
+    )
+
+
+def test_a_body_too_narrow_to_be_one(tmp_path: Path) -> None:
+    config = changed_config(tmp_path, robot={"body": {"width_m": 1e-9}})
+    assert "robot.body.width_m: Input should be greater than or equal to 0.05" in refusal(
+        "run", "--config", config
+    )
+
+
 def test_a_path_that_the_robot_cannot_drive(tmp_path: Path) -> None:
     scenario = yaml.safe_load((CONFIG_DIR / "scenarios" / "empty.yaml").read_text())
     scenario["path"]["segments"] = [{"kind": "arc", "radius_m": 0.05, "angle_deg": 90.0}]
@@ -156,6 +170,17 @@ def test_observations_in_a_folder_that_is_not_there(tmp_path: Path) -> None:
 
 def test_a_recording_that_is_not_there() -> None:
     assert "nowhere" in refusal("replay", "nowhere")
+
+
+def test_a_bag_that_is_none(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_text("these are notes")
+    message = refusal("replay", tmp_path / "run.mcap")
+    assert "run.mcap: cannot be read as a ROS bag" in message
+    assert "ros2 bag info" in message
+
+
+def test_topics_of_a_folder() -> None:
+    assert "is no ROS bag, so it has no topics" in refusal("replay", DESK, "--depth-topic", "/depth")
 
 
 def test_a_recording_without_its_calibration(recording: Path) -> None:

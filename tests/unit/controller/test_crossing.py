@@ -36,7 +36,6 @@ def test_an_oblique_one_blocks_other_places_when_it_leaves() -> None:
     (one,) = conflicts(box(8.0, 3.0, -0.5, -1.0))
     assert one.lo_in_m == pytest.approx(7.3 - 0.5 * 2.25)
     assert one.lo_out_m == pytest.approx(7.3 - 0.5 * 3.75)
-    assert one.hi_out_m == pytest.approx(8.7 - 0.5 * 3.75)
 
 
 def test_what_is_in_the_way_already_is_so_from_now_on() -> None:
@@ -73,7 +72,7 @@ def ramps(v_mps: float) -> SpeedRamps:
     return SpeedRamps(v_mps, 0.0, SPEEDS, accel_mps2=0.3, decel_mps2=0.3, jerk_mps3=0.6)
 
 
-CROSSING = Conflict(0, 4.0, 6.0, 5.0, 5.0, 6.0, 6.0)
+CROSSING = Conflict(0, 4.0, 6.0, 5.0, 5.0, 6.0)
 
 
 def choose(conflict: Conflict, v_mps: float, enter_s: float = 0.0, leave_s: float = 0.0) -> Choice:
@@ -97,23 +96,23 @@ def test_a_time_margin_slows_it_more() -> None:
 def test_pass_first_when_the_whole_body_is_past_before_it_enters() -> None:
     """At 1.5 m/s the robot is at 6 m after 4 s, exactly at hi: not past. With 5 s it is."""
     assert math.isinf(choose(CROSSING, 1.5).first_mps)
-    later = Conflict(0, 5.0, 7.0, 5.0, 5.0, 6.0, 6.0)
+    later = Conflict(0, 5.0, 7.0, 5.0, 5.0, 6.0)
     assert choose(later, 1.5).first_mps < 1.5
     assert choose(later, 1.5, enter_s=1.1).first_mps == math.inf
 
 
 def test_far_away_nothing_has_to_be_slowed() -> None:
-    far = Conflict(0, 1.0, 2.0, 9.0, 9.0, 10.0, 10.0)
+    far = Conflict(0, 1.0, 2.0, 9.0, 9.0, 10.0)
     assert choose(far, 1.5).yield_mps == math.inf
 
 
 def test_too_near_even_for_standing() -> None:
-    near = Conflict(0, 0.0, 6.0, -0.1, -0.1, 1.0, 1.0)
+    near = Conflict(0, 0.0, 6.0, -0.1, -0.1, 1.0)
     assert choose(near, 0.5).yield_mps == 0.0
 
 
 def test_what_stays_cannot_be_waited_for() -> None:
-    stays = Conflict(0, 3.0, math.inf, 5.0, 3.0, 6.0, 4.0)
+    stays = Conflict(0, 3.0, math.inf, 5.0, 3.0, 6.0)
     assert choose(stays, 1.0).yield_mps == 0.0
 
 

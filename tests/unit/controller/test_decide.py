@@ -18,7 +18,7 @@ from tests.support.scenes import free_space
 from vision.scene import CameraCondition, CameraHealth
 
 
-def test_a_free_way() -> None:
+def test_a_free_way_is_driven_at_full_speed() -> None:
     decision = Bench().settle(v_mps=1.0)
     assert decision.action is Action.INCREASE
     assert decision.target_speed_mps == 1.5

@@ -10,6 +10,7 @@ import pytest
 
 from controller.decide import Action, Decision
 from controller.path import OnPath
+from controller.situation import Situation
 from hal.types import PlanarPose
 from tests.support.deciding import AGE_NS, PATH, STEP_NS, Bench, obstacle
 from vision.scene import CameraCondition, CameraHealth, Obstacle
@@ -131,7 +132,8 @@ def test_the_pose_and_the_place_on_the_path_are_each_needed() -> None:
         bench = Bench()
         bench.settle()
         bench.now_ns += STEP_NS
-        decision = bench.maker.step(bench.scene(), PATH, pose, on_path, 1.0, 0.0, bench.now_ns)
+        at = Situation(bench.scene(), PATH, pose, on_path, 1.0, 0.0, bench.now_ns)
+        decision = bench.maker.step(at)
         assert stops(decision, "fault", word)
 
 

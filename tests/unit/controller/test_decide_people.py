@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from config.decision import DecisionConfig
+from config.path import LineSpec, PathSpec
+from config.robot import Robot
 from controller.decide import Action
+from controller.path import Path
 from tests.support.deciding import Bench, obstacle
 
 
@@ -54,6 +57,16 @@ def test_who_leaves_in_many_seconds_is_approached_like_who_stands() -> None:
 def test_the_robot_passes_first_when_there_is_time() -> None:
     decision = Bench().settle(obstacle(3.0, 4.5, vy_mps=-0.6), v_mps=1.5)
     assert decision.target_speed_mps == 1.5
+
+
+def test_where_the_path_is_slow_nobody_is_passed_first_by_a_speed_that_it_does_not_allow() -> None:
+    """At 1.5 m/s it would be past in time; the path allows 0.7."""
+    slow = Path(PathSpec(segments=(LineSpec(kind="line", length_m=30.0, max_speed_mps=0.7),)), Robot())
+    bench = Bench()
+    for _ in range(20):
+        decision = bench.step(bench.scene(obstacle(2.0, 3.9, vy_mps=-0.9)), 0.7, path=slow)
+    assert decision.reason.rule == "crossing"
+    assert decision.target_speed_mps < 0.7
 
 
 def test_the_choice_does_not_flip_with_noise() -> None:

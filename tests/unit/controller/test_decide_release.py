@@ -11,6 +11,7 @@ from config.path import LineSpec, PathSpec, StartSpec
 from config.robot import Limits, Robot
 from controller.decide import Action
 from controller.path import OnPath, Path
+from controller.situation import Situation
 from hal.types import PlanarPose
 from tests.support.deciding import STEP_NS, Bench, obstacle
 from vision.scene import CameraCondition, CameraHealth
@@ -146,7 +147,7 @@ def test_another_path_is_looked_along_anew() -> None:
     for _ in range(60):
         bench.now_ns += STEP_NS
         scene = replace(bench.scene(obstacle(3.0, -3.0)), robot_pose=pose)
-        decision = bench.maker.step(scene, aside, pose, on_path, 0.6, 0.0, bench.now_ns)
+        decision = bench.maker.step(Situation(scene, aside, pose, on_path, 0.6, 0.0, bench.now_ns))
     assert decision.reason.rule == "free"
 
 

@@ -27,7 +27,7 @@ def chart() -> tuple[Image, Chart]:
         (13.0, 37.0, [15.0, 20.0, 25.0, 30.0, 35.0]),
     ],
 )
-def test_round_ticks(low: float, high: float, ticks: list[float]) -> None:
+def test_ticks_are_round_numbers_within_the_axis(low: float, high: float, ticks: list[float]) -> None:
     assert round_ticks(low, high) == pytest.approx(ticks)
 
 
@@ -80,6 +80,15 @@ def test_bars_stand_on_the_axis() -> None:
     marks = painted(image, ORANGE)
     assert marks[round(inside[1]), round(inside[0])]
     assert not marks[round(above[1]), round(above[0])]
+
+
+@pytest.mark.parametrize("height", [1.5, math.inf])
+def test_a_bar_that_goes_on_beyond_the_frame_has_an_arrow_above_it(height: float) -> None:
+    image, drawn = chart()
+    drawn.bars([2.0, 6.0, 7.0], [4.0, 7.0, 8.0], [height, 1.0, math.nan], ORANGE)
+    rows, columns = np.nonzero(painted(image, ORANGE)[: drawn.plot.y - 2])
+    assert len(rows) > 20
+    assert columns.mean() == pytest.approx(drawn.to_px([3.0], [0.0])[0, 0], abs=0.7)
 
 
 @pytest.mark.parametrize("marker", ["circle", "square", "diamond"])

@@ -20,7 +20,7 @@ from hal.errors import BadRecording
 DESK = Path(__file__).parents[2] / "recordings" / "desk_rpy"
 
 
-def test_recording_report(tmp_path: Path) -> None:
+def test_a_recording_without_truth_is_reported_by_what_is_called_moving(tmp_path: Path) -> None:
     result = CliRunner().invoke(
         cli, ["evaluate", str(DESK), "--static", "--odometry", "none", "--report", str(tmp_path / "out")]
     )
@@ -62,6 +62,11 @@ def test_an_unknown_sequence_is_named_with_those_that_exist() -> None:
 def test_only_without_sim(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="give --sim with it"):
         run_evaluation(EvaluationOptions((DESK,), False, tmp_path, only=("walk-plain",)))
+
+
+def test_static_without_a_recording(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="--static says that nothing moves in the recordings"):
+        run_evaluation(EvaluationOptions((), True, tmp_path, static=True))
 
 
 def test_a_bad_recording_is_told_before_anything_is_written(tmp_path: Path) -> None:

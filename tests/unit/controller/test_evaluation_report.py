@@ -79,6 +79,7 @@ def test_durations_are_those_of_the_stopwatch(records: tuple[SequenceRecord, ...
 def test_two_runs_see_the_same(records: tuple[SequenceRecord, ...]) -> None:
     again = run_sequence(CROSSING, (OURS, LIDAR), (), clock())
     for name in (OURS, LIDAR):
+        assert any(answer.detections for answer in again.methods[name].answers)
         for first, second in zip(records[0].methods[name].answers, again.methods[name].answers, strict=True):
             assert [one.id for one in first.detections] == [one.id for one in second.detections]
             for a, b in zip(first.detections, second.detections, strict=True):
@@ -121,7 +122,9 @@ def test_summary_has_stable_keys(records: tuple[SequenceRecord, ...]) -> None:
     assert result["endpoint_error_px"]["beyond_2_m_median"] > 0.0
 
 
-def test_report_folder(records: tuple[SequenceRecord, ...], tmp_path: Path) -> None:
+def test_the_report_has_its_sections_figures_and_json(
+    records: tuple[SequenceRecord, ...], tmp_path: Path
+) -> None:
     prepare_folder(tmp_path)
     summary = summarise(records)
     write_figures(tmp_path, summary, records)
@@ -179,7 +182,7 @@ def test_an_unknown_figure_reaches_no_target() -> None:
     assert not any(target.reached(float("nan"), alone) for target in TARGETS for alone in (True, False))
 
 
-def test_numbers_of_tables() -> None:
+def test_tables_have_three_decimals_and_say_what_is_unknown() -> None:
     assert [fixed(value) for value in (0.12345, float("nan"), float("inf"))] == ["0.123", "n/a", "never"]
     assert table(("a", "b"), [("1", "2")]) == ["| a | b |", "|---|---|", "| 1 | 2 |", ""]
     assert section("T", "two\n   lines") == ["## T", "", "two lines", ""]

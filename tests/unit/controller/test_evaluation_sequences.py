@@ -119,7 +119,7 @@ def test_movers_stay_in_the_room_and_clear_of_robot_and_clutter(one: Sequence) -
                 assert gaps.min() > 0.3
 
 
-def test_people_differ() -> None:
+def test_people_differ_in_clothes_and_height() -> None:
     people = [body for one in ALL for body in one.scenario().bodies if isinstance(body, Person)]
     assert {person.texture for person in people} == {"fine", "coarse", "plain"}
     assert len({person.height_m for person in people}) > 1

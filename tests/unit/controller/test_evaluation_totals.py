@@ -81,7 +81,7 @@ def test_object_curve_trades_precision_for_recall() -> None:
     assert per_frame.recall[-1] == 1.0
 
 
-def test_pixel_curve() -> None:
+def test_the_pixel_curve_goes_from_the_surest_pixels_to_all_that_are_claimed() -> None:
     moving, rest = np.zeros(256, np.int64), np.zeros(256, np.int64)
     moving[[0, 200]], rest[[0, 100]] = (25, 75), (900, 25)
     counts = PixelCounts(moving, rest)

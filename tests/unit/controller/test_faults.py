@@ -39,7 +39,7 @@ TRIAL = TrialResult(
 )
 
 
-def test_the_tables() -> None:
+def test_the_tables_say_never_and_no_where_a_base_did_not_come_to_rest_or_drive_again() -> None:
     lost = TrialResult("agilex", "unplugged", ChassisMode.LOST, "unplugged", math.nan, 1.0, 0.5, False)
     text = describe([TRIAL, lost], [KillResult("kill -9 of control", 1.04, None, None)], "agilex")
     assert "Made by `treadwatch faults --processes agilex`." in text

@@ -86,6 +86,19 @@ def test_on_the_path_of_a_bend_it_turns_with_it() -> None:
     assert follower.step(OnPath(1.0, 0.0, 0.0), 1.0) == pytest.approx(-0.5)
 
 
+def test_beside_a_bend_it_turns_as_the_bend_through_the_robot_does() -> None:
+    """5 cm inside a bend of 2 m the radius is 1.95 m, outside 2.05 m; the rest is as on a line."""
+
+    def difference(path: Path, s_m: float) -> float:
+        follower = PathFollower(path, ROBOT.limits)
+        inside, outside = (follower.step(OnPath(s_m, d_m, 0.0), 0.4) for d_m in (0.05, -0.05))
+        return inside - outside
+
+    bend = Path(PathSpec(segments=(arc(2.0, 90.0),)), ROBOT)
+    straight = Path(PathSpec(segments=(line(6.0),)), ROBOT)
+    assert difference(bend, 1.5) - difference(straight, 1.5) == pytest.approx(0.4 / 1.95 - 0.4 / 2.05)
+
+
 @pytest.mark.parametrize("v_mps", [0.0, -0.5, math.nan])
 def test_no_yaw_without_speed(v_mps: float) -> None:
     follower = PathFollower(hook(2.0), ROBOT.limits)

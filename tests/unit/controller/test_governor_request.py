@@ -8,7 +8,7 @@ from controller.governor.request import MessageError, Request, Twist, answer, pa
 GOOD = {"seq": 7, "t_s": 1.5, "v_mps": 0.5, "w_radps": -0.1}
 
 
-def test_a_request() -> None:
+def test_a_request_is_read_with_its_numbers_as_they_are() -> None:
     assert parse_request(json.dumps(GOOD).encode()) == Request(7, 1.5, Twist(0.5, -0.1))
     # One that sends whole numbers means them as they are.
     assert parse_request(b'{"w_radps": 0, "v_mps": 1, "t_s": 3, "seq": 0}\n').twist == Twist(1.0, 0.0)

@@ -64,7 +64,7 @@ def test_what_passes_and_what_does_not(setpoint: Setpoint, words: str) -> None:
     assert bool(said) is bool(words)
 
 
-def test_age() -> None:
+def test_a_command_is_too_old_after_100_ms() -> None:
     old = Setpoint(NOW - 100 * MS, 0.0, 0.0, 0.0)
     assert objection(old, None, LIMITS, NOW) == ""
     assert objection(old, None, LIMITS, NOW + 1) == "the command is 100 ms old"

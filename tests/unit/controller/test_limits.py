@@ -10,7 +10,7 @@ from controller.limits import Gap, Motion, stop_before
 COMFORT = BrakeLimits(0.3, 0.6)
 
 
-def test_far_enough() -> None:
+def test_what_is_far_enough_limits_nothing_and_tells_its_margin() -> None:
     """From 1.5 m/s: 4.125 m, 0.2 s of latency 0.3 m, margin 0.45 m; 6 m leave 1.125 m."""
     limit = stop_before(
         Gap(6.0, obstacle_id=3), Motion(1.5, 0.0, 0.2), COMFORT, 0.45, 0.2, "static", "stands"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from config.loader import ConfigError
 from config.path import ArcSpec, LineSpec, PathSpec, StartSpec
 from config.robot import Body, Limits, Robot
-from controller.path import Path, PathError, compose
+from controller.path import Path, PathError
 from hal.types import PlanarPose
 
 ROBOT = Robot()
@@ -180,12 +180,6 @@ def test_wide_turns_and_crossings_are_accepted() -> None:
 def test_impossible_segments_are_refused(segments: list[object], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         PathSpec.model_validate({"segments": segments})
-
-
-def test_compose_puts_odometry_on_the_path() -> None:
-    start = PlanarPose(1.0, 2.0, math.pi / 2)
-    near(compose(start, PlanarPose(0.0, 0.0, 0.0)), 1, 2, math.pi / 2)
-    near(compose(start, PlanarPose(3.0, 1.0, math.pi / 2)), 0, 5, -math.pi)
 
 
 @given(st.floats(0.0, HOOK.length_m), st.floats(-1.2, 1.2))

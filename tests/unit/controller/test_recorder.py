@@ -31,7 +31,7 @@ def written(path: FilePath) -> list[dict[str, object]]:
 def test_a_frame_is_written_with_the_first_decision_that_knew_it(tmp_path: FilePath) -> None:
     camera, eyes = TickingCamera(33_000_000), PlainEyes()
     with ObservationFile(tmp_path / "o.jsonl") as observations:
-        recorder = RunRecorder(Recorder(observations, None, AROUND, timed=False), STRAIGHT)
+        recorder = RunRecorder(Recorder(observations, None, None, AROUND, timed=False), STRAIGHT)
         recorder.saw(eyes.look(camera.read(0.0)))
         recorder.decided(control_step(20_000_000, None))
         recorder.saw(eyes.look(camera.read(0.0)))

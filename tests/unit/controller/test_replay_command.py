@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,10 @@ import pytest
 
 from config.loader import CONFIG_DIR
 from controller.replay import EgoSpeed, ReplayOptions, run_replay
+from hal.cameras.tum_replay import TumReplay
+from hal.cameras.tum_writer import TumWriter
 from hal.types import Pose
+from tests.support.bags import camera_entries, write_bag
 from vision.scene import EgoMotion
 
 DESK = Path(__file__).resolve().parents[2] / "recordings" / "desk_rpy"
@@ -78,3 +82,27 @@ def test_the_ego_speed_is_the_median_of_the_last_five() -> None:
 
 def test_a_camera_that_goes_back_has_no_speed_ahead() -> None:
     assert EgoSpeed(None).step(moved(-0.2)) == 0.0
+
+
+def test_a_bag_is_seen_as_the_folder_with_the_same_frames(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frames = []
+    with TumReplay(DESK) as recorded:
+        for _ in range(5):
+            frame = recorded.read(0.0)
+            mm = np.rint(frame.depth * (1000.0 * frame.depth_scale_m)).astype(np.uint16)
+            frames.append(replace(frame, depth=mm, depth_scale_m=0.001))
+    with TumWriter(tmp_path / "folder") as writer:
+        for frame in frames:
+            writer.write(frame)
+    bag = write_bag(tmp_path, "mcap", lambda ros: camera_entries(ros, frames))
+    seen = []
+    for recording in (tmp_path / "folder", bag):
+        observations = tmp_path / f"{recording.name}.jsonl"
+        run_replay(ReplayOptions(recording, "none", CONFIG_DIR / "replay.yaml", observations, quiet=True))
+        lines = observations.read_text().splitlines()
+        seen.append([{**json.loads(line), "timing_ms": None} for line in lines])
+    assert len(seen[0]) == 5
+    assert seen[0] == seen[1]
+    assert "note        colour is /camera/color/image_raw" in capsys.readouterr().out

@@ -27,8 +27,6 @@ def test_ready_and_stopping_reach_the_manager(manager_socket: socket.socket) -> 
     assert manager_socket.recv(200) == b"READY=1\nSTATUS=driving"
     service.stopping("SIGTERM")
     assert manager_socket.recv(200) == b"STOPPING=1\nSTATUS=SIGTERM"
-    service.status("at rest")
-    assert manager_socket.recv(200) == b"STATUS=at rest"
 
 
 def test_the_watchdog_is_fed_at_half_its_interval(manager_socket: socket.socket) -> None:

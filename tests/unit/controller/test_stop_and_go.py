@@ -143,3 +143,10 @@ def test_a_robot_without_a_simulation_cannot_be_measured(tmp_path: Path) -> None
     wrong = StopAndGoOptions(CONFIG_DIR / "robot-bunker.yaml", 1, 0, "noise", tmp_path / "out")
     with pytest.raises(UserError, match=r"camera\.kind 'simulated'"):
         run_stop_and_go(wrong)
+
+
+def test_frames_can_only_be_kept_of_a_camera(tmp_path: Path) -> None:
+    wrong = StopAndGoOptions(CONFIG_DIR / "sim.yaml", 1, 0, "noise", tmp_path / "out", keep=True)
+    with pytest.raises(UserError, match="--keep needs --mode camera"):
+        run_stop_and_go(wrong)
+    assert not (tmp_path / "out").exists()

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from config.robot import Limits
-from controller.tally import SetpointTally, Standstill, TimingTally, mean_speed_mps
+from controller.tally import SetpointTally, ShaperFaults, Standstill, TimingTally, mean_speed_mps
 from hal.types import ChassisMode, Setpoint
 
 MS = 1_000_000
@@ -36,6 +36,19 @@ def test_a_gentle_start_breaks_nothing() -> None:
 )
 def test_each_broken_limit_is_counted(points: tuple[tuple[float, float], ...], what: str) -> None:
     assert tally_of(*points).violations == 1, what
+
+
+def test_the_greatest_of_speed_and_acceleration_stay_when_less_follows() -> None:
+    tally = tally_of((0.5, 0.0), (0.504, 0.2), (0.502, 0.0))
+    assert tally.max_speed_mps == 0.504
+    assert tally.max_accel_mps2 == pytest.approx(0.2)
+
+
+def test_of_the_shapers_faults_the_first_is_told() -> None:
+    faults = ShaperFaults()
+    for fault in ("", "no solution", "another"):
+        faults.add(fault)
+    assert faults.line() == "braked by the stop profile in 2 steps; first: no solution"
 
 
 def test_a_late_step_followed_by_one_on_time_is_no_jerk() -> None:

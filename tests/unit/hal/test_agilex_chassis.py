@@ -19,7 +19,7 @@ from hal.chassis.agilex_messages import (
 from hal.links.scripted import ScriptedCanLink
 from hal.types import CanFrame, ChassisMode, Setpoint
 from tests.support.agilex_bench import CAN, REMOTE, SERIAL, STANDBY, Bench, state
-from tests.support.chassis_rig import MS, agilex_config
+from tests.support.chassis_rig import MS, agilex_config, agilex_rig, can_link_config
 
 
 def test_standby_says_zero_and_leaves_the_mode_alone() -> None:
@@ -264,3 +264,15 @@ def test_what_came_instead_is_told_when_arming_gives_up(frames: list[CanFrame], 
     assert seen.mode is ChassisMode.STANDBY
     assert seen.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
     assert hint in seen.reason
+
+
+def test_two_lives_alike_to_the_bit() -> None:
+    """Same steps, same states: what lock-step simulation rests on."""
+
+    def life() -> list[str]:
+        with agilex_rig("bus", can_link_config()) as rig:
+            rig.run(0.2)
+            rig.arm()
+            return [repr(rig.step(0.004 * k, 0.002 * k)) for k in range(150)]
+
+    assert life() == life()

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hal.chassis.command import CommandLimits, is_zero, zero
+from hal.chassis.command import CommandLimits, due, is_zero, zero
 from hal.types import Setpoint
 
 MS = 1_000_000
@@ -35,6 +35,7 @@ def test_a_command_older_than_the_limit_stops() -> None:
     moving = setpoint(0.5)
     assert LIMITS.objection(moving, 200 * MS) == ""
     assert LIMITS.objection(moving, 240 * MS) == "the command is 240 ms old"
+    assert LIMITS.objection(setpoint(0.5, stamp_ns=100 * MS), 300 * MS) == ""
     assert LIMITS.objection(setpoint(0.0), 10_000 * MS) == "", "an old zero is still a zero"
     assert LIMITS.objection(None, 0) == ""
 
@@ -43,6 +44,19 @@ def test_a_fast_command_is_slowed_on_the_same_curve() -> None:
     fitted = LIMITS.fit(setpoint(6.0, 1.0, stamp_ns=7), 9)
     assert (fitted.v_mps, fitted.w_radps) == pytest.approx((3.0, 0.5))
     assert fitted.stamp_ns == 7
+
+
+def test_too_fast_a_turn_in_place_is_slowed() -> None:
+    fitted = LIMITS.fit(setpoint(0.0, -4.0), 0)
+    assert (fitted.v_mps, fitted.w_radps) == (0.0, -2.5)
+
+
+def test_what_was_never_sent_is_due_and_what_was_is_so_again_a_period_later() -> None:
+    assert due(None, 20 * MS, 0)
+    assert not due(1000 * MS, 20 * MS, 1000 * MS)
+    assert not due(1000 * MS, 20 * MS, 1010 * MS)
+    assert due(1000 * MS, 20 * MS, 1020 * MS)
+    assert due(1000 * MS, 20 * MS, 999 * MS), "a clock that went back keeps nothing waiting"
 
 
 def test_a_command_within_limits_is_left_alone() -> None:

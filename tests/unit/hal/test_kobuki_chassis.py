@@ -11,7 +11,7 @@ from hal.chassis.kobuki_packets import TICK_M, base_control
 from hal.types import ChassisMode
 from sim.kobuki_emulator import KobukiEmulator
 from tests.support.chassis_rig import KOBUKI_PLANT, MS, kobuki_config
-from tests.support.serial_bench import SerialBench, reason_for_giving_up
+from tests.support.serial_bench import SerialBench, every, reason_for_giving_up
 
 STOP = bytes.fromhex("AA 55 06 01 04 00 00 00 00 03")
 
@@ -172,14 +172,7 @@ def test_a_restart_shows_in_clock_or_ticks() -> None:
 def test_wrong_checksums_on_the_line_are_survived() -> None:
     bench = Bench()
     bench.arm()
-    count = 0
-
-    def spoil(data: bytes) -> bytes:
-        nonlocal count
-        count += 1
-        return data[:9] + bytes((data[9] ^ 0x40,)) + data[10:] if count % 4 == 0 else data
-
-    bench.near.hear_through(spoil)
+    bench.near.hear_through(every(4, lambda data: data[:9] + bytes((data[9] ^ 0x40,)) + data[10:]))
     states = [bench.step(0.4) for _ in range(300)]
     assert {state.mode for state in states} == {ChassisMode.ARMED}
     assert states[-1].pose.x_m == pytest.approx(bench.plant.pose.x_m, abs=0.01)

@@ -47,7 +47,9 @@ def said(v_mps: float, w_radps: float) -> tuple[int, int]:
         (0.0, -1e9, (-32767, 1)),
     ],
 )
-def test_directions_and_bounds(v_mps: float, w_radps: float, wire: tuple[int, int]) -> None:
+def test_twists_become_speed_and_radius_within_int16(
+    v_mps: float, w_radps: float, wire: tuple[int, int]
+) -> None:
     assert said(v_mps, w_radps) == wire
 
 

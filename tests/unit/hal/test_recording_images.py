@@ -109,7 +109,7 @@ def test_a_missing_an_empty_and_a_foreign_file_are_told_apart(tmp_path: Path) ->
 
 
 def test_a_wrong_size_is_told_with_both_sizes(colour: Path) -> None:
-    with pytest.raises(ImageError, match=r"is 64x48, camera\.yaml says 640x480"):
+    with pytest.raises(ImageError, match=r"is 64x48, its calibration says 640x480"):
         read_colour(colour, 640, 480)
 
 

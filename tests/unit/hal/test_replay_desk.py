@@ -104,7 +104,7 @@ def test_source_licence_and_citation_stand_beside_it() -> None:
         assert needed in text
 
 
-def test_it_stays_small() -> None:
+def test_the_recording_in_the_repository_stays_small() -> None:
     files: list[Path] = [path for path in DESK_RPY.rglob("*") if path.is_file()]
     assert len(files) == 2 * FRAMES + 6
     assert sum(path.stat().st_size for path in files) <= LIMIT_BYTES

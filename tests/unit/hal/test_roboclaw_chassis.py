@@ -1,4 +1,4 @@
-"""The RoboClaw driver and its port by the bytes they write and read, with a line that misbehaves."""
+"""The RoboClaw driver by the bytes it writes and reads, with a line that misbehaves."""
 
 from __future__ import annotations
 
@@ -9,107 +9,10 @@ import pytest
 
 from hal.chassis import roboclaw_packets as packets
 from hal.chassis.roboclaw import RoboclawChassis
-from hal.chassis.roboclaw_port import Answer, RoboclawPort
-from hal.links.scripted import ScriptedSerialLink
 from hal.types import ChassisMode
 from sim.roboclaw_emulator import RoboclawEmulator
-from tests.support.chassis_rig import COUNTS_PER_M, MS, PLANT, roboclaw_config
-from tests.support.serial_bench import SerialBench, first_known, reason_for_giving_up
-
-ADDRESS = 0x80
-
-
-def crc(command: int, data: bytes) -> bytes:
-    return packets.crc16(bytes((ADDRESS, command)) + data).to_bytes(2, "big")
-
-
-class TestPort:
-    def test_one_request_at_a_time_and_its_answer(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        assert port.idle(0)
-        port.start(packets.MAIN_BATTERY_REQUEST, 0)
-        assert not port.idle(0)
-        assert bytes(link.sent) == b"\x80\x18"
-        assert port.poll(1 * MS) is None
-        link.deliver(b"\x00\xfc" + crc(24, b"\x00\xfc"))
-        assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, b"\x00\xfc", 0)
-        assert port.idle(2 * MS)
-
-    def test_short_reads_are_put_together(self) -> None:
-        link = ScriptedSerialLink()
-        link.read_at_most(1)
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.ENCODERS_REQUEST, 0)
-        data = struct.pack(">II", 1, 2)
-        link.deliver(data + crc(78, data))
-        answers = [port.poll(k * MS) for k in range(10)]
-        assert answers[:-1] == [None] * 9
-        assert answers[-1] == Answer(packets.ENCODERS_REQUEST, data, 0)
-
-    def test_a_lost_answer_ends_after_its_time_and_a_silence(self) -> None:
-        port = RoboclawPort(ScriptedSerialLink(), ADDRESS)
-        port.start(packets.ENCODERS_REQUEST, 0)
-        assert port.poll(29 * MS) is None
-        assert port.poll(30 * MS) == Answer(packets.ENCODERS_REQUEST, None, 0)
-        assert not port.idle(39 * MS)
-        assert port.idle(40 * MS)
-
-    @pytest.mark.parametrize("noise", [b"\x00", b"\xff\x55\xaa"])
-    def test_noise_before_an_answer_spoils_it(self, noise: bytes) -> None:
-        """An answer has no start mark: guessing where it begins would accept wrong checksums."""
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.MAIN_BATTERY_REQUEST, 0)
-        link.deliver(noise + b"\x00\xfc" + crc(24, b"\x00\xfc"))
-        assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
-
-    def test_a_wrong_checksum_is_no_answer(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.MAIN_BATTERY_REQUEST, 0)
-        link.deliver(b"\x00\xfd" + crc(24, b"\x00\xfc"))
-        assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
-
-    def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.speeds(1, 1), 0)
-        port.poll(30 * MS)
-        link.deliver(b"\xff")
-        assert port.poll(38 * MS) is None
-        assert not port.idle(40 * MS), "the line is left quiet once more"
-        assert port.poll(48 * MS) is None
-        assert port.idle(48 * MS)
-        port.start(packets.speeds(2, 2), 48 * MS)
-        assert port.poll(50 * MS) is None
-
-    def test_an_abandoned_request_leaves_room_for_its_answer(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.speeds(1, 1), 0)
-        port.abandon(5 * MS)
-        link.deliver(b"\xff")
-        assert port.poll(20 * MS) is None
-        assert not port.idle(34 * MS)
-        assert port.idle(35 * MS)
-        port.abandon(50 * MS)
-        assert port.idle(50 * MS), "nothing to abandon"
-
-    def test_the_short_status_is_whole_when_silence_follows(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.STATUS_REQUEST, 0)
-        link.deliver(b"\x00\x04" + crc(90, b"\x00\x04"))
-        assert port.poll(4 * MS) is None, "it may be the beginning of the long one"
-        assert port.poll(14 * MS) == Answer(packets.STATUS_REQUEST, b"\x00\x04", 0)
-
-    def test_the_long_status_is_whole_at_once(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.STATUS_REQUEST, 0)
-        link.deliver(bytes.fromhex("00 00 00 01 97 9D"))
-        assert port.poll(4 * MS) == Answer(packets.STATUS_REQUEST, bytes.fromhex("00 00 00 01"), 0)
+from tests.support.chassis_rig import COUNTS_PER_M, PLANT, roboclaw_config
+from tests.support.serial_bench import SerialBench, every, first_known, reason_for_giving_up
 
 
 class Bench(SerialBench[RoboclawEmulator]):
@@ -200,6 +103,7 @@ def test_the_fastest_speed_holds_for_each_track() -> None:
     bench = Bench(max_qpps=10_000)
     bench.arm()
     twists = [(s.sent.v_mps, s.sent.w_radps) for s in (bench.step(0.5, 1.0) for _ in range(4)) if s.sent]
+    assert twists
     for v_mps, w_radps in twists:
         assert v_mps + 0.5 * w_radps * 0.555 * 1.1 == pytest.approx(0.5)
         assert w_radps == pytest.approx(2.0 * v_mps)
@@ -233,14 +137,7 @@ def test_wrong_checksums_on_the_line_are_survived() -> None:
     """Every seventh answer is spoilt: the drive goes on, and nothing wrong is believed."""
     bench = Bench()
     bench.arm()
-    count = 0
-
-    def spoil(data: bytes) -> bytes:
-        nonlocal count
-        count += 1
-        return bytes((data[0] ^ 0x40,)) + data[1:] if count % 7 == 0 else data
-
-    bench.near.hear_through(spoil)
+    bench.near.hear_through(every(7, lambda data: bytes((data[0] ^ 0x40,)) + data[1:]))
     states = [bench.step(0.5) for _ in range(400)]
     assert {state.mode for state in states} == {ChassisMode.ARMED}
     assert states[-1].v_mps == pytest.approx(0.5, abs=0.005)

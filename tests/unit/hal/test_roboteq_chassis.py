@@ -1,31 +1,12 @@
-"""The Roboteq driver by the bytes it writes and reads, with a line and a controller that misbehave."""
+"""The Roboteq driver by the bytes it writes and reads, with a line that misbehaves."""
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
-from hal.chassis.roboteq import RoboteqChassis
 from hal.types import ChassisMode
-from sim.roboteq_emulator import RoboteqEmulator
-from tests.support.chassis_rig import COUNTS_PER_M, PLANT, roboteq_config
-from tests.support.serial_bench import SerialBench, first_known, reason_for_giving_up
-
-
-class Bench(SerialBench[RoboteqEmulator]):
-    def __init__(self, **changes: object) -> None:
-        super().__init__(
-            PLANT,
-            lambda link, plant: RoboteqEmulator(
-                link, plant, full_speed_mps=1.0, counts_per_m=COUNTS_PER_M, boot_ms=0
-            ),
-            lambda link: RoboteqChassis(link, roboteq_config(**changes)),
-        )
-
-    def written(self) -> list[bytes]:
-        """The lines of the last exchange."""
-        return b"".join(self.near.written).split(b"\r")[:-1]
+from tests.support.roboteq_bench import Bench
+from tests.support.serial_bench import every, first_known
 
 
 def test_echo_off_watchdog_and_release_are_sent_with_consent_and_read_back() -> None:
@@ -125,115 +106,10 @@ def test_stop_says_zero_even_on_a_line_that_fails() -> None:
     assert bench.near.written == [b"!M 0 0\r"] * 2, "one was lost"
 
 
-def test_a_watchdog_that_does_not_hold_is_told() -> None:
-    bench = Bench()
-    bench.emulator.settable_watchdog = False
-    bench.chassis.arm(0)
-    reasons = [bench.step().reason for _ in range(160)]
-    waiting = "the base does not take commands: its watchdog reads 1000 ms, not 300 ms"
-    assert f"arming: {waiting}" in reasons
-    assert reasons[-1] == f"arming gave up after 3.0 s: {waiting}"
-
-
-def test_the_emergency_stop_stays_in_the_controller_until_consent() -> None:
-    bench = Bench()
-    bench.arm()
-    bench.run(50, 0.5)
-    bench.emulator.press_estop()
-    state = bench.run(20, 0.5)
-    assert (state.mode, state.reason) == (
-        ChassisMode.ESTOP,
-        "emergency stop is active; release the button, then arm",
-    )
-    bench.emulator.release_estop()
-    bench.run(100)
-    assert bench.emulator.fault_flags == 0x10, "nobody but a person ends it"
-    bench.chassis.arm(bench.now_ns)
-    assert bench.run(30).mode is ChassisMode.ARMED
-    assert bench.emulator.fault_flags == 0
-
-
-def test_consent_while_the_button_is_pressed_leads_nowhere() -> None:
-    bench = Bench()
-    bench.arm()
-    bench.emulator.press_estop()
-    bench.run(20)
-    bench.chassis.arm(bench.now_ns)
-    states = [bench.step() for _ in range(160)]
-    assert ChassisMode.ARMED not in {state.mode for state in states}
-    assert states[-1].mode is ChassisMode.ESTOP
-    bench.emulator.release_estop()
-    assert bench.run(100).mode is ChassisMode.ESTOP, "!MG was said once, with the consent, and never again"
-
-
-def test_a_fault_beside_the_emergency_stop_is_not_reset() -> None:
-    bench = Bench()
-    bench.arm()
-    bench.emulator.fault_flags = 0x18
-    bench.run(20)
-    bench.chassis.arm(bench.now_ns)
-    state = bench.step()
-    assert state.mode is ChassisMode.ESTOP
-    assert "arming refused: error: short circuit" in state.reason
-    assert state.faults == ("error: short circuit",)
-
-
-@pytest.mark.parametrize(
-    ("flags", "mode", "faults"),
-    [
-        ([1, 0], ChassisMode.ARMED, ("warning: motor 1 at its current limit",)),
-        ([0, 2], ChassisMode.ESTOP, ("error: motor 2 stalled",)),
-    ],
-)
-def test_motor_flags_latch_or_are_told(flags: list[int], mode: ChassisMode, faults: tuple[str, ...]) -> None:
-    bench = Bench()
-    bench.arm()
-    bench.emulator.motor_flags = flags
-    state = bench.run(20, 0.3)
-    assert (state.mode, state.faults) == (mode, faults)
-
-
-def test_a_base_that_moves_against_zero_is_shut_down() -> None:
-    """A script or a stick may drive the motors; after three seconds of zeros unheeded comes !EX."""
-    bench = Bench()
-    bench.arm()
-    bench.run(20, 0.3)
-    bench.far.hear_through(lambda data: data.replace(b"!M 0 0\r", b"!M 300 300\r"))
-    bench.step(math.nan)
-    lines: list[bytes] = []
-    for _ in range(145):
-        bench.step()
-        lines += bench.written()
-    assert b"!EX" not in lines
-    bench.run(10)
-    assert b"!EX" in bench.written()
-    bench.run(50)
-    assert bench.plant.twist[0] == pytest.approx(0.0, abs=1e-3)
-
-
-def test_a_controller_that_refuses_commands_is_told() -> None:
-    bench = Bench()
-    bench.arm()
-    bench.run(20, 0.3)
-    bench.far.hear_through(lambda data: data.replace(b"!M", b"!Q"))
-    state = bench.run(10, 0.3)
-    assert (state.mode, state.reason.split(";")[0]) == (
-        ChassisMode.ESTOP,
-        "the base no longer obeys: it refuses commands",
-    )
-
-
 def test_single_refusals_are_survived() -> None:
     bench = Bench()
     bench.arm()
-    count = 0
-
-    def spoil(data: bytes) -> bytes:
-        nonlocal count
-        count += 1
-        return data.replace(b"!M", b"!N") if count % 3 == 0 else data
-
-    bench.far.hear_through(spoil)
+    bench.far.hear_through(every(3, lambda data: data.replace(b"!M", b"!N")))
     assert bench.run(100, 0.3).mode is ChassisMode.ARMED
     assert bench.emulator.refused > 20
 
@@ -242,14 +118,7 @@ def test_lost_answers_are_survived() -> None:
     """Every fifth answer loses its name: the drive goes on, and nothing wrong is believed."""
     bench = Bench()
     bench.arm()
-    count = 0
-
-    def spoil(data: bytes) -> bytes:
-        nonlocal count
-        count += 1
-        return data.replace(b"=", b"?") if count % 5 == 0 else data
-
-    bench.near.hear_through(spoil)
+    bench.near.hear_through(every(5, lambda data: data.replace(b"=", b"?")))
     states = [bench.step(0.5) for _ in range(400)]
     assert {state.mode for state in states} == {ChassisMode.ARMED}
     assert states[-1].v_mps == pytest.approx(0.5, abs=0.005)
@@ -263,19 +132,6 @@ def test_echo_is_no_answer() -> None:
     bench.arm()
     assert bench.emulator.echo
     assert bench.run(100, 0.5).v_mps == pytest.approx(0.5, abs=0.005)
-
-
-def test_a_restart_shows_in_the_counters_or_in_the_watchdog() -> None:
-    driving, standing = Bench(), Bench()
-    driving.arm()
-    driving.run(100, 0.5)
-    driving.emulator.restart()
-    assert driving.run(20, 0.5).reason.startswith("the base no longer obeys: its counters jumped: restarted")
-    standing.arm()
-    standing.emulator.restart()
-    state = standing.run(40)
-    assert state.mode is ChassisMode.ESTOP
-    assert state.reason.startswith("the base no longer obeys: its watchdog reads 1000 ms, not 300 ms")
 
 
 def test_a_counter_that_noise_made_is_not_believed() -> None:
@@ -311,14 +167,3 @@ def test_the_fastest_speed_holds_for_each_track() -> None:
 def test_nothing_is_known_before_the_second_counter_answer() -> None:
     bench = Bench()
     assert first_known([bench.step() for _ in range(20)]) >= 3
-
-
-@pytest.mark.parametrize(
-    ("babble", "hint"),
-    [
-        (b"", "not one byte came; check port, power, baud and the crossed lines"),
-        (b"\xff\x00\x12", "bytes came, none an answer to ?FF; check baud and that it is a Roboteq"),
-    ],
-)
-def test_a_device_that_is_no_roboteq_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    assert hint in reason_for_giving_up(lambda link: RoboteqChassis(link, roboteq_config()), babble)

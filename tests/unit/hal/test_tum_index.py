@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hal.cameras.recording import SkippedFrame
 from hal.cameras.tum_index import (
-    SkippedFrame,
     associate,
     format_stamp,
     parse_stamp_ns,

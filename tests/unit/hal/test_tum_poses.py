@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hal.cameras.pose_file import PoseFile, open_odometry, rotation_matrix
+from hal.cameras.pose_file import PoseFile, open_odometry
+from hal.cameras.pose_track import rotation_matrix
 from hal.errors import BadRecording
 from tests.support.recordings import DESK_RPY
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hal.cameras.tum_index import SkippedFrame
+from hal.cameras.recording import SkippedFrame
 from hal.cameras.tum_replay import TumReplay
 from hal.errors import BadRecording, DeviceRefused, EndOfStream
 from hal.types import CameraMount, RgbdFrame
@@ -153,7 +153,7 @@ def spoil_cut_colour(folder: Path) -> str:
 
 def spoil_colour_size(folder: Path) -> str:
     assert cv2.imwrite(str(colour_files(folder)[1]), np.zeros((24, 32, 3), np.uint8))
-    return "is 32x24, camera.yaml says 64x48"
+    return "is 32x24, its calibration says 64x48"
 
 
 def spoil_colour_kind(folder: Path) -> str:
@@ -249,7 +249,7 @@ def test_when_no_frame_is_usable_the_recording_is_bad_and_the_first_reason_told(
     with (
         TumReplay(recording) as replay,
         pytest.raises(
-            BadRecording, match=r"none of the 4 frames is usable.*is 64x48, camera\.yaml says 640x48"
+            BadRecording, match=r"none of the 4 frames is usable.*is 64x48, its calibration says 640x48"
         ),
     ):
         replay.read(0.0)

@@ -69,6 +69,15 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
         TumWriter(tmp_path / "file" / "recording").__enter__()
 
 
+def test_a_disk_that_fills_up_is_told(tmp_path: Path) -> None:
+    (tmp_path / "camera.yaml").mkdir()
+    with (
+        TumWriter(tmp_path) as writer,
+        pytest.raises(DeviceRefused, match=r"camera\.yaml: cannot be"),
+    ):
+        writer.write(small_frame(0))
+
+
 def test_time_must_go_on_and_the_camera_stay_the_same(tmp_path: Path) -> None:
     with TumWriter(tmp_path) as writer:
         writer.write(small_frame(1))

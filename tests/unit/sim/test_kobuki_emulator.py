@@ -83,7 +83,9 @@ def test_it_streams_fifty_frames_a_second() -> None:
         (357, -600, (0.357, 0.357 * 485 / 715)),
     ],
 )
-def test_base_control(speed: int, radius: int, wheels: tuple[float, float]) -> None:
+def test_base_control_turns_the_wheels_as_the_radius_says(
+    speed: int, radius: int, wheels: tuple[float, float]
+) -> None:
     bench = Bench()
     bench.keep(drive(speed, radius))
     assert bench.plant.track_speeds_mps == pytest.approx(wheels, abs=1e-3)

@@ -86,7 +86,7 @@ def test_vectors_of_the_manual_are_acknowledged() -> None:
         (write(33, struct.pack(">h", -32767)), (0.0, -1.5)),
     ],
 )
-def test_motion_commands(packet: bytes, speeds: tuple[float, float]) -> None:
+def test_a_motion_command_drives_each_track(packet: bytes, speeds: tuple[float, float]) -> None:
     bench = Bench()
     assert bench.ask(packet) == b"\xff"
     bench.after(1000)
@@ -100,7 +100,7 @@ def test_ramps_are_followed() -> None:
     assert bench.plant.track_speeds_mps[0] == pytest.approx(0.25, abs=0.03)
 
 
-def test_queries() -> None:
+def test_queries_tell_counters_and_speeds() -> None:
     bench = Bench()
     bench.ask(write(37, struct.pack(">ii", 500, -500)))
     bench.after(1000)

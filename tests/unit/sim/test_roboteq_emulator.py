@@ -61,7 +61,7 @@ def test_it_echoes_every_character_until_told_not_to() -> None:
         (b"!M 9999 0\r", (1.0, 0.0)),
     ],
 )
-def test_motion_commands(command: bytes, speeds: tuple[float, float]) -> None:
+def test_a_motion_command_drives_each_track(command: bytes, speeds: tuple[float, float]) -> None:
     bench = Bench()
     assert bench.drive(command) == b"+\r"
     assert bench.plant.track_speeds_mps == pytest.approx(speeds, abs=1e-3)
@@ -91,7 +91,7 @@ def test_an_empty_line_is_nothing() -> None:
     assert Bench().ask(b"\r\r") == b""
 
 
-def test_queries() -> None:
+def test_queries_tell_speeds_counters_and_voltages() -> None:
     bench = Bench()
     bench.drive(b"!M 500 -500\r", 900)
     assert bench.ask(b"?S\r") == b"S=1500:-1500\r"

@@ -69,7 +69,6 @@ def test_truth_of_a_moving_crate() -> None:
     back = picture.camera.rotation @ body.velocity_mps
     assert back == pytest.approx([0.0, 0.8, 0.0], abs=1e-9)
     assert body.velocity_mps[0] == pytest.approx(-0.8 * np.cos(0.2))
-    assert body.nearest_m == pytest.approx(float(picture.depth_m()[mask].min()))
     assert body.position_m[2] == pytest.approx(float(picture.depth_m()[mask].mean()))
 
 

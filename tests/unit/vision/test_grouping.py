@@ -1,4 +1,4 @@
-"""Parts to bodies: what is merged, divided, attached and detached."""
+"""Parts to bodies: what is merged, attached and detached (what is divided: test_division.py)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from tests.support.grids import CAMERA, LEVEL_UP, X, grid_of, labelled, nearest, plate
-from vision.depth_grid import DepthGrid
-from vision.grouping import Bodies, Boxes, attach, boxes, detach, expected_in, gaps_m, join, merges, split
+from tests.support.grids import CAMERA, grid_of, labelled, nearest, plate
+from vision.grouping import Bodies, Boxes, attach, boxes, detach, expected_in, gaps_m, merges
 from vision.regions import Regions, measure
 
 ALL = np.array
@@ -183,74 +181,6 @@ def test_tracks_that_are_not_seen_take_no_part() -> None:
     assert merged(PERSON, Body(0.45, y=-0.3, width=0.3, height=0.3, cells=0)) == []
 
 
-def two_people(gap_m: float, bridge: bool = True) -> tuple[DepthGrid, NDArray[np.int32]]:
-    """Two upright plates 0.45 m wide, gap_m apart, joined at the hands: one connected part."""
-    half = gap_m / 2
-    left = plate(3.0, (-half - 0.45, -half), (-0.7, 0.9))
-    right = plate(3.0, (half, half + 0.45), (-0.7, 0.9))
-    hands = plate(3.0, (-half, half), (0.2, 0.32)) if bridge else np.zeros_like(left)
-    depth_m = nearest(left, right, hands)
-    return grid_of(depth_m, LEVEL_UP, 1.0), labelled(depth_m > 0.0)
-
-
-def test_two_people_hand_in_hand_are_divided_between_them() -> None:
-    grid, labels = two_people(0.4)
-    second = split(grid, labels, 0)
-    assert second is not None
-    columns = second % labels.shape[1]
-    side = np.sign(X[columns])
-    assert (side == side[0]).mean() > 0.97  # all on one side of the middle
-    of_side = np.count_nonzero((labels > 0) & (np.sign(X) == side[0])[None, :])
-    assert len(second) >= 0.8 * of_side
-    assert 2 * len(second) <= np.count_nonzero(labels) + 1  # the smaller one
-
-
-@pytest.mark.parametrize(("share", "divided"), [(0.3, True), (0.42, False)])
-def test_a_valley_is_lower_than_a_third_of_both_sides(share: float, divided: bool) -> None:
-    left, right = plate(3.0, (-0.7, -0.25), (-0.7, 0.9)), plate(3.0, (0.25, 0.7), (-0.7, 0.9))
-    depth_m = nearest(left, right, plate(3.0, (-0.25, 0.25), (0.9 - 1.6 * share, 0.9)))
-    assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is not None) == divided
-
-
-def test_a_part_that_would_be_divided_from_one_goes_to_the_next() -> None:
-    grid, labels = two_people(0.4)
-    labels = np.where(labels == 0, 0, np.where(X < 0.0, 1, 2)[None, :]).astype(np.int32)
-    labels[-labels.shape[0] // 2 :][labels[-labels.shape[0] // 2 :] == 2] = 3  # the right one's legs
-    joined, gone = join(grid, labels, [(1, 0), (2, 1)])
-    assert gone == [2]
-    np.testing.assert_array_equal(joined, np.where(labels == 3, 2, labels))
-    # Nothing goes where nothing is left.
-    assert join(grid, labels, [(2, 1), (2, 0), (1, 2)])[1] == [2]
-
-
-def test_only_the_cells_of_that_track_are_divided() -> None:
-    grid, labels = two_people(0.4)
-    both = np.where(labels == 1, np.int32(2), np.int32(0)).astype(np.int32)
-    assert split(grid, both, 0) is None
-    assert split(grid, both, 1) is not None
-
-
-@pytest.mark.parametrize("width_m", [0.6, 1.4, 2.0])
-def test_a_crate_is_one_however_wide(width_m: float) -> None:
-    depth_m = plate(3.0, (-width_m / 2, width_m / 2), (-0.4, 0.6))
-    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
-
-
-def test_one_person_with_arms_stretched_out_is_one() -> None:
-    body, arms = plate(3.0, (-0.2, 0.2), (-0.7, 0.9)), plate(3.0, (-0.55, 0.55), (-0.4, -0.25))
-    depth_m = nearest(body, arms)
-    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
-
-
-def test_a_few_cells_are_not_divided() -> None:
-    grid, labels = two_people(0.4)
-    sparse = np.zeros_like(labels)
-    chosen = np.flatnonzero(labels)[::40]
-    assert len(chosen) < 48
-    sparse.ravel()[chosen] = 1
-    assert split(grid, sparse, 0) is None
-
-
 def test_a_small_part_that_nobody_claims_goes_to_the_mover_beside_it() -> None:
     parts = regions(PERSON, ARM, Body(3.0, cells=30), Body(-0.45, cells=101))
     winner = np.array([2, 0, 0, 0], np.int32)
@@ -299,7 +229,13 @@ def test_a_part_in_which_its_mover_is_expected_stays_or_comes_however_far() -> N
     np.testing.assert_array_equal(attach(np.array([1]), parts, new, mover, NOWHERE[:2, :1]), [1, 0])
 
 
-def behind(middle_m: float | None, part_x: float = 0.6, part_z: float = 4.0, width_m: float = 1.2) -> bool:
+def behind(
+    middle_m: float | None,
+    part_x: float = 0.6,
+    part_z: float = 4.0,
+    width_m: float = 1.2,
+    moves: bool = True,
+) -> bool:
     """Whether a part at part_x is expected to be of a body width_m wide, 4 m away, that is seen from -0.6 to
     -0.2 m, with somebody 2 m away in front of its middle or nobody."""
     left, right = Body(-0.4), Body(part_x, z=part_z, width=0.2, cells=50)
@@ -313,7 +249,8 @@ def behind(middle_m: float | None, part_x: float = 0.6, part_z: float = 4.0, wid
         np.array([0.1]),
     )
     winner, votes = np.array([1, 0], np.int32), np.array([90, 0])
-    expected = expected_in(grid_of(nearest(*visible)), regions(left, right), winner, votes, body)
+    grid, mover = grid_of(nearest(*visible)), np.array([moves])
+    expected = expected_in(grid, regions(left, right), winner, votes, body, mover)
     return bool(expected[1, 0])
 
 
@@ -324,13 +261,4 @@ def test_a_body_is_expected_on_the_other_side_of_what_hides_its_middle() -> None
         0.0, width_m=0.8
     )  # there is no room for it: 0.6 + 0.25 m from the middle of what is seen
     assert not behind(0.0, part_z=4.5)  # nor is that at its depth
-
-
-def test_one_body_behind_somebody_is_not_divided() -> None:
-    """1.3 m wide; what hides its middle, and leaves a foot's breadth of it, makes no two of it."""
-    whole, foot = plate(4.0, (-0.65, 0.65), (-0.6, 0.8)), plate(4.0, (-0.3, 0.3), (0.7, 0.8))
-    somebody = plate(2.0, (-0.15, 0.15), (-0.5, 0.35))
-    two = nearest(plate(4.0, (-0.65, -0.3), (-0.6, 0.8)), plate(4.0, (0.3, 0.65), (-0.6, 0.8)), foot)
-    hidden = nearest(whole, somebody)
-    assert split(grid_of(two), labelled(two > 0.0), 0) is not None
-    assert split(grid_of(hidden), labelled(hidden == 4.0), 0) is None
+    assert not behind(0.0, moves=False)

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vision.line_of_sight import split, squared_sigmas
+from vision.line_of_sight import split
 
 UP = np.array([0.0, -1.0, 0.0])
 
 
-def test_squared_sigmas_by_hand() -> None:
+def test_split_by_hand() -> None:
     """Along x, y, z: 0.3, 0.4, 0.5 m/s with variances 0.0091, 0.0391, 0.2491 and 0.0009 added to each."""
     velocity = np.array([[0.3, 0.4, 0.5]])
     doubt = np.diag([0.0091, 0.0391, 0.2491])[None]
     # 0.09 / 0.01 + 0.16 / 0.04 + 0.25 / 0.25
-    assert squared_sigmas(velocity, doubt)[0] == pytest.approx(9.0 + 4.0 + 1.0)
     ahead = split(velocity, doubt, np.array([[0.0, 0.0, 1.0]]), None)
+    assert ahead.total[0] == pytest.approx(14.0)
     assert ahead.along[0] == pytest.approx(1.0)
     assert ahead.across[0] == pytest.approx(13.0)
     aside = split(velocity, doubt, np.array([[1.0, 0.0, 0.0]]), None)
@@ -48,4 +48,5 @@ def test_many_velocities_are_split_at_once_as_one_by_one() -> None:
         alone = split(velocity[k], doubt[k], sight, UP)
         np.testing.assert_allclose(together[k].along, alone.along)
         np.testing.assert_allclose(together[k].across, alone.across)
+        np.testing.assert_allclose(together[k].total, alone.total)
         np.testing.assert_allclose(together[k].level, alone.level)

@@ -199,7 +199,7 @@ MOVES = np.array([False, True])
 
 def ballot(*present: tuple[bool, bool]) -> masks.Ballot:
     table = np.array(present)
-    return masks.Ballot(table, (table.argmax(axis=1) + 1).astype(np.int32), np.array([150, 290]))
+    return masks.elect(table, table * np.array([[150], [290]]))
 
 
 @pytest.mark.parametrize(("came", "winner"), [(60, 0), (59, 1)])
@@ -248,9 +248,15 @@ def test_what_came_in_two_parts_has_left_nothing_behind() -> None:
 
 
 def test_a_mover_who_had_won_the_part_keeps_its_votes() -> None:
-    before = masks.Ballot(
-        np.array([[True, True], [True, False]]), np.array([2, 1], np.int32), np.array([150, 290])
-    )
+    before = masks.elect(np.array([[True, True], [True, False]]), np.array([[140, 150], [290, 0]]))
     left = masks.release(before, CELLS, np.array([60, 0]), MOVES)
     np.testing.assert_array_equal(left.winner, [2, 1])
     np.testing.assert_array_equal(left.votes, [150, 290])
+
+
+def test_a_part_that_came_goes_to_the_mover_with_the_most_votes_for_it() -> None:
+    present = np.array([[True, True, True], [True, False, False]])
+    before = masks.elect(present, np.array([[150, 20, 40], [290, 0, 0]]))
+    left = masks.release(before, CELLS, np.array([60, 0]), np.array([False, True, True]))
+    np.testing.assert_array_equal(left.winner, [3, 1])
+    np.testing.assert_array_equal(left.votes, [40, 290])

@@ -9,14 +9,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from config.perception import FragmentSettings, PerceptionConfig
+from config.perception import PerceptionConfig
 from hal.types import FloatArray, Intrinsics, PlanarPose, RgbdFrame
 from tests.support.painted import (
     FRAME_NS,
-    MOUNT,
     QVGA,
     VGA,
-    Quad,
     Take,
     box,
     drive,
@@ -24,26 +22,14 @@ from tests.support.painted import (
     plain,
     record,
     vector,
-    wall,
 )
+from tests.support.painted_room import CRATE_M, SIDEWAYS, SMALL, TOWARDS, look, perception, room
 from vision.perception import Perception
 from vision.scene import CameraCondition, Obstacle, Scene
 from vision.tracker import Percept
 
-# Half the resolution, everything counted in pixels halved with it.
-SMALL = PerceptionConfig(grid_step_px=2, fragments=FragmentSettings(min_length_px=16, tile_px=20))
-CRATE_M = vector(0.4, 0.6, 1.2)
-SIDEWAYS = vector(0.0, -0.8, 0.0)
-TOWARDS = vector(-0.9, 0.0, 0.0)
 JUDGED = 21  # frames: 0.7 s
-
-
-def perception(config: PerceptionConfig = SMALL) -> Perception:
-    return Perception(config, MOUNT, body_height_m=0.8, clearance_m=0.05)
-
-
-def room() -> list[Quad]:
-    return floor() + wall()
+watch = cache(look)  # most tests ask the same few takes different questions
 
 
 @cache
@@ -62,17 +48,6 @@ def towards(speed_mps: float, turn_radps: float) -> Take:
 def standing_room(speed_mps: float, turn_radps: float, count: int) -> Take:
     crates = box(vector(4.0, 1.0, 0.0), CRATE_M, 10) + box(vector(5.0, -1.0, 0.0), vector(0.4, 0.8, 0.7), 20)
     return record(room() + crates, drive(speed_mps, turn_radps), count, QVGA)
-
-
-def look(take: Take, odometry: bool, config: PerceptionConfig = SMALL) -> list[Percept]:
-    eyes = perception(config)
-    return [
-        eyes.perceive(frame, camera if odometry else None, None)
-        for frame, camera in zip(take.frames, take.cameras, strict=True)
-    ]
-
-
-watch = cache(look)  # most tests ask the same few takes different questions
 
 
 def only_mover(scene: Scene) -> Obstacle:
@@ -247,33 +222,6 @@ def test_a_mover_that_leaves_the_view_is_not_listed_for_ever() -> None:
     percepts = watch(record(gone, drive(), 40, QVGA), True)
     assert any(one.moving for percept in percepts for one in percept.scene.obstacles)
     assert not any(one.moving for one in percepts[-1].scene.obstacles)
-
-
-@pytest.mark.parametrize("velocity_mps", [TOWARDS, SIDEWAYS])
-@pytest.mark.parametrize("textured", [True, False])
-def test_true_velocity_is_within_three_sigmas_from_the_first_sight_on(
-    velocity_mps: FloatArray, textured: bool
-) -> None:
-    crate = box(vector(4.5, 0.3, 0.0), CRATE_M, 10, velocity_mps)
-    if not textured:
-        crate = [replace(face, texture=plain(60)) for face in crate]
-    take = record(room() + crate, drive(), 12, QVGA)
-    listed = 0
-    for percept, camera in zip(look(take, True), take.cameras, strict=True):
-        for one in percept.scene.obstacles:
-            if one.extent_m[0] > 1.5:
-                continue  # the wall
-            off = one.velocity_mps - camera.rotation.T @ velocity_mps
-            assert (np.abs(off) <= 3.0 * np.sqrt(np.diag(one.velocity_cov))).all()
-            listed += 1
-    assert listed == 10  # from the third frame on
-
-
-def test_first_sight_without_fragments_does_not_call_the_closing_speed_zero() -> None:
-    crate = [replace(face, texture=plain(60)) for face in box(vector(4.5, 0.3, 0.0), CRATE_M, 10)]
-    young = look(record(room() + crate, drive(), 3, QVGA), True)[-1].scene.obstacles
-    (one,) = (one for one in young if one.extent_m[0] < 1.5)
-    assert np.sqrt(one.velocity_cov[2, 2]) > 0.5  # 1.5 m/s towards the camera is within three sigmas
 
 
 def covered(frame: RgbdFrame) -> RgbdFrame:

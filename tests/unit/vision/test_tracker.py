@@ -112,6 +112,15 @@ def test_who_leaves_the_table_that_he_stood_at_is_the_mover_and_not_the_table() 
     np.testing.assert_allclose(mover.position_m[0], -0.25 - way_m(steps), atol=0.03)
 
 
+def test_somebody_may_come_into_a_view_in_which_there_was_nothing() -> None:
+    """Beyond 10 m only; then he stands there from one frame to the next."""
+    hall = wall(12.0)
+    percepts = track([hall] * 20 + [nearest(walker(0.0), hall)] * 5)
+    assert not percepts[19].scene.obstacles
+    (comer,) = percepts[-1].scene.obstacles
+    np.testing.assert_allclose(comer.position_m, [0.0, 0.2, 4.0], atol=0.06)
+
+
 @pytest.mark.parametrize(("off_m", "comes_back"), [(-0.5, False), (0.6, True)])
 def test_what_was_seen_before_and_while_the_cameras_motion_was_lost_proves_nothing(
     off_m: float, comes_back: bool

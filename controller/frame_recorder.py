@@ -1,0 +1,65 @@
+"""Frames on their way to the disk, while the next ones are looked at."""
+
+from __future__ import annotations
+
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import click
+
+from hal.cameras.tum_writer import TumWriter
+from hal.types import Pose, RgbdFrame
+
+# Two thirds of a second: longer than a disk pauses now and then, some 30 MB.
+_MOST_WAITING = 20
+
+
+class FrameRecorder:
+    """Compresses and writes in a thread of its own: OpenCV does so without the interpreter's lock.
+
+    may_drop: where writing does not keep up, frames are left out, and counted; else whoever records waits.
+    """
+
+    def __init__(self, writer: TumWriter, folder: Path, may_drop: bool) -> None:
+        self._writer, self._folder, self._may_drop = writer, folder, may_drop
+        self._waiting: deque[Future[None]] = deque()
+        self._thread: ThreadPoolExecutor | None = None
+        self._last_ns: int | None = None
+        self.dropped = 0
+
+    def __enter__(self) -> Self:
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="frame-recorder")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """What was taken in is written. Raises DeviceRefused if it cannot be and nothing else is wrong."""
+        assert self._thread is not None
+        self._thread.shutdown(wait=True)
+        if self.dropped:
+            why = "they came faster than they could be written"
+            click.echo(f"treadwatch: {self._folder}: {self.dropped} frames were left out: {why}", err=True)
+        if error is None:
+            self._collect(0)
+
+    def write(self, frame: RgbdFrame, odometry: Pose | None) -> None:
+        """Take in one frame; one that is not later than the last says nothing new. Raises DeviceRefused where
+        an earlier one could not be written."""
+        assert self._thread is not None
+        if self._last_ns is not None and frame.captured_ns <= self._last_ns:
+            return
+        self._last_ns = frame.captured_ns
+        self._collect(len(self._waiting) if self._may_drop else _MOST_WAITING - 1)
+        if len(self._waiting) >= _MOST_WAITING:
+            self.dropped += 1
+            return
+        self._waiting.append(self._thread.submit(self._writer.write, frame, odometry))
+
+    def _collect(self, most: int) -> None:
+        """Raise what went wrong; wait until at most so many are left."""
+        while self._waiting and (self._waiting[0].done() or len(self._waiting) > most):
+            self._waiting.popleft().result()

@@ -1,0 +1,131 @@
+"""camera_info and transforms of a bag -> the calibration that camera.yaml would give."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from config.recording import RecordingCamera
+from hal.cameras.bag_file import BagFile, Topic
+from hal.cameras.bag_realsense import TRANSFORM, depth_unit_topic, reference_of, stream_of
+from hal.cameras.bag_topics import BagTopics
+from hal.cameras.bag_transforms import StaticTransforms, frame_name
+from hal.errors import BadRecording
+from hal.types import Pose
+
+_TF_STATIC = "/tf_static"
+_PER_METRE = 1000.0
+_BROWN = ("plumb_bob", "rational_polynomial", "Brown Conrady")
+_COEFFICIENTS = 5
+
+
+def read_transforms(bag: BagFile) -> StaticTransforms:
+    """All of /tf_static, and those of RealSense streams. Raises BadRecording."""
+    transforms = StaticTransforms()
+    own = [topic.name for topic in bag.topics if topic.kind == TRANSFORM and reference_of(topic.name)]
+    for topic, message in bag.messages((_TF_STATIC, *own)):
+        try:
+            if (streams := reference_of(topic)) is not None:
+                transforms.add(*streams, message)
+                continue
+            for one in message.transforms:
+                transforms.add(frame_name(one.header.frame_id), frame_name(one.child_frame_id), one.transform)
+        except ValueError as error:
+            raise BadRecording(f"{bag.path}: {topic}: {error}") from error
+    return transforms
+
+
+def read_calibration(
+    bag: BagFile, topics: BagTopics, transforms: StaticTransforms
+) -> tuple[RecordingCamera, str, tuple[str, ...]]:
+    """(calibration, frame of the colour camera, notes). Raises BadRecording."""
+    if topics.colour_info is None:
+        raise BadRecording(
+            f"{bag.path}: no camera_info was recorded beside {topics.colour.name}, so its focal length is "
+            "not known; record that topic too"
+        )
+    colour = bag.first(topics.colour_info)
+    values: dict[str, Any] = dict(
+        zip(("fx", "fy", "cx", "cy"), _pinhole(colour, topics.rectified), strict=True),
+        width=int(colour.width),
+        height=int(colour.height),
+        depth_factor=_depth_factor(bag, topics),
+        distortion=() if topics.rectified else _distortion(bag, topics.colour_info, colour),
+    )
+    frame = _frame_of(colour, topics.colour)
+    notes: tuple[str, ...] = ()
+    depth = None if topics.depth_info is None else bag.first(topics.depth_info)
+    depth_frame = frame if depth is None else _frame_of(depth, topics.depth)
+    if depth is not None and not topics.says_registered and depth_frame != frame:
+        apart = transforms.find(frame, depth_frame)
+        if apart is None:
+            notes = (
+                f"no transform from {depth_frame} to {frame} was recorded: depth and colour are taken as "
+                "seen from one place",
+            )
+        values |= _depth_camera(depth, apart or Pose(np.eye(3), np.zeros(3)))
+    try:
+        return RecordingCamera(**values), frame, notes
+    except ValidationError as error:
+        told = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+        raise BadRecording(
+            f"{bag.path}: the calibration in {topics.colour_info} is impossible ({told})"
+        ) from error
+
+
+def _frame_of(info: Any, images: Topic) -> str:
+    """The frame that a camera_info names; RealSense streams of a .bag are frames themselves."""
+    return frame_name(info.header.frame_id) or stream_of(images.name) or images.name
+
+
+def _depth_factor(bag: BagFile, topics: BagTopics) -> float:
+    """Units a metre: millimetres (REP 118), unless a RealSense says otherwise."""
+    stream = stream_of(topics.depth.name)
+    option = None if stream is None else bag.first(depth_unit_topic(stream))
+    if option is None:
+        return _PER_METRE
+    try:
+        # A float of 32 bits: a thousandth comes as 0.0010000000475.
+        return round(1.0 / float(option.data), 3)
+    except (ValueError, ZeroDivisionError) as error:
+        raise BadRecording(f"{bag.path}: {topics.depth.name}: its depth unit is {option.data!r}") from error
+
+
+def _pinhole(info: Any, rectified: bool) -> tuple[float, float, float, float]:
+    """fx, fy, cx, cy: of K, or of P where the images are rectified."""
+    if rectified:
+        p = _matrix(info, "p")
+        return float(p[0]), float(p[5]), float(p[2]), float(p[6])
+    k = _matrix(info, "k")
+    return float(k[0]), float(k[4]), float(k[2]), float(k[5])
+
+
+def _matrix(info: Any, name: str) -> Any:
+    """ROS 1 writes the names of matrices in capitals."""
+    return getattr(info, name) if hasattr(info, name) else getattr(info, name.upper())
+
+
+def _distortion(bag: BagFile, topic: str, info: Any) -> tuple[float, ...]:
+    found = tuple(float(value) for value in _matrix(info, "d"))
+    if not any(found):
+        return ()
+    if info.distortion_model in _BROWN and not any(found[_COEFFICIENTS:]):
+        return found[:_COEFFICIENTS]
+    raise BadRecording(
+        f"{bag.path}: {topic}: the lens model {info.distortion_model} with {len(found)} coefficients cannot "
+        "be used; rectify the images (image_proc) and choose their topic with --colour-topic"
+    )
+
+
+def _depth_camera(depth: Any, in_colour: Pose) -> dict[str, Any]:
+    names = ("depth_fx", "depth_fy", "depth_cx", "depth_cy")
+    return dict(
+        zip(names, _pinhole(depth, rectified=False), strict=True),
+        depth_registered=False,
+        depth_width=int(depth.width),
+        depth_height=int(depth.height),
+        depth_to_colour_translation_m=tuple(in_colour.translation_m.tolist()),
+        depth_to_colour_rotation=tuple(in_colour.rotation.ravel().tolist()),
+    )

@@ -1,0 +1,65 @@
+"""nav_msgs Odometry of a base, with where its camera sits -> poses of the camera."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hal.cameras.bag_file import BagFile
+from hal.cameras.bag_transforms import StaticTransforms, frame_name
+from hal.cameras.pose_track import PoseTrack, quaternion_of, rotation_matrix
+from hal.clocks import NS_PER_S
+from hal.errors import BadRecording
+from hal.types import FloatArray
+
+_UNIT_TOLERANCE = 0.01
+
+
+def stamp_ns(message: Any) -> int:
+    """The time in a message's header."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
+
+
+def read_odometry(bag: BagFile, topic: str, camera: str, transforms: StaticTransforms) -> PoseTrack:
+    """Of the frame camera. Raises BadRecording: no transform to it, or a pose that is none."""
+    rows: dict[int, FloatArray] = {}
+    base = None
+    for _, message in bag.messages((topic,)):
+        base = base or frame_name(message.child_frame_id) or "base_link"
+        at, q = message.pose.pose.position, message.pose.pose.orientation
+        values = np.array([at.x, at.y, at.z, q.x, q.y, q.z, q.w])
+        length = float(np.linalg.norm(values[3:]))
+        if not (np.isfinite(values).all() and abs(length - 1.0) <= _UNIT_TOLERANCE):
+            raise BadRecording(
+                f"{bag.path}: {topic}: pose {len(rows) + 1} is none; replay it with --odometry none"
+            )
+        values[3:] /= length
+        rows.setdefault(stamp_ns(message), values)
+    mount = None if base is None else transforms.find(base, camera)
+    if mount is None:
+        raise BadRecording(
+            f"{bag.path}: {topic}: where {camera} sits on {base or 'the base'} was not recorded in "
+            "/tf_static; record it, or replay with --odometry none"
+        )
+    stamps_ns = sorted(rows)
+    poses = np.stack([rows[one] for one in stamps_ns])
+    # A camera that is bolted on turns as its base does: the constant turn between them is on the right.
+    positions = np.stack([rotation_matrix(pose[3:]) @ mount.translation_m + pose[:3] for pose in poses])
+    return PoseTrack(topic, stamps_ns, positions, _turned(poses[:, 3:], quaternion_of(mount.rotation)))
+
+
+def _turned(first: FloatArray, then: FloatArray) -> FloatArray:
+    """(N, 4) Hamilton's product of quaternions (N, 4) and (4,), qx qy qz qw."""
+    x, y, z, w = first.T
+    a, b, c, d = then
+    return np.stack(
+        (
+            w * a + x * d + y * c - z * b,
+            w * b - x * c + y * d + z * a,
+            w * c + x * b - y * a + z * d,
+            w * d - x * a - y * b - z * c,
+        ),
+        axis=1,
+    )

@@ -1,0 +1,194 @@
+"""A ROS bag as a camera."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from config.camera import OdometryChoice
+from hal.cameras.bag_calibration import read_calibration, read_transforms
+from hal.cameras.bag_file import BagFile
+from hal.cameras.bag_images import colour_image, depth_image
+from hal.cameras.bag_odometry import read_odometry, stamp_ns
+from hal.cameras.bag_topics import BagTopics, WantedTopics, choose_topics
+from hal.cameras.bag_transforms import StaticTransforms
+from hal.cameras.calibration import RecordingCalibration
+from hal.cameras.image_file import ImageError
+from hal.cameras.pose_track import PoseTrack
+from hal.cameras.recording import SkippedFrame
+from hal.cameras.stamp_pairing import Stamped, StampPairing
+from hal.cameras.tum_index import format_stamp
+from hal.clocks import NS_PER_S
+from hal.errors import BadRecording, DeviceRefused, EndOfStream
+from hal.types import CameraMount, Intrinsics, RgbdFrame
+
+_ANY_TOPICS = WantedTopics()
+
+
+class BagReplay:
+    """Recording over the images of a bag of ROS 1 or ROS 2, or of a RealSense viewer (.db3).
+
+    Topics, calibration and odometry are read at once (raises BadRecording; DeviceNotFound where rosbags is
+    not installed), images when entered. captured_ns is the time in the header of the colour image. odometry:
+    what was asked for, and recorded. Entering again starts from the beginning.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        odometry: OdometryChoice = "auto",
+        wanted: WantedTopics = _ANY_TOPICS,
+        max_pair_gap_s: float = 0.02,
+    ) -> None:
+        self._path, self._max_gap_ns = path, round(max_pair_gap_s * NS_PER_S)
+        with BagFile(path) as bag:
+            self._topics = choose_topics(path, bag.topics, wanted)
+            transforms = read_transforms(bag)
+            camera, frame, notes = read_calibration(bag, self._topics, transforms)
+            self.odometry, odometry_notes = _odometry(bag, self._topics, odometry, frame, transforms)
+            self.fps = self._topics.colour.messages / bag.duration_s if bag.duration_s > 0.0 else None
+        self._calibration = RecordingCalibration(camera)
+        self._notes = (*notes, *odometry_notes)
+        self._messages: Iterator[tuple[str, Any]] | None = None
+        self._closing = ExitStack()
+        self._rewind()
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Of the undistorted images that read() gives."""
+        return self._calibration.intrinsics
+
+    @property
+    def mount(self) -> CameraMount | None:
+        """A bag does not say how high over the floor its camera was."""
+        return None
+
+    @property
+    def frame_count(self) -> int:
+        """As many as there are of the rarer of colour and depth."""
+        return min(self._topics.colour.messages, self._topics.depth.messages)
+
+    @property
+    def skipped(self) -> tuple[SkippedFrame, ...]:
+        """What could not be used so far, and why, in the order of the recording."""
+        return tuple(self._skipped)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Plain sentences for the summary: what was chosen, assumed or left out."""
+        colour, depth = self._pairing.colour, self._pairing.depth
+        counted = {
+            "colour images without depth of the same time": colour.unpaired,
+            "depth images without colour of the same time": depth.unpaired,
+            "images not later than the one before, left out": colour.out_of_order + depth.out_of_order,
+        }
+        chosen = f"colour is {self._topics.colour.name}, depth {self._topics.depth.name}"
+        found = tuple(f"{count} {what}" for what, count in counted.items() if count)
+        return (chosen, *self._notes, *found)
+
+    def __enter__(self) -> Self:
+        """Raises BadRecording."""
+        self._rewind()
+        bag = self._closing.enter_context(BagFile(self._path))
+        self._messages = bag.messages((self._topics.colour.name, self._topics.depth.name))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._messages = None
+        self._closing.close()
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """The next usable frame. A recording is never late: timeout_s plays no part.
+
+        Raises EndOfStream after the last frame, BadRecording instead if not one frame was usable,
+        DeviceRefused outside of a with block.
+        """
+        if self._messages is None:
+            raise DeviceRefused(f"{self._path}: the recording is not open; read it inside a with block")
+        while self._pairs or not self._ended:
+            if not self._pairs:
+                self._take_in(self._messages)
+                continue
+            outcome = self._load(*self._pairs.popleft())
+            if isinstance(outcome, RgbdFrame):
+                self._usable += 1
+                return outcome
+            self._skipped.append(outcome)
+        if self._usable == 0:
+            why = f"; the first: {self._skipped[0]}" if self._skipped else "; check the times of its images"
+            raise BadRecording(f"{self._path}: not one frame is usable{why}")
+        raise EndOfStream(f"{self._path}: no further frame")
+
+    def _rewind(self) -> None:
+        self._pairing: StampPairing[Any] = StampPairing(self._max_gap_ns)
+        self._pairs: deque[tuple[Stamped[Any], Stamped[Any]]] = deque()
+        self._skipped: list[SkippedFrame] = []
+        self._usable, self._taken, self._ended = 0, 0, False
+
+    def _take_in(self, messages: Iterator[tuple[str, Any]]) -> None:
+        try:
+            topic, message = next(messages)
+        except StopIteration:
+            self._end()
+        except BadRecording as error:
+            # What came before the damage was whole, and is not lost for it.
+            self._skipped.append(SkippedFrame("the rest", str(error)))
+            self._ended = True
+        else:
+            self._taken += 1
+            is_colour = topic == self._topics.colour.name
+            stream = self._pairing.colour if is_colour else self._pairing.depth
+            stream.add(stamp_ns(message), message)
+        self._pairs.extend(self._pairing.pairs(self._ended))
+
+    def _end(self) -> None:
+        """The bag's index says how many there are: a storage may pass over what is damaged in silence."""
+        self._ended = True
+        promised = self._topics.colour.messages + self._topics.depth.messages
+        if self._taken < promised:
+            why = f"{promised - self._taken} of {promised} images cannot be found; the bag is damaged"
+            self._skipped.append(SkippedFrame("the rest", why))
+
+    def _load(self, colour: Stamped[Any], depth: Stamped[Any]) -> RgbdFrame | SkippedFrame:
+        calibration = self._calibration
+        topic, stamp = self._topics.colour.name, colour.stamp_ns
+        try:
+            bgr = colour_image(colour.item, calibration.intrinsics.width, calibration.intrinsics.height)
+            topic, stamp = self._topics.depth.name, depth.stamp_ns
+            measured = depth_image(depth.item, calibration.depth_width, calibration.depth_height)
+        except ImageError as error:
+            return SkippedFrame(f"{topic} at {format_stamp(stamp)}", str(error))
+        bgr, measured = calibration.rectify(bgr, measured)
+        return RgbdFrame(
+            colour=bgr,
+            depth=measured,
+            depth_scale_m=calibration.depth_scale_m,
+            captured_ns=colour.stamp_ns,
+            device_s=colour.stamp_ns / NS_PER_S,
+            sequence=colour.number,
+            intrinsics=calibration.intrinsics,
+        )
+
+
+def _odometry(
+    bag: BagFile, topics: BagTopics, choice: OdometryChoice, camera: str, transforms: StaticTransforms
+) -> tuple[PoseTrack | None, tuple[str, ...]]:
+    """The poses that were chosen, and what is to be said of it. Raises BadRecording."""
+    if choice == "groundtruth":
+        raise BadRecording(f"{bag.path}: a bag has no groundtruth.txt; choose another odometry, or none")
+    if choice == "none" or (choice == "auto" and topics.odometry is None):
+        return None, ()
+    if topics.odometry is None:
+        raise BadRecording(f"{bag.path}: no odometry was recorded (nav_msgs/Odometry); choose auto, or none")
+    try:
+        return read_odometry(bag, topics.odometry, camera, transforms), ()
+    except BadRecording as error:
+        if choice == "file":
+            raise
+        return None, (f"odometry is not used: {error}",)

@@ -1,0 +1,127 @@
+"""Which topics of a bag are colour, depth, their calibration and the odometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from hal.cameras.bag_file import Topic
+from hal.cameras.bag_realsense import info_topic, stream_of
+from hal.errors import BadRecording
+
+_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+_ODOMETRY = "nav_msgs/msg/Odometry"
+_TRANSPORTS = ("/compressed", "/compressedDepth")
+_COLOUR_WORDS = ("color", "colour", "rgb")
+_NO_COLOUR_WORDS = ("depth", "infra", "/ir", "mask", "label", "disparity", "confidence")
+_REGISTERED_WORDS = ("aligned", "registered")
+_RECTIFIED = "rect"
+
+
+@dataclass(frozen=True, slots=True)
+class WantedTopics:
+    """What the user asks for; None: to be found."""
+
+    colour: str | None = None
+    depth: str | None = None
+    odometry: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BagTopics:
+    """The chosen ones; an info or the odometry is None where there is none."""
+
+    colour: Topic
+    depth: Topic
+    colour_info: str | None
+    depth_info: str | None
+    odometry: str | None
+
+    @property
+    def says_registered(self) -> bool:
+        """Whether depth calls itself registered to colour."""
+        return is_registered(self.depth.name)
+
+    @property
+    def rectified(self) -> bool:
+        """Whether the colour images have no lens distortion any more."""
+        return _RECTIFIED in base_name(self.colour.name).rsplit("/", 1)[-1]
+
+
+def choose_topics(path: Path, topics: Sequence[Topic], wanted: WantedTopics) -> BagTopics:
+    """Raises BadRecording where there is none, or several that are equally good, naming them."""
+    images = [one for one in topics if one.kind in _IMAGES]
+    colour = _choose(path, images, wanted.colour, "colour", _colour_rank)
+    depth = _choose(path, images, wanted.depth, "depth", _depth_rank)
+    infos = {one.name for one in topics if one.kind == _CAMERA_INFO}
+    moves = [one for one in topics if one.kind == _ODOMETRY]
+    odometry = None
+    if moves or wanted.odometry is not None:
+        odometry = _choose(path, moves, wanted.odometry, "odometry", lambda _: 0).name
+    return BagTopics(colour, depth, _info_of(colour, infos), _info_of(depth, infos), odometry)
+
+
+def base_name(topic: str) -> str:
+    """Without the image transport."""
+    for transport in _TRANSPORTS:
+        topic = topic.removesuffix(transport)
+    return topic
+
+
+def is_registered(topic: str) -> bool:
+    """Whether a depth topic is named as registered to colour."""
+    return any(word in topic.lower() for word in _REGISTERED_WORDS)
+
+
+def _choose(
+    path: Path, topics: Sequence[Topic], wanted: str | None, what: str, rank: Callable[[Topic], int | None]
+) -> Topic:
+    """The topic that is wanted, or the one that ranks least; None is no candidate."""
+    if wanted is not None:
+        named = [one for one in topics if one.name == wanted]
+        if named:
+            return named[0]
+        raise BadRecording(f"{path}: --{what}-topic {wanted}: there is none; there are {_names(topics)}")
+    ranked = {one: place for one in topics if (place := rank(one)) is not None}
+    if not ranked:
+        raise BadRecording(
+            f"{path}: no topic with {what} images was found; choose one with --{what}-topic; "
+            f"there are {_names(topics)}"
+        )
+    best = [one for one in topics if ranked.get(one) == min(ranked.values())]
+    # The same images in several transports: uncompressed ones sort first, by their shorter name.
+    if len({base_name(one.name) for one in best}) > 1:
+        raise BadRecording(
+            f"{path}: several topics could be the {what}: {_names(best)}; choose one with --{what}-topic"
+        )
+    return min(best, key=lambda one: len(one.name))
+
+
+def _colour_rank(topic: Topic) -> int | None:
+    name = topic.name.lower()
+    if any(word in name for word in _NO_COLOUR_WORDS):
+        return None
+    named = any(word in name for word in _COLOUR_WORDS)
+    return (0 if named else 2) + (0 if _RECTIFIED in name else 1)
+
+
+def _depth_rank(topic: Topic) -> int | None:
+    name = topic.name.lower()
+    # Depth through a codec for pictures is no depth any more.
+    if "depth" not in name or topic.name.endswith("/compressed"):
+        return None
+    return 0 if is_registered(topic.name) else 1
+
+
+def _info_of(topic: Topic, infos: set[str]) -> str | None:
+    """As image_transport finds it: beside the images."""
+    beside = base_name(topic.name).rsplit("/", 1)[0] + "/camera_info"
+    stream = stream_of(topic.name)
+    places = [beside] if stream is None else [beside, info_topic(stream)]
+    return next((place for place in places if place in infos), None)
+
+
+def _names(topics: Sequence[Topic]) -> str:
+    return ", ".join(one.name for one in topics) or "none of that kind"

@@ -1,0 +1,46 @@
+"""The tree of frames that a bag's transforms span."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from hal.cameras.pose_track import rotation_matrix
+from hal.types import Pose
+
+
+class StaticTransforms:
+    """Where frames stand in each other."""
+
+    def __init__(self) -> None:
+        self._seen_from: dict[str, dict[str, Pose]] = {}
+
+    def add(self, parent: str, child: str, transform: Any) -> None:
+        """transform: a geometry_msgs Transform, child in parent. Raises ValueError for one that is none."""
+        t, q = transform.translation, transform.rotation
+        quaternion, origin_m = np.array([q.x, q.y, q.z, q.w]), np.array([t.x, t.y, t.z])
+        length = float(np.linalg.norm(quaternion))
+        if not (length > 0.0 and np.isfinite(length) and np.isfinite(origin_m).all()):
+            raise ValueError(f"the transform from {parent} to {child} is impossible")
+        pose = Pose(rotation_matrix(quaternion / length), origin_m)
+        self._seen_from.setdefault(parent, {})[child] = pose
+        self._seen_from.setdefault(child, {})[parent] = pose.inverse()
+
+    def find(self, outer: str, inner: str) -> Pose | None:
+        """The inner frame as the outer one sees it, over whatever lies between; None: they are not linked."""
+        poses = {outer: Pose(np.eye(3), np.zeros(3))}
+        waiting = deque([outer])
+        while waiting and inner not in poses:
+            here = waiting.popleft()
+            for there, pose in self._seen_from.get(here, {}).items():
+                if there not in poses:
+                    poses[there] = poses[here] @ pose
+                    waiting.append(there)
+        return poses.get(inner)
+
+
+def frame_name(name: str) -> str:
+    """ROS 1 began names of frames with a slash."""
+    return name.lstrip("/")

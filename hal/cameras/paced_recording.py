@@ -1,0 +1,53 @@
+"""A recording that plays as if it were a camera: in its own time, on the clock of the run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import TracebackType
+from typing import Self
+
+from hal.api import Clock, FrameSource
+from hal.clocks import NS_PER_S
+from hal.errors import FrameTimeout
+from hal.types import Intrinsics, RgbdFrame
+
+
+class PacedRecording:
+    """FrameSource: each frame comes when its time has come, counted from the first read, and bears that time.
+
+    For a base on the bench before recorded images: what the decision sees must be fresh.
+    """
+
+    def __init__(self, recording: FrameSource, clock: Clock) -> None:
+        self._recording, self._clock = recording, clock
+        self._waiting: RgbdFrame | None = None
+        self._later_ns: int | None = None
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        return self._recording.intrinsics
+
+    def __enter__(self) -> Self:
+        self._recording.__enter__()
+        self._waiting = self._later_ns = None
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._recording.__exit__(kind, error, trace)
+
+    def read(self, timeout_s: float) -> RgbdFrame:
+        """Raises FrameTimeout where the next frame is not due by then, and what the recording raises."""
+        frame = self._waiting or self._recording.read(timeout_s)
+        now_ns = self._clock.now_ns()
+        if self._later_ns is None:
+            self._later_ns = now_ns - frame.captured_ns
+        due_ns = frame.captured_ns + self._later_ns
+        gives_up_ns = now_ns + round(timeout_s * NS_PER_S)
+        self._clock.sleep_until_ns(min(due_ns, gives_up_ns))
+        if due_ns > gives_up_ns:
+            self._waiting = frame
+            raise FrameTimeout(f"the recording has no frame within {timeout_s:g} s")
+        self._waiting = None
+        return replace(frame, captured_ns=due_ns)

@@ -1,0 +1,100 @@
+"""Camera poses at times, and between them."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+
+import numpy as np
+
+from hal.clocks import NS_PER_S
+from hal.types import FloatArray, Pose
+
+# Below this angle sin(angle) / angle is 1 to the last digit but divides by nearly nothing.
+_SMALL_ANGLE_RAD = 1e-6
+
+
+class PoseTrack:
+    """OdometrySource: the camera's optical frame in a frame that does not move.
+
+    name: where the poses are from. stamps_ns: N, growing. positions_m (N, 3). quaternions (N, 4) as
+    qx qy qz qw, of unit length.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        stamps_ns: Sequence[int],
+        positions_m: FloatArray,
+        quaternions: FloatArray,
+        max_gap_s: float = 0.2,
+    ) -> None:
+        self.name = name
+        self._stamps_ns = stamps_ns
+        self._positions_m, self._quaternions = positions_m, quaternions
+        self._max_gap_ns = round(max_gap_s * NS_PER_S)
+
+    def __len__(self) -> int:
+        return len(self._stamps_ns)
+
+    def camera_pose(self, stamp_ns: int) -> Pose | None:
+        """Interpolated between the neighbours: position linearly, attitude along the shortest turn.
+
+        None before the first pose, after the last, and between two that are further apart than max_gap_s.
+        """
+        after = bisect_right(self._stamps_ns, stamp_ns)
+        if after == 0:
+            return None
+        before = after - 1
+        start_ns = self._stamps_ns[before]
+        if start_ns == stamp_ns:
+            return self._pose(self._positions_m[before], self._quaternions[before])
+        if after == len(self._stamps_ns) or self._stamps_ns[after] - start_ns > self._max_gap_ns:
+            return None
+        share = (stamp_ns - start_ns) / (self._stamps_ns[after] - start_ns)
+        position_m = (1.0 - share) * self._positions_m[before] + share * self._positions_m[after]
+        return self._pose(position_m, _slerp(self._quaternions[before], self._quaternions[after], share))
+
+    @staticmethod
+    def _pose(position_m: FloatArray, quaternion: FloatArray) -> Pose:
+        return Pose(rotation_matrix(quaternion), position_m.copy())
+
+
+def rotation_matrix(quaternion: FloatArray) -> FloatArray:
+    """(qx, qy, qz, qw) of unit length -> (3, 3)."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_of(rotation: FloatArray) -> FloatArray:
+    """(3, 3) -> (qx, qy, qz, qw): the greatest eigenvector of Bar-Itzhack's matrix, good at every angle."""
+    r = rotation
+    k = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], 0.0, 0.0, 0.0],
+            [r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], 0.0, 0.0],
+            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1], 0.0],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]],
+        ]
+    )
+    vectors: FloatArray = np.linalg.eigh(k / 3.0).eigenvectors
+    return vectors[:, -1]
+
+
+def _slerp(start: FloatArray, end: FloatArray, share: float) -> FloatArray:
+    """Shoemake's spherical interpolation of unit quaternions, the short way round."""
+    cosine = float(start @ end)
+    if cosine < 0.0:  # q and -q are the same attitude
+        end, cosine = -end, -cosine
+    angle_rad = math.acos(min(cosine, 1.0))
+    if angle_rad < _SMALL_ANGLE_RAD:
+        return start
+    mixed = math.sin((1.0 - share) * angle_rad) * start + math.sin(share * angle_rad) * end
+    return mixed / math.sin(angle_rad)

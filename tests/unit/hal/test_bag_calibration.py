@@ -1,0 +1,168 @@
+"""Which topics of a bag are meant, and what its camera_info and transforms say of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hal.cameras.bag_calibration import read_transforms
+from hal.cameras.bag_file import BagFile
+from hal.cameras.bag_replay import BagReplay
+from hal.cameras.bag_topics import WantedTopics
+from hal.errors import BadRecording
+from tests.support.bags import (
+    ALIGNED,
+    ALIGNED_INFO,
+    COLOUR,
+    COLOUR_FRAME,
+    COLOUR_INFO,
+    DEPTH,
+    DEPTH_FRAME,
+    DEPTH_INFO,
+    Entry,
+    Ros,
+    camera_entries,
+    read_all,
+    without,
+    write_bag,
+)
+from tests.support.recordings import SMALL, START_NS, small_frame
+
+RECORDINGS = Path(__file__).resolve().parents[2] / "recordings"
+FRAMES = [small_frame(number) for number in range(4)]
+
+
+def test_depth_of_its_own_camera_is_registered_with_the_transforms(tmp_path: Path) -> None:
+    """The depth camera sits 60 mm right of colour's: at 1 m and 60 px that is 3.6 px."""
+
+    def entries(ros: Ros) -> list[Entry]:
+        depth = np.full((SMALL.height, SMALL.width), 1000, np.uint16)
+        depth[:, :20] = 0
+        image = ros.image(START_NS, DEPTH_FRAME, "16UC1", depth)
+        level = (0.0, 0.0, 0.0, 1.0)
+        return [
+            ("/tf_static", START_NS, ros.transform("camera_link", COLOUR_FRAME, (0.0, 0.01, 0.0), level)),
+            ("/tf_static", START_NS, ros.transform("camera_link", DEPTH_FRAME, (0.06, 0.01, 0.0), level)),
+            *without(camera_entries(ros, FRAMES[:1]), ALIGNED, ALIGNED_INFO),
+            (DEPTH_INFO, START_NS, ros.info(DEPTH_FRAME, SMALL)),
+            (DEPTH, START_NS, image),
+        ]
+
+    (frame,) = read_all(BagReplay(write_bag(tmp_path, "db3", entries)))
+    measured = np.flatnonzero(frame.depth[24])
+    assert measured[0] == pytest.approx(20 + 3.6, abs=1.0)
+    assert (frame.depth[24, measured] == 1000).all()
+
+
+def test_depth_from_an_unknown_place_is_told(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        image = ros.image(START_NS, DEPTH_FRAME, "16UC1", FRAMES[0].depth)
+        return [
+            *without(camera_entries(ros, FRAMES[:1]), ALIGNED, ALIGNED_INFO),
+            (DEPTH_INFO, START_NS, ros.info(DEPTH_FRAME, SMALL)),
+            (DEPTH, START_NS, image),
+        ]
+
+    replay = BagReplay(write_bag(tmp_path, "mcap", entries))
+    assert len(read_all(replay)) == 1
+    assert f"no transform from {DEPTH_FRAME} to {COLOUR_FRAME} was recorded" in " ".join(replay.notes)
+
+
+def test_the_lens_is_straightened(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        found = camera_entries(ros, [small_frame(n) for n in range(1)])
+        painted = np.zeros((SMALL.height, SMALL.width, 3), np.uint8)
+        painted[:, 4] = 255
+        found[0] = (COLOUR_INFO, START_NS, ros.info(COLOUR_FRAME, SMALL, (-0.3, 0.0, 0.0, 0.0, 0.0)))
+        return [*found[:-1], (COLOUR, START_NS, ros.image(START_NS, COLOUR_FRAME, "bgr8", painted))]
+
+    (frame,) = read_all(BagReplay(write_bag(tmp_path, "bag", entries)))
+    middle, top = frame.colour[24, :, 0].argmax(), frame.colour[2, :, 0].argmax()
+    assert middle != top
+
+
+def test_without_a_calibration_it_is_refused(tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "mcap", lambda ros: without(camera_entries(ros, FRAMES), COLOUR_INFO))
+    with pytest.raises(BadRecording, match=f"no camera_info was recorded beside {COLOUR}"):
+        BagReplay(path)
+
+
+def test_an_impossible_calibration_is_refused(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        info = ros.info(COLOUR_FRAME, SMALL)
+        matrix = info.K if ros.is1 else info.k
+        matrix[0] = 0.0
+        return [(COLOUR_INFO, START_NS, info), *without(camera_entries(ros, FRAMES), COLOUR_INFO)]
+
+    with pytest.raises(BadRecording, match=r"impossible \(fx: Input should be greater than 0\)"):
+        BagReplay(write_bag(tmp_path, "bag", entries))
+
+
+def test_a_lens_that_cannot_be_straightened_is_refused(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        info = ros.info(COLOUR_FRAME, SMALL, (0.1, 0.0, 0.0, 0.0), "equidistant")
+        return [(COLOUR_INFO, START_NS, info), *without(camera_entries(ros, FRAMES), COLOUR_INFO)]
+
+    with pytest.raises(BadRecording, match="the lens model equidistant"):
+        BagReplay(write_bag(tmp_path, "mcap", entries))
+
+
+def test_an_impossible_transform_is_refused(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        bad = ros.transform("base_link", "camera_link", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+        return [("/tf_static", START_NS, bad), *camera_entries(ros, FRAMES)]
+
+    with pytest.raises(BadRecording, match="the transform from base_link to camera_link is impossible"):
+        BagReplay(write_bag(tmp_path, "mcap", entries))
+
+
+def test_the_topics_that_are_asked_for_are_taken(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        found = camera_entries(ros, FRAMES)
+        second = [(topic.replace("/camera/", "/rear/"), t, m) for topic, t, m in found]
+        return [*found, *second]
+
+    path = write_bag(tmp_path, "mcap", entries)
+    with pytest.raises(BadRecording, match=r"several topics could be the colour: .*--colour-topic"):
+        BagReplay(path)
+    rear = WantedTopics(COLOUR.replace("/camera/", "/rear/"), ALIGNED.replace("/camera/", "/rear/"))
+    replay = BagReplay(path, wanted=rear)
+    assert len(read_all(replay)) == 4
+    assert replay.notes[0] == f"colour is {rear.colour}, depth {rear.depth}"
+    with pytest.raises(BadRecording, match="--depth-topic /left: there is none"):
+        BagReplay(path, wanted=WantedTopics(rear.colour, "/left"))
+
+
+@pytest.mark.parametrize(
+    ("file", "depth", "colour"),
+    [
+        ("realsense-2.59.db3", "Depth", "Color"),
+        ("realsense-2.55.bag", "/device_0/sensor_0/Depth_0", "/device_0/sensor_1/Color_0"),
+    ],
+)
+def test_realsense_bags_say_where_depth_stands_in_colour(file: str, depth: str, colour: str) -> None:
+    """As it was given to the recorder: turned by 0.02 rad, moved by (15, 2, 3) mm."""
+    with BagFile(RECORDINGS / file) as bag:
+        pose = read_transforms(bag).find(colour, depth)
+    assert pose is not None
+    assert pose.translation_m == pytest.approx([0.015, 0.002, 0.003], abs=1e-6)
+    turned = [[0.9998, -0.02, 0.0], [0.02, 0.9998, 0.0], [0.0, 0.0, 1.0]]
+    assert pose.rotation == pytest.approx(np.array(turned), abs=1e-5)
+
+
+def test_a_realsense_with_a_finer_depth_unit_is_believed(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        renamed = {
+            ALIGNED: "/device_0/sensor_0/Depth_0/image/data",
+            ALIGNED_INFO: "/device_0/sensor_0/Depth_0/image/camera_info",
+        }
+        unit = ros.make("std_msgs/msg/String", data="0.000100")
+        return [
+            ("/device_0/sensor_0/option/Depth_Units/value", START_NS, unit),
+            *((renamed.get(topic, topic), t, one) for topic, t, one in camera_entries(ros, FRAMES)),
+        ]
+
+    frame = read_all(BagReplay(write_bag(tmp_path, "mcap", entries)))[0]
+    assert frame.depth_scale_m == 0.0001

@@ -1,0 +1,63 @@
+"""Two encoders by hand: 1000 counts a metre, tracks 0.5 m apart, 0.8 m/s at the most."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from hal.chassis.encoder_feedback import EncoderFeedback
+from hal.chassis.tracks import TrackGeometry
+
+STEP_NS = 100_000_000
+
+
+class Answers(EncoderFeedback):
+    """Counters that answer every 0.1 s; the right one counts down when its track goes ahead."""
+
+    def __init__(self) -> None:
+        super().__init__(TrackGeometry(0.5, 1.0), 1000.0, (1, -1), fastest_mps=0.8)
+        self.now_ns = 0
+
+    def answer(self, left: int, right: int, after_ns: int = STEP_NS) -> None:
+        self.now_ns += after_ns
+        self._count(left, right, self.now_ns, self.now_ns)
+
+
+def test_speeds_are_counter_steps_over_time() -> None:
+    """40 mm and 60 mm in 0.1 s: 0.5 m/s ahead, (0.6 - 0.4) m/s / 0.5 m to the left."""
+    told = Answers()
+    told.answer(7, 9)
+    assert math.isnan(told.v_mps)
+    told.answer(47, -51)
+    assert (told.v_mps, told.w_radps) == pytest.approx((0.5, 0.4))
+    assert not told.standing
+    assert (told.pose.x_m, told.pose.heading_rad) == pytest.approx((0.05, 0.04), abs=1e-4)
+    told.answer(47, -51)
+    assert told.standing
+
+
+def test_two_answers_to_one_moment_are_no_speed() -> None:
+    told = Answers()
+    told.answer(0, 0)
+    told.answer(40, -40)
+    told.answer(41, -41, after_ns=0)
+    assert told.v_mps == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("step", "believed"), [(169, True), (171, False)])
+def test_a_step_beyond_what_the_tracks_can_do_is_a_restart(step: int, believed: bool) -> None:
+    """1.5 x 0.8 m/s x 0.1 s + 0.05 m = 0.17 m."""
+    told = Answers()
+    told.answer(0, 0)
+    told.answer(step, 0)
+    assert math.isfinite(told.v_mps) == believed
+    assert (told.pose.x_m > 0.0) == believed
+
+
+def test_turning_on_the_spot_is_not_standing() -> None:
+    told = Answers()
+    told.answer(0, 0)
+    told.answer(2, 2)
+    assert told.v_mps == 0.0
+    assert not told.standing

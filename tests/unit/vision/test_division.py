@@ -1,0 +1,89 @@
+"""Two people who are one connected part of the depth image are divided; one body never is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.support.grids import LEVEL_UP, X, grid_of, labelled, nearest, plate
+from vision.depth_grid import DepthGrid
+from vision.grouping import join, split
+
+
+def two_people(gap_m: float, bridge: bool = True) -> tuple[DepthGrid, NDArray[np.int32]]:
+    """Two upright plates 0.45 m wide, gap_m apart, joined at the hands: one connected part."""
+    half = gap_m / 2
+    left = plate(3.0, (-half - 0.45, -half), (-0.7, 0.9))
+    right = plate(3.0, (half, half + 0.45), (-0.7, 0.9))
+    hands = plate(3.0, (-half, half), (0.2, 0.32)) if bridge else np.zeros_like(left)
+    depth_m = nearest(left, right, hands)
+    return grid_of(depth_m, LEVEL_UP, 1.0), labelled(depth_m > 0.0)
+
+
+def test_two_people_hand_in_hand_are_divided_between_them() -> None:
+    grid, labels = two_people(0.4)
+    second = split(grid, labels, 0)
+    assert second is not None
+    columns = second % labels.shape[1]
+    side = np.sign(X[columns])
+    assert (side == side[0]).mean() > 0.97  # all on one side of the middle
+    of_side = np.count_nonzero((labels > 0) & (np.sign(X) == side[0])[None, :])
+    assert len(second) >= 0.8 * of_side
+    assert 2 * len(second) <= np.count_nonzero(labels) + 1  # the smaller one
+
+
+@pytest.mark.parametrize(("share", "divided"), [(0.3, True), (0.42, False)])
+def test_a_valley_is_lower_than_a_third_of_both_sides(share: float, divided: bool) -> None:
+    left, right = plate(3.0, (-0.7, -0.25), (-0.7, 0.9)), plate(3.0, (0.25, 0.7), (-0.7, 0.9))
+    depth_m = nearest(left, right, plate(3.0, (-0.25, 0.25), (0.9 - 1.6 * share, 0.9)))
+    assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is not None) == divided
+
+
+def test_a_part_that_would_be_divided_from_one_goes_to_the_next() -> None:
+    grid, labels = two_people(0.4)
+    labels = np.where(labels == 0, 0, np.where(X < 0.0, 1, 2)[None, :]).astype(np.int32)
+    labels[-labels.shape[0] // 2 :][labels[-labels.shape[0] // 2 :] == 2] = 3  # the right one's legs
+    joined, gone = join(grid, labels, [(1, 0), (2, 1)])
+    assert gone == [2]
+    np.testing.assert_array_equal(joined, np.where(labels == 3, 2, labels))
+    # Nothing goes where nothing is left.
+    assert join(grid, labels, [(2, 1), (2, 0), (1, 2)])[1] == [2]
+
+
+def test_only_the_cells_of_that_track_are_divided() -> None:
+    grid, labels = two_people(0.4)
+    both = np.where(labels == 1, np.int32(2), np.int32(0)).astype(np.int32)
+    assert split(grid, both, 0) is None
+    assert split(grid, both, 1) is not None
+
+
+@pytest.mark.parametrize("width_m", [0.6, 1.4, 2.0])
+def test_a_crate_is_one_however_wide(width_m: float) -> None:
+    depth_m = plate(3.0, (-width_m / 2, width_m / 2), (-0.4, 0.6))
+    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+
+
+def test_one_person_with_arms_stretched_out_is_one() -> None:
+    body, arms = plate(3.0, (-0.2, 0.2), (-0.7, 0.9)), plate(3.0, (-0.55, 0.55), (-0.4, -0.25))
+    depth_m = nearest(body, arms)
+    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+
+
+def test_a_few_cells_are_not_divided() -> None:
+    grid, labels = two_people(0.4)
+    sparse = np.zeros_like(labels)
+    chosen = np.flatnonzero(labels)[::40]
+    assert len(chosen) < 48
+    sparse.ravel()[chosen] = 1
+    assert split(grid, sparse, 0) is None
+
+
+def test_one_body_behind_somebody_is_not_divided() -> None:
+    """1.3 m wide; what hides its middle, and leaves a foot's breadth of it, makes no two of it."""
+    whole, foot = plate(4.0, (-0.65, 0.65), (-0.6, 0.8)), plate(4.0, (-0.3, 0.3), (0.7, 0.8))
+    somebody = plate(2.0, (-0.15, 0.15), (-0.5, 0.35))
+    two = nearest(plate(4.0, (-0.65, -0.3), (-0.6, 0.8)), plate(4.0, (0.3, 0.65), (-0.6, 0.8)), foot)
+    hidden = nearest(whole, somebody)
+    assert split(grid_of(two), labelled(two > 0.0), 0) is not None
+    assert split(grid_of(hidden), labelled(hidden == 4.0), 0) is None
