@@ -203,6 +203,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
     return MotionEvidence(
         sight=sight / np.linalg.norm(sight, axis=1)[:, None],
         distance_m=rng.uniform(0.0, 10.0, count),
+        depth_sigma_m=rng.uniform(0.0, 0.8, count),
         velocity=rng.normal(0.0, 1.0, (count, 3)),
         covariance=covariances(),
         own_velocity=rng.normal(0.0, 1.0, (count, 3)),
@@ -212,6 +213,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         ends=rng.integers(0, 40, count),
         agreement=rng.uniform(0.0, 1.0, count),
         restless=rng.random(count) < 0.5,
+        unrest_s=rng.uniform(0.0, 1.0, count),
         arrived=rng.integers(0, 40, count),
         cells=rng.integers(40, 200, count),
         size_m=rng.uniform(0.0, 4.0, count),
