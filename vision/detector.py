@@ -13,21 +13,14 @@ from vision.depth_grid import DepthGrid, make_grid
 from vision.depth_mask import surface_depth
 from vision.detection import Detection, camera_health, no_motion
 from vision.edges import GreyImage
-from vision.ego_motion import (
-    CameraEstimate,
-    MotionPrior,
-    estimate,
-    odometry_prior,
-    steady_prior,
-    with_gyro,
-)
+from vision.ego_motion import CameraEstimate, estimate
 from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
 from vision.floor import FloorFinder, on_floor
 from vision.fragments import FragmentStore
 from vision.health import Continuity, HealthMonitor
 from vision.lens import project, rays
+from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
 from vision.renewal import Renewal
-from vision.rolling import rolling_prior
 from vision.scene import CameraHealth, EgoMotion, Fragments
 from vision.velocities import PointMotion
 

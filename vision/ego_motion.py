@@ -8,19 +8,17 @@ therefore a person who fills half of the view cannot outvote the odometry.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import EgoMotionSettings
-from hal.types import FloatArray, GyroSamples, Intrinsics, Pose
+from hal.types import FloatArray, Intrinsics, Pose
 from vision.lens import rotation_from_vector, vector_from_rotation
+from vision.motion_prior import MotionPrior
 from vision.order import median
 
-NS_PER_S = 1e9
 _ITERATIONS = 6
 _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
 _ANNEAL = (32.0, 4.0)  # robust scale of the first iterations, falling to 1
@@ -32,18 +30,6 @@ _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2])  # of the prior's sigm
 _CONVERGED_SIGMAS = 0.2  # a step of less is nothing beside what the pose may be off anyway
 _IDENTITY = np.eye(6)
 _STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivatives say, to 0.01 px
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MotionPrior:
-    """What is known before looking: motion (the camera now in the camera before) and the standard
-    deviation (6,) of a small motion of the camera now: rotation about, translation along x, y, z.
-    binding: it is known that well, so that data which contradict it follow something large that moves."""
-
-    motion: Pose
-    sigma: FloatArray
-    source: str
-    binding: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,40 +54,6 @@ class CameraEstimate:
     covariance: FloatArray
     inlier_ratio: float
     visual: bool
-
-
-def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
-    """A prior from dead reckoning: good in translation, slipping in yaw, blind to vibration."""
-    turn_rad = math.hypot(*vector_from_rotation(motion.rotation).tolist())
-    way_m = math.hypot(*motion.translation_m.tolist())
-    yaw = settings.odometry_yaw_ratio * turn_rad + settings.odometry_rotation_radps * dt_s
-    tilt = settings.vibration_radps * dt_s + 0.1 * turn_rad
-    way = settings.odometry_speed_ratio * way_m + settings.odometry_speed_mps * dt_s
-    return MotionPrior(motion, np.array([tilt, yaw, tilt, way, way, way]), "odometry", True)
-
-
-def steady_prior(last: Pose, last_dt_s: float, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
-    """A prior where nothing else is known: the camera goes on as it did. last_dt_s 0: not even that."""
-    known = last_dt_s > 0
-    share = dt_s / last_dt_s if known else 0.0
-    turn = rotation_from_vector(vector_from_rotation(last.rotation) * share)
-    sigma = np.array([settings.steady_rotation_radps] * 3 + [settings.steady_speed_mps] * 3) * dt_s
-    sigma *= 1.0 if known else settings.unknown_factor
-    return MotionPrior(Pose(turn, last.translation_m * share), sigma, "none")
-
-
-def with_gyro(
-    prior: MotionPrior, gyro: GyroSamples, from_ns: int, to_ns: int, settings: EgoMotionSettings
-) -> MotionPrior:
-    """The prior with its rotation taken from the gyro's mean rate over the interval."""
-    inside = (gyro.stamps_ns > from_ns) & (gyro.stamps_ns <= to_ns)
-    if not inside.any() or not np.isfinite(gyro.rates_radps[inside]).all():
-        return prior
-    dt_s = (to_ns - from_ns) / NS_PER_S
-    turn = rotation_from_vector(gyro.rates_radps[inside].mean(axis=0) * dt_s)
-    sigma = prior.sigma.copy()
-    sigma[:3] = settings.gyro_radps * dt_s
-    return MotionPrior(Pose(turn, prior.motion.translation_m), sigma, prior.source, prior.binding)
 
 
 def estimate(

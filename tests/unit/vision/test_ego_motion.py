@@ -10,18 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from config.perception import EgoMotionSettings
-from hal.types import FloatArray, GyroSamples, Intrinsics, Pose
+from hal.types import FloatArray, Intrinsics, Pose
 from vision import ego_motion
-from vision.ego_motion import (
-    Anchors,
-    CameraEstimate,
-    MotionPrior,
-    estimate,
-    odometry_prior,
-    steady_prior,
-    with_gyro,
-)
+from vision.ego_motion import Anchors, CameraEstimate, estimate
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
+from vision.motion_prior import MotionPrior, odometry_prior, steady_prior
 
 CAMERA = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
 SETTINGS = EgoMotionSettings()
@@ -185,58 +178,6 @@ def test_sigma_tells_the_error() -> None:
         )  # 99 % of chi2 with 6 degrees of freedom
         sigmas.append(float(np.sqrt(np.trace(found.covariance[3:, 3:]))))
     assert sigmas[1] < 0.75 * sigmas[0]
-
-
-def test_odometry_prior_by_hand() -> None:
-    settings = EgoMotionSettings(
-        odometry_yaw_ratio=0.2,
-        odometry_rotation_radps=0.04,
-        vibration_radps=0.25,
-        odometry_speed_ratio=0.06,
-        odometry_speed_mps=0.03,
-    )
-    turned = Pose(rotation_from_vector(np.array([0.0, 0.05, 0.0])), np.array([0.0, 0.0, 0.1]))
-    prior = odometry_prior(turned, 0.1, settings)
-    # Yaw 0.2 0.05 + 0.04 0.1; tilt 0.25 0.1 + 0.1 0.05; way 0.06 0.1 + 0.03 0.1.
-    np.testing.assert_allclose(prior.sigma, [0.03, 0.014, 0.03, 0.009, 0.009, 0.009])
-    assert prior.source == "odometry"
-    assert prior.motion is turned
-
-
-def test_steady_prior_goes_on_as_before() -> None:
-    last = Pose(rotation_from_vector(np.array([0.0, 0.02, 0.0])), np.array([0.0, 0.0, 0.05]))
-    prior = steady_prior(last, 0.1, 0.2, SETTINGS)
-    np.testing.assert_allclose(prior.motion.translation_m, [0.0, 0.0, 0.1])
-    np.testing.assert_allclose(vector_from_rotation(prior.motion.rotation), [0.0, 0.04, 0.0])
-    np.testing.assert_allclose(prior.sigma, [0.6 * 0.2] * 3 + [0.5 * 0.2] * 3)
-    assert prior.source == "none"
-    blind = steady_prior(last, 0.0, 0.2, SETTINGS)
-    np.testing.assert_allclose(blind.motion.translation_m, 0.0)
-    np.testing.assert_allclose(blind.sigma, 3.0 * prior.sigma)
-
-
-def gyro(*samples: tuple[int, float]) -> GyroSamples:
-    stamps = np.array([stamp for stamp, _ in samples], np.int64)
-    return GyroSamples(stamps, np.array([[0.0, rate, 0.0] for _, rate in samples]))
-
-
-def test_gyro_gives_the_rotation_of_the_interval_only() -> None:
-    prior = odometry()
-    # The first sample belongs to the interval before.
-    readings = gyro((1_000_000_000, 9.0), (1_050_000_000, 0.4), (1_100_000_000, 0.6))
-    turned = with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS)
-    np.testing.assert_allclose(vector_from_rotation(turned.motion.rotation), [0.0, 0.05, 0.0])
-    np.testing.assert_allclose(turned.motion.translation_m, prior.motion.translation_m)
-    np.testing.assert_allclose(turned.sigma[:3], 0.02 * 0.1)
-    np.testing.assert_allclose(turned.sigma[3:], prior.sigma[3:])
-
-
-@pytest.mark.parametrize("readings", [gyro(), gyro((999_999_999, 0.5)), gyro((1_050_000_000, float("nan")))])
-def test_a_gyro_without_a_usable_reading_changes_nothing(readings: GyroSamples) -> None:
-    prior = odometry()
-    if len(readings.stamps_ns) == 0:
-        readings = GyroSamples(np.empty(0, np.int64), np.empty((0, 3)))
-    assert with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS) is prior
 
 
 def test_ends_on_upright_edges_count_across_them_only() -> None:
