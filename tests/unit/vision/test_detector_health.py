@@ -29,8 +29,8 @@ def room() -> Take:
 def agreeing(monkeypatch: pytest.MonkeyPatch, ratio: float, visual: bool = True) -> None:
     """As if this share of the fragments agreed with the motion found; visual: whether it was found."""
 
-    def told(anchors: Any, pixels: Any, before: Pose, prior: MotionPrior, camera: Any) -> CameraEstimate:
-        found = estimate(anchors, pixels, before, prior, camera)
+    def told(anchors: Any, pixels: Any, before: Pose, prior: MotionPrior, *rest: Any) -> CameraEstimate:
+        found = estimate(anchors, pixels, before, prior, *rest)
         return replace(found, inlier_ratio=ratio, visual=visual)
 
     monkeypatch.setattr(detector, "estimate", told)

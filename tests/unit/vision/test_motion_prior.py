@@ -17,6 +17,7 @@ CAMERA = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
 SETTINGS = EgoMotionSettings()
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 DT_S = 1.0 / 30.0
+GLOBAL_SHUTTER = np.full(2, 1e-4)
 LEVEL = CameraMount(0.3, 0.0, 0.5, 0.0)
 
 
@@ -65,7 +66,7 @@ def sideways_mps(prior: MotionPrior) -> float:
     now: FloatArray = points.copy()
     now[:60, 0] += 0.7 * DT_S
     now[:, 2] -= 0.5 * DT_S
-    found = estimate(anchors, project(now, CAMERA), IDENTITY, prior, CAMERA)
+    found = estimate(anchors, project(now, CAMERA), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA)
     return float(found.pose.translation_m[0]) / DT_S
 
 
