@@ -103,7 +103,8 @@ class BagFile:
 
 
 def _told(error: Exception) -> str:
-    return str(error) or type(error).__name__
+    """In one line."""
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _load_vendor() -> tuple[Any, Any]:

@@ -15,8 +15,10 @@ from hal.errors import BadRecording, DeviceNotFound
 from hal.types import Intrinsics
 from tests.support.bags import (
     ALIGNED,
+    ALIGNED_INFO,
     COLOUR,
     COLOUR_FRAME,
+    COLOUR_INFO,
     FORMATS,
     Entry,
     Format,
@@ -69,6 +71,23 @@ def test_what_a_realsense_viewer_records_is_read(file: str) -> None:
     assert [np.unique(frame.depth).tolist() for frame in frames] == [[1003 + n] for n in range(4)]
     assert replay.intrinsics == Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
     assert len(replay.notes) == 1
+
+
+def test_an_old_realsense_bag_has_nothing_behind_its_images(tmp_path: Path) -> None:
+    """The first versions of librealsense did not write the depth unit there."""
+    stream = {
+        COLOUR: "/device_0/sensor_1/Color_0/image/data",
+        COLOUR_INFO: "/device_0/sensor_1/Color_0/info/camera_info",
+        ALIGNED: "/device_0/sensor_0/Depth_0/image/data",
+        ALIGNED_INFO: "/device_0/sensor_0/Depth_0/info/camera_info",
+    }
+    path = write_bag(
+        tmp_path, "bag", lambda ros: [(stream[topic], t, m) for topic, t, m in camera_entries(ros, FRAMES)]
+    )
+    replay = BagReplay(path)
+    for found, recorded in zip(read_all(replay), FRAMES, strict=True):
+        assert np.array_equal(found.depth, recorded.depth)
+    assert replay.skipped == ()
 
 
 def test_a_tum_folder_is_no_bag(tmp_path: Path) -> None:
@@ -146,6 +165,14 @@ def test_a_file_that_is_no_bag_is_refused_in_one_line(of: Format, tmp_path: Path
     path = tmp_path / f"notes.{of}"
     path.write_text("not a bag")
     with pytest.raises(BadRecording, match="cannot be read as a ROS bag") as refused:
+        BagReplay(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_what_is_wrong_with_a_folder_is_told_in_one_line(tmp_path: Path) -> None:
+    path = small_bag(tmp_path)
+    (path / "metadata.yaml").write_text("- [")
+    with pytest.raises(BadRecording, match="Could not load YAML") as refused:
         BagReplay(path)
     assert "\n" not in str(refused.value)
 
