@@ -57,6 +57,11 @@ def test_yuv_is_read_in_the_order_of_its_name(
     assert bright[0] > dark[0] + 90
 
 
+def test_two_neighbours_that_share_a_colour_are_not_three() -> None:
+    with pytest.raises(ImageError, match="is 3 pixels wide, as yuv422 no image can be"):
+        colour_image(image("yuv422", np.zeros((2, 3, 2), np.uint8)), 3, 2)
+
+
 @pytest.mark.parametrize("padding", [0, 2])
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_depth_in_millimetres_is_taken_as_it_is(order: str, padding: int) -> None:
