@@ -195,6 +195,8 @@ def open_replay(
     Raises BadRecording, and DeviceNotFound for a bag without the package that reads it.
     """
     if is_bag(path):
+        if odometry == "none" and wanted is not None and wanted.odometry is not None:
+            raise BadRecording(f"{path}: --odometry-topic has no effect with --odometry none; leave one out")
         bag = BagReplay(path, odometry, wanted or WantedTopics())
         return bag, bag.odometry
     if wanted is not None and wanted != WantedTopics():

@@ -46,7 +46,7 @@ class BagReplay:
     ) -> None:
         self._path, self._max_gap_ns = path, round(max_pair_gap_s * NS_PER_S)
         with BagFile(path) as bag:
-            self._topics = choose_topics(path, bag.topics, wanted)
+            self._topics = choose_topics(path, bag.topics, wanted, with_odometry=odometry != "none")
             transforms = read_transforms(bag)
             camera, frame, notes = read_calibration(bag, self._topics, transforms)
             self.odometry, odometry_notes = _odometry(bag, self._topics, odometry, frame, transforms)

@@ -47,18 +47,27 @@ class BagTopics:
     @property
     def rectified(self) -> bool:
         """Whether the colour images have no lens distortion any more."""
-        return _RECTIFIED in base_name(self.colour.name).rsplit("/", 1)[-1]
+        return _is_rectified(self.colour.name)
+
+    @property
+    def depth_rectified(self) -> bool:
+        """The same of depth."""
+        return _is_rectified(self.depth.name)
 
 
-def choose_topics(path: Path, topics: Sequence[Topic], wanted: WantedTopics) -> BagTopics:
+def choose_topics(
+    path: Path, topics: Sequence[Topic], wanted: WantedTopics, with_odometry: bool = True
+) -> BagTopics:
     """Raises BadRecording where there is none, or several that are equally good, naming them."""
     images = [one for one in topics if one.kind in _IMAGES]
     colour = _choose(path, images, wanted.colour, "colour", _colour_rank)
     depth = _choose(path, images, wanted.depth, "depth", _depth_rank)
+    if colour == depth:
+        raise BadRecording(f"{path}: {colour.name} cannot be both colour and depth; choose another topic")
     infos = {one.name for one in topics if one.kind == _CAMERA_INFO}
     moves = [one for one in topics if one.kind == _ODOMETRY]
     odometry = None
-    if moves or wanted.odometry is not None:
+    if with_odometry and (moves or wanted.odometry is not None):
         odometry = _choose(path, moves, wanted.odometry, "odometry", lambda _: 0).name
     return BagTopics(colour, depth, _info_of(colour, infos), _info_of(depth, infos), odometry)
 
@@ -73,6 +82,10 @@ def base_name(topic: str) -> str:
 def is_registered(topic: str) -> bool:
     """Whether a depth topic is named as registered to colour."""
     return any(word in topic.lower() for word in _REGISTERED_WORDS)
+
+
+def _is_rectified(topic: str) -> bool:
+    return _RECTIFIED in base_name(topic).rsplit("/", 1)[-1]
 
 
 def _choose(

@@ -183,6 +183,11 @@ def test_topics_of_a_folder() -> None:
     assert "is no ROS bag, so it has no topics" in refusal("replay", DESK, "--depth-topic", "/depth")
 
 
+def test_a_topic_of_odometry_that_is_not_wanted(tmp_path: Path) -> None:
+    wish = ("--odometry", "none", "--odometry-topic", "/odom")
+    assert "--odometry-topic has no effect" in refusal("replay", tmp_path / "run.mcap", *wish)
+
+
 def test_a_recording_without_its_calibration(recording: Path) -> None:
     (recording / "camera.yaml").unlink()
     assert "camera.yaml" in refusal("replay", recording)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hal.cameras.bag_file import BagFile
 from hal.cameras.bag_replay import BagReplay
 from hal.cameras.bag_topics import WantedTopics
 from hal.errors import BadRecording
+from hal.types import Intrinsics
 from tests.support.bags import (
     ALIGNED,
     ALIGNED_INFO,
@@ -68,6 +70,70 @@ def test_depth_from_an_unknown_place_is_told(tmp_path: Path) -> None:
     replay = BagReplay(write_bag(tmp_path, "mcap", entries))
     assert len(read_all(replay)) == 1
     assert f"no transform from {DEPTH_FRAME} to {COLOUR_FRAME} was recorded" in " ".join(replay.notes)
+
+
+TOP_LEFT = np.zeros((SMALL.height, SMALL.width), np.uint16)
+TOP_LEFT[:8, :8] = 1000
+WIDE = Intrinsics(SMALL.width, SMALL.height, 0.5 * SMALL.fx, 0.5 * SMALL.fy, SMALL.cx, SMALL.cy)
+
+
+def other_depth(ros: Ros, info: Any, pixels: np.ndarray[Any, Any] = TOP_LEFT) -> list[Entry]:
+    """Depth of a camera that is not colour's. info: its camera_info."""
+    image = ros.image(START_NS, info.header.frame_id, "16UC1", pixels)
+    return [
+        *without(camera_entries(ros, FRAMES[:1]), ALIGNED, ALIGNED_INFO),
+        (DEPTH_INFO, START_NS, info),
+        (DEPTH, START_NS, image),
+    ]
+
+
+def test_one_place_with_two_lenses_is_no_one_camera(tmp_path: Path) -> None:
+    """Simulators name one frame for both: what is in the corner of the wider one is beyond colour's."""
+    path = write_bag(tmp_path, "mcap", lambda ros: other_depth(ros, ros.info(COLOUR_FRAME, WIDE)))
+    replay = BagReplay(path)
+    (frame,) = read_all(replay)
+    assert not frame.depth.any()
+    assert len(replay.notes) == 1
+
+
+def test_registered_depth_may_have_fewer_pixels(tmp_path: Path) -> None:
+    half = Intrinsics(32, 24, 0.5 * SMALL.fx, 0.5 * SMALL.fy, 0.5 * SMALL.cx, 0.5 * SMALL.cy)
+    pixels = np.full((24, 32), 1000, np.uint16)
+    path = write_bag(tmp_path, "mcap", lambda ros: other_depth(ros, ros.info(COLOUR_FRAME, half), pixels))
+    (frame,) = read_all(BagReplay(path))
+    assert np.mean(frame.depth == 1000) > 0.9
+
+
+def test_rectified_depth_is_of_the_pinhole_that_it_was_rectified_to(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        info = ros.info(DEPTH_FRAME, WIDE, (0.1, 0.0, 0.0, 0.0, 0.0))
+        info.p[:] = ros.info(DEPTH_FRAME, SMALL).p
+        return other_depth(ros, info)
+
+    replay = BagReplay(write_bag(tmp_path, "mcap", entries))
+    (frame,) = read_all(replay)
+    assert np.flatnonzero(frame.depth[0]).max() == pytest.approx(7, abs=1)
+    assert not any("distortion" in note for note in replay.notes)
+
+
+def test_depth_of_which_nothing_is_known_is_told(tmp_path: Path) -> None:
+    path = write_bag(
+        tmp_path,
+        "mcap",
+        lambda ros: without(other_depth(ros, ros.info(DEPTH_FRAME, SMALL)), DEPTH_INFO),
+    )
+    notes = " ".join(BagReplay(path).notes)
+    assert f"no camera_info was recorded beside {DEPTH}: depth is taken as registered" in notes
+
+
+def test_the_lens_of_depth_that_is_not_straightened_is_told(tmp_path: Path) -> None:
+    raw = DEPTH.replace("image_rect_raw", "image_raw")
+
+    def entries(ros: Ros) -> list[Entry]:
+        found = other_depth(ros, ros.info(DEPTH_FRAME, SMALL, (-0.3, 0.0, 0.0, 0.0, 0.0)))
+        return [(raw if topic == DEPTH else topic, t, one) for topic, t, one in found]
+
+    assert "the lens distortion in" in " ".join(BagReplay(write_bag(tmp_path, "mcap", entries)).notes)
 
 
 def test_the_lens_is_straightened(tmp_path: Path) -> None:
@@ -133,6 +199,8 @@ def test_the_topics_that_are_asked_for_are_taken(tmp_path: Path) -> None:
     assert replay.notes[0] == f"colour is {rear.colour}, depth {rear.depth}"
     with pytest.raises(BadRecording, match="--depth-topic /left: there is none"):
         BagReplay(path, wanted=WantedTopics(rear.colour, "/left"))
+    with pytest.raises(BadRecording, match="cannot be both colour and depth"):
+        BagReplay(path, wanted=WantedTopics(rear.depth, rear.depth))
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,19 @@ def test_odometry_of_an_unknown_mounting_is_not_used(tmp_path: Path) -> None:
         BagReplay(path, "file")
 
 
+def test_which_of_several_is_asked_only_where_one_is_wanted(tmp_path: Path) -> None:
+    """robot_localization publishes a second one on most robots."""
+
+    def entries(ros: Ros) -> list[Entry]:
+        second = [("/odometry/filtered", t, one) for topic, t, one in moving(ros) if topic == ODOMETRY]
+        return [*moving(ros), *second]
+
+    path = write_bag(tmp_path, "mcap", entries)
+    with pytest.raises(BadRecording, match="several topics could be the odometry"):
+        BagReplay(path)
+    assert BagReplay(path, "none").odometry is None
+
+
 def test_an_impossible_pose_is_refused(tmp_path: Path) -> None:
     def entries(ros: Ros) -> list[Entry]:
         lost = ros.odometry(START_NS + 1, (np.nan, 0.0, 0.0), (0, 0, 0, 1))
