@@ -74,9 +74,10 @@ class TumWriter:
                 self._pose(odometry, stamp)
 
     def _image(self, index: TextIO, file: str, image: cv2.typing.MatLike, stamp: str) -> None:
-        if not cv2.imwrite(str(self._folder / file), image, _PNG_FAST):
-            raise DeviceRefused(f"{self._folder / file}: cannot be written; is the disk full?")
+        # Not by OpenCV: for it an image whose last bytes no longer fit on the disk is written.
+        data = cv2.imencode(".png", image, _PNG_FAST)[1]
         with self._told(file):
+            (self._folder / file).write_bytes(data.tobytes())
             index.write(f"{stamp} {file}\n")
 
     @contextmanager
@@ -115,4 +116,5 @@ class TumWriter:
             content["camera_height_m"] = self._mount.height_m
             content["camera_pitch_deg"] = math.degrees(self._mount.pitch_rad)
             content["camera_forward_m"] = self._mount.forward_m
+            content["camera_left_m"] = self._mount.left_m
         (self._folder / "camera.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
