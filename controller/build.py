@@ -125,7 +125,7 @@ def open_camera(
             assert_never(unknown)
 
 
-def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> FrameSource:
+def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> Recording:
     path = resolve(camera.folder, config_path)
     if is_bag(path):
         return BagReplay(path, "none", max_pair_gap_s=camera.max_pair_gap_s)

@@ -125,6 +125,15 @@ class BagReplay:
             raise BadRecording(f"{self._path}: not one frame is usable{why}")
         raise EndOfStream(f"{self._path}: no further frame")
 
+    def pass_over(self, until_ns: int) -> None:
+        """Leave out what another frame follows until then, without decoding it."""
+        while self._messages is not None:
+            while len(self._pairs) < 2 and not self._ended:
+                self._take_in(self._messages)
+            if len(self._pairs) < 2 or self._pairs[1][0].stamp_ns > until_ns:
+                return
+            self._pairs.popleft()
+
     def _rewind(self) -> None:
         self._pairing: StampPairing[Any] = StampPairing(self._max_gap_ns)
         self._pairs: deque[tuple[Stamped[Any], Stamped[Any]]] = deque()
