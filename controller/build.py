@@ -127,8 +127,10 @@ def open_camera(
 
 def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> Recording:
     path = resolve(camera.folder, config_path)
+    wanted = WantedTopics(camera.colour_topic, camera.depth_topic)
     if is_bag(path):
-        return BagReplay(path, "none", max_pair_gap_s=camera.max_pair_gap_s)
+        return BagReplay(path, "none", wanted, camera.max_pair_gap_s)
+    _refuse_topics(path, wanted)
     return TumReplay(path, camera.max_pair_gap_s, camera.read_ahead)
 
 
@@ -199,11 +201,15 @@ def open_replay(
             raise BadRecording(f"{path}: --odometry-topic has no effect with --odometry none; leave one out")
         bag = BagReplay(path, odometry, wanted or WantedTopics())
         return bag, bag.odometry
+    _refuse_topics(path, wanted)
+    return TumReplay(path), open_odometry(path, odometry)
+
+
+def _refuse_topics(folder: FilePath, wanted: WantedTopics | None) -> None:
     if wanted is not None and wanted != WantedTopics():
         raise BadRecording(
-            f"{path}: is no ROS bag, so it has no topics; leave out --colour-topic and the like"
+            f"{folder}: is no ROS bag, so it has no topics; leave out colour-topic and the like"
         )
-    return TumReplay(path), open_odometry(path, odometry)
 
 
 def build_replay_perceiver(

@@ -96,18 +96,18 @@ def _choose(
         named = [one for one in topics if one.name == wanted]
         if named:
             return named[0]
-        raise BadRecording(f"{path}: --{what}-topic {wanted}: there is none; there are {_names(topics)}")
+        raise BadRecording(f"{path}: {what} topic {wanted}: there is none; there are {_names(topics)}")
     ranked = {one: place for one in topics if (place := rank(one)) is not None}
     if not ranked:
         raise BadRecording(
-            f"{path}: no topic with {what} images was found; choose one with --{what}-topic; "
+            f"{path}: no topic with {what} images was found; choose one with {_option(what)}; "
             f"there are {_names(topics)}"
         )
     best = [one for one in topics if ranked.get(one) == min(ranked.values())]
     # The same images in several transports: uncompressed ones sort first, by their shorter name.
     if len({base_name(one.name) for one in best}) > 1:
         raise BadRecording(
-            f"{path}: several topics could be the {what}: {_names(best)}; choose one with --{what}-topic"
+            f"{path}: several topics could be the {what}: {_names(best)}; choose one with {_option(what)}"
         )
     return min(best, key=lambda one: len(one.name))
 
@@ -134,6 +134,12 @@ def _info_of(topic: Topic, infos: set[str]) -> str | None:
     stream = stream_of(topic.name)
     places = [beside] if stream is None else [beside, info_topic(stream)]
     return next((place for place in places if place in infos), None)
+
+
+def _option(what: str) -> str:
+    """Where the user chooses: on the command line, or for a recording in place of the camera in YAML."""
+    in_yaml = "" if what == "odometry" else f" (or camera.{what}_topic)"
+    return f"--{what}-topic{in_yaml}"
 
 
 def _names(topics: Sequence[Topic]) -> str:

@@ -197,7 +197,7 @@ def test_the_topics_that_are_asked_for_are_taken(tmp_path: Path) -> None:
     replay = BagReplay(path, wanted=rear)
     assert len(read_all(replay)) == 4
     assert replay.notes[0] == f"colour is {rear.colour}, depth {rear.depth}"
-    with pytest.raises(BadRecording, match="--depth-topic /left: there is none"):
+    with pytest.raises(BadRecording, match="depth topic /left: there is none"):
         BagReplay(path, wanted=WantedTopics(rear.colour, "/left"))
     with pytest.raises(BadRecording, match="cannot be both colour and depth"):
         BagReplay(path, wanted=WantedTopics(rear.depth, rear.depth))
