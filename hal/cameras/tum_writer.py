@@ -31,17 +31,21 @@ class TumWriter:
         self._last_ns = -1
         self._odometry: TextIO | None = None
 
-    def __enter__(self) -> Self:
-        """Raises DeviceRefused if the folder holds a recording already or cannot be made."""
+    def prepare(self) -> None:
+        """Make the folders. Raises DeviceRefused if there is a recording already or they cannot be made."""
         if (self._folder / "rgb.txt").exists():
             raise DeviceRefused(f"{self._folder}: holds a recording already; choose another folder")
-        try:
-            for name in ("rgb", "depth"):
+        for name in ("rgb", "depth"):
+            with self._told(name):
                 (self._folder / name).mkdir(parents=True, exist_ok=True)
+
+    def __enter__(self) -> Self:
+        """Raises DeviceRefused as prepare() does, and if the files cannot be made."""
+        self.prepare()
+        with self._told("rgb.txt"):
             self._colour_index = self._index("rgb.txt", "# time of the colour image in seconds, file")
+        with self._told("depth.txt"):
             self._depth_index = self._index("depth.txt", "# time of the depth image in seconds, file")
-        except OSError as error:
-            raise DeviceRefused(f"{self._folder}: cannot be written ({error.strerror})") from error
         return self
 
     def __exit__(
