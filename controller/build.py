@@ -125,6 +125,12 @@ def open_camera(
             assert_never(unknown)
 
 
+def require_camera(config: AppConfig, config_path: FilePath) -> None:
+    """Before a robot is armed that another process sees for: a recording must be one. Raises HalError."""
+    if isinstance(config.camera, ReplayCameraConfig):
+        _recording(config.camera, config_path)
+
+
 def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> Recording:
     path = resolve(camera.folder, config_path)
     wanted = WantedTopics(camera.colour_topic, camera.depth_topic)

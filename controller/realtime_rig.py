@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 from config.app import AppConfig, RealtimeRunner
-from controller.build import build_path, build_simulation
+from controller.build import build_path, build_simulation, require_camera
 from controller.build_chassis import build_base
 from controller.channel import Channel, channel_sockets
 from controller.console import Console
@@ -100,6 +100,7 @@ def _told(
 @contextmanager
 def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOptions) -> Iterator[RealtimeRig]:
     """The base, opened, and the simulated world if it is one. Raises ConfigError, HalError, UserError."""
+    require_camera(config, options.config_path)
     require_writable(_recording(options))
     clock = MonotonicClock()
     start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)

@@ -203,6 +203,13 @@ def test_what_cannot_be_recorded_is_told_before_a_robot_is_armed(
     assert told in message
 
 
+def test_a_recording_in_place_of_the_camera_that_is_none(tmp_path: Path) -> None:
+    robot = yaml.safe_load((CONFIG_DIR / "robot-roboclaw.yaml").read_text())
+    robot["camera"] = {"kind": "replay", "folder": str(tmp_path / "nowhere")}
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(robot))
+    assert "nowhere: there is no such folder" in refusal("run", "--config", tmp_path / "robot.yaml")
+
+
 def test_a_recording_without_its_calibration(recording: Path) -> None:
     (recording / "camera.yaml").unlink()
     assert "camera.yaml" in refusal("replay", recording)
