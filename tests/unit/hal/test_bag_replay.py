@@ -67,6 +67,7 @@ def test_what_a_realsense_viewer_records_is_read(file: str) -> None:
     """Four frames of librealsense's own recorder: depth from a camera of its own, 3 mm further back."""
     replay = BagReplay(RECORDINGS / file)
     frames = read_all(replay)
+    assert frames[0].depth_scale_m == 0.001
     assert [frame.colour[0, 0].tolist() for frame in frames] == [[10, 20, 30 + n] for n in range(4)]
     assert [np.unique(frame.depth).tolist() for frame in frames] == [[1003 + n] for n in range(4)]
     assert replay.intrinsics == Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
@@ -93,6 +94,9 @@ def test_an_old_realsense_bag_has_nothing_behind_its_images(tmp_path: Path) -> N
 def test_a_tum_folder_is_no_bag(tmp_path: Path) -> None:
     assert not is_bag(tmp_path)
     assert not is_bag(tmp_path / "rgb.txt")
+    (tmp_path / "metadata.yaml").write_text("room: hall")
+    (tmp_path / "rgb.txt").write_text("")
+    assert not is_bag(tmp_path)
 
 
 def test_entering_again_starts_from_the_beginning(tmp_path: Path) -> None:
@@ -114,7 +118,9 @@ def test_depth_and_colour_of_different_times_are_paired_and_the_rest_is_told(tmp
         ]
 
     replay = BagReplay(write_bag(tmp_path, "mcap", entries))
-    assert [frame.captured_ns for frame in read_all(replay)] == [frame.captured_ns for frame in FRAMES]
+    frames = read_all(replay)
+    assert [frame.captured_ns for frame in frames] == [frame.captured_ns for frame in FRAMES]
+    assert [frame.sequence for frame in frames] == [0, 1, 2, 3]
     assert "1 colour images without depth of the same time" in replay.notes
     assert "1 images not later than the one before, left out" in replay.notes
 
