@@ -172,20 +172,20 @@ def test_a_lens_with_more_coefficients_than_can_be_straightened_is_refused(tmp_p
 
 def test_what_is_straight_already_is_not_straightened_again(tmp_path: Path) -> None:
     """And it is of the pinhole that it was rectified to."""
+    striped = np.zeros((SMALL.height, SMALL.width, 3), np.uint8)
+    striped[:, ::4] = 255
 
     def entries(ros: Ros) -> list[Entry]:
         info = ros.info(COLOUR_FRAME, WIDE, (-0.3, 0.0, 0.0, 0.0, 0.0))
         info.p[:] = ros.info(COLOUR_FRAME, SMALL).p
         rectified = COLOUR.replace("image_raw", "image_rect_color")
-        found = without(camera_entries(ros, FRAMES[:1]), COLOUR_INFO)
-        return [
-            (COLOUR_INFO, START_NS, info),
-            *((rectified if topic == COLOUR else topic, t, one) for topic, t, one in found),
-        ]
+        found = without(camera_entries(ros, FRAMES[:1]), COLOUR_INFO, COLOUR)
+        image = ros.image(START_NS, COLOUR_FRAME, "bgr8", striped)
+        return [(COLOUR_INFO, START_NS, info), *found, (rectified, START_NS, image)]
 
     replay = BagReplay(write_bag(tmp_path, "mcap", entries))
     (frame,) = read_all(replay)
-    assert np.array_equal(frame.colour, FRAMES[0].colour)
+    assert np.array_equal(frame.colour, striped)
     assert replay.intrinsics == SMALL
 
 
