@@ -49,6 +49,7 @@ BodyPose = Callable[[int], PlanarPose | None]
 
 # Recordings are shown at this rate, whatever theirs was.
 REPLAY_FPS = 30.0
+_LEAST_FPS = 0.5
 _ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
 
@@ -238,13 +239,14 @@ def build_replay_decision(config: ReplayConfig, mount: CameraMount | None) -> De
     return DecisionMaker(config.decision, config.robot, mount or level, 1.0 / REPLAY_FPS)
 
 
-def replay_surroundings(config: ReplayConfig, mount: CameraMount | None) -> Surroundings:
-    """What a replay's video shows around the observations."""
+def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: float | None) -> Surroundings:
+    """What a replay's video shows around the observations. fps: of the recording, if it is known."""
     return Surroundings(
         mount,
         config.robot.body if mount is not None else None,
         config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
-        REPLAY_FPS,
+        # Two digits: containers count time in whole fractions of a second.
+        REPLAY_FPS if fps is None else max(round(fps, 2), _LEAST_FPS),
         config.robot.limits.max_speed_mps,
         config.perception.max_depth_m,
     )

@@ -112,7 +112,9 @@ def run_replay(options: ReplayOptions) -> None:
     recording = RecordingOptions(options.observations, options.video)
     with ExitStack() as devices:
         devices.enter_context(source)
-        recorder = devices.enter_context(open_recorder(recording, replay_surroundings(config, mount)))
+        recorder = devices.enter_context(
+            open_recorder(recording, replay_surroundings(config, mount, source.fps))
+        )
         while True:
             try:
                 frame = source.read(timeout_s=0.0)

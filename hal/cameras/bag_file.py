@@ -12,7 +12,6 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from hal.cameras.bag_realsense import message_of
-from hal.clocks import NS_PER_S
 from hal.errors import BadRecording, DeviceNotFound
 
 _SUFFIXES = (".bag", ".db3", ".mcap")
@@ -63,11 +62,6 @@ class BagFile:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closing.close()
-
-    @property
-    def duration_s(self) -> float:
-        """From the first message of any topic to the last."""
-        return float(self._reader.duration) / NS_PER_S
 
     @property
     def topics(self) -> tuple[Topic, ...]:

@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -118,3 +119,12 @@ def test_odometry_of_another_time_is_not_called_used(
             writer.write(small_frame(number), Pose(np.eye(3), np.zeros(3)) if number == 0 else None)
     run_replay(ReplayOptions(tmp_path, "auto", CONFIG_DIR / "replay.yaml", quiet=True))
     assert "odometry.txt: 1 poses; of the time of 2 of 3 frames there is none" in capsys.readouterr().out
+
+
+def test_a_video_plays_at_the_pace_of_the_recording(tmp_path: Path) -> None:
+    with TumWriter(tmp_path / "slow") as writer:
+        for number in range(4):
+            writer.write(replace(small_frame(number), captured_ns=number * 125_000_000))
+    video = tmp_path / "v.mp4"
+    run_replay(ReplayOptions(tmp_path / "slow", "auto", CONFIG_DIR / "replay.yaml", video=video, quiet=True))
+    assert cv2.VideoCapture(str(video)).get(cv2.CAP_PROP_FPS) == pytest.approx(8.0)

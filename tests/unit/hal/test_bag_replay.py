@@ -50,7 +50,7 @@ def test_every_format_gives_the_frames_that_were_recorded(of: Format, tmp_path: 
         assert found.depth_scale_m == 0.001
     assert replay.intrinsics == SMALL
     assert replay.frame_count == 4
-    assert replay.fps == pytest.approx(30.0, rel=0.5)
+    assert replay.fps == pytest.approx(30.0, rel=1e-6)
     assert replay.skipped == ()
     assert replay.notes == (f"colour is {COLOUR}, depth {ALIGNED}",)
     assert replay.odometry is None
@@ -220,3 +220,15 @@ def test_compressed_images_are_read(tmp_path: Path) -> None:
     for found, recorded in zip(frames, FRAMES, strict=True):
         assert np.array_equal(found.colour, recorded.colour)
         assert np.array_equal(found.depth, recorded.depth)
+
+
+def test_how_often_frames_come_is_not_a_matter_of_other_topics(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        later = ros.odometry(START_NS, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        return [*camera_entries(ros, FRAMES), ("/odom", START_NS + 9000 * PERIOD_NS, later)]
+
+    assert BagReplay(write_bag(tmp_path, "mcap", entries)).fps == pytest.approx(30.0, rel=1e-6)
+
+
+def test_of_one_image_it_is_not_known_how_often_they_come(tmp_path: Path) -> None:
+    assert BagReplay(small_bag(tmp_path, count=1)).fps is None
