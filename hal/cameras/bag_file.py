@@ -19,9 +19,11 @@ _METADATA = "metadata.yaml"
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path names a bag: a file with one of its suffixes, or a folder that ROS 2 has written."""
+    """Whether a path names a bag: a file with one of its suffixes, or a folder that ROS 2 has written, if not
+    to its end: only then it writes metadata.yaml."""
     if path.is_dir():
-        return (path / _METADATA).is_file() and not (path / "rgb.txt").exists()
+        written = (path / _METADATA).is_file() or any(one.suffix in _SUFFIXES for one in path.glob("*"))
+        return written and not (path / "rgb.txt").exists()
     return path.suffix in _SUFFIXES
 
 

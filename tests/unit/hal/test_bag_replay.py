@@ -175,6 +175,16 @@ def test_a_file_that_is_no_bag_is_refused_in_one_line(of: Format, tmp_path: Path
     assert "\n" not in str(refused.value)
 
 
+def test_a_folder_that_was_not_written_to_its_end_is_told_how_to_mend(tmp_path: Path) -> None:
+    path = small_bag(tmp_path)
+    (path / "metadata.yaml").unlink()
+    assert is_bag(path)
+    with pytest.raises(
+        BadRecording, match=r"metadata file .* does not exist.*mend it with .*ros2 bag reindex"
+    ):
+        BagReplay(path)
+
+
 def test_what_is_wrong_with_a_folder_is_told_in_one_line(tmp_path: Path) -> None:
     path = small_bag(tmp_path)
     (path / "metadata.yaml").write_text("- [")
