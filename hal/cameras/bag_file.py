@@ -14,7 +14,8 @@ from typing import Any, NamedTuple, Self
 from hal.cameras.bag_realsense import message_of
 from hal.errors import BadRecording, DeviceNotFound
 
-_SUFFIXES = (".bag", ".db3", ".mcap")
+_ROS_2 = (".db3", ".mcap")
+_SUFFIXES = (".bag", *_ROS_2)
 _METADATA = "metadata.yaml"
 
 
@@ -22,7 +23,7 @@ def is_bag(path: Path) -> bool:
     """Whether a path names a bag: a file with one of its suffixes, or a folder that ROS 2 has written, if not
     to its end: only then it writes metadata.yaml."""
     if path.is_dir():
-        written = (path / _METADATA).is_file() or any(one.suffix in _SUFFIXES for one in path.glob("*"))
+        written = (path / _METADATA).is_file() or any(one.suffix in _ROS_2 for one in path.glob("*"))
         return written and not (path / "rgb.txt").exists()
     return path.suffix in _SUFFIXES
 
