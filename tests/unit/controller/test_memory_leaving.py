@@ -168,6 +168,11 @@ def test_who_was_certainly_going_goes_on_as_it_was_measured() -> None:
     assert found.xy_m[0].tolist() == pytest.approx([1.6 + 0.025, 0.1 + 0.3])
 
 
+def test_however_certainly_nobody_goes_as_fast_as_a_mistake() -> None:
+    assert out_of_view_after(0.5, left_mps=2.3, sigma_mps=0.1).moving.tolist() == [True]
+    assert out_of_view_after(0.5, left_mps=2.5, sigma_mps=0.1).moving.tolist() == [False]
+
+
 def test_however_certainly_hardly_any_speed_is_no_going() -> None:
     assert out_of_view_after(0.5, left_mps=0.18, sigma_mps=0.02).moving.tolist() == [False]
     assert out_of_view_after(0.5, left_mps=0.22, sigma_mps=0.02).moving.tolist() == [True]
