@@ -23,6 +23,10 @@ class ReplayCameraConfig(Section):
     read_ahead: int = Field(
         default=2, ge=0, le=64, description="folders: frames decoded in advance; 0: when asked for"
     )
+    colour_topic: str | None = Field(
+        default=None, min_length=1, description="bags: the colour images, if they are not found"
+    )
+    depth_topic: str | None = Field(default=None, min_length=1, description="bags: the same of depth")
 
 
 class RealsenseCameraConfig(Section):

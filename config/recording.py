@@ -47,8 +47,8 @@ class RecordingCamera(Section):
 
     depth_factor: depth image value / depth_factor = metres (5000 for TUM, 1000 for millimetres).
     distortion: [k1, k2, p1, p2, k3] of the colour image, OpenCV's order. camera_pitch_deg: positive
-    looks down. camera_forward_m: ahead of the turning centre. Depth outside depth_min_m..depth_max_m
-    counts as not measured.
+    looks down. camera_forward_m, camera_left_m: ahead and to the left of the turning centre. Depth
+    outside depth_min_m..depth_max_m counts as not measured.
 
     Where depth is not registered to colour, depth_fx, depth_fy, depth_cx, depth_cy (with depth_width
     and depth_height where its size differs) and depth_to_colour_translation_m [x, y, z] and
@@ -73,6 +73,7 @@ class RecordingCamera(Section):
     camera_height_m: Positive | None = None
     camera_pitch_deg: Annotated[Number, Field(ge=-90, le=90)] = 0.0
     camera_forward_m: Number = 0.0
+    camera_left_m: Number = 0.0
     depth_min_m: Annotated[Number, Field(ge=0)] | None = None
     depth_max_m: Positive | None = None
     depth_width: Pixels | None = None

@@ -137,11 +137,6 @@ def speed_before_section(distance_m: float, section_mps: float, limits: BrakeLim
     return low
 
 
-def paper_speed(distance_m: float, decel_mps2: float) -> float:
-    """V_r of Daeef 2020, eq. 1: the speed from which the robot stops within distance_m."""
-    return math.sqrt(2.0 * decel_mps2 * distance_m)
-
-
 def paper_braking_distance(v_mps: float, decel_mps2: float) -> float:
     """S_r of Daeef 2020, eq. 2: stop() with infinite jerk."""
     return stop(v_mps, 0.0, BrakeLimits(decel_mps2, math.inf)).distance_m

@@ -49,6 +49,7 @@ BodyPose = Callable[[int], PlanarPose | None]
 
 # Recordings are shown at this rate, whatever theirs was.
 REPLAY_FPS = 30.0
+_LEAST_FPS = 0.5
 _ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
 
@@ -125,10 +126,18 @@ def open_camera(
             assert_never(unknown)
 
 
-def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> FrameSource:
+def require_camera(config: AppConfig, config_path: FilePath) -> None:
+    """Before a robot is armed that another process sees for: a recording must be one. Raises HalError."""
+    if isinstance(config.camera, ReplayCameraConfig):
+        _recording(config.camera, config_path)
+
+
+def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> Recording:
     path = resolve(camera.folder, config_path)
+    wanted = WantedTopics(camera.colour_topic, camera.depth_topic)
     if is_bag(path):
-        return BagReplay(path, "none", max_pair_gap_s=camera.max_pair_gap_s)
+        return BagReplay(path, "none", wanted, camera.max_pair_gap_s)
+    _refuse_topics(path, wanted)
     return TumReplay(path, camera.max_pair_gap_s, camera.read_ahead)
 
 
@@ -195,13 +204,19 @@ def open_replay(
     Raises BadRecording, and DeviceNotFound for a bag without the package that reads it.
     """
     if is_bag(path):
+        if odometry == "none" and wanted is not None and wanted.odometry is not None:
+            raise BadRecording(f"{path}: --odometry-topic has no effect with --odometry none; leave one out")
         bag = BagReplay(path, odometry, wanted or WantedTopics())
         return bag, bag.odometry
+    _refuse_topics(path, wanted)
+    return TumReplay(path), open_odometry(path, odometry)
+
+
+def _refuse_topics(folder: FilePath, wanted: WantedTopics | None) -> None:
     if wanted is not None and wanted != WantedTopics():
         raise BadRecording(
-            f"{path}: is no ROS bag, so it has no topics; leave out --colour-topic and the like"
+            f"{folder}: is no ROS bag, so it has no topics; leave out colour-topic and the like"
         )
-    return TumReplay(path), open_odometry(path, odometry)
 
 
 def build_replay_perceiver(
@@ -224,13 +239,14 @@ def build_replay_decision(config: ReplayConfig, mount: CameraMount | None) -> De
     return DecisionMaker(config.decision, config.robot, mount or level, 1.0 / REPLAY_FPS)
 
 
-def replay_surroundings(config: ReplayConfig, mount: CameraMount | None) -> Surroundings:
-    """What a replay's video shows around the observations."""
+def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: float | None) -> Surroundings:
+    """What a replay's video shows around the observations. fps: of the recording, if it is known."""
     return Surroundings(
         mount,
         config.robot.body if mount is not None else None,
         config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
-        REPLAY_FPS,
+        # Two digits: containers count time in whole fractions of a second.
+        REPLAY_FPS if fps is None else max(round(fps, 2), _LEAST_FPS),
         config.robot.limits.max_speed_mps,
         config.perception.max_depth_m,
     )

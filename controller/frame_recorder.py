@@ -11,6 +11,7 @@ from typing import Self
 import click
 
 from hal.cameras.tum_writer import TumWriter
+from hal.errors import DeviceRefused
 from hal.types import Pose, RgbdFrame
 
 # Two thirds of a second: longer than a disk pauses now and then, some 30 MB.
@@ -37,14 +38,20 @@ class FrameRecorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """What was taken in is written. Raises DeviceRefused if it cannot be and nothing else is wrong."""
+        """What was taken in is written. Raises DeviceRefused if it cannot be, and where something else ends
+        the drive tells it."""
         assert self._thread is not None
         self._thread.shutdown(wait=True)
         if self.dropped:
             why = "they came faster than they could be written"
             click.echo(f"treadwatch: {self._folder}: {self.dropped} frames were left out: {why}", err=True)
-        if error is None:
+        try:
             self._collect(0)
+        except DeviceRefused as refused:
+            if error is None:
+                raise
+            if not isinstance(error, DeviceRefused):
+                click.echo(f"treadwatch: {refused}", err=True)
 
     def write(self, frame: RgbdFrame, odometry: Pose | None) -> None:
         """Take in one frame; one that is not later than the last says nothing new. Raises DeviceRefused where

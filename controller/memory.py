@@ -44,6 +44,7 @@ _NOBODY_HALF_M = 0.1
 # So certainly it goes that it will not be found where it was seen last. Who has been looked at for longer
 # stands by a verdict that had time: what sinks below the view may well seem to move.
 _CERTAIN_SIGMAS, _NO_VERDICT_S = 5.0, 1.0
+_MISTAKEN_MPS = 2.4  # and whatever is measured as faster is a mistake, as in vision/judgement.py
 # Two velocities that differ by so much are of two.
 _APART_SIGMAS = 2.0
 
@@ -241,6 +242,7 @@ def _as_measured(bodies: Bodies) -> Bodies:
     variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
     goes = ~bodies.moving & (bodies.age_s < _NO_VERDICT_S)
     goes &= (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
+    goes &= squared <= _MISTAKEN_MPS**2
     if not goes.any():
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)

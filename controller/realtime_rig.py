@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 from config.app import AppConfig, RealtimeRunner
-from controller.build import build_path, build_simulation
+from controller.build import build_path, build_simulation, require_camera
 from controller.build_chassis import build_base
 from controller.channel import Channel, channel_sockets
 from controller.console import Console
@@ -21,7 +21,7 @@ from controller.ending import Ending
 from controller.perception_process import perceive_forever
 from controller.punctual import PunctualChassis
 from controller.realtime import PerceptionLink, Punctuality, RealtimeMoment, run_realtime
-from controller.recorder import RecordingOptions
+from controller.recorder import RecordingOptions, require_writable
 from controller.result import MissionOptions
 from controller.scheduling import become_realtime
 from controller.service import ServiceManager, stop_on_signals
@@ -64,7 +64,7 @@ class RealtimeRig:
         on_ready is called once, when the first scene has come.
         """
         service = ServiceManager(os.environ, os.getpid())
-        recording = RecordingOptions(self.options.observations, self.options.video, self.options.record)
+        recording = _recording(self.options)
         with (
             perception_beside(self.config, self.options.config_path, self.start_ns, recording) as link,
             stop_on_signals() as stop,
@@ -100,6 +100,8 @@ def _told(
 @contextmanager
 def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOptions) -> Iterator[RealtimeRig]:
     """The base, opened, and the simulated world if it is one. Raises ConfigError, HalError, UserError."""
+    require_camera(config, options.config_path)
+    require_writable(_recording(options))
     clock = MonotonicClock()
     start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)
     start = build_path(config, options.config_path).start
@@ -113,6 +115,10 @@ def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOpti
         period_ns = round(NS_PER_S / runner.control_rate_hz)
         punctual = devices.enter_context(PunctualChassis(chassis, clock, period_ns))
         yield RealtimeRig(config, runner, options, clock, start_ns, punctual, simulation, Punctuality())
+
+
+def _recording(options: MissionOptions) -> RecordingOptions:
+    return RecordingOptions(options.observations, options.video, options.record)
 
 
 @contextmanager

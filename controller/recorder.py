@@ -99,6 +99,17 @@ class Recorder:
             self._video.write(self._composer.compose(moment))
 
 
+def require_writable(options: RecordingOptions) -> None:
+    """Before a robot is armed for a drive that another process records. Raises UserError, HalError."""
+    if options.observations is not None:
+        with ObservationFile(options.observations):
+            pass
+    if options.video is not None:
+        VideoWriter(options.video, fps=1.0)
+    if options.frames is not None:
+        TumWriter(options.frames).prepare()
+
+
 @contextmanager
 def open_recorder(options: RecordingOptions, surroundings: Surroundings) -> Iterator[Recorder]:
     """A recorder whose files are complete when the block ends. Raises VideoError, UserError, HalError."""

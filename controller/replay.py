@@ -55,10 +55,11 @@ class ReplayOptions:
 
 @dataclass
 class ReplayTally:
-    """What a replay adds up to."""
+    """What a replay adds up to. without_pose: frames of whose time odometry tells nothing."""
 
     timing: TimingTally = field(default_factory=TimingTally)
     frames: int = 0
+    without_pose: int = 0
     first_ns: int = 0
     last_ns: int = 0
     ids: set[int] = field(default_factory=set)
@@ -73,6 +74,7 @@ class ReplayTally:
         self.first_ns = look.scene.captured_ns if self.frames == 0 else self.first_ns
         self.last_ns = look.scene.captured_ns
         self.frames += 1
+        self.without_pose += look.camera_pose is None
         self.ids.update(obstacle.id for obstacle in look.scene.obstacles)
         self.moving_ids.update(obstacle.id for obstacle in look.scene.obstacles if obstacle.moving)
         for obstacle in look.scene.obstacles:
@@ -110,7 +112,9 @@ def run_replay(options: ReplayOptions) -> None:
     recording = RecordingOptions(options.observations, options.video)
     with ExitStack() as devices:
         devices.enter_context(source)
-        recorder = devices.enter_context(open_recorder(recording, replay_surroundings(config, mount)))
+        recorder = devices.enter_context(
+            open_recorder(recording, replay_surroundings(config, mount, source.fps))
+        )
         while True:
             try:
                 frame = source.read(timeout_s=0.0)
@@ -126,6 +130,8 @@ def run_replay(options: ReplayOptions) -> None:
     prior = "none: the camera's motion is estimated from images and depth alone"
     if odometry is not None:
         prior = f"{odometry.name}: {len(odometry)} poses"
+        if tally.without_pose:
+            prior += f"; of the time of {tally.without_pose} of {tally.frames} frames there is none"
     skipped = [str(skip) for skip in source.skipped]
     console.summary(_summary(options, tally, prior, skipped, source.notes))
 

@@ -13,21 +13,15 @@ from vision.depth_grid import DepthGrid, make_grid
 from vision.depth_mask import surface_depth
 from vision.detection import Detection, camera_health, no_motion
 from vision.edges import GreyImage
-from vision.ego_motion import (
-    CameraEstimate,
-    MotionPrior,
-    estimate,
-    odometry_prior,
-    steady_prior,
-    with_gyro,
-)
+from vision.ego_motion import CameraEstimate, estimate
 from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
 from vision.floor import FloorFinder, on_floor
 from vision.fragments import FragmentStore
 from vision.health import Continuity, HealthMonitor
-from vision.lens import project, rays
+from vision.lens import project, rays, vector_from_rotation
+from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
 from vision.renewal import Renewal
-from vision.rolling import rolling_prior
+from vision.rolling_shutter import ReadOut
 from vision.scene import CameraHealth, EgoMotion, Fragments
 from vision.velocities import PointMotion
 
@@ -35,6 +29,7 @@ from vision.velocities import PointMotion
 _AGREEMENT = 0.45
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
+_NO_SWEEP = np.zeros(2)
 
 
 class Detector:
@@ -53,6 +48,7 @@ class Detector:
         self._odometry: Pose | None = None
         self._motion = _IDENTITY
         self._motion_dt_s = 0.0
+        self._read_out = ReadOut(config.ego_motion.vibration_radps)
         self._variance_scale = 1.0
 
     def step(self, frame: RgbdFrame, odometry: Pose | None, previous: Fragments | None = None) -> Detection:
@@ -117,7 +113,7 @@ class Detector:
         depths = appraise(anchor, config.depth_noise)
         static = static_points(anchor, depths, store.pixel_cov, moving)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
-        result = estimate(static, pixels, self._pose, prior, camera)
+        result = estimate(static, pixels, self._pose, prior, self._read_out.sweep_sigma_rad(), camera)
         motion = gather(store, anchor, depths, result, camera, config.depth_noise, self._variance_scale)
         if result.visual:
             self._variance_scale = observed_variance_scale(
@@ -125,6 +121,7 @@ class Detector:
             )
         average_depth(store, store.before(frame.captured_ns), result.pose, config.depth_noise)
         step = self._pose.inverse() @ result.pose
+        self._read_out.learn(result, vector_from_rotation(step.rotation), dt_s)
         ego = _ego(step, dt_s, result, prior)
         blurred = result.visual and prior.source == "none" and result.inlier_ratio < _AGREEMENT
         health = camera_health(health, ego, blurred)
@@ -137,7 +134,7 @@ class Detector:
         self._renew(frame, grey)
         if ego.source == "none":
             self._store.break_history()
-        self._commit(frame, grey, odometry)
+        self._commit(frame, grey, odometry, result.sweep_rad)
         return detection
 
     def _grid(self, frame: RgbdFrame) -> DepthGrid:
@@ -154,8 +151,10 @@ class Detector:
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
-    def _commit(self, frame: RgbdFrame, grey: GreyImage, odometry: Pose | None) -> None:
-        self._store.commit(frame.captured_ns, self._pose, frame.intrinsics)
+    def _commit(
+        self, frame: RgbdFrame, grey: GreyImage, odometry: Pose | None, sweep_rad: FloatArray
+    ) -> None:
+        self._store.commit(frame.captured_ns, self._pose, frame.intrinsics, sweep_rad)
         self._grey, self._last_ns, self._odometry = grey, frame.captured_ns, odometry
 
     def _restart(
@@ -168,16 +167,18 @@ class Detector:
     ) -> Detection:
         """Begin anew: after the first frame, a gap, or a change of the image's size."""
         self._store.clear()
+        self._read_out.lose()
         self._motion, self._motion_dt_s = _IDENTITY, 0.0
         ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
         self._renew(frame, grey)
         motion = no_motion(2 * len(self._store))
         detection = self._detection(frame, grid, 0.0, motion, ego, health, True)
-        self._commit(frame, grey, odometry)
+        self._commit(frame, grey, odometry, _NO_SWEEP)
         return detection
 
     def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
         """Nothing can be followed through this frame; the fragments wait for the next good one."""
+        self._read_out.lose()
         ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
         motion = no_motion(2 * len(self._store))
         return self._detection(frame, grid, 0.0, motion, ego, health, False)

@@ -3,24 +3,23 @@
 Gauss-Newton on the reprojection of points anchored some frames ago. A point's error has a pixel part
 and a depth part: depth moves the prediction along its epipolar line only, so a point with uncertain
 depth still measures across it. Points that even the prior's uncertainty cannot explain never enter,
-therefore a person who fills half of the view cannot outvote the odometry.
+therefore a person who fills half of the view cannot outvote the odometry. How far the camera turned while the
+rows of the image were read, its sweep, is found with it (vision/rolling_shutter.py).
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from config.perception import EgoMotionSettings
-from hal.types import FloatArray, GyroSamples, Intrinsics, Pose
-from vision.lens import rotation_from_vector, vector_from_rotation
+from hal.types import FloatArray, Intrinsics, Pose
+from vision.lens import rotation_from_vector, row_delays, vector_from_rotation
+from vision.motion_prior import MotionPrior
 from vision.order import median
 
-NS_PER_S = 1e9
 _ITERATIONS = 6
 _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
 _ANNEAL = (32.0, 4.0)  # robust scale of the first iterations, falling to 1
@@ -28,22 +27,11 @@ _MIN_POINTS = 8
 _MIN_INLIER_RATIO = 0.25
 _MIN_BACKGROUND_RATIO = 0.10
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
-_TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2])  # of the prior's sigma, where it decides
+_TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, where it decides
 _CONVERGED_SIGMAS = 0.2  # a step of less is nothing beside what the pose may be off anyway
-_IDENTITY = np.eye(6)
+_UNKNOWNS = 8  # rotation and translation (3 each), sweep about x and y
+_IDENTITY = np.eye(_UNKNOWNS)
 _STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivatives say, to 0.01 px
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MotionPrior:
-    """What is known before looking: motion (the camera now in the camera before) and the standard
-    deviation (6,) of a small motion of the camera now: rotation about, translation along x, y, z.
-    binding: it is known that well, so that data which contradict it follow something large that moves."""
-
-    motion: Pose
-    sigma: FloatArray
-    source: str
-    binding: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,67 +49,40 @@ class Anchors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraEstimate:
-    """pose: the camera in the fixed frame. covariance (6, 6) of a small motion of it. inlier_ratio: NaN
-    where not estimated. visual: False where only the prior speaks."""
+    """pose: the camera in the fixed frame, when the middle row was read. sweep_rad (2,): how far it turned
+    about x and y from the first row to the last. covariance (8, 8) of a small motion of it and of
+    sweep_rad. inlier_ratio: NaN where not estimated. visual: False where only the prior speaks."""
 
     pose: Pose
+    sweep_rad: FloatArray
     covariance: FloatArray
     inlier_ratio: float
     visual: bool
 
 
-def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
-    """A prior from dead reckoning: good in translation, slipping in yaw, blind to vibration."""
-    turn_rad = math.hypot(*vector_from_rotation(motion.rotation).tolist())
-    way_m = math.hypot(*motion.translation_m.tolist())
-    yaw = settings.odometry_yaw_ratio * turn_rad + settings.odometry_rotation_radps * dt_s
-    tilt = settings.vibration_radps * dt_s + 0.1 * turn_rad
-    way = settings.odometry_speed_ratio * way_m + settings.odometry_speed_mps * dt_s
-    return MotionPrior(motion, np.array([tilt, yaw, tilt, way, way, way]), "odometry", True)
-
-
-def steady_prior(last: Pose, last_dt_s: float, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
-    """A prior where nothing else is known: the camera goes on as it did. last_dt_s 0: not even that."""
-    known = last_dt_s > 0
-    share = dt_s / last_dt_s if known else 0.0
-    turn = rotation_from_vector(vector_from_rotation(last.rotation) * share)
-    sigma = np.array([settings.steady_rotation_radps] * 3 + [settings.steady_speed_mps] * 3) * dt_s
-    sigma *= 1.0 if known else settings.unknown_factor
-    return MotionPrior(Pose(turn, last.translation_m * share), sigma, "none")
-
-
-def with_gyro(
-    prior: MotionPrior, gyro: GyroSamples, from_ns: int, to_ns: int, settings: EgoMotionSettings
-) -> MotionPrior:
-    """The prior with its rotation taken from the gyro's mean rate over the interval."""
-    inside = (gyro.stamps_ns > from_ns) & (gyro.stamps_ns <= to_ns)
-    if not inside.any() or not np.isfinite(gyro.rates_radps[inside]).all():
-        return prior
-    dt_s = (to_ns - from_ns) / NS_PER_S
-    turn = rotation_from_vector(gyro.rates_radps[inside].mean(axis=0) * dt_s)
-    sigma = prior.sigma.copy()
-    sigma[:3] = settings.gyro_radps * dt_s
-    return MotionPrior(Pose(turn, prior.motion.translation_m), sigma, prior.source, prior.binding)
-
-
 def estimate(
-    anchors: Anchors, pixels: FloatArray, before: Pose, prior: MotionPrior, camera: Intrinsics
+    anchors: Anchors,
+    pixels: FloatArray,
+    before: Pose,
+    prior: MotionPrior,
+    sweep_sigma_rad: FloatArray,
+    camera: Intrinsics,
 ) -> CameraEstimate:
     """The camera now, from where anchored points are seen now (pixels (N, 2)).
 
-    before: the camera of the frame before, in the fixed frame.
+    before: the camera of the frame before, in the fixed frame. sweep_sigma_rad (2,): one sigma of sweep_rad.
     """
-    start = before @ prior.motion
+    start, sigma = before @ prior.motion, np.concatenate((prior.sigma, sweep_sigma_rad))
     use = np.flatnonzero(anchors.usable)
     if len(use) < _MIN_POINTS:
-        return _unseen(start, prior, float("nan"))
+        return _unseen(start, sigma, float("nan"))
     view = _view(anchors, pixels, use, camera)
-    found = _solve(view, start, prior.sigma)
+    found = _solve(view, start, sigma)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
     torn = prior.binding and _conflict(found.pose, start, prior.sigma)
     if torn:
         # Something large moves, and the data follow it. What agrees with the prior is the ground.
-        found = _solve(view, start, prior.sigma * _TRUSTED_SHARE)
+        found = _solve(view, start, sigma * _TRUSTED_SHARE)
         least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
         # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
         torn = _conflict(found.pose, start, prior.sigma)
@@ -129,32 +90,33 @@ def estimate(
     # OpenCV answers zeros where there is no inverse: the least that is known would seem the most.
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
     if found.inliers < least or torn or not regular:
-        return _unseen(start, prior, ratio)
-    return CameraEstimate(found.pose, np.asarray(covariance, np.float64), ratio, True)
+        return _unseen(start, sigma, ratio)
+    return CameraEstimate(found.pose, found.sweep_rad, np.asarray(covariance, np.float64), ratio, True)
 
 
-def _unseen(start: Pose, prior: MotionPrior, inlier_ratio: float) -> CameraEstimate:
+def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:
     """Only the prior speaks."""
-    return CameraEstimate(start, np.diag(np.square(prior.sigma)), inlier_ratio, False)
+    return CameraEstimate(start, np.zeros(2), np.diag(np.square(sigma)), inlier_ratio, False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
     """The N points that count, coordinate by coordinate: at this size a NumPy call costs more than what it
     computes, so everything of one kind lies in one array. lines (3, 2N): points, then their derivatives
-    by depth. seen (2, N): on the plane z = 1. whitening (3, N): turns an error (a, b) on that plane into
-    (w0 a, w1 a + w2 b), of unit variance."""
+    by depth. seen (2, N): on the plane z = 1; delays (N,) of their rows. whitening (3, N): turns an error
+    (a, b) on that plane into (w0 a, w1 a + w2 b), of unit variance."""
 
     lines: FloatArray
     seen: FloatArray
+    delays: FloatArray
     depth_variance: FloatArray
     whitening: FloatArray
-    camera: Intrinsics
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solution:
     pose: Pose
+    sweep_rad: FloatArray
     information: FloatArray
     inliers: int
 
@@ -178,35 +140,35 @@ def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: I
     whitening[0] = camera.fx / first
     whitening[1] = -camera.fx * low / (first * second)
     whitening[2] = camera.fy / second
-    return _View(lines, seen, np.square(anchors.depth_sigma_m[use]), whitening, camera)
+    return _View(lines, seen, row_delays(v, camera), np.square(anchors.depth_sigma_m[use]), whitening)
 
 
 def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
-    """Iteratively reweighted Gauss-Newton from start, which is known to sigma (6,)."""
+    """Iteratively reweighted Gauss-Newton from start, which is known to sigma (8,)."""
     prior = 1.0 / np.square(sigma)
     information = prior_information = _IDENTITY * prior
-    pose = _shift(view, start, sigma)
+    pose, sweep_rad = _shift(view, start, sigma), np.zeros(2)
     count = view.seen.shape[1]
-    table, weights = np.empty((8, 3, count)), np.empty((3, count))
-    flat = table[:7].reshape(7, 3 * count)
+    table, weights = np.empty((10, 3, count)), np.empty((3, count))
+    flat = table[:9].reshape(9, 3 * count)
     in_front, shrink = _linearise(view, pose, table)
-    missing = _difference(pose, start)
+    missing = np.concatenate((_difference(pose, start), sweep_rad))
     allowed = np.ones(count)
-    gone = np.zeros(6)  # since the image was linearised
+    gone = np.zeros(_UNKNOWNS)  # since the image was linearised
     for iteration in range(_ITERATIONS):
-        a, b, along = table[6]
+        a, b, along = table[8]
         chi2 = a * a + b * b - shrink * along * along
         if iteration == 0:
-            doubt = np.square(table[:6, :2] * sigma[:, None, None]).reshape(12, count).sum(axis=0)
+            doubt = np.square(table[:8, :2] * sigma[:, None, None]).reshape(16, count).sum(axis=0)
             allowed = (in_front & (chi2 <= _GATE_CHI2 * (1.0 + doubt))).astype(np.float64)
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
         weight = allowed * in_front / (scale * np.square(1.0 + chi2 * (1.0 / (_GATE_CHI2 * scale))))
         weights[:2] = weight
         weights[2] = weight * -shrink
-        # Six rows of the normal matrix, and in the last column the right side.
-        normal = (table[:7] * weights).reshape(7, 3 * count) @ flat.T
-        information = normal[:6, :6] + prior_information
-        side = normal[:6, 6] + prior * missing
+        # Eight rows of the normal matrix, and in the last column the right side.
+        normal = (table[:9] * weights).reshape(9, 3 * count) @ flat.T
+        information = normal[:8, :8] + prior_information
+        side = normal[:8, 8] + prior * missing
         _, solved = cv2.solve(information, side[:, None])
         step = np.asarray(solved, np.float64)[:, 0]
         gone = gone + step
@@ -214,14 +176,15 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
         if iteration >= len(_ANNEAL) and float(step @ side) < _CONVERGED_SIGMAS**2:
             break
         if max(map(abs, gone.tolist())) > _STRAIGHT:
-            pose, gone = _moved(pose, gone), np.zeros(6)
+            pose, sweep_rad, gone = _moved(pose, gone[:6]), sweep_rad + gone[6:], np.zeros(_UNKNOWNS)
             in_front, shrink = _linearise(view, pose, table)
-            missing = _difference(pose, start)
+            table[8] -= (sweep_rad @ flat[6:8]).reshape(3, count)
+            missing = np.concatenate((_difference(pose, start), -sweep_rad))
         else:
             missing = missing - step
-            table[6] -= (step @ flat[:6]).reshape(3, count)
+            table[8] -= (step @ flat[:8]).reshape(3, count)
     inliers = int(np.count_nonzero(allowed * (chi2 <= _GATE_CHI2)))
-    return _Solution(_moved(pose, gone), information, inliers)
+    return _Solution(_moved(pose, gone[:6]), sweep_rad + gone[6:], information, inliers)
 
 
 def _moved(pose: Pose, step: FloatArray) -> Pose:
@@ -236,12 +199,13 @@ def _conflict(pose: Pose, start: Pose, sigma: FloatArray) -> bool:
 
 
 def _linearise(view: _View, pose: Pose, table: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Fill table (8, 3, N). Returns which points lie in front of the camera and what the variance of their
+    """Fill table (10, 3, N). Returns which points lie in front of the camera and what the variance of their
     depth takes off the square of an error along the derivative by depth: (N,), (N,).
 
-    Rows 0 to 5: derivative of the image by a small motion of the camera (rotation, translation); row 6:
-    seen minus predicted; row 7: derivative by depth. First and second layer: across and down the image,
-    in sigmas. Third layer: the part along the derivative by depth, times its length.
+    Rows 0 to 5: derivative of the image by a small motion of the camera (rotation, translation); rows 6
+    and 7: by its sweep; row 8: seen minus predicted, without sweep; row 9: derivative by depth. First and
+    second layer: across and down the image, in sigmas. Third layer: the part along the derivative by depth,
+    times its length.
     """
     count = view.seen.shape[1]
     turned = pose.rotation.T @ view.lines
@@ -265,23 +229,25 @@ def _linearise(view: _View, pose: Pose, table: FloatArray) -> tuple[NDArray[np.b
     down[4] = across[3]
     np.multiply(x, inverse, out=across[5])
     np.multiply(y, inverse, out=down[5])
-    np.subtract(view.seen[0], x, out=across[6])
-    np.subtract(view.seen[1], y, out=down[6])
-    np.multiply(inverse, direction[0] - x * direction[2], out=across[7])
-    np.multiply(inverse, direction[1] - y * direction[2], out=down[7])
+    np.subtract(view.seen[0], x, out=across[8])
+    np.subtract(view.seen[1], y, out=down[8])
+    np.multiply(inverse, direction[0] - x * direction[2], out=across[9])
+    np.multiply(inverse, direction[1] - y * direction[2], out=down[9])
+    np.multiply(across[:2], view.delays, out=across[6:8])
+    np.multiply(down[:2], view.delays, out=down[6:8])
     own, mixed, other = view.whitening
     down *= other
     down += across * mixed
     across *= own
-    np.multiply(across, across[7], out=along)
-    along += down * down[7]
+    np.multiply(across, across[9], out=along)
+    along += down * down[9]
     # Depth's share of the covariance, by Sherman and Morrison: only along the epipolar line.
-    shrink = view.depth_variance / (1.0 + view.depth_variance * along[7])
+    shrink = view.depth_variance / (1.0 + view.depth_variance * along[9])
     return in_front, shrink
 
 
 def _shift(view: _View, start: Pose, sigma: FloatArray) -> Pose:
-    """A better start: turn by the median miss of all points, as far as sigma (6,) admits."""
+    """A better start: turn by the median miss of all points, as far as sigma (8,) admits."""
     count = view.seen.shape[1]
     local = start.rotation.T @ view.lines[:, :count] - (start.rotation.T @ start.translation_m)[:, None]
     across, down = median(view.seen - local[:2] / np.maximum(local[2], 0.1))

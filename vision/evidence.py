@@ -13,8 +13,8 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth_mask import depth_sigma_m
 from vision.ego_motion import Anchors, CameraEstimate
 from vision.fragments import AnchorEnds, FragmentStore
-from vision.lens import rays
 from vision.order import quantile
+from vision.rolling_shutter import straight_rays
 from vision.velocities import PointMotion, chi2_2d
 
 # Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
@@ -86,7 +86,7 @@ def gather(
     turn = now.pose.rotation.T
     direction = turn @ anchor.direction
     origin = turn @ (anchor.origin - now.pose.translation_m[:, None])
-    ray = rays(store.ends_px.reshape(-1, 2), camera).T[:2]
+    ray = straight_rays(store.ends_px.reshape(-1, 2), camera, now.sweep_rad).T[:2]
     # Near and far surface at once, in the middle index: (3, 2, 2N), (2, 2, 2N).
     surfaces = np.empty((2, len(depths.near_m)))
     surfaces[0], surfaces[1] = depths.near_m, depths.far_m
@@ -190,5 +190,5 @@ def _pixel_covariance(store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[n
 def _pose_variance(covariance: FloatArray, squared_depth: FloatArray) -> FloatArray:
     """(N,) variance in metres across the view that the camera's own uncertainty makes at a depth."""
     variance = covariance.diagonal().tolist()
-    result: FloatArray = max(variance[3:]) + max(variance[:3]) * squared_depth
+    result: FloatArray = max(variance[3:6]) + max(variance[:3]) * squared_depth
     return result

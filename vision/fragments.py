@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.lens import rays
+from vision.rolling_shutter import straight_rays
 
 HISTORY = 24
 _FEWEST_PLACES = 64
@@ -120,12 +120,13 @@ class FragmentStore:
             places = np.concatenate((places, np.arange(len(free), len(free) + more)))
         return places[:count]
 
-    def commit(self, stamp_ns: int, pose: Pose, camera: Intrinsics) -> None:
-        """Write the present ends into the history, with the camera of this frame."""
+    def commit(self, stamp_ns: int, pose: Pose, camera: Intrinsics, sweep_rad: FloatArray) -> None:
+        """Write the present ends into the history, with the camera of this frame; sweep_rad as in
+        straight_rays."""
         self._head = (self._head + 1) % HISTORY
         self._comparable = min(self._comparable + 1, HISTORY)
         frame, place = self._history[:, self._head], self._place
-        direction = pose.rotation @ rays(self.ends_px.reshape(-1, 2), camera).T
+        direction = pose.rotation @ straight_rays(self.ends_px.reshape(-1, 2), camera, sweep_rad).T
         ends = np.empty((6, len(place), 2))
         ends[:3] = direction.reshape(3, -1, 2)
         ends[3], ends[4], ends[5] = self.depth_m, self.far_m, self.looks

@@ -31,6 +31,11 @@ _PAIR_DISTANCE_M = 0.5
 _VALLEY = 0.35
 _MIN_CELLS = 24
 _BINS = 12
+_CARRIED_M = 0.8
+_CARRIED_MPS = 0.25
+_CARRIED_SIGMA_MPS = 0.35
+_MOSTLY = 0.7
+_TOUCHING_PX = 16.0
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
 
 
@@ -116,7 +121,8 @@ def detach(
 ) -> NDArray[np.int32]:
     """winner (P,), track index + 1 of each part or 0, without the parts far from the track's main one.
 
-    votes (P,): how many cells spoke for the winner. expected (P, T): parts that stay with it all the same.
+    votes (P,): how many cells spoke for the winner. expected (P, T): parts that stay with it all the same, as
+    those do that stand on the main one in the image and were its own before.
     """
     owned = np.flatnonzero(winner > 0)
     if len(owned) == 0:
@@ -128,7 +134,10 @@ def detach(
         return winner
     main = order[np.maximum.accumulate(np.where(is_main, np.arange(len(order)), 0))]
     box = boxes(parts)
-    far = (gaps_m(box, order, box, main) > _APART_M) & ~expected[order, track - 1]
+    gap = gaps_m(box, order, box, main)
+    carried = (votes[order] >= _MOSTLY * parts.cells[order]) & (gap <= _CARRIED_M)
+    carried &= _stacked(parts.bbox_px[order], parts.bbox_px[main])
+    far = (gap > _APART_M) & ~expected[order, track - 1] & ~carried
     result = winner.copy()
     result[order[far]] = 0
     return result
@@ -166,7 +175,8 @@ def merges(
     moving: NDArray[np.bool_],
 ) -> list[tuple[int, int]]:
     """Pairs (small, large) of tracks that may be one body: a suspect or mover beside a larger mover, the
-    closest pairs first. A track may be beside several.
+    closest pairs first. A track may be beside several. What begins where another one ends in the image and
+    surely goes exactly as that does is carried by it, even if it is farther back: the mast of a cart.
 
     velocity (T, 3) and velocity_sigma (T,) of the tracks.
     """
@@ -185,6 +195,9 @@ def merges(
     overlap = _overlaps(regions.bbox_px[a], regions.bbox_px[b])
     fits = (cells[a] <= _SMALL_SHARE * cells[b]) | (width <= _SINGLE_WIDTH_M) | (overlap >= _OVERLAP)
     reach = np.where(overlap >= _OVERLAP, _APART_M, _CLOSE_M)
+    known = np.maximum(velocity_sigma[a], velocity_sigma[b]) <= _CARRIED_SIGMA_MPS
+    carried = known & (difference <= _CARRIED_MPS) & _stacked(regions.bbox_px[a], regions.bbox_px[b])
+    reach = np.where(carried, _CARRIED_M, reach)
     gap = gaps_m(box, a, box, b)
     one = (gap <= reach) & alike & fits
     a, b = a[one], b[one]
@@ -205,6 +218,15 @@ def join(grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]]) -> tupl
             labels = joined
             gone.append(small)
     return labels, gone
+
+
+def _stacked(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
+    """(K,) whether the lower end of box a[k] is the upper end of box b[k] in the image, for most of the
+    width of a[k]; (K, 4) each: u0, v0, u1, v1."""
+    shared = np.minimum(a[:, 2], b[:, 2]) - np.maximum(a[:, 0], b[:, 0])
+    apart = np.abs(a[:, 3] - b[:, 1])
+    result: NDArray[np.bool_] = (shared >= _MOSTLY * (a[:, 2] - a[:, 0])) & (apart <= _TOUCHING_PX)
+    return result
 
 
 def _overlaps(a: FloatArray, b: FloatArray) -> FloatArray:

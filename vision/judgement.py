@@ -32,6 +32,9 @@ _ENDS_ACROSS = 4
 _ENDS_ALONG = 8
 _LEVEL_SHARE = 0.5  # of the threshold: with less than that, what goes up or down needs as many ends as along
 _MIN_AGREEMENT = 0.18
+_UNREST_SHARE = 0.5  # of the threshold
+_LASTING_UNREST_S = 0.4
+_LIKELY_SHARE = 0.25
 _OWN_PROOF = 3.0
 _SHARED_PROOF = 0.55  # of the threshold, where fragments and surface say the same
 _SPEED_PER_METRE = 0.02
@@ -43,6 +46,7 @@ _KNOWN_SPEED = 2.0  # of the least speed: with less doubt than this, a slow move
 _IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
 _CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
 _CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewhat longer
+_CLEAR_WAY = 4.0  # times the noise of one pixel's depth: no noise that neighbours share feigns so long a way
 _CLEAN_LOOKS = 2.5  # three of them, where frames are few
 _EVEN_CELLS = 48  # fewer lie on two or three patches of depth noise, and go to and fro with these
 _COMPACT_M = 2.2
@@ -55,9 +59,10 @@ _LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them
 class MotionEvidence:
     """Of T tracks, along the axes of the fixed frame.
 
-    sight (T, 3): unit vector from the camera; distance_m (T,). velocity (T, 3), covariance (T, 3, 3): as
-    filtered. own_velocity, own_covariance: of this frame's fragments alone, from ends (T,) points of
-    which agreement (T,) agree; restless (T,): by these it does not stand still, whether they agree or not.
+    sight (T, 3): unit vector from the camera; distance_m (T,); depth_sigma_m (T,): of one pixel's depth
+    there. velocity (T, 3), covariance (T, 3, 3): as filtered. own_velocity, own_covariance: of this
+    frame's fragments alone, from ends (T,) points of which agreement (T,) agree; restless (T,): by these it
+    does not stand still, whether they agree or not; unrest_s (T,): for how long it has not.
     surface_velocity, surface_covariance: from the surface's centre alone.
     arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
     its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
@@ -69,6 +74,7 @@ class MotionEvidence:
 
     sight: FloatArray
     distance_m: FloatArray
+    depth_sigma_m: FloatArray
     velocity: FloatArray
     covariance: FloatArray
     own_velocity: FloatArray
@@ -78,6 +84,7 @@ class MotionEvidence:
     ends: NDArray[np.intp]
     agreement: FloatArray
     restless: NDArray[np.bool_]
+    unrest_s: FloatArray
     arrived: NDArray[np.intp]
     cells: NDArray[np.intp]
     size_m: FloatArray
@@ -184,9 +191,14 @@ def _by_fragments(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
 
 
 def _by_unrest(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
-    """(T,) whether many ends, by whatever each of them does, bear out the filter's velocity."""
+    """(T,) whether many ends, by whatever each of them does, bear out the filter's velocity.
+
+    That of a slow body with swinging limbs never becomes clear. Where its ends have denied for longer than
+    any limb swings one way, it need only be likely.
+    """
+    share = np.where(seen.unrest_s >= _LASTING_UNREST_S, _LIKELY_SHARE, _UNREST_SHARE)
     result: NDArray[np.bool_] = (
-        seen.restless & (seen.ends >= _ENDS_ALONG) & (read.filtered.total > 0.5 * read.threshold)
+        seen.restless & (seen.ends >= _ENDS_ALONG) & (read.filtered.total > share * read.threshold)
     )
     return result
 
@@ -242,13 +254,16 @@ def _by_surface(seen: MotionEvidence, read: _Reading, dt_s: float) -> NDArray[np
 
     A new viewpoint shows other sides of a thing that stands still, so its centre wanders with the view, and
     it wanders while more and more of it comes to be seen: that much speed proves nothing. Nor does a few
-    cells' way along the line of sight: a wall seen through a chair has not many more.
+    cells' way along the line of sight: a wall seen through a chair has not many more. Along it a longer time
+    is asked for, unless the way is far beyond what depth is off by.
     """
     speed = np.sqrt(np.square(seen.surface_velocity).sum(axis=1))
     looks_s = _CLEAN_LOOKS * dt_s
     clear = (read.surface.across > read.threshold) & (seen.clean_s >= max(_CLEAN_ACROSS_S, looks_s))
     even = seen.cells >= _EVEN_CELLS
-    clear |= even & (read.surface.along > read.threshold) & (seen.clean_s >= max(_CLEAN_ALONG_S, looks_s))
+    far = np.abs(read.surface.value) * seen.clean_s >= _CLEAR_WAY * seen.depth_sigma_m
+    long_s = np.maximum(np.where(far, _CLEAN_ACROSS_S, _CLEAN_ALONG_S), looks_s)
+    clear |= even & (read.surface.along > read.threshold) & (seen.clean_s >= long_s)
     wander = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps
     result: NDArray[np.bool_] = clear & (seen.size_m <= _COMPACT_M) & (speed > read.least_mps + wander)
     return result

@@ -24,6 +24,11 @@ def rays(pixels: RealArray, camera: Intrinsics) -> FloatArray:
     return result.T
 
 
+def row_delays(v_px: RealArray, camera: Intrinsics) -> FloatArray:
+    """(N,) when the rows v_px (N,) of an image are read: -0.5 for its first to 0.5 for its last one."""
+    return v_px.astype(np.float64) / camera.height - 0.5
+
+
 def project(points_m: FloatArray, camera: Intrinsics) -> FloatArray:
     """(N, 2) pixels of points (N, 3) in the optical frame; the caller keeps z > 0."""
     inverse_z = 1.0 / points_m[:, 2]

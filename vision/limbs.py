@@ -21,6 +21,8 @@ _RESTLESS = 0.7  # of the ends: so many must be where nothing that stands still 
 # Limbs swing about as fast as their body goes. For half a step it is the same ones that disagree: that is
 # no noise which averages out from frame to frame.
 _DISAGREEMENT_MPS = 1.0
+# What several limbs have in common is their body's; a limb and what belongs to it shows so many ends.
+_ENDS_PER_LIMB = 8.0
 _GAIT = 0.6  # of the body's speed: what one limb, over a step, has more or less than its body
 
 
@@ -45,7 +47,10 @@ def variance(body: BodyVelocities, speed_mps: FloatArray) -> FloatArray:
     speed_mps (G,): of bodies that are known to move, 0 for others: what stands does not swing its limbs.
     """
     agreeing = np.maximum(body.agreement * body.ends, 1.0)
+    # Where some ends stand, the others are no limbs of a body that goes.
+    limbs = np.where(restless(body), np.maximum(body.ends / _ENDS_PER_LIMB, 1.0), 1.0)
     result: FloatArray = (
-        np.square(_DISAGREEMENT_MPS * (1.0 - body.agreement)) + np.square(_GAIT * speed_mps) / agreeing
+        np.square(_DISAGREEMENT_MPS * (1.0 - body.agreement)) / limbs
+        + np.square(_GAIT * speed_mps) / agreeing
     )
     return result

@@ -1,7 +1,8 @@
 """The visible surfaces of the tracks into their filters: where the bodies are, and how fast these centres go.
 
 A centre tells of the velocity only while the same whole surface is seen. Where it is cut at its side by the
-image's border, hidden in part or suddenly another one, it tells of the position alone.
+image's border, hidden in part or suddenly another one, it tells of the position alone; of what is known to
+move it tells roughly all the same, for a body cannot be far from what is seen of it.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ MIN_CELLS = 6
 _CENTRE_SIGMA_M = 0.015
 _CENTRE_SHARE = 0.0125  # of its size, across the line of sight: cells at the rim come and go
 _CENTRE_DEPTH_SHARE = 0.04
+_SHIFT_SHARE = 0.35  # of its size: the middle of what is seen of a body, from where it is while all is seen
 _CUT_SIGMA_M = 1.0  # in height, of what reaches beyond the image above or below
 _CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it does not average out
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
@@ -45,15 +47,18 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     usual_m2 = np.where(tracks.sightings[seen] == 0, area_m2, tracks.area_m2[seen])
     change = np.abs(area_m2 - usual_m2) / usual_m2
     jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
-    smooth = (
-        measured.wide[seen] & (change <= _SAME_AREA) & (jump <= _JUMP_M + 2.0 * depth_sigma_m(depth, noise))
-    )
-    smooth &= detection.motion_known  # else the camera's own error would be theirs
+    steady = jump <= _JUMP_M + 2.0 * depth_sigma_m(depth, noise)
+    steady &= detection.motion_known  # else the camera's own error would be theirs
+    smooth = measured.wide[seen] & (change <= _SAME_AREA) & steady
     # What is left to see of a mover that goes behind something is not where its body is.
     sliver = tracks.moving[seen] & (area_m2 < _SLIVER * usual_m2)
-    cut = ~smooth & ~sliver
+    rough = ~smooth & ~sliver & steady & tracks.moving[seen]
+    cut = ~smooth & ~sliver & ~rough
     tracks.sliver[seen] = sliver & ~_at_border(measured.bbox_px[seen], detection)
     tracks.locate(seen[smooth], position[smooth], covariance[smooth])
+    shift_m = _SHIFT_SHARE * measured.extent_m[seen, :2].max(axis=1)
+    doubt = covariance + np.square(shift_m)[:, None, None] * np.eye(3)
+    tracks.locate(seen[rough], position[rough], doubt[rough])
     tracks.relocate(seen[cut], position[cut], covariance[cut])
     tracks.clean_s[seen] = np.where(smooth & measured.tall[seen], tracks.clean_s[seen] + detection.dt_s, 0.0)
     tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S

@@ -14,6 +14,7 @@ from vision.adoption import adopt
 from vision.arrivals import FreeMemory
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
+from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.judgement import MotionEvidence, judge
 from vision.obstacles import FragmentVelocities
@@ -223,11 +224,15 @@ class Tracker:
                 rotation @ noise @ rotation.T,
                 3,
             )
+        restless = limbs.restless(body)
+        longer = np.where(restless, detection.dt_s, -detection.dt_s)
+        tracks.unrest_s = np.maximum(tracks.unrest_s + longer, 0.0)
         sight = tracks.state[:, :3] - detection.pose.translation_m
         distance = np.sqrt(np.square(sight).sum(axis=1))
         seen = MotionEvidence(
             sight=sight / np.maximum(distance, 0.1)[:, None],
             distance_m=distance,
+            depth_sigma_m=np.asarray(depth_sigma_m(distance, self._config.depth_noise), np.float64),
             velocity=tracks.state[:, 3:],
             covariance=tracks.covariance[:, 3:, 3:],
             own_velocity=body.velocity_mps @ rotation.T,
@@ -236,7 +241,8 @@ class Tracker:
             surface_covariance=tracks.surface_covariance[:, 3:, 3:],
             ends=np.where(use, body.ends, 0),
             agreement=body.agreement,
-            restless=limbs.restless(body),
+            restless=restless,
+            unrest_s=tracks.unrest_s,
             arrived=arrivals,
             cells=cells,
             size_m=tracks.extent_m.max(axis=1),

@@ -36,6 +36,7 @@ _FIELDS = (
     "trailing_m",
     "stands",
     "calm_s",
+    "unrest_s",
 )
 
 
@@ -47,7 +48,8 @@ class Tracks:
     averaged, up to a common factor; cells (T,) of the grid covered when last seen; clean_s (T,): for how long
     the surface's centre has told of the velocity without a break; sliver (T,): a mover of which hardly
     anything was left to see; trailing_m (T, 3): where the centre was of late, averaged; stands (T,): its
-    fragments are sure of it; calm_s (T,): since when there has been no evidence, inf if there never was."""
+    fragments are sure of it; calm_s (T,): since when there has been no evidence, inf if there never was;
+    unrest_s (T,): for how long nearly all of its ends have denied that it stands, less what they did not."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -73,6 +75,7 @@ class Tracks:
         self.trailing_m = np.empty((0, 3))
         self.stands = np.empty(0, np.bool_)
         self.calm_s = np.empty(0)
+        self.unrest_s = np.empty(0)
         self._next_id = 1
 
     def __len__(self) -> int:

@@ -23,16 +23,6 @@ from hal.types import FloatArray
 from vision.symmetric import inverse_entries, whole
 
 
-def depth_after(depth_m: FloatArray, length_before: FloatArray, length_now: FloatArray) -> FloatArray:
-    """Eqs. 6 and 8: Z_{t+1} = Z_t L_t / L_{t+1}, for lengths of one segment in two images."""
-    return depth_m * length_before / length_now
-
-
-def lateral_after(x_image: FloatArray, depth_m: FloatArray) -> FloatArray:
-    """Eqs. 7 and 9 solved for the coordinate itself: X = x Z, with x on the image plane z = 1 m."""
-    return x_image * depth_m
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PointMotion:
     """Evidence of N tracked points, in the camera axes now. All NaN-free where usable.
@@ -57,11 +47,6 @@ class PointMotion:
     depth_lag_s: FloatArray
     static_chi2: FloatArray
     usable: NDArray[np.bool_]
-
-
-def static_miss(static_m: FloatArray, ray: FloatArray) -> FloatArray:
-    """(N, 2) x' Z - X and y' Z - Y: how far, in metres at its depth, a point is from where it should be."""
-    return ray * static_m[:, 2:3] - static_m[:, :2]
 
 
 def chi2_2d(miss: FloatArray, covariance: FloatArray, effect: FloatArray) -> FloatArray:

@@ -55,17 +55,8 @@ def read_calibration(
         distortion=() if topics.rectified else _distortion(bag, topics.colour_info, colour),
     )
     frame = _frame_of(colour, topics.colour)
-    notes: tuple[str, ...] = ()
-    depth = None if topics.depth_info is None else bag.first(topics.depth_info)
-    depth_frame = frame if depth is None else _frame_of(depth, topics.depth)
-    if depth is not None and not topics.says_registered and depth_frame != frame:
-        apart = transforms.find(frame, depth_frame)
-        if apart is None:
-            notes = (
-                f"no transform from {depth_frame} to {frame} was recorded: depth and colour are taken as "
-                "seen from one place",
-            )
-        values |= _depth_camera(depth, apart or Pose(np.eye(3), np.zeros(3)))
+    depth_values, notes = _depth_camera(bag, topics, transforms, colour)
+    values |= depth_values
     try:
         return RecordingCamera(**values), frame, notes
     except ValidationError as error:
@@ -119,10 +110,46 @@ def _distortion(bag: BagFile, topic: str, info: Any) -> tuple[float, ...]:
     )
 
 
-def _depth_camera(depth: Any, in_colour: Pose) -> dict[str, Any]:
+def _depth_camera(
+    bag: BagFile, topics: BagTopics, transforms: StaticTransforms, colour: Any
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """(values of camera.yaml, notes) of depth that is not registered to colour; colour: its camera_info."""
+    depth = None if topics.depth_info is None else bag.first(topics.depth_info)
+    if depth is None:
+        if topics.says_registered:
+            return {}, ()
+        name = topics.depth.name
+        return {}, (f"no camera_info was recorded beside {name}: depth is taken as registered to colour",)
+    frame, depth_frame = _frame_of(colour, topics.colour), _frame_of(depth, topics.depth)
+    if topics.says_registered or depth_frame == frame:
+        # From one place; but perhaps through another lens, or with fewer pixels.
+        of_one_size = (depth.width, depth.height) == (colour.width, colour.height)
+        if of_one_size and (topics.says_registered or _of_one_lens(depth, colour)):
+            return {}, ()
+        depth_frame = frame
+    notes = []
+    if any(_matrix(depth, "d")) and not topics.depth_rectified:
+        notes.append(f"the lens distortion in {topics.depth_info} is left out: depth lies a little beside")
+    in_colour = transforms.find(frame, depth_frame)
+    if in_colour is None:
+        in_colour = Pose(np.eye(3), np.zeros(3))
+        notes.append(
+            f"no transform from {depth_frame} to {frame} was recorded: depth and colour are taken as "
+            "seen from one place"
+        )
+    # Some drivers leave P empty.
+    rectified = topics.depth_rectified and float(_matrix(depth, "p")[0]) > 0.0
+    return _depth_values(depth, _pinhole(depth, rectified), in_colour), tuple(notes)
+
+
+def _of_one_lens(depth: Any, colour: Any) -> bool:
+    return _pinhole(depth, rectified=False) == _pinhole(colour, rectified=False)
+
+
+def _depth_values(depth: Any, pinhole: tuple[float, float, float, float], in_colour: Pose) -> dict[str, Any]:
     names = ("depth_fx", "depth_fy", "depth_cx", "depth_cy")
     return dict(
-        zip(names, _pinhole(depth, rectified=False), strict=True),
+        zip(names, pinhole, strict=True),
         depth_registered=False,
         depth_width=int(depth.width),
         depth_height=int(depth.height),

@@ -13,18 +13,20 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from hal.cameras.bag_realsense import message_of
-from hal.clocks import NS_PER_S
 from hal.errors import BadRecording, DeviceNotFound
 
-_SUFFIXES = (".bag", ".db3", ".mcap")
+_ROS_2 = (".db3", ".mcap")
+_SUFFIXES = (".bag", *_ROS_2)
 _METADATA = "metadata.yaml"
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path names a bag: a file with one of its suffixes, or a folder that ROS 2 has written."""
+    """Whether a path names a bag: a file with one of its suffixes, or a folder that ROS 2 has written, if not
+    to its end: only then it writes metadata.yaml."""
     # os.path and not Path: what may not be looked at is simply none.
     if os.path.isdir(path):
-        return os.path.isfile(path / _METADATA) and not os.path.exists(path / "rgb.txt")
+        written = os.path.isfile(path / _METADATA) or any(one.suffix in _ROS_2 for one in path.glob("*"))
+        return written and not os.path.exists(path / "rgb.txt")
     return path.suffix in _SUFFIXES
 
 
@@ -67,11 +69,6 @@ class BagFile:
         self._closing.close()
 
     @property
-    def duration_s(self) -> float:
-        """From the first message of any topic to the last."""
-        return float(self._reader.duration) / NS_PER_S
-
-    @property
     def topics(self) -> tuple[Topic, ...]:
         """Those with messages, by name."""
         counts: dict[tuple[str, str], int] = {}
@@ -105,7 +102,8 @@ class BagFile:
 
 
 def _told(error: Exception) -> str:
-    return str(error) or type(error).__name__
+    """In one line."""
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _load_vendor() -> tuple[Any, Any]:

@@ -31,6 +31,8 @@ _COLOURS: dict[str, tuple[int, int | None]] = {
     "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
     "yuyv": (2, cv2.COLOR_YUV2BGR_YUY2),
 }
+# So many bytes a pixel: two neighbours share one colour.
+_SHARED_COLOUR = 2
 _MILLIMETRES, _METRES = ("16UC1", "mono16"), "32FC1"
 _MM_PER_M = 1000.0
 _PNG_START = b"\x89PNG"
@@ -49,6 +51,8 @@ def colour_image(message: Any, width: int, height: int) -> ColourImage:
     pixels = _pixels(message, np.dtype(np.uint8), channels)
     if to_bgr is None:
         return pixels.copy()
+    if channels == _SHARED_COLOUR and width % 2:
+        raise ImageError(f"is {width} pixels wide, as {message.encoding} no image can be")
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(pixels), to_bgr), np.uint8)
 
 

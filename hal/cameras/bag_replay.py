@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from itertools import islice, pairwise
 from pathlib import Path
+from statistics import median
 from types import TracebackType
 from typing import Any, Self
 
@@ -27,6 +29,7 @@ from hal.errors import BadRecording, DeviceRefused, EndOfStream
 from hal.types import CameraMount, Intrinsics, RgbdFrame
 
 _ANY_TOPICS = WantedTopics()
+_FIRST_IMAGES = 10
 
 
 class BagReplay:
@@ -46,11 +49,11 @@ class BagReplay:
     ) -> None:
         self._path, self._max_gap_ns = path, round(max_pair_gap_s * NS_PER_S)
         with BagFile(path) as bag:
-            self._topics = choose_topics(path, bag.topics, wanted)
+            self._topics = choose_topics(path, bag.topics, wanted, with_odometry=odometry != "none")
             transforms = read_transforms(bag)
             camera, frame, notes = read_calibration(bag, self._topics, transforms)
             self.odometry, odometry_notes = _odometry(bag, self._topics, odometry, frame, transforms)
-            self.fps = self._topics.colour.messages / bag.duration_s if bag.duration_s > 0.0 else None
+            self.fps = _usual_fps(bag, self._topics.colour.name)
         self._calibration = RecordingCalibration(camera)
         self._notes = (*notes, *odometry_notes)
         self._messages: Iterator[tuple[str, Any]] | None = None
@@ -125,6 +128,15 @@ class BagReplay:
             raise BadRecording(f"{self._path}: not one frame is usable{why}")
         raise EndOfStream(f"{self._path}: no further frame")
 
+    def pass_over(self, until_ns: int) -> None:
+        """Leave out what another frame follows until then, without decoding it."""
+        while self._messages is not None:
+            while len(self._pairs) < 2 and not self._ended:
+                self._take_in(self._messages)
+            if len(self._pairs) < 2 or self._pairs[1][0].stamp_ns > until_ns:
+                return
+            self._pairs.popleft()
+
     def _rewind(self) -> None:
         self._pairing: StampPairing[Any] = StampPairing(self._max_gap_ns)
         self._pairs: deque[tuple[Stamped[Any], Stamped[Any]]] = deque()
@@ -174,6 +186,17 @@ class BagReplay:
             sequence=colour.number,
             intrinsics=calibration.intrinsics,
         )
+
+
+def _usual_fps(bag: BagFile, topic: str) -> float | None:
+    """By the first images: other topics of the bag may begin earlier and end later."""
+    stamps_ns = []
+    # Damage is told when the frames are read.
+    with suppress(BadRecording):
+        for _, message in islice(bag.messages((topic,)), _FIRST_IMAGES):
+            stamps_ns.append(stamp_ns(message))
+    gaps_ns = [after - before for before, after in pairwise(stamps_ns) if after > before]
+    return NS_PER_S / median(gaps_ns) if gaps_ns else None
 
 
 def _odometry(

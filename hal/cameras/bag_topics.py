@@ -47,18 +47,27 @@ class BagTopics:
     @property
     def rectified(self) -> bool:
         """Whether the colour images have no lens distortion any more."""
-        return _RECTIFIED in base_name(self.colour.name).rsplit("/", 1)[-1]
+        return _is_rectified(self.colour.name)
+
+    @property
+    def depth_rectified(self) -> bool:
+        """The same of depth."""
+        return _is_rectified(self.depth.name)
 
 
-def choose_topics(path: Path, topics: Sequence[Topic], wanted: WantedTopics) -> BagTopics:
+def choose_topics(
+    path: Path, topics: Sequence[Topic], wanted: WantedTopics, with_odometry: bool = True
+) -> BagTopics:
     """Raises BadRecording where there is none, or several that are equally good, naming them."""
     images = [one for one in topics if one.kind in _IMAGES]
     colour = _choose(path, images, wanted.colour, "colour", _colour_rank)
     depth = _choose(path, images, wanted.depth, "depth", _depth_rank)
+    if colour == depth:
+        raise BadRecording(f"{path}: {colour.name} cannot be both colour and depth; choose another topic")
     infos = {one.name for one in topics if one.kind == _CAMERA_INFO}
     moves = [one for one in topics if one.kind == _ODOMETRY]
     odometry = None
-    if moves or wanted.odometry is not None:
+    if with_odometry and (moves or wanted.odometry is not None):
         odometry = _choose(path, moves, wanted.odometry, "odometry", lambda _: 0).name
     return BagTopics(colour, depth, _info_of(colour, infos), _info_of(depth, infos), odometry)
 
@@ -75,6 +84,10 @@ def is_registered(topic: str) -> bool:
     return any(word in topic.lower() for word in _REGISTERED_WORDS)
 
 
+def _is_rectified(topic: str) -> bool:
+    return _RECTIFIED in base_name(topic).rsplit("/", 1)[-1]
+
+
 def _choose(
     path: Path, topics: Sequence[Topic], wanted: str | None, what: str, rank: Callable[[Topic], int | None]
 ) -> Topic:
@@ -83,18 +96,18 @@ def _choose(
         named = [one for one in topics if one.name == wanted]
         if named:
             return named[0]
-        raise BadRecording(f"{path}: --{what}-topic {wanted}: there is none; there are {_names(topics)}")
+        raise BadRecording(f"{path}: {what} topic {wanted}: there is none; there are {_names(topics)}")
     ranked = {one: place for one in topics if (place := rank(one)) is not None}
     if not ranked:
         raise BadRecording(
-            f"{path}: no topic with {what} images was found; choose one with --{what}-topic; "
+            f"{path}: no topic with {what} images was found; choose one with {_option(what)}; "
             f"there are {_names(topics)}"
         )
     best = [one for one in topics if ranked.get(one) == min(ranked.values())]
     # The same images in several transports: uncompressed ones sort first, by their shorter name.
     if len({base_name(one.name) for one in best}) > 1:
         raise BadRecording(
-            f"{path}: several topics could be the {what}: {_names(best)}; choose one with --{what}-topic"
+            f"{path}: several topics could be the {what}: {_names(best)}; choose one with {_option(what)}"
         )
     return min(best, key=lambda one: len(one.name))
 
@@ -121,6 +134,12 @@ def _info_of(topic: Topic, infos: set[str]) -> str | None:
     stream = stream_of(topic.name)
     places = [beside] if stream is None else [beside, info_topic(stream)]
     return next((place for place in places if place in infos), None)
+
+
+def _option(what: str) -> str:
+    """Where the user chooses: on the command line, or for a recording in place of the camera in YAML."""
+    in_yaml = "" if what == "odometry" else f" (or camera.{what}_topic)"
+    return f"--{what}-topic{in_yaml}"
 
 
 def _names(topics: Sequence[Topic]) -> str:

@@ -92,7 +92,10 @@ def _mount(camera: RecordingCamera) -> CameraMount | None:
     if camera.camera_height_m is None:
         return None
     return CameraMount(
-        camera.camera_forward_m, 0.0, camera.camera_height_m, math.radians(camera.camera_pitch_deg)
+        camera.camera_forward_m,
+        camera.camera_left_m,
+        camera.camera_height_m,
+        math.radians(camera.camera_pitch_deg),
     )
 
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
-from hal.api import Clock, FrameSource
+from hal.api import Clock
+from hal.cameras.recording import Recording
 from hal.clocks import NS_PER_S
 from hal.errors import FrameTimeout
 from hal.types import Intrinsics, RgbdFrame
@@ -15,10 +16,11 @@ from hal.types import Intrinsics, RgbdFrame
 class PacedRecording:
     """FrameSource: each frame comes when its time has come, counted from the first read, and bears that time.
 
-    For a base on the bench before recorded images: what the decision sees must be fresh.
+    For a base on the bench before recorded images: what the decision sees must be fresh. Whoever does not
+    keep up gets the newest frame that is due, as from a camera; those before it are left out.
     """
 
-    def __init__(self, recording: FrameSource, clock: Clock) -> None:
+    def __init__(self, recording: Recording, clock: Clock) -> None:
         self._recording, self._clock = recording, clock
         self._waiting: RgbdFrame | None = None
         self._later_ns: int | None = None
@@ -39,9 +41,10 @@ class PacedRecording:
 
     def read(self, timeout_s: float) -> RgbdFrame:
         """Raises FrameTimeout where the next frame is not due by then, and what the recording raises."""
-        frame = self._waiting or self._recording.read(timeout_s)
         now_ns = self._clock.now_ns()
+        frame = self._waiting or self._newest(now_ns)
         if self._later_ns is None:
+            now_ns = self._clock.now_ns()
             self._later_ns = now_ns - frame.captured_ns
         due_ns = frame.captured_ns + self._later_ns
         gives_up_ns = now_ns + round(timeout_s * NS_PER_S)
@@ -51,3 +54,9 @@ class PacedRecording:
             raise FrameTimeout(f"the recording has no frame within {timeout_s:g} s")
         self._waiting = None
         return replace(frame, captured_ns=due_ns)
+
+    def _newest(self, now_ns: int) -> RgbdFrame:
+        """Of what is due, or the first that will be."""
+        if self._later_ns is not None:
+            self._recording.pass_over(now_ns - self._later_ns)
+        return self._recording.read(0.0)

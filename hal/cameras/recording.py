@@ -23,6 +23,10 @@ class SkippedFrame:
 class Recording(FrameSource, Protocol):
     """A FrameSource that ends, and knows what it is."""
 
+    def pass_over(self, until_ns: int) -> None:
+        """Leave out what another frame follows until then, without decoding it."""
+        ...
+
     @property
     def mount(self) -> CameraMount | None:
         """Where the camera sat on the robot; None where the recording does not say."""

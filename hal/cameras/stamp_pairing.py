@@ -6,11 +6,14 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Generic, NamedTuple, TypeVar
 
+from hal.cameras.tum_index import associate
 from hal.clocks import NS_PER_S
 
 Item = TypeVar("Item")
 
 _PATIENCE_NS = 2 * NS_PER_S
+# An image has a rival, the rival another choice with a rival of its own: after three, all is settled.
+_LOOK_AHEAD_GAPS = 3
 
 
 class Stamped(NamedTuple, Generic[Item]):
@@ -47,11 +50,12 @@ class Stream(Generic[Item]):
 class StampPairing(Generic[Item]):
     """Each colour image with the depth image nearest to it in time, each of them once.
 
-    As hal/cameras/tum_index.associate, but while they arrive: a colour image waits until depth is as late.
+    By hal/cameras/tum_index.associate, but while they arrive: a colour image waits until whatever comes later
+    is too late to be of its time, or of that of an image which would rather have the same depth.
     """
 
     def __init__(self, max_gap_ns: int) -> None:
-        self._max_gap_ns = max_gap_ns
+        self._max_gap_ns, self._ahead_ns = max_gap_ns, _LOOK_AHEAD_GAPS * max_gap_ns
         self.colour: Stream[Item] = Stream()
         self.depth: Stream[Item] = Stream()
 
@@ -59,20 +63,34 @@ class StampPairing(Generic[Item]):
         """Those that are certain by now. ended: nothing more will come."""
         colours, depths = self.colour.waiting, self.depth.waiting
         while colours:
-            stamp_ns = colours[0].stamp_ns
-            certain = ended or _waited(colours) or (depths and depths[-1].stamp_ns >= stamp_ns)
-            if not certain:
-                return
-            while len(depths) > 1 and abs(depths[1].stamp_ns - stamp_ns) < abs(depths[0].stamp_ns - stamp_ns):
+            # Of what is earlier than the first colour image, the last alone may be of its time.
+            while len(depths) > 1 and depths[1].stamp_ns <= colours[0].stamp_ns:
                 self.depth.drop()
-            if depths and abs(depths[0].stamp_ns - stamp_ns) <= self._max_gap_ns:
-                yield colours.popleft(), depths.popleft()
-            else:
+            if not (ended or self._certain()):
+                return
+            partner = self._first_partner()
+            if partner is None:
                 self.colour.drop()
-        while depths and (ended or _waited(depths)):
+                continue
+            for _ in range(partner):
+                self.depth.drop()
+            yield colours.popleft(), depths.popleft()
+        while depths and (ended or self._waited(depths)):
             self.depth.drop()
 
+    def _certain(self) -> bool:
+        """Whether enough is known of both for the first colour image, or the other stream may have ended."""
+        colours, depths = self.colour.waiting, self.depth.waiting
+        late_ns = colours[0].stamp_ns + self._ahead_ns
+        known = bool(depths) and min(colours[-1].stamp_ns, depths[-1].stamp_ns) >= late_ns
+        return known or self._waited(colours) or self._waited(depths)
 
-def _waited(stream: deque[Stamped[Item]]) -> bool:
-    """Whether the oldest one need not be waited with any longer: the other stream may have ended."""
-    return stream[-1].stamp_ns - stream[0].stamp_ns > _PATIENCE_NS
+    def _waited(self, stream: deque[Stamped[Item]]) -> bool:
+        """Whether the oldest one need not be waited with any longer: the other stream may have ended."""
+        return bool(stream) and stream[-1].stamp_ns - stream[0].stamp_ns > _PATIENCE_NS + self._ahead_ns
+
+    def _first_partner(self) -> int | None:
+        """Which of depth goes with the first colour image, if any does."""
+        colour_ns = [one.stamp_ns for one in self.colour.waiting]
+        depth_ns = [one.stamp_ns for one in self.depth.waiting]
+        return dict(associate(colour_ns, depth_ns, self._max_gap_ns)).get(0)

@@ -94,8 +94,8 @@ def associate(colour_ns: Sequence[int], depth_ns: Sequence[int], max_gap_ns: int
     """Pairs (index of colour, index of depth) in time order; both inputs strictly increase.
 
     As the benchmark's own associate.py does: of all couples not further apart than max_gap_ns the
-    closest is taken first, and each image serves once. A pair that would take depth back in time
-    behind the pair before it is dropped.
+    closest is taken first, and each image serves once. A couple that would take depth back in time
+    beside a closer one is none.
     """
     couples: list[tuple[int, int, int]] = []
     for i, stamp_ns in enumerate(colour_ns):
@@ -103,14 +103,11 @@ def associate(colour_ns: Sequence[int], depth_ns: Sequence[int], max_gap_ns: int
         while j < len(depth_ns) and depth_ns[j] <= stamp_ns + max_gap_ns:
             couples.append((abs(depth_ns[j] - stamp_ns), i, j))
             j += 1
-    depth_of: dict[int, int] = {}
-    used: set[int] = set()
-    for _, i, j in sorted(couples):
-        if i not in depth_of and j not in used:
-            depth_of[i] = j
-            used.add(j)
     pairs: list[tuple[int, int]] = []
-    for i in sorted(depth_of):
-        if not pairs or depth_of[i] > pairs[-1][1]:
-            pairs.append((i, depth_of[i]))
+    for _, i, j in sorted(couples):
+        at = bisect_left(pairs, (i, j))
+        after_those_before = at == 0 or (pairs[at - 1][0] < i and pairs[at - 1][1] < j)
+        before_those_after = at == len(pairs) or (i < pairs[at][0] and j < pairs[at][1])
+        if after_those_before and before_those_after:
+            pairs.insert(at, (i, j))
     return pairs

@@ -135,6 +135,20 @@ class TumReplay:
             )
         raise EndOfStream(f"{self._folder}: no further frame")
 
+    def pass_over(self, until_ns: int) -> None:
+        """Leave out what another frame follows until then, without decoding it."""
+        while (second := self._second()) < len(self._pairs):
+            if self._pairs[second].colour.stamp_ns > until_ns:
+                return
+            if self._ahead:
+                self._ahead.popleft().cancel()
+            else:
+                self._next += 1
+
+    def _second(self) -> int:
+        """Which pair follows the one that read() gives next."""
+        return self._next - len(self._ahead) + 1
+
     def _rewind(self) -> None:
         self._next = 0
         self._usable = 0

@@ -32,17 +32,21 @@ class TumWriter:
         self._last_ns = -1
         self._odometry: TextIO | None = None
 
-    def __enter__(self) -> Self:
-        """Raises DeviceRefused if the folder holds a recording already or cannot be made."""
+    def prepare(self) -> None:
+        """Make the folders. Raises DeviceRefused if there is a recording already or they cannot be made."""
         if os.path.exists(self._folder / "rgb.txt"):
             raise DeviceRefused(f"{self._folder}: holds a recording already; choose another folder")
-        try:
-            for name in ("rgb", "depth"):
+        for name in ("rgb", "depth"):
+            with self._told(name):
                 (self._folder / name).mkdir(parents=True, exist_ok=True)
+
+    def __enter__(self) -> Self:
+        """Raises DeviceRefused as prepare() does, and if the files cannot be made."""
+        self.prepare()
+        with self._told("rgb.txt"):
             self._colour_index = self._index("rgb.txt", "# time of the colour image in seconds, file")
+        with self._told("depth.txt"):
             self._depth_index = self._index("depth.txt", "# time of the depth image in seconds, file")
-        except OSError as error:
-            raise DeviceRefused(f"{self._folder}: cannot be written ({error.strerror})") from error
         return self
 
     def __exit__(
@@ -75,9 +79,10 @@ class TumWriter:
                 self._pose(odometry, stamp)
 
     def _image(self, index: TextIO, file: str, image: cv2.typing.MatLike, stamp: str) -> None:
-        if not cv2.imwrite(str(self._folder / file), image, _PNG_FAST):
-            raise DeviceRefused(f"{self._folder / file}: cannot be written; is the disk full?")
+        # Not by OpenCV: for it an image whose last bytes no longer fit on the disk is written.
+        data = cv2.imencode(".png", image, _PNG_FAST)[1]
         with self._told(file):
+            (self._folder / file).write_bytes(data.tobytes())
             index.write(f"{stamp} {file}\n")
 
     @contextmanager
@@ -116,4 +121,5 @@ class TumWriter:
             content["camera_height_m"] = self._mount.height_m
             content["camera_pitch_deg"] = math.degrees(self._mount.pitch_rad)
             content["camera_forward_m"] = self._mount.forward_m
+            content["camera_left_m"] = self._mount.left_m
         (self._folder / "camera.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")

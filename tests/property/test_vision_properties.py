@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 from config.perception import FragmentSettings, MotionSettings, PerceptionConfig
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
 from tests.support.grids import grid_of, plane
+from tests.support.point_motion import static_miss
 from vision import kalman
 from vision.floor import FloorFinder
 from vision.judgement import MotionEvidence, judge
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
 from vision.perception import Perception
 from vision.scene import Scene
-from vision.velocities import PointMotion, normal_equations, static_miss
+from vision.velocities import PointMotion, normal_equations
 
 SMALL = PerceptionConfig(grid_step_px=2, fragments=FragmentSettings(min_length_px=16, tile_px=20))
 
@@ -203,6 +204,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
     return MotionEvidence(
         sight=sight / np.linalg.norm(sight, axis=1)[:, None],
         distance_m=rng.uniform(0.0, 10.0, count),
+        depth_sigma_m=rng.uniform(0.0, 0.8, count),
         velocity=rng.normal(0.0, 1.0, (count, 3)),
         covariance=covariances(),
         own_velocity=rng.normal(0.0, 1.0, (count, 3)),
@@ -212,6 +214,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         ends=rng.integers(0, 40, count),
         agreement=rng.uniform(0.0, 1.0, count),
         restless=rng.random(count) < 0.5,
+        unrest_s=rng.uniform(0.0, 1.0, count),
         arrived=rng.integers(0, 40, count),
         cells=rng.integers(40, 200, count),
         size_m=rng.uniform(0.0, 4.0, count),

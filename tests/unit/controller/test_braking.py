@@ -139,7 +139,8 @@ def test_the_paper_is_the_case_of_infinite_jerk_and_no_latency() -> None:
     assert braking.paper_braking_distance(1.5, 0.3) == pytest.approx(3.75)
     assert braking.paper_stopping_time(1.5, 0.3) == pytest.approx(5.0)
     assert braking.paper_detection_distance(1.5, 1.5, 0.3) == pytest.approx(11.25)
-    assert braking.paper_speed(3.75, 0.3) == pytest.approx(1.5)
+    # Eq. 1 of the paper: V_r = sqrt(2 a S_r).
+    assert braking.paper_braking_distance(1.5, 0.3) == pytest.approx(1.5**2 / (2.0 * 0.3))
 
 
 def test_inverse_by_the_formula_of_the_reference() -> None:

@@ -183,6 +183,33 @@ def test_topics_of_a_folder() -> None:
     assert "is no ROS bag, so it has no topics" in refusal("replay", DESK, "--depth-topic", "/depth")
 
 
+def test_a_topic_of_odometry_that_is_not_wanted(tmp_path: Path) -> None:
+    wish = ("--odometry", "none", "--odometry-topic", "/odom")
+    assert "--odometry-topic has no effect" in refusal("replay", tmp_path / "run.mcap", *wish)
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "told"),
+    [
+        ("--record", ".", "holds a recording already"),
+        ("--observations", "nowhere/o.jsonl", "observations cannot be written there"),
+        ("--video", "nowhere/v.mp4", "the video cannot be written there"),
+    ],
+)
+def test_what_cannot_be_recorded_is_told_before_a_robot_is_armed(
+    option: str, name: str, told: str, recording: Path
+) -> None:
+    message = refusal("run", "--config", CONFIG_DIR / "sim-realtime.yaml", option, recording / name)
+    assert told in message
+
+
+def test_a_recording_in_place_of_the_camera_that_is_none(tmp_path: Path) -> None:
+    robot = yaml.safe_load((CONFIG_DIR / "robot-roboclaw.yaml").read_text())
+    robot["camera"] = {"kind": "replay", "folder": str(tmp_path / "nowhere")}
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(robot))
+    assert "nowhere: there is no such folder" in refusal("run", "--config", tmp_path / "robot.yaml")
+
+
 def test_a_recording_without_its_calibration(recording: Path) -> None:
     (recording / "camera.yaml").unlink()
     assert "camera.yaml" in refusal("replay", recording)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import threading
 from pathlib import Path
 from typing import Any
@@ -19,7 +21,7 @@ from controller.result import MissionOptions
 from hal.cameras.pose_file import open_odometry
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
-from hal.errors import DeviceRefused
+from hal.errors import DeviceRefused, EndOfStream
 from hal.types import Pose, RgbdFrame
 from tests.support.recordings import START_NS, small_frame
 
@@ -67,14 +69,34 @@ def test_the_same_moment_twice_is_one_frame(tmp_path: Path) -> None:
     assert TumReplay(tmp_path).frame_count == 2
 
 
-def test_a_disk_that_is_full_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hal.cameras.tum_writer.cv2.imwrite", lambda *_: False)
+@pytest.fixture
+def full(monkeypatch: pytest.MonkeyPatch) -> None:
+    def write_bytes(path: Path, data: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr(Path, "write_bytes", write_bytes)
+
+
+@pytest.mark.usefixtures("full")
+def test_a_disk_that_is_full_is_told(tmp_path: Path) -> None:
     with (
-        pytest.raises(DeviceRefused, match="cannot be written; is the disk full"),
+        pytest.raises(DeviceRefused, match=r"\.png: cannot be written \(No space left on device\)"),
         TumWriter(tmp_path) as writer,
         FrameRecorder(writer, tmp_path, may_drop=False) as recorder,
     ):
         recorder.write(small_frame(0), None)
+
+
+@pytest.mark.usefixtures("full")
+def test_that_the_last_frames_are_lost_is_told_where_the_drive_has_ended_already(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Perception ends by an error always: the control process has gone, or the camera's stream."""
+    with TumWriter(tmp_path) as writer:
+        recorder = FrameRecorder(writer, tmp_path, may_drop=True).__enter__()
+        recorder.write(small_frame(0), None)
+        recorder.__exit__(EndOfStream, EndOfStream("the last frame"), None)
+    assert capsys.readouterr().err.count("cannot be written (No space left on device)") == 1
 
 
 def test_odometry_comes_back_as_written(tmp_path: Path) -> None:

@@ -149,3 +149,30 @@ def test_who_was_certainly_going_is_not_thought_to_stand_where_it_is_not_seen(
         before = seen
     assert kept[: round(kept_s * 10) - 1] == [1] * (round(kept_s * 10) - 1)
     assert kept[-1] == (0 if kept_s == 2.0 else 1)
+
+
+def out_of_view_after(seconds: float, left_mps: float, sigma_mps: float) -> Bodies:
+    """Of what was measured so below the view, standing by the verdict."""
+    view, pallet = memory(), box(1.6, 0.1, top_m=0.1, sigma_mps=sigma_mps, age_s=0.9)
+    before = measured(pallet, left_mps)
+    for number in range(1, round(seconds * 10) + 1):
+        seen = replace(no_bodies(0), captured_ns=number * FRAME_NS)
+        found = view.update(before, seen, HERE, EDGE, number > 1, NOTHING_SEEN)
+        before = seen
+    return found
+
+
+def test_who_was_certainly_going_goes_on_as_it_was_measured() -> None:
+    found = out_of_view_after(0.5, left_mps=0.6, sigma_mps=0.1)
+    assert found.velocity_mps[0].tolist() == [0.05, 0.6]
+    assert found.xy_m[0].tolist() == pytest.approx([1.6 + 0.025, 0.1 + 0.3])
+
+
+def test_however_certainly_nobody_goes_as_fast_as_a_mistake() -> None:
+    assert out_of_view_after(0.5, left_mps=2.3, sigma_mps=0.1).moving.tolist() == [True]
+    assert out_of_view_after(0.5, left_mps=2.5, sigma_mps=0.1).moving.tolist() == [False]
+
+
+def test_however_certainly_hardly_any_speed_is_no_going() -> None:
+    assert out_of_view_after(0.5, left_mps=0.18, sigma_mps=0.02).moving.tolist() == [False]
+    assert out_of_view_after(0.5, left_mps=0.22, sigma_mps=0.02).moving.tolist() == [True]

@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
 from hal.types import Pose
 from tests.support.bags import camera_entries, write_bag
+from tests.support.recordings import small_frame
 from vision.scene import EgoMotion
 
 DESK = Path(__file__).resolve().parents[2] / "recordings" / "desk_rpy"
@@ -106,3 +108,23 @@ def test_a_bag_is_seen_as_the_folder_with_the_same_frames(
     assert len(seen[0]) == 5
     assert seen[0] == seen[1]
     assert "note        colour is /camera/color/image_raw" in capsys.readouterr().out
+
+
+def test_odometry_of_another_time_is_not_called_used(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A robot whose clock is not the camera's."""
+    with TumWriter(tmp_path) as writer:
+        for number in range(3):
+            writer.write(small_frame(number), Pose(np.eye(3), np.zeros(3)) if number == 0 else None)
+    run_replay(ReplayOptions(tmp_path, "auto", CONFIG_DIR / "replay.yaml", quiet=True))
+    assert "odometry.txt: 1 poses; of the time of 2 of 3 frames there is none" in capsys.readouterr().out
+
+
+def test_a_video_plays_at_the_pace_of_the_recording(tmp_path: Path) -> None:
+    with TumWriter(tmp_path / "slow") as writer:
+        for number in range(4):
+            writer.write(replace(small_frame(number), captured_ns=number * 125_000_000))
+    video = tmp_path / "v.mp4"
+    run_replay(ReplayOptions(tmp_path / "slow", "auto", CONFIG_DIR / "replay.yaml", video=video, quiet=True))
+    assert cv2.VideoCapture(str(video)).get(cv2.CAP_PROP_FPS) == pytest.approx(8.0)

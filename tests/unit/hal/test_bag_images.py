@@ -34,8 +34,10 @@ def image(encoding: str, pixels: np.ndarray[Any, Any], padding: int = 0) -> Any:
     ],
 )
 def test_colour_in_any_order_becomes_bgr(encoding: str, pixels: np.ndarray[Any, Any], padding: int) -> None:
-    found = colour_image(image(encoding, pixels, padding), 2, 2)
+    message = image(encoding, pixels, padding)
+    found = colour_image(message, 2, 2)
     assert found.tolist() == BGR.tolist()
+    assert not np.shares_memory(found, message.data)
     assert found.flags.c_contiguous
     assert found.flags.writeable
 
@@ -55,6 +57,18 @@ def test_yuv_is_read_in_the_order_of_its_name(
     assert np.ptp(bright) <= 2
     assert np.ptp(dark) <= 2
     assert bright[0] > dark[0] + 90
+
+
+def test_a_row_that_is_shorter_than_its_pixels_is_refused() -> None:
+    short = image("bgr8", BGR)
+    short.step = 5
+    with pytest.raises(ImageError, match="12 bytes in rows of 5, too few for 2x2"):
+        colour_image(short, 2, 2)
+
+
+def test_two_neighbours_that_share_a_colour_are_not_three() -> None:
+    with pytest.raises(ImageError, match="is 3 pixels wide, as yuv422 no image can be"):
+        colour_image(image("yuv422", np.zeros((2, 3, 2), np.uint8)), 3, 2)
 
 
 @pytest.mark.parametrize("padding", [0, 2])

@@ -15,8 +15,10 @@ from hal.errors import BadRecording, DeviceNotFound
 from hal.types import Intrinsics
 from tests.support.bags import (
     ALIGNED,
+    ALIGNED_INFO,
     COLOUR,
     COLOUR_FRAME,
+    COLOUR_INFO,
     FORMATS,
     Entry,
     Format,
@@ -48,7 +50,7 @@ def test_every_format_gives_the_frames_that_were_recorded(of: Format, tmp_path: 
         assert found.depth_scale_m == 0.001
     assert replay.intrinsics == SMALL
     assert replay.frame_count == 4
-    assert replay.fps == pytest.approx(30.0, rel=0.5)
+    assert replay.fps == pytest.approx(30.0, rel=1e-6)
     assert replay.skipped == ()
     assert replay.notes == (f"colour is {COLOUR}, depth {ALIGNED}",)
     assert replay.odometry is None
@@ -65,15 +67,36 @@ def test_what_a_realsense_viewer_records_is_read(file: str) -> None:
     """Four frames of librealsense's own recorder: depth from a camera of its own, 3 mm further back."""
     replay = BagReplay(RECORDINGS / file)
     frames = read_all(replay)
+    assert frames[0].depth_scale_m == 0.001
     assert [frame.colour[0, 0].tolist() for frame in frames] == [[10, 20, 30 + n] for n in range(4)]
     assert [np.unique(frame.depth).tolist() for frame in frames] == [[1003 + n] for n in range(4)]
     assert replay.intrinsics == Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
     assert len(replay.notes) == 1
 
 
+def test_an_old_realsense_bag_has_nothing_behind_its_images(tmp_path: Path) -> None:
+    """The first versions of librealsense did not write the depth unit there."""
+    stream = {
+        COLOUR: "/device_0/sensor_1/Color_0/image/data",
+        COLOUR_INFO: "/device_0/sensor_1/Color_0/info/camera_info",
+        ALIGNED: "/device_0/sensor_0/Depth_0/image/data",
+        ALIGNED_INFO: "/device_0/sensor_0/Depth_0/info/camera_info",
+    }
+    path = write_bag(
+        tmp_path, "bag", lambda ros: [(stream[topic], t, m) for topic, t, m in camera_entries(ros, FRAMES)]
+    )
+    replay = BagReplay(path)
+    for found, recorded in zip(read_all(replay), FRAMES, strict=True):
+        assert np.array_equal(found.depth, recorded.depth)
+    assert replay.skipped == ()
+
+
 def test_a_tum_folder_is_no_bag(tmp_path: Path) -> None:
     assert not is_bag(tmp_path)
     assert not is_bag(tmp_path / "rgb.txt")
+    (tmp_path / "metadata.yaml").write_text("room: hall")
+    (tmp_path / "rgb.txt").write_text("")
+    assert not is_bag(tmp_path)
 
 
 def test_entering_again_starts_from_the_beginning(tmp_path: Path) -> None:
@@ -95,7 +118,9 @@ def test_depth_and_colour_of_different_times_are_paired_and_the_rest_is_told(tmp
         ]
 
     replay = BagReplay(write_bag(tmp_path, "mcap", entries))
-    assert [frame.captured_ns for frame in read_all(replay)] == [frame.captured_ns for frame in FRAMES]
+    frames = read_all(replay)
+    assert [frame.captured_ns for frame in frames] == [frame.captured_ns for frame in FRAMES]
+    assert [frame.sequence for frame in frames] == [0, 1, 2, 3]
     assert "1 colour images without depth of the same time" in replay.notes
     assert "1 images not later than the one before, left out" in replay.notes
 
@@ -150,6 +175,24 @@ def test_a_file_that_is_no_bag_is_refused_in_one_line(of: Format, tmp_path: Path
     assert "\n" not in str(refused.value)
 
 
+def test_a_folder_that_was_not_written_to_its_end_is_told_how_to_mend(tmp_path: Path) -> None:
+    path = small_bag(tmp_path)
+    (path / "metadata.yaml").unlink()
+    assert is_bag(path)
+    with pytest.raises(
+        BadRecording, match=r"metadata file .* does not exist.*mend it with .*ros2 bag reindex"
+    ):
+        BagReplay(path)
+
+
+def test_what_is_wrong_with_a_folder_is_told_in_one_line(tmp_path: Path) -> None:
+    path = small_bag(tmp_path)
+    (path / "metadata.yaml").write_text("- [")
+    with pytest.raises(BadRecording, match="Could not load YAML") as refused:
+        BagReplay(path)
+    assert "\n" not in str(refused.value)
+
+
 def test_a_missing_bag_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadRecording, match="there is no such file"):
         BagReplay(tmp_path / "run.mcap")
@@ -187,3 +230,15 @@ def test_compressed_images_are_read(tmp_path: Path) -> None:
     for found, recorded in zip(frames, FRAMES, strict=True):
         assert np.array_equal(found.colour, recorded.colour)
         assert np.array_equal(found.depth, recorded.depth)
+
+
+def test_how_often_frames_come_is_not_a_matter_of_other_topics(tmp_path: Path) -> None:
+    def entries(ros: Ros) -> list[Entry]:
+        later = ros.odometry(START_NS, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        return [*camera_entries(ros, FRAMES), ("/odom", START_NS + 9000 * PERIOD_NS, later)]
+
+    assert BagReplay(write_bag(tmp_path, "mcap", entries)).fps == pytest.approx(30.0, rel=1e-6)
+
+
+def test_of_one_image_it_is_not_known_how_often_they_come(tmp_path: Path) -> None:
+    assert BagReplay(small_bag(tmp_path, count=1)).fps is None

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from hal.cameras.bag_replay import BagReplay
 from hal.cameras.paced_recording import PacedRecording
+from hal.cameras.recording import Recording
 from hal.cameras.tum_replay import TumReplay
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.errors import EndOfStream, FrameTimeout
+from tests.support.bags import small_bag
 from tests.support.recordings import PERIOD_NS, write_recording
 
 
@@ -44,9 +47,30 @@ def test_who_comes_late_gets_the_frame_with_the_time_it_was_taken(
 ) -> None:
     with camera:
         first = camera.read(1.0)
-        clock.sleep_until_ns(first.captured_ns + 10 * PERIOD_NS)
+        clock.sleep_until_ns(first.captured_ns + PERIOD_NS + 1)
         late = camera.read(1.0)
     assert late.captured_ns == first.captured_ns + PERIOD_NS
+
+
+@pytest.mark.parametrize("kind", ["folder", "folder without reading ahead", "bag"])
+def test_who_does_not_keep_up_gets_the_newest_frame(kind: str, tmp_path: Path, clock: SimulatedClock) -> None:
+    """Else every frame would be older than the one before, and the robot would stand for ever."""
+    recording: Recording
+    if kind == "bag":
+        recording = BagReplay(small_bag(tmp_path, count=12))
+    else:
+        recording = TumReplay(write_recording(tmp_path, 12), read_ahead=2 if kind == "folder" else 0)
+    with PacedRecording(recording, clock) as camera:
+        seen = []
+        for _ in range(5):
+            frame = camera.read(1.0)
+            assert clock.now_ns() - frame.captured_ns < PERIOD_NS
+            seen.append(frame.sequence)
+            clock.sleep_until_ns(clock.now_ns() + 13 * PERIOD_NS // 5)
+        assert seen == [0, 2, 5, 7, 10]
+        assert camera.read(1.0).sequence == 11
+        with pytest.raises(EndOfStream):
+            camera.read(1.0)
 
 
 def test_a_timeout_loses_no_frame(camera: PacedRecording, clock: SimulatedClock) -> None:

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hal.cameras.stamp_pairing import StampPairing
+from hal.cameras.tum_index import associate
 
 GAP = 20
 STAMPS = st.lists(st.integers(0, 400), unique=True, max_size=20).map(sorted)
@@ -40,14 +41,27 @@ def test_what_does_not_come_later_is_left_out_and_counted() -> None:
     assert pairing.colour.out_of_order == 2
 
 
-def test_a_pair_is_given_as_soon_as_it_is_certain() -> None:
+def test_a_pair_is_given_as_soon_as_nothing_that_comes_can_change_it() -> None:
     pairing: StampPairing[str] = StampPairing(GAP)
     pairing.depth.add(95, "early")
     pairing.colour.add(100, "picture")
+    pairing.depth.add(160, "late")
     assert list(pairing.pairs(ended=False)) == []
-    pairing.depth.add(128, "late")
+    pairing.colour.add(160, "next")
     ((colour, depth),) = pairing.pairs(ended=False)
     assert (colour.item, depth.item) == ("picture", "early")
+
+
+def test_one_lost_image_does_not_shift_all_that_follow() -> None:
+    """Where frames come faster than max_gap, the next one's depth is near enough too."""
+    stamps = list(range(0, 400, 11))
+    assert paired(stamps, stamps[1:])[0] == [(one, one) for one in stamps[1:]]
+
+
+def test_of_more_colour_than_depth_those_of_the_same_time_are_taken() -> None:
+    assert paired(list(range(0, 400, 11)), list(range(11, 400, 22)))[0] == [
+        (one, one) for one in range(11, 400, 22)
+    ]
 
 
 def test_where_one_stream_has_ended_the_other_does_not_pile_up() -> None:
@@ -61,6 +75,21 @@ def test_where_one_stream_has_ended_the_other_does_not_pile_up() -> None:
         assert stream.unpaired + len(stream.waiting) == 300
 
 
+def test_a_time_that_is_far_off_does_not_make_the_other_stream_pile_up() -> None:
+    pairing: StampPairing[None] = StampPairing(GAP)
+    pairing.colour.add(10**18, None)
+    for number in range(300):
+        pairing.depth.add(number * 33_333_333, None)
+        assert list(pairing.pairs(ended=False)) == []
+        assert len(pairing.depth.waiting) <= 2
+
+
+@given(STAMPS, STAMPS)
+def test_images_are_paired_as_those_of_a_folder(colour: list[int], depth: list[int]) -> None:
+    folder = [(colour[i], depth[j]) for i, j in associate(colour, depth, GAP)]
+    assert paired(colour, depth)[0] == folder
+
+
 @given(STAMPS, STAMPS)
 def test_pairs_are_near_grow_and_nothing_is_lost(colour: list[int], depth: list[int]) -> None:
     pairs, pairing = paired(colour, depth)
@@ -72,8 +101,8 @@ def test_pairs_are_near_grow_and_nothing_is_lost(colour: list[int], depth: list[
     assert len(pairs) + pairing.depth.unpaired == len(depth)
     assert not pairing.colour.waiting
     assert not pairing.depth.waiting
-    # A colour image stays alone only where all depth near it was taken, or is earlier than what was.
+    # Who stays alone could only have what would go back in time.
     for alone in set(colour) - {a for a, _ in pairs}:
-        near = [b for b in depth if abs(alone - b) <= GAP]
         before = max((b for a, b in pairs if a < alone), default=-1)
-        assert all(b <= before or b in {taken for _, taken in pairs} for b in near)
+        after = min((b for a, b in pairs if a > alone), default=401)
+        assert not [b for b in depth if before < b < after and abs(alone - b) <= GAP]

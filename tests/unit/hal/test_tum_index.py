@@ -130,6 +130,10 @@ def test_pairs_never_cross_in_time() -> None:
     assert associate([0, 10 * MS], [-5 * MS, 1 * MS], 20 * MS) == [(0, 1)]
 
 
+def test_a_couple_that_would_go_back_in_time_does_not_cost_a_closer_one() -> None:
+    assert associate([0, 10 * MS], [10 * MS, 20 * MS], 20 * MS) == [(1, 0)]
+
+
 @given(
     st.lists(st.integers(0, 300), unique=True).map(sorted),
     st.lists(st.integers(0, 300), unique=True).map(sorted),

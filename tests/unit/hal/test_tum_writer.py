@@ -41,12 +41,12 @@ def test_frames_times_and_calibration_come_back_as_written(tmp_path: Path) -> No
 
 
 def test_the_mount_comes_back(tmp_path: Path) -> None:
-    mount = CameraMount(0.45, 0.0, 0.6, math.radians(4.0))
+    mount = CameraMount(0.45, -0.1, 0.6, math.radians(4.0))
     with TumWriter(tmp_path, mount) as writer:
         writer.write(small_frame(0))
     read = TumReplay(tmp_path).mount
     assert read is not None
-    assert (read.forward_m, read.left_m, read.height_m) == (0.45, 0.0, 0.6)
+    assert (read.forward_m, read.left_m, read.height_m) == (0.45, -0.1, 0.6)
     assert read.pitch_rad == pytest.approx(mount.pitch_rad)
 
 

@@ -14,7 +14,8 @@ from tests.support.painted import MOUNT, QVGA, Take, box, drive, floor, record, 
 from vision import detector
 from vision.detection import Detection
 from vision.detector import Detector
-from vision.ego_motion import CameraEstimate, MotionPrior, estimate
+from vision.ego_motion import CameraEstimate, estimate
+from vision.motion_prior import MotionPrior
 from vision.scene import CameraCondition
 
 SMALL = PerceptionConfig(grid_step_px=2, fragments=FragmentSettings(min_length_px=16, tile_px=20))
@@ -28,8 +29,8 @@ def room() -> Take:
 def agreeing(monkeypatch: pytest.MonkeyPatch, ratio: float, visual: bool = True) -> None:
     """As if this share of the fragments agreed with the motion found; visual: whether it was found."""
 
-    def told(anchors: Any, pixels: Any, before: Pose, prior: MotionPrior, camera: Any) -> CameraEstimate:
-        found = estimate(anchors, pixels, before, prior, camera)
+    def told(anchors: Any, pixels: Any, before: Pose, prior: MotionPrior, *rest: Any) -> CameraEstimate:
+        found = estimate(anchors, pixels, before, prior, *rest)
         return replace(found, inlier_ratio=ratio, visual=visual)
 
     monkeypatch.setattr(detector, "estimate", told)

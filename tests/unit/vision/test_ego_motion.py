@@ -10,23 +10,17 @@ import pytest
 from numpy.typing import NDArray
 
 from config.perception import EgoMotionSettings
-from hal.types import FloatArray, GyroSamples, Intrinsics, Pose
+from hal.types import FloatArray, Intrinsics, Pose
 from vision import ego_motion
-from vision.ego_motion import (
-    Anchors,
-    CameraEstimate,
-    MotionPrior,
-    estimate,
-    odometry_prior,
-    steady_prior,
-    with_gyro,
-)
+from vision.ego_motion import Anchors, CameraEstimate, estimate
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
+from vision.motion_prior import MotionPrior, odometry_prior, steady_prior
 
 CAMERA = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
 SETTINGS = EgoMotionSettings()
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 DT_S = 1.0 / 30.0
+GLOBAL_SHUTTER = np.full(2, 1e-4)
 # 0.6 m/s ahead with 0.3 rad/s of yaw and some vibration in pitch.
 TRUE = Pose(rotation_from_vector(np.array([0.002, 0.010, -0.001])), np.array([0.001, -0.0005, 0.020]))
 
@@ -72,7 +66,7 @@ def share(count: int, ratio: float) -> NDArray[np.bool_]:
 @pytest.mark.parametrize("prior", [odometry(), nothing_known()])
 def test_exact_points_give_the_exact_motion(prior: MotionPrior) -> None:
     static = anchors()
-    found = estimate(static, seen(static.points_m), IDENTITY, prior, CAMERA)
+    found = estimate(static, seen(static.points_m), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA)
     metres, radians = off(found)
     assert metres < 1e-3
     assert radians < 2e-4
@@ -90,7 +84,7 @@ def test_the_motion_starts_from_where_the_camera_was() -> None:
         local.pixel_cov,
         local.usable,
     )
-    found = estimate(placed, seen(local.points_m), before, nothing_known(), CAMERA)
+    found = estimate(placed, seen(local.points_m), before, nothing_known(), GLOBAL_SHUTTER, CAMERA)
     metres, radians = off(found, before @ TRUE)
     assert metres < 1e-3
     assert radians < 2e-4
@@ -101,7 +95,7 @@ def test_40_percent_that_move_do_not_carry_the_camera_away(prior: MotionPrior) -
     static = anchors()
     moving = share(160, 0.4)
     now = static.points_m + np.where(moving[:, None], [0.035, 0.0, -0.02], 0.0)  # 1.2 m/s
-    found = estimate(static, seen(now, noise_px=0.1), IDENTITY, prior, CAMERA)
+    found = estimate(static, seen(now, noise_px=0.1), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA)
     metres, radians = off(found)
     assert metres < 3e-3
     assert radians < 1e-3
@@ -120,7 +114,7 @@ def test_the_odometry_decides_when_a_near_body_fills_most_of_the_view(
     points = static.range_m * depth_m[:, None]
     now = points + np.where(moving[:, None], way_m, 0.0)
     crowded = replace(static, points_m=points)
-    found = estimate(crowded, seen(now, noise_px=0.1), IDENTITY, odometry(), CAMERA)
+    found = estimate(crowded, seen(now, noise_px=0.1), IDENTITY, odometry(), GLOBAL_SHUTTER, CAMERA)
     metres, radians = off(found)
     assert metres < 2e-3  # the majority went 27 to 50 mm
     # Where only the odometry speaks, what it cannot know is missing: 2.2 mrad of pitch and roll.
@@ -133,7 +127,7 @@ def test_points_marked_as_not_usable_have_no_say() -> None:
     moving = share(160, 0.8)
     now = static.points_m + np.where(moving[:, None], [0.05, 0.0, 0.0], 0.0)
     known = replace(static, usable=~moving)
-    found = estimate(known, seen(now), IDENTITY, nothing_known(), CAMERA)
+    found = estimate(known, seen(now), IDENTITY, nothing_known(), GLOBAL_SHUTTER, CAMERA)
     metres, _ = off(found)
     assert metres < 2e-3
     assert found.inlier_ratio > 0.95
@@ -142,12 +136,12 @@ def test_points_marked_as_not_usable_have_no_say() -> None:
 def test_with_too_few_points_only_the_prior_speaks() -> None:
     static = anchors(7)
     prior = odometry()
-    found = estimate(static, seen(static.points_m), IDENTITY, prior, CAMERA)
+    found = estimate(static, seen(static.points_m), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA)
     assert not found.visual
     assert np.isnan(found.inlier_ratio)
     np.testing.assert_allclose(found.pose.translation_m, prior.motion.translation_m)
     np.testing.assert_allclose(found.pose.rotation, prior.motion.rotation)
-    np.testing.assert_allclose(np.diag(found.covariance), np.square(prior.sigma))
+    np.testing.assert_allclose(np.diag(found.covariance)[:6], np.square(prior.sigma))
 
 
 def test_a_motion_whose_uncertainty_cannot_be_told_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,15 +152,15 @@ def test_a_motion_whose_uncertainty_cannot_be_told_is_not_known(monkeypatch: pyt
 
     monkeypatch.setattr(ego_motion, "_solve", singular)
     static, prior = anchors(), odometry()
-    found = estimate(static, seen(static.points_m), IDENTITY, prior, CAMERA)
+    found = estimate(static, seen(static.points_m), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA)
     assert not found.visual
-    np.testing.assert_allclose(np.diag(found.covariance), np.square(prior.sigma))
+    np.testing.assert_allclose(np.diag(found.covariance)[:6], np.square(prior.sigma))
 
 
 def test_points_that_agree_with_nothing_are_not_believed() -> None:
     static = anchors()
     pixels = np.random.default_rng(4).uniform((0.0, 0.0), (639.0, 479.0), (160, 2))
-    found = estimate(static, pixels, IDENTITY, odometry(), CAMERA)
+    found = estimate(static, pixels, IDENTITY, odometry(), GLOBAL_SHUTTER, CAMERA)
     assert not found.visual
     assert found.inlier_ratio < 0.25
     np.testing.assert_allclose(found.pose.translation_m, odometry().motion.translation_m)
@@ -177,66 +171,16 @@ def test_sigma_tells_the_error() -> None:
     sigmas = []
     for count in (40, 160):
         static = anchors(count)
-        found = estimate(static, seen(static.points_m, noise_px=0.14), IDENTITY, nothing_known(), CAMERA)
+        found = estimate(
+            static, seen(static.points_m, noise_px=0.14), IDENTITY, nothing_known(), GLOBAL_SHUTTER, CAMERA
+        )
         back = found.pose.inverse() @ TRUE
         error = np.concatenate((vector_from_rotation(back.rotation), back.translation_m))
         assert (
-            error @ np.linalg.solve(found.covariance, error) < 16.8
+            error @ np.linalg.solve(found.covariance[:6, :6], error) < 16.8
         )  # 99 % of chi2 with 6 degrees of freedom
-        sigmas.append(float(np.sqrt(np.trace(found.covariance[3:, 3:]))))
+        sigmas.append(float(np.sqrt(np.trace(found.covariance[3:6, 3:6]))))
     assert sigmas[1] < 0.75 * sigmas[0]
-
-
-def test_odometry_prior_by_hand() -> None:
-    settings = EgoMotionSettings(
-        odometry_yaw_ratio=0.2,
-        odometry_rotation_radps=0.04,
-        vibration_radps=0.25,
-        odometry_speed_ratio=0.06,
-        odometry_speed_mps=0.03,
-    )
-    turned = Pose(rotation_from_vector(np.array([0.0, 0.05, 0.0])), np.array([0.0, 0.0, 0.1]))
-    prior = odometry_prior(turned, 0.1, settings)
-    # Yaw 0.2 0.05 + 0.04 0.1; tilt 0.25 0.1 + 0.1 0.05; way 0.06 0.1 + 0.03 0.1.
-    np.testing.assert_allclose(prior.sigma, [0.03, 0.014, 0.03, 0.009, 0.009, 0.009])
-    assert prior.source == "odometry"
-    assert prior.motion is turned
-
-
-def test_steady_prior_goes_on_as_before() -> None:
-    last = Pose(rotation_from_vector(np.array([0.0, 0.02, 0.0])), np.array([0.0, 0.0, 0.05]))
-    prior = steady_prior(last, 0.1, 0.2, SETTINGS)
-    np.testing.assert_allclose(prior.motion.translation_m, [0.0, 0.0, 0.1])
-    np.testing.assert_allclose(vector_from_rotation(prior.motion.rotation), [0.0, 0.04, 0.0])
-    np.testing.assert_allclose(prior.sigma, [0.6 * 0.2] * 3 + [0.5 * 0.2] * 3)
-    assert prior.source == "none"
-    blind = steady_prior(last, 0.0, 0.2, SETTINGS)
-    np.testing.assert_allclose(blind.motion.translation_m, 0.0)
-    np.testing.assert_allclose(blind.sigma, 3.0 * prior.sigma)
-
-
-def gyro(*samples: tuple[int, float]) -> GyroSamples:
-    stamps = np.array([stamp for stamp, _ in samples], np.int64)
-    return GyroSamples(stamps, np.array([[0.0, rate, 0.0] for _, rate in samples]))
-
-
-def test_gyro_gives_the_rotation_of_the_interval_only() -> None:
-    prior = odometry()
-    # The first sample belongs to the interval before.
-    readings = gyro((1_000_000_000, 9.0), (1_050_000_000, 0.4), (1_100_000_000, 0.6))
-    turned = with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS)
-    np.testing.assert_allclose(vector_from_rotation(turned.motion.rotation), [0.0, 0.05, 0.0])
-    np.testing.assert_allclose(turned.motion.translation_m, prior.motion.translation_m)
-    np.testing.assert_allclose(turned.sigma[:3], 0.02 * 0.1)
-    np.testing.assert_allclose(turned.sigma[3:], prior.sigma[3:])
-
-
-@pytest.mark.parametrize("readings", [gyro(), gyro((999_999_999, 0.5)), gyro((1_050_000_000, float("nan")))])
-def test_a_gyro_without_a_usable_reading_changes_nothing(readings: GyroSamples) -> None:
-    prior = odometry()
-    if len(readings.stamps_ns) == 0:
-        readings = GyroSamples(np.empty(0, np.int64), np.empty((0, 3)))
-    assert with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS) is prior
 
 
 def test_ends_on_upright_edges_count_across_them_only() -> None:
@@ -244,7 +188,7 @@ def test_ends_on_upright_edges_count_across_them_only() -> None:
     static = anchors()
     slid = seen(static.points_m) + np.array([0.0, 4.0])
     upright = replace(static, pixel_cov=np.tile([0.02, 0.0, 400.0], (len(slid), 1)))
-    found = estimate(upright, slid, IDENTITY, odometry(), CAMERA)
+    found = estimate(upright, slid, IDENTITY, odometry(), GLOBAL_SHUTTER, CAMERA)
     assert found.visual
     yaw = vector_from_rotation((TRUE.inverse() @ found.pose).rotation)[1]
     assert abs(yaw) < 2e-4

@@ -21,7 +21,7 @@ FRAME_NS = 33_333_333
 FRAME_S = FRAME_NS * 1e-9
 WINDOW_S = 0.25
 STILL = Pose(np.eye(3), np.zeros(3))
-HERE = CameraEstimate(STILL, 1e-12 * np.eye(6), 0.9, True)
+HERE = CameraEstimate(STILL, np.zeros(2), 1e-12 * np.eye(8), 0.9, True)
 ENDS_M = np.array([[-0.2, 0.1, 5.0], [0.3, 0.1, 5.0]])
 
 
@@ -50,7 +50,7 @@ def follow(ends_m: list[FloatArray], far_m: float | None = None, scale: float = 
             anchor = store.anchors(stamp_ns, WINDOW_S)
             way.motions.append(gather(store, anchor, appraise(anchor, NOISE), HERE, CAMERA, NOISE, scale))
             average_depth(store, store.before(stamp_ns), STILL, NOISE)
-        store.commit(stamp_ns, STILL, CAMERA)
+        store.commit(stamp_ns, STILL, CAMERA, np.zeros(2))
     return way
 
 
@@ -117,7 +117,7 @@ def test_missing_depth_is_a_distant_point_hardly_known_and_not_used() -> None:
     pixels = project(ENDS_M, CAMERA).astype(np.float32)[None]
     nothing = np.full((1, 2), np.nan, np.float32)
     store.add(pixels, nothing, nothing, np.ones((1, 2, 3), np.float32))
-    store.commit(FRAME_NS, STILL, CAMERA)
+    store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
     anchor = store.anchors(2 * FRAME_NS, WINDOW_S)
     depths = appraise(anchor, NOISE)
     np.testing.assert_array_equal(depths.near_m, 12.0)

@@ -28,7 +28,7 @@ def add(store: FragmentStore, count: int) -> None:
 
 
 def commit(store: FragmentStore, frame: int) -> None:
-    store.commit(frame * FRAME_NS, pose_of(frame), CAMERA)
+    store.commit(frame * FRAME_NS, pose_of(frame), CAMERA, np.zeros(2))
 
 
 def points_of(store: FragmentStore, back_s: float, frame: int) -> tuple[FloatArray, NDArray[np.intp]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -153,6 +153,28 @@ def test_of_two_that_a_part_may_belong_to_the_closer_one_comes_first() -> None:
     # Both touch it: the one at whose depth it is.
     deep = Body(0.0, z=3.8, width=0.6, deep=0.8, cells=900)
     assert merged(deep, Body(0.1, z=4.1, width=0.4), shank)[0] == (2, 1)
+
+
+CART = Body(0.0, y=0.2, z=1.0, width=0.6, height=0.4, cells=900)
+MAST = Body(0.0, y=-0.3, z=1.7, width=0.2, height=0.6, deep=0.1, cells=100)  # 0.55 m behind the cart's front
+
+
+def test_what_stands_on_a_mover_in_the_image_and_goes_exactly_as_it_does_is_carried_by_it() -> None:
+    assert merged(CART, MAST) == [(1, 0)]
+    assert merged(CART, replace(MAST, y=-0.4)) == []  # it ends above the cart
+    assert merged(CART, replace(MAST, x=0.5, width=0.4)) == []  # and this beside it
+    assert merged(CART, replace(MAST, z=2.1)) == []  # 0.95 m behind it
+    assert merged(CART, MAST, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
+    assert merged(CART, MAST, sigma=0.4) == []  # not known well enough
+
+
+def test_what_a_mover_carries_stays_with_it_while_most_of_it_was_there_before() -> None:
+    parts, winner = regions(CART, MAST), np.array([1, 1], np.int32)
+    nowhere = NOWHERE[:2, :1]
+    np.testing.assert_array_equal(detach(winner, parts, np.array([800, 70]), nowhere), [1, 1])
+    np.testing.assert_array_equal(detach(winner, parts, np.array([800, 69]), nowhere), [1, 0])
+    above = regions(CART, replace(MAST, y=-0.4))
+    np.testing.assert_array_equal(detach(winner, above, np.array([800, 100]), nowhere), [1, 0])
 
 
 def test_tracks_that_are_not_seen_take_no_part() -> None:

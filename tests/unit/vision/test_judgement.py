@@ -111,8 +111,15 @@ def test_fragments_and_surface_that_say_the_same_prove_together(direction: Speed
 def test_a_surface_seen_long_enough_without_a_break_proves_by_itself() -> None:
     assert rises(by_surface(ACROSS, 0.25))
     assert not rises(by_surface(ACROSS, 0.2))
-    assert rises(by_surface(ALONG, 0.5))
-    assert not rises(by_surface(ALONG, 0.45))  # noise of depth is shared by neighbours: longer
+    deep = {"depth_sigma_m": np.array([0.19])}
+    assert rises(by_surface(ALONG, 0.5, **deep))
+    assert not rises(by_surface(ALONG, 0.45, **deep))  # noise of depth is shared by neighbours: longer
+
+
+def test_along_the_line_of_sight_a_way_far_beyond_the_noise_of_depth_proves_as_soon_as_across() -> None:
+    assert rises(by_surface(ALONG, 0.3, depth_sigma_m=np.array([0.059])))  # 0.24 m, more than 4 sigmas
+    assert not rises(by_surface(ALONG, 0.3, depth_sigma_m=np.array([0.061])))
+    assert not rises(by_surface(ALONG, 0.2, depth_sigma_m=np.array([0.01])))
 
 
 @pytest.mark.parametrize(("looks", "proves"), [(2, False), (3, True)])
@@ -216,6 +223,15 @@ def test_unrest_of_many_ends_proves_what_the_filter_says_by_half() -> None:
     assert not rises(one(ALONG, **{**half, "ends": np.array([7])}))
     assert not rises(one(ALONG, **{**half, "covariance": covariance(0.085)}))  # 7.4
     assert not rises(one((0.0, 0.0, -0.2), **half, trusted=False))
+
+
+def test_many_ends_that_deny_for_long_bear_out_a_velocity_that_is_only_likely() -> None:
+    slow = {"covariance": covariance(0.14), "ends": np.array([8]), "restless": np.array([True])}  # 4.5
+    assert not rises(one(ACROSS, **slow, unrest_s=np.array([0.35])))
+    assert rises(one(ACROSS, **slow, unrest_s=np.array([0.45])))
+    unlikely = {**slow, "covariance": covariance(0.17)}  # 3.7
+    assert not rises(one(ACROSS, **unlikely, unrest_s=np.array([0.45])))
+    assert not rises(one(ACROSS, **{**slow, "ends": np.array([7])}, unrest_s=np.array([0.45])))
 
 
 def test_tracks_are_judged_each_by_itself() -> None:

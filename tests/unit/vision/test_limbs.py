@@ -41,8 +41,14 @@ def test_a_rigid_body_that_stands_has_no_limbs() -> None:
 
 
 def test_what_disagrees_widens_the_velocity() -> None:
-    """Half of them: 0.5 m/s."""
-    assert limbs.variance(body(12, 0.5), np.zeros(1))[0] == pytest.approx(0.25)
+    """Half of them: 0.5 m/s, however many, where the others stand."""
+    assert limbs.variance(body(12, 0.5, unexplained=0.5), np.zeros(1))[0] == pytest.approx(0.25)
+
+
+def test_what_several_limbs_say_is_less_uncertain_than_what_one_says() -> None:
+    """All deny that they stand and disagree, as when somebody starts to walk: 1 m/s over their root."""
+    assert limbs.variance(body(8, 0.0, unexplained=1.0), np.zeros(1))[0] == pytest.approx(1.0)
+    assert limbs.variance(body(40, 0.0, unexplained=1.0), np.zeros(1))[0] == pytest.approx(0.2)
 
 
 def test_one_fragment_on_a_walker_may_be_a_shank() -> None:

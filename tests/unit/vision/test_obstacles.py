@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.point_motion import static_miss
 from vision.obstacles import BodyVelocities, body_velocities, fragment_velocities, long_static
-from vision.velocities import PointMotion, static_miss
+from vision.velocities import PointMotion
 
 NAN = float("nan")
 

@@ -42,3 +42,22 @@ def test_what_stands_is_no_sliver() -> None:
 def test_who_leaves_the_image_is_no_sliver() -> None:
     """Its rest is where it is seen to be, and the others are outside."""
     assert not seen_of(-1.6, -1.5).sliver.any()
+
+
+def reaching_in(moving: bool) -> float:
+    """Velocity across, as filtered, of a body 3 m away whose right side comes into the view at 1.2 m/s."""
+    tracks = Tracks()
+    tracks.start(np.array([[-1.4, 0.0, 3.0]]), 0.2, 1.5, 1.0, 0)
+    tracks.moving[:] = moving
+    for frame in range(12):
+        tracks.predict(1.0 / 30.0, 0.12, None)
+        depth_m = plate(3.0, (-2.0, -1.2 + 0.04 * frame), (-0.6, 0.6))
+        grid, labels = grid_of(depth_m), labelled(depth_m > 0.0)
+        measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
+        sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
+    return float(tracks.state[0, 3])
+
+
+def test_a_surface_that_is_cut_tells_roughly_of_the_velocity_of_what_is_known_to_move() -> None:
+    assert 0.3 < reaching_in(moving=True) < 1.2  # its middle goes half as fast as its rim
+    assert reaching_in(moving=False) == 0.0  # of what stands a new rim is no motion

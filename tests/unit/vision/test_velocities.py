@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from hal.types import FloatArray
+from tests.support.point_motion import static_miss
 from vision.velocities import (
     NormalEquations,
     PointMotion,
     chi2_2d,
-    depth_after,
     end_information,
-    lateral_after,
     normal_equations,
     solve_velocity,
-    static_miss,
 )
 
 
@@ -37,35 +35,18 @@ def evidence(static_m: FloatArray, ray: FloatArray, lag_s: float) -> PointMotion
     )
 
 
-def test_depth_from_the_length_ratio_equations_6_and_8() -> None:
-    # 0.6 m at 4 m and a focal length of 300 px is 45 px; at 3 m it is 60 px. Going away: 30 px at 6 m.
-    depth = depth_after(np.array([4.0, 4.0]), np.array([45.0, 45.0]), np.array([60.0, 30.0]))
-    np.testing.assert_allclose(depth, [3.0, 6.0])
-
-
-def test_lateral_position_equations_7_and_9() -> None:
-    # 75 px right of the centre at f = 300 px is x = 0.25; in the centre of the image it is 0, not 0/0.
-    np.testing.assert_allclose(lateral_after(np.array([0.25, 0.0]), np.array([4.0, 3.0])), [1.0, 0.0])
-
-
 def test_length_ratio_and_lateral_speed_follow_from_the_point_equations() -> None:
-    """Two ends at one depth: the general equations give the paper's numbers."""
+    """Two ends at one depth: the general equations give the numbers of the paper's eqs. 6 to 9."""
     static = np.array([[-0.3, 0.0, 4.0], [0.3, 0.0, 4.0]])
     # One second later, seen 60 px long instead of 45 (f = 300), and 20 px right of the centre.
     ray = np.array([[-30.0 + 20.0, 0.0], [30.0 + 20.0, 0.0]]) / 300.0
     equations = normal_equations(evidence(static, ray, 1.0), np.ones(2))
     information = equations.matrix.sum(axis=0)
     velocity = np.linalg.solve(information, equations.rhs.sum(axis=0))
-    later_m = float(depth_after(np.array([4.0]), np.array([45.0]), np.array([60.0]))[0])
+    later_m = 4.0 * 45.0 / 60.0  # eqs. 6 and 8: Z' = Z L / L'
     assert velocity[2] == pytest.approx(later_m - 4.0)  # -1 m/s
-    middle = float(lateral_after(np.array([20.0 / 300.0]), np.array([later_m]))[0])
-    assert velocity[0] == pytest.approx(middle)  # 0.2 m/s
+    assert velocity[0] == pytest.approx(20.0 / 300.0 * later_m)  # 0.2 m/s; eqs. 7 and 9: X' = x' Z'
     assert velocity[1] == pytest.approx(0.0)
-
-
-def test_static_miss_by_numbers() -> None:
-    miss = static_miss(np.array([[1.0, 0.5, 4.0], [1.0, 0.5, 4.0]]), np.array([[0.3, 0.1], [0.25, 0.125]]))
-    np.testing.assert_allclose(miss, [[0.2, -0.1], [0.0, 0.0]], atol=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The prior of a camera on a robot that says nothing of its own motion."""
+"""What is known of the camera before looking: by odometry, by a gyro, or on a robot that says nothing."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from config.perception import EgoMotionSettings
-from hal.types import CameraMount, FloatArray, Intrinsics, Pose
-from vision.ego_motion import Anchors, MotionPrior, estimate, steady_prior
+from hal.types import CameraMount, FloatArray, GyroSamples, Intrinsics, Pose
+from vision.ego_motion import Anchors, estimate
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
-from vision.rolling import rolling_prior
+from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
 
 CAMERA = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
 SETTINGS = EgoMotionSettings()
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 DT_S = 1.0 / 30.0
+GLOBAL_SHUTTER = np.full(2, 1e-4)
 LEVEL = CameraMount(0.3, 0.0, 0.5, 0.0)
 
 
@@ -65,7 +66,7 @@ def sideways_mps(prior: MotionPrior) -> float:
     now: FloatArray = points.copy()
     now[:60, 0] += 0.7 * DT_S
     now[:, 2] -= 0.5 * DT_S
-    found = estimate(anchors, project(now, CAMERA), IDENTITY, prior, CAMERA)
+    found = estimate(anchors, project(now, CAMERA), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA)
     return float(found.pose.translation_m[0]) / DT_S
 
 
@@ -75,3 +76,55 @@ def test_a_crowd_that_crosses_does_not_pass_for_the_robots_own_motion() -> None:
     assert sideways_mps(rolling_prior(last, DT_S, DT_S, mount, SETTINGS)) == pytest.approx(0.0, abs=0.1)
     # A camera carried by hand may well have gone to the left: then the majority decides.
     assert sideways_mps(steady_prior(last, DT_S, DT_S, SETTINGS)) == pytest.approx(-0.7, abs=0.1)
+
+
+def test_odometry_prior_by_hand() -> None:
+    settings = EgoMotionSettings(
+        odometry_yaw_ratio=0.2,
+        odometry_rotation_radps=0.04,
+        vibration_radps=0.25,
+        odometry_speed_ratio=0.06,
+        odometry_speed_mps=0.03,
+    )
+    turned = Pose(rotation_from_vector(np.array([0.0, 0.05, 0.0])), np.array([0.0, 0.0, 0.1]))
+    prior = odometry_prior(turned, 0.1, settings)
+    # Yaw 0.2 0.05 + 0.04 0.1; tilt 0.25 0.1 + 0.1 0.05; way 0.06 0.1 + 0.03 0.1.
+    np.testing.assert_allclose(prior.sigma, [0.03, 0.014, 0.03, 0.009, 0.009, 0.009])
+    assert prior.source == "odometry"
+    assert prior.motion is turned
+
+
+def test_steady_prior_goes_on_as_before() -> None:
+    last = Pose(rotation_from_vector(np.array([0.0, 0.02, 0.0])), np.array([0.0, 0.0, 0.05]))
+    prior = steady_prior(last, 0.1, 0.2, SETTINGS)
+    np.testing.assert_allclose(prior.motion.translation_m, [0.0, 0.0, 0.1])
+    np.testing.assert_allclose(vector_from_rotation(prior.motion.rotation), [0.0, 0.04, 0.0])
+    np.testing.assert_allclose(prior.sigma, [0.6 * 0.2] * 3 + [0.5 * 0.2] * 3)
+    assert prior.source == "none"
+    blind = steady_prior(last, 0.0, 0.2, SETTINGS)
+    np.testing.assert_allclose(blind.motion.translation_m, 0.0)
+    np.testing.assert_allclose(blind.sigma, 3.0 * prior.sigma)
+
+
+def gyro(*samples: tuple[int, float]) -> GyroSamples:
+    stamps = np.array([stamp for stamp, _ in samples], np.int64)
+    return GyroSamples(stamps, np.array([[0.0, rate, 0.0] for _, rate in samples]))
+
+
+def test_gyro_gives_the_rotation_of_the_interval_only() -> None:
+    prior = odometry_prior(motion((0.002, 0.01, -0.001), (0.0, 0.0, 0.02)), DT_S, SETTINGS)
+    # The first sample belongs to the interval before.
+    readings = gyro((1_000_000_000, 9.0), (1_050_000_000, 0.4), (1_100_000_000, 0.6))
+    turned = with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS)
+    np.testing.assert_allclose(vector_from_rotation(turned.motion.rotation), [0.0, 0.05, 0.0])
+    np.testing.assert_allclose(turned.motion.translation_m, prior.motion.translation_m)
+    np.testing.assert_allclose(turned.sigma[:3], 0.02 * 0.1)
+    np.testing.assert_allclose(turned.sigma[3:], prior.sigma[3:])
+
+
+@pytest.mark.parametrize("readings", [gyro(), gyro((999_999_999, 0.5)), gyro((1_050_000_000, float("nan")))])
+def test_a_gyro_without_a_usable_reading_changes_nothing(readings: GyroSamples) -> None:
+    prior = odometry_prior(motion((0.002, 0.01, -0.001), (0.0, 0.0, 0.02)), DT_S, SETTINGS)
+    if len(readings.stamps_ns) == 0:
+        readings = GyroSamples(np.empty(0, np.int64), np.empty((0, 3)))
+    assert with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS) is prior

@@ -1,0 +1,90 @@
+"""Images whose rows are read one after another: shaken meanwhile, they come out bent.
+
+The colour sensor of a D435i takes some 10 to 20 ms from its first row to its last. Tracks shake the camera
+by a quarter of a radian a second and more, which stretches the image by pixels, now this way and now that:
+just what a length ratio takes for speed. How far the camera turned while an image was read is estimated
+with its motion (vision/ego_motion.py); how far it can have turned follows from how long its rows take, and
+that no recording tells, so it is learned. A global shutter is found to take no time, and nothing is bent.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hal.types import FloatArray, Intrinsics
+from vision.ego_motion import CameraEstimate
+from vision.lens import RealArray, rays, row_delays
+
+_UNKNOWN_S = 0.015  # one sigma of the read-out before anything is seen
+_MOST_S = 0.035  # frames follow each other in that time
+_MEMORY = 0.98  # a frame: of what is known; what was learned from a bad start fades
+_OTHER_BENDS_RAD = 0.7e-3  # one sigma, by whatever else bends an image
+_LEAST_RAD = 1e-5  # a hundredth of a pixel: nothing, but enough to learn by
+_RATE_MEMORY = 0.9  # a frame: of the fastest turn, since vibration comes and goes between frames
+
+
+def straight_rays(pixels: RealArray, camera: Intrinsics, sweep_rad: FloatArray) -> FloatArray:
+    """(N, 3) points at z = 1 m behind pixels (N, 2), as if all rows had been read with the middle one.
+
+    sweep_rad (2,): how far the camera turned about x and y while the image was read.
+    """
+    result = rays(pixels, camera)
+    x, y = result[:, 0].copy(), result[:, 1].copy()
+    about_x, about_y = np.multiply.outer(sweep_rad, row_delays(pixels[:, 1], camera))
+    # The derivatives of a small rotation, as in vision/ego_motion.py.
+    result[:, 0] -= about_x * x * y - about_y * (1.0 + x * x)
+    result[:, 1] -= about_x * (1.0 + y * y) - about_y * x * y
+    return result
+
+
+class ReadOut:
+    """How long the rows of an image take, learned from how it bends while the camera pitches.
+
+    Least squares of the bend over the rate of turn at that image, from a prior of 0 +- 15 ms. Only pitch
+    teaches: vibration goes to and fro, while a steady turn bends all images alike, which nothing shows.
+    """
+
+    def __init__(self, vibration_radps: float) -> None:
+        """vibration_radps: as fast as the camera may turn before it has been seen to."""
+        self._rates_radps = np.full(2, vibration_radps)
+        self._information = 0.0
+        self._told = 0.0
+        self._bend: tuple[float, float, float, float] | None = None
+
+    @property
+    def seconds(self) -> float:
+        """From the first row to the last: what is certain to one sigma, 0 for a global shutter."""
+        information = self._information + 1.0 / _UNKNOWN_S**2
+        return min(max(self._told / information - 1.0 / math.sqrt(information), 0.0), _MOST_S)
+
+    def sweep_sigma_rad(self) -> FloatArray:
+        """(2,) one sigma of how far the camera turns about x and y while the next image is read."""
+        return _LEAST_RAD + self.seconds * self._rates_radps
+
+    def learn(self, found: CameraEstimate, turn_rad: FloatArray, dt_s: float) -> None:
+        """After an image that was estimated with the present sweep_sigma_rad().
+
+        turn_rad (3,): the camera's turn since the frame before, dt_s ago. The rate at an image is known one
+        frame later, when its turns before and after it are.
+        """
+        bend = self._free_bend(found)
+        if self._bend is not None:
+            bend_rad, variance, before_rad, before_s = self._bend
+            rate = (before_rad + float(turn_rad[0])) / (before_s + dt_s)
+            weight = 1.0 / (variance + _OTHER_BENDS_RAD**2)
+            self._told = _MEMORY * self._told + weight * bend_rad * rate
+            self._information = _MEMORY * self._information + weight * rate * rate
+        self._bend = (*bend, float(turn_rad[0]), dt_s) if found.visual else None
+        self._rates_radps = np.maximum(_RATE_MEMORY * self._rates_radps, np.abs(turn_rad[:2]) / dt_s)
+
+    def lose(self) -> None:
+        """The next image does not follow the last one."""
+        self._bend = None
+
+    def _free_bend(self, found: CameraEstimate) -> tuple[float, float]:
+        """The sweep about x and its variance as the image alone tells them, without what was assumed."""
+        variance = float(found.covariance[6, 6])
+        told = max(1.0 - variance / float(self.sweep_sigma_rad()[0]) ** 2, 1e-9)
+        return float(found.sweep_rad[0]) / told, variance / told
