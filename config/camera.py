@@ -82,9 +82,11 @@ class SimulatedCameraConfig(Section):
     vibration_hz: float = Field(default=8.0, gt=0, le=100)
 
     @model_validator(mode="after")
-    def _has_a_depth_range(self) -> Self:
+    def _possible(self) -> Self:
         if self.depth_min_m >= self.depth_max_m:
             raise ValueError("depth_min_m must be smaller than depth_max_m")
+        if not (0 <= self.cx < self.width and 0 <= self.cy < self.height):
+            raise ValueError(f"cx, cy must lie inside the {self.width}x{self.height} image, in pixels")
         return self
 
 

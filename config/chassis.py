@@ -6,8 +6,9 @@ import ipaddress
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Literal, Self
+from urllib.parse import urlsplit
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from config.loader import Section
 
@@ -62,6 +63,26 @@ class SerialLinkConfig(Section):
 
     url: str = Field(min_length=1)
     baud: int = Field(default=115_200, ge=1_200, le=4_000_000)
+
+    @field_validator("url")
+    @classmethod
+    def _has_host_and_port(cls, url: str) -> str:
+        scheme = url.partition("://")[0]
+        if scheme in _NETWORK_SCHEMES and not _names_host_and_port(url):
+            raise ValueError(f"needs a host and a port, such as {scheme}://192.168.0.7:4001")
+        return url
+
+
+# pyserial's ports at the other end of a network; what is wrong with such a URL, it does not tell.
+_NETWORK_SCHEMES = frozenset({"socket", "rfc2217"})
+
+
+def _names_host_and_port(url: str) -> bool:
+    try:
+        parts = urlsplit(url)
+        return bool(parts.hostname) and parts.port is not None
+    except ValueError:  # a port beyond 65535 or of letters
+        return False
 
 
 AgilexModelName = Literal["bunker", "bunker_mini", "bunker_pro", "scout", "scout_mini", "tracer"]

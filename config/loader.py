@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import math
+import os.path
 from pathlib import Path
 from typing import TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
 
 from config.known_keys import advice, written
 
 CONFIG_DIR = Path(__file__).resolve().parent
 # A file with more mistakes than this is another kind of file, and one line is for reading.
 _MOST_MISTAKES = 8
+# Where pydantic speaks of itself instead of the file.
+_IN_OTHER_WORDS = {
+    "union_tag_not_found": "its key kind is missing",
+    "tuple_type": "Input should be a list",
+    "model_type": "Input should be keys and values",
+    "model_attributes_type": "Input should be keys and values",
+}
 
 
 class ConfigError(Exception):
@@ -28,19 +38,40 @@ class Section(BaseModel):
 SectionT = TypeVar("SectionT", bound=Section)
 
 
-class _UniqueKeyLoader(yaml.SafeLoader):
-    """SafeLoader that refuses a key given twice: the second would silently win."""
+_MERGE = "tag:yaml.org,2002:merge"
+# What PyYAML lets out, without a place, where a scalar is none of what its tag says: day 32, 5000 digits.
+_NOT_WHAT_IT_SAYS = (ValueError, LookupError, AttributeError, TypeError, OverflowError)
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[object, object]:
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """SafeLoader that refuses a key given twice: the second would silently win. A merged key (<<) may be
+    given again, that is what merging is for."""
+
+    def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[object, object]:
+        if not isinstance(node, yaml.MappingNode):
+            raise _wrong(node, "expected keys and values")  # as in `!!set [a]`
         seen: set[object] = set()
         for key_node, _ in node.value:
+            if key_node.tag == _MERGE:
+                continue
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise _wrong(key_node, "a key must be a word, not a list or other keys")
             key = self.construct_object(key_node, deep=True)
             if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key!r} is given twice", key_node.start_mark
-                )
+                raise _wrong(key_node, f"key {key!r} is given twice")
             seen.add(key)
         return super().construct_mapping(node, deep)
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> object:
+        try:
+            return super().construct_object(node, deep)
+        except _NOT_WHAT_IT_SAYS as error:
+            kind = node.tag.rpartition(":")[2]
+            raise _wrong(node, f"{str(node.value)[:40]!r} is no {kind}; put text in quotes") from error
+
+
+def _wrong(node: yaml.Node, problem: str) -> yaml.constructor.ConstructorError:
+    return yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
 
 
 def read_yaml(path: Path) -> object:
@@ -51,8 +82,12 @@ def read_yaml(path: Path) -> object:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); check the path") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not UTF-8 text ({error.reason}); is it a YAML file?") from error
+    except ValueError as error:  # a NUL in the name
+        raise ConfigError(f"{path}: cannot be read ({error}); check the path") from error
     try:
         return yaml.load(text, Loader=_UniqueKeyLoader)
+    except RecursionError as error:
+        raise ConfigError(f"{path}: is nested too deeply to be a configuration") from error
     except yaml.YAMLError as error:
         raise ConfigError(f"{path}: is not valid YAML: {_yaml_mistake(error)}") from error
 
@@ -88,7 +123,7 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
             continue  # a default that follows from a key that is wrong itself
         unknown = detail["type"] == "extra_forbidden"
         key = written(model, detail["loc"], last_is_key=unknown)
-        reason = detail["msg"].removeprefix("Value error, ")
+        reason = _IN_OTHER_WORDS.get(detail["type"], detail["msg"].removeprefix("Value error, "))
         if unknown:
             hint = advice(model, detail["loc"])
             # Several keys of another kind of file: what is known is said once.
@@ -97,11 +132,22 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
         elif detail["type"] == "missing":
             reason = "missing key"
         elif not isinstance(detail["input"], dict | list):
-            reason = f"{reason}, found {detail['input']!r}"
+            reason = f"{reason}, found {detail['input']!r}" + _as_number(detail)
         parts.append(f"{key}: {reason}" if key else reason)
     if len(parts) > _MOST_MISTAKES:
         parts[_MOST_MISTAKES:] = [f"and {len(parts) - _MOST_MISTAKES} more mistakes"]
     return "; ".join(parts)
+
+
+def _as_number(detail: ErrorDetails) -> str:
+    """YAML 1.1 reads `15e-1` and '"1.5"' as text: what to write."""
+    if detail["type"] not in ("float_type", "int_type") or not isinstance(detail["input"], str):
+        return ""
+    try:
+        number = float(detail["input"])
+    except ValueError:
+        return ""
+    return f", which is text: write {number:g}" if math.isfinite(number) else ""
 
 
 def resolve(path: str, relative_to: Path) -> Path:
@@ -110,4 +156,6 @@ def resolve(path: str, relative_to: Path) -> Path:
     if given.is_absolute():
         return given
     beside = relative_to.parent / given
-    return beside if beside.exists() else CONFIG_DIR / given
+    shipped = CONFIG_DIR / given
+    # os.path, not Path.exists(): that one raises for a name too long and a folder that may not be read.
+    return shipped if os.path.exists(shipped) and not os.path.exists(beside) else beside

@@ -237,10 +237,9 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     given = Path(name_or_path)
     if given.suffix in {".yaml", ".yml"}:
         return load(given, Scenario)
-    shipped = SCENARIO_DIR / f"{given.name}.yaml"
-    if len(given.parts) != 1 or not shipped.exists():
+    if len(given.parts) != 1 or given.name not in scenario_names():
         raise ConfigError(
             f"{name_or_path}: there is no such scenario; give a YAML file or one of: "
             f"{', '.join(scenario_names())}"
         )
-    return load(shipped, Scenario)
+    return load(SCENARIO_DIR / f"{given.name}.yaml", Scenario)

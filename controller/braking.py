@@ -226,7 +226,9 @@ def _bisect_speed(
 ) -> float:
     """The rare states: the law is not one closed form, but it still grows with the speed."""
     # Too fast: easing the acceleration off sheds a^2 / J at most, and from what is left v^2 / 2A is too far.
-    low, high = 0.0, math.sqrt(2.0 * limits.decel_mps2 * free_m) + abs(a_mps2) + a_mps2**2 / limits.jerk_mps3
+    # free_m is below 0 only by rounding of what is next to nothing.
+    room_m = max(free_m, 0.0)
+    low, high = 0.0, math.sqrt(2.0 * limits.decel_mps2 * room_m) + abs(a_mps2) + a_mps2**2 / limits.jerk_mps3
     for _ in range(_NEWTON_STEPS):
         middle = 0.5 * (low + high)
         if required_distance(middle, a_mps2, towards_mps, latency_s, limits) <= free_m:

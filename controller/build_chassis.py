@@ -129,10 +129,20 @@ def build_serial_emulator(config: AnyChassisConfig, link: SerialLink, plant: Tra
             bus = AgilexSerialBus(link)
             return AgilexEmulator(bus, plant, model=model_of(config), over_serial=True)
         case RoboclawChassisConfig():
-            return RoboclawEmulator(link, plant, counts_per_m=config.counts_per_m, address=config.address)
+            return RoboclawEmulator(
+                link,
+                plant,
+                counts_per_m=config.counts_per_m,
+                address=config.address,
+                signs=(config.left_sign, config.right_sign),
+            )
         case RoboteqChassisConfig():
             return RoboteqEmulator(
-                link, plant, full_speed_mps=config.full_speed_mps, counts_per_m=config.counts_per_m
+                link,
+                plant,
+                full_speed_mps=config.full_speed_mps,
+                counts_per_m=config.counts_per_m,
+                signs=(config.left_sign, config.right_sign),
             )
         case KobukiChassisConfig():
             return KobukiEmulator(link, plant)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 import click
 
@@ -60,6 +61,11 @@ class Console:
                 f"{stamp_s:7.2f} s  standing for {lasted_s:.0f} s, since {since_s:.2f} s: "
                 f"{decision.reason.sentence}"
             )
+
+    def complaints(self, stamp_s: float, new: Sequence[str]) -> None:
+        """What the base complains of without stopping for it."""
+        for complaint in new:
+            self.event(f"{stamp_s:7.2f} s  the base says: {complaint}")
 
     def event(self, line: str) -> None:
         """A line that stays."""

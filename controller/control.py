@@ -19,6 +19,8 @@ from vision.scene import Scene
 
 # At rest within this of the path's end counts as arrived.
 ARRIVED_M = 0.05
+# Further past it, the target was missed.
+PASSED_M = 0.10
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +107,10 @@ class ControlLoop:
         setpoint, fault = self._setpoint(decision, on_path, now_ns)
         self._state = self._chassis.exchange(setpoint, now_ns)
         self.localiser.add_odometry(now_ns, self._state.pose)
-        arrived = self.path.length_m - on_path.s_m <= ARRIVED_M
+        to_go_m = self.path.length_m - on_path.s_m
+        if to_go_m < -PASSED_M:
+            self.request_stop("went past the target", Outcome.BROKEN_OFF)
+        arrived = -PASSED_M <= to_go_m <= ARRIVED_M
         self.ending.conclude(self._state, setpoint, now_ns, arrived=arrived)
         sequence = None if scene is None else scene.sequence
         return ControlStep(

@@ -135,9 +135,9 @@ def can_link(link: CanLinkConfig, options: EmulateOptions) -> CanLinkConfig:
 def _linked(path: str, target: str) -> Iterator[None]:
     """A symbolic link to the pseudo-terminal, for as long as the block runs. Raises UserError."""
     link = Path(path)
-    if link.is_symlink() and os.readlink(link).startswith("/dev/pts/"):
-        link.unlink()  # left behind by an emulator that was killed
     try:
+        if link.is_symlink() and os.readlink(link).startswith("/dev/pts/"):
+            link.unlink()  # left behind by an emulator that was killed
         link.symlink_to(target)
     except OSError as error:
         raise UserError(

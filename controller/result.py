@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from controller.control import ControlLoop, ControlStep
 from controller.ending import Outcome
 from controller.realtime import Punctuality
-from controller.tally import SetpointTally, ShaperFaults, Standstill, TimingTally
+from controller.tally import Complaints, SetpointTally, ShaperFaults, Standstill, TimingTally
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
@@ -41,6 +41,7 @@ class MissionResult:
     punctuality: Punctuality | None = None
     standstill: Standstill = field(default_factory=Standstill)
     shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
+    complaints: Complaints = field(default_factory=Complaints)
 
     @property
     def duration_s(self) -> float:

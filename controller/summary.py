@@ -28,6 +28,7 @@ def report(console: Console, result: MissionResult, step: ControlStep) -> None:
     seconds = (step.now_ns - result.started_ns) / NS_PER_S
     console.decision(seconds, step.decision, step.setpoint.v_mps)
     console.standing(seconds, result.standstill.lasted_s(step.now_ns), step.decision)
+    console.complaints(seconds, result.complaints.add(step.chassis.faults))
 
 
 def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, str]]:
@@ -42,6 +43,8 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
     rows.append(("limits", limits_text(config, result.setpoints)))
     if result.shaper_faults.count:
         rows.append(("shaper", result.shaper_faults.line()))
+    if result.complaints.told:
+        rows.append(("base", result.complaints.line()))
     rows.append(("perception", result.timing.line()))
     if math.isfinite(result.wall_s):
         ratio = result.duration_s / result.wall_s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -86,6 +87,23 @@ class ShaperFaults:
     def line(self) -> str:
         """For the summary."""
         return f"braked by the stop profile in {self.count} steps; first: {self.first}"
+
+
+@dataclass
+class Complaints:
+    """What the base has complained of, each once and in the order in which it came."""
+
+    told: list[str] = field(default_factory=list)
+
+    def add(self, faults: Sequence[str]) -> list[str]:
+        """Of one exchange; those that are new."""
+        new = [fault for fault in faults if fault not in self.told]
+        self.told += new
+        return new
+
+    def line(self) -> str:
+        """For the summary."""
+        return "; ".join(self.told)
 
 
 @dataclass

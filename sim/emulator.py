@@ -91,10 +91,16 @@ class SerialEmulator(ChassisEmulator):
 
 
 class MotorController(SerialEmulator):
-    """Answers only when asked, and moves two tracks along ramps, in steps of a millisecond."""
+    """Answers only when asked, and moves two tracks along ramps, in steps of a millisecond.
 
-    def __init__(self, link: SerialLink, plant: TrackedPlant, boot_ms: int) -> None:
+    signs: the directions of the motors (left, right) that move their tracks ahead; -1 where one is mirrored.
+    """
+
+    def __init__(
+        self, link: SerialLink, plant: TrackedPlant, boot_ms: int, signs: tuple[int, int] = (1, 1)
+    ) -> None:
         super().__init__(link, plant, boot_ms)
+        self._signs = signs
         self._goal_mps = [0.0, 0.0]
         self._target_mps = [0.0, 0.0]
 
@@ -104,9 +110,22 @@ class MotorController(SerialEmulator):
         while self._now_ns < now_ns:
             step_ns = min(_STEP_NS, now_ns - self._now_ns)
             self._ramp(step_ns / NS_PER_S)
-            self._plant.command_tracks(*self._target_mps)
+            self._plant.command_tracks(*self._signed(*self._target_mps))
             self._now_ns += step_ns
             self._plant.advance_to(self._now_ns)
+
+    @property
+    def _turned_m(self) -> tuple[float, float]:
+        """How far the motors have turned their tracks since power came."""
+        return self._signed(*self._travel_m)
+
+    @property
+    def _turning_mps(self) -> tuple[float, float]:
+        """How fast they do."""
+        return self._signed(*self._plant.track_speeds_mps)
+
+    def _signed(self, left: float, right: float) -> tuple[float, float]:
+        return self._signs[0] * left, self._signs[1] * right
 
     @abstractmethod
     def _listen(self) -> None:

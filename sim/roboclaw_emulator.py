@@ -42,10 +42,11 @@ class RoboclawEmulator(MotorController):
         *,
         counts_per_m: float = 20_000.0,
         address: int = 0x80,
+        signs: tuple[int, int] = (1, 1),
         status_bytes: int = 4,
         boot_ms: int = 500,
     ) -> None:
-        super().__init__(link, plant, boot_ms)
+        super().__init__(link, plant, boot_ms, signs)
         self._counts_per_m = counts_per_m
         self._address = address
         self._status_bytes = status_bytes
@@ -129,7 +130,7 @@ class RoboclawEmulator(MotorController):
 
     def _read(self, command: int) -> bytes:
         left, right = self._counts()
-        left_qpps, right_qpps = (round(speed * self._counts_per_m) for speed in self._plant.track_speeds_mps)
+        left_qpps, right_qpps = (round(speed * self._counts_per_m) for speed in self._turning_mps)
         replies: dict[int, Callable[[], bytes]] = {
             15: lambda: bytes((self.timeout_ms // 100,)),
             16: lambda: struct.pack(">IB", left, left_qpps < 0),
@@ -155,7 +156,7 @@ class RoboclawEmulator(MotorController):
         return bits.to_bytes(self._status_bytes, "big")
 
     def _counts(self) -> tuple[int, int]:
-        left_m, right_m = self._travel_m
+        left_m, right_m = self._turned_m
         return round(left_m * self._counts_per_m) % (1 << 32), round(right_m * self._counts_per_m) % (1 << 32)
 
     def _write(self, command: int, data: bytes) -> None:

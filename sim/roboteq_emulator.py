@@ -39,10 +39,11 @@ class RoboteqEmulator(MotorController):
         full_speed_mps: float = 1.5,
         counts_per_m: float = 20_000.0,
         max_rpm: int = 3000,
+        signs: tuple[int, int] = (1, 1),
         ramp_mps2: float = 5.0,
         boot_ms: int = 500,
     ) -> None:
-        super().__init__(link, plant, boot_ms)
+        super().__init__(link, plant, boot_ms, signs)
         self._full_speed_mps = full_speed_mps
         self._counts_per_m = counts_per_m
         self._max_rpm = max_rpm
@@ -169,7 +170,7 @@ class RoboteqEmulator(MotorController):
 
     def _query(self, name: str, values: list[int]) -> str:
         left_rpm, right_rpm = (
-            round(speed / self._full_speed_mps * self._max_rpm) for speed in self._plant.track_speeds_mps
+            round(speed / self._full_speed_mps * self._max_rpm) for speed in self._turning_mps
         )
         if name == "FID":
             return "FID=Roboteq v2.1 EMULATED 01/01/2020"
@@ -195,7 +196,7 @@ class RoboteqEmulator(MotorController):
         return f"{name}={':'.join(map(str, told))}"
 
     def _counts(self) -> tuple[int, ...]:
-        return tuple(as_int32(round(travel_m * self._counts_per_m)) for travel_m in self._travel_m)
+        return tuple(as_int32(round(travel_m * self._counts_per_m)) for travel_m in self._turned_m)
 
     def _currents(self) -> tuple[int, ...]:
         return tuple(round(5 + 30 * abs(speed)) for speed in self._target_mps)

@@ -116,7 +116,7 @@ def _prepare(json_path: FilePath) -> None:
         raise UserError(
             f"{json_path.parent}: cannot be made ({error.strerror}); choose another --json"
         ) from error
-    if not os.access(json_path if json_path.exists() else json_path.parent, os.W_OK):
+    if not os.access(json_path if os.path.exists(json_path) else json_path.parent, os.W_OK):
         raise UserError(f"{json_path}: may not be written; choose another --json or mend its permissions")
 
 

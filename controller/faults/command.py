@@ -29,7 +29,7 @@ class FaultsOptions:
 def run_faults(options: FaultsOptions) -> None:
     """Raises ConfigError, HalError, UserError."""
     page = options.into
-    if page is not None and not os.access(page if page.exists() else page.parent, os.W_OK):
+    if page is not None and not os.access(page if os.path.exists(page) else page.parent, os.W_OK):
         # Now, not after minutes of measuring.
         raise UserError(f"{page}: may not be written; name a page in a folder that exists")
     trials = []
@@ -89,7 +89,7 @@ def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | Non
 def write_section(path: Path, section: str) -> None:
     """Put the section into a page, in place of the one that is there. Raises UserError."""
     try:
-        page = path.read_text(encoding="utf-8") if path.exists() else "# Measured results\n"
+        page = path.read_text(encoding="utf-8") if os.path.exists(path) else "# Measured results\n"
         before, found, after = page.partition(f"{HEADING}\n")
         if found:
             following = re.search(r"^## ", after, re.MULTILINE)

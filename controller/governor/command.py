@@ -20,7 +20,7 @@ from controller.realtime_rig import realtime_rig
 from controller.result import MissionOptions
 from controller.service import ServiceManager
 from controller.summary import contact_text, limits_text, punctuality_text
-from controller.tally import SetpointTally, ShaperFaults, Standstill, TimingTally
+from controller.tally import Complaints, SetpointTally, ShaperFaults, Standstill, TimingTally
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
@@ -39,6 +39,7 @@ class Governing:
     last: ControlStep | None = None
     standstill: Standstill = field(default_factory=Standstill)
     shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
+    complaints: Complaints = field(default_factory=Complaints)
 
     @property
     def succeeded(self) -> bool:
@@ -106,6 +107,7 @@ def _report(console: Console, governing: Governing, step: ControlStep) -> None:
     console.progress(0.0, f"{step.setpoint.v_mps:4.2f} m/s  {step.decision.reason.sentence}")
     console.decision(seconds, step.decision, step.setpoint.v_mps)
     console.standing(seconds, governing.standstill.lasted_s(step.now_ns), step.decision)
+    console.complaints(seconds, governing.complaints.add(step.chassis.faults))
 
 
 def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, str]]:
@@ -115,6 +117,8 @@ def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, st
     rows.append(("limits", limits_text(config, governing.setpoints)))
     if governing.shaper_faults.count:
         rows.append(("shaper", governing.shaper_faults.line()))
+    if governing.complaints.told:
+        rows.append(("base", governing.complaints.line()))
     rows.append(("perception", governing.timing.line()))
     if governing.punctuality.late_ns:
         rows.append(("control", punctuality_text(governing.punctuality)))

@@ -102,7 +102,7 @@ def _codec_for(path: Path) -> str:
 
 def _check_writable(path: Path) -> None:
     """By trying: permissions alone do not tell of a read-only disk. An existing file is left as it is."""
-    existed = path.exists()
+    existed = os.path.exists(path)
     try:
         path.open("ab").close()
         if not existed:

@@ -5,6 +5,7 @@ The one module that imports rosbags (Apache-2.0, extra "ros"), and only when a b
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -22,9 +23,10 @@ _METADATA = "metadata.yaml"
 def is_bag(path: Path) -> bool:
     """Whether a path names a bag: a file with one of its suffixes, or a folder that ROS 2 has written, if not
     to its end: only then it writes metadata.yaml."""
-    if path.is_dir():
-        written = (path / _METADATA).is_file() or any(one.suffix in _ROS_2 for one in path.glob("*"))
-        return written and not (path / "rgb.txt").exists()
+    # os.path and not Path: what may not be looked at is simply none.
+    if os.path.isdir(path):
+        written = os.path.isfile(path / _METADATA) or any(one.suffix in _ROS_2 for one in path.glob("*"))
+        return written and not os.path.exists(path / "rgb.txt")
     return path.suffix in _SUFFIXES
 
 
@@ -47,8 +49,8 @@ class BagFile:
     def __enter__(self) -> Self:
         """Raises BadRecording, and DeviceNotFound where rosbags is not installed."""
         any_reader, known_types = _load_vendor()
-        if not self.path.exists():
-            raise BadRecording(f"{self.path}: there is no such file")
+        if not os.path.exists(self.path):
+            raise BadRecording(f"{self.path}: there is no such file, or it may not be read")
         try:
             # Bags of RealSense viewers do not say what their messages are made of. Of a damaged bag, each
             # storage has errors of its own.

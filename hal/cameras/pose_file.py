@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,7 @@ def open_odometry(folder: Path, choice: OdometryChoice) -> PoseFile | None:
     if choice == "none":
         return None
     path = folder / _FILE_OF[choice]
-    if not path.is_file():
+    if not os.path.isfile(path):
         if choice == "auto":
             return None
         raise BadRecording(f"{path}: there is no such file; choose another odometry, or none")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Sequence
@@ -185,10 +186,10 @@ class TumReplay:
 
 
 def _require_recording(folder: Path) -> None:
-    if not folder.is_dir():
-        found = "it is not a folder" if folder.exists() else "there is no such folder"
+    if not os.path.isdir(folder):
+        found = "it is not a folder" if os.path.exists(folder) else "there is no such folder"
         raise BadRecording(f"{folder}: {found}; {_FORMAT_HINT}")
-    missing = [name for name in _NEEDED if not (folder / name).is_file()]
+    missing = [name for name in _NEEDED if not os.path.isfile(folder / name)]
     if missing:
         raise BadRecording(f"{folder}: {', '.join(missing)} missing; {_FORMAT_HINT}")
 

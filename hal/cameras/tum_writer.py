@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -33,7 +34,7 @@ class TumWriter:
 
     def prepare(self) -> None:
         """Make the folders. Raises DeviceRefused if there is a recording already or they cannot be made."""
-        if (self._folder / "rgb.txt").exists():
+        if os.path.exists(self._folder / "rgb.txt"):
             raise DeviceRefused(f"{self._folder}: holds a recording already; choose another folder")
         for name in ("rgb", "depth"):
             with self._told(name):

@@ -15,6 +15,7 @@ from hal.api import Closing
 from hal.chassis import arming
 from hal.chassis.arming import Arming, ArmingLimits, Evidence
 from hal.chassis.command import CommandLimits, is_zero, zero
+from hal.chassis.following import Following
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import LinkLost
 from hal.geometry import advance_pose
@@ -66,6 +67,7 @@ class ChassisDriver(ABC):
         self._commands = commands
         self._limits = limits
         self._arming = Arming()
+        self._following = Following()
         self._asked: Setpoint | None = None
         self._objection = ""
         self._link_error = ""
@@ -92,8 +94,10 @@ class ChassisDriver(ABC):
         self._asked = setpoint
         self._objection = self._commands.objection(setpoint, now_ns)
         self._hear(now_ns)
+        self._following.step(self._told.pose, now_ns)
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
         command = self._commands.fit(setpoint, now_ns) if self._arming.may_move else zero(now_ns)
+        self._following.ordered(command)
         return self._state(now_ns, self._say(command, now_ns))
 
     def arm(self, now_ns: int) -> None:
@@ -172,7 +176,7 @@ class ChassisDriver(ABC):
             feedback_ns=told.feedback_ns,
             status_ns=told.status_ns,
             disobeys=told.disobeys,
-            stop_cause=told.stop_cause or self._objection,
+            stop_cause=told.stop_cause or self._objection or self._following.sentence,
             standing=told.standing,
             command_is_zero=is_zero(self._asked),
             silence="" if told.status_ns is not None else told.silence,

@@ -2,7 +2,9 @@
 
 The controller answers one request at a time, so motion commands and queries take turns: with a 50 Hz
 loop a motion command goes out every 40 ms. A motion command whose answer is lost is never sent again: the
-next one is newer. Only settings are repeated.
+next one is newer, and goes out before any query: queries carry no checksum and feed the controller's own
+time-out, so one that takes no commands would keep its speed for as long as it is asked. Only settings are
+repeated.
 """
 
 from __future__ import annotations
@@ -71,6 +73,7 @@ class RoboclawChassis(ChassisDriver):
         self._setup: deque[Request] = deque()
         self._queries = cycle(_QUERIES)
         self._queries_turn = False
+        self._heeded = True
         self._moving = False
 
     def _listen(self, now_ns: int) -> None:
@@ -78,6 +81,8 @@ class RoboclawChassis(ChassisDriver):
         self._feedback.bytes_heard = self._port.bytes_heard
         if answer is None:
             return
+        if answer.request.command == packets.RAMPED_SPEEDS:
+            self._heeded = answer.data is not None
         if answer.data is not None:
             self._feedback.take(answer.request.command, answer.data, answer.asked_ns, now_ns)
         elif answer.request.command in _SETTINGS and self._arming.mode is ChassisMode.ARMING:
@@ -90,7 +95,7 @@ class RoboclawChassis(ChassisDriver):
         if self._setup:
             self._port.start(self._setup.popleft(), now_ns)
             return None
-        self._queries_turn = not self._queries_turn and not stops
+        self._queries_turn = not self._queries_turn and not stops and self._heeded
         if self._queries_turn:
             self._port.start(next(self._queries), now_ns)
             return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from ruckig import (  # type: ignore[import-not-found]  # a compiled module without stubs
     ControlInterface,
@@ -66,6 +66,14 @@ def test_agrees_with_ruckig_from_outside_the_limits(
     margin=st.floats(0.0, 1.0),
     limits=limit_pairs,
 )
+@example(
+    distance=0.0,
+    share=-1.0439174505618068e-159,
+    closing=1.0,
+    latency=0.0,
+    margin=1.3059287670137526e-240,
+    limits=BrakeLimits(1.0, 1.0),
+).via("next to no room and next to no acceleration: the root of a negative number")
 def test_the_inverse_is_the_greatest_speed_that_fits(
     distance: float, share: float, closing: float, latency: float, margin: float, limits: BrakeLimits
 ) -> None:

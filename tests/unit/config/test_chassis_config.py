@@ -140,3 +140,23 @@ def test_a_mirrored_motor_counts_backwards(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", sorted(CONFIG_DIR.glob("robot-*.yaml")), ids=lambda path: path.stem)
 def test_the_files_to_start_from_are_right(path: Path) -> None:
     assert load_app(path).simulation is None
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "socket://10.0.0.7",
+        "socket://:4001",
+        "socket://10.0.0.7:99999",
+        "rfc2217://base:port",
+        "socket://[::1",
+    ],
+)
+def test_a_port_of_another_machine_needs_a_host_and_a_number(tmp_path: Path, url: str) -> None:
+    with pytest.raises(ConfigError, match=r"link\.url: needs a host and a port, such as (socket|rfc2217)://"):
+        read(tmp_path, KOBUKI.replace("/dev/kobuki", f'"{url}"'))
+
+
+def test_a_port_of_another_machine_is_taken_as_it_is(tmp_path: Path) -> None:
+    link = read(tmp_path, KOBUKI.replace("/dev/kobuki", '"socket://base-7:4001"')).link
+    assert link == SerialLinkConfig(url="socket://base-7:4001")

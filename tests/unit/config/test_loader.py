@@ -1,4 +1,5 @@
 from pathlib import Path
+from typing import Annotated, Literal
 
 import pytest
 from pydantic import Field
@@ -10,9 +11,19 @@ class Inner(Section):
     speed_mps: float = Field(default=1.0, gt=0)
 
 
+class One(Section):
+    kind: Literal["one"]
+
+
+class Two(Section):
+    kind: Literal["two"]
+
+
 class Outer(Section):
     count: int
     inner: Inner = Inner()
+    many: Annotated[tuple[int, ...], Field(strict=False)] = ()
+    one: Annotated[One | Two, Field(discriminator="kind")] = One(kind="one")
 
 
 def written(tmp_path: Path, text: str) -> Path:
@@ -33,6 +44,11 @@ def refusal(tmp_path: Path, text: str) -> str:
 def test_a_good_file_is_read(tmp_path: Path) -> None:
     config = load(written(tmp_path, "count: 3\ninner: {speed_mps: 2}\n"), Outer)
     assert config == Outer(count=3, inner=Inner(speed_mps=2.0))
+
+
+def test_what_is_merged_in_may_be_given_again(tmp_path: Path) -> None:
+    config = load(written(tmp_path, "count: 3\ninner: {<<: {speed_mps: 1}, speed_mps: 2}\n"), Outer)
+    assert config.inner.speed_mps == 2.0
 
 
 def test_every_mistake_is_named_with_its_key(tmp_path: Path) -> None:
@@ -58,6 +74,21 @@ def test_every_mistake_is_named_with_its_key(tmp_path: Path) -> None:
             "a: 1\n\tb: 2",
             "not valid YAML: line 2, column 1: found character '\\t' that cannot start any token",
         ),
+        ("count: 2020-13-45", "line 1, column 8: '2020-13-45' is no timestamp; put text in quotes"),
+        ("count: " + "9" * 5000, "is no int"),
+        ("count: !!timestamp soon", "'soon' is no timestamp"),
+        ("count: !!int ''", "'' is no int"),
+        ("count: !!set [a]", "expected keys and values"),
+        ("? [1, 2]\n: 3", "line 1, column 3: a key must be a word, not a list or other keys"),
+        ("? {a: 1}\n: 3", "a key must be a word"),
+        ("inner: " + "[" * 3000 + "]" * 3000, "nested too deeply"),
+        ("inner: &a {<<: {speed_mps: 1}, speed_mps: 2, speed_mps: 3}", "given twice"),
+        ("inner: {<<: 3}", "expected a mapping or list of mappings for merging"),
+        ("inner: 3", "inner: Input should be keys and values, found 3"),
+        ("count: 3\nmany: 3", "many: Input should be a list, found 3"),
+        ("count: 3\none: {b: 1}", "one: its key kind is missing"),
+        ("count: 3e0", "found '3e0', which is text: write 3"),
+        ("count: 3\ninner: {speed_mps: '1.5'}", "found '1.5', which is text: write 1.5"),
         ("- 3", "must hold keys and values, found list"),
         ("", "is empty; it must hold keys and values"),
         ("\n".join(f"k{n}: 1" for n in range(12)), "; and 5 more mistakes"),
@@ -83,5 +114,7 @@ def test_a_named_file_is_found_beside_the_yaml_first_then_among_those_that_ship(
     main = tmp_path / "main.yaml"
     (tmp_path / "near.yaml").touch()
     assert resolve("near.yaml", main) == tmp_path / "near.yaml"
-    assert resolve("far.yaml", main) == CONFIG_DIR / "far.yaml"
+    assert resolve("sim.yaml", main) == CONFIG_DIR / "sim.yaml"
+    assert resolve("none.yaml", main) == tmp_path / "none.yaml", "what is nowhere is missed beside the YAML"
     assert resolve("/abs/a.yaml", main) == Path("/abs/a.yaml")
+    assert resolve("a" * 5000, main) == tmp_path / ("a" * 5000), "no file can be called so"

@@ -88,6 +88,12 @@ def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
         load_scenario("moon")
 
 
+@pytest.mark.parametrize("name", ["a" * 5000, "a" * 5000 + ".yaml", "a\0b", "a\0b.yaml", ""])
+def test_a_name_that_no_file_can_have_is_told(name: str) -> None:
+    with pytest.raises(ConfigError, match=r"no such scenario|cannot be read"):
+        load_scenario(name)
+
+
 def test_a_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"none\.yaml"):
         load_scenario(tmp_path / "none.yaml")

@@ -18,6 +18,8 @@ def test_the_default_is_like_a_d435i() -> None:
     [
         ("depth_max_m", 0.2, "smaller than depth_max_m"),
         ("depth_noise", "laser", "depth_noise"),
+        ("cx", 640.0, "inside the 640x480 image"),
+        ("cy", -0.5, "inside the 640x480 image"),
         ("fps", 0.0, "greater than 0"),
         ("hole_ratio", 0.9, "less than or equal"),
         ("zoom", 2.0, "extra"),

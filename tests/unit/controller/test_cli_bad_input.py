@@ -247,3 +247,24 @@ def test_bad_frames_are_skipped_counted_and_named(recording: Path) -> None:
     assert "2 skipped" in done.stdout
     assert colour[2].name in done.stdout
     assert depth[5].name in done.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("replay", "{}"),
+        ("replay", "{}.bag"),
+        ("replay", DESK, "--video", "{}.mp4"),
+        ("replay", DESK, "--observations", "{}"),
+        ("evaluate", "{}", "--report", "{}"),
+        ("run", "--scenario", "empty", "--record", "{}"),
+        ("bench", "--json", "{}/figures.json"),
+        ("faults", "--into", "{}/page.md"),
+        ("emulate", "kobuki", "--channel", "{}"),
+    ],
+)
+def test_a_path_that_may_not_even_be_looked_at(tmp_path: Path, arguments: tuple[str | Path, ...]) -> None:
+    """The system refuses a name this long as it does one in a folder that belongs to somebody else."""
+    nowhere = str(tmp_path / ("x" * 300))
+    message = refusal(*(str(argument).format(nowhere) for argument in arguments))
+    assert "x" * 300 in message

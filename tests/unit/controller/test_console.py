@@ -37,6 +37,14 @@ def test_a_robot_that_does_not_get_on_says_why_ever_more_rarely(capsys: pytest.C
     ]
 
 
+def test_what_the_base_complains_of_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    Console(quiet=False).complaints(12.5, ["warning: board warm", "battery low"])
+    assert capsys.readouterr().out.splitlines() == [
+        "  12.50 s  the base says: warning: board warm",
+        "  12.50 s  the base says: battery low",
+    ]
+
+
 def test_quiet_leaves_only_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
     console = Console(quiet=True)
     console.event("something")

@@ -1,5 +1,6 @@
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -13,7 +14,7 @@ from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path import Path
 from controller.shape import SpeedShaper
-from hal.types import CameraMount, ChassisMode
+from hal.types import CameraMount, ChassisMode, ChassisState, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
 from tests.support.scenes import scene
 
@@ -53,6 +54,25 @@ def test_a_free_way_is_driven_to_its_end_and_the_chassis_is_stopped_there() -> N
     assert taken[-1].progress_m == pytest.approx(3.0, abs=0.02)
     assert chassis.stopped_at_ns == [taken[-1].now_ns]
     assert chassis.armed_at_ns == [0]
+
+
+class SlidingChassis(ObedientChassis):
+    """Its odometry finds near the target of 3 m that it is 30 cm further."""
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        state = super().exchange(setpoint, now_ns)
+        further_m = 0.3 if state.pose.x_m > 2.9 else 0.0
+        return replace(state, pose=replace(state.pose, x_m=state.pose.x_m + further_m))
+
+
+def test_a_robot_that_went_past_its_target_has_not_reached_it() -> None:
+    chassis = SlidingChassis()
+    loop = loop_on(chassis)
+    taken = drive(loop, 2000)
+    assert loop.ending.outcome is Outcome.BROKEN_OFF
+    assert loop.ending.stop_reason == "went past the target"
+    assert taken[-1].progress_m > 3.1
+    assert chassis.stopped_at_ns == [taken[-1].now_ns]
 
 
 def test_nothing_moves_before_the_chassis_is_armed() -> None:

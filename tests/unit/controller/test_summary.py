@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from config.app import load_app
@@ -8,16 +10,24 @@ from controller.result import MissionResult
 from controller.shape import SpeedShaper
 from controller.summary import report, summary_rows
 from controller.tally import SetpointTally, TimingTally
+from hal.types import ChassisState, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
 from tests.support.scenes import scene
 
 CONFIG_PATH = CONFIG_DIR / "sim.yaml"
 
 
-def drive(seconds: float, sees: bool) -> MissionResult:
+class WarmChassis(ObedientChassis):
+    """Drives, and complains."""
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        return replace(super().exchange(setpoint, now_ns), faults=("warning: board warm",))
+
+
+def drive(seconds: float, sees: bool, chassis: ObedientChassis | None = None) -> MissionResult:
     """The first seconds of the simulated mission, with a free way in sight or nothing at all."""
     config = load_app(CONFIG_PATH)
-    loop = build_control(config, CONFIG_PATH, ObedientChassis())
+    loop = build_control(config, CONFIG_PATH, chassis or ObedientChassis())
     result = MissionResult(loop, SetpointTally(config.robot.limits, PERIOD_S), TimingTally())
     console = Console(quiet=False)
     for index in range(round(seconds / PERIOD_S)):
@@ -59,3 +69,10 @@ def test_a_mission_that_gets_on_says_nothing_of_standing(capsys: pytest.CaptureF
     result = drive(12.0, sees=True)
     assert "standing" not in capsys.readouterr().out
     assert "standing" not in dict(summary_rows(load_app(CONFIG_PATH), result))
+
+
+def test_what_the_base_complains_of_is_told_once_and_at_the_end(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "base" not in dict(summary_rows(load_app(CONFIG_PATH), drive(1.0, sees=True)))
+    result = drive(1.0, sees=True, chassis=WarmChassis())
+    assert capsys.readouterr().out.count("the base says: warning: board warm") == 1
+    assert dict(summary_rows(load_app(CONFIG_PATH), result))["base"] == "warning: board warm"

@@ -3,7 +3,14 @@ import math
 import pytest
 
 from config.robot import Limits
-from controller.tally import SetpointTally, ShaperFaults, Standstill, TimingTally, mean_speed_mps
+from controller.tally import (
+    Complaints,
+    SetpointTally,
+    ShaperFaults,
+    Standstill,
+    TimingTally,
+    mean_speed_mps,
+)
 from hal.types import ChassisMode, Setpoint
 
 MS = 1_000_000
@@ -49,6 +56,13 @@ def test_of_the_shapers_faults_the_first_is_told() -> None:
     for fault in ("", "no solution", "another"):
         faults.add(fault)
     assert faults.line() == "braked by the stop profile in 2 steps; first: no solution"
+
+
+def test_a_complaint_of_the_base_is_new_once() -> None:
+    complaints = Complaints()
+    said = [complaints.add(faults) for faults in ((), ("warm",), ("warm", "low"), (), ("warm",))]
+    assert said == [[], ["warm"], ["low"], [], []]
+    assert complaints.line() == "warm; low"
 
 
 def test_a_late_step_followed_by_one_on_time_is_no_jerk() -> None:

@@ -197,3 +197,15 @@ def test_nothing_is_known_before_the_second_encoder_answer() -> None:
 )
 def test_a_device_that_is_no_roboclaw_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
     assert hint in reason_for_giving_up(lambda link: RoboclawChassis(link, roboclaw_config()), babble)
+
+
+def test_a_controller_that_takes_questions_but_no_commands_is_left_to_its_time_out() -> None:
+    """Questions carry no checksum and feed its time-out: asked on, it would keep the last speed for ever."""
+    bench = Bench()
+    bench.arm()
+    bench.run(100, 0.5)
+    bench.far.hear_through(lambda data: data if len(data) < 16 else data[:-1] + bytes((data[-1] ^ 1,)))
+    state = bench.run(60, 0.5)
+    assert state.mode is ChassisMode.LOST
+    assert state.reason.startswith("no motion feedback")
+    assert bench.plant.twist[0] == pytest.approx(0.0, abs=0.001)

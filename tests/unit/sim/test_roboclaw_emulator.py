@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import pytest
 
@@ -33,7 +34,7 @@ def write(command: int, data: bytes, address: int = 0x80) -> bytes:
 class Bench:
     """A host's hand on the line of one emulated controller, 1000 counts a metre."""
 
-    def __init__(self, **options: int) -> None:
+    def __init__(self, **options: Any) -> None:
         self.host, self.far = serial_pair()
         self.plant = TrackedPlant(PlantConfig(max_accel_mps2=50.0, lag_s=0.02))
         self.claw = RoboclawEmulator(self.far, self.plant, counts_per_m=1000.0, **options)

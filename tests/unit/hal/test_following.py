@@ -1,0 +1,91 @@
+"""A base that tells of no motion while it is told to move."""
+
+import math
+
+import pytest
+
+from config.chassis import PlantConfig
+from hal.chassis.following import Following
+from hal.types import PlanarPose, Setpoint
+from sim.plant import TrackedPlant
+from tests.support.chassis_rig import PERIOD_NS
+
+STANDS = PlanarPose(0.0, 0.0, 0.0)
+
+
+def seconds_until_told(following: Following, v_mps: float, w_radps: float = 0.0) -> float:
+    """How long a base that stands is ordered to move before that is noticed; at most a minute."""
+    for period in range(50 * 60):
+        following.step(STANDS, period * PERIOD_NS)
+        if following.sentence:
+            return period / 50
+        following.ordered(Setpoint(period * PERIOD_NS, v_mps, 0.0, w_radps))
+    raise AssertionError("not noticed")
+
+
+@pytest.mark.parametrize(
+    ("v_mps", "w_radps", "after_s"), [(1.5, 0.0, 1.0), (0.5, 0.0, 1.0), (0.1, 0.0, 3.0), (0.0, 0.5, 2.0)]
+)
+def test_a_base_that_stands_is_noticed_by_what_was_commanded(
+    v_mps: float, w_radps: float, after_s: float
+) -> None:
+    assert seconds_until_told(Following(), v_mps, w_radps) == pytest.approx(after_s, abs=0.05)
+
+
+def test_the_sentence_says_what_was_told_and_what_commanded() -> None:
+    following = Following()
+    seconds_until_told(following, 0.5)
+    assert following.sentence == (
+        "the base does not follow: it tells of 0.00 m in the 1.0 s in which 0.50 m were commanded; "
+        "are its tracks free and its encoders connected?"
+    )
+
+
+def test_one_dead_encoder_is_a_turn_that_nobody_commanded() -> None:
+    following, width_m = Following(), 0.5
+    for period in range(100):
+        told_m = 0.4 * period / 50  # of the right track; the left one is not counted any more
+        heading_rad = told_m / width_m
+        following.step(PlanarPose(0.25 * math.sin(heading_rad), 0.0, heading_rad), period * PERIOD_NS)
+        following.ordered(Setpoint(period * PERIOD_NS, 0.4, 0.0, 0.0))
+    assert following.sentence == (
+        "the base does not follow: it tells of 0.80 rad in the 1.0 s in which 0.00 rad were commanded; "
+        "are its tracks free and its encoders connected?"
+    )
+
+
+@pytest.mark.parametrize("lag_s", [0.05, 0.3, 0.6])
+@pytest.mark.parametrize("w_radps", [0.4, 0.8, 1.2])
+def test_bends_one_way_and_the_other_are_followed(lag_s: float, w_radps: float) -> None:
+    """The yaw rate steps, as where arcs without a blend meet."""
+    following, plant = Following(), TrackedPlant(PlantConfig(lag_s=lag_s, slip_factor=1.3))
+    for period in range(1000):
+        now_ns = period * PERIOD_NS
+        plant.advance_to(now_ns)
+        following.step(plant.pose, now_ns)
+        assert following.sentence == ""
+        turn = w_radps if period // 70 % 2 else -w_radps
+        plant.command(0.5, turn)
+        following.ordered(Setpoint(now_ns, 0.5, 0.0, turn))
+
+
+def test_zero_ends_it() -> None:
+    following = Following()
+    seconds_until_told(following, 0.5)
+    following.ordered(Setpoint(0, 0.0, 0.0, 0.0))
+    following.step(STANDS, 100 * PERIOD_NS * 50)
+    assert following.sentence == ""
+
+
+@pytest.mark.parametrize("lag_s", [0.05, 0.5, 2.0])
+@pytest.mark.parametrize("accel_mps2", [0.1, 0.3, 3.0])
+def test_a_sluggish_base_follows(lag_s: float, accel_mps2: float) -> None:
+    following, plant = Following(), TrackedPlant(PlantConfig(lag_s=lag_s, slip_factor=1.3))
+    for period in range(500):
+        now_ns = period * PERIOD_NS
+        plant.advance_to(now_ns)
+        following.step(plant.pose, now_ns)
+        assert following.sentence == ""
+        v_mps = min(accel_mps2 * period / 50, 1.0)
+        plant.command(v_mps, 0.4 * v_mps)
+        following.ordered(Setpoint(now_ns, v_mps, 0.0, 0.4 * v_mps))
