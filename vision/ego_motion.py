@@ -31,6 +31,7 @@ _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the pr
 _CONVERGED_SIGMAS = 0.2  # a step of less is nothing beside what the pose may be off anyway
 _UNKNOWNS = 8  # rotation and translation (3 each), sweep about x and y
 _IDENTITY = np.eye(_UNKNOWNS)
+_OF_SWEEP = np.array([0.0] * 6 + [1.0] * 2)
 _STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivatives say, to 0.01 px
 
 
@@ -51,10 +52,13 @@ class Anchors:
 class CameraEstimate:
     """pose: the camera in the fixed frame, when the middle row was read. sweep_rad (2,): how far it turned
     about x and y from the first row to the last. covariance (8, 8) of a small motion of it and of
-    sweep_rad. inlier_ratio: NaN where not estimated. visual: False where only the prior speaks."""
+    sweep_rad. bend_rad, bend_variance (2,): the sweep as the image alone tells it, inf where it tells
+    nothing. inlier_ratio: NaN where not estimated. visual: False where only the prior speaks."""
 
     pose: Pose
     sweep_rad: FloatArray
+    bend_rad: FloatArray
+    bend_variance: FloatArray
     covariance: FloatArray
     inlier_ratio: float
     visual: bool
@@ -91,12 +95,24 @@ def estimate(
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
     if found.inliers < least or torn or not regular:
         return _unseen(start, sigma, ratio)
-    return CameraEstimate(found.pose, found.sweep_rad, np.asarray(covariance, np.float64), ratio, True)
+    bend_rad, bend_variance = _bend(found)
+    spread = np.asarray(covariance, np.float64)
+    return CameraEstimate(found.pose, found.sweep_rad, bend_rad, bend_variance, spread, ratio, True)
 
 
 def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:
     """Only the prior speaks."""
-    return CameraEstimate(start, np.zeros(2), np.diag(np.square(sigma)), inlier_ratio, False)
+    nothing, unknown = np.zeros(2), np.full(2, np.inf)
+    return CameraEstimate(start, nothing, nothing, unknown, np.diag(np.square(sigma)), inlier_ratio, False)
+
+
+def _bend(found: _Solution) -> tuple[FloatArray, FloatArray]:
+    """The sweep and its variance, (2,) each, had nothing been assumed of it: one more step from the last."""
+    regular, covariance = cv2.invert(found.free, flags=cv2.DECOMP_CHOLESKY)
+    if not regular:
+        return np.zeros(2), np.full(2, np.inf)
+    spread = np.asarray(covariance, np.float64)[6:]
+    return found.free_from_rad + spread @ found.free_side, spread[:, 6:].diagonal()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,10 +131,16 @@ class _View:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solution:
+    """information (8, 8). free (8, 8), free_side (8,): normal equations of the last step, from a sweep of
+    free_from_rad (2,) on, without the prior of the sweep."""
+
     pose: Pose
     sweep_rad: FloatArray
     information: FloatArray
     inliers: int
+    free: FloatArray
+    free_side: FloatArray
+    free_from_rad: FloatArray
 
 
 def _view(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: Intrinsics) -> _View:
@@ -168,7 +190,7 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
         # Eight rows of the normal matrix, and in the last column the right side.
         normal = (table[:9] * weights).reshape(9, 3 * count) @ flat.T
         information = normal[:8, :8] + prior_information
-        side = normal[:8, 8] + prior * missing
+        side, assumed = normal[:8, 8] + prior * missing, missing
         _, solved = cv2.solve(information, side[:, None])
         step = np.asarray(solved, np.float64)[:, 0]
         gone = gone + step
@@ -184,7 +206,10 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
             missing = missing - step
             table[8] -= (step @ flat[:8]).reshape(3, count)
     inliers = int(np.count_nonzero(allowed * (chi2 <= _GATE_CHI2)))
-    return _Solution(_moved(pose, gone[:6]), sweep_rad + gone[6:], information, inliers)
+    free, free_side = information - prior_information * _OF_SWEEP, side - prior * assumed * _OF_SWEEP
+    return _Solution(
+        _moved(pose, gone[:6]), sweep_rad + gone[6:], information, inliers, free, free_side, -assumed[6:]
+    )
 
 
 def _moved(pose: Pose, step: FloatArray) -> Pose:

@@ -21,7 +21,7 @@ _UNKNOWN_S = 0.015  # one sigma of the read-out before anything is seen
 _MOST_S = 0.035  # frames follow each other in that time
 _MEMORY = 0.98  # a frame: of what is known; what was learned from a bad start fades
 _OTHER_BENDS_RAD = 0.7e-3  # one sigma, by whatever else bends an image
-_LEAST_RAD = 1e-5  # a hundredth of a pixel: nothing, but enough to learn by
+_LEAST_RAD = 1e-5  # a hundredth of a pixel
 _RATE_MEMORY = 0.9  # a frame: of the fastest turn, since vibration comes and goes between frames
 
 
@@ -64,27 +64,22 @@ class ReadOut:
         return _LEAST_RAD + self.seconds * self._rates_radps
 
     def learn(self, found: CameraEstimate, turn_rad: FloatArray, dt_s: float) -> None:
-        """After an image that was estimated with the present sweep_sigma_rad().
+        """After an image.
 
         turn_rad (3,): the camera's turn since the frame before, dt_s ago. The rate at an image is known one
         frame later, when its turns before and after it are.
         """
-        bend = self._free_bend(found)
         if self._bend is not None:
             bend_rad, variance, before_rad, before_s = self._bend
             rate = (before_rad + float(turn_rad[0])) / (before_s + dt_s)
             weight = 1.0 / (variance + _OTHER_BENDS_RAD**2)
             self._told = _MEMORY * self._told + weight * bend_rad * rate
             self._information = _MEMORY * self._information + weight * rate * rate
-        self._bend = (*bend, float(turn_rad[0]), dt_s) if found.visual else None
+        self._bend = None
+        if found.visual:
+            self._bend = float(found.bend_rad[0]), float(found.bend_variance[0]), float(turn_rad[0]), dt_s
         self._rates_radps = np.maximum(_RATE_MEMORY * self._rates_radps, np.abs(turn_rad[:2]) / dt_s)
 
     def lose(self) -> None:
         """The next image does not follow the last one."""
         self._bend = None
-
-    def _free_bend(self, found: CameraEstimate) -> tuple[float, float]:
-        """The sweep about x and its variance as the image alone tells them, without what was assumed."""
-        variance = float(found.covariance[6, 6])
-        told = max(1.0 - variance / float(self.sweep_sigma_rad()[0]) ** 2, 1e-9)
-        return float(found.sweep_rad[0]) / told, variance / told

@@ -21,7 +21,7 @@ FRAME_NS = 33_333_333
 FRAME_S = FRAME_NS * 1e-9
 WINDOW_S = 0.25
 STILL = Pose(np.eye(3), np.zeros(3))
-HERE = CameraEstimate(STILL, np.zeros(2), 1e-12 * np.eye(8), 0.9, True)
+HERE = CameraEstimate(STILL, np.zeros(2), np.zeros(2), np.ones(2), 1e-12 * np.eye(8), 0.9, True)
 ENDS_M = np.array([[-0.2, 0.1, 5.0], [0.3, 0.1, 5.0]])
 
 

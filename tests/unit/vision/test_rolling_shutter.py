@@ -90,6 +90,19 @@ def test_the_sweep_is_found_with_the_motion() -> None:
     np.testing.assert_array_less(np.abs(found.sweep_rad - sweep_rad), 4.0 * sigma)
 
 
+def test_what_the_image_tells_of_the_sweep_does_not_depend_on_what_was_assumed() -> None:
+    """Or nobody would ever learn that the rows take longer than was thought."""
+    sweep_rad = np.array([0.002, -0.001])
+    free, bound = found_from(sweep_rad, 0.005)[0], found_from(sweep_rad, 1e-5)[0]
+    sigma = np.sqrt(free.bend_variance)
+    assert (sigma < 0.0005).all()
+    np.testing.assert_array_less(np.abs(bound.sweep_rad), 1e-5)
+    for found in (free, bound):
+        np.testing.assert_array_less(np.abs(found.bend_rad - sweep_rad), 4.0 * sigma)
+    # What is bent fits worse, and has less weight.
+    assert (bound.bend_variance < 4.0 * free.bend_variance).all()
+
+
 def test_a_bend_that_is_not_admitted_becomes_motion() -> None:
     """Why it is estimated at all: 1.5 px at the rims of the image pass for centimetres a frame."""
     sweep_rad = np.array([0.005, 0.0])
@@ -127,13 +140,11 @@ def shaken(
         phase, before = (2.0 * math.pi * hz * DT_S * k for k in (frame, frame - 1))
         turn = amplitude_rad * (math.sin(phase) - math.sin(before))
         rate = amplitude_rad * 2.0 * math.pi * hz * math.cos(phase)
-        # What an estimate makes of it, between the image and the prior.
-        sigma = learned.sweep_sigma_rad()
-        variance = 1.0 / (1.0 / NOISE_RAD**2 + 1.0 / sigma**2)
-        bend = read_out_s * rate + NOISE_RAD * rng.standard_normal()
-        covariance = np.diag([1e-8] * 6 + variance.tolist())
-        sweep = np.array([bend, 0.0]) * variance / NOISE_RAD**2
-        learned.learn(CameraEstimate(HERE, sweep, covariance, 0.9, visual), np.array([turn, 0.0, 0.0]), DT_S)
+        bend_rad = np.array([read_out_s * rate + NOISE_RAD * rng.standard_normal(), 0.0])
+        found = CameraEstimate(
+            HERE, np.zeros(2), bend_rad, np.full(2, NOISE_RAD**2), 1e-8 * np.eye(8), 0.9, visual
+        )
+        learned.learn(found, np.array([turn, 0.0, 0.0]), DT_S)
         if gaps:
             learned.lose()
     return learned
