@@ -31,7 +31,7 @@ _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the pr
 _CONVERGED_SIGMAS = 0.2  # a step of less is nothing beside what the pose may be off anyway
 _UNKNOWNS = 8  # rotation and translation (3 each), sweep about x and y
 _IDENTITY = np.eye(_UNKNOWNS)
-_OF_SWEEP = np.array([0.0] * 6 + [1.0] * 2)
+_OF_MOTION = np.array([1.0] * 6 + [0.0] * 2)
 _STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivatives say, to 0.01 px
 
 
@@ -206,7 +206,10 @@ def _solve(view: _View, start: Pose, sigma: FloatArray) -> _Solution:
             missing = missing - step
             table[8] -= (step @ flat[:8]).reshape(3, count)
     inliers = int(np.count_nonzero(allowed * (chi2 <= _GATE_CHI2)))
-    free, free_side = information - prior_information * _OF_SWEEP, side - prior * assumed * _OF_SWEEP
+    free, free_side = (
+        normal[:8, :8] + prior_information * _OF_MOTION,
+        normal[:8, 8] + prior * assumed * _OF_MOTION,
+    )
     return _Solution(
         _moved(pose, gone[:6]), sweep_rad + gone[6:], information, inliers, free, free_side, -assumed[6:]
     )

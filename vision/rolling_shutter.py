@@ -21,7 +21,7 @@ _UNKNOWN_S = 0.015  # one sigma of the read-out before anything is seen
 _MOST_S = 0.035  # frames follow each other in that time
 _MEMORY = 0.98  # a frame: of what is known; what was learned from a bad start fades
 _OTHER_BENDS_RAD = 0.7e-3  # one sigma, by whatever else bends an image
-_LEAST_RAD = 1e-5  # a hundredth of a pixel
+_LEAST_RAD = 1e-9  # nothing, but no division by zero
 _RATE_MEMORY = 0.9  # a frame: of the fastest turn, since vibration comes and goes between frames
 
 
