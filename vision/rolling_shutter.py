@@ -1,10 +1,11 @@
 """Images whose rows are read one after another: shaken meanwhile, they come out bent.
 
-The colour sensor of a D435i takes some 10 to 20 ms from its first row to its last. Tracks shake the camera
-by a quarter of a radian a second and more, which stretches the image by pixels, now this way and now that:
-just what a length ratio takes for speed. How far the camera turned while an image was read is estimated
-with its motion (vision/ego_motion.py); how far it can have turned follows from how long its rows take, and
-that no recording tells, so it is learned. A global shutter is found to take no time, and nothing is bent.
+The colour sensor of a D435i has a rolling shutter; such sensors take some 10 to 30 ms from their first row to
+their last. Tracks shake the camera by a quarter of a radian a second and more, which stretches the image by
+pixels, now this way and now that: just what a length ratio takes for speed. How far the camera turned while
+an image was read is estimated with its motion (vision/ego_motion.py); how far it can have turned follows
+from how long its rows take, and that no recording tells, so it is learned. A global shutter is found to take
+no time, and nothing is bent.
 """
 
 from __future__ import annotations
