@@ -50,20 +50,23 @@ def surface_depth(
     max_m: float,
     noise: DepthNoise,
 ) -> SurfaceDepth:
-    """Near and far surface around pixels (N, 2), within [min_m, max_m] (the paper's 10 m)."""
+    """Near and far surface around pixels (N, 2), the near one within [min_m, max_m] (the paper's 10 m).
+
+    The far one may be beyond: the texture of a distant wall mixes with an outline as that of a near one does.
+    """
     sample_m = _samples(depth, pixels) * np.float32(scale_m)
-    sample_m[(sample_m < min_m) | (sample_m > max_m)] = _NO_DATA_M
+    sample_m[sample_m < min_m] = _NO_DATA_M
     # One column per point: sums over the samples then run along the memory.
     ordered = np.ascontiguousarray(np.sort(sample_m, axis=1).T)
-    valid = ordered < _NO_DATA_M
-    count = _count(valid)
+    within = ordered <= max_m
+    count = _count(within)
     # With holes around, the same share of what is valid decides.
     rank = np.minimum(_NEAR_RANK, count // 3)
     anchor_m = ordered[rank, np.arange(len(rank))]
     gate_m = (0.06 + 3.0 * depth_sigma_m(anchor_m.astype(float), noise)).astype(np.float32)
     behind_m = ordered - anchor_m
-    is_near = np.abs(behind_m) <= gate_m
-    is_far = (behind_m > gate_m) & valid
+    is_near = (np.abs(behind_m) <= gate_m) & within
+    is_far = (behind_m > gate_m) & (ordered < _NO_DATA_M)
     near_count, far_count = _count(is_near), _count(is_far)
     near_m = _sum(ordered, is_near) / np.maximum(near_count, 1)
     far_m = _sum(ordered, is_far) / np.maximum(far_count, 1)

@@ -44,6 +44,18 @@ def test_the_nearer_surface_at_an_edge_and_what_lies_behind() -> None:
     np.testing.assert_allclose(at_middle(depth).near_m, [2.0], rtol=1e-6)
 
 
+def test_what_lies_behind_may_be_beyond_the_limit() -> None:
+    """Else the texture of a distant wall would be that of the tree before it, and the tree would go away."""
+    depth = flat(14_000)
+    depth[:, :41] = 6000
+    found = at_middle(depth)
+    np.testing.assert_allclose(found.near_m, [6.0], rtol=1e-6)
+    np.testing.assert_allclose(found.far_m, [14.0], rtol=1e-6)
+    # What is nearer than the limit does not count what is beyond, however little: noise of 0.1 m.
+    depth[:, 41:], depth[:, :41] = 10_050, 9950
+    np.testing.assert_allclose(at_middle(depth).near_m, [9.95], rtol=1e-6)
+
+
 def test_a_corner_of_a_body_is_the_body() -> None:
     depth = flat(4000)
     depth[:31, :41] = 2000
