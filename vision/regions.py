@@ -22,6 +22,8 @@ _FOOT_M = 0.12
 _FOOT_PER_METRE = 0.015
 _OCCLUDED_SHARE = 0.15
 _GAP_CELLS = 3
+_HIDDEN_SHARE = 0.5
+_HEAD_M = 0.2
 _RIM = 8  # one in so many columns of a part is its rim, on either side
 
 
@@ -234,6 +236,23 @@ def _overlapped_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[n
     farther = np.where(step > 0.0, label.take(rims), label.take(rims + 1))
     jumps = np.abs(step) > np.float32(_LEAST_JUMP)
     return np.bincount(farther[near & jumps], minlength=count + 1)[1:]
+
+
+def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[np.bool_]:
+    """(R,) parts whose lower end something nearer hides, for at least half of their width: what they are
+    further down is not known. A beam ends before what is farther away. A head is as tall as _HEAD_M."""
+    inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
+    width = labels.shape[1]
+    rims = np.flatnonzero((flat[:-width] > 0) & (flat[:-width] != flat[width:]))
+    below = np.zeros(len(rims), inverse.dtype)
+    for step in range(1, _GAP_CELLS + 1):
+        below = np.maximum(below, inverse.take(np.minimum(rims + step * width, len(flat) - 1)))
+    nearer = below - inverse.take(rims) > np.float32(_MOST_JUMP)
+    cells = np.bincount(flat.take(rims[nearer]), minlength=len(regions.cells) + 1)[1:]
+    across = (regions.bbox_px[:, 2] - regions.bbox_px[:, 0]) / grid.step_px
+    tall = regions.extent_m[:, 1] >= _HEAD_M
+    result: NDArray[np.bool_] = tall & (regions.cells > 0) & (cells >= _HIDDEN_SHARE * across)
+    return result
 
 
 def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:

@@ -15,6 +15,7 @@ MIN_SIGHTINGS = 3
 _LISTED_UNSEEN_S = 0.15  # a track is remembered for longer, but no longer shown as seen
 _WAY_SIGMA_M = 0.06
 _STATIC_SCORE = 0.5
+_OVERHEAD_CELLS = 24  # half of a head, 6 m away
 
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
@@ -26,6 +27,9 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
     unseen_s: FloatArray = np.multiply(detection.captured_ns - tracks.seen_ns, 1e-9, dtype=np.float64)
     listed = (tracks.sightings >= MIN_SIGHTINGS) & (local[:, 2] > 0.0) & _expected(tracks, unseen_s)
     bbox, unseen = tracks.bbox_px, unseen_s != 0.0
+    # What is above the robot may end there. What goes has legs behind what hides them; of slivers that is
+    # hard to tell.
+    listed &= ~tracks.overhead | (tracks.moving & (tracks.cells >= _OVERHEAD_CELLS))
     # A mover that is out of sight, but for a sliver, is where it goes, whole, and not where its rest is seen.
     whole = tracks.moving & (unseen | tracks.sliver)
     if unseen.any():

@@ -100,6 +100,8 @@ class Tracker:
             self._free.remember(grid, pose, detection.captured_ns)
         labels, measured = self._label(detection, standing, arrived, velocities, elapsed_s)
         sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
+        if tracks.overhead.any():
+            tracks.overhead &= ~self._reaching_down(grid, labels, len(tracks))
         owner = adopt(tracks, detection, labels, owner, self._config.depth_noise)
         arrivals = np.bincount(labels[arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
@@ -167,13 +169,14 @@ class Tracker:
         winner: NDArray[np.int32],
         labels: IntGrid,
     ) -> IntGrid:
-        """Parts that nobody claims become tracks if they are large enough and reach down to the robot."""
+        """Parts that nobody claims become tracks if they are large enough and reach down to the robot, or may
+        do so behind what hides their lower end."""
         grid, tracks = detection.grid, self._tracks
         large = (winner == 0) & (measured.cells >= _MIN_CELLS)
+        overhead = np.zeros(len(winner), np.bool_)
         if grid.height_m is not None and large.any():
-            low = np.flatnonzero((parts > 0) & (grid.height_m < self._body_height_m))
-            reach = np.bincount(parts.ravel().take(low), minlength=len(winner) + 1)[1:]
-            large &= reach >= _MIN_CELLS // 2
+            overhead = large & ~self._reaching_down(grid, parts, len(winner))
+            large &= ~overhead | regions.hidden_below(grid, parts, measured)
         born = np.flatnonzero(large)
         if len(born) == 0:
             return labels
@@ -186,8 +189,16 @@ class Tracker:
             0.0,
             detection.captured_ns,
         )
+        tracks.overhead[-len(born) :] = overhead[born]
         own = number[parts]
         return np.where(own > 0, own, labels).astype(np.int32)
+
+    def _reaching_down(self, grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.bool_]:
+        """(count,) parts 1..count of labels (h, w) that are seen at the robot's height."""
+        low = np.flatnonzero((labels > 0) & (grid.height_m < self._body_height_m))
+        cells = np.bincount(labels.ravel().take(low), minlength=count + 1)[1:]
+        result: NDArray[np.bool_] = cells >= _MIN_CELLS // 2
+        return result
 
     def _measure_velocities(
         self,

@@ -37,6 +37,7 @@ _FIELDS = (
     "stands",
     "calm_s",
     "unrest_s",
+    "overhead",
 )
 
 
@@ -49,7 +50,8 @@ class Tracks:
     the surface's centre has told of the velocity without a break; sliver (T,): a mover of which hardly
     anything was left to see; trailing_m (T, 3): where the centre was of late, averaged; stands (T,): its
     fragments are sure of it; calm_s (T,): since when there has been no evidence, inf if there never was;
-    unrest_s (T,): for how long nearly all of its ends have denied that it stands, less what they did not."""
+    unrest_s (T,): for how long nearly all of its ends have denied that it stands, less what they did not;
+    overhead (T,): seen only above the robot so far, with its lower part behind something nearer."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -76,6 +78,7 @@ class Tracks:
         self.stands = np.empty(0, np.bool_)
         self.calm_s = np.empty(0)
         self.unrest_s = np.empty(0)
+        self.overhead = np.empty(0, np.bool_)
         self._next_id = 1
 
     def __len__(self) -> int:

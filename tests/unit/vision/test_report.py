@@ -157,3 +157,15 @@ def test_what_is_seen_and_what_stands_still_keep_the_box_they_were_seen_by() -> 
         made.bbox_px[:] = [10.0, 20.0, 14.0, 30.0]
         (one,) = report.obstacles(made, now())
         assert one.bbox_px == (10.0, 20.0, 14.0, 30.0)
+
+
+@pytest.mark.parametrize(
+    ("overhead", "moving", "cells", "listed"),
+    [(True, False, 99, False), (True, True, 24, True), (True, True, 23, False), (False, False, 6, True)],
+)
+def test_what_is_seen_above_the_robot_only_is_listed_when_much_of_it_moves(
+    overhead: bool, moving: bool, cells: int, listed: bool
+) -> None:
+    made = tracks(BEFORE_ME)
+    made.overhead[0], made.moving[0], made.cells[0] = overhead, moving, cells
+    assert len(report.obstacles(made, now())) == listed
