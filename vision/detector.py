@@ -113,7 +113,7 @@ class Detector:
         depths = appraise(anchor, config.depth_noise)
         static = static_points(anchor, depths, store.pixel_cov, moving)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
-        result = estimate(static, pixels, self._pose, prior, self._read_out.sweep_sigma_rad(), camera)
+        result = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), camera)
         motion = gather(store, anchor, depths, result, camera, config.depth_noise, self._variance_scale)
         if result.visual:
             self._variance_scale = observed_variance_scale(

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth_mask import depth_sigma_m
-from vision.ego_motion import Anchors, CameraEstimate
+from vision.ego_motion import CameraEstimate
 from vision.fragments import AnchorEnds, FragmentStore
 from vision.order import quantile
+from vision.reprojection import Anchors
 from vision.rolling_shutter import straight_rays
 from vision.velocities import PointMotion, chi2_2d
 

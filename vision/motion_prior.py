@@ -30,6 +30,15 @@ class MotionPrior:
     binding: bool = False
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SweepPrior:
+    """What is known of how far the camera turns about x and y while an image is read: one sigma of what is
+    certain, sigma_rad (2,), and of what is possible, most_rad (2,)."""
+
+    sigma_rad: FloatArray
+    most_rad: FloatArray
+
+
 def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
     """A prior from dead reckoning: good in translation, slipping in yaw, blind to vibration."""
     turn_rad = math.hypot(*vector_from_rotation(motion.rotation).tolist())

@@ -17,6 +17,7 @@ import numpy as np
 from hal.types import FloatArray, Intrinsics
 from vision.ego_motion import CameraEstimate
 from vision.lens import RealArray, rays, row_delays
+from vision.motion_prior import SweepPrior
 
 _UNKNOWN_S = 0.015  # one sigma of the read-out before anything is seen
 _MOST_S = 0.035  # frames follow each other in that time
@@ -60,9 +61,13 @@ class ReadOut:
         information = self._information + 1.0 / _UNKNOWN_S**2
         return min(max(self._told / information - 1.0 / math.sqrt(information), 0.0), _MOST_S)
 
-    def sweep_sigma_rad(self) -> FloatArray:
-        """(2,) one sigma of how far the camera turns about x and y while the next image is read."""
-        return _LEAST_RAD + self.seconds * self._rates_radps
+    def sweep(self) -> SweepPrior:
+        """How far the camera turns about x and y while the next image is read."""
+        information = self._information + 1.0 / _UNKNOWN_S**2
+        most_s = min(max(self._told / information, 0.0) + 1.0 / math.sqrt(information), _MOST_S)
+        return SweepPrior(
+            _LEAST_RAD + self.seconds * self._rates_radps, _LEAST_RAD + most_s * self._rates_radps
+        )
 
     def learn(self, found: CameraEstimate, turn_rad: FloatArray, dt_s: float) -> None:
         """After an image.

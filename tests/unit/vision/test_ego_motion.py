@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from config.perception import EgoMotionSettings
 from hal.types import FloatArray, Intrinsics, Pose
 from vision import ego_motion
-from vision.ego_motion import Anchors, CameraEstimate, estimate
+from vision.ego_motion import CameraEstimate, estimate
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
-from vision.motion_prior import MotionPrior, odometry_prior, steady_prior
+from vision.motion_prior import MotionPrior, SweepPrior, odometry_prior, steady_prior
+from vision.reprojection import Anchors
 
 CAMERA = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
 SETTINGS = EgoMotionSettings()
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 DT_S = 1.0 / 30.0
-GLOBAL_SHUTTER = np.full(2, 1e-4)
+GLOBAL_SHUTTER = SweepPrior(np.full(2, 1e-4), np.full(2, 1e-4))
 # 0.6 m/s ahead with 0.3 rad/s of yaw and some vibration in pitch.
 TRUE = Pose(rotation_from_vector(np.array([0.002, 0.010, -0.001])), np.array([0.001, -0.0005, 0.020]))
 

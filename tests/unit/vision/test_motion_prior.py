@@ -9,15 +9,23 @@ import pytest
 
 from config.perception import EgoMotionSettings
 from hal.types import CameraMount, FloatArray, GyroSamples, Intrinsics, Pose
-from vision.ego_motion import Anchors, estimate
+from vision.ego_motion import estimate
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
-from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
+from vision.motion_prior import (
+    MotionPrior,
+    SweepPrior,
+    odometry_prior,
+    rolling_prior,
+    steady_prior,
+    with_gyro,
+)
+from vision.reprojection import Anchors
 
 CAMERA = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
 SETTINGS = EgoMotionSettings()
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 DT_S = 1.0 / 30.0
-GLOBAL_SHUTTER = np.full(2, 1e-4)
+GLOBAL_SHUTTER = SweepPrior(np.full(2, 1e-4), np.full(2, 1e-4))
 LEVEL = CameraMount(0.3, 0.0, 0.5, 0.0)
 
 

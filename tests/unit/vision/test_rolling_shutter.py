@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.ego_motion import Anchors, CameraEstimate, estimate
+from vision.ego_motion import CameraEstimate, estimate
 from vision.lens import project, rays, rotation_from_vector, row_delays, vector_from_rotation
-from vision.motion_prior import MotionPrior
+from vision.motion_prior import MotionPrior, SweepPrior
+from vision.reprojection import Anchors
 from vision.rolling_shutter import ReadOut, straight_rays
 
 CAMERA = Intrinsics(640, 480, 610.0, 600.0, 319.5, 239.5)
@@ -66,7 +67,9 @@ def test_what_turning_bends_is_straightened_to_a_hundredth_of_a_pixel(about_x: f
     assert np.abs(off).max() * CAMERA.fx < 0.05
 
 
-def found_from(sweep_rad: FloatArray, sweep_sigma_rad: float) -> tuple[CameraEstimate, Pose]:
+def found_from(
+    sweep_rad: FloatArray, sigma_rad: float, most_rad: float | None = None
+) -> tuple[CameraEstimate, Pose]:
     """What is estimated of a camera that pitches, yaws and goes on, with 0.1 px of noise; and the truth."""
     truth = Pose(rotation_from_vector(np.array([0.004, 0.01, -0.001])), np.array([0.001, -0.002, 0.03]))
     world = points()
@@ -79,7 +82,8 @@ def found_from(sweep_rad: FloatArray, sweep_sigma_rad: float) -> tuple[CameraEst
         np.ones(len(world), np.bool_),
     )
     pixels = bent(world, truth, sweep_rad) + noise
-    return estimate(static, pixels, HERE, NOTHING_KNOWN, np.full(2, sweep_sigma_rad), CAMERA), truth
+    sweep = SweepPrior(np.full(2, sigma_rad), np.full(2, most_rad or sigma_rad))
+    return estimate(static, pixels, HERE, NOTHING_KNOWN, sweep, CAMERA), truth
 
 
 def test_the_sweep_is_found_with_the_motion() -> None:
@@ -113,6 +117,18 @@ def test_a_bend_that_is_not_admitted_becomes_motion() -> None:
     rigid, bending = off_m(*found_from(sweep_rad, 1e-5)), off_m(*found_from(sweep_rad, 0.005))
     assert bending < 0.002
     assert rigid > 3.0 * bending
+
+
+def test_what_is_plain_to_see_is_straightened_before_anything_is_known_of_the_read_out() -> None:
+    sweep_rad = np.array([0.005, -0.003])
+    bound, open_minded = found_from(sweep_rad, 1e-9)[0], found_from(sweep_rad, 1e-9, 0.004)[0]
+    assert np.abs(bound.sweep_rad).max() < 1e-8
+    np.testing.assert_allclose(open_minded.sweep_rad, sweep_rad, atol=0.0005)
+    assert open_minded.inlier_ratio > bound.inlier_ratio + 0.05
+
+
+def test_what_is_possible_bends_no_straight_image() -> None:
+    assert np.abs(found_from(np.zeros(2), 1e-9, 0.004)[0].sweep_rad).max() < 1e-8
 
 
 def test_a_straight_image_is_left_straight() -> None:
@@ -159,22 +175,25 @@ def test_the_read_out_is_learned_from_vibration(read_out_s: float) -> None:
 def test_a_global_shutter_is_found_out() -> None:
     assert shaken(0.0).seconds < 0.001
     # One sigma of a sweep then is far below a pixel: 0.001 s of 0.1 rad/s and hardly more.
-    assert shaken(0.0).sweep_sigma_rad()[0] * CAMERA.fy < 0.1
+    assert shaken(0.0).sweep().sigma_rad[0] * CAMERA.fy < 0.1
+    assert shaken(0.0).sweep().most_rad[0] < 0.1 * ReadOut(0.25).sweep().most_rad[0]
 
 
 def test_before_anything_is_seen_nothing_is_bent() -> None:
     fresh = ReadOut(0.25)
     assert fresh.seconds == 0.0
-    assert fresh.sweep_sigma_rad().max() < 1e-4
+    assert fresh.sweep().sigma_rad.max() < 1e-4
+    # Possible it is: 15 ms of 0.25 rad/s.
+    np.testing.assert_allclose(fresh.sweep().most_rad, 0.00375, rtol=1e-3)
     assert shaken(0.02, amplitude_rad=0.0).seconds == 0.0
     assert shaken(0.02, visual=False).seconds == 0.0
 
 
 def test_the_faster_it_shakes_the_more_may_bend() -> None:
     hard, soft = shaken(0.02, amplitude_rad=0.008), shaken(0.02, amplitude_rad=0.004)
-    assert hard.sweep_sigma_rad()[0] == pytest.approx(2.0 * soft.sweep_sigma_rad()[0], rel=0.15)
+    assert hard.sweep().sigma_rad[0] == pytest.approx(2.0 * soft.sweep().sigma_rad[0], rel=0.15)
     # About the other axis it did not turn, and what was assumed at first is forgotten.
-    assert hard.sweep_sigma_rad()[1] < 0.01 * hard.sweep_sigma_rad()[0]
+    assert hard.sweep().sigma_rad[1] < 0.01 * hard.sweep().sigma_rad[0]
 
 
 def test_nothing_is_learned_across_a_gap() -> None:
