@@ -173,9 +173,9 @@ class Tracker:
         do so behind what hides their lower end."""
         grid, tracks = detection.grid, self._tracks
         large = (winner == 0) & (measured.cells >= _MIN_CELLS)
-        overhead = np.zeros(len(winner), np.bool_)
-        if grid.height_m is not None and large.any():
-            overhead = large & ~self._reaching_down(grid, parts, len(winner))
+        overhead = large.copy()
+        if large.any():
+            overhead &= ~self._reaching_down(grid, parts, len(winner))
             large &= ~overhead | regions.hidden_below(grid, parts, measured)
         born = np.flatnonzero(large)
         if len(born) == 0:
@@ -194,7 +194,9 @@ class Tracker:
         return np.where(own > 0, own, labels).astype(np.int32)
 
     def _reaching_down(self, grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.bool_]:
-        """(count,) parts 1..count of labels (h, w) that are seen at the robot's height."""
+        """(count,) parts 1..count of labels (h, w) seen at the robot's height; all where it is not known."""
+        if grid.height_m is None:
+            return np.ones(count, np.bool_)
         low = np.flatnonzero((labels > 0) & (grid.height_m < self._body_height_m))
         cells = np.bincount(labels.ravel().take(low), minlength=count + 1)[1:]
         result: NDArray[np.bool_] = cells >= _MIN_CELLS // 2
