@@ -30,10 +30,12 @@ class SurfaceDepth:
     """near_m (N,): depth of the nearest supported surface around each point, NaN where there is none.
 
     far_m (N,): depth of what lies behind it, equal to near_m where there is one surface only.
+    holes (N,): share of the surroundings without any depth, where it is not known what lies there.
     """
 
     near_m: FloatArray
     far_m: FloatArray
+    holes: FloatArray
 
 
 def depth_sigma_m(depth_m: Depths, noise: DepthNoise) -> Depths:
@@ -58,7 +60,7 @@ def surface_depth(
     sample_m[sample_m < min_m] = _NO_DATA_M
     # One column per point: sums over the samples then run along the memory.
     ordered = np.ascontiguousarray(np.sort(sample_m, axis=1).T)
-    within = ordered <= max_m
+    within, measured = ordered <= max_m, ordered < _NO_DATA_M
     count = _count(within)
     # With holes around, the same share of what is valid decides.
     rank = np.minimum(_NEAR_RANK, count // 3)
@@ -66,12 +68,13 @@ def surface_depth(
     gate_m = (0.06 + 3.0 * depth_sigma_m(anchor_m.astype(float), noise)).astype(np.float32)
     behind_m = ordered - anchor_m
     is_near = (np.abs(behind_m) <= gate_m) & within
-    is_far = (behind_m > gate_m) & (ordered < _NO_DATA_M)
+    is_far = (behind_m > gate_m) & measured
     near_count, far_count = _count(is_near), _count(is_far)
     near_m = _sum(ordered, is_near) / np.maximum(near_count, 1)
     far_m = _sum(ordered, is_far) / np.maximum(far_count, 1)
     near_m[(count < _MIN_SUPPORT) | (near_count < 2)] = np.nan
-    return SurfaceDepth(near_m, np.where((far_count >= 2) & (near_m == near_m), far_m, near_m))
+    far_m = np.where((far_count >= 2) & (near_m == near_m), far_m, near_m)
+    return SurfaceDepth(near_m, far_m, 1.0 - _count(measured) / len(measured))
 
 
 def _samples(depth: DepthImage, pixels: RealArray) -> DepthImage:

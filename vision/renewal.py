@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 
 import cv2
@@ -12,10 +11,17 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import FloatArray, RgbdFrame
+from vision.candidates import (
+    NOTHING_NEW,
+    NewFragments,
+    depth_along,
+    held_ends,
+    new_fragments,
+    on_one_surface,
+)
 from vision.contours import find_contours
-from vision.depth_mask import depth_sigma_m, surface_depth
 from vision.edges import GreyImage, find_edges
-from vision.segments import hough_segments, lengths_px, smaller_eigenvalue, snap_to_corners
+from vision.segments import hough_segments, lengths_px
 
 PART_PX = (240, 160)
 _BLOCKS = 2  # per part, one above the other: each has its own threshold of contrast
@@ -23,32 +29,9 @@ _MARGIN_PX = 8
 _MANY_MISSING = 8  # where more than one fragment in so many is missing, all parts of a band are searched
 _FEW_MISSING = 16  # where less than one in so many is, none: a search costs as much for one as for ten
 _MIN_END_DISTANCE_PX = 12.0
-_TAKEN_PX = 6
 _LOW_SHARE = 0.4
 _CANDIDATES_PER_TILE = 4
 _SHARE_WITHOUT_DEPTH = 0.15
-_NOISE_STRUCTURE = 220.0  # what image noise of 3 grey levels adds to both eigenvalues over 7x7 px
-_LEAST_STRUCTURE = 3.0
-_STAIRS = 0.05  # of the larger eigenvalue, that the stairs of a coarsely sampled edge add to the smaller one
-_MATCH_SIGMA = 6.0  # grey levels by which two sights of the same patch differ
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NewFragments:
-    """ends_px (N, 2, 2), near_m and far_m (N, 2), pixel_cov (N, 2, 3): xx, xy, yy of one flow step, px^2."""
-
-    ends_px: NDArray[np.float32]
-    near_m: NDArray[np.float32]
-    far_m: NDArray[np.float32]
-    pixel_cov: NDArray[np.float32]
-
-
-_NOTHING_NEW = NewFragments(
-    np.empty((0, 2, 2), np.float32),
-    np.empty((0, 2), np.float32),
-    np.empty((0, 2), np.float32),
-    np.empty((0, 2, 3), np.float32),
-)
 
 
 class Renewal:
@@ -78,7 +61,7 @@ class Renewal:
             self._last_visit = np.full(rows * columns, -1, np.intp)
         room = settings.max_fragments - len(ends_px)
         if room * _FEW_MISSING < settings.max_fragments:
-            return _NOTHING_NEW
+            return NOTHING_NEW
         self._visits += 1
         counts = _tile_counts(ends_px, settings.tile_px, *grey.shape)
         parts = rows if room * _MANY_MISSING > settings.max_fragments else 1
@@ -139,38 +122,16 @@ class Renewal:
         candidates = candidates[np.argsort(-lengths_px(candidates), kind="stable")]
         tile = _tiles(candidates, settings.tile_px, counts.shape[1])
         wanted = _rank_within(tile) < np.minimum(4 * missing, _CANDIDATES_PER_TILE).take(tile)
-        snapped, tensor = snap_to_corners(grey, candidates[wanted])
-        held = smaller_eigenvalue(tensor[..., 0], tensor[..., 1], tensor[..., 2]).min(axis=1)
-        order = np.argsort(-held, kind="stable")
-        snapped, tensor = snapped[order], tensor[order]
-        wanted = (lengths_px(snapped) >= _MIN_END_DISTANCE_PX) & _not_taken(snapped, ends_px, grey.shape)
-        snapped, tensor = snapped[wanted], tensor[wanted]
-        shares = np.array([0.0, 0.25, 0.5, 0.75, 1.0], np.float32)
-        along = np.empty((len(snapped), len(shares), 2), np.float32)
-        for k in (0, 1):
-            begin, end = snapped[:, :1, k], snapped[:, 1:, k]
-            along[..., k] = begin + (end - begin) * shares
-        surface = surface_depth(
-            frame.depth,
-            frame.depth_scale_m,
-            along.reshape(-1, 2),
-            config.min_depth_m,
-            config.max_depth_m,
-            config.depth_noise,
-        )
-        near, far = surface.near_m.reshape(-1, 5), surface.far_m.reshape(-1, 5)
+        snapped, tensor = held_ends(grey, candidates[wanted], ends_px, _MIN_END_DISTANCE_PX)
+        surface = depth_along(snapped, frame, config)
+        near = surface.near_m
         # Where nothing is measured at all, it is mostly far away: good to know the camera's turn by.
         beyond = ~(near == near).any(axis=1)
         beyond &= np.cumsum(beyond) <= room[1]
-        whole = np.flatnonzero(_on_one_surface(near, shares, config) | beyond)
+        whole = np.flatnonzero(on_one_surface(near, config) | beyond)
         tile = _tiles(snapped[whole], settings.tile_px, counts.shape[1])
         picked = whole[_rank_within(tile) < missing[tile]][: max(0, room[0])]
-        return NewFragments(
-            snapped[picked],
-            near[picked, ::4].astype(np.float32),
-            far[picked, ::4].astype(np.float32),
-            _flow_covariance(tensor[picked], settings.pixel_sigma_px),
-        )
+        return new_fragments(picked, snapped, tensor, surface, settings)
 
 
 def _pixels_of(tiles: NDArray[np.bool_], tile_px: int, rows: slice, columns: slice) -> NDArray[np.bool_]:
@@ -196,28 +157,6 @@ def _tiles(ends_px: NDArray[np.float32], tile_px: int, columns: int) -> NDArray[
     return result
 
 
-def _not_taken(
-    candidates: NDArray[np.float32], ends_px: NDArray[np.float32], shape: tuple[int, ...]
-) -> NDArray[np.bool_]:
-    """Which candidates have both ends where no other fragment, old or earlier in the list, has one."""
-    columns = shape[1] // _TAKEN_PX + 1
-    taken = np.zeros((shape[0] // _TAKEN_PX + 1) * columns, np.bool_)
-    taken[_cells(ends_px, columns).ravel()] = True
-    cells = _cells(candidates, columns).ravel()
-    # Writing backwards leaves in each cell the first one that wants it.
-    first = np.empty(len(taken), np.intp)
-    first[cells[::-1]] = np.arange(len(cells))[::-1]
-    alone = (first.take(cells) == np.arange(len(cells))) & ~taken.take(cells)
-    result: NDArray[np.bool_] = alone[0::2] & alone[1::2]
-    return result
-
-
-def _cells(ends_px: NDArray[np.float32], columns: int) -> NDArray[np.intp]:
-    index = (ends_px * (1.0 / _TAKEN_PX)).astype(np.intp)
-    result: NDArray[np.intp] = index[:, :, 1] * columns + index[:, :, 0]
-    return result
-
-
 def _rank_within(groups: NDArray[np.intp]) -> NDArray[np.intp]:
     """(N,) how many earlier entries have the same group."""
     if len(groups) == 0:
@@ -230,42 +169,3 @@ def _rank_within(groups: NDArray[np.intp]) -> NDArray[np.intp]:
     rank = np.empty(len(groups), np.intp)
     rank[order] = place - np.maximum.accumulate(starts)
     return rank
-
-
-def _on_one_surface(
-    near_m: NDArray[np.float64], shares: NDArray[np.float32], config: PerceptionConfig
-) -> NDArray[np.bool_]:
-    """Inverse depth runs straight along a segment of one plane; a segment across a depth edge jumps."""
-    inverse = 1.0 / near_m
-    straight = inverse[:, :1] + (inverse[:, 4:] - inverse[:, :1]) * shares
-    expected_m = 1.0 / straight[:, 1:4]
-    gate_m = 0.05 + 3.0 * depth_sigma_m(expected_m, config.depth_noise)
-    inside = np.abs(near_m[:, 1:4] - expected_m) <= gate_m
-    # One of the three samples in between may fall into a hole.
-    missing = np.isnan(near_m)
-    good = (inside | missing[:, 1:4]).all(axis=1) & (missing[:, 1:4].sum(axis=1) <= 1)
-    result: NDArray[np.bool_] = good & ~missing[:, 0] & ~missing[:, 4]
-    return result
-
-
-def _flow_covariance(tensor: NDArray[np.float32], floor_px: float) -> NDArray[np.float32]:
-    """(N, 2, 3) covariance of one flow step from the structure tensor (N, 2, 3): wide along an edge.
-
-    Image noise makes every direction look structured, and so do the stairs that a strong edge has where it
-    is sampled coarsely; they wander along it as it turns. Both shares are taken off first, or an end on a
-    straight edge would seem as well held along the edge as across it.
-    """
-    uu, uv, vv = tensor[..., 0], tensor[..., 1], tensor[..., 2]
-    middle, half = 0.5 * (uu + vv), 0.5 * (uu - vv)
-    radius = np.sqrt(half * half + uv * uv)
-    larger = np.maximum(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
-    smaller = np.maximum(middle - radius - _NOISE_STRUCTURE - _STAIRS * larger, _LEAST_STRUCTURE)
-    # The inverse has the same axes and the inverse eigenvalues.
-    across, along = _MATCH_SIGMA**2 / larger, _MATCH_SIGMA**2 / smaller
-    mean, spread = 0.5 * (across + along), 0.5 * (across - along)
-    scale = spread / np.maximum(radius, 1e-6)
-    floor = floor_px**2
-    result = np.empty(tensor.shape, np.float32)
-    result[..., 0], result[..., 2] = mean + scale * half + floor, mean - scale * half + floor
-    result[..., 1] = scale * uv
-    return result
