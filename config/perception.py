@@ -30,6 +30,9 @@ class FragmentSettings(Section):
     edge_share: float = Field(default=0.05, gt=0, le=0.5, description="edge pixels that are enough")
     min_length_px: float = Field(default=32.0, ge=8, le=400, description="the paper's 32 px")
     max_fragments: int = Field(default=128, ge=20, le=2000)
+    closer_fragments: int = Field(
+        default=16, ge=0, le=400, description="and more, for bodies of which too few of them tell"
+    )
     tile_px: int = Field(default=40, ge=16, le=160, description="cell in which fragments are counted")
     fragments_per_tile: int = Field(default=2, ge=1, le=16)
     lk_window_px: int = Field(default=11, ge=5, le=41)

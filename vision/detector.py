@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
 from vision import optical_flow
+from vision.attention import Attention, Wanted
 from vision.depth_grid import DepthGrid, make_grid
 from vision.depth_mask import surface_depth
 from vision.detection import Detection, camera_health, no_motion
@@ -20,6 +21,7 @@ from vision.fragments import FragmentStore
 from vision.health import Continuity, HealthMonitor
 from vision.lens import project, rays, vector_from_rotation
 from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
+from vision.percept import Percept
 from vision.renewal import Renewal
 from vision.rolling_shutter import ReadOut
 from vision.scene import CameraHealth, EgoMotion, Fragments
@@ -40,6 +42,7 @@ class Detector:
         self._mount = mount
         self._store = FragmentStore()
         self._renewal = Renewal(config)
+        self._attention = Attention(config)
         self._health = HealthMonitor(config)
         self._floor = FloorFinder()
         self._grey: GreyImage | None = None
@@ -51,11 +54,11 @@ class Detector:
         self._read_out = ReadOut(config.ego_motion.vibration_radps)
         self._variance_scale = 1.0
 
-    def step(self, frame: RgbdFrame, odometry: Pose | None, previous: Fragments | None = None) -> Detection:
+    def step(self, frame: RgbdFrame, odometry: Pose | None, previous: Percept | None = None) -> Detection:
         """One frame. odometry: the camera by dead reckoning at captured_ns, None where not known.
 
-        previous: the fragments as tracking left them, so that those on moving things are kept out of
-        the ego-motion and searched for where their obstacle goes.
+        previous: what tracking made of the frame before, so that fragments on moving things are kept out of
+        the ego-motion and searched for where their obstacle goes, and more are looked for where wanted.
         """
         grey = np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         grid = self._grid(frame)
@@ -77,13 +80,13 @@ class Detector:
         grey: GreyImage,
         grid: DepthGrid,
         odometry: Pose | None,
-        previous: Fragments | None,
+        previous: Percept | None,
         dt_s: float,
         health: CameraHealth,
     ) -> Detection:
         store, config, camera = self._store, self._config, frame.intrinsics
         prior = self._prior(frame, odometry, dt_s)
-        moving, velocity = _hint(store.ids, previous)
+        moving, velocity = _hint(store.ids, previous.fragments if previous else None)
         guess = self._guess(prior.motion, velocity, dt_s, camera)
         assert self._grey is not None
         flow = optical_flow.track(
@@ -111,13 +114,13 @@ class Detector:
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
         anchor = store.anchors(frame.captured_ns, config.motion.window_s)
         depths = appraise(anchor, config.depth_noise)
-        static = static_points(anchor, depths, store.pixel_cov, moving)
+        static = static_points(anchor, depths, store.pixel_cov, moving | store.witness)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
         result = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), camera)
         motion = gather(store, anchor, depths, result, camera, config.depth_noise, self._variance_scale)
         if result.visual:
             self._variance_scale = observed_variance_scale(
-                motion, store.age_frames, moving, self._variance_scale
+                motion, store.age_frames, moving | store.witness, self._variance_scale
             )
         average_depth(store, store.before(frame.captured_ns), result.pose, config.depth_noise)
         step = self._pose.inverse() @ result.pose
@@ -132,6 +135,8 @@ class Detector:
             frame, grid, dt_s, motion, ego, health, False, known, prior.source != "none"
         )
         self._renew(frame, grey)
+        if previous is not None:
+            self._look_closer(frame, grey, previous.wanted)
         if ego.source == "none":
             self._store.break_history()
         self._commit(frame, grey, odometry, result.sweep_rad)
@@ -150,6 +155,10 @@ class Detector:
         without_depth = int(np.count_nonzero(missing[:, 0] & missing[:, 1]))
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
+
+    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: Wanted) -> None:
+        new = self._attention.find(frame, grey, self._store.ends_px, bodies)
+        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, witness=True)
 
     def _commit(
         self, frame: RgbdFrame, grey: GreyImage, odometry: Pose | None, sweep_rad: FloatArray

@@ -39,7 +39,8 @@ class FragmentStore:
     """Holds the fragments and their history. Changed only by the detector.
 
     near_m, far_m (N, 2): depth measured in this frame. depth_m (N, 2): of the near surface, averaged over
-    looks (N, 2) frames as for a static point.
+    looks (N, 2) frames as for a static point. witness (N,): found on a body whose motion is in question; they
+    do not tell of the camera's.
 
     The history is a ring of frames. Each fragment keeps its place in it for life, so that neither losing
     nor finding fragments moves what is remembered of the others.
@@ -59,6 +60,7 @@ class FragmentStore:
         self.looks = np.empty((0, 2), np.float32)
         self.age_frames = np.empty(0, np.intp)
         self.pixel_cov = np.empty((0, 2, 3), np.float32)
+        self.witness = np.empty(0, np.bool_)
         # Direction (3), depth, far depth and looks of both ends: by frame and place.
         self._history = np.empty((6, HISTORY, _FEWEST_PLACES, 2))
         self._place = np.empty(0, np.intp)
@@ -83,6 +85,7 @@ class FragmentStore:
         self.looks = self.looks.take(kept, axis=0)
         self.age_frames = self.age_frames.take(kept)
         self.pixel_cov = self.pixel_cov.take(kept, axis=0)
+        self.witness = self.witness.take(kept)
         self._place = self._place.take(kept)
 
     def add(
@@ -91,6 +94,7 @@ class FragmentStore:
         near_m: NDArray[np.float32],
         far_m: NDArray[np.float32],
         pixel_cov: NDArray[np.float32],
+        witness: bool = False,
     ) -> None:
         """New fragments, seen for the first time in the frame that is committed next."""
         count = len(ends_px)
@@ -105,6 +109,7 @@ class FragmentStore:
         self.looks = np.concatenate((self.looks, np.ones((count, 2), np.float32)))
         self.age_frames = np.concatenate((self.age_frames, np.zeros(count, np.intp)))
         self.pixel_cov = np.concatenate((self.pixel_cov, pixel_cov))
+        self.witness = np.concatenate((self.witness, np.full(count, witness)))
         self._place = np.concatenate((self._place, self._free_places(count)))
 
     def _free_places(self, count: int) -> NDArray[np.intp]:

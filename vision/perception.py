@@ -6,8 +6,8 @@ from config.perception import PerceptionConfig
 from hal.types import CameraMount, PlanarPose, Pose, RgbdFrame
 from vision.detection import Detection
 from vision.detector import Detector
-from vision.scene import Fragments
-from vision.tracker import Percept, Tracker
+from vision.percept import Percept
+from vision.tracker import Tracker
 
 
 class Perception:
@@ -22,17 +22,17 @@ class Perception:
     ) -> None:
         self._detector = Detector(config, mount)
         self._tracker = Tracker(config, body_height_m, clearance_m)
-        self._fragments: Fragments | None = None
+        self._before: Percept | None = None
 
     def detect(self, frame: RgbdFrame, odometry: Pose | None) -> Detection:
         """RGB-D frame to fragments with motion evidence. odometry: the camera (optical frame) in the
         odometry frame at frame.captured_ns by dead reckoning, None where not known."""
-        return self._detector.step(frame, odometry, self._fragments)
+        return self._detector.step(frame, odometry, self._before)
 
     def track(self, detection: Detection, robot_pose: PlanarPose | None) -> Percept:
         """Motion evidence to the scene. robot_pose is handed on to it."""
         percept = self._tracker.step(detection, robot_pose)
-        self._fragments = percept.fragments
+        self._before = percept
         return percept
 
     def perceive(self, frame: RgbdFrame, odometry: Pose | None, robot_pose: PlanarPose | None) -> Percept:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,14 +10,16 @@ from hal.types import PlanarPose
 from vision import carving, grouping, kalman, limbs, masks, obstacles, regions, report, sightings
 from vision.adoption import adopt
 from vision.arrivals import FreeMemory
+from vision.attention import wanted
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.judgement import MotionEvidence, judge
 from vision.obstacles import FragmentVelocities
+from vision.percept import Percept
 from vision.regions import IntGrid, Regions
-from vision.scene import CameraCondition, Fragments, Scene
+from vision.scene import CameraCondition, Scene
 from vision.tracks import Tracks
 
 _ACCEL_DENSITY = 0.12  # (m/s^2)^2 s: how briskly people start, stop and turn
@@ -27,14 +27,6 @@ _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _MIN_CELLS = 12
 _IDENTITY = np.eye(3)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Percept:
-    """What perception says of one frame."""
-
-    scene: Scene
-    fragments: Fragments
 
 
 class Tracker:
@@ -293,7 +285,11 @@ class Tracker:
         index = tracks.index_of(owner)
         moving = np.concatenate((tracks.moving, [False]))[index]
         owner = np.where(index >= 0, owner, -1)
-        return Percept(scene, report.fragments(detection, owner, moving, velocities))
+        return Percept(
+            scene,
+            report.fragments(detection, owner, moving, velocities),
+            wanted(tracks, detection, self._config),
+        )
 
     def _in_the_way(self, grid: DepthGrid, standing: BoolGrid) -> BoolGrid:
         return standing if grid.height_m is None else standing & (grid.height_m < self._body_height_m)

@@ -12,8 +12,9 @@ from tests.support.grids import CAMERA, grid_of
 from tests.support.scenes import GOOD
 from vision.depth_grid import DepthGrid
 from vision.detection import Detection
+from vision.percept import Percept
 from vision.scene import EgoMotion
-from vision.tracker import Percept, Tracker
+from vision.tracker import Tracker
 from vision.velocities import PointMotion
 
 FRAME_NS = 33_333_333

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from config.perception import FragmentSettings, PerceptionConfig
 from tests.support.painted import MOUNT, Quad, Take, floor, vector, wall
+from vision.percept import Percept
 from vision.perception import Perception
-from vision.tracker import Percept
 
 # Half the resolution, everything counted in pixels halved with it.
 SMALL = PerceptionConfig(grid_step_px=2, fragments=FragmentSettings(min_length_px=16, tile_px=20))

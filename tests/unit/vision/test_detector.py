@@ -70,9 +70,9 @@ def test_new_fragments_replace_those_that_leave_the_view() -> None:
 
 
 def test_no_more_fragments_than_the_configuration_allows() -> None:
-    few = SMALL.fragments.model_copy(update={"max_fragments": 30})
+    few = SMALL.fragments.model_copy(update={"max_fragments": 30, "closer_fragments": 2})
     seen = watch(ahead(), SMALL.model_copy(update={"fragments": few}))
-    assert max(len(one.ids) for one in seen) <= 30
+    assert max(len(one.ids) for one in seen) <= 32
     assert len(seen[-1].ids) >= 25
 
 

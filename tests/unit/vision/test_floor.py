@@ -26,8 +26,8 @@ from tests.support.painted import QVGA, Take, box, drive, record, vector
 from tests.support.painted import floor as painted_floor
 from tests.support.painted import wall as painted_wall
 from vision.floor import Floor, FloorFinder, on_floor
+from vision.percept import Percept
 from vision.perception import Perception
-from vision.tracker import Percept
 
 SMALL = PerceptionConfig(grid_step_px=2, fragments=FragmentSettings(min_length_px=16, tile_px=20))
 NOISE = DepthNoise(floor_m=0.005, quadratic_per_m=0.0075)

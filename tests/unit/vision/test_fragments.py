@@ -105,3 +105,14 @@ def test_cleared_it_begins_anew_with_new_ids(count: int) -> None:
     store.clear()
     add(store, count)
     assert store.ids.tolist() == list(range(4, 4 + count))
+
+
+def test_who_is_a_witness_stays_one() -> None:
+    store = FragmentStore()
+    add(store, 3)
+    ends, depth = np.zeros((2, 2, 2), np.float32), np.ones((2, 2), np.float32)
+    store.add(ends, depth, depth, np.ones((2, 2, 3), np.float32), witness=True)
+    store.keep(np.array([False, True, True, False, True]))
+    assert store.witness.tolist() == [False, False, True]
+    store.clear()
+    assert len(store.witness) == 0

@@ -24,9 +24,9 @@ from tests.support.painted import (
     vector,
 )
 from tests.support.painted_room import CRATE_M, SIDEWAYS, SMALL, TOWARDS, look, perception, room
+from vision.percept import Percept
 from vision.perception import Perception
 from vision.scene import CameraCondition, Obstacle, Scene
-from vision.tracker import Percept
 
 JUDGED = 21  # frames: 0.7 s
 watch = cache(look)  # most tests ask the same few takes different questions
