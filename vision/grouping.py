@@ -1,8 +1,8 @@
-"""Parts to bodies, where connected depth says too much or too little.
+"""Parts to bodies, where connected depth says too little.
 
 A shoe, an arm or a load may be parted from its body by a hole in the depth image: what is small, close
-to a mover and does not contradict its motion is part of it. Two people who walk side by side may be one
-connected part: a mover that is too wide for one is divided where it is thin.
+to a mover and does not contradict its motion is part of it. Of the plain sides of a vehicle a depth camera
+sees nothing but the edges: pieces that go exactly alike, with nothing seen between them, are one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision.depth_grid import DepthGrid
-from vision.order import median, quantile, quantiles
+from vision.division import NEARER_INVERSE, SINGLE_WIDTH_M, split
 from vision.regions import IntGrid, Regions
 
 _CLOSE_M = 0.25
@@ -22,18 +22,13 @@ _APART_M = 0.40
 _SAME_DEPTH_M = 0.30
 _ALONG = np.linspace(0.0, 1.0, 24)[:, None]  # from one part to another
 _LEAST_SAMPLES = 3
-_NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
 _SMALL_SHARE = 0.5
 _SAME_VELOCITY_MPS = 0.4
 _ALIKE_SIGMAS = 2.0  # a shank that stands, or swings, on a body that goes
-_SINGLE_WIDTH_M = 0.85
-_PAIR_DISTANCE_M = 0.5
-_VALLEY = 0.35
-_MIN_CELLS = 24
-_BINS = 12
 _CARRIED_M = 0.8
 _CARRIED_MPS = 0.25
 _CARRIED_SIGMA_MPS = 0.35
+_GOES_MPS = 0.3  # what goes more slowly goes like whatever stands
 _MOSTLY = 0.7
 _TOUCHING_PX = 16.0
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
@@ -107,11 +102,9 @@ def _parted(
     grid: DepthGrid, parts: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     """(K,) whether something nearer stands between the middles of parts one[k] and other[k] in the image."""
-    middle = 0.5 * (parts.bbox_px[:, :2] + parts.bbox_px[:, 2:])
-    u, v = (k[one] + (k[other] - k[one]) * _ALONG for k in middle.T)
-    inverse = grid.inverse_depth.ravel().take(grid.cells(u, v))
+    inverse = _inverse_between(grid, parts, one, other)
     depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
-    nearer = inverse > 1.0 / np.maximum(depth, 0.1) + _NEARER_INVERSE
+    nearer = inverse > 1.0 / np.maximum(depth, 0.1) + NEARER_INVERSE
     result: NDArray[np.bool_] = nearer.sum(axis=0) >= _LEAST_SAMPLES
     return result
 
@@ -168,6 +161,7 @@ def attach(
 
 
 def merges(
+    grid: DepthGrid,
     regions: Regions,
     velocity: FloatArray,
     velocity_sigma: FloatArray,
@@ -176,7 +170,8 @@ def merges(
 ) -> list[tuple[int, int]]:
     """Pairs (small, large) of tracks that may be one body: a suspect or mover beside a larger mover, the
     closest pairs first. A track may be beside several. What begins where another one ends in the image and
-    surely goes exactly as that does is carried by it, even if it is farther back: the mast of a cart.
+    surely goes exactly as that does is carried by it, even if it is farther back: the mast of a cart. Pieces
+    of something wider than anybody, that surely go exactly alike, are one where nothing is seen between them.
 
     velocity (T, 3) and velocity_sigma (T,) of the tracks.
     """
@@ -193,17 +188,44 @@ def merges(
     alike = difference <= _SAME_VELOCITY_MPS + _ALIKE_SIGMAS * np.hypot(velocity_sigma[a], velocity_sigma[b])
     width = np.maximum(box.high_m[a, 0], box.high_m[b, 0]) - np.minimum(box.low_m[a, 0], box.low_m[b, 0])
     overlap = _overlaps(regions.bbox_px[a], regions.bbox_px[b])
-    fits = (cells[a] <= _SMALL_SHARE * cells[b]) | (width <= _SINGLE_WIDTH_M) | (overlap >= _OVERLAP)
+    fits = (cells[a] <= _SMALL_SHARE * cells[b]) | (width <= SINGLE_WIDTH_M) | (overlap >= _OVERLAP)
     reach = np.where(overlap >= _OVERLAP, _APART_M, _CLOSE_M)
     known = np.maximum(velocity_sigma[a], velocity_sigma[b]) <= _CARRIED_SIGMA_MPS
     carried = known & (difference <= _CARRIED_MPS) & _stacked(regions.bbox_px[a], regions.bbox_px[b])
     reach = np.where(carried, _CARRIED_M, reach)
     gap = gaps_m(box, a, box, b)
     one = (gap <= reach) & alike & fits
+    wide = np.maximum(regions.extent_m[a, 0], regions.extent_m[b, 0]) > SINGLE_WIDTH_M
+    goes = np.square(velocity[b]).sum(axis=1) > _GOES_MPS**2
+    pieces = known & (difference <= _CARRIED_MPS) & goes & wide & (gap <= _CARRIED_M) & ~one
+    if pieces.any():
+        one |= pieces & ~_seen_between(grid, regions, a, b)
     a, b = a[one], b[one]
     away = np.abs(regions.position_m[a, 2] - regions.position_m[b, 2])
     closest_first = np.lexsort((away, gap[one]))
     return list(zip(a[closest_first].tolist(), b[closest_first].tolist(), strict=True))
+
+
+def _seen_between(
+    grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """(K,) whether something farther is seen between the middles of regions one[k] and other[k]."""
+    inverse = _inverse_between(grid, regions, one, other)
+    depth = np.maximum(regions.position_m[one, 2], regions.position_m[other, 2])
+    farther = (inverse > 0.0) & (inverse < 1.0 / np.maximum(depth, 0.1) - NEARER_INVERSE)
+    result: NDArray[np.bool_] = farther.sum(axis=0) >= _LEAST_SAMPLES
+    return result
+
+
+def _inverse_between(
+    grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
+) -> FloatArray:
+    """(24, K) inverse depth in the image on the way from the middle of region one[k] to that of other[k], 0
+    where there is none."""
+    middle = 0.5 * (regions.bbox_px[:, :2] + regions.bbox_px[:, 2:])
+    u, v = (k[one] + (k[other] - k[one]) * _ALONG for k in middle.T)
+    result: FloatArray = grid.inverse_depth.ravel().take(grid.cells(u, v)).astype(float)
+    return result
 
 
 def join(grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]]) -> tuple[IntGrid, list[int]]:
@@ -235,57 +257,3 @@ def _overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
     shared = np.maximum(size, 0.0).prod(axis=1)
     result: FloatArray = shared / np.maximum((a[:, 2:] - a[:, :2]).prod(axis=1), 1.0)
     return result
-
-
-def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | None:
-    """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one.
-
-    The cells are laid along the line on which they spread most (seen from above). Two people leave a
-    valley in between; a crate, however wide, does not, and where something nearer fills it, it is none.
-    """
-    cells = np.flatnonzero(labels.ravel() == track + 1)
-    if len(cells) < 2 * _MIN_CELLS:
-        return None
-    points = grid.points(cells)[::2].T.astype(float)
-    if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < _SINGLE_WIDTH_M:
-        return None  # as is most, whichever line they are laid along
-    centred = points - median(points.T)
-    _, axes = np.linalg.eigh(centred.T @ centred)
-    along = centred @ axes[:, 1]
-    low, high = quantiles(along, (0.03, 0.97))
-    if high - low < _SINGLE_WIDTH_M:
-        return None
-    # A far cell stands for more surface than a near one.
-    weight = np.square(points[:, 1])
-    counts, edges = np.histogram(along, _BINS, (low, high), weights=weight)
-    smooth = np.convolve(counts, [0.25, 0.5, 0.25], mode="same")
-    valley = int(smooth[2:-2].argmin()) + 2
-    left, right = smooth[:valley].max(), smooth[valley + 1 :].max()
-    if smooth[valley] > _VALLEY * min(left, right):
-        return None
-    cut = 0.5 * (edges[valley] + edges[valley + 1])
-    second = along > cut
-    if np.count_nonzero(second) * 2 > len(cells):
-        second = ~second
-    if np.count_nonzero(second) < _MIN_CELLS:
-        return None
-    if abs(median(along[second]) - median(along[~second])) < _PAIR_DISTANCE_M:
-        return None
-    if _hidden_between(grid, cells[second], cells[~second]):
-        return None
-    cut_off: NDArray[np.intp] = cells[second]
-    return cut_off
-
-
-def _hidden_between(grid: DepthGrid, one: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
-    """Whether something nearer fills most of the image between two groups of flat cells: then the valley
-    there is what hides the middle of one body."""
-    width = grid.depth_m.shape[1]
-    left, right = (one, other) if median(one % width) < median(other % width) else (other, one)
-    first, last = int(quantile(left % width, 0.9)) + 1, int(quantile(right % width, 0.1))
-    top, last_row = quantiles(np.concatenate((one, other)) // width, (0.25, 0.75))
-    inverse = grid.inverse_depth
-    between = inverse[int(top) : int(last_row) + 1, first:last]
-    nearest = max(float(median(inverse.ravel()[one])), float(median(inverse.ravel()[other])))
-    nearer = between > nearest + _NEARER_INVERSE
-    return last > first and bool(np.count_nonzero(nearer) >= 0.5 * nearer.size)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import PlanarPose
-from vision import carving, grouping, kalman, limbs, masks, obstacles, regions, report, sightings
+from vision import carving, division, grouping, kalman, limbs, masks, obstacles, regions, report, sightings
 from vision.adoption import adopt
 from vision.arrivals import FreeMemory
 from vision.attention import wanted
@@ -142,11 +142,11 @@ class Tracker:
             return labels
         sigma = np.sqrt(tracks.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
         mover = tracks.moving | (tracks.evidence > 0.0)
-        pairs = grouping.merges(measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
+        pairs = grouping.merges(grid, measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
         labels, gone = grouping.join(grid, labels, pairs)
         tracks.seen_ns[gone] = 0
         for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
-            second = grouping.split(grid, labels, track)
+            second = division.split(grid, labels, track)
             if second is not None:
                 tracks.twin(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
                 labels = labels.copy()

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from tests.support.grids import LEVEL_UP, X, grid_of, labelled, nearest, plate
 from vision.depth_grid import DepthGrid
-from vision.grouping import join, split
+from vision.division import split
+from vision.grouping import join
 
 
 def two_people(gap_m: float, bridge: bool = True) -> tuple[DepthGrid, NDArray[np.int32]]:
@@ -87,3 +88,16 @@ def test_one_body_behind_somebody_is_not_divided() -> None:
     hidden = nearest(whole, somebody)
     assert split(grid_of(two), labelled(two > 0.0), 0) is not None
     assert split(grid_of(hidden), labelled(hidden == 4.0), 0) is None
+
+
+@pytest.mark.parametrize(
+    ("wide_m", "behind_m", "divided"), [(1.0, 0.0, False), (1.0, 6.0, True), (0.5, 0.0, True)]
+)
+def test_between_a_piece_wider_than_anybody_and_another_something_has_to_be_seen(
+    wide_m: float, behind_m: float, divided: bool
+) -> None:
+    """The rim of a vehicle's side, of which depth shows nothing else."""
+    left, right = plate(3.0, (-0.3 - wide_m, -0.3), (-0.7, 0.9)), plate(3.0, (0.3, 0.8), (-0.7, 0.9))
+    body = nearest(left, right, plate(3.0, (-0.3, 0.3), (-0.7, -0.6)))
+    depth_m = np.where(body > 0.0, body, behind_m)
+    assert (split(grid_of(depth_m), labelled(body > 0.0), 0) is not None) == divided

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from tests.support.grids import CAMERA, grid_of, labelled, nearest, plate
+from tests.support.grids import CAMERA, grid_of, labelled, nearest, plate, wall
 from vision.grouping import Bodies, Boxes, attach, boxes, detach, expected_in, gaps_m, merges
 from vision.regions import Regions, measure
 
@@ -57,12 +57,15 @@ def merged(
     sigma: float = 0.05,
     moving: list[bool] | None = None,
     mover: list[bool] | None = None,
+    behind_m: float = 9.0,
 ) -> list[tuple[int, int]]:
-    """All move alike, and all are known as moving, unless said otherwise."""
+    """All move alike, and all are known as moving, unless said otherwise. behind_m: of what is seen between
+    them, 0 for nothing."""
     count = len(bodies)
     speeds = velocity or [(0.8, 0.0, 0.0)] * count
     known = moving or [True] * count
     return merges(
+        grid_of(wall(behind_m)),
         regions(*bodies),
         np.array(speeds),
         np.full(count, sigma),
@@ -175,6 +178,23 @@ def test_what_a_mover_carries_stays_with_it_while_most_of_it_was_there_before() 
     np.testing.assert_array_equal(detach(winner, parts, np.array([800, 69]), nowhere), [1, 0])
     above = regions(CART, replace(MAST, y=-0.4))
     np.testing.assert_array_equal(detach(winner, above, np.array([800, 100]), nowhere), [1, 0])
+
+
+REAR = Body(-0.6, z=3.0, width=1.0, height=1.2, deep=0.1, cells=900)
+WHEEL = Body(0.6, y=0.3, z=3.2, width=0.4, height=0.6, deep=0.1, cells=480)  # 0.51 m from the rear
+
+
+def test_pieces_of_something_wide_with_nothing_seen_between_them_are_one() -> None:
+    assert merged(REAR, WHEEL, behind_m=0.0) == [(1, 0)]
+    assert merged(REAR, WHEEL, behind_m=3.1) == [(1, 0)]  # its own side
+    assert merged(REAR, WHEEL, behind_m=5.0) == []  # the way behind is seen
+    assert merged(REAR, replace(WHEEL, x=0.95), behind_m=0.0) == []  # 0.86 m away
+    narrow = replace(REAR, x=-0.4, width=0.6)
+    assert merged(narrow, WHEEL, behind_m=0.0) == []  # two people walk like that
+    assert merged(REAR, WHEEL, behind_m=0.0, sigma=0.4) == []
+    assert merged(REAR, WHEEL, behind_m=0.0, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
+    # Hardly anything moves so slowly that it would not go like what stands.
+    assert merged(REAR, WHEEL, behind_m=0.0, velocity=[(0.29, 0.0, 0.0)] * 2) == []
 
 
 def test_tracks_that_are_not_seen_take_no_part() -> None:

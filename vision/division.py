@@ -1,0 +1,77 @@
+"""One part of connected depth, two bodies: two people who walk side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.depth_grid import DepthGrid
+from vision.order import median, quantile, quantiles
+from vision.regions import IntGrid
+
+SINGLE_WIDTH_M = 0.85  # nobody is wider
+NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
+_PAIR_DISTANCE_M = 0.5
+_VALLEY = 0.35
+_HARDLY = 0.2  # of the image between two groups of cells
+_MIN_CELLS = 24
+_BINS = 12
+
+
+def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | None:
+    """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one.
+
+    The cells are laid along the line on which they spread most (seen from above). Two people leave a
+    valley in between; a crate, however wide, does not, and where something nearer fills it, it is none. Nor
+    is it one beside a piece that is too wide for anybody, where nothing is seen in it.
+    """
+    cells = np.flatnonzero(labels.ravel() == track + 1)
+    if len(cells) < 2 * _MIN_CELLS:
+        return None
+    points = grid.points(cells)[::2].T.astype(float)
+    if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < SINGLE_WIDTH_M:
+        return None  # as is most, whichever line they are laid along
+    centred = points - median(points.T)
+    _, axes = np.linalg.eigh(centred.T @ centred)
+    along = centred @ axes[:, 1]
+    low, high = quantiles(along, (0.03, 0.97))
+    if high - low < SINGLE_WIDTH_M:
+        return None
+    # A far cell stands for more surface than a near one.
+    weight = np.square(points[:, 1])
+    counts, edges = np.histogram(along, _BINS, (low, high), weights=weight)
+    smooth = np.convolve(counts, [0.25, 0.5, 0.25], mode="same")
+    valley = int(smooth[2:-2].argmin()) + 2
+    left, right = smooth[:valley].max(), smooth[valley + 1 :].max()
+    if smooth[valley] > _VALLEY * min(left, right):
+        return None
+    cut = 0.5 * (edges[valley] + edges[valley + 1])
+    second = along > cut
+    if np.count_nonzero(second) * 2 > len(cells):
+        second = ~second
+    if np.count_nonzero(second) < _MIN_CELLS:
+        return None
+    if abs(median(along[second]) - median(along[~second])) < _PAIR_DISTANCE_M:
+        return None
+    wide = max(float(np.ptp(along[second])), float(np.ptp(along[~second]))) > SINGLE_WIDTH_M
+    if _hidden_between(grid, cells[second], cells[~second], wide):
+        return None
+    cut_off: NDArray[np.intp] = cells[second]
+    return cut_off
+
+
+def _hidden_between(grid: DepthGrid, one: NDArray[np.intp], other: NDArray[np.intp], wide: bool) -> bool:
+    """Whether something nearer fills most of the image between two groups of flat cells: then the valley
+    there is what hides the middle of one body. wide: so it is, too, if hardly anything is seen there."""
+    width = grid.depth_m.shape[1]
+    left, right = (one, other) if median(one % width) < median(other % width) else (other, one)
+    first, last = int(quantile(left % width, 0.9)) + 1, int(quantile(right % width, 0.1))
+    if last <= first:
+        return False
+    top, last_row = quantiles(np.concatenate((one, other)) // width, (0.25, 0.75))
+    inverse = grid.inverse_depth
+    between = inverse[int(top) : int(last_row) + 1, first:last]
+    nearest = max(float(median(inverse.ravel()[one])), float(median(inverse.ravel()[other])))
+    nearer = np.count_nonzero(between > nearest + NEARER_INVERSE)
+    farther = np.count_nonzero((between > 0.0) & (between < nearest - NEARER_INVERSE))
+    return bool(nearer >= 0.5 * between.size or (wide and farther <= _HARDLY * between.size))
