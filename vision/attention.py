@@ -40,6 +40,7 @@ _MARGIN_PX = 6
 _MIN_SIDE_PX = 16
 _MIN_LENGTH = 0.5  # of the length of other fragments
 _MIN_END_DISTANCE_PX = 8.0
+_LEAST_HELD = 600.0  # on a short edge without corners both ends slide alike; noise alone makes 220
 _CONTRAST = 60.0
 _LOW_SHARE = 0.4
 _CANDIDATES = 48
@@ -100,7 +101,7 @@ class Attention:
             return NOTHING_NEW
         segments_px = self._segments(grey[top:bottom, left:right])
         segments_px += np.array((left, top), np.float32)
-        ends, tensor = held_ends(grey, segments_px, ends_px, _MIN_END_DISTANCE_PX)
+        ends, tensor = held_ends(grey, segments_px, ends_px, _MIN_END_DISTANCE_PX, _LEAST_HELD)
         surface = depth_along(ends, frame, self._config)
         picked = np.flatnonzero(self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]))
         return new_fragments(picked[: min(room, _AT_ONCE)], ends, tensor, surface, settings)

@@ -40,16 +40,22 @@ NOTHING_NEW = NewFragments(
 
 
 def held_ends(
-    grey: GreyImage, segments_px: NDArray[np.float32], ends_px: NDArray[np.float32], min_distance_px: float
+    grey: GreyImage,
+    segments_px: NDArray[np.float32],
+    ends_px: NDArray[np.float32],
+    min_distance_px: float,
+    least_held: float = 0.0,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Of segments (N, 2, 2) those whose ends, moved to corners, are no nearer to each other than
     min_distance_px and no fragment's of ends_px (K, 2, 2): (M, 2, 2), the best held ones first, and the
-    structure tensor at their ends (M, 2, 3)."""
+    structure tensor at their ends (M, 2, 3). least_held: of its smaller eigenvalue at either end.
+    """
     snapped, tensor = snap_to_corners(grey, segments_px)
     held = smaller_eigenvalue(tensor[..., 0], tensor[..., 1], tensor[..., 2]).min(axis=1)
     order = np.argsort(-held, kind="stable")
     snapped, tensor = snapped[order], tensor[order]
     wanted = (lengths_px(snapped) >= min_distance_px) & _not_taken(snapped, ends_px, grey.shape)
+    wanted &= held[order] >= least_held
     return snapped[wanted], tensor[wanted]
 
 
