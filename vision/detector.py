@@ -114,7 +114,7 @@ class Detector:
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
         anchor = store.anchors(frame.captured_ns, config.motion.window_s)
         depths = appraise(anchor, config.depth_noise)
-        static = static_points(anchor, depths, store.pixel_cov, moving | store.witness)
+        static = static_points(anchor, depths, store.pixel_cov, moving | store.witness, config.max_depth_m)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
         result = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), camera)
         motion = gather(store, anchor, depths, result, camera, config.depth_noise, self._variance_scale)

@@ -59,15 +59,25 @@ def appraise(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
 
 
 def static_points(
-    anchor: AnchorEnds, depths: AnchorDepths, pixel_cov: NDArray[np.float32], moving: NDArray[np.bool_]
+    anchor: AnchorEnds,
+    depths: AnchorDepths,
+    pixel_cov: NDArray[np.float32],
+    moving: NDArray[np.bool_],
+    distant_m: float,
 ) -> Anchors:
-    """The 2N ends as points to find the camera by. pixel_cov (N, 2, 3) and moving (N,) of the fragments."""
+    """The 2N ends as points to find the camera by. pixel_cov (N, 2, 3) and moving (N,) of the fragments.
+
+    An end on two surfaces could be on either. Where one of them is farther than distant_m away, it tells of
+    the camera's turn all the same: across its epipolar line. In a wide hall hardly any others may be left.
+    """
+    distant = depths.mixed & (depths.far_m > distant_m)
+    between_m = np.where(distant, depths.far_m - depths.near_m, 0.0)
     return Anchors(
         (anchor.direction * depths.near_m + anchor.origin).T,
         anchor.direction.T,
-        depths.sigma_m,
+        np.maximum(depths.sigma_m, between_m),
         pixel_cov.reshape(-1, 3).astype(float),
-        ~(depths.mixed | moving.repeat(2)),
+        ~((depths.mixed & ~distant) | moving.repeat(2)),
     )
 
 

@@ -129,6 +129,18 @@ def test_missing_depth_is_a_distant_point_hardly_known_and_not_used() -> None:
     assert np.isfinite(motion.static_chi2).all()
 
 
+def test_before_something_distant_an_end_tells_of_the_cameras_turn_whichever_of_both_it_is_on() -> None:
+    store = FragmentStore()
+    pixels = project(ENDS_M, CAMERA).astype(np.float32)[None]
+    near, far = np.full((1, 2), 5.0, np.float32), np.array([[14.0, 9.9]], np.float32)
+    store.add(pixels, near, far, np.ones((1, 2, 3), np.float32))
+    store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
+    anchor = store.anchors(2 * FRAME_NS, WINDOW_S)
+    points = static_points(anchor, appraise(anchor, NOISE), store.pixel_cov, np.array([False]), 10.0)
+    assert points.usable.tolist() == [True, False]
+    assert points.depth_sigma_m[0] == pytest.approx(9.0)
+
+
 def test_looks_make_depth_surer_but_never_more_than_twice() -> None:
     """Of neighbouring pixels noise is alike in part."""
     store = follow(going((0.0, 0.0, 0.0), 20)).store
@@ -144,13 +156,13 @@ def test_ends_on_two_surfaces_and_ends_of_movers_are_no_static_points() -> None:
     anchor = store.anchors(4 * FRAME_NS, WINDOW_S)
     depths = appraise(anchor, NOISE)
     assert depths.mixed.all()
-    assert not static_points(anchor, depths, store.pixel_cov, np.array([False])).usable.any()
+    assert not static_points(anchor, depths, store.pixel_cov, np.array([False]), 10.0).usable.any()
     store = follow(going((0.0, 0.0, 0.0), 3)).store
     anchor = store.anchors(4 * FRAME_NS, WINDOW_S)
     depths = appraise(anchor, NOISE)
     assert not depths.mixed.any()
-    assert not static_points(anchor, depths, store.pixel_cov, np.array([True])).usable.any()
-    points = static_points(anchor, depths, store.pixel_cov, np.array([False]))
+    assert not static_points(anchor, depths, store.pixel_cov, np.array([True]), 10.0).usable.any()
+    points = static_points(anchor, depths, store.pixel_cov, np.array([False]), 10.0)
     assert points.usable.all()
     np.testing.assert_allclose(points.points_m, ENDS_M, atol=1e-4)
 
