@@ -69,9 +69,10 @@ def _hidden_between(grid: DepthGrid, one: NDArray[np.intp], other: NDArray[np.in
     if last <= first:
         return False
     top, last_row = quantiles(np.concatenate((one, other)) // width, (0.25, 0.75))
-    inverse = grid.inverse_depth
-    between = inverse[int(top) : int(last_row) + 1, first:last]
+    inverse, inside = grid.inverse_depth, (slice(int(top), int(last_row) + 1), slice(first, last))
+    between = inverse[inside]
     nearest = max(float(median(inverse.ravel()[one])), float(median(inverse.ravel()[other])))
     nearer = np.count_nonzero(between > nearest + NEARER_INVERSE)
-    farther = np.count_nonzero((between > 0.0) & (between < nearest - NEARER_INVERSE))
-    return bool(nearer >= 0.5 * between.size or (wide and farther <= _HARDLY * between.size))
+    farther = (between > 0.0) & (between < nearest - NEARER_INVERSE)
+    unseen = np.count_nonzero(farther | grid.beyond[inside]) <= _HARDLY * between.size
+    return bool(nearer >= 0.5 * between.size or (wide and unseen))

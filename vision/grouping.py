@@ -102,7 +102,7 @@ def _parted(
     grid: DepthGrid, parts: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     """(K,) whether something nearer stands between the middles of parts one[k] and other[k] in the image."""
-    inverse = _inverse_between(grid, parts, one, other)
+    inverse = grid.inverse_depth.ravel().take(_cells_between(grid, parts, one, other))
     depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
     nearer = inverse > 1.0 / np.maximum(depth, 0.1) + NEARER_INVERSE
     result: NDArray[np.bool_] = nearer.sum(axis=0) >= _LEAST_SAMPLES
@@ -210,22 +210,21 @@ def _seen_between(
     grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     """(K,) whether something farther is seen between the middles of regions one[k] and other[k]."""
-    inverse = _inverse_between(grid, regions, one, other)
+    cells = _cells_between(grid, regions, one, other)
+    inverse, beyond = grid.inverse_depth.ravel().take(cells), grid.beyond.ravel().take(cells)
     depth = np.maximum(regions.position_m[one, 2], regions.position_m[other, 2])
     farther = (inverse > 0.0) & (inverse < 1.0 / np.maximum(depth, 0.1) - NEARER_INVERSE)
-    result: NDArray[np.bool_] = farther.sum(axis=0) >= _LEAST_SAMPLES
+    result: NDArray[np.bool_] = (farther | beyond).sum(axis=0) >= _LEAST_SAMPLES
     return result
 
 
-def _inverse_between(
+def _cells_between(
     grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
-) -> FloatArray:
-    """(24, K) inverse depth in the image on the way from the middle of region one[k] to that of other[k], 0
-    where there is none."""
+) -> NDArray[np.intp]:
+    """(24, K) cells in the image on the way from the middle of region one[k] to that of other[k]."""
     middle = 0.5 * (regions.bbox_px[:, :2] + regions.bbox_px[:, 2:])
     u, v = (k[one] + (k[other] - k[one]) * _ALONG for k in middle.T)
-    result: FloatArray = grid.inverse_depth.ravel().take(grid.cells(u, v)).astype(float)
-    return result
+    return grid.cells(u, v)
 
 
 def join(grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]]) -> tuple[IntGrid, list[int]]:

@@ -91,7 +91,8 @@ def test_one_body_behind_somebody_is_not_divided() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wide_m", "behind_m", "divided"), [(1.0, 0.0, False), (1.0, 6.0, True), (0.5, 0.0, True)]
+    ("wide_m", "behind_m", "divided"),
+    [(1.0, 0.0, False), (1.0, 6.0, True), (1.0, 14.0, True), (0.5, 0.0, True)],
 )
 def test_between_a_piece_wider_than_anybody_and_another_something_has_to_be_seen(
     wide_m: float, behind_m: float, divided: bool

@@ -188,6 +188,7 @@ def test_pieces_of_something_wide_with_nothing_seen_between_them_are_one() -> No
     assert merged(REAR, WHEEL, behind_m=0.0) == [(1, 0)]
     assert merged(REAR, WHEEL, behind_m=3.1) == [(1, 0)]  # its own side
     assert merged(REAR, WHEEL, behind_m=5.0) == []  # the way behind is seen
+    assert merged(REAR, WHEEL, behind_m=14.0) == []  # even beyond the depth mask
     assert merged(REAR, replace(WHEEL, x=0.95), behind_m=0.0) == []  # 0.86 m away
     narrow = replace(REAR, x=-0.4, width=0.6)
     assert merged(narrow, WHEEL, behind_m=0.0) == []  # two people walk like that
