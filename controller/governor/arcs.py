@@ -92,8 +92,8 @@ def understand(twist: Twist, robot: Robot) -> Wish:
 
 
 def driveable(wish: Wish, v_mps: float, robot: Robot) -> Wish:
-    """An arc that can be driven at once: at v_mps the yaw rate may not yet admit the one that is asked for,
-    so the robot slows down on the tightest that it does admit."""
+    """An arc that can be driven at once: at v_mps, the most it will still come to, the yaw rate may not yet
+    admit the one that is asked for, so the robot slows down on the tightest that it does admit."""
     most_1pm = robot.limits.max_yaw_rate_radps / max(v_mps, STANDING_MPS)
     if abs(wish.curvature_1pm) <= most_1pm:
         return wish

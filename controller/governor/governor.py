@@ -151,7 +151,9 @@ class SpeedGovernor:
         between two directions of turning, the robot stands."""
         stands = self._shape.v_mps == 0.0 and self._shape.a_mps2 == 0.0
         if wish.kind is Kind.ARC and (stands or self._motion.kind is Kind.ARC):
-            self._motion = driveable(wish, self._shape.v_mps, self._robot)
+            # Until its acceleration has come to nothing it still gets faster.
+            more_mps = max(self._shape.a_mps2, 0.0) ** 2 / (2.0 * self._robot.limits.max_jerk_mps3)
+            self._motion = driveable(wish, self._shape.v_mps + more_mps, self._robot)
         elif wish.kind is Kind.TURN and (
             stands or (self._motion.kind is Kind.TURN and self._motion.left == wish.left)
         ):

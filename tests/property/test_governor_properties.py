@@ -29,8 +29,18 @@ def drive(sequence: list[tuple[Twist | None, int]], things: list[Thing] | None =
     return run.run(len(asked) * PERIOD_S - 1e-6)
 
 
+# A tight arc while it still gets faster, at the speed at which it turns as fast as it may.
+STILL_FASTER: list[tuple[Twist | None, int]] = [
+    (None, 3),
+    (Twist(1.0, 0.0), 74),
+    (None, 5),
+    (Twist(0.25, 0.5), 1),
+]
+
+
 @settings(max_examples=8, deadline=None)
 @given(SEQUENCES)
+@example(STILL_FASTER)
 def test_limits_are_kept_whatever_is_asked(sequence: list[tuple[Twist | None, int]]) -> None:
     steps = drive(sequence, [Thing(stands(3.5, 0.2))])
     v = np.array([0.0] + [one.governed.v_mps for one in steps])
