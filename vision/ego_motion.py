@@ -71,17 +71,20 @@ def estimate(
         return _unseen(start, sigma, float("nan"))
     view = view_of(anchors, pixels, use, camera)
     found = _solve(view, start, sigma)
-    if _looks_bent(found):
+    bend_rad, bend_variance = _bend(found)
+    if (np.square(bend_rad - found.sweep_rad) > _BENT_CHI2 * bend_variance).any():
         # Before the read-out is known, what is not certain may all the same be plain to see.
         possible = np.concatenate((prior.sigma, sweep.most_rad))
         straightened = _solve(view, start, possible)
         if straightened.inliers >= found.inliers + _STRAIGHTENED_SHARE * len(use):
             found, sigma = straightened, possible
+            bend_rad, bend_variance = _bend(found)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
     torn = prior.binding and _conflict(found.pose, start, prior.sigma)
     if torn:
         # Something large moves, and the data follow it. What agrees with the prior is the ground.
         found = _solve(view, start, sigma * _TRUSTED_SHARE)
+        bend_rad, bend_variance = _bend(found)
         least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
         # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
         torn = _conflict(found.pose, start, prior.sigma)
@@ -90,16 +93,8 @@ def estimate(
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
     if found.inliers < least or torn or not regular:
         return _unseen(start, sigma, ratio)
-    bend_rad, bend_variance = _bend(found)
     spread = np.asarray(covariance, np.float64)
     return CameraEstimate(found.pose, found.sweep_rad, bend_rad, bend_variance, spread, ratio, True)
-
-
-def _looks_bent(found: _Solution) -> bool:
-    """Whether the image tells clearly of another sweep than was found."""
-    bend_rad, variance = _bend(found)
-    off = bend_rad - found.sweep_rad
-    return bool((off * off > _BENT_CHI2 * variance).any())
 
 
 def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:
