@@ -34,7 +34,9 @@ class RealsenseCameraConfig(Section):
 
     kind: Literal["realsense"] = "realsense"
     serial: str | None = Field(default=None, min_length=1, description="needed where several are connected")
-    width: int = Field(default=640, gt=0, le=1920)
+    width: int = Field(
+        default=848, gt=0, le=1920, description="with 480 rows, 848 see 69 degrees, 640 see 55"
+    )
     height: int = Field(default=480, gt=0, le=1080)
     fps: int = Field(default=30, gt=0, le=90)
     gyro: bool = Field(default=False, description="also read the D435i's gyro")
@@ -57,12 +59,12 @@ class SimulatedCameraConfig(Section):
     """
 
     kind: Literal["simulated"] = "simulated"
-    width: int = Field(default=640, ge=32, le=4096)
+    width: int = Field(default=848, ge=32, le=4096)
     height: int = Field(default=480, ge=32, le=4096)
     fx: float = Field(default=610.0, gt=0)
     fy: float = Field(default=610.0, gt=0)
     cx: float = Field(
-        default_factory=lambda given: 0.5 * (given.get("width", 640) - 1),
+        default_factory=lambda given: 0.5 * (given.get("width", 848) - 1),
         description="the middle, if not given",
     )
     cy: float = Field(

@@ -24,7 +24,7 @@ from sim.render import Picture
 from sim.world import World
 
 _FAR_M = 10.0
-_MAP_PX = (640, 480)
+_MAP_PX = (848, 480)
 
 
 @click.command()

@@ -54,7 +54,11 @@ class Sequence:
     def camera(self) -> SimulatedCameraConfig:
         """640x480 at 30 frames a second."""
         return SimulatedCameraConfig(
-            depth_noise=self.noise, vibration_deg=self.vibration_deg, vibration_hz=9.0
+            width=640,
+            height=480,
+            depth_noise=self.noise,
+            vibration_deg=self.vibration_deg,
+            vibration_hz=9.0,
         )
 
 

@@ -97,7 +97,7 @@ class TumWriter:
         if self._odometry is None:
             self._odometry = self._index("odometry.txt", "# camera: time tx ty tz qx qy qz qw")
         values = (*pose.translation_m.tolist(), *quaternion_of(pose.rotation).tolist())
-        self._odometry.write(f"{stamp} {' '.join(f'{value:.9f}' for value in values)}\n")
+        self._odometry.write(f"{stamp} {' '.join(f'{value:.12f}' for value in values)}\n")
 
     def _index(self, name: str, heading: str) -> TextIO:
         # A line at a time reaches the disk, so a recording that ends abruptly can still be read.

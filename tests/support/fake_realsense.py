@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hal.clocks import NS_PER_MS, SimulatedClock
 
-WIDTH, HEIGHT, FPS = 640, 480, 30
+WIDTH, HEIGHT, FPS = 848, 480, 30
 SERIAL = "000000000001"
 PERIOD_MS = 1000.0 / FPS
 

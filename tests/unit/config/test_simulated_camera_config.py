@@ -8,7 +8,7 @@ from config.camera import SimulatedCameraConfig
 
 def test_the_default_is_like_a_d435i() -> None:
     config = SimulatedCameraConfig()
-    assert (config.width, config.height, config.fps) == (640, 480, 30.0)
+    assert (config.width, config.height, config.fps) == (848, 480, 30.0)
     assert (config.depth_min_m, config.depth_max_m) == (0.3, 10.0)
     assert config.depth_noise == "realsense"
 
@@ -18,8 +18,8 @@ def test_the_default_is_like_a_d435i() -> None:
     [
         ("depth_max_m", 0.2, "smaller than depth_max_m"),
         ("depth_noise", "laser", "depth_noise"),
-        ("cx", 640.0, "inside the 640x480 image"),
-        ("cy", -0.5, "inside the 640x480 image"),
+        ("cx", 848.0, "inside the 848x480 image"),
+        ("cy", -0.5, "inside the 848x480 image"),
         ("fps", 0.0, "greater than 0"),
         ("hole_ratio", 0.9, "less than or equal"),
         ("zoom", 2.0, "extra"),

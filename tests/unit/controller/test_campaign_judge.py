@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from config.app import AppConfig
+from config.camera import SimulatedCameraConfig
 from config.scenario import Go, Motion, Wait
 from controller.campaign.drive import DriveLog
 from controller.campaign.judge import Row, false_stops, flaps, judge
@@ -20,8 +22,8 @@ from tests.support.campaign import CONFIG, crate, log_of, mover, stage
 UP, DOWN, KEEP = Action.INCREASE, Action.DECREASE, Action.KEEP
 
 
-def judged(made: Stage, log: DriveLog) -> Row:
-    return judge(made, log, "ours", "noise", yardstick(made, CONFIG))
+def judged(made: Stage, log: DriveLog, config: AppConfig = CONFIG) -> Row:
+    return judge(made, log, "ours", "noise", yardstick(made, config))
 
 
 def cruise(v_mps: float, duration_s: float, then: tuple[float, ...] = ()) -> DriveLog:
@@ -84,7 +86,8 @@ def test_the_driver_takes_over_the_robot_as_it_is(gain_mps2: float, at_fault: in
     steps = 140
     before = [max(0.6 - gain_mps2 * 0.02 * (steps - k), 0.0) for k in range(steps)]
     log = log_of(before + [0.6] * 300, s_m=0.6 * steps * 0.02 - sum(before) * 0.02)
-    row = judged(stage(mover(3.3, -4.3, 3.3, 4.0, 1.4, start_s=0.6), length_m=9.0), log)
+    narrow = CONFIG.model_copy(update={"camera": SimulatedCameraConfig(width=640)})
+    row = judged(stage(mover(3.3, -4.3, 3.3, 4.0, 1.4, start_s=0.6), length_m=9.0), log, narrow)
     assert (row.contacts, row.contacts_at_fault) == (1, at_fault)
 
 

@@ -39,16 +39,16 @@ def test_gives_colour_and_depth_with_scale_intrinsics_and_device_time() -> None:
     camera, _, _ = camera_over(*framesets(0, 3))
     with camera:
         frame = camera.read(0.1)
-        assert frame.colour.shape == (480, 640, 3)
+        assert frame.colour.shape == (480, 848, 3)
         assert frame.colour.dtype == np.uint8
         assert np.all(frame.colour == 1)
-        assert frame.depth.shape == (480, 640)
+        assert frame.depth.shape == (480, 848)
         assert frame.depth.dtype == np.uint16
         assert np.all(frame.depth == 1001)
         assert frame.depth_scale_m == 0.001
         assert frame.sequence == 1
         assert frame.device_s == pytest.approx(PERIOD_MS / 1000)
-        assert frame.intrinsics == camera.intrinsics == Intrinsics(640, 480, 615.0, 614.0, 321.5, 238.5)
+        assert frame.intrinsics == camera.intrinsics == Intrinsics(848, 480, 615.0, 614.0, 321.5, 238.5)
         assert frame.gyro is None
 
 
@@ -77,8 +77,8 @@ def test_asks_for_the_configured_modes_of_the_one_device_and_steadies_its_sensor
     with camera:
         assert vendor.configs[0].serial == "000000000001"
         assert vendor.configs[0].streams == [
-            ("color", 640, 480, "bgr8", 30),
-            ("depth", 640, 480, "z16", 30),
+            ("color", 848, 480, "bgr8", 30),
+            ("depth", 848, 480, "z16", 30),
         ]
         assert [sensor.options for sensor in vendor.device.sensors] == [
             {"global_time_enabled": 0},
@@ -240,14 +240,14 @@ def test_of_several_cameras_the_named_one_is_opened() -> None:
 def test_a_mode_that_does_not_start_is_refused_with_the_vendors_reason() -> None:
     camera, vendor, _ = camera_over()
     vendor.refuse_video = "Couldn't resolve requests"
-    with pytest.raises(DeviceRefused, match=r"640x480.*30 Hz.*Couldn't resolve requests.*USB 3"):
+    with pytest.raises(DeviceRefused, match=r"848x480.*30 Hz.*Couldn't resolve requests.*USB 3"):
         camera.__enter__()
 
 
 def test_a_device_that_gives_another_mode_than_asked_is_refused_and_stopped() -> None:
     camera, vendor, _ = camera_over(*framesets(0, 1))
-    vendor.streams["depth"] = FakeStream("Depth", "z16", size=(848, 480))
-    with pytest.raises(DeviceRefused, match=r"Depth was asked for 640x480 .* gave 848x480"):
+    vendor.streams["depth"] = FakeStream("Depth", "z16", size=(640, 480))
+    with pytest.raises(DeviceRefused, match=r"Depth was asked for 848x480 .* gave 640x480"):
         camera.__enter__()
     assert [pipeline.running for pipeline in vendor.pipelines] == [False]
 

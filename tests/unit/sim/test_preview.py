@@ -26,8 +26,8 @@ def test_it_writes_four_pictures_in_one(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     sheet = cv2.imread(str(out))
     assert sheet is not None
-    assert sheet.shape == (960, 1280, 3)
-    quarters = [sheet[v : v + 480, u : u + 640] for v in (0, 480) for u in (0, 640)]
+    assert sheet.shape == (960, 1696, 3)
+    quarters = [sheet[v : v + 480, u : u + 848] for v in (0, 480) for u in (0, 848)]
     assert all(float(np.std(quarter)) > 10 for quarter in quarters)
 
 
