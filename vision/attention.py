@@ -22,11 +22,10 @@ from vision.candidates import (
     new_fragments,
     on_one_surface,
 )
-from vision.contours import find_contours
 from vision.depth_mask import SurfaceDepth, depth_sigma_m
 from vision.detection import Detection
 from vision.edges import GreyImage, find_edges
-from vision.segments import hough_segments, lengths_px
+from vision.segments import find_segments, longest_first
 from vision.tracks import Tracks
 
 _FEW_FRAGMENTS = 4
@@ -42,7 +41,6 @@ _MIN_LENGTH = 0.5  # of the length of other fragments
 _MIN_END_DISTANCE_PX = 8.0
 _LEAST_HELD = 600.0  # on a short edge without corners both ends slide alike; noise alone makes 220
 _CONTRAST = 60.0
-_LOW_SHARE = 0.4
 _CANDIDATES = 48
 _AT_ONCE = 4
 _GATE_M = 0.3
@@ -99,9 +97,10 @@ class Attention:
         top, bottom = max(0, v0 - _MARGIN_PX), min(height, v1 + _MARGIN_PX)
         if min(right - left, bottom - top) < _MIN_SIDE_PX:
             return NOTHING_NEW
-        segments_px = self._segments(grey[top:bottom, left:right])
-        segments_px += np.array((left, top), np.float32)
-        ends, tensor = held_ends(grey, segments_px, ends_px, _MIN_END_DISTANCE_PX, _LEAST_HELD)
+        edges = find_edges(grey[top:bottom, left:right], _CONTRAST)
+        segments_px = find_segments(edges, _MIN_LENGTH * settings.min_length_px, (left, top))
+        longest_px = longest_first(segments_px)[:_CANDIDATES]
+        ends, tensor = held_ends(grey, longest_px, ends_px, _MIN_END_DISTANCE_PX, _LEAST_HELD)
         surface = depth_along(ends, frame, self._config)
         picked = np.flatnonzero(self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]))
         return new_fragments(picked[: min(room, _AT_ONCE)], ends, tensor, surface, settings)
@@ -128,11 +127,3 @@ class Attention:
         first = int(np.lexsort((-waited_ns, ~bodies.urgent, ~due))[0])
         self._looked_ns[ids[first]] = now_ns
         return first
-
-    def _segments(self, grey: GreyImage) -> NDArray[np.float32]:
-        """(N, 2, 2) by Hough and by contours, the longest ones, where others look for longer ones."""
-        min_length_px = _MIN_LENGTH * self._config.fragments.min_length_px
-        contours = find_contours(find_edges(grey, _LOW_SHARE * _CONTRAST, _CONTRAST), min_length_px)
-        found = np.concatenate((hough_segments(contours.edges, min_length_px), contours.ends_px))
-        longest: NDArray[np.float32] = found[np.argsort(-lengths_px(found), kind="stable")[:_CANDIDATES]]
-        return longest

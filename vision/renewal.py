@@ -19,9 +19,8 @@ from vision.candidates import (
     new_fragments,
     on_one_surface,
 )
-from vision.contours import find_contours
 from vision.edges import GreyImage, find_edges
-from vision.segments import hough_segments, lengths_px
+from vision.segments import find_segments, longest_first
 
 PART_PX = (240, 160)
 _BLOCKS = 2  # per part, one above the other: each has its own threshold of contrast
@@ -29,7 +28,6 @@ _MARGIN_PX = 8
 _MANY_MISSING = 8  # where more than one fragment in so many is missing, all parts of a band are searched
 _FEW_MISSING = 16  # where less than one in so many is, none: a search costs as much for one as for ten
 _MIN_END_DISTANCE_PX = 12.0
-_LOW_SHARE = 0.4
 _CANDIDATES_PER_TILE = 4
 _SHARE_WITHOUT_DEPTH = 0.15
 
@@ -74,7 +72,7 @@ class Renewal:
     def _segments(
         self, grey: GreyImage, counts: NDArray[np.intp], row: int, column: int
     ) -> NDArray[np.float32]:
-        """Segments of one part, by Hough and by contours, outside of tiles that are full."""
+        """Segments of one part, outside of tiles that are full."""
         settings = self._config.fragments
         rows, columns = (
             slice(
@@ -86,11 +84,7 @@ class Renewal:
         edges = self._edges(grey[rows, columns], self._threshold[row, column])
         free = counts < 2 * settings.fragments_per_tile
         edges *= _pixels_of(free, settings.tile_px, rows, columns)
-        contours = find_contours(edges, settings.min_length_px)
-        lines = hough_segments(contours.edges, settings.min_length_px)
-        segments = np.concatenate((lines, contours.ends_px))
-        segments += np.array((columns.start, rows.start), np.float32)
-        return segments
+        return find_segments(edges, settings.min_length_px, (columns.start, rows.start))
 
     def _edges(self, grey: GreyImage, thresholds: FloatArray) -> GreyImage:
         """Edges of one part, block by block. The next visit looks closer where little was seen, less close
@@ -100,7 +94,7 @@ class Renewal:
         borders = [len(grey) * block // _BLOCKS for block in range(_BLOCKS + 1)]
         for block, (top, bottom) in enumerate(pairwise(borders)):
             high = float(thresholds[block])
-            inside = find_edges(grey[top:bottom], _LOW_SHARE * high, high)
+            inside = find_edges(grey[top:bottom], high)
             edges[top:bottom] = inside
             share = max(cv2.countNonZero(inside) / inside.size, 1e-3)
             wanted = high * min(max(math.sqrt(share / settings.edge_share), 0.6), 1.6)
@@ -119,7 +113,7 @@ class Renewal:
         """Thin out to what the tiles lack; drop what has no depth, crosses a depth edge or is untrackable."""
         settings, config = self._config.fragments, self._config
         missing = settings.fragments_per_tile - counts.ravel() // 2
-        candidates = candidates[np.argsort(-lengths_px(candidates), kind="stable")]
+        candidates = longest_first(candidates)
         tile = _tiles(candidates, settings.tile_px, counts.shape[1])
         wanted = _rank_within(tile) < np.minimum(4 * missing, _CANDIDATES_PER_TILE).take(tile)
         snapped, tensor = held_ends(grey, candidates[wanted], ends_px, _MIN_END_DISTANCE_PX)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.contours import find_contours
 from vision.edges import GreyImage
 
 FloatImage = NDArray[np.float32]
@@ -23,6 +24,21 @@ _ONES = np.ones(2 * _WINDOW_PX + 1)
 # A segment of 32 px turns by somewhat more when an end moves by a pixel: finer says no more. Upright, level
 # and diagonal lines are met exactly.
 _ANGLE_RAD = math.pi / 120.0
+
+
+def find_segments(edges: GreyImage, min_length_px: float, corner_px: tuple[int, int]) -> NDArray[np.float32]:
+    """(N, 2, 2) segments of one part of an image, by the Hough transform and by contours; short contours take
+    part in neither. edges (H, W): of that part; corner_px (u, v): its upper left pixel in the image."""
+    contours = find_contours(edges, min_length_px)
+    found = np.concatenate((hough_segments(contours.edges, min_length_px), contours.ends_px))
+    found += np.array(corner_px, np.float32)
+    return found
+
+
+def longest_first(segments_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Segments (N, 2, 2) by their length; of equal ones the first stays first."""
+    ordered: NDArray[np.float32] = segments_px[np.argsort(-lengths_px(segments_px), kind="stable")]
+    return ordered
 
 
 def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32]:

@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 
 from vision.contours import find_contours
 from vision.edges import find_edges
-from vision.segments import hough_segments, lengths_px, smaller_eigenvalue, snap_to_corners
+from vision.segments import (
+    find_segments,
+    hough_segments,
+    lengths_px,
+    longest_first,
+    smaller_eigenvalue,
+    snap_to_corners,
+)
 
 
 def empty() -> NDArray[np.uint8]:
@@ -26,7 +33,7 @@ def stroke(length_px: int, row: int = 50, first: int = 20) -> NDArray[np.uint8]:
 def test_edges_lie_where_the_grey_level_steps() -> None:
     grey = empty()
     grey[:, 150:] = 120
-    columns = np.flatnonzero(find_edges(grey, 40.0, 100.0).any(axis=0))
+    columns = np.flatnonzero(find_edges(grey, 100.0).any(axis=0))
     assert len(columns) == 1
     assert columns[0] in (149, 150)
 
@@ -34,8 +41,16 @@ def test_edges_lie_where_the_grey_level_steps() -> None:
 def test_a_step_below_the_threshold_is_no_edge() -> None:
     grey = empty()
     grey[:, 150:] = 20  # a Sobel response of 80
-    assert find_edges(grey, 40.0, 70.0).any()
-    assert not find_edges(grey, 40.0, 100.0).any()
+    assert find_edges(grey, 70.0).any()
+    assert not find_edges(grey, 100.0).any()
+
+
+@pytest.mark.parametrize(("step", "goes_on"), [(20, False), (30, True)])
+def test_an_edge_goes_on_where_four_tenths_of_its_contrast_are_left(step: int, goes_on: bool) -> None:
+    """From a Sobel response of 400 in the upper half down to 80 or 120 in the lower one."""
+    grey = empty()
+    grey[:100, 150:], grey[100:, 150:] = 100, step
+    assert find_edges(grey, 250.0)[110:].any() == goes_on
 
 
 def test_contours_from_32_pixels_on_are_kept() -> None:
@@ -89,6 +104,21 @@ def test_hough_finds_a_stroke_with_its_ends(u: int, v: int) -> None:
 
 def test_hough_leaves_out_short_strokes() -> None:
     assert hough_segments(stroke(20), 32.0).shape == (0, 2, 2)
+
+
+def test_segments_of_one_part_lie_in_the_whole_image() -> None:
+    """A stroke by its two contours, there and back, and by Hough; nothing of a short one."""
+    found = find_segments(stroke(40) | stroke(20, row=90), 32.0, (100, 30))
+    assert len(found) == 3
+    for ends in found:
+        ordered = ends[ends[:, 0].argsort()]
+        np.testing.assert_allclose(ordered, [[120.0, 80.0], [160.0, 80.0]], atol=1.0)
+
+
+def test_the_longest_segment_comes_first_and_of_equal_ones_the_first() -> None:
+    ends = np.zeros((4, 2, 2), np.float32)
+    ends[:, 1] = [(3.0, 4.0), (0.0, 8.0), (0.0, 5.0), (0.0, 2.0)]
+    np.testing.assert_array_equal(longest_first(ends), ends[[1, 0, 2, 3]])
 
 
 def test_length_of_a_segment() -> None:
