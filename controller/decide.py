@@ -104,7 +104,7 @@ class DecisionMaker:
     def _knowledge(self, path: Path, on_path: OnPath) -> Knowledge:
         if self._known is None or path is not self._path:
             self._path = path
-            self._known = Knowledge(path, self._robot.body, self._mount, self._config, on_path.s_m)
+            self._known = Knowledge(path, self._robot, self._mount, self._config, on_path.s_m)
         return self._known
 
     def _path_limits(self, path: Path, on_path: OnPath, motion: Motion) -> list[Limit]:

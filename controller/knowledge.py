@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
-from config.robot import Body
+from config.robot import Robot
 from controller.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.corridor import Corridor
 from controller.limits import STANDING_MPS
@@ -39,9 +39,9 @@ class Knowledge:
     """
 
     def __init__(
-        self, path: Path, body: Body, mount: CameraMount, config: DecisionConfig, start_s_m: float
+        self, path: Path, robot: Robot, mount: CameraMount, config: DecisionConfig, start_s_m: float
     ) -> None:
-        self.corridor = Corridor(path, body)
+        self.corridor = Corridor(path, robot.body)
         self.sight = Sight(self.corridor, mount, config, start_s_m)
         self.bodies = self._seen = no_bodies(0)
         self.health = _GOOD
@@ -52,7 +52,7 @@ class Knowledge:
         self._boxes = no_bodies(0)
         self._sprawls = np.zeros(0, np.bool_)
         self._steady = SteadyVelocities()
-        self._memory = OutOfView(mount, config.sight.near_m)
+        self._memory = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
         self.edge_tan = 0.5
         self._places: deque[tuple[int, FloatArray]] = deque()
         self._captured_ns: int | None = None

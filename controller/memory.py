@@ -20,6 +20,7 @@ from controller.bodies import Bodies, no_bodies
 from controller.limits import LEAVES_ASLANT
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
+from vision.judgement import IMPLAUSIBLE
 from vision.scene import FreeSpace
 
 BoolArray = NDArray[np.bool_]
@@ -44,7 +45,6 @@ _NOBODY_HALF_M = 0.1
 # So certainly it goes that it will not be found where it was seen last. Who has been looked at for longer
 # stands by a verdict that had time: what sinks below the view may well seem to move.
 _CERTAIN_SIGMAS, _NO_VERDICT_S = 5.0, 1.0
-_MISTAKEN_MPS = 2.4  # and whatever is measured as faster is a mistake, as in vision/judgement.py
 # Two velocities that differ by so much are of two.
 _APART_SIGMAS = 2.0
 
@@ -52,10 +52,12 @@ _APART_SIGMAS = 2.0
 class OutOfView:
     """Standing bodies are kept until their place is seen again or has been passed, moving ones go on as they
     did: for a while, or, where they may come before the robot, until they must have come into view again.
-    near_m: ahead of the camera, nearer than this the floor is not seen."""
+    near_m: ahead of the camera, nearer than this the floor is not seen. max_obstacle_speed_mps: what is
+    measured as much faster is a mistake."""
 
-    def __init__(self, mount: CameraMount, near_m: float) -> None:
+    def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
         self._mount, self._near_m = mount, near_m
+        self._mistaken_mps = IMPLAUSIBLE * max_obstacle_speed_mps
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
         # How those that stand by the verdict were measured when they were last seen, of whom clearly came.
@@ -113,7 +115,7 @@ class OutOfView:
         if not len(self._since_s) and not gone.any():
             return no_bodies(seen.captured_ns)
         since = np.concatenate((self._since_s, np.zeros(int(gone.sum())))) + dt_s
-        bodies = self._bodies.joined(_as_measured(before.select(gone)))
+        bodies = self._bodies.joined(_as_measured(before.select(gone), self._mistaken_mps))
         bodies = replace(
             bodies,
             captured_ns=seen.captured_ns,
@@ -234,15 +236,16 @@ def _clearly_comes(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     return np.asarray(inwards_mps > np.maximum(_CLEAR_SIGMAS * sigma_mps, _CLEAR_MPS))
 
 
-def _as_measured(bodies: Bodies) -> Bodies:
+def _as_measured(bodies: Bodies, mistaken_mps: float) -> Bodies:
     """With the velocity that was measured for who stands by the verdict alone, which takes some frames.
-    Thought to stand where it is not seen, it would be waited for without end."""
+    Thought to stand where it is not seen, it would be waited for without end. Not with a velocity above
+    mistaken_mps: it is none."""
     squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
     # Along its way: v' C v / v'v is the variance there.
     variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
     goes = ~bodies.moving & (bodies.age_s < _NO_VERDICT_S)
     goes &= (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
-    goes &= squared <= _MISTAKEN_MPS**2
+    goes &= squared <= mistaken_mps**2
     if not goes.any():
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)

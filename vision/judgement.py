@@ -43,7 +43,7 @@ _ARRIVED_SHARE = 0.05
 _MUCH_CELLS = 20
 _MUCH_SHARE = 0.2
 _KNOWN_SPEED = 2.0  # of the least speed: with less doubt than this, a slow mover has stopped
-_IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
+IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
 _CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
 _CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewhat longer
 _CLEAR_WAY = 4.0  # times the noise of one pixel's depth: no noise that neighbours share feigns so long a way
@@ -136,7 +136,7 @@ def judge(
 ) -> Verdict:
     """Raise or lower the evidence of each track, and decide."""
     read = _read(seen, settings)
-    possible = (read.speed_mps <= _IMPLAUSIBLE * settings.max_speed_mps) & (seen.size_m <= _LARGEST_M)
+    possible = (read.speed_mps <= IMPLAUSIBLE * settings.max_speed_mps) & (seen.size_m <= _LARGEST_M)
     evident = (
         _by_fragments(seen, read) | _by_unrest(seen, read) | _by_arrival(read) | _by_surface(seen, read, dt_s)
     )

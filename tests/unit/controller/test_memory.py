@@ -24,7 +24,7 @@ ALL_SEEN = FreeSpace(BANDS, 0.025, np.full(20, np.inf), np.full(20, 8.0))
 
 class Recall:
     def __init__(self) -> None:
-        self.memory = OutOfView(MOUNT, NEAR_M)
+        self.memory = OutOfView(MOUNT, NEAR_M, 1.5)
         self.before = no_bodies(0)
         self.now_ns = 0
 
@@ -168,7 +168,7 @@ def test_who_goes_along_but_leaves_aslant_is_not_either(aside_mps: float, kept: 
 
 
 def test_how_long_it_was_not_seen_is_counted() -> None:
-    memory, before = OutOfView(MOUNT, NEAR_M), box(2.0, 2.5, 0.0, -0.3)
+    memory, before = OutOfView(MOUNT, NEAR_M, 1.5), box(2.0, 2.5, 0.0, -0.3)
     seen = replace(no_bodies(0), captured_ns=FRAME_NS)
     kept = memory.update(before, seen, PlanarPose(0.0, 0.0, 0.0), EDGE, False, NOTHING_SEEN)
     assert kept.unseen_s.tolist() == pytest.approx([0.1])

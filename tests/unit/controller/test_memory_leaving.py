@@ -7,11 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from config.decision import DecisionConfig
+from config.robot import Limits, Robot
 from controller.bodies import Bodies, no_bodies
+from controller.knowledge import Knowledge
 from controller.memory import SETTLED_S, OutOfView
+from controller.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
-from vision.scene import FreeSpace
+from tests.support.deciding import MOUNT, PATH, obstacle
+from tests.support.scenes import GOOD, STILL, free_space
+from vision.scene import FreeSpace, Scene
 
 NEAR_M, EDGE = 1.3, 0.5
 HERE = PlanarPose(0.0, 0.0, 0.0)
@@ -21,8 +27,8 @@ NOTHING_SEEN = FreeSpace(np.zeros(1), EDGE, np.full(1, np.inf), np.zeros(1))
 AT_EDGE = box(4.4, 2.1, sigma_mps=0.1)
 
 
-def memory() -> OutOfView:
-    return OutOfView(CameraMount(0.4, 0.0, 0.60, 0.0), NEAR_M)
+def memory(max_obstacle_speed_mps: float = 1.5) -> OutOfView:
+    return OutOfView(CameraMount(0.4, 0.0, 0.60, 0.0), NEAR_M, max_obstacle_speed_mps)
 
 
 def measured(bodies: Bodies, left_mps: float, unseen_s: float = 0.0) -> Bodies:
@@ -151,9 +157,10 @@ def test_who_was_certainly_going_is_not_thought_to_stand_where_it_is_not_seen(
     assert kept[-1] == (0 if kept_s == 2.0 else 1)
 
 
-def out_of_view_after(seconds: float, left_mps: float, sigma_mps: float) -> Bodies:
-    """Of what was measured so below the view, standing by the verdict."""
-    view, pallet = memory(), box(1.6, 0.1, top_m=0.1, sigma_mps=sigma_mps, age_s=0.9)
+def out_of_view_after(seconds: float, left_mps: float, sigma_mps: float, fastest_mps: float = 1.5) -> Bodies:
+    """Of what was measured so below the view, standing by the verdict; fastest_mps: the greatest speed of any
+    obstacle."""
+    view, pallet = memory(fastest_mps), box(1.6, 0.1, top_m=0.1, sigma_mps=sigma_mps, age_s=0.9)
     before = measured(pallet, left_mps)
     for number in range(1, round(seconds * 10) + 1):
         seen = replace(no_bodies(0), captured_ns=number * FRAME_NS)
@@ -168,9 +175,27 @@ def test_who_was_certainly_going_goes_on_as_it_was_measured() -> None:
     assert found.xy_m[0].tolist() == pytest.approx([1.6 + 0.025, 0.1 + 0.3])
 
 
-def test_however_certainly_nobody_goes_as_fast_as_a_mistake() -> None:
-    assert out_of_view_after(0.5, left_mps=2.3, sigma_mps=0.1).moving.tolist() == [True]
-    assert out_of_view_after(0.5, left_mps=2.5, sigma_mps=0.1).moving.tolist() == [False]
+@pytest.mark.parametrize(("fastest_mps", "left_mps"), [(1.5, 2.4), (1.0, 1.6), (2.5, 4.0)])
+def test_however_certainly_nobody_goes_as_fast_as_a_mistake(fastest_mps: float, left_mps: float) -> None:
+    """Which is 1.6 times as fast as any obstacle."""
+    for measured_mps, goes in ((left_mps - 0.1, True), (left_mps + 0.1, False)):
+        found = out_of_view_after(0.5, measured_mps, sigma_mps=0.1, fastest_mps=fastest_mps)
+        assert found.moving.tolist() == [goes]
+
+
+@pytest.mark.parametrize(("fastest_mps", "goes"), [(1.5, True), (1.0, False)])
+def test_how_fast_any_obstacle_is_the_robots_limits_say(fastest_mps: float, goes: bool) -> None:
+    """Of a pallet that sinks below the view while it is measured at 2 m/s, standing by the verdict."""
+    robot = Robot(limits=Limits(max_obstacle_speed_mps=fastest_mps))
+    known = Knowledge(PATH, robot, MOUNT, DecisionConfig(), 0.0)
+    sinking = replace(
+        obstacle(1.6, 0.1, size_m=(0.5, 0.1), age_s=0.9), velocity_mps=np.array([-2.0, 0.0, 0.0])
+    )
+    for number, seen in enumerate([(sinking,), ()]):
+        scene = Scene(number * FRAME_NS, number, seen, free_space(), STILL, GOOD, HERE)
+        known.update(scene, HERE, OnPath(0.0, 0.0, 0.0), 1.0, number * FRAME_NS)
+    assert known.remembered.tolist() == [True]
+    assert known.bodies.moving.tolist() == [goes]
 
 
 def test_however_certainly_hardly_any_speed_is_no_going() -> None:
