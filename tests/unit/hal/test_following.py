@@ -23,6 +23,19 @@ def seconds_until_told(following: Following, v_mps: float, w_radps: float = 0.0)
     raise AssertionError("not noticed")
 
 
+def assert_follows(lag_s: float, commands: list[tuple[float, float]]) -> None:
+    """A base on slipping tracks that lags by lag_s, told each (v_mps, w_radps) for one period, is never said
+    not to follow."""
+    following, plant = Following(), TrackedPlant(PlantConfig(lag_s=lag_s, slip_factor=1.3))
+    for period, (v_mps, w_radps) in enumerate(commands):
+        now_ns = period * PERIOD_NS
+        plant.advance_to(now_ns)
+        following.step(plant.pose, now_ns)
+        assert following.sentence == ""
+        plant.command(v_mps, w_radps)
+        following.ordered(Setpoint(now_ns, v_mps, 0.0, w_radps))
+
+
 @pytest.mark.parametrize(
     ("v_mps", "w_radps", "after_s"), [(1.5, 0.0, 1.0), (0.5, 0.0, 1.0), (0.1, 0.0, 3.0), (0.0, 0.5, 2.0)]
 )
@@ -58,15 +71,7 @@ def test_one_dead_encoder_is_a_turn_that_nobody_commanded() -> None:
 @pytest.mark.parametrize("w_radps", [0.4, 0.8, 1.2])
 def test_bends_one_way_and_the_other_are_followed(lag_s: float, w_radps: float) -> None:
     """The yaw rate steps, as where arcs without a blend meet."""
-    following, plant = Following(), TrackedPlant(PlantConfig(lag_s=lag_s, slip_factor=1.3))
-    for period in range(1000):
-        now_ns = period * PERIOD_NS
-        plant.advance_to(now_ns)
-        following.step(plant.pose, now_ns)
-        assert following.sentence == ""
-        turn = w_radps if period // 70 % 2 else -w_radps
-        plant.command(0.5, turn)
-        following.ordered(Setpoint(now_ns, 0.5, 0.0, turn))
+    assert_follows(lag_s, [(0.5, w_radps if period // 70 % 2 else -w_radps) for period in range(1000)])
 
 
 def test_zero_ends_it() -> None:
@@ -80,12 +85,5 @@ def test_zero_ends_it() -> None:
 @pytest.mark.parametrize("lag_s", [0.05, 0.5, 2.0])
 @pytest.mark.parametrize("accel_mps2", [0.1, 0.3, 3.0])
 def test_a_sluggish_base_follows(lag_s: float, accel_mps2: float) -> None:
-    following, plant = Following(), TrackedPlant(PlantConfig(lag_s=lag_s, slip_factor=1.3))
-    for period in range(500):
-        now_ns = period * PERIOD_NS
-        plant.advance_to(now_ns)
-        following.step(plant.pose, now_ns)
-        assert following.sentence == ""
-        v_mps = min(accel_mps2 * period / 50, 1.0)
-        plant.command(v_mps, 0.4 * v_mps)
-        following.ordered(Setpoint(now_ns, v_mps, 0.0, 0.4 * v_mps))
+    speeds_mps = [min(accel_mps2 * period / 50, 1.0) for period in range(500)]
+    assert_follows(lag_s, [(v_mps, 0.4 * v_mps) for v_mps in speeds_mps])

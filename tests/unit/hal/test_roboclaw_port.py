@@ -18,6 +18,14 @@ def crc(command: int, data: bytes) -> bytes:
     return packets.crc16(bytes((ADDRESS, command)) + data).to_bytes(2, "big")
 
 
+def asked(request: packets.Request) -> tuple[ScriptedSerialLink, RoboclawPort]:
+    """A line, and a port that sent this request on it at time 0."""
+    link = ScriptedSerialLink()
+    port = RoboclawPort(link, ADDRESS)
+    port.start(request, 0)
+    return link, port
+
+
 class TestPort:
     def test_one_request_at_a_time_and_its_answer(self) -> None:
         link = ScriptedSerialLink()
@@ -32,10 +40,8 @@ class TestPort:
         assert port.idle(2 * MS)
 
     def test_short_reads_are_put_together(self) -> None:
-        link = ScriptedSerialLink()
+        link, port = asked(packets.ENCODERS_REQUEST)
         link.read_at_most(1)
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.ENCODERS_REQUEST, 0)
         data = struct.pack(">II", 1, 2)
         link.deliver(data + crc(78, data))
         answers = [port.poll(k * MS) for k in range(10)]
@@ -43,8 +49,7 @@ class TestPort:
         assert answers[-1] == Answer(packets.ENCODERS_REQUEST, data, 0)
 
     def test_a_lost_answer_ends_after_its_time_and_a_silence(self) -> None:
-        port = RoboclawPort(ScriptedSerialLink(), ADDRESS)
-        port.start(packets.ENCODERS_REQUEST, 0)
+        _, port = asked(packets.ENCODERS_REQUEST)
         assert port.poll(29 * MS) is None
         assert port.poll(30 * MS) == Answer(packets.ENCODERS_REQUEST, None, 0)
         assert not port.idle(39 * MS)
@@ -53,23 +58,17 @@ class TestPort:
     @pytest.mark.parametrize("noise", [b"\x00", b"\xff\x55\xaa"])
     def test_noise_before_an_answer_spoils_it(self, noise: bytes) -> None:
         """An answer has no start mark: guessing where it begins would accept wrong checksums."""
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.MAIN_BATTERY_REQUEST, 0)
+        link, port = asked(packets.MAIN_BATTERY_REQUEST)
         link.deliver(noise + b"\x00\xfc" + crc(24, b"\x00\xfc"))
         assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
 
     def test_a_wrong_checksum_is_no_answer(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.MAIN_BATTERY_REQUEST, 0)
+        link, port = asked(packets.MAIN_BATTERY_REQUEST)
         link.deliver(b"\x00\xfd" + crc(24, b"\x00\xfc"))
         assert port.poll(2 * MS) == Answer(packets.MAIN_BATTERY_REQUEST, None, 0)
 
     def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.speeds(1, 1), 0)
+        link, port = asked(packets.speeds(1, 1))
         port.poll(30 * MS)
         link.deliver(b"\xff")
         assert port.poll(38 * MS) is None
@@ -80,9 +79,7 @@ class TestPort:
         assert port.poll(50 * MS) is None
 
     def test_an_abandoned_request_leaves_room_for_its_answer(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.speeds(1, 1), 0)
+        link, port = asked(packets.speeds(1, 1))
         port.abandon(5 * MS)
         link.deliver(b"\xff")
         assert port.poll(20 * MS) is None
@@ -92,16 +89,12 @@ class TestPort:
         assert port.idle(50 * MS), "nothing to abandon"
 
     def test_the_short_status_is_whole_when_silence_follows(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.STATUS_REQUEST, 0)
+        link, port = asked(packets.STATUS_REQUEST)
         link.deliver(b"\x00\x04" + crc(90, b"\x00\x04"))
         assert port.poll(4 * MS) is None, "it may be the beginning of the long one"
         assert port.poll(14 * MS) == Answer(packets.STATUS_REQUEST, b"\x00\x04", 0)
 
     def test_the_long_status_is_whole_at_once(self) -> None:
-        link = ScriptedSerialLink()
-        port = RoboclawPort(link, ADDRESS)
-        port.start(packets.STATUS_REQUEST, 0)
+        link, port = asked(packets.STATUS_REQUEST)
         link.deliver(bytes.fromhex("00 00 00 01 97 9D"))
         assert port.poll(4 * MS) == Answer(packets.STATUS_REQUEST, bytes.fromhex("00 00 00 01"), 0)
