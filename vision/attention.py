@@ -40,6 +40,7 @@ _MIN_SIDE_PX = 16
 _MIN_LENGTH = 0.5  # of the length of other fragments
 _MIN_END_DISTANCE_PX = 8.0
 _LEAST_HELD = 600.0  # on a short edge without corners both ends slide alike; noise alone makes 220
+# Not what vision/renewal.py has adapted to there, mostly more: velocities were no better known by it.
 _CONTRAST = 60.0
 _CANDIDATES = 48
 _AT_ONCE = 4
