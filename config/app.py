@@ -57,6 +57,16 @@ class RealtimeRunner(Section):
 RunnerConfig = Annotated[LockstepRunner | RealtimeRunner, Field(discriminator="kind")]
 
 
+def _check_speeds(robot: Robot, perception: PerceptionConfig) -> None:
+    """Who goes as fast as the decision reckons with must be believed when seen. Raises ValueError."""
+    reckoned_mps, believed_mps = robot.limits.max_obstacle_speed_mps, perception.motion.max_speed_mps
+    if believed_mps < reckoned_mps:
+        raise ValueError(
+            f"perception.motion.max_speed_mps ({believed_mps:g}) is less than "
+            f"robot.limits.max_obstacle_speed_mps ({reckoned_mps:g}): give both the same value"
+        )
+
+
 class AppConfig(Section):
     """What `treadwatch run` and `treadwatch govern` read with --config FILE."""
 
@@ -75,6 +85,7 @@ class AppConfig(Section):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
+        _check_speeds(self.robot, self.perception)
         simulated = self.camera.kind == "simulated"
         if simulated and self.simulation is None:
             raise ValueError("camera.kind 'simulated' needs a 'simulation' section with a scenario")
@@ -116,6 +127,11 @@ class ReplayConfig(Section):
     perception: PerceptionConfig = PerceptionConfig()
     decision: DecisionConfig = DecisionConfig()
     assume_mount: bool = Field(default=False, description="use robot.camera_mount where none is recorded")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        _check_speeds(self.robot, self.perception)
+        return self
 
 
 def load_replay(path: Path) -> ReplayConfig:

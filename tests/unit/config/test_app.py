@@ -1,0 +1,35 @@
+"""What the sections of one YAML have to agree on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from config.app import load_app, load_replay
+from config.loader import CONFIG_DIR, ConfigError
+
+SIM = yaml.safe_load((CONFIG_DIR / "sim.yaml").read_text())
+
+
+def speeds(reckoned_mps: float, believed_mps: float) -> dict[str, object]:
+    return {
+        "robot": {"limits": {"max_obstacle_speed_mps": reckoned_mps}},
+        "perception": {"motion": {"max_speed_mps": believed_mps}},
+    }
+
+
+def written(folder: Path, content: dict[str, object]) -> Path:
+    path = folder / "robot.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+@pytest.mark.parametrize("base", [SIM, {}], ids=["robot", "replay"])
+def test_who_is_reckoned_with_must_be_believed(tmp_path: Path, base: dict[str, object]) -> None:
+    load = load_app if base else load_replay
+    load(written(tmp_path, base | speeds(2.0, 2.0)))
+    load(written(tmp_path, base | speeds(1.5, 2.0)))
+    with pytest.raises(ConfigError, match=r"max_speed_mps \(1\.5\) is less than .* \(2\)"):
+        load(written(tmp_path, base | speeds(2.0, 1.5)))
