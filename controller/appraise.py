@@ -1,4 +1,21 @@
-"""Obstacles and what depth sees -> speed limits with their reasons, for one control step."""
+"""Obstacles and depth -> speed limits with their reasons, for one control step.
+
+controller/decide.py calls Appraiser.limits and takes the least of these limits and its own (path, range,
+camera). The advisers, in the order in which they are called:
+
+1. Depth (controller/sight.py): a blind corner, the nearest surface that no obstacle explains, and the end of
+   the floor that was seen to be free.
+2. standing.StandingLimits: bodies that stand in the swept corridor.
+3. moving.MovingLimits: bodies that cross, come or drive ahead (conflicts: controller/crossing.py).
+4. worst_case.WorstCase: what the watched bodies could do at worst (geometry: controller/contingency.py).
+
+Words for the bodies that controller/knowledge.py knows:
+
+* watched: those that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone.
+* enters: watched bodies that are in the swept corridor or are likely to come into it (crossing.comes_in),
+  debounced.
+* remembered: those out of the camera's view, kept by controller/memory.py.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,13 @@
-"""The worst case: whatever moving obstacles may do within their means, can the robot still stand before it?
+"""The geometry of the worst case: what bodies could reach, and whether an emergency stop ends short of that.
 
-An obstacle that moves may stop dead wherever its way leads it, may change its velocity by a bounded
-acceleration up to V_omax, and its velocity is only known with a spread. Standing when something touches it is
-all that a robot which cannot leave its path can promise; so for each speed the emergency stop is followed,
-latency included, against all that each obstacle could reach by then.
+Called by controller/worst_case.py alone, which makes a speed limit of the answers. What is assumed:
+
+* A body may stop dead anywhere on its way, so the stretch of the path that it could block only grows.
+* A body may change its velocity by a bounded acceleration, up to the greatest obstacle speed V_omax.
+* The velocity of a body is known only with a spread.
+
+A robot that cannot leave its path can promise no more than to stand when something touches it. So the
+emergency stop from each speed, latency included, is followed in time against all that each body could reach.
 """
 
 from __future__ import annotations

@@ -1,7 +1,10 @@
-"""Obstacles that cross: pass before them, slow a little, or wait - one choice each, kept unless it must go.
+"""Conflicts with bodies that cross the robot's path, and the speeds that solve them. Nothing is remembered.
 
-A conflict is the time between an obstacle's entering the swept corridor and its leaving it, with the stretch
-of the robot's way that it blocks meanwhile.
+A conflict is the time between a body's entering the swept corridor and its leaving it, with the stretch of
+the robot's way that the body blocks meanwhile. comes_in tells which bodies enter (controller/appraise.py asks
+it), find_conflicts tells when and where. choices gives two speeds for a conflict: up to yield_mps the robot
+lets the body pass first, from first_mps on it passes before the body. controller/moving.py makes limits of
+these choices and keeps them from step to step.
 """
 
 from __future__ import annotations

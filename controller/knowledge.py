@@ -1,4 +1,10 @@
-"""What the decision knows of the way ahead: the last good scene, and what has gone out of sight since."""
+"""What the decision knows of the way ahead: the last good scene, and the bodies out of sight since then.
+
+For each new scene, Knowledge makes boxes of the obstacles (controller/bodies.py), averages their velocities
+(controller/steadying.py), adds bodies that have left the view (controller/memory.py), and notes free floor
+and unexplained surfaces along the path (controller/sight.py). In each control step it says whether the camera
+can be relied on: the field fault. controller/appraise.py makes speed limits of what is known.
+"""
 
 from __future__ import annotations
 

@@ -1,11 +1,18 @@
-"""Bodies that have left the camera's view but are still there: under its nose and beside its edges.
+"""Bodies that have left the camera's view but are still there: under the robot's nose and beside the view.
 
-A verdict on what stands or moves takes some frames, and of who leaves the view there are no more: who was
-clearly measured as coming counts as moving then. And who comes into view where somebody is expected may be
-somebody else: two people walk side by side, and one of them alone is seen.
+A body of the last scene that is missing in this one is kept while its place is outside the view:
 
-Where the view is seen through, nobody is. Who should have been there by what was measured of its velocity has
-not come in: it is reckoned with beside what is seen through, and no longer as coming.
+* Standing (seen for 0.5 s at least; the robot drives): kept where it was, until its place is in view again,
+  a seen body covers it, or it lies 2 m behind the camera. If the robot stood, the body went away: dropped.
+* Moving: goes on with its last velocity for 2 s, or for 6 s if that leads towards the robot's axis or along
+  with the robot. Dropped earlier where its place is well within the view or lies 2 m behind the camera.
+* Judged standing (a verdict takes some frames), but clearly measured as coming (or as going anywhere,
+  if seen for less than 1 s): counts as moving, with the velocity measured last.
+* Should have come in, but its place is seen to be free: moved sideways to the edge of the free space, and no
+  longer coming (the velocity towards the axis becomes 0, the variance grows). The same 2 s or 6 s apply. Who
+  was clearly coming may first be some decimetres late.
+* Another body is seen where a moving one was expected: the kept one is dropped only if the other has been
+  seen for more than 0.5 s, with the same velocity within 2 sigma. Else both count: they may be two people.
 """
 
 from __future__ import annotations
@@ -50,10 +57,8 @@ _APART_SIGMAS = 2.0
 
 
 class OutOfView:
-    """Standing bodies are kept until their place is seen again or has been passed, moving ones go on as they
-    did: for a while, or, where they may come before the robot, until they must have come into view again.
-    near_m: ahead of the camera, nearer than this the floor is not seen. max_obstacle_speed_mps: what is
-    measured as much faster is a mistake."""
+    """Call leaving, then update, once a scene. near_m: nearer than this ahead of the camera the floor is not
+    seen. max_obstacle_speed_mps: a velocity that was measured as much greater is a mistake."""
 
     def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
         self._mount, self._near_m = mount, near_m
@@ -65,9 +70,10 @@ class OutOfView:
         self._widest_half_m: dict[int, float] = {}
 
     def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
-        """The bodies of a scene, those of them moving that perception only expects beside the view, and that
-        came towards the robot's axis when they were last seen; as they were measured then."""
-        # Of what only stands where something stood, the velocity was hardly measured.
+        """The bodies seen; standing ones that perception no longer sees but still expects, out of view,
+        count as moving if they came towards the robot's axis: with the velocity measured last."""
+        # Not at the age that knowledge.py gives to whatever stands where something stood: its velocity was
+        # hardly measured.
         settled = ~seen.moving & (seen.age_s > SETTLED_S) & self._wide_enough(seen)
         out = settled & (seen.unseen_s > 0.0)
         comes = settled & ~out & _clearly_comes(seen, pose)

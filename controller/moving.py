@@ -1,5 +1,9 @@
-"""What crosses, comes or drives ahead -> speed limits, and for each conflict the choice: before it or behind
-it, without changing one's mind for noise."""
+"""Speed limits for bodies that cross, come towards the robot or drive ahead of it.
+
+controller/crossing.py finds the conflicts and the speeds that solve each one. This file compares letting the
+body pass with stopping before it (or following it), settles all conflicts on one speed, and keeps each choice
+from step to step: hysteresis, so that noise does not change it.
+"""
 
 from __future__ import annotations
 

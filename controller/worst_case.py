@@ -1,4 +1,9 @@
-"""The limit by what moving obstacles could do at worst (controller/contingency.py says what that is)."""
+"""The worst case as a speed limit: how fast may the robot go and still stand before a body could touch it?
+
+controller/contingency.py has the geometry: what each body could reach, and how much room a stop leaves. This
+file decides by how much each body may change its velocity, tries emergency stops from many speeds, and makes
+a Limit of the greatest speed that suffices. controller/appraise.py calls it last, after the other advisers.
+"""
 
 from __future__ import annotations
 
