@@ -1,7 +1,8 @@
-"""Composition: the only place that names concrete devices. YAML in, the parts of a program out.
+"""Composition: YAML in, the parts of a program out.
 
-There are no mode flags behind this file: simulation, hardware in the loop and robot differ only in
-which of these parts the YAML asks for.
+This file and controller/build_chassis.py are the only ones of the program that name concrete devices (bench,
+campaign and evaluation apart). There are no mode flags behind them: simulation, hardware in the loop and
+robot differ only in which of these parts the YAML asks for.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Composition of the chassis: driver, link, output guard, and the emulator at the other end.
 
-With controller.build the only place that names concrete devices.
+Like controller/build.py, and no other file of the program, it names concrete devices.
 """
 
 from __future__ import annotations

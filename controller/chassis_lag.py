@@ -1,8 +1,12 @@
 """How far a chassis lags behind its commands, learnt from commands and odometry while driving.
 
-What was commanded minus what was travelled is lag * speed + drift * distance: the first part comes back when
-the robot stops, the second (a wheel radius, slipping tracks) does not. Both are estimated by recursive least
-squares, because the closing on the target point needs the first one to a few hundredths of a second.
+    commanded - travelled = lag * v + drift * distance
+
+commanded: distance commanded so far, in m; travelled: by odometry, in m; v: speed at which the chassis
+follows (commanded speed less lag * commanded acceleration), in m/s; distance: again the commanded one, in m.
+The part lag * v (lag in s) comes back when the robot stops. The part drift * distance (a wrong wheel radius,
+slipping tracks) does not. Both lag and drift are estimated by recursive least squares, because closing in on
+the target point needs the lag to a few hundredths of a second.
 """
 
 from __future__ import annotations

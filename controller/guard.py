@@ -1,8 +1,10 @@
-"""The output guard: a last gate between the program and the bytes, which knows only physics and the clock.
+"""The output guard: the last check between the program and the base. It knows only limits and the clock.
 
-It stands around any chassis driver. What passes is finite, fresh, in order of time, ahead, and within the
-emergency limits of speed, yaw rate, acceleration and jerk. What does not is answered by an explicit stop
-and a latch with its reason; only arm(), a person's consent, leads out. In a correct program it never speaks.
+GuardedChassis stands around any chassis driver. It passes a setpoint on if that is finite, fresh, not older
+than the one before, not backwards, and within the limits of speed, yaw rate and acceleration and the
+emergency limits of deceleration and jerk. Otherwise it sends an explicit stop and latches with the reason.
+Only arm(), a person's consent, releases the latch. In a correct program the guard never intervenes.
+GuardedCanLink sends only CAN frames with identifiers that it was given.
 """
 
 from __future__ import annotations

@@ -1,11 +1,14 @@
 """Where the robot is on the floor: the chassis' odometry, its yaw corrected by what the camera sees.
 
-Tracks slip when they turn: the odometry of a skid-steered base is wrong in yaw by 10 % and more,
-while its distance is good. The camera's own rotation, measured against the static scene, is not
-fooled by slip. So distance comes from the tracks and yaw from both: the share of each turn that
-really happens is estimated from the pairs (odometry yaw, visual yaw) of all frames (least squares,
-weighted by how sure the camera was). The slip belongs to the base and its floor, so every better
-estimate holds for the way that lies behind too: it is dead-reckoned anew from its legs.
+Tracks slip when they turn: the odometry of a skid-steered base is wrong in yaw by 10 % and more, while its
+distance is good. The camera's own rotation, measured against the static scene, is not affected by slip. So
+distance comes from the odometry and yaw from both: the yaw ratio, the share of each turn that really happens,
+is estimated from the pairs (odometry yaw, visual yaw) of all frames by least squares, weighted by how sure
+the camera was.
+
+The slip belongs to the base and its floor, so a better estimate holds for the path already driven, too. That
+path is stored as legs (distance, raw turn by odometry) and re-integrated with each new yaw ratio. The pose
+therefore moves a little with each estimate.
 """
 
 from __future__ import annotations
