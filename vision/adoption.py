@@ -1,4 +1,7 @@
-"""Which fragment belongs to which body: the one on whose visible surface, and at whose depth, it lies."""
+"""Which fragment belongs to which track: the one on whose visible surface, and at whose depth, it lies.
+
+Terms (fragment, surface, track): vision/__init__.py.
+"""
 
 from __future__ import annotations
 

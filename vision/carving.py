@@ -1,8 +1,9 @@
 """Movers that connected depth hides in something larger: a person close to a wall is one part with it.
 
-Cells that have arrived, and cells around fragments that no static surface explains, are cut out and
-become tracks of their own. They are suspects only: without further evidence they go, and their cells
-fall back to what is around them. A mover that has grown over what it walks along is cut back the same way.
+Two kinds of cells are cut out of a large static track and become tracks of their own: cells that have arrived
+(vision/arrivals.py), and cells around fragments that no static surface explains. Such a track is only a
+suspect: without further evidence it ends, and its cells go back to the track around them. Likewise a mover
+that has grown over something it walks along is cut back to these cells. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations

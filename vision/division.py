@@ -1,4 +1,7 @@
-"""One part of connected depth, two bodies: two people who walk side by side."""
+"""Two bodies in one part of connected depth, such as two people who walk side by side: where to divide it.
+
+Terms (cell, part, body): vision/__init__.py.
+"""
 
 from __future__ import annotations
 

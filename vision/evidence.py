@@ -1,4 +1,12 @@
-"""Motion evidence of every end: where it would be if it were static, and how far from there it is."""
+"""Residual of every fragment end (end point of a fragment) against the prediction that it is static.
+
+The prediction: where the end would be now if it had stayed at its anchor, by the camera's own motion. The
+residual (innovation): how far from there it is seen, with its covariance and chi-square (PointMotion). In
+this file, vision/detection.py and vision/velocities.py "evidence" means these residuals; in
+vision/judgement.py it is something else, a score of each track. The ends that are not known to move also give
+the points that the camera's motion is found by (static_points) and the scale of the noise
+(observed_variance_scale).
+"""
 
 from __future__ import annotations
 

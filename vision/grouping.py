@@ -1,8 +1,14 @@
-"""Parts to bodies, where connected depth says too little.
+"""Parts to bodies, where connected depth says too little. Terms: vision/__init__.py.
 
-A shoe, an arm or a load may be parted from its body by a hole in the depth image: what is small, close
-to a mover and does not contradict its motion is part of it. Of the plain sides of a vehicle a depth camera
-sees nothing but the edges: pieces that go exactly alike, with nothing seen between them, are one.
+* attach: a hole in the depth image may part a shoe, an arm or a load from its body. A small new part close to
+  a mover becomes part of it.
+* expected_in: something nearer, a post for example, may divide a mover in the image. The piece on the other
+  side of it is still part of the mover.
+* detach: a part far from the main part of its track leaves the track, unless it is expected there or is a
+  load that stands on the main part.
+* merges, join: two tracks that may be one body are joined: a small one beside a mover whose velocity does not
+  contradict; a load on its carrier; pieces of a vehicle, of whose plain sides a depth camera sees only the
+  edges, if they move exactly alike and nothing is seen between them.
 """
 
 from __future__ import annotations

@@ -1,10 +1,25 @@
-"""Moving or static, with hysteresis: a verdict needs consistent evidence over time, of several kinds.
+"""Moving or static, for each track: a verdict with hysteresis, from several kinds of proof.
 
-Fragments: the body's velocity over ground differs from zero by many sigmas, and most of its fragments
-agree with it. Level and across the line of sight that is enough; along it, where a few sliding ends can
-feign a change of length, the body's own depth must not contradict. Unrest: nearly all of many fragments
-deny that the body stands still, though as limbs do they agree on no velocity. Arrivals: the body stands
-where free space was seen.
+Kinds of proof in one frame (threshold: settings.sigmas squared; ends: end points of the track's fragments):
+
+* Fragments (_by_fragments): the velocity over ground, as filtered and by this frame's fragments alone,
+  differs clearly from zero. If it is level and across the line of sight, 4 agreeing ends suffice. Along the
+  line of sight 8 are needed: a few sliding ends look like a change of length. The surface must not contradict
+  (across, 8 ends outvote it); where the surface confirms the velocity, less will do.
+* Unrest (_by_unrest): of 8 ends or more, at least 70 % contradict standing still, though, as limbs do, they
+  may agree on no velocity. The filtered velocity needs half of the threshold only, after 0.4 s a quarter.
+* Arrival (_by_arrival): part of the surface stands where free space was seen. Half of the threshold suffices.
+  Where much of the surface has arrived, that alone is proof, except for a mover that has just stopped.
+* Surface (_by_surface): the centre of a whole, compact surface moves for longer and more clearly than a new
+  viewpoint or a growing surface explains.
+
+All kinds need a known motion of the camera and, except for much arrival, more than the least speed. Bodies
+too fast or too wide to be true prove nothing.
+
+Hysteresis: evidence is a score from 0 to 1.5. A frame with proof raises it by dt / 0.06 s (0.07 s without
+odometry) or more, by 0.5 at most. Without proof it falls by dt / 0.30 s, by dt / 2 s while the motion seems
+to go on, by dt / 0.12 s with proof of standing still. A track becomes moving at 1.0 and static
+again at 0.
 """
 
 from __future__ import annotations

@@ -1,8 +1,12 @@
 """Bodies whose parts move by themselves: when to believe fragments that disagree, and how far.
 
-People are no rigid bodies. A shank goes from rest to more than twice the walker's speed within half a
-step, so that a fragment or two, however sharply seen, tell little of the body, and where many fragments
-disagree, some of them are limbs. Most of the time all of them deny that the body stands still.
+People are not rigid. Within half a step a shank goes from rest to more than twice the walker's speed. So:
+
+* believable: whether the fragments of a body tell its velocity: some agree, or the body is restless.
+* variance: how far the fragments' velocity may be from the body's. Great for one or two fragments of a
+  mover, however sharply they are seen, and where many fragments disagree: some of these are limbs.
+* restless: of 6 ends or more, 70 % contradict that the body stands still, whether they agree with each other
+  or not. A walker is restless most of the time.
 """
 
 from __future__ import annotations

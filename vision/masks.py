@@ -1,9 +1,18 @@
-"""Which cells of the grid belong to which track: what was its surface before, moved on, claims its depth.
+"""Which cells of the depth grid belong to which track. Terms: vision/__init__.py.
 
-Connected depth alone would merge a person with the wall that he passes. So every track keeps the cells
-it covered; moved on by its velocity and by the camera's motion they vote for the connected parts that
-they fall into. A part that only one track votes for is that track's, whole, unless it has come while the
-rest of that track stood; a part that a mover shares is divided by the nearest vote.
+Connected depth alone would merge a person with the wall that the person passes. So each track remembers the
+cells that it covered, and these vote:
+
+1. predict: the old cells of each track move with the camera and, for movers, with the track's velocity. A
+   cell where they arrive belongs to the prediction if the depth measured there agrees.
+2. count_votes: each predicted cell is one vote of its track for the connected part in which it lies. A few
+   stray votes do not count, and of several static tracks in a part only the strongest stays.
+3. release: the exception. A standing track loses a newly arrived part if the rest of the track was there
+   before: somebody who stood beside furniture has left it.
+4. divide: a part with one voter goes to that track as a whole. A part with several voters (at most one of
+   them is static) is divided: each cell goes to the nearest vote.
+
+Between 3 and 4, vision/grouping.py corrects to which track a whole part goes.
 """
 
 from __future__ import annotations

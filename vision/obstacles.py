@@ -1,4 +1,7 @@
-"""Fragments to bodies: which fragments move together, and how fast the body does that they belong to."""
+"""Least-squares velocities: of each fragment by its two ends, and of each body by all ends that belong to it.
+
+Also which moving fragments are neighbours that move alike (cluster), and which fragments are static or not.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Connected depth: the parts of the view that stand out of the floor, and what each of them measures."""
+"""Connected depth: the parts of the view that stand out of the floor, and what each of them measures.
+
+Terms (cell, part, region): vision/__init__.py.
+"""
 
 from __future__ import annotations
 

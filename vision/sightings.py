@@ -1,8 +1,14 @@
-"""The visible surfaces of the tracks into their filters: where the bodies are, and how fast these centres go.
+"""Measurement update of each track's filters by the centroid of its visible surface.
 
-A centre tells of the velocity only while the same whole surface is seen. Where it is cut at its side by the
-image's border, hidden in part or suddenly another one, it tells of the position alone; of what is known to
-move it tells roughly all the same, for a body cannot be far from what is seen of it.
+What the centroid measures depends on what is seen:
+
+* Position and velocity (Tracks.locate): the same whole surface as before, neither cut at its side by the
+  image's border nor hidden there, of about its usual area, and without a jump.
+* Position and velocity, but with a larger variance: any other surface of a track that is known to move. A
+  body cannot be far from what is seen of it.
+* Position only (Tracks.relocate): a surface of a static track that is cut, hidden in part or suddenly another
+  one; any surface after a jump, or while the camera's own motion is not known.
+* Neither: a sliver, the little that is left to see of a mover that goes behind something.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""track: what was detected -> the Scene. Bodies with stable ids and filtered velocity, moving or static."""
+"""track: what was detected -> the Scene. Bodies with stable ids and filtered velocity, moving or static.
+
+Terms (cell, part, track, body, surface, region): vision/__init__.py. Order of the steps: obstacles (velocity
+of fragments), regions, masks, grouping (cells to tracks), carving, grouping, division (cut out, join, split),
+sightings (filters), adoption (fragments to tracks), obstacles (velocity of bodies), judgement, report.
+"""
 
 from __future__ import annotations
 
@@ -161,8 +166,7 @@ class Tracker:
         winner: NDArray[np.int32],
         labels: IntGrid,
     ) -> IntGrid:
-        """Parts that nobody claims become tracks if they are large enough and reach down to the robot, or may
-        do so behind what hides their lower end."""
+        """Large parts that no track claims become tracks if they reach down to the robot or may, hidden."""
         grid, tracks = detection.grid, self._tracks
         large = (winner == 0) & (measured.cells >= _MIN_CELLS)
         overhead = large.copy()
