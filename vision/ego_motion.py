@@ -1,10 +1,19 @@
-"""The camera's own motion from static fragments and depth; a prior holds when most of the view moves.
+"""The camera's own motion, from static fragments, depth and a prior.
 
-Gauss-Newton on the reprojection of points anchored some frames ago. A point's error has a pixel part
-and a depth part: depth moves the prediction along its epipolar line only, so a point with uncertain
-depth still measures across it. Points that even the prior's uncertainty cannot explain never enter,
-therefore a person who fills half of the view cannot outvote the odometry. How far the camera turned while the
-rows of the image were read, its sweep, is found with it (vision/rolling_shutter.py).
+* Unknowns, 8: the pose of the camera now (rotation 3, translation 3) and its sweep (2), that is how far it
+  turned about x and y while the rows of the image were read (vision/rolling_shutter.py).
+* Measurements: where anchored points are seen now. A point is anchored if its place in the fixed frame is
+  known from some frames ago (vision/fragments.py).
+* Prior: mean and standard deviation of the motion, and of the sweep (vision/motion_prior.py).
+
+Method: robust Gauss-Newton on the reprojection error (vision/reprojection.py). A point's error has a pixel
+part and a depth part. Depth moves the prediction along its epipolar line only, so a point with uncertain
+depth still measures across it.
+
+Gate: a point enters only if its error at the start has a chi-square of 9.21 at most (99 % of static points),
+widened by the uncertainty of the prior. Therefore a person who fills half of the view cannot outvote the
+odometry. If the result contradicts a binding prior, it is solved again with a tighter one; if that fails or
+too few points agree, the prior alone is the answer.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
-"""What is known of the camera's motion before looking, and how well: from odometry, a gyro, or from nothing.
+"""The prior of vision/ego_motion.py: how the camera moved since the frame before, as known before looking.
 
-Where nothing says how a camera on a robot moved: tracks roll ahead and turn, never aside.
+A prior has a mean (a Pose) and six standard deviations. From odometry: odometry_prior. Without odometry:
+rolling_prior for a camera on a robot (a tracked base rolls ahead and turns, never sideways), steady_prior for
+any other camera (it goes on as it did). A gyro replaces the rotation of any of them: with_gyro. The sweep,
+the camera's turn while the rows of one image are read, has a prior of its own: SweepPrior.
 """
 
 from __future__ import annotations

@@ -1,5 +1,9 @@
-"""Where anchored points are predicted in the image, how that changes with the camera's motion, and how far
-off they are, in standard deviations: what vision/ego_motion.py solves."""
+"""Reprojection error of anchored points, with its derivatives: what vision/ego_motion.py minimises.
+
+For a given pose of the camera: where points that were anchored some frames ago are predicted in the image,
+how far from there they are seen (the residual), and how that changes with each unknown: pose (6) and sweep
+(2, the camera's turn while the image was read). All in standard deviations.
+"""
 
 from __future__ import annotations
 

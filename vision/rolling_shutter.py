@@ -1,11 +1,13 @@
-"""Images whose rows are read one after another: shaken meanwhile, they come out bent.
+"""Rolling shutter: the rows of an image are read one after another, so a camera that shakes bends the image.
 
 The colour sensor of a D435i has a rolling shutter; such sensors take some 10 to 30 ms from their first row to
-their last. Tracks shake the camera by a quarter of a radian a second and more, which stretches the image by
-pixels, now this way and now that: just what a length ratio takes for speed. How far the camera turned while
-an image was read is estimated with its motion (vision/ego_motion.py); how far it can have turned follows
-from how long its rows take, and that no recording tells, so it is learned. A global shutter is found to take
-no time, and nothing is bent.
+their last. The robot's tracks shake the camera by a quarter of a radian per second and more. That stretches
+and shrinks the image by pixels, and the length ratio (vision/velocities.py) would take this for speed.
+
+The sweep is how far the camera turned about x and y while one image was read. vision/ego_motion.py estimates
+it for each image, and straight_rays corrects pixels by it. How far the camera can have turned follows from
+the rate of turn and the read-out time of the image. No recording states the read-out time, so ReadOut learns
+it. For a global shutter ReadOut learns 0, and nothing is corrected.
 """
 
 from __future__ import annotations
