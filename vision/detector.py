@@ -21,6 +21,7 @@ from vision.fragments import FragmentStore
 from vision.health import Continuity, HealthMonitor
 from vision.lens import project, rays, vector_from_rotation
 from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
+from vision.optical_flow import Pyramid, pyramid
 from vision.percept import Percept
 from vision.renewal import Renewal
 from vision.rolling_shutter import ReadOut
@@ -45,7 +46,7 @@ class Detector:
         self._attention = Attention(config)
         self._health = HealthMonitor(config)
         self._floor = FloorFinder()
-        self._grey: GreyImage | None = None
+        self._images: Pyramid = ()
         self._last_ns = 0
         self._pose = _IDENTITY
         self._odometry: Pose | None = None
@@ -64,7 +65,7 @@ class Detector:
         grid = self._grid(frame)
         check = self._health.check(frame, grey, grid)
         usable = check.usable_colour and check.usable_depth
-        known = self._grey is not None and self._grey.shape == grey.shape
+        known = len(self._images) > 0 and self._images[0].shape == grey.shape
         if not usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
             return self._blind(frame, grid, check.health)
         if check.continuity is not Continuity.NEXT or not known:
@@ -88,10 +89,10 @@ class Detector:
         prior = self._prior(frame, odometry, dt_s)
         moving, velocity = _hint(store.ids, previous.fragments if previous else None)
         guess = self._guess(prior.motion, velocity, dt_s, camera)
-        assert self._grey is not None
+        images = pyramid(grey, config.fragments)
         flow = optical_flow.track(
-            self._grey,
-            grey,
+            self._images,
+            images,
             store.ends_px.reshape(-1, 2),
             guess,
             store.pixel_cov.reshape(-1, 3),
@@ -139,7 +140,7 @@ class Detector:
             self._look_closer(frame, grey, previous.wanted)
         if ego.source == "none":
             self._store.break_history()
-        self._commit(frame, grey, odometry, result.sweep_rad)
+        self._commit(frame, images, odometry, result.sweep_rad)
         return detection
 
     def _grid(self, frame: RgbdFrame) -> DepthGrid:
@@ -161,10 +162,10 @@ class Detector:
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, witness=True)
 
     def _commit(
-        self, frame: RgbdFrame, grey: GreyImage, odometry: Pose | None, sweep_rad: FloatArray
+        self, frame: RgbdFrame, images: Pyramid, odometry: Pose | None, sweep_rad: FloatArray
     ) -> None:
         self._store.commit(frame.captured_ns, self._pose, frame.intrinsics, sweep_rad)
-        self._grey, self._last_ns, self._odometry = grey, frame.captured_ns, odometry
+        self._images, self._last_ns, self._odometry = images, frame.captured_ns, odometry
 
     def _restart(
         self,
@@ -182,7 +183,7 @@ class Detector:
         self._renew(frame, grey)
         motion = no_motion(2 * len(self._store))
         detection = self._detection(frame, grid, 0.0, motion, ego, health, True)
-        self._commit(frame, grey, odometry, _NO_SWEEP)
+        self._commit(frame, pyramid(grey, self._config.fragments), odometry, _NO_SWEEP)
         return detection
 
     def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:

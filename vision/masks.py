@@ -173,10 +173,11 @@ def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[n
     """(h, w) track index + 1: whole parts to their winner (P,), shared ones by the nearest vote."""
     labels = np.concatenate((_NOBODY, winner)).take(parts)
     shared = np.zeros(len(winner) + 1, np.bool_)
-    shared[1:] = (ballot.present.sum(axis=1) > 1) & (winner > 0)
+    count, tracks = ballot.present.shape
+    # Nobody shares in the part of a track that begins just now.
+    shared[1:] = (ballot.present.sum(axis=1) > 1) & (winner > 0) & (winner <= tracks)
     if not shared.any():
         return labels
-    count, tracks = ballot.present.shape
     allowed = np.zeros((count + 1, tracks + 1), np.bool_)
     allowed[1:, 1:] = ballot.present
     inside = shared.take(parts)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import cv2
 import numpy as np
@@ -19,6 +18,9 @@ _MIN_EIGENVALUE = 1e-5
 _FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 _EXPECTATION_PX = 2.0
 
+# An image, then itself at half the size, at a quarter, and so on.
+Pyramid = tuple[GreyImage, ...]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Flow:
@@ -28,9 +30,19 @@ class Flow:
     found: NDArray[np.bool_]
 
 
+def pyramid(grey: GreyImage, settings: FragmentSettings) -> Pyramid:
+    """grey with its smaller copies: no more than the settings ask for, nor smaller than the search window."""
+    levels = [grey]
+    while len(levels) <= settings.lk_levels:
+        if min(levels[-1].shape) < 2 * settings.lk_window_px + 1:
+            break
+        levels.append(np.asarray(cv2.pyrDown(levels[-1]), np.uint8))
+    return tuple(levels)
+
+
 def track(
-    before: GreyImage,
-    now: GreyImage,
+    before: Pyramid,
+    now: Pyramid,
     pixels: NDArray[np.float32],
     guess: NDArray[np.float32],
     covariance: NDArray[np.float32],
@@ -46,29 +58,49 @@ def track(
     """
     if len(pixels) == 0:
         return Flow(np.empty((0, 2), np.float32), np.empty(0, np.bool_))
-    window = (settings.lk_window_px, settings.lk_window_px)
-    search = partial(
-        cv2.calcOpticalFlowPyrLK,
-        winSize=window,
-        criteria=_CRITERIA,
-        flags=_FLAGS,
-        minEigThreshold=_MIN_EIGENVALUE,
-    )
-    there, there_ok, _ = search(before, now, pixels, guess.copy(), maxLevel=settings.lk_levels)
+    there, there_ok = _search(before, now, pixels, guess, settings.lk_window_px)
     # What all ends have in common was the guess's own error: a turn of the camera it did not know of.
     expected = guess + median((there - guess).T)
     back_guess = there - (expected - pixels)
-    back, back_ok, _ = search(now, before, there, back_guess, maxLevel=min(settings.lk_levels, 1))
-    end = _held(np.asarray(there, np.float32), expected, covariance)
+    back, back_ok = _search(now[:2], before[:2], there, back_guess, settings.lk_window_px)
+    end = _held(there, expected, covariance)
     miss = back - pixels
-    height, width = now.shape
-    found = (np.asarray(there_ok) & np.asarray(back_ok))[:, 0].astype(np.bool_)
+    height, width = now[0].shape
+    found = there_ok & back_ok
     found &= mahalanobis(miss, covariance) <= settings.forward_backward_sigmas**2
     near = np.abs(miss) <= settings.forward_backward_px
     found &= near[:, 0] & near[:, 1]
     u, v = end.T
     found &= (u >= 2.0) & (u <= width - 3) & (v >= 2.0) & (v <= height - 3)
     return Flow(end, found)
+
+
+def _search(
+    before: Pyramid,
+    now: Pyramid,
+    pixels: NDArray[np.float32],
+    guess: NDArray[np.float32],
+    window_px: int,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Where pixels (N, 2) are found, coarse to fine from guess (N, 2) on, and which are: (N, 2), (N,).
+
+    Level by level: a call for all of them at once would make the pyramids of both images anew, twice a frame.
+    """
+    there, found = guess * np.float32(0.5 ** len(now)), np.empty((0, 1), np.uint8)
+    for level in reversed(range(len(now))):
+        ends, status, _ = cv2.calcOpticalFlowPyrLK(
+            before[level],
+            now[level],
+            pixels * np.float32(0.5**level),
+            2.0 * there,
+            winSize=(window_px, window_px),
+            maxLevel=0,
+            criteria=_CRITERIA,
+            flags=_FLAGS,
+            minEigThreshold=_MIN_EIGENVALUE,
+        )
+        there, found = np.asarray(ends, np.float32), np.asarray(status, np.uint8)
+    return there, found[:, 0].astype(np.bool_)
 
 
 def _held(

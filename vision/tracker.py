@@ -129,8 +129,8 @@ class Tracker:
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
         winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, mover, expected)
+        winner = self._births(detection, parts, measured, winner)
         labels = masks.divide(parts, predicted, ballot, winner)
-        labels = self._births(detection, parts, measured, winner, labels)
         measured = regions.measure(grid, labels, len(tracks))
         carved = carving.carve(tracks, detection, labels, measured, arrived, velocities, self._config)
         if carved is not labels:
@@ -164,9 +164,8 @@ class Tracker:
         parts: IntGrid,
         measured: Regions,
         winner: NDArray[np.int32],
-        labels: IntGrid,
-    ) -> IntGrid:
-        """Large parts that no track claims become tracks if they reach down to the robot or may, hidden."""
+    ) -> NDArray[np.int32]:
+        """winner (P,) with new tracks: large parts that nobody claims, if they reach down to the robot or may."""
         grid, tracks = detection.grid, self._tracks
         large = (winner == 0) & (measured.cells >= _MIN_CELLS)
         overhead = large.copy()
@@ -175,9 +174,9 @@ class Tracker:
             large &= ~overhead | regions.hidden_below(grid, parts, measured)
         born = np.flatnonzero(large)
         if len(born) == 0:
-            return labels
-        number = np.zeros(len(winner) + 1, np.int32)
-        number[born + 1] = np.arange(1, len(born) + 1) + len(tracks)
+            return winner
+        result = winner.copy()
+        result[born] = np.arange(1, len(born) + 1) + len(tracks)
         tracks.start(
             detection.pose.apply(measured.position_m[born]),
             0.2,
@@ -186,8 +185,7 @@ class Tracker:
             detection.captured_ns,
         )
         tracks.overhead[-len(born) :] = overhead[born]
-        own = number[parts]
-        return np.where(own > 0, own, labels).astype(np.int32)
+        return result
 
     def _reaching_down(self, grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.bool_]:
         """(count,) parts 1..count of labels (h, w) seen at the robot's height; all where it is not known."""

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
 from vision.edges import GreyImage
-from vision.optical_flow import mahalanobis, track
+from vision.optical_flow import Flow, mahalanobis, pyramid
+from vision.optical_flow import track as track_in
 
 SETTINGS = FragmentSettings()
 
@@ -35,6 +36,18 @@ def points() -> NDArray[np.float32]:
 def steady(count: int) -> NDArray[np.float32]:
     """Held to 0.2 px in every direction."""
     return np.tile(np.array([0.04, 0.0, 0.04], np.float32), (count, 1))
+
+
+def track(
+    before: GreyImage,
+    now: GreyImage,
+    pixels: NDArray[np.float32],
+    guess: NDArray[np.float32],
+    covariance: NDArray[np.float32],
+    settings: FragmentSettings,
+) -> Flow:
+    images = pyramid(before, settings), pyramid(now, settings)
+    return track_in(*images, pixels, guess, covariance, settings)
 
 
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (0.4, -0.3), (3.3, -1.7), (9.5, 6.25)])
@@ -81,6 +94,32 @@ def test_a_plain_area_has_no_flow() -> None:
     plain = np.full((180, 240), 128, np.uint8)
     start = points()
     assert not track(plain, plain, start, start, steady(len(start)), SETTINGS).found.any()
+
+
+def test_searching_level_by_level_finds_what_one_call_for_all_of_them_finds() -> None:
+    before, start = pattern(1), points()
+    now, window = shifted(before, 9.5, 6.25), SETTINGS.lk_window_px
+    whole, _, _ = cv2.calcOpticalFlowPyrLK(
+        before,
+        now,
+        start,
+        start.copy(),
+        winSize=(window, window),
+        maxLevel=SETTINGS.lk_levels,
+        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02),
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        minEigThreshold=1e-5,
+    )
+    # So sure of every end that what is expected of it has no weight.
+    flow = track(before, now, start, start, 1e-9 * steady(len(start)), SETTINGS)
+    np.testing.assert_allclose(flow.pixels, np.asarray(whole), atol=1e-4)
+
+
+@pytest.mark.parametrize(("size", "levels"), [((480, 640), 4), ((45, 200), 3), ((22, 200), 1)])
+def test_a_pyramid_ends_where_an_image_would_be_smaller_than_the_window(
+    size: tuple[int, int], levels: int
+) -> None:
+    assert len(pyramid(np.zeros(size, np.uint8), SETTINGS)) == levels
 
 
 def test_no_points() -> None:
