@@ -92,6 +92,7 @@ class DepthGrid:
         return (flat * inside.view(np.uint8)).astype(np.intp), inside, inverse
 
 
+@np.errstate(divide="ignore")  # what comes of a division by zero is left out; once, for it takes a while
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
     """Sub-sample the depth of frame; depth outside [min_depth_m, max_depth_m] is not valid."""
     step = config.grid_step_px
@@ -161,8 +162,7 @@ def _view(
 
 def _inverted(values: FloatGrid, valid: BoolGrid) -> FloatGrid:
     """1 / values where valid, else 0. valid values are not zero; what comes of the others is left out."""
-    with np.errstate(divide="ignore"):
-        inverted = np.float32(1.0) / values
+    inverted = np.float32(1.0) / values
     return np.asarray(cv2.copyTo(inverted, valid.view(np.uint8)), np.float32)
 
 
@@ -194,8 +194,11 @@ def _four_samples(depth: DepthImage, step: int, scale_m: float) -> DepthImage:
     nearer, farther = np.minimum(first, second), np.maximum(first, second)
     gap = farther - nearer
     # 1/nearer - 1/farther <= k, without a division; in one type each, or NumPy converts piece by piece.
-    reach = np.multiply(nearer, farther, dtype=np.float32) * np.float32(_AGREE_INVERSE * scale_m)
+    reach = nearer.astype(np.float32)
+    reach *= farther.astype(np.float32)
+    reach *= np.float32(_AGREE_INVERSE * scale_m)
     same = gap.astype(np.float32) <= reach
     gap >>= 1
-    nearer += np.multiply(gap, same.view(np.uint8), dtype=np.uint16)
+    gap *= same.astype(np.uint16)
+    nearer += gap
     return nearer

@@ -100,6 +100,8 @@ def expected_in(
     fewest_first = np.argsort(votes)
     main[winner[fewest_first]] = fewest_first
     part, track = np.nonzero(inside & (main[1:] >= 0))
+    if len(part) == 0:
+        return result
     result[part, track] = _parted(grid, parts, part, main[track + 1])
     return result
 

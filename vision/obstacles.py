@@ -147,12 +147,11 @@ def _spread(chi2: FloatArray, parties: _Parties) -> FloatArray:
 
 def _end_chi2(motion: PointMotion, trust: FloatArray, velocity: FloatArray) -> FloatArray:
     """(2N,) chi-square of each end if it moves with velocity (3, 2N). trust: see end_information."""
-    x, y = motion.ray.T
-    across, down, away = velocity * motion.lag_s
-    a = motion.miss_m[:, 0] - across + x * away
-    b = motion.miss_m[:, 1] - down + y * away
-    xx, xy, yy = trust
-    result: FloatArray = (xx * a + xy * b) * a + (xy * a + yy * b) * b
+    way = velocity * motion.lag_s
+    # Both coordinates at once, and both rows of the quadratic form.
+    miss = motion.miss_m.T - way[:2] + motion.ray.T * way[2]
+    weighted = (trust[:2] * miss[0] + trust[1:] * miss[1]) * miss
+    result: FloatArray = weighted[0] + weighted[1]
     return result
 
 

@@ -61,10 +61,11 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     rough = ~smooth & ~sliver & steady & tracks.moving[seen]
     cut = ~smooth & ~sliver & ~rough
     tracks.sliver[seen] = sliver & ~_at_border(measured.bbox_px[seen], detection)
-    tracks.locate(seen[smooth], position[smooth], covariance[smooth])
-    shift_m = _SHIFT_SHARE * measured.extent_m[seen, :2].max(axis=1)
-    doubt = covariance + np.square(shift_m)[:, None, None] * np.eye(3)
-    tracks.locate(seen[rough], position[rough], doubt[rough])
+    located, doubt = np.flatnonzero(smooth | rough), covariance
+    if rough.any():
+        shift_m = np.where(rough, _SHIFT_SHARE * measured.extent_m[seen, :2].max(axis=1), 0.0)
+        doubt = covariance + np.square(shift_m)[:, None, None] * np.eye(3)
+    tracks.locate(seen[located], position[located], doubt[located])
     tracks.relocate(seen[cut], position[cut], covariance[cut])
     tracks.clean_s[seen] = np.where(smooth & measured.tall[seen], tracks.clean_s[seen] + detection.dt_s, 0.0)
     tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S
