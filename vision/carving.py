@@ -50,8 +50,8 @@ def carve(
     if len(tracks) == 0:
         return labels
     grid = detection.grid
-    evidence = arrived | _around_moving_fragments(detection, velocities, config)
-    if not evidence.any():
+    suspicious = np.flatnonzero(obstacles.moving_candidates(detection.motion, detection.age_frames))
+    if len(suspicious) < _MIN_FRAGMENTS and not arrived.any():
         return labels
     mover = tracks.moving | (tracks.evidence > 0.0)
     # Where the lines of something wider than a body stand while a part of it arrives, somebody touches it.
@@ -60,14 +60,20 @@ def carve(
         measured.extent_m[:, 2]
         <= _COMPACT_M + 2.0 * depth_sigma_m(measured.position_m[:, 2], config.depth_noise)
     )
-    searched = ~mover & (~compact | touched)
-    labels = _cut_back(tracks, detection, labels, tracks.moving & ~compact, evidence, config)
+    searched, overgrown = ~mover & (~compact | touched), tracks.moving & ~compact
     chosen = np.zeros(len(tracks) + 1, np.bool_)
-    chosen[1 : len(searched) + 1] = searched
-    inside = chosen.take(labels)
-    seeds = evidence & inside
-    if not seeds.any():
+    chosen[1:] = searched | overgrown
+    if not chosen.any():
         return labels
+    looked_at = chosen.take(labels)
+    evidence = arrived & looked_at
+    evidence |= _around_moving_fragments(detection, velocities, suspicious, looked_at, config)
+    if not evidence.any():
+        return labels
+    chosen[1:] = searched
+    inside = chosen.take(labels) if overgrown.any() else looked_at
+    labels = _cut_back(tracks, detection, labels, overgrown, evidence, config)
+    seeds = evidence & inside
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
     if np.count_nonzero(grown) < _MIN_CELLS:
@@ -117,13 +123,16 @@ def _start(
 
 
 def _around_moving_fragments(
-    detection: Detection, velocities: FragmentVelocities, config: PerceptionConfig
+    detection: Detection,
+    velocities: FragmentVelocities,
+    chosen: NDArray[np.intp],
+    looked_at: BoolGrid,
+    config: PerceptionConfig,
 ) -> BoolGrid:
-    """(h, w) cells close to fragments that move in company, at their depth."""
+    """(h, w) those cells of looked_at (h, w) that are close to the ones of fragments chosen (K,) that move in
+    company, at their depth."""
     result = np.zeros(detection.grid.depth_m.shape, np.bool_)
     motion = detection.motion
-    candidate = obstacles.moving_candidates(motion, detection.age_frames)
-    chosen = np.flatnonzero(candidate)
     if len(chosen) < _MIN_FRAGMENTS:
         return result
     velocity, covariance = velocities.velocity_mps[chosen], velocities.covariance[chosen]
@@ -135,13 +144,18 @@ def _around_moving_fragments(
     if len(chosen) == 0:
         return result
     return _near_ends(
-        detection.grid, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
+        detection.grid, looked_at, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
     )
 
 
 def _near_ends(
-    grid: DepthGrid, ends_px: NDArray[np.float32], depth_m: NDArray[np.float32], focal_px: float
+    grid: DepthGrid,
+    looked_at: BoolGrid,
+    ends_px: NDArray[np.float32],
+    depth_m: NDArray[np.float32],
+    focal_px: float,
 ) -> BoolGrid:
+    """(h, w) those cells of looked_at (h, w) that are close to the ends (N, 2, 2), at their depth (N, 2)."""
     result = np.zeros(grid.depth_m.shape, np.bool_)
     depth = depth_m.ravel().astype(float)
     known = np.isfinite(depth)
@@ -153,6 +167,8 @@ def _near_ends(
     reach_cells = int(_AROUND_M * focal_px / (grid.step_px * float(depth.min()))) + 2
     top, left = max(int(rows.min()) - reach_cells, 0), max(int(columns.min()) - reach_cells, 0)
     box = slice(top, int(rows.max()) + reach_cells + 1), slice(left, int(columns.max()) + reach_cells + 1)
+    if not looked_at[box].any():
+        return result
     rows, columns = rows - top, columns - left
     seeds = np.ones(result[box].shape, np.uint8)
     seeds[rows, columns] = 0
@@ -163,5 +179,5 @@ def _near_ends(
     nearest_m = there.take(label)
     reach = np.asarray(distance) * (grid.step_px / (_AROUND_M * focal_px)) * nearest_m <= 1.0
     agrees = np.abs(grid.depth_m[box] - nearest_m) <= _AGREE_M + _AGREE_PER_M2 * nearest_m * nearest_m
-    result[box] = reach & agrees & grid.valid[box]
+    result[box] = reach & agrees & looked_at[box]
     return result

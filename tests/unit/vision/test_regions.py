@@ -175,7 +175,7 @@ def test_cells_near_an_end_are_those_within_20_cm_at_its_depth() -> None:
     depth[:, 20:] = 4.0
     grid = grid_of(depth)
     ends = np.array([[[42.0, 42.0], [np.nan, np.nan]]], np.float32)
-    found = _near_ends(grid, np.nan_to_num(ends), np.array([[2.0, np.nan]], np.float32), 400.0)
+    found = _near_ends(grid, grid.valid, np.nan_to_num(ends), np.array([[2.0, np.nan]], np.float32), 400.0)
     for row, column in np.ndindex(*SHAPE):
         away_m = np.hypot(row - 10, column - 10) * 0.02
         if away_m < 0.18 and column < 20:
@@ -186,4 +186,5 @@ def test_cells_near_an_end_are_those_within_20_cm_at_its_depth() -> None:
 
 def test_without_depth_no_cell_is_near() -> None:
     nowhere = np.full((1, 2), np.nan, np.float32)
-    assert not _near_ends(grid_of(flat(2.0)), np.zeros((1, 2, 2), np.float32), nowhere, 400.0).any()
+    grid = grid_of(flat(2.0))
+    assert not _near_ends(grid, grid.valid, np.zeros((1, 2, 2), np.float32), nowhere, 400.0).any()
