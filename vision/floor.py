@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -120,16 +121,20 @@ def _refined(
         on_it = np.abs(plane @ cells - inverse) <= _TOLERANCE
         if np.count_nonzero(on_it) < max(3.0, least_cells):
             return None
-        plane = np.asarray(np.linalg.lstsq(cells[:, on_it].T, inverse[on_it], rcond=None)[0], np.float64)
+        # Three unknowns of one size: the normal equations will do. A row of cells only is no plane.
+        chosen = cells * on_it
+        _, found = cv2.solve(chosen @ cells.T, chosen @ inverse[:, None], flags=cv2.DECOMP_SVD)
+        plane = np.asarray(found, np.float64)[:, 0]
     good = _possible(plane[None])[0] and _score(plane[None], cells, inverse)[0] > 0.0
     return plane if good else None
 
 
 def _score(planes: FloatArray, cells: FloatArray, inverse: FloatArray) -> FloatArray:
     """(P,) cells on each plane (P, 3), less those seen through it."""
-    above = inverse - planes @ cells  # positive: nearer than the plane
-    on_it = np.count_nonzero(np.abs(above) <= _TOLERANCE, axis=1)
+    above = planes @ cells
+    np.subtract(inverse, above, out=above)  # positive: nearer than the plane
     below = np.count_nonzero(above < -2.0 * _TOLERANCE, axis=1)
+    on_it = np.count_nonzero(np.abs(above, out=above) <= _TOLERANCE, axis=1)
     result: FloatArray = on_it - _BELOW_COSTS * below
     return result
 

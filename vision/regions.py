@@ -182,11 +182,8 @@ def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
     in depth: what was divided from its surroundings by guess has its middle where the guess put it."""
     hidden = _hidden_cells(grid, labels, len(regions.cells))
     overlapped = _overlapped_cells(grid, labels, len(regions.cells))
-    return replace(
-        regions,
-        wide=regions.wide & (hidden <= _OCCLUDED_SHARE * regions.rows),
-        overlapped=overlapped > _OCCLUDED_SHARE * regions.rows,
-    )
+    least = _OCCLUDED_SHARE * regions.rows
+    return replace(regions, wide=regions.wide & (hidden <= least), overlapped=overlapped > least)
 
 
 def _foot_px(
