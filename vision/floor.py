@@ -56,10 +56,11 @@ class FloorFinder:
         rows, columns = np.nonzero(grid.valid[::_EVERY, ::_EVERY])
         plane = None
         if len(rows) >= 3:
-            cells = np.stack((grid.x[::_EVERY][columns], grid.y[::_EVERY][rows], np.ones(len(rows))))
+            cells = np.ones((3, len(rows)))
+            cells[0], cells[1] = grid.x[::_EVERY].take(columns), grid.y[::_EVERY].take(rows)
             inverse = grid.inverse_depth[::_EVERY, ::_EVERY][rows, columns].astype(float)
             least = _LEAST_SHARE * grid.valid.size / _EVERY**2
-            plane = self._plane_in(cells.astype(float), inverse, least)
+            plane = self._plane_in(cells, inverse, least)
         self._missed = 0 if plane is not None else self._missed + 1
         if plane is not None or self._missed > _KEEP_FRAMES:
             self._plane = plane
