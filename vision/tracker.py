@@ -165,7 +165,7 @@ class Tracker:
         measured: Regions,
         winner: NDArray[np.int32],
     ) -> NDArray[np.int32]:
-        """winner (P,) with new tracks: large parts that nobody claims, if they reach down to the robot or may."""
+        """winner (P,) with new tracks: large parts nobody claims, if they reach down to the robot or may."""
         grid, tracks = detection.grid, self._tracks
         large = (winner == 0) & (measured.cells >= _MIN_CELLS)
         overhead = large.copy()
