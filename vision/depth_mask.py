@@ -23,13 +23,16 @@ _REACH_PX = np.array((-6, -3, 0, 3, 6))
 _NEAR_RANK = 4  # the 5th nearest of 25 samples: a corner of a body still covers a fifth of them
 _MIN_SUPPORT = 4
 _NO_DATA_M = np.float32(1e6)  # sorts behind everything that is valid
+_HOLES = 0.25  # of the surroundings: so much without depth may be another surface
+UNSEEN_M = 12.0  # how far that is taken to be
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceDepth:
     """near_m (N,): depth of the nearest supported surface around each point, NaN where there is none.
 
-    far_m (N,): depth of what lies behind it, equal to near_m where there is one surface only.
+    far_m (N,): depth of what lies behind it, equal to near_m where there is one surface only. Where much of
+    the surroundings has no depth, another surface may be there: then it is UNSEEN_M or more.
     holes (N,): share of the surroundings without any depth, where it is not known what lies there.
     """
 
@@ -74,7 +77,9 @@ def surface_depth(
     far_m = _sum(ordered, is_far) / np.maximum(far_count, 1)
     near_m[(count < _MIN_SUPPORT) | (near_count < 2)] = np.nan
     far_m = np.where((far_count >= 2) & (near_m == near_m), far_m, near_m)
-    return SurfaceDepth(near_m, far_m, 1.0 - _count(measured) / len(measured))
+    holes = 1.0 - _count(measured) / len(measured)
+    far_m = np.where((holes >= _HOLES) & (near_m == near_m), np.maximum(far_m, UNSEEN_M), far_m)
+    return SurfaceDepth(near_m, far_m, holes)
 
 
 def _samples(depth: DepthImage, pixels: RealArray) -> DepthImage:

@@ -16,6 +16,8 @@ SINGLE_WIDTH_M = 0.85  # nobody is wider
 NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
 _PAIR_DISTANCE_M = 0.5
 _VALLEY = 0.35
+WITHIN = 0.9  # of a group of cells: it is seen through another one
+LOW = 0.5  # of the height of that in the image; somebody behind somebody else is taller
 _HARDLY = 0.2  # of the image between two groups of cells
 _MIN_CELLS = 24
 _BINS = 12
@@ -26,7 +28,8 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
 
     The cells are laid along the line on which they spread most (seen from above). Two people leave a
     valley in between; a crate, however wide, does not, and where something nearer fills it, it is none. Nor
-    is it one beside a piece that is too wide for anybody, where nothing is seen in it.
+    is it one beside a piece that is too wide for anybody, where nothing is seen in it. What is seen through
+    the larger group is no second body either.
     """
     cells = np.flatnonzero(labels.ravel() == track + 1)
     if len(cells) < 2 * _MIN_CELLS:
@@ -56,11 +59,24 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
         return None
     if abs(median(along[second]) - median(along[~second])) < _PAIR_DISTANCE_M:
         return None
+    if _seen_through(cells[second], cells[~second], grid.depth_m.shape[1]):
+        return None
     wide = max(float(np.ptp(along[second])), float(np.ptp(along[~second]))) > SINGLE_WIDTH_M
     if _hidden_between(grid, cells[second], cells[~second], wide):
         return None
     cut_off: NDArray[np.intp] = cells[second]
     return cut_off
+
+
+def _seen_through(small: NDArray[np.intp], large: NDArray[np.intp], width: int) -> bool:
+    """Whether a small group of flat cells is low and for the most part within the image box of the large one, as
+    the far wheels of a cart are that are seen under it."""
+    (top, left), (bottom, right) = (edge(np.divmod(large, width), axis=1) for edge in (np.min, np.max))
+    row, column = np.divmod(small, width)
+    if np.ptp(row) + 1 > LOW * (bottom - top + 1):
+        return False
+    inside = (row >= top) & (row <= bottom) & (column >= left) & (column <= right)
+    return bool(np.count_nonzero(inside) >= WITHIN * len(small))
 
 
 def _hidden_between(grid: DepthGrid, one: NDArray[np.intp], other: NDArray[np.intp], wide: bool) -> bool:

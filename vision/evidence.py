@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.depth_mask import depth_sigma_m
+from vision.depth_mask import UNSEEN_M, depth_sigma_m
 from vision.ego_motion import CameraEstimate
 from vision.fragments import AnchorEnds, FragmentStore
 from vision.order import quantile
@@ -27,8 +27,7 @@ from vision.rolling_shutter import straight_rays
 from vision.velocities import PointMotion, chi2_2d
 
 # Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
-_UNKNOWN_DEPTH_M = 12.0
-_UNKNOWN_DEPTH_SIGMA_M = 10.0
+_UNSEEN_SIGMA_M = 10.0
 _SETTLED_FRAMES = 3
 _LEAST_ENDS = 16
 _CHI2_THIRD = 0.811  # a third of static ends, 2 degrees of freedom, lies below
@@ -40,6 +39,7 @@ _MOST_LOOKS = 6.0
 _SETTLED_LATE_FRAMES = 4.0  # between the plain mean of the first looks and the running one: 2.5 to 5
 _COMMON_NOISE = 0.5
 _MIXED_SIGMAS = 3.0
+_STATIC_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom, lie below
 _MIXED_ALONG_PX = 3.0
 _MIXED_ACROSS_PX = 0.3
 
@@ -59,10 +59,10 @@ class AnchorDepths:
 def appraise(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
     """Where depth is missing, the end is taken for a distant one whose depth is hardly known."""
     known = np.isfinite(anchor.depth_m)
-    near_m = np.where(known, anchor.depth_m, _UNKNOWN_DEPTH_M)
-    far_m = np.where(known, anchor.far_m, _UNKNOWN_DEPTH_M)
+    near_m = np.where(known, anchor.depth_m, UNSEEN_M)
+    far_m = np.where(known, anchor.far_m, UNSEEN_M)
     single = depth_sigma_m(near_m, noise)
-    sigma_m = np.where(known, single * _averaged(anchor.looks), _UNKNOWN_DEPTH_SIGMA_M)
+    sigma_m = np.where(known, single * _averaged(anchor.looks), _UNSEEN_SIGMA_M)
     return AnchorDepths(near_m, sigma_m, far_m, known, far_m - near_m > 0.1 + _MIXED_SIGMAS * single)
 
 
@@ -118,11 +118,16 @@ def gather(
     in_front = depth > 0.1
     squared = np.square(depth)
     per_pixel = np.array([[1.0 / camera.fx**2], [1.0 / (camera.fx * camera.fy)], [1.0 / camera.fy**2]])
-    covariance = _pixel_covariance(store, anchor, depths.mixed) * (per_pixel * (variance_scale * squared))
+    passing = static[:2, 1] / np.maximum(static[2, 1], 0.1) - static[:2, 0] / np.maximum(depth, 0.1)
+    passing *= np.array([[camera.fx], [camera.fy]])
+    covariance = _pixel_covariance(store, anchor, depths.mixed, passing)
+    covariance *= per_pixel * (variance_scale * squared)
     covariance[::2] += _pose_variance(now.covariance, squared)
     doubt = np.empty((3, 2, len(depth)))
     doubt[:, 0], doubt[:, 1] = covariance, covariance * np.square(static[2, 1] / np.maximum(depth, 0.1))
-    chi2 = chi2_2d(miss.reshape(2, -1).T, doubt.reshape(3, -1).T, effect.reshape(2, -1).T)
+    chi2 = chi2_2d(miss.reshape(2, -1).T, doubt.reshape(3, -1).T, effect.reshape(2, -1).T).reshape(2, -1)
+    # What is where the far one of two surfaces would have it says nothing of how the near one moves.
+    behind = (chi2[0] > _STATIC_CHI2) & (chi2[1] <= _STATIC_CHI2)
     depth_now = store.near_m.ravel().astype(float)
     sigma_now = depth_sigma_m(np.where(np.isnan(depth_now), 1.0, depth_now), noise)
     return PointMotion(
@@ -135,8 +140,8 @@ def gather(
         depth_step_m=depth_now - depth,
         depth_step_sigma_m=np.hypot(depths.sigma_m, sigma_now),
         depth_lag_s=_depth_lag_s(anchor),
-        static_chi2=chi2.reshape(2, -1).min(axis=0),
-        usable=depths.known & in_front & np.isfinite(miss[0, 0] + miss[1, 0]),
+        static_chi2=chi2.min(axis=0),
+        usable=depths.known & in_front & ~behind & np.isfinite(miss[0, 0] + miss[1, 0]),
     )
 
 
@@ -186,12 +191,15 @@ def _depth_lag_s(anchor: AnchorEnds) -> FloatArray:
     return anchor.lag_s.repeat(2) + late_frames * frame_s
 
 
-def _pixel_covariance(store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[np.bool_]) -> FloatArray:
+def _pixel_covariance(
+    store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[np.bool_], passing_px: FloatArray
+) -> FloatArray:
     """(3, 2N) covariance xx, xy, yy of the ends in the image, px^2, since their anchors.
 
     An end whose surroundings lie on two surfaces (mixed (2N,)) is often no corner of a body but the place
-    where the outline of one crosses a line of another: it slides along the fragment when either moves.
-    Across the fragment it is held as well as any.
+    where the outline of one crosses a line of another: it slides along the fragment when either moves, by as
+    much as they pass each other in the image, passing_px (2, 2N). Across the fragment it is held as well as
+    any.
     """
     steps = np.maximum(1.0, _STEPS_SHARE * anchor.lag_frames).repeat(2)
     result: FloatArray = store.pixel_cov.reshape(-1, 3).T * steps
@@ -199,7 +207,8 @@ def _pixel_covariance(store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[n
     both = store.ends_px[ends // 2].astype(float)
     du, dv = (both[:, 1] - both[:, 0]).T
     squared = np.maximum(du * du + dv * dv, 1e-12)
-    slide, rest = _MIXED_ALONG_PX**2 / squared, _MIXED_ACROSS_PX**2
+    along = (passing_px[0, ends] * du + passing_px[1, ends] * dv) ** 2 / squared
+    slide, rest = np.maximum(along, _MIXED_ALONG_PX**2) / squared, _MIXED_ACROSS_PX**2
     result[0, ends] += slide * du * du + rest
     result[1, ends] += slide * du * dv
     result[2, ends] += slide * dv * dv + rest

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from vision.depth_grid import DepthGrid
-from vision.division import NEARER_INVERSE, SINGLE_WIDTH_M, split
+from vision.division import LOW, NEARER_INVERSE, SINGLE_WIDTH_M, WITHIN, split
 from vision.regions import IntGrid, Regions
 
 _CLOSE_M = 0.25
@@ -38,6 +38,7 @@ _GOES_MPS = 0.3  # what goes more slowly goes like whatever stands
 _MOSTLY = 0.7
 _TOUCHING_PX = 16.0
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
+_THROUGH_M = 1.5  # by so much farther back a vehicle may be seen through itself
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +124,7 @@ def detach(
     """winner (P,), track index + 1 of each part or 0, without the parts far from the track's main one.
 
     votes (P,): how many cells spoke for the winner. expected (P, T): parts that stay with it all the same, as
-    those do that stand on the main one in the image and were its own before.
+    those do that stand on the main one in the image, or are seen through it, and were its own before.
     """
     owned = np.flatnonzero(winner > 0)
     if len(owned) == 0:
@@ -136,8 +137,10 @@ def detach(
     main = order[np.maximum.accumulate(np.where(is_main, np.arange(len(order)), 0))]
     box = boxes(parts)
     gap = gaps_m(box, order, box, main)
-    carried = (votes[order] >= _MOSTLY * parts.cells[order]) & (gap <= _CARRIED_M)
-    carried &= _stacked(parts.bbox_px[order], parts.bbox_px[main])
+    own, of = parts.bbox_px[order], parts.bbox_px[main]
+    carried = (gap <= _CARRIED_M) & _stacked(own, of)
+    carried |= (gap <= _THROUGH_M) & _seen_through(own, of)
+    carried &= votes[order] >= _MOSTLY * parts.cells[order]
     far = (gap > _APART_M) & ~expected[order, track - 1] & ~carried
     result = winner.copy()
     result[order[far]] = 0
@@ -178,7 +181,8 @@ def merges(
 ) -> list[tuple[int, int]]:
     """Pairs (small, large) of tracks that may be one body: a suspect or mover beside a larger mover, the
     closest pairs first. A track may be beside several. What begins where another one ends in the image and
-    surely goes exactly as that does is carried by it, even if it is farther back: the mast of a cart. Pieces
+    surely goes exactly as that does is carried by it, even if it is farther back: the mast of a cart. So is
+    what is seen through it: its own far side. Pieces
     of something wider than anybody, that surely go exactly alike, are one where nothing is seen between them.
 
     velocity (T, 3) and velocity_sigma (T,) of the tracks.
@@ -199,8 +203,10 @@ def merges(
     fits = (cells[a] <= _SMALL_SHARE * cells[b]) | (width <= SINGLE_WIDTH_M) | (overlap >= _OVERLAP)
     reach = np.where(overlap >= _OVERLAP, _APART_M, _CLOSE_M)
     known = np.maximum(velocity_sigma[a], velocity_sigma[b]) <= _CARRIED_SIGMA_MPS
-    carried = known & (difference <= _CARRIED_MPS) & _stacked(regions.bbox_px[a], regions.bbox_px[b])
-    reach = np.where(carried, _CARRIED_M, reach)
+    like = known & (difference <= _CARRIED_MPS)
+    carried = like & _stacked(regions.bbox_px[a], regions.bbox_px[b])
+    through = like & _seen_through(regions.bbox_px[a], regions.bbox_px[b])
+    reach = np.where(carried, _CARRIED_M, np.where(through, _THROUGH_M, reach))
     gap = gaps_m(box, a, box, b)
     one = (gap <= reach) & alike & fits
     wide = np.maximum(regions.extent_m[a, 0], regions.extent_m[b, 0]) > SINGLE_WIDTH_M
@@ -255,6 +261,14 @@ def _stacked(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
     shared = np.minimum(a[:, 2], b[:, 2]) - np.maximum(a[:, 0], b[:, 0])
     apart = np.abs(a[:, 3] - b[:, 1])
     result: NDArray[np.bool_] = (shared >= _MOSTLY * (a[:, 2] - a[:, 0])) & (apart <= _TOUCHING_PX)
+    return result
+
+
+def _seen_through(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
+    """(K,) whether box a[k] lies within box b[k] in the image and is at most half as tall, as nobody behind
+    somebody else is; (K, 4) each: u0, v0, u1, v1."""
+    low = a[:, 3] - a[:, 1] <= LOW * (b[:, 3] - b[:, 1])
+    result: NDArray[np.bool_] = low & (_overlaps(a, b) >= WITHIN)
     return result
 
 

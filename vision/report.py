@@ -15,6 +15,7 @@ MIN_SIGHTINGS = 3
 _LISTED_UNSEEN_S = 0.15  # a track is remembered for longer, but no longer shown as seen
 _WAY_SIGMA_M = 0.06
 _STATIC_SCORE = 0.5
+_LAST_CELLS = 12  # less of a sliver is no sight of anybody
 _OVERHEAD_CELLS = 24  # half of a head, 6 m away
 
 
@@ -65,6 +66,8 @@ def _expected(tracks: Tracks, unseen_s: FloatArray) -> NDArray[np.bool_]:
     """(T,) of which it is known well enough where they went since they were seen unseen_s (T,) ago."""
     sigma_mps = np.sqrt(tracks.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
     known = ~tracks.moving | (sigma_mps * unseen_s <= _WAY_SIGMA_M)
+    # What was seen last of somebody who went behind something tells little of where he is now.
+    known &= ~tracks.sliver | (tracks.cells >= _LAST_CELLS)
     result: NDArray[np.bool_] = (unseen_s <= _LISTED_UNSEEN_S) & known
     return result
 

@@ -80,6 +80,16 @@ def test_a_few_cells_are_not_divided() -> None:
     assert split(grid, sparse, 0) is None
 
 
+def test_what_is_seen_through_a_body_is_not_divided_from_it() -> None:
+    """The far wheels of a cart, 1.2 m behind its front, under it; and not under it."""
+    front = nearest(plate(2.0, (-0.4, 0.4), (-0.6, 0.3)), plate(2.0, (-0.4, -0.3), (0.3, 0.7)))
+    wheel = plate(3.2, (-0.1, 0.3), (0.6, 1.0))
+    beside = plate(3.2, (0.9, 1.3), (0.6, 1.0))
+    for far, one in ((wheel, True), (beside, False)):
+        depth_m = nearest(front, far)
+        assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None) == one
+
+
 def test_one_body_behind_somebody_is_not_divided() -> None:
     """1.3 m wide; what hides its middle, and leaves a foot's breadth of it, makes no two of it."""
     whole, foot = plate(4.0, (-0.65, 0.65), (-0.6, 0.8)), plate(4.0, (-0.3, 0.3), (0.7, 0.8))

@@ -130,9 +130,9 @@ def test_halves_of_one_persons_width_are_one() -> None:
 
 def test_what_overlaps_in_the_image_by_half_is_one_even_when_large_and_somewhat_deeper() -> None:
     wide = Body(0.0, width=1.0, cells=300)
-    assert merged(wide, Body(0.2, z=4.45, width=0.9, cells=250)) == [(1, 0)]  # 0.25 m behind
-    assert merged(wide, Body(0.2, z=4.58, width=0.9, cells=250)) == [(1, 0)]  # 0.38
-    assert merged(wide, Body(0.2, z=4.75, width=0.9, cells=250)) == []  # 0.55
+    assert merged(wide, Body(0.3, z=4.45, width=0.9, cells=250)) == [(1, 0)]  # 0.25 m behind
+    assert merged(wide, Body(0.3, z=4.58, width=0.9, cells=250)) == [(1, 0)]  # 0.38
+    assert merged(wide, Body(0.3, z=4.75, width=0.9, cells=250)) == []  # 0.55
     # 0.47 m of 0.9 m, and 0.43 m of it.
     assert merged(wide, Body(0.48, width=0.9, cells=250)) == [(1, 0)]
     assert merged(wide, Body(0.52, width=0.9, cells=250)) == []
@@ -169,6 +169,29 @@ def test_what_stands_on_a_mover_in_the_image_and_goes_exactly_as_it_does_is_carr
     assert merged(CART, replace(MAST, z=2.1)) == []  # 0.95 m behind it
     assert merged(CART, MAST, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
     assert merged(CART, MAST, sigma=0.4) == []  # not known well enough
+
+
+FAR_WHEEL = Body(0.1, y=0.5, z=2.0, width=0.2, height=0.4, deep=0.1, cells=40)  # 0.85 m behind the front
+
+
+def test_what_is_seen_through_a_mover_and_goes_exactly_as_it_does_is_its_own() -> None:
+    assert merged(CART, FAR_WHEEL) == [(1, 0)]
+    assert merged(CART, replace(FAR_WHEEL, x=0.8)) == []  # beside it
+    assert merged(CART, replace(FAR_WHEEL, z=2.9, y=0.6)) == []  # 1.75 m behind it
+    assert merged(CART, FAR_WHEEL, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
+    assert merged(CART, FAR_WHEEL, sigma=0.4) == []
+
+
+def test_what_is_seen_through_a_mover_stays_with_it_while_most_of_it_was_there_before() -> None:
+    winner, nowhere = np.array([1, 1], np.int32), NOWHERE[:2, :1]
+    for wheel, votes, stays in (
+        (FAR_WHEEL, 28, 1),
+        (FAR_WHEEL, 27, 0),
+        (replace(FAR_WHEEL, x=0.8), 40, 0),
+        (replace(FAR_WHEEL, z=2.9, y=0.6), 40, 0),
+    ):
+        parts = regions(CART, wheel)
+        np.testing.assert_array_equal(detach(winner, parts, np.array([800, votes]), nowhere), [1, stays])
 
 
 def test_what_a_mover_carries_stays_with_it_while_most_of_it_was_there_before() -> None:

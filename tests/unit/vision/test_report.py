@@ -146,8 +146,19 @@ def test_a_mover_of_which_a_sliver_is_left_to_see_has_its_whole_box_and_the_sliv
     made.moving[:], made.sliver[:] = True, True
     made.bbox_px[:] = [170.0, 40.0, 190.0, 60.0]
     made.box_m[:] = [-0.3, -0.9, 0.3, 0.9]
+    made.cells[:] = 12
     (one,) = report.obstacles(made, now())
     assert one.bbox_px == pytest.approx((170.0, 29.5, 239.5, 209.5))
+
+
+@pytest.mark.parametrize("unseen_s", [0.0, 0.1])
+def test_of_whom_hardly_anything_is_left_to_see_is_not_listed(unseen_s: float) -> None:
+    made = tracks((0.5, 0.0, 3.0), unseen_s=unseen_s)
+    made.moving[:], made.sliver[:] = True, True
+    made.covariance[:] = 0.01 * np.eye(6)
+    for cells, listed in ((11, 0), (12, 1)):
+        made.cells[:] = cells
+        assert len(report.obstacles(made, now())) == listed
 
 
 def test_what_is_seen_and_what_stands_still_keep_the_box_they_were_seen_by() -> None:
