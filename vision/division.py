@@ -69,8 +69,8 @@ def split(grid: DepthGrid, labels: IntGrid, track: int) -> NDArray[np.intp] | No
 
 
 def _seen_through(small: NDArray[np.intp], large: NDArray[np.intp], width: int) -> bool:
-    """Whether a small group of flat cells is low and for the most part within the image box of the large one, as
-    the far wheels of a cart are that are seen under it."""
+    """Whether a small group of flat cells is low and mostly within the image box of the large one, as the far
+    wheels of a cart are that are seen under it."""
     (top, left), (bottom, right) = (edge(np.divmod(large, width), axis=1) for edge in (np.min, np.max))
     row, column = np.divmod(small, width)
     if np.ptp(row) + 1 > LOW * (bottom - top + 1):
