@@ -181,9 +181,9 @@ def merges(
 ) -> list[tuple[int, int]]:
     """Pairs (small, large) of tracks that may be one body: a suspect or mover beside a larger mover, the
     closest pairs first. A track may be beside several. What begins where another one ends in the image and
-    surely goes exactly as that does is carried by it, even if it is farther back: the mast of a cart. So is
-    what is seen through it: its own far side. Pieces
-    of something wider than anybody, that surely go exactly alike, are one where nothing is seen between them.
+    surely goes exactly as that does is carried by it, even if it is farther back: the mast of a cart. What is
+    seen through it and goes so is its own far side. Pieces of something wider than anybody, that surely go
+    exactly alike, are one where nothing is seen between them.
 
     velocity (T, 3) and velocity_sigma (T,) of the tracks.
     """
@@ -211,7 +211,7 @@ def merges(
     one = (gap <= reach) & alike & fits
     wide = np.maximum(regions.extent_m[a, 0], regions.extent_m[b, 0]) > SINGLE_WIDTH_M
     goes = np.square(velocity[b]).sum(axis=1) > _GOES_MPS**2
-    pieces = known & (difference <= _CARRIED_MPS) & goes & wide & (gap <= _CARRIED_M) & ~one
+    pieces = like & goes & wide & (gap <= _CARRIED_M) & ~one
     if pieces.any():
         one |= pieces & ~_seen_between(grid, regions, a, b)
     a, b = a[one], b[one]
