@@ -67,7 +67,7 @@ def _expected(tracks: Tracks, unseen_s: FloatArray) -> NDArray[np.bool_]:
     sigma_mps = np.sqrt(tracks.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
     known = ~tracks.moving | (sigma_mps * unseen_s <= _WAY_SIGMA_M)
     # What was seen last of somebody who went behind something tells little of where he is now.
-    known &= ~tracks.sliver | (tracks.cells >= _LAST_CELLS)
+    known &= ~(tracks.moving & tracks.sliver) | (tracks.cells >= _LAST_CELLS)
     result: NDArray[np.bool_] = (unseen_s <= _LISTED_UNSEEN_S) & known
     return result
 

@@ -1,54 +1,20 @@
-"""Parts to bodies: what is merged, attached and detached (what is divided: test_division.py)."""
+"""Parts to bodies: what is merged, attached and detached (what is divided: test_division.py;
+where the rest of somebody hidden is expected: test_expected.py)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.support.grids import CAMERA, grid_of, labelled, nearest, plate, wall
-from vision.grouping import Bodies, Boxes, attach, boxes, detach, expected_in, gaps_m, merges
-from vision.regions import Regions, measure
+from tests.support.grids import grid_of, labelled, plate, wall
+from tests.support.parts import Body, regions
+from vision.grouping import Boxes, attach, boxes, detach, gaps_m, merges
+from vision.regions import measure
 
 ALL = np.array
 NOWHERE = np.zeros((4, 2), np.bool_)  # no track is expected in any of four parts
-
-
-@dataclass(frozen=True)
-class Body:
-    """Centre x, y, z; width, height, depth in metres; cells."""
-
-    x: float
-    y: float = 0.0
-    z: float = 4.0
-    width: float = 0.4
-    height: float = 1.6
-    deep: float = 0.2
-    cells: int = 200
-
-
-def regions(*bodies: Body) -> Regions:
-    """As if measured, with boxes in the image as the pinhole camera sees them."""
-    bbox = [
-        [
-            CAMERA.cx + CAMERA.fx * (b.x - b.width / 2) / b.z,
-            CAMERA.cy + CAMERA.fy * (b.y - b.height / 2) / b.z,
-            CAMERA.cx + CAMERA.fx * (b.x + b.width / 2) / b.z,
-            CAMERA.cy + CAMERA.fy * (b.y + b.height / 2) / b.z,
-        ]
-        for b in bodies
-    ]
-    return Regions(
-        ALL([b.cells for b in bodies]),
-        ALL([10 for _ in bodies]),
-        ALL(bbox),
-        ALL([[b.x, b.y, b.z] for b in bodies]),
-        ALL([[b.width, b.height, b.deep] for b in bodies]),
-        np.ones(len(bodies), np.bool_),
-        np.ones(len(bodies), np.bool_),
-        np.zeros(len(bodies), np.bool_),
-    )
 
 
 def merged(
@@ -260,49 +226,3 @@ def test_what_is_measured_of_a_grid_agrees_with_its_boxes() -> None:
     box = boxes(measure(grid_of(depth_m), labelled(depth_m > 0.0), 1))
     np.testing.assert_allclose(box.low_m[0], [-0.5, -0.4, 3.0], atol=0.06)
     np.testing.assert_allclose(box.high_m[0], [0.1, 0.6, 3.0], atol=0.06)
-
-
-def test_a_part_in_which_its_mover_is_expected_stays_or_comes_however_far() -> None:
-    parts = regions(Body(0.0), Body(0.9, cells=50))
-    there = np.array([[False], [True]])
-    winner, votes = np.array([1, 1], np.int32), np.array([90, 40])
-    np.testing.assert_array_equal(detach(winner, parts, votes, there), [1, 1])
-    np.testing.assert_array_equal(detach(winner, parts, votes, NOWHERE[:2, :1]), [1, 0])
-    new, mover = np.array([1, 0], np.int32), np.array([True])
-    np.testing.assert_array_equal(attach(np.array([1]), parts, new, mover, there), [1, 1])
-    np.testing.assert_array_equal(attach(np.array([1]), parts, new, mover, NOWHERE[:2, :1]), [1, 0])
-
-
-def behind(
-    middle_m: float | None,
-    part_x: float = 0.6,
-    part_z: float = 4.0,
-    width_m: float = 1.2,
-    moves: bool = True,
-) -> bool:
-    """Whether a part at part_x is expected to be of a body width_m wide, 4 m away, that is seen from -0.6 to
-    -0.2 m, with somebody 2 m away in front of its middle or nobody."""
-    left, right = Body(-0.4), Body(part_x, z=part_z, width=0.2, cells=50)
-    visible = [plate(b.z, (b.x - b.width / 2, b.x + b.width / 2), (-0.8, 0.8)) for b in (left, right)]
-    if middle_m is not None:
-        visible.append(plate(2.0, (middle_m - 0.1, middle_m + 0.1), (-0.8, 0.8)))
-    body = Bodies(
-        np.array([[-0.4, 0.0, 4.0]]),
-        np.array([[0.4, 1.6, 0.2]]),
-        np.array([[-width_m / 2, -0.8, width_m / 2, 0.8]]),
-        np.array([0.1]),
-    )
-    winner, votes = np.array([1, 0], np.int32), np.array([90, 0])
-    grid, mover = grid_of(nearest(*visible)), np.array([moves])
-    expected = expected_in(grid, regions(left, right), winner, votes, body, mover)
-    return bool(expected[1, 0])
-
-
-def test_a_body_is_expected_on_the_other_side_of_what_hides_its_middle() -> None:
-    assert behind(0.0)
-    assert not behind(None)  # nothing divides the two: they are two
-    assert not behind(
-        0.0, width_m=0.8
-    )  # there is no room for it: 0.6 + 0.25 m from the middle of what is seen
-    assert not behind(0.0, part_z=4.5)  # nor is that at its depth
-    assert not behind(0.0, moves=False)
