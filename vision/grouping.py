@@ -1,7 +1,7 @@
 """Parts to bodies, where connected depth says too little. Terms: vision/__init__.py.
 
 * attach: a hole in the depth image may part a shoe, an arm or a load from its body. A small new part close to
-  a mover becomes part of it.
+  somebody who moves, or has moved before, becomes part of it.
 * expected_in: something nearer, a post for example, may divide a mover in the image. The piece on the other
   side of it is still part of the mover.
 * detach: a part far from the main part of its track leaves the track, unless it is expected there or is a
@@ -151,12 +151,12 @@ def attach(
     new_parts: NDArray[np.intp],
     parts: Regions,
     winner: NDArray[np.int32],
-    mover: NDArray[np.bool_],
+    alive: NDArray[np.bool_],
     expected: NDArray[np.bool_],
 ) -> NDArray[np.int32]:
-    """winner (P,) with new parts (indices) given to the mover that they are small beside and close to, or to
-    the one that is expected there (P, T)."""
-    of_mover = np.flatnonzero((winner > 0) & np.concatenate(([False], mover))[winner])
+    """winner (P,) with new parts (indices) given to the track that they are small beside and close to, or to
+    the one that is expected there (P, T). alive (T,): the tracks that may get them, which move or moved."""
+    of_mover = np.flatnonzero((winner > 0) & np.concatenate(([False], alive))[winner])
     if len(of_mover) == 0 or len(new_parts) == 0:
         return winner
     box = boxes(parts)

@@ -128,7 +128,8 @@ class Tracker:
         bodies = sightings.bodies(tracks, pose, self._config.depth_noise)
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
-        winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, mover, expected)
+        alive = mover | tracks.has_moved
+        winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, alive, expected)
         winner = self._births(detection, parts, measured, winner)
         labels = masks.divide(parts, predicted, ballot, winner)
         measured = regions.measure(grid, labels, len(tracks))
@@ -263,6 +264,7 @@ class Tracker:
         )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
+        tracks.has_moved |= verdict.moving
         tracks.confidence, tracks.stands = verdict.confidence, verdict.stands
         tracks.calm_s = np.where(tracks.evidence > 0.0, 0.0, tracks.calm_s + detection.dt_s)
 

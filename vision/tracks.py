@@ -23,6 +23,7 @@ _FIELDS = (
     "sightings",
     "evidence",
     "moving",
+    "has_moved",
     "confidence",
     "bbox_px",
     "box_m",
@@ -44,14 +45,15 @@ _FIELDS = (
 class Tracks:
     """state (T, 6): position and velocity; covariance (T, 6, 6); surface_state and surface_covariance: the
     same from the centres of the visible surface alone, without the fragments, as a second opinion; evidence
-    (T,) of motion; moving (T,); confidence (T,) 0..1; bbox_px (T, 4); box_m (T, 4): edges
-    of the last box that showed the whole body, at its depth, from its centre; extent_m (T, 3); area_m2 (T,):
-    averaged, up to a common factor; cells (T,) of the grid covered when last seen; clean_s (T,): for how long
-    the surface's centre has told of the velocity without a break; sliver (T,): a mover of which hardly
-    anything was left to see; trailing_m (T, 3): where the centre was of late, averaged; stands (T,): its
-    fragments are sure of it; calm_s (T,): since when there has been no evidence, inf if there never was;
-    unrest_s (T,): for how long nearly all of its ends have denied that it stands, less what they did not;
-    overhead (T,): seen only above the robot so far, with its lower part behind something nearer."""
+    (T,) of motion; moving (T,); has_moved (T,): now or ever before; confidence (T,) 0..1; bbox_px (T, 4);
+    box_m (T, 4): edges of the last box that showed the whole body, at its depth, from its centre; extent_m
+    (T, 3); area_m2 (T,): averaged, up to a common factor; cells (T,) of the grid covered when last seen;
+    clean_s (T,): for how long the surface's centre has told of the velocity without a break; sliver (T,): a
+    mover of which hardly anything was left to see; trailing_m (T, 3): where the centre was of late, averaged;
+    stands (T,): its fragments are sure of it; calm_s (T,): since when there has been no evidence, inf if
+    there never was; unrest_s (T,): for how long nearly all of its ends have denied that it stands, less what
+    they did not; overhead (T,): seen only above the robot so far, with its lower part behind something
+    nearer."""
 
     def __init__(self) -> None:
         self.ids = np.empty(0, np.int64)
@@ -64,6 +66,7 @@ class Tracks:
         self.sightings = np.empty(0, np.intp)
         self.evidence = np.empty(0)
         self.moving = np.empty(0, np.bool_)
+        self.has_moved = np.empty(0, np.bool_)
         self.confidence = np.empty(0)
         self.bbox_px = np.empty((0, 4))
         self.box_m = np.empty((0, 4))
