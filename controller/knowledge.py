@@ -24,6 +24,7 @@ from controller.memory import SETTLED_S, OutOfView
 from controller.path import OnPath, Path
 from controller.sight import Sight
 from controller.steadying import SteadyVelocities
+from controller.surfaces import NO_SURFACES, surfaces_of
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import CameraCondition, CameraHealth, Scene
@@ -40,8 +41,9 @@ _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 class Knowledge:
     """Takes in scenes along one path.
 
-    bodies: boxes to reckon with. fault: why the camera cannot be relied
-    on now, "" if it can. age_s: of the newest scene (inf: none yet). edge_tan: how wide the camera looks.
+    bodies: boxes to reckon with. surfaces: what depth saw in the newest scene. fault: why the camera cannot
+    be relied on now, "" if it can. age_s: of the newest scene (inf: none yet). edge_tan: how wide the camera
+    looks.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class Knowledge:
         self.corridor = Corridor(path, robot.body)
         self.sight = Sight(self.corridor, mount, config, start_s_m)
         self.bodies = self._seen = no_bodies(0)
+        self.surfaces = NO_SURFACES
         self.health = _GOOD
         self.fault = "no scene yet"
         self.age_s = self.since_s = float("inf")
@@ -79,7 +82,7 @@ class Knowledge:
         self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._sprawls = before._seen, before._sprawls
         self._steady, self._memory, self._places = before._steady, before._memory, before._places
-        self._poses = before._poses
+        self._poses, self.surfaces = before._poses, before.surfaces
         self.health, self.edge_tan = before.health, before.edge_tan
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
 
@@ -145,14 +148,15 @@ class Knowledge:
             self.edge_tan = (
                 float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
             )
+        self.surfaces = surfaces = surfaces_of(scene.free_space, pose, self._mount)
         boxes = self._steady.update(self._recognise(seen.select(~sprawling)))
         boxes = self._memory.leaving(boxes, pose, self.edge_tan)
         standing = v_mps <= STANDING_MPS
         remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, scene.free_space)
         self.bodies = boxes.joined(remembered)
         self._boxes, self._seen, self._sprawls = boxes, seen, sprawling
-        self.sight.look(scene.free_space, pose, s_m, scene.captured_ns, boxes, standing)
-        self._places.append((scene.captured_ns, np.concatenate((self.sight.points_m, seen.xy_m))))
+        self.sight.look(scene.free_space, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
+        self._places.append((scene.captured_ns, np.concatenate((surfaces.points_m, seen.xy_m))))
         self.health = scene.health
         self._captured_ns = scene.captured_ns
         return ""

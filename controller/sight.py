@@ -16,6 +16,7 @@ from config.decision import DecisionConfig
 from controller.blind_corners import BlindCorners
 from controller.bodies import Bodies
 from controller.corridor import Corridor
+from controller.surfaces import Surfaces
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -36,8 +37,8 @@ class Sight:
 
     surface_s_m: where the nearest unexplained surface stands in the corridor (path coordinate of its nearest
     point, inf: none), steady against single frames.
-    known_s_m: the corridor was seen free up to here. points_m (P, 2): every surface of the newest scene.
-    corners: where somebody could step out from behind something.
+    known_s_m: the corridor was seen free up to here. corners: where somebody could step out from behind
+    something.
     """
 
     def __init__(
@@ -55,27 +56,26 @@ class Sight:
         self._held_s_m = math.inf
         self.surface_s_m = math.inf
         self.known_s_m = self._consent_s_m
-        self.points_m: FloatArray = np.zeros((0, 2))
         self.corners = BlindCorners(config.sight)
 
     def look(
         self,
         free: FreeSpace,
+        surfaces: Surfaces,
         pose: PlanarPose,
         s_m: float,
         captured_ns: int,
         explained_by: Bodies,
         standing: bool,
     ) -> None:
-        """Take in one scene. pose, s_m: of the robot when it was captured. standing: it was at rest then."""
-        bands = (np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan)).nonzero()[0]
-        forward = free.nearest_m[bands]
-        self.points_m = points = self._surface_points(forward, free.bearing_tan[bands], pose)
+        """Take in one scene. surfaces: those of free. pose, s_m: of the robot when it was captured. standing:
+        it was at rest then."""
+        bands, forward, points = surfaces.bands, surfaces.forward_m, surfaces.points_m
         surface_s, surface_d = self._corridor.path.project_points(
             points, s_m, s_m + self._sight.range_m + 2.0
         )
         half_width = self._corridor.half_width(surface_s)
-        side = np.abs(surface_d) - forward * free.half_width_tan
+        side = np.abs(surface_d) - surfaces.half_band_m
         inside = (side <= half_width + self._lateral_m) & (surface_s > s_m)
         reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
         moving = explained_by.select(explained_by.moving).covers(points, reach_m, _AROUND_M)
@@ -98,16 +98,6 @@ class Sight:
         in_corridor = np.zeros(len(free.bearing_tan), np.bool_)
         in_corridor[bands] = inside
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
-
-    def _surface_points(self, forward: FloatArray, bearing: FloatArray, pose: PlanarPose) -> FloatArray:
-        """Floor points (B, 2) of surfaces seen at these forward distances from the camera."""
-        ahead = forward + self._mount.forward_m
-        left = self._mount.left_m - forward * bearing
-        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        points = np.empty((len(forward), 2))
-        points[:, 0] = pose.x_m + ahead * cos - left * sin
-        points[:, 1] = pose.y_m + ahead * sin + left * cos
-        return points
 
     def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
         nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf

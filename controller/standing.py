@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +11,16 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.bodies import Bodies
-from controller.corridor import Placed, place
+from controller.corridor import Corridor, Placed, place
 from controller.knowledge import Knowledge
 from controller.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
 from controller.memory import visible_from_m
+from controller.outline import outline_clear_m
 from hal.types import CameraMount, FloatArray
 
 _INSIDE_BODY_M = 0.05
+# What stands so near beside the way may come to graze it when only a part of it is in view.
+_BESIDE_M = 0.5
 _NOW = np.zeros(1)
 
 
@@ -43,6 +47,8 @@ class StandingLimits:
         self._inside = inside
         self._of: Bodies | None = None
         self._near: list[_Near] = []
+        self._corridor: Corridor | None = None
+        self._outlines_m: dict[int, float] = {}
 
     def limits(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
         """For the robot at s_m."""
@@ -80,7 +86,8 @@ class StandingLimits:
             return
         sight, margins = self._config.sight, self._config.margins
         placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
-        near = placed.clear_m[:, 0] <= margins.lateral_m + margins.graze_m
+        clear_m = self._clear(known, placed, s_m)
+        near = clear_m <= margins.lateral_m + margins.graze_m
         self._inside.difference_update(bodies.ids[standing & ~near].tolist())
         rows = (standing & near).nonzero()[0]
         if not len(rows):
@@ -90,11 +97,32 @@ class StandingLimits:
             bodies.ids,
             placed.lo_m[:, 0],
             placed.hi_m[:, 0],
-            placed.clear_m[:, 0],
+            clear_m,
             bodies.age_s,
             stop_m,
         )
         self._near = [_Near(*of) for of in zip(*(one[rows].tolist() for one in columns), strict=True)]
+
+    def _clear(self, known: Knowledge, placed: Placed, s_m: float) -> FloatArray:
+        """(N,) free floor beside the swept corridor; in bends, by the outlines when they were last seen
+        whole."""
+        clear_m: FloatArray = placed.clear_m[:, 0].copy()
+        before = self._outlines_m if known.corridor is self._corridor else {}
+        self._corridor, self._outlines_m = known.corridor, {}
+        if known.corridor.straight:
+            return clear_m
+        bodies, margins = known.bodies, self._config.margins
+        beside = ~bodies.moving & (clear_m <= margins.lateral_m + _BESIDE_M) & (placed.hi_m[:, 0] > s_m)
+        for k in beside.nonzero()[0].tolist():
+            stretch_m = s_m - ALONGSIDE_M, float(placed.hi_m[k, 0]) + known.corridor.front_m
+            depth_m = self._config.prediction.body_depth_m
+            outline_m = outline_clear_m(bodies, k, known.surfaces, known.corridor, stretch_m, depth_m)
+            number = int(bodies.ids[k])
+            if outline_m == -math.inf:
+                outline_m = before.get(number, -math.inf)
+            self._outlines_m[number] = outline_m
+            clear_m[k] = max(clear_m[k], outline_m)
+        return clear_m
 
     def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:
         """(N,) where to stand before a body: so that it is still seen, and seen to leave."""

@@ -13,6 +13,7 @@ from config.robot import Body
 from controller.bodies import Bodies, no_bodies
 from controller.corridor import Corridor
 from controller.sight import Sight
+from controller.surfaces import NO_SURFACES, surfaces_of
 from hal.types import CameraMount, FloatArray, PlanarPose
 from tests.support.bodies import arc_path, box, line_path
 from vision.scene import FreeSpace
@@ -47,9 +48,11 @@ class Watch:
     ) -> Sight:
         for _ in range(times):
             self.frame += 1
+            pose = PlanarPose(s_m, 0.0, 0.0)
             self.sight.look(
                 seen,
-                PlanarPose(s_m, 0.0, 0.0),
+                surfaces_of(seen, pose, MOUNT),
+                pose,
                 s_m,
                 self.frame * FRAME_NS,
                 explained or no_bodies(0),
@@ -156,10 +159,11 @@ def test_behind_a_corner_beside_the_path_the_floor_is_unknown() -> None:
     sight = Sight(Corridor(path, BODY), MOUNT, DecisionConfig(), 0.0)
     shelf = np.where(BEARING < -0.5, 3.0, math.inf)
     blocked = np.where(BEARING < -0.5, 3.0, 10.0)
-    sight.look(free(shelf, blocked), path.start, 0.0, FRAME_NS, no_bodies(0), False)
+    seen = free(shelf, blocked)
+    sight.look(seen, surfaces_of(seen, path.start, MOUNT), path.start, 0.0, FRAME_NS, no_bodies(0), False)
     hidden = sight.known_s_m
     sight = Sight(Corridor(path, BODY), MOUNT, DecisionConfig(), 0.0)
-    sight.look(free(), path.start, 0.0, FRAME_NS, no_bodies(0), False)
+    sight.look(free(), NO_SURFACES, path.start, 0.0, FRAME_NS, no_bodies(0), False)
     assert hidden < sight.known_s_m - 0.3
 
 

@@ -1,0 +1,41 @@
+"""The free space of a scene as points on the floor, in the frame of the path: the nearest surfaces around."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import CameraMount, FloatArray, PlanarPose
+from vision.scene import FreeSpace
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surfaces:
+    """P points, left to right. bands (P,): of the free space, which they are of; count of its bands in all.
+    forward_m (P,) from the camera. half_band_m (P,): half of the width that a point stands for. points_m
+    (P, 2)."""
+
+    count: int
+    bands: NDArray[np.intp]
+    forward_m: FloatArray
+    half_band_m: FloatArray
+    points_m: FloatArray
+
+
+NO_SURFACES = Surfaces(0, np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+
+
+def surfaces_of(free: FreeSpace, pose: PlanarPose, mount: CameraMount) -> Surfaces:
+    """What was seen of free by a camera that a body at pose carried."""
+    bands = (np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan)).nonzero()[0]
+    forward = free.nearest_m[bands]
+    ahead = forward + mount.forward_m
+    left = mount.left_m - forward * free.bearing_tan[bands]
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    points = np.empty((len(forward), 2))
+    points[:, 0] = pose.x_m + ahead * cos - left * sin
+    points[:, 1] = pose.y_m + ahead * sin + left * cos
+    return Surfaces(len(free.nearest_m), bands, forward, forward * free.half_width_tan, points)

@@ -1,0 +1,137 @@
+"""How far beside the way something stands, by its outline in depth: what is seen corner-on, beside a bend."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from config.robot import Body
+from controller.corridor import Corridor
+from controller.decision import Decision
+from controller.outline import outline_clear_m
+from controller.path import OnPath, Path
+from controller.situation import Situation
+from controller.surfaces import Surfaces
+from hal.types import FloatArray, PlanarPose
+from tests.support.bodies import arc_path, box, line_path
+from tests.support.deciding import MOUNT, STEP_NS, Bench, obstacle
+from tests.support.scenes import free_space
+from vision.scene import FreeSpace, Obstacle
+
+# A square of 0.424 m, 3 m ahead, 1 m to the left, one side along the way: looking 45 degrees aside, a robot
+# sees it as a box of 0.6 m.
+SIDE_M = 0.3 * math.sqrt(2.0)
+NEAR_X_M, NEAR_Y_M = 3.0 - 0.5 * SIDE_M, 1.0 - 0.5 * SIDE_M
+EDGE = np.linspace(0.0, SIDE_M, 15)[:, None]
+FRONT_FACE = np.array([NEAR_X_M, NEAR_Y_M]) + EDGE * [0.0, 1.0]
+SIDE_FACE = np.array([NEAR_X_M, NEAR_Y_M]) + EDGE * [1.0, 0.0]
+CORNER_ON = np.concatenate((FRONT_FACE[::-1], SIDE_FACE[1:]))
+HALF_BAND_M = 0.01
+BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)
+
+
+def clear_m(points_m: FloatArray, view_deg: float, first_band: int = 20) -> float:
+    """Of the box seen in direction view_deg, beside a way of which the robot takes 0.4 m to either side."""
+    one = replace(
+        box(3.0, 1.0, half_view_m=0.3, half_across_m=0.3), view_rad=np.array([math.radians(view_deg)])
+    )
+    count = len(points_m)
+    seen = Surfaces(
+        80, np.arange(first_band, first_band + count), points_m[:, 0], np.full(count, HALF_BAND_M), points_m
+    )
+    corridor = Corridor(line_path(), BODY)
+    return outline_clear_m(one, 0, seen, corridor, (0.0, 8.0), depth_m=0.3)
+
+
+def test_the_side_that_is_seen_decides() -> None:
+    """The box's corner would be 0.176 m from the corridor."""
+    assert clear_m(CORNER_ON, 45.0) == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
+
+
+def test_behind_a_flat_face_the_body_goes_on() -> None:
+    """A face across the view towards the way: 0.3 m behind it, along the view, the body may end."""
+    flat = np.array([NEAR_X_M, NEAR_Y_M]) + EDGE * [1.0, 1.0]
+    behind_m = 0.3 * math.sin(math.radians(45.0))
+    assert clear_m(flat, -45.0) == pytest.approx(NEAR_Y_M - behind_m - 0.4 - HALF_BAND_M, abs=1e-9)
+
+
+def test_an_outline_with_a_gap_is_none() -> None:
+    assert clear_m(np.concatenate((CORNER_ON[:10], CORNER_ON[16:])), 45.0) == -math.inf
+    assert clear_m(CORNER_ON[:20], 45.0) == -math.inf
+    assert clear_m(CORNER_ON[:0], 45.0) == -math.inf
+
+
+def test_an_outline_that_may_go_on_outside_of_the_view_is_none() -> None:
+    assert clear_m(CORNER_ON, 45.0, first_band=0) == -math.inf
+    assert clear_m(CORNER_ON, 45.0, first_band=1) > 0.0
+    assert clear_m(CORNER_ON, 45.0, first_band=80 - len(CORNER_ON)) == -math.inf
+
+
+BEND = arc_path(4.0, 80.0)  # to the left
+# Outside of the bend, corner-on to a robot that has not begun to turn.
+CRATE_X_M, CRATE_Y_M, HALF_DIAGONAL_M = 2.9, -0.1, 0.4
+TANGENTS = np.linspace(-0.66, 0.66, 80)
+HALF_BAND = float(TANGENTS[1] - TANGENTS[0]) / 2.0
+
+
+def crate(width_m: float = 2.0 * HALF_DIAGONAL_M, y_m: float = CRATE_Y_M) -> Obstacle:
+    """Its box as the camera sees it: as deep as what is seen of it."""
+    near = obstacle(CRATE_X_M - 0.5 * HALF_DIAGONAL_M, y_m, size_m=(width_m, 0.8))
+    return replace(near, extent_m=np.array([width_m, 0.8, HALF_DIAGONAL_M]))
+
+
+def depth(corner_on: bool) -> FreeSpace:
+    """Of the crate, or of a box that fills its box."""
+    space = free_space(bands=80)
+    nearest_m = np.full(80, math.inf)
+    for band, tangent in enumerate(TANGENTS.tolist()):
+        x_m = np.linspace(0.5, 4.0, 3501)
+        off_m = np.abs(-(x_m - MOUNT.forward_m) * tangent - CRATE_Y_M)
+        front_m = CRATE_X_M - HALF_DIAGONAL_M + (off_m if corner_on else 0.0)
+        hit = (off_m <= HALF_DIAGONAL_M) & (x_m >= front_m) & (x_m <= CRATE_X_M)
+        if hit.any():
+            nearest_m[band] = x_m[hit][0] - MOUNT.forward_m
+    return FreeSpace(TANGENTS, HALF_BAND, nearest_m, np.minimum(nearest_m, space.known_m[0]))
+
+
+def look(bench: Bench, one: Obstacle, seen: FreeSpace, path: Path = BEND) -> Decision:
+    """At the beginning of the bend, for ten frames."""
+    for _ in range(10):
+        bench.now_ns += STEP_NS
+        pose, on_path = PlanarPose(0.0, 0.0, 0.0), OnPath(0.0, 0.0, 0.0)
+        decision = bench.maker.step(
+            Situation(bench.scene(one, free=seen), path, pose, on_path, 0.4, 0.0, bench.now_ns)
+        )
+    return decision
+
+
+def test_a_crate_seen_corner_on_beside_a_bend_is_passed() -> None:
+    assert look(Bench(), crate(), depth(corner_on=True)).reason.rule != "static"
+    assert look(Bench(), crate(), depth(corner_on=False)).reason.rule == "static"
+
+
+def cut(seen: FreeSpace) -> FreeSpace:
+    """As if the view ended a little to the right of the crate's middle."""
+    inside = seen.bearing_tan < 0.06
+    arrays = (seen.bearing_tan, seen.nearest_m, seen.known_m)
+    bearing, nearest, known = (array[inside] for array in arrays)
+    return FreeSpace(bearing, seen.half_width_tan, nearest, known)
+
+
+def test_what_was_seen_whole_is_passed_while_it_leaves_the_view() -> None:
+    """What is left of it in view could be the edge of something larger."""
+    part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
+    bench = Bench()
+    look(bench, crate(), seen)
+    assert look(bench, part, cut(seen)).reason.rule != "static"
+    assert look(Bench(), part, cut(seen)).reason.rule == "static"
+
+
+def test_what_was_seen_along_one_path_says_nothing_of_another() -> None:
+    part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
+    bench = Bench()
+    look(bench, crate(), seen)
+    assert look(bench, part, cut(seen), arc_path(4.0, 81.0)).reason.rule == "static"
