@@ -29,6 +29,8 @@ from vision.scene import CameraCondition, CameraHealth, EgoMotion, FreeSpace, Ob
 
 _GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)
 _BOX_PX = (0.0, 0.0, 1.0, 1.0)
+# What was in view in the frame before was so within this many of its periods.
+_SEEN_FRAMES = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,7 @@ class NoisyCamera:
         """The scene of an exposure at t_s. known_pose: where the robot believes to be."""
         polygons, velocity = self._stage.world.look(t_s)
         view = self.eye.look(polygons, true_pose)
-        self._advance(velocity)
+        self._advance(velocity, t_s)
         self._sight(view, t_s, true_pose)
         return Scene(
             captured_ns=round(t_s * NS_PER_S),
@@ -104,14 +106,17 @@ class NoisyCamera:
             robot_pose=known_pose,
         )
 
-    def _advance(self, velocity: FloatArray) -> None:
-        """Errors wander, measured velocities follow the true ones, what is not seen goes on as it did."""
+    def _advance(self, velocity: FloatArray, t_s: float) -> None:
+        """Errors wander, measured velocities follow the true ones; what is not seen goes on as it did, or as
+        it was thought to."""
         noise, dt_s = self._noise, self._period_s
         keep = math.exp(-dt_s / noise.wander_s) if self._started else 0.0
         self._started = True
         fresh = self._random.standard_normal(self._wander.shape)
         self._wander = keep * self._wander + math.sqrt(1.0 - keep * keep) * fresh
-        self._velocity += (velocity - self._velocity) * -math.expm1(-dt_s / noise.velocity_lag_s)
+        follows = -math.expm1(-dt_s / noise.velocity_lag_s)
+        seen = self._seen_s > t_s - _SEEN_FRAMES * dt_s
+        self._velocity += np.where(seen[:, None], follows * (velocity - self._velocity), 0.0)
         self._centre += self._velocity * dt_s
 
     def _sight(self, view: View, t_s: float, pose: PlanarPose) -> None:

@@ -109,6 +109,16 @@ def test_what_goes_out_of_sight_is_forgotten_after_half_a_second_and_comes_back_
     assert sum(gap) > 0.5 * CAMERA.fps
 
 
+def test_of_what_goes_out_of_sight_nothing_new_is_known() -> None:
+    """It stops behind the crate: while it is remembered, it goes on as it was seen to."""
+    made = stage(mover(8.0, -4.0, 8.0, -0.9, 1.0), crate(4.0, 0.0, size_m=1.2))
+    walkers = [one for scene in scenes(made, 200, QUIET) for one in scene.obstacles if one.moving]
+    hidden = [one for one in walkers if one.unseen_s > 0.0]
+    assert len(hidden) > 10
+    assert [one.velocity_mps[0] for one in hidden] == pytest.approx([hidden[0].velocity_mps[0]] * len(hidden))
+    assert abs(hidden[0].velocity_mps[0]) > 0.5
+
+
 def test_free_space_shows_the_nearest_and_knows_nothing_behind_it() -> None:
     space = scenes(stage(crate(5.0, size_m=1.0)), 1, QUIET)[0].free_space
     ahead = np.abs(space.bearing_tan) < 0.08
