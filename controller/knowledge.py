@@ -34,6 +34,8 @@ from vision.scene import CameraCondition, CameraHealth, Scene
 _SPRAWLING_M = 0.8
 _BEFORE_NS = 200_000_000
 _SAME_PLACE_M = 0.25
+# Half the width of what is nothing by itself: the edge of a leg of somebody who walks by close to the camera.
+_SLIVER_M = 0.015
 _FUTURE_S = 0.005
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
@@ -171,4 +173,5 @@ class Knowledge:
         if captured_ns > bodies.captured_ns - _BEFORE_NS:
             return bodies
         there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
+        there &= bodies.half_across_m > _SLIVER_M
         return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, SETTLED_S), bodies.age_s))

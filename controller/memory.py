@@ -199,8 +199,9 @@ class OutOfView:
         left = dy * cos - dx * sin - self._mount.left_m
         near_face = ahead - bodies.half_view_m
         below = (near_face < self._near_m) & (bodies.top_m < self._lowest_seen_m(near_face) + _UNCERTAIN_M)
-        # At the edge of the view it may be outside by what is not known of it.
-        edge_m = edge_tan * np.maximum(ahead, 0.0) - _EDGE_M - _EDGE_MPS * bodies.unseen_s
+        # At the edge of the view it may be outside by what is not known of it: of who goes, more and more.
+        late_m = np.where(bodies.moving, _EDGE_MPS * bodies.unseen_s, 0.0)
+        edge_m = edge_tan * np.maximum(ahead, 0.0) - _EDGE_M - late_m
         beside = np.abs(left) > edge_m
         hidden: BoolArray = (below | beside) & (ahead > -2.0)
         return hidden
