@@ -22,7 +22,8 @@ def ages_s(*shown: Obstacle) -> list[float]:
     for one in [(obstacle(4.0, 0.0),)] * 10 + [shown]:
         bench.now_ns += 33_000_000
         known.update(bench.scene(*one), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
-    return known.bodies.age_s.tolist()
+    ages_s: list[float] = known.bodies.age_s.tolist()
+    return ages_s
 
 
 def test_what_stands_where_something_stood_is_no_newcomer() -> None:
