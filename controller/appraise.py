@@ -151,13 +151,13 @@ class Appraiser:
 
 
 def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:
-    """The sprawling obstacle whose surface this is, if one is tracked there."""
-    sprawling = known.sprawling
-    if not len(sprawling):
+    """The obstacle whose surface this is, if one is tracked there that is no box."""
+    unboxed = known.unboxed
+    if not len(unboxed):
         return None
-    placed = place(sprawling, known.corridor, np.zeros(1), s_m, surface_s_m - s_m + 2.0)
+    placed = place(unboxed, known.corridor, np.zeros(1), s_m, surface_s_m - s_m + 2.0)
     near_s = placed.s_m[:, 0] - placed.half_s_m[:, 0]
     far_s = placed.s_m[:, 0] + placed.half_s_m[:, 0]
     off = np.maximum(np.maximum(near_s - surface_s_m, surface_s_m - far_s), 0.0)
     best = int(off.argmin())
-    return int(sprawling.ids[best]) if off[best] < _SAME_SURFACE_M else None
+    return int(unboxed.ids[best]) if off[best] < _SAME_SURFACE_M else None

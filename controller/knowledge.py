@@ -32,10 +32,11 @@ from vision.scene import CameraCondition, CameraHealth, Scene
 # A wall or a rack is not a box: as a box it would reach into the corridor wherever the path bends. Its
 # surface in the corridor is what depth sees (controller/sight.py).
 _SPRAWLING_M = 0.8
+# Nor is a strip of a centimetre or two: a rack that is looked along has dozens of them, others in each frame.
+# Half of its width; poles are wider.
+_STRIP_M = 0.015
 _BEFORE_NS = 200_000_000
 _SAME_PLACE_M = 0.25
-# Half the width of what is nothing by itself: the edge of a leg of somebody who walks by close to the camera.
-_SLIVER_M = 0.015
 _FUTURE_S = 0.005
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
@@ -61,7 +62,7 @@ class Knowledge:
         self._mount, self._config = mount, config
         self._poses = PoseHistory()
         self._boxes = no_bodies(0)
-        self._sprawls = np.zeros(0, np.bool_)
+        self._boxed = np.zeros(0, np.bool_)
         self._steady = SteadyVelocities()
         self._memory = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
         self.edge_tan = 0.5
@@ -82,7 +83,7 @@ class Knowledge:
         """Take over what does not hang on the path: who is seen, who was seen and may come back, how fast
         they go, what hides them, and what the camera is worth."""
         self.bodies, self._boxes = before.bodies, before._boxes
-        self._seen, self._sprawls = before._seen, before._sprawls
+        self._seen, self._boxed = before._seen, before._boxed
         self._steady, self._memory, self._places = before._steady, before._memory, before._places
         self._poses, self.surfaces = before._poses, before.surfaces
         self.health, self.edge_tan = before.health, before.edge_tan
@@ -94,9 +95,9 @@ class Knowledge:
         return np.arange(len(self.bodies)) >= len(self._boxes)
 
     @property
-    def sprawling(self) -> Bodies:
-        """Seen, but no boxes."""
-        return self._seen.select(self._sprawls)
+    def unboxed(self) -> Bodies:
+        """Seen, but as surfaces only."""
+        return self._seen.select(~self._boxed)
 
     def update(
         self, scene: Scene | None, pose: PlanarPose, on_path: OnPath, v_mps: float, now_ns: int
@@ -145,18 +146,20 @@ class Knowledge:
         except SceneError as error:
             return str(error)
         s_m = self.corridor.path.project(pose, on_path.s_m).s_m
-        sprawling = ~seen.moving & (np.maximum(seen.half_view_m, seen.half_across_m) > _SPRAWLING_M)
+        boxed = np.maximum(seen.half_view_m, seen.half_across_m) <= _SPRAWLING_M
+        boxed &= seen.half_across_m > _STRIP_M
+        boxed |= seen.moving
         if len(scene.free_space.bearing_tan):
             self.edge_tan = (
                 float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
             )
         self.surfaces = surfaces = surfaces_of(scene.free_space, pose, self._mount)
-        boxes = self._steady.update(self._recognise(seen.select(~sprawling)))
+        boxes = self._steady.update(self._recognise(seen.select(boxed)))
         boxes = self._memory.leaving(boxes, pose, self.edge_tan)
         standing = v_mps <= STANDING_MPS
         remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, scene.free_space)
         self.bodies = boxes.joined(remembered)
-        self._boxes, self._seen, self._sprawls = boxes, seen, sprawling
+        self._boxes, self._seen, self._boxed = boxes, seen, boxed
         self.sight.look(scene.free_space, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
         self._places.append((scene.captured_ns, np.concatenate((surfaces.points_m, seen.xy_m))))
         self.health = scene.health
@@ -173,5 +176,4 @@ class Knowledge:
         if captured_ns > bodies.captured_ns - _BEFORE_NS:
             return bodies
         there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
-        there &= bodies.half_across_m > _SLIVER_M
         return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, SETTLED_S), bodies.age_s))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from config.decision import DecisionConfig
@@ -15,24 +18,45 @@ from vision.scene import Obstacle
 START = OnPath(0.0, 0.0, 0.0)
 
 
-def ages_s(*shown: Obstacle) -> list[float]:
-    """For how long each was seen, by what is known after ten frames of a crate and one of these instead."""
+def after(*frames: tuple[Obstacle, ...]) -> Knowledge:
+    """What is known after these were seen, one after the other, by a robot that drives."""
     bench = Bench()
     known = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
-    for one in [(obstacle(4.0, 0.0),)] * 10 + [shown]:
+    for shown in frames:
         bench.now_ns += 33_000_000
-        known.update(bench.scene(*one), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
-    ages_s: list[float] = known.bodies.age_s.tolist()
-    return ages_s
+        known.update(bench.scene(*shown), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
+    return known
+
+
+CRATE = [(obstacle(4.0, 0.0),)] * 10
+
+
+def age_s(y_m: float, seen_s: float) -> float:
+    """For how long something was seen, by what is known, that shows where there was a crate before."""
+    found: float = after(*CRATE, (obstacle(4.0, y_m, age_s=seen_s, number=6),)).bodies.age_s.item()
+    return found
 
 
 def test_what_stands_where_something_stood_is_no_newcomer() -> None:
-    assert ages_s(obstacle(4.0, 0.1, age_s=0.03, number=6)) == [0.5]
-    assert ages_s(obstacle(4.0, 1.0, age_s=0.03, number=6)) == [pytest.approx(0.03)]
-    assert ages_s(obstacle(4.0, 0.1, age_s=2.0, number=6)) == [2.0]
+    assert age_s(0.1, 0.03) == 0.5
+    assert age_s(1.0, 0.03) == pytest.approx(0.03)
+    assert age_s(0.1, 2.0) == 2.0
 
 
-def test_an_edge_that_shows_there_is_nothing_by_itself() -> None:
-    """2 cm wide: when it goes, nothing is waited for that could not be seen to leave."""
-    assert ages_s(obstacle(4.0, 0.1, age_s=0.03, number=6, size_m=(0.02, 0.3))) == [pytest.approx(0.03)]
-    assert ages_s(obstacle(4.0, 0.1, age_s=0.03, number=6, size_m=(0.05, 0.3))) == [0.5]
+def test_a_strip_is_no_body_unless_it_moves() -> None:
+    """2 cm of a rack, or of somebody's leg: where it stands is what depth sees of it."""
+    strip = obstacle(4.0, 0.1, age_s=0.6, number=6, size_m=(0.02, 0.3))
+    known = after(*[(strip,)] * 3)
+    assert not len(known.bodies)
+    assert known.unboxed.ids.tolist() == [6]
+    assert after((replace(strip, moving=True),)).bodies.ids.tolist() == [6]
+    assert after((obstacle(4.0, 0.1, number=6, size_m=(0.04, 0.3)),)).bodies.ids.tolist() == [6]
+
+
+def test_of_what_leaves_the_view_the_last_strip_is_not_all_that_is_remembered() -> None:
+    """A crate at the edge of the view, of which less and less is in it."""
+    crate = obstacle(2.0, 0.9)
+    known = after((crate,), (replace(crate, extent_m=np.array([0.02, 1.7, 0.2])),))
+    assert known.bodies.ids.tolist() == [5]
+    assert known.remembered.tolist() == [True]
+    assert known.bodies.half_across_m.tolist() == [0.25]
