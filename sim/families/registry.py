@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.scenario import Scenario
-from sim.families import crossing, oncoming, same_way, standing
+from sim.families import close_by, crossing, oncoming, same_way, standing
 from sim.families.layout import Random
 from sim.faults import NO_FAULTS, Faults, Window
 
@@ -80,7 +80,9 @@ _FAMILIES: dict[str, _Family] = {
     "grazing": _Family(oncoming.grazing),
     "crowd_junction": _Family(crossing.crowd_junction),
     "curved_path": _Family(crossing.curved_path),
+    "crate_beside_bend": _Family(close_by.crate_beside_bend),
     "empty_aisle": _Family(standing.empty_aisle),
+    "narrow_aisle": _Family(close_by.narrow_aisle),
     "glass_front": _Family(standing.glass_front, _glass),
     "camera_dropout": _Family(crossing.crossing_left, _silent),
     "camera_frozen": _Family(crossing.crossing_right, _frozen),

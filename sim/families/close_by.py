@@ -1,0 +1,79 @@
+"""What stands close beside the way and leaves it free: a crate beside a bend, racks on both sides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from config.path import ArcSpec, LineSpec, PathSpec
+from config.scenario import Crate, Room, Scenario, Shelf
+from sim.families.layout import FRONT_M, HALF_WIDTH_M, RACK_DEPTH_M, Random, scenario, side_of
+
+_BLEND_M = 0.8
+# Corners and middles of the sides of a crate, as shares of its size.
+_OUTLINE = np.array([(x, y) for x in (-0.5, 0.0, 0.5) for y in (-0.5, 0.0, 0.5) if x or y])
+
+
+def crate_beside_bend(random: Random) -> Scenario:
+    """A crate turned anyhow, inside or outside of a bend: it must not stop for that."""
+    radius, turn = float(random.uniform(2.5, 7.0)), side_of(random) * float(random.uniform(40.0, 90.0))
+    before, after = float(random.uniform(3.0, 5.0)), float(random.uniform(4.0, 6.0))
+    path = PathSpec(
+        segments=(
+            LineSpec(kind="line", length_m=before),
+            ArcSpec(kind="arc", radius_m=radius, angle_deg=turn, blend_m=_BLEND_M),
+            LineSpec(kind="line", length_m=after),
+        )
+    )
+    crate = _crate_at(random, before, radius, turn, outside=bool(random.integers(2)))
+    reach = before + radius + after + 6.0
+    room = Room(x_min_m=-6.0, x_max_m=reach, y_min_m=-reach, y_max_m=reach)
+    return scenario("crate_beside_bend", 0.0, (crate,), path=path, room=room)
+
+
+def _crate_at(random: Random, before_m: float, radius_m: float, turn_deg: float, outside: bool) -> Crate:
+    """0.3 to 0.7 m from what the robot sweeps on the circle of the bend, which its blends hardly leave."""
+    length, width = float(random.uniform(0.4, 0.9)), float(random.uniform(0.4, 0.8))
+    heading = float(random.uniform(0.0, 180.0))
+    left = math.copysign(1.0, turn_deg)
+    along = math.radians(abs(turn_deg)) * float(random.uniform(0.2, 0.8))
+    outwards = np.array([math.sin(along), -left * math.cos(along)])
+    cos, sin = math.cos(math.radians(heading)), math.sin(math.radians(heading))
+    outline = _OUTLINE * (length, width) @ np.array([[cos, sin], [-sin, cos]])
+    swept = math.hypot(radius_m + HALF_WIDTH_M, FRONT_M) - radius_m + float(random.uniform(0.3, 0.7))
+    # How far its middle is from its outermost or innermost place, seen from the centre of the bend.
+    if outside:
+        from_centre = radius_m + swept - float((outline @ outwards).min())
+    else:
+        from_centre = radius_m - swept - float((outline @ outwards).max())
+    x, y = np.array([before_m + 0.5 * _BLEND_M, left * radius_m]) + from_centre * outwards
+    return Crate(
+        kind="crate",
+        name="crate outside" if outside else "crate inside",
+        x_m=float(x),
+        y_m=float(y),
+        heading_deg=heading,
+        length_m=length,
+        width_m=width,
+        height_m=float(random.uniform(0.4, 1.0)),
+    )
+
+
+def narrow_aisle(random: Random) -> Scenario:
+    """Racks on both sides, 0.3 to 0.6 m from the robot's sides, and nothing else."""
+    length = float(random.uniform(18.0, 24.0))
+    shelves = []
+    for side in (1.0, -1.0):
+        beside = HALF_WIDTH_M + float(random.uniform(0.3, 0.6))
+        shelves.append(
+            Shelf(
+                kind="shelf",
+                name="rack left" if side > 0 else "rack right",
+                x_m=0.5 * length - 2.0,
+                y_m=side * (beside + 0.5 * RACK_DEPTH_M),
+                length_m=length,
+                width_m=RACK_DEPTH_M,
+            )
+        )
+    return scenario("narrow_aisle", length, tuple(shelves))
