@@ -7,6 +7,7 @@ the box of something seen corner-on reach into a corridor that it leaves free.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,47 +17,53 @@ from controller.corridor import Corridor
 from controller.surfaces import Surfaces
 from hal.types import FloatArray
 
-# Points so far beside a box are still its own: noise of depth, a box that lags a little.
-_AROUND_M = 0.15
 # The outline may have no wider gap, in bands, or something of the body was not seen.
 _GAP_BANDS = 2.5
 
 
-def outline_clear_m(
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """clear_m: free floor between what is in view of a body and the swept corridor; negative: inside it; inf:
+    nothing is in view. whole: it was seen from end to end, and all of it is in view."""
+
+    clear_m: float
+    whole: bool
+
+
+def outline_of(
     bodies: Bodies,
     k: int,
+    own: NDArray[np.bool_],
     surfaces: Surfaces,
     corridor: Corridor,
     stretch_m: tuple[float, float],
     depth_m: float,
-) -> float:
-    """Free floor between the outline of body k and the swept corridor; negative: inside it; -inf: its outline
-    was not seen from end to end, or may go on outside of the view.
+) -> Outline:
+    """The outline of body k, whose are the own (P,) of the surfaces, which are of the same scene.
 
-    surfaces: of the same scene. stretch_m: the path is looked at from there to there. depth_m: how deep a
-    body is at least, from the nearest point of it on; its back is hidden.
+    stretch_m: the path is looked at from there to there. depth_m: how deep a body is at least, from the
+    nearest point of it on; its back is hidden.
     """
+    if not own.any():
+        return Outline(math.inf, whole=False)
     view_rad = float(bodies.view_rad[k])
     ahead = np.array([math.cos(view_rad), math.sin(view_rad)])
-    offset = surfaces.points_m - bodies.xy_m[k]
+    outline, half_band_m = surfaces.points_m[own], surfaces.half_band_m[own]
+    offset = outline - bodies.xy_m[k]
     along, across = offset @ ahead, offset @ (-ahead[1], ahead[0])
-    across_m = float(bodies.half_across_m[k])
-    own = (np.abs(along) <= bodies.half_view_m[k] + _AROUND_M) & (np.abs(across) <= across_m + _AROUND_M)
-    half_band_m = surfaces.half_band_m[own]
-    if not _seen_throughout(across[own], half_band_m, across_m) or _cut_off(surfaces, own):
-        return -math.inf
-    outline = surfaces.points_m[own]
-    hidden_m = max(depth_m - float(np.ptp(along[own])), 0.0)
-    points = np.concatenate((outline, outline + hidden_m * ahead))
-    s, d = corridor.path.project_points(points, *stretch_m)
-    clear = np.abs(d) - np.concatenate((half_band_m, half_band_m)) - corridor.half_width(s)
-    return float(clear.min())
+    whole = _seen_throughout(across, half_band_m, float(bodies.half_across_m[k]))
+    whole &= not _cut_off(surfaces, own)
+    if whole:
+        hidden_m = max(depth_m - float(np.ptp(along)), 0.0)
+        outline = np.concatenate((outline, outline + hidden_m * ahead))
+        half_band_m = np.concatenate((half_band_m, half_band_m))
+    s, d = corridor.path.project_points(outline, *stretch_m)
+    clear = np.abs(d) - half_band_m - corridor.half_width(s)
+    return Outline(float(clear.min()), whole)
 
 
 def _seen_throughout(across_m: FloatArray, half_band_m: FloatArray, half_m: float) -> bool:
     """Whether points at across_m (P,) cover the width from -half_m to half_m without a gap."""
-    if not len(across_m):
-        return False
     edges = np.concatenate(((-half_m,), np.sort(across_m), (half_m,)))
     return bool(np.diff(edges).max() <= _GAP_BANDS * 2.0 * float(half_band_m.max()))
 

@@ -26,10 +26,6 @@ _NEVER_NS = -(2**62)
 _LANES = 5
 # One frame's outlier must not brake; three frames of five are a tenth of a second.
 _FRAMES = 5
-# A point this near to an obstacle's box is part of it: swinging limbs, a box that lags a little.
-_AROUND_M = 0.3
-_DEPTH_SIGMA_1PM = 0.0075
-_DEPTH_SIGMAS = 3.5
 
 
 class Sight:
@@ -77,8 +73,7 @@ class Sight:
         half_width = self._corridor.half_width(surface_s)
         side = np.abs(surface_d) - surfaces.half_band_m
         inside = (side <= half_width + self._lateral_m) & (surface_s > s_m)
-        reach_m = _AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * forward**2
-        moving = explained_by.select(explained_by.moving).covers(points, reach_m, _AROUND_M)
+        belongs = surfaces.of(explained_by)
         self.corners.look(
             bands,
             forward,
@@ -87,13 +82,12 @@ class Sight:
             half_width,
             2.0 * free.half_width_tan,
             s_m + self._corridor.front_m,
-            np.logical_not(moving.any(axis=1)),
+            np.logical_not(belongs[:, explained_by.moving].any(axis=1)),
         )
         way = inside.nonzero()[0]
         way_s = surface_s[way]
         if len(way) and len(explained_by):
-            explained = explained_by.covers(points.take(way, 0), reach_m[way], _AROUND_M).any(axis=1)
-            way_s = way_s[~explained]
+            way_s = way_s[~belongs.take(way, 0).any(axis=1)]
         self._note_surface(way_s, s_m, standing)
         in_corridor = np.zeros(len(free.bearing_tan), np.bool_)
         in_corridor[bands] = inside

@@ -15,7 +15,7 @@ from controller.corridor import Corridor, Placed, place
 from controller.knowledge import Knowledge
 from controller.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
 from controller.memory import visible_from_m
-from controller.outline import outline_clear_m
+from controller.outline import outline_of
 from hal.types import CameraMount, FloatArray
 
 _INSIDE_BODY_M = 0.05
@@ -105,7 +105,7 @@ class StandingLimits:
 
     def _clear(self, known: Knowledge, placed: Placed, s_m: float) -> FloatArray:
         """(N,) free floor beside the swept corridor; in bends, by the outlines when they were last seen
-        whole."""
+        whole, as long as nothing nearer is seen of them."""
         clear_m: FloatArray = placed.clear_m[:, 0].copy()
         before = self._outlines_m if known.corridor is self._corridor else {}
         self._corridor, self._outlines_m = known.corridor, {}
@@ -113,15 +113,14 @@ class StandingLimits:
             return clear_m
         bodies, margins = known.bodies, self._config.margins
         beside = ~bodies.moving & (clear_m <= margins.lateral_m + _BESIDE_M) & (placed.hi_m[:, 0] > s_m)
+        own, depth_m = known.surfaces.of(bodies), self._config.prediction.body_depth_m
         for k in beside.nonzero()[0].tolist():
             stretch_m = s_m - ALONGSIDE_M, float(placed.hi_m[k, 0]) + known.corridor.front_m
-            depth_m = self._config.prediction.body_depth_m
-            outline_m = outline_clear_m(bodies, k, known.surfaces, known.corridor, stretch_m, depth_m)
+            outline = outline_of(bodies, k, own[:, k], known.surfaces, known.corridor, stretch_m, depth_m)
             number = int(bodies.ids[k])
-            if outline_m == -math.inf:
-                outline_m = before.get(number, -math.inf)
-            self._outlines_m[number] = outline_m
-            clear_m[k] = max(clear_m[k], outline_m)
+            whole_m = outline.clear_m if outline.whole else before.get(number, -math.inf)
+            self._outlines_m[number] = whole_m
+            clear_m[k] = max(clear_m[k], min(whole_m, outline.clear_m))
         return clear_m
 
     def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:

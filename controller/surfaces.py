@@ -8,8 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.bodies import Bodies
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
+
+# A point this near to an obstacle's box is part of it: swinging limbs, a box that lags a little.
+AROUND_M = 0.3
+_DEPTH_SIGMA_1PM = 0.0075
+_DEPTH_SIGMAS = 3.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +29,11 @@ class Surfaces:
     forward_m: FloatArray
     half_band_m: FloatArray
     points_m: FloatArray
+
+    def of(self, bodies: Bodies) -> NDArray[np.bool_]:
+        """(P, N) which points belong to which bodies: along the view, depth may be off."""
+        reach_m = AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * self.forward_m**2
+        return bodies.covers(self.points_m, reach_m, AROUND_M)
 
 
 NO_SURFACES = Surfaces(0, np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)))

@@ -11,7 +11,7 @@ import pytest
 from config.robot import Body
 from controller.corridor import Corridor
 from controller.decision import Decision
-from controller.outline import outline_clear_m
+from controller.outline import Outline, outline_of
 from controller.path import OnPath, Path
 from controller.situation import Situation
 from controller.surfaces import Surfaces
@@ -33,41 +33,45 @@ HALF_BAND_M = 0.01
 BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)
 
 
-def clear_m(points_m: FloatArray, view_deg: float, first_band: int = 20) -> float:
+def outline(points_m: FloatArray, view_deg: float, first_band: int = 20) -> Outline:
     """Of the box seen in direction view_deg, beside a way of which the robot takes 0.4 m to either side."""
     one = replace(
         box(3.0, 1.0, half_view_m=0.3, half_across_m=0.3), view_rad=np.array([math.radians(view_deg)])
     )
     count = len(points_m)
-    seen = Surfaces(
-        80, np.arange(first_band, first_band + count), points_m[:, 0], np.full(count, HALF_BAND_M), points_m
-    )
+    bands, half_band_m = np.arange(first_band, first_band + count), np.full(count, HALF_BAND_M)
+    seen = Surfaces(80, bands, points_m[:, 0], half_band_m, points_m)
     corridor = Corridor(line_path(), BODY)
-    return outline_clear_m(one, 0, seen, corridor, (0.0, 8.0), depth_m=0.3)
+    return outline_of(one, 0, seen.of(one)[:, 0], seen, corridor, (0.0, 8.0), depth_m=0.3)
 
 
 def test_the_side_that_is_seen_decides() -> None:
     """The box's corner would be 0.176 m from the corridor."""
-    assert clear_m(CORNER_ON, 45.0) == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
+    found = outline(CORNER_ON, 45.0)
+    assert found.whole
+    assert found.clear_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
 
 
 def test_behind_a_flat_face_the_body_goes_on() -> None:
     """A face across the view towards the way: 0.3 m behind it, along the view, the body may end."""
     flat = np.array([NEAR_X_M, NEAR_Y_M]) + EDGE * [1.0, 1.0]
     behind_m = 0.3 * math.sin(math.radians(45.0))
-    assert clear_m(flat, -45.0) == pytest.approx(NEAR_Y_M - behind_m - 0.4 - HALF_BAND_M, abs=1e-9)
+    assert outline(flat, -45.0).clear_m == pytest.approx(NEAR_Y_M - behind_m - 0.4 - HALF_BAND_M, abs=1e-9)
 
 
-def test_an_outline_with_a_gap_is_none() -> None:
-    assert clear_m(np.concatenate((CORNER_ON[:10], CORNER_ON[16:])), 45.0) == -math.inf
-    assert clear_m(CORNER_ON[:20], 45.0) == -math.inf
-    assert clear_m(CORNER_ON[:0], 45.0) == -math.inf
+def test_an_outline_with_a_gap_is_not_whole() -> None:
+    assert not outline(np.concatenate((CORNER_ON[:10], CORNER_ON[16:])), 45.0).whole
+    front = outline(CORNER_ON[:12], 45.0)
+    assert not front.whole
+    assert front.clear_m == pytest.approx(CORNER_ON[11, 1] - 0.4 - HALF_BAND_M)
+    assert outline(CORNER_ON[:0], 45.0) == Outline(math.inf, whole=False)
+    assert outline(np.add(CORNER_ON, (0.0, 1.5)), 45.0) == Outline(math.inf, whole=False)
 
 
-def test_an_outline_that_may_go_on_outside_of_the_view_is_none() -> None:
-    assert clear_m(CORNER_ON, 45.0, first_band=0) == -math.inf
-    assert clear_m(CORNER_ON, 45.0, first_band=1) > 0.0
-    assert clear_m(CORNER_ON, 45.0, first_band=80 - len(CORNER_ON)) == -math.inf
+def test_an_outline_that_may_go_on_outside_of_the_view_is_not_whole() -> None:
+    assert not outline(CORNER_ON, 45.0, first_band=0).whole
+    assert outline(CORNER_ON, 45.0, first_band=1).whole
+    assert not outline(CORNER_ON, 45.0, first_band=80 - len(CORNER_ON)).whole
 
 
 BEND = arc_path(4.0, 80.0)  # to the left
@@ -128,6 +132,14 @@ def test_what_was_seen_whole_is_passed_while_it_leaves_the_view() -> None:
     look(bench, crate(), seen)
     assert look(bench, part, cut(seen)).reason.rule != "static"
     assert look(Bench(), part, cut(seen)).reason.rule == "static"
+
+
+def test_what_then_shows_in_the_way_is_stopped_for() -> None:
+    """The crate was the end of something longer, which goes on into the way."""
+    part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
+    bench = Bench()
+    look(bench, crate(), seen)
+    assert look(bench, part, cut(depth(corner_on=False))).reason.rule == "static"
 
 
 def test_what_was_seen_along_one_path_says_nothing_of_another() -> None:
