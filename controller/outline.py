@@ -19,6 +19,8 @@ from hal.types import FloatArray
 
 # The outline may have no wider gap, in bands, or something of the body was not seen.
 _GAP_BANDS = 2.5
+# Nor may it begin farther behind the near side of the box: then it is something else, behind what gives none.
+_BEHIND_M = 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ def outline_of(
     offset = outline - bodies.xy_m[k]
     along, across = offset @ ahead, offset @ (-ahead[1], ahead[0])
     whole = _seen_throughout(across, half_band_m, float(bodies.half_across_m[k]))
-    whole &= not _cut_off(surfaces, own)
+    whole &= float(along.min()) <= _BEHIND_M - float(bodies.half_view_m[k]) and not _cut_off(surfaces, own)
     if whole:
         hidden_m = max(depth_m - float(np.ptp(along)), 0.0)
         outline = np.concatenate((outline, outline + hidden_m * ahead))

@@ -111,16 +111,17 @@ class StandingLimits:
         self._corridor, self._outlines_m = known.corridor, {}
         if known.corridor.straight:
             return clear_m
-        bodies, margins = known.bodies, self._config.margins
-        beside = ~bodies.moving & (clear_m <= margins.lateral_m + _BESIDE_M) & (placed.hi_m[:, 0] > s_m)
-        own, depth_m = known.surfaces.of(bodies), self._config.prediction.body_depth_m
-        for k in beside.nonzero()[0].tolist():
-            stretch_m = s_m - ALONGSIDE_M, float(placed.hi_m[k, 0]) + known.corridor.front_m
+        standing, near_m = ~known.bodies.moving, self._config.margins.lateral_m + _BESIDE_M
+        beside = standing & (clear_m <= near_m) & (placed.hi_m[:, 0] > s_m)
+        bodies, depth_m = known.bodies.select(beside), self._config.prediction.body_depth_m
+        own = known.surfaces.of(bodies)
+        for k, row in enumerate(beside.nonzero()[0].tolist()):
+            stretch_m = s_m - ALONGSIDE_M, float(placed.hi_m[row, 0]) + known.corridor.front_m
             outline = outline_of(bodies, k, own[:, k], known.surfaces, known.corridor, stretch_m, depth_m)
             number = int(bodies.ids[k])
             whole_m = outline.clear_m if outline.whole else before.get(number, -math.inf)
             self._outlines_m[number] = whole_m
-            clear_m[k] = max(clear_m[k], min(whole_m, outline.clear_m))
+            clear_m[row] = max(clear_m[row], min(whole_m, outline.clear_m))
         return clear_m
 
     def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:

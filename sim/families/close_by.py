@@ -6,11 +6,18 @@ import math
 
 import numpy as np
 
-from config.path import ArcSpec, LineSpec, PathSpec
-from config.scenario import Crate, Room, Scenario, Shelf
-from sim.families.layout import FRONT_M, HALF_WIDTH_M, RACK_DEPTH_M, Random, scenario, side_of
+from config.scenario import Crate, Scenario, Shelf
+from sim.families.layout import (
+    BLEND_M,
+    FRONT_M,
+    HALF_WIDTH_M,
+    RACK_DEPTH_M,
+    Random,
+    round_a_bend,
+    scenario,
+    side_of,
+)
 
-_BLEND_M = 0.8
 # Corners and middles of the sides of a crate, as shares of its size.
 _OUTLINE = np.array([(x, y) for x in (-0.5, 0.0, 0.5) for y in (-0.5, 0.0, 0.5) if x or y])
 
@@ -19,16 +26,8 @@ def crate_beside_bend(random: Random) -> Scenario:
     """A crate turned anyhow, inside or outside of a bend: it must not stop for that."""
     radius, turn = float(random.uniform(2.5, 7.0)), side_of(random) * float(random.uniform(40.0, 90.0))
     before, after = float(random.uniform(3.0, 5.0)), float(random.uniform(4.0, 6.0))
-    path = PathSpec(
-        segments=(
-            LineSpec(kind="line", length_m=before),
-            ArcSpec(kind="arc", radius_m=radius, angle_deg=turn, blend_m=_BLEND_M),
-            LineSpec(kind="line", length_m=after),
-        )
-    )
     crate = _crate_at(random, before, radius, turn, outside=bool(random.integers(2)))
-    reach = before + radius + after + 6.0
-    room = Room(x_min_m=-6.0, x_max_m=reach, y_min_m=-reach, y_max_m=reach)
+    path, room = round_a_bend(before, radius, turn, after)
     return scenario("crate_beside_bend", 0.0, (crate,), path=path, room=room)
 
 
@@ -47,7 +46,7 @@ def _crate_at(random: Random, before_m: float, radius_m: float, turn_deg: float,
         from_centre = radius_m + swept - float((outline @ outwards).min())
     else:
         from_centre = radius_m - swept - float((outline @ outwards).max())
-    x, y = np.array([before_m + 0.5 * _BLEND_M, left * radius_m]) + from_centre * outwards
+    x, y = np.array([before_m + 0.5 * BLEND_M, left * radius_m]) + from_centre * outwards
     return Crate(
         kind="crate",
         name="crate outside" if outside else "crate inside",

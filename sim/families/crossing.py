@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from config.path import ArcSpec, LineSpec, PathSpec
-from config.scenario import BodySpec, Column, Crate, Room, Scenario, Shelf
+from config.scenario import BodySpec, Column, Crate, Scenario, Shelf
 from sim.families.layout import (
+    BLEND_M,
     RACK_DEPTH_M,
     Random,
     drive,
@@ -15,6 +15,7 @@ from sim.families.layout import (
     person,
     racks,
     robot,
+    round_a_bend,
     scenario,
     side_of,
     walk,
@@ -104,30 +105,24 @@ def curved_path(random: Random) -> Scenario:
     """A bend, crates on both its sides, and for most seeds somebody who crosses behind it."""
     radius, turn = float(random.uniform(3.0, 7.0)), side_of(random) * float(random.uniform(40.0, 90.0))
     before, after = float(random.uniform(3.0, 5.0)), float(random.uniform(4.0, 6.0))
-    path = PathSpec(
-        segments=(
-            LineSpec(kind="line", length_m=before),
-            ArcSpec(kind="arc", radius_m=radius, angle_deg=turn, blend_m=0.8),
-            LineSpec(kind="line", length_m=after),
-        )
-    )
+    path, room = round_a_bend(before, radius, turn, after)
     left = math.copysign(1.0, turn)
     bend = math.radians(abs(turn))
     # The circle's own geometry, without the blends: near enough to put things beside it.
-    exit_x, exit_y = before + 0.4 + radius * math.sin(bend), left * radius * (1.0 - math.cos(bend))
+    exit_x, exit_y = before + 0.5 * BLEND_M + radius * math.sin(bend), left * radius * (1.0 - math.cos(bend))
     out_x, out_y = math.cos(bend), left * math.sin(bend)
     bodies: list[BodySpec] = [
         Crate(
             kind="crate",
             name="crate inside",
-            x_m=before + 0.4 + radius * math.sin(0.5 * bend) - 1.5 * math.sin(0.5 * bend),
+            x_m=before + 0.5 * BLEND_M + radius * math.sin(0.5 * bend) - 1.5 * math.sin(0.5 * bend),
             y_m=left * (radius - (radius - 1.6) * math.cos(0.5 * bend)),
             heading_deg=math.degrees(left * 0.5 * bend),
         ),
         Crate(
             kind="crate",
             name="crate outside",
-            x_m=before + 0.4 + (radius + 1.7) * math.sin(0.6 * bend),
+            x_m=before + 0.5 * BLEND_M + (radius + 1.7) * math.sin(0.6 * bend),
             y_m=left * (radius - (radius + 1.7) * math.cos(0.6 * bend)),
             heading_deg=math.degrees(left * 0.6 * bend),
         ),
@@ -141,6 +136,4 @@ def curved_path(random: Random) -> Scenario:
         on_path_s = earliest_s(before + radius * bend + along) + float(random.uniform(-2.0, 3.0))
         way = walk(on_path_s - _OUT_M / speed, go(x - away_x, y - away_y, speed))
         bodies.append(person(random, "person", (x + away_x, y + away_y), way))
-    reach = before + radius + after + 6.0
-    room = Room(x_min_m=-6.0, x_max_m=reach, y_min_m=-reach, y_max_m=reach)
     return scenario("curved_path", 0.0, tuple(bodies), path=path, room=room)

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from config.path import LineSpec, PathSpec
+from config.path import ArcSpec, LineSpec, PathSpec
 from config.scenario import (
     BodySpec,
     Go,
@@ -32,6 +32,7 @@ HALF_WIDTH_M = 0.39
 # The fastest that the robot gets anywhere: no delay, no jerk limit, the speed that the camera's range admits.
 _TOP_MPS, _ACCEL_MPS2 = 1.5, 0.3
 RACK_DEPTH_M = 1.1
+BLEND_M = 0.8  # of bends, on either side
 _BAY_M = 2.7
 
 
@@ -52,6 +53,19 @@ def earliest_s(x_m: float) -> float:
 def straight(length_m: float) -> PathSpec:
     """Along x from the origin."""
     return PathSpec(segments=(LineSpec(kind="line", length_m=length_m),))
+
+
+def round_a_bend(before_m: float, radius_m: float, turn_deg: float, after_m: float) -> tuple[PathSpec, Room]:
+    """From the origin along x, round a bend and on; and a building around that."""
+    path = PathSpec(
+        segments=(
+            LineSpec(kind="line", length_m=before_m),
+            ArcSpec(kind="arc", radius_m=radius_m, angle_deg=turn_deg, blend_m=BLEND_M),
+            LineSpec(kind="line", length_m=after_m),
+        )
+    )
+    reach_m = before_m + radius_m + after_m + 6.0
+    return path, Room(x_min_m=-6.0, x_max_m=reach_m, y_min_m=-reach_m, y_max_m=reach_m)
 
 
 def hall(length_m: float, half_width_m: float = 5.0) -> Room:

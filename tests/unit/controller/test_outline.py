@@ -53,10 +53,11 @@ def test_the_side_that_is_seen_decides() -> None:
 
 
 def test_behind_a_flat_face_the_body_goes_on() -> None:
-    """A face across the view towards the way: 0.3 m behind it, along the view, the body may end."""
-    flat = np.array([NEAR_X_M, NEAR_Y_M]) + EDGE * [1.0, 1.0]
+    """A face across the view towards the way, on the near side of the box: 0.3 m behind it, along the view,
+    the body may end."""
     behind_m = 0.3 * math.sin(math.radians(45.0))
-    assert outline(flat, -45.0).clear_m == pytest.approx(NEAR_Y_M - behind_m - 0.4 - HALF_BAND_M, abs=1e-9)
+    flat = np.array([NEAR_X_M - behind_m, NEAR_Y_M + behind_m]) + EDGE * [1.0, 1.0]
+    assert outline(flat, -45.0).clear_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
 
 
 def test_an_outline_with_a_gap_is_not_whole() -> None:
@@ -66,6 +67,13 @@ def test_an_outline_with_a_gap_is_not_whole() -> None:
     assert front.clear_m == pytest.approx(CORNER_ON[11, 1] - 0.4 - HALF_BAND_M)
     assert outline(CORNER_ON[:0], 45.0) == Outline(math.inf, whole=False)
     assert outline(np.add(CORNER_ON, (0.0, 1.5)), 45.0) == Outline(math.inf, whole=False)
+
+
+def test_an_outline_behind_the_box_is_of_something_else() -> None:
+    """What is too low for depth would begin 0.3 m before the middle of its box."""
+    behind = np.array([0.14, 0.14])  # 0.2 m along the view
+    assert not outline(CORNER_ON + behind, 45.0).whole
+    assert outline(CORNER_ON + 0.5 * behind, 45.0).whole
 
 
 def test_an_outline_that_may_go_on_outside_of_the_view_is_not_whole() -> None:
