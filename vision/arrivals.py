@@ -2,7 +2,8 @@
 
 Whatever the camera saw through, from wherever it stood, was empty. A surface that is there now has
 come. The test needs no texture and no segmentation, and neither a new viewpoint nor what it uncovers
-can mislead it: what was hidden or not measured then proves nothing.
+can mislead it: what was hidden or not measured then proves nothing. By the same memory a surface is known
+that was there before, as far as the noise of depth tells: somebody close to a wall seems to be.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from hal.types import Pose
 from vision.depth_grid import BoolGrid, DepthGrid, FloatGrid
 
 _KEEP_EVERY_S = 0.06
-_LOOK_BACK_S = (0.2, 0.6)
+LOOK_BACK_S = (0.2, 0.6)
 _MARGIN_M = 0.10
 _SIGMAS = 3.5
 # Of a cell over that of a pixel: a median over 25 cells of four samples each, of noise that neighbours share.
@@ -35,6 +36,15 @@ class _Memory:
     nearest_inverse: FloatGrid  # per cell the nearest surface of its 3x3 neighbourhood; large: not known
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Changes:
+    """arrived (h, w): surfaces in space that was seen free. stayed (h, w): surfaces that were seen there
+    LOOK_BACK_S[-1] ago; what was hidden or not measured then is neither."""
+
+    arrived: BoolGrid
+    stayed: BoolGrid
+
+
 class FreeMemory:
     """Remembers what was seen through during the last moments."""
 
@@ -48,21 +58,27 @@ class FreeMemory:
         """Forget: the poses before cannot be compared with those to come."""
         self._memories.clear()
 
-    def arrived(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> BoolGrid:
-        """(h, w) cells of mask whose surface stands in space that was seen free."""
-        result = np.zeros(mask.shape, np.bool_)
+    def changes(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> Changes:
+        """What has come and what has stayed, of the cells of mask (h, w)."""
+        result = Changes(np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_))
         cells = np.flatnonzero(mask)
         points = grid.points(cells)
         came = np.zeros(len(cells), np.bool_)
-        for memory in (self._memory_of(now_ns, wanted_s) for wanted_s in _LOOK_BACK_S):
-            if memory is not None:
-                came |= self._free_then(grid, points, pose, memory)
+        for wanted_s in LOOK_BACK_S:
+            memory = self._memory_of(now_ns, wanted_s)
+            if memory is None:
+                continue
+            nearer, inside, margin = self._compare(grid, points, pose, memory)
+            came |= inside & (nearer > margin)
+            if wanted_s == LOOK_BACK_S[-1]:
+                result.stayed.ravel()[cells] = inside & (np.abs(nearer) <= margin)
         if not came.any():
             return result
-        result.ravel()[cells] = came
+        result.arrived.ravel()[cells] = came
         block, outside = (3, 3), cv2.BORDER_CONSTANT
-        count = cv2.boxFilter(result.view(np.uint8), -1, block, normalize=False, borderType=outside)
-        return result & (np.asarray(count) >= _NEIGHBOURS)
+        count = cv2.boxFilter(result.arrived.view(np.uint8), -1, block, normalize=False, borderType=outside)
+        np.logical_and(result.arrived, np.asarray(count) >= _NEIGHBOURS, out=result.arrived)
+        return result
 
     def remember(self, grid: DepthGrid, pose: Pose, now_ns: int) -> None:
         """Keep this view, unless the last one kept is very young."""
@@ -73,7 +89,7 @@ class FreeMemory:
         nearest[grid.beyond] = self._range_inverse
         cv2.dilate(nearest, _BLOCK, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest))
-        horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))
+        horizon_ns = now_ns - int(1.5e9 * max(LOOK_BACK_S))
         self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
 
     def _memory_of(self, now_ns: int, wanted_s: float) -> _Memory | None:
@@ -85,10 +101,11 @@ class FreeMemory:
                 best, gap = memory, off
         return best
 
-    def _free_then(
+    def _compare(
         self, grid: DepthGrid, points: FloatGrid, pose: Pose, memory: _Memory
-    ) -> NDArray[np.bool_]:
-        """(K,) which of points (3, K), camera axes now, lay in what memory saw through."""
+    ) -> tuple[FloatGrid, NDArray[np.bool_], FloatGrid]:
+        """(K,) by how much points (3, K), camera axes now, are nearer, in 1/m, than what memory saw there;
+        which of them it may have seen, and by how much noise may have it so."""
         relative = memory.pose.inverse() @ pose
         there = relative.rotation.astype(np.float32) @ points
         there += relative.translation_m.astype(np.float32)[:, None]
@@ -96,5 +113,4 @@ class FreeMemory:
         seen = memory.nearest_inverse.ravel().take(cell)
         sigma = np.float32(np.sqrt(2.0) * _CELL_NOISE * self._noise.quadratic_per_m)
         margin = np.float32(_MARGIN_M) * inverse * inverse + np.float32(_SIGMAS) * sigma
-        result: NDArray[np.bool_] = inside & (inverse - seen > margin)
-        return result
+        return inverse - seen, inside, margin

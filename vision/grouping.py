@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.depth_grid import DepthGrid
-from vision.division import LOW, NEARER_INVERSE, SINGLE_WIDTH_M, WITHIN, split
+from vision.depth_grid import BoolGrid, DepthGrid
+from vision.division import LOW, LOW_BESIDE, NEARER_INVERSE, SINGLE_WIDTH_M, WITHIN, split
 from vision.regions import IntGrid, Regions
 
 _CLOSE_M = 0.25
@@ -37,6 +37,7 @@ _CARRIED_SIGMA_MPS = 0.35
 _GOES_MPS = 0.3  # what goes more slowly goes like whatever stands
 _MOSTLY = 0.7
 _TOUCHING_PX = 16.0
+_TOUCHING_M = 0.1
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
 _THROUGH_M = 1.5  # by so much farther back a vehicle may be seen through itself
 
@@ -182,7 +183,8 @@ def merges(
     """Pairs (small, large) of tracks that may be one body: a suspect or mover beside a larger mover, the
     closest pairs first. A track may be beside several. What begins where another one ends in the image and
     surely goes exactly as that does is carried by it, even if it is farther back: the mast of a cart. What is
-    seen through it and goes so is its own far side. Pieces of something wider than anybody, that surely go
+    seen through it and surely goes much as it does is its own far side; what is low beside it and does so is
+    what it pushes. Pieces of something wider than anybody, that surely go
     exactly alike, are one where nothing is seen between them.
 
     velocity (T, 3) and velocity_sigma (T,) of the tracks.
@@ -204,10 +206,13 @@ def merges(
     reach = np.where(overlap >= _OVERLAP, _APART_M, _CLOSE_M)
     known = np.maximum(velocity_sigma[a], velocity_sigma[b]) <= _CARRIED_SIGMA_MPS
     like = known & (difference <= _CARRIED_MPS)
+    near = known & (difference <= _SAME_VELOCITY_MPS)
     carried = like & _stacked(regions.bbox_px[a], regions.bbox_px[b])
-    through = like & _seen_through(regions.bbox_px[a], regions.bbox_px[b])
+    through = near & _seen_through(regions.bbox_px[a], regions.bbox_px[b])
     reach = np.where(carried, _CARRIED_M, np.where(through, _THROUGH_M, reach))
     gap = gaps_m(box, a, box, b)
+    rows = regions.bbox_px[:, 3] - regions.bbox_px[:, 1]
+    fits |= near & (rows[a] <= LOW_BESIDE * rows[b]) & (gap <= _TOUCHING_M)
     one = (gap <= reach) & alike & fits
     wide = np.maximum(regions.extent_m[a, 0], regions.extent_m[b, 0]) > SINGLE_WIDTH_M
     goes = np.square(velocity[b]).sum(axis=1) > _GOES_MPS**2
@@ -241,15 +246,18 @@ def _cells_between(
     return grid.cells(u, v)
 
 
-def join(grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]]) -> tuple[IntGrid, list[int]]:
+def join(
+    grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]], stayed: BoolGrid
+) -> tuple[IntGrid, list[int]]:
     """labels (h, w), track index + 1, with the small track of a pair given to the large one, and which small
-    ones have gone so. Two that would be divided again stay two, and the small one may be part of another."""
+    ones have gone so. Two that would be divided again, as stayed (h, w) may have it, stay two, and the small
+    one may be part of another."""
     gone: list[int] = []
     for small, large in pairs:
         if small in gone or large in gone:
             continue
         joined = np.where(labels == small + 1, np.int32(large + 1), labels)
-        if split(grid, joined, large) is None:
+        if split(grid, joined, large, stayed) is None:
             labels = joined
             gone.append(small)
     return labels, gone

@@ -114,12 +114,14 @@ class MotionEvidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdict:
-    """evidence, moving, confidence 0..1 and whether its fragments are sure that it stands: (T,) each."""
+    """evidence, moving, confidence 0..1, whether its fragments are sure that it stands, and whether this
+    frame proved that it moves: (T,) each."""
 
     evidence: FloatArray
     moving: NDArray[np.bool_]
     confidence: FloatArray
     stands: NDArray[np.bool_]
+    proven: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,7 +170,7 @@ def judge(
     new_evidence = np.minimum(np.maximum(evidence + change, 0.0), _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
     confidence = 1.0 - np.exp(-read.filtered.total / _SURE_SQUARED_SIGMAS)
-    return Verdict(new_evidence, new_moving, confidence, stands)
+    return Verdict(new_evidence, new_moving, confidence, stands, rising)
 
 
 def _read(seen: MotionEvidence, settings: MotionSettings) -> _Reading:

@@ -8,7 +8,8 @@ cells that it covered, and these vote:
 2. count_votes: each predicted cell is one vote of its track for the connected part in which it lies. A few
    stray votes do not count, and of several static tracks in a part only the strongest stays.
 3. release: the exception. A standing track loses a newly arrived part if the rest of the track was there
-   before: somebody who stood beside furniture has left it.
+   before: somebody who stood beside furniture has left it. The other way round in withdraw: a mover that
+   must have gone on loses what was there before and is claimed by what stands.
 4. divide: a part with one voter goes to that track as a whole. A part with several voters (at most one of
    them is static) is divided: each cell goes to the nearest vote.
 
@@ -23,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray, Pose
-from vision.depth_grid import DepthGrid, FloatGrid
+from vision.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.regions import IntGrid, spread_labels
 
 _LEAST_VOTES = 4
@@ -32,6 +33,7 @@ _SHARE_OF_TRACK = 0.30
 _CAME_CELLS = 20
 _CAME_SHARE = 0.3
 _LEAVING_SHARE = 0.75  # of what stands: a larger part is the thing itself
+_STAYED_SHARE = 0.7
 _DEPTH_GATE_INVERSE = 0.03  # 1/m
 _DEPTH_GATE_M = 0.25
 _NOBODY = np.zeros(1, np.int32)
@@ -132,9 +134,7 @@ def count_votes(
     if tracks == 0 or count == 0:
         nobody, cast = np.zeros(count, np.int32), np.zeros((count, tracks), np.intp)
         return Ballot(cast.astype(np.bool_), cast, nobody, nobody.astype(np.intp))
-    ballots = np.flatnonzero((parts > 0) & (predicted > 0))
-    pair = parts.ravel().take(ballots) * tracks + predicted.ravel().take(ballots) - (tracks + 1)
-    votes = np.bincount(pair, minlength=count * tracks).reshape(count, tracks)
+    votes = _votes(parts, predicted, (parts > 0) & (predicted > 0), (count, tracks))
     total, own = votes.sum(axis=1)[:, None], votes.sum(axis=0)
     least = np.minimum(_SHARE_OF_PART * total, _SHARE_OF_TRACK * own)
     present = votes >= np.maximum(least, _LEAST_VOTES)
@@ -143,6 +143,13 @@ def count_votes(
     strongest = static_votes.argmax(axis=1)[:, None] == np.arange(tracks)
     present &= mover | (strongest & (static_votes > 0))
     return elect(present, votes)
+
+
+def _votes(parts: IntGrid, predicted: IntGrid, voters: BoolGrid, shape: tuple[int, int]) -> NDArray[np.intp]:
+    """(P, T) how many of the cells voters (h, w) speak for each track in each part; shape: P, T."""
+    ballots = np.flatnonzero(voters)
+    pair = parts.ravel().take(ballots) * shape[1] + predicted.ravel().take(ballots) - (shape[1] + 1)
+    return np.bincount(pair, minlength=shape[0] * shape[1]).reshape(shape)
 
 
 def elect(present: NDArray[np.bool_], cast: NDArray[np.intp]) -> Ballot:
@@ -167,6 +174,30 @@ def release(
     leaves = ~mover & (rest > 0)
     left = ballot.present & leaves & came[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
     return elect(ballot.present & ~left, ballot.cast)
+
+
+def withdraw(
+    ballot: Ballot,
+    parts: IntGrid,
+    predicted: IntGrid,
+    stayed: BoolGrid,
+    overdue: NDArray[np.bool_],
+    mover: NDArray[np.bool_],
+) -> tuple[Ballot, NDArray[np.bool_]]:
+    """ballot without movers that must have gone on for parts that something that stands claims as well, if
+    most of their votes there are for surfaces that have stayed: they went behind them, at about their depth.
+    And which tracks (T,) have lost all of their parts so.
+
+    parts, predicted and mover as for count_votes; stayed (h, w); overdue (T,): the movers in question.
+    """
+    present = ballot.present
+    doubtful = present & overdue & np.any(present & ~mover, axis=1, keepdims=True)
+    if not doubtful.any():
+        return ballot, np.zeros(len(mover), np.bool_)
+    votes = _votes(parts, predicted, (parts > 0) & (predicted > 0) & stayed, present.shape)
+    left = present & ~(doubtful & (votes >= _STAYED_SHARE * ballot.cast))
+    hidden: NDArray[np.bool_] = np.any(present, axis=0) & ~np.any(left, axis=0)
+    return elect(left, ballot.cast), hidden
 
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:

@@ -1,8 +1,9 @@
 """track: what was detected -> the Scene. Bodies with stable ids and filtered velocity, moving or static.
 
 Terms (cell, part, track, body, surface, region): vision/__init__.py. Order of the steps: obstacles (velocity
-of fragments), regions, masks, grouping (cells to tracks), carving, grouping, division (cut out, join, split),
-sightings (filters), adoption (fragments to tracks), obstacles (velocity of bodies), judgement, report.
+of fragments), arrivals, regions, masks, grouping (cells to tracks), births, carving, grouping, division (cut
+out, join, split), sightings (filters), adoption (fragments to tracks), obstacles (velocity of bodies),
+judgement, report.
 """
 
 from __future__ import annotations
@@ -12,9 +13,21 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import PlanarPose
-from vision import carving, division, grouping, kalman, limbs, masks, obstacles, regions, report, sightings
+from vision import (
+    births,
+    carving,
+    division,
+    grouping,
+    kalman,
+    limbs,
+    masks,
+    obstacles,
+    regions,
+    report,
+    sightings,
+)
 from vision.adoption import adopt
-from vision.arrivals import FreeMemory
+from vision.arrivals import LOOK_BACK_S, Changes, FreeMemory
 from vision.attention import wanted
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
@@ -30,7 +43,6 @@ from vision.tracks import Tracks
 _ACCEL_DENSITY = 0.12  # (m/s^2)^2 s: how briskly people start, stop and turn
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
-_MIN_CELLS = 12
 _IDENTITY = np.eye(3)
 
 
@@ -92,15 +104,15 @@ class Tracker:
     ) -> NDArray[np.int64]:
         """Surfaces first, then velocities, then the verdict. Returns the owners of the fragments."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
-        arrived = self._free.arrived(grid, standing, pose, detection.captured_ns)
+        changes = self._free.changes(grid, standing, pose, detection.captured_ns)
         if detection.motion_known or detection.restarted:
             self._free.remember(grid, pose, detection.captured_ns)
-        labels, measured = self._label(detection, standing, arrived, velocities, elapsed_s)
+        labels, measured = self._label(detection, standing, changes, velocities, elapsed_s)
         sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
         if tracks.overhead.any():
-            tracks.overhead &= ~self._reaching_down(grid, labels, len(tracks))
+            tracks.overhead &= ~births.reaching_down(grid, labels, len(tracks), self._body_height_m)
         owner = adopt(tracks, detection, labels, owner, self._config.depth_noise)
-        arrivals = np.bincount(labels[arrived], minlength=len(tracks) + 1)[1:]
+        arrivals = np.bincount(labels[changes.arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
             self._measure_velocities(detection, owner, velocities, arrivals, measured.cells)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
@@ -110,7 +122,7 @@ class Tracker:
         self,
         detection: Detection,
         standing: BoolGrid,
-        arrived: BoolGrid,
+        changes: Changes,
         velocities: FragmentVelocities,
         elapsed_s: float,
     ) -> tuple[IntGrid, Regions]:
@@ -123,25 +135,29 @@ class Tracker:
         count, parts = regions.components(grid, standing)
         measured = regions.measure(grid, parts, count)
         ballot = masks.count_votes(parts, count, predicted, len(tracks), mover)
-        came = np.bincount(parts[arrived], minlength=count + 1)[1:]
+        overdue = tracks.overdue(LOOK_BACK_S[-1])
+        ballot, hidden = masks.withdraw(ballot, parts, predicted, changes.stayed, overdue, mover)
+        tracks.hide(hidden)
+        came = np.bincount(parts[changes.arrived], minlength=count + 1)[1:]
         ballot = masks.release(ballot, measured.cells, came, mover)
         bodies = sightings.bodies(tracks, pose, self._config.depth_noise)
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
         alive = mover | tracks.has_moved
         winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, alive, expected)
-        winner = self._births(detection, parts, measured, winner)
+        speed_mps = self._config.motion.max_speed_mps
+        winner = births.begin(tracks, detection, parts, measured, winner, self._body_height_m, speed_mps)
         labels = masks.divide(parts, predicted, ballot, winner)
         measured = regions.measure(grid, labels, len(tracks))
-        carved = carving.carve(tracks, detection, labels, measured, arrived, velocities, self._config)
+        carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))
-        labels = self._regroup(detection, carved, measured)
+        labels = self._regroup(detection, carved, measured, changes.stayed)
         if labels is not carved:
             measured = regions.measure(grid, labels, len(tracks))
         return labels, measured
 
-    def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions) -> IntGrid:
+    def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, stayed: BoolGrid) -> IntGrid:
         """Merge what is one body and split what is two; the same labels where there is nothing to do."""
         tracks, grid = self._tracks, detection.grid
         if not tracks.moving.any():
@@ -149,53 +165,15 @@ class Tracker:
         sigma = np.sqrt(tracks.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
         mover = tracks.moving | (tracks.evidence > 0.0)
         pairs = grouping.merges(grid, measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
-        labels, gone = grouping.join(grid, labels, pairs)
+        labels, gone = grouping.join(grid, labels, pairs, stayed)
         tracks.seen_ns[gone] = 0
         for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
-            second = division.split(grid, labels, track)
+            second = division.split(grid, labels, track, stayed)
             if second is not None:
                 tracks.twin(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
                 labels = labels.copy()
                 labels.ravel()[second] = len(tracks)
         return labels
-
-    def _births(
-        self,
-        detection: Detection,
-        parts: IntGrid,
-        measured: Regions,
-        winner: NDArray[np.int32],
-    ) -> NDArray[np.int32]:
-        """winner (P,) with new tracks: large parts nobody claims, if they reach down to the robot or may."""
-        grid, tracks = detection.grid, self._tracks
-        large = (winner == 0) & (measured.cells >= _MIN_CELLS)
-        overhead = large.copy()
-        if large.any():
-            overhead &= ~self._reaching_down(grid, parts, len(winner))
-            large &= ~overhead | regions.hidden_below(grid, parts, measured)
-        born = np.flatnonzero(large)
-        if len(born) == 0:
-            return winner
-        result = winner.copy()
-        result[born] = np.arange(1, len(born) + 1) + len(tracks)
-        tracks.start(
-            detection.pose.apply(measured.position_m[born]),
-            0.2,
-            self._config.motion.max_speed_mps,
-            0.0,
-            detection.captured_ns,
-        )
-        tracks.overhead[-len(born) :] = overhead[born]
-        return result
-
-    def _reaching_down(self, grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.bool_]:
-        """(count,) parts 1..count of labels (h, w) seen at the robot's height; all where it is not known."""
-        if grid.height_m is None:
-            return np.ones(count, np.bool_)
-        low = np.flatnonzero((labels > 0) & (grid.height_m < self._body_height_m))
-        cells = np.bincount(labels.ravel().take(low), minlength=count + 1)[1:]
-        result: NDArray[np.bool_] = cells >= _MIN_CELLS // 2
-        return result
 
     def _measure_velocities(
         self,
@@ -264,6 +242,7 @@ class Tracker:
         )
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
+        tracks.unproven_s = np.where(verdict.proven, 0.0, tracks.unproven_s + detection.dt_s)
         tracks.has_moved |= verdict.moving
         tracks.confidence, tracks.stands = verdict.confidence, verdict.stands
         tracks.calm_s = np.where(tracks.evidence > 0.0, 0.0, tracks.calm_s + detection.dt_s)

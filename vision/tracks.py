@@ -12,6 +12,8 @@ from vision import kalman
 
 _TRAIL_S = 0.3
 _GOING_SHARE = 0.4
+_UNPROVEN_S = 0.05
+_GONE_SHARE = 0.6  # of its width
 _FIELDS = (
     "ids",
     "state",
@@ -38,6 +40,7 @@ _FIELDS = (
     "stands",
     "calm_s",
     "unrest_s",
+    "unproven_s",
     "overhead",
 )
 
@@ -52,7 +55,8 @@ class Tracks:
     mover of which hardly anything was left to see; trailing_m (T, 3): where the centre was of late, averaged;
     stands (T,): its fragments are sure of it; calm_s (T,): since when there has been no evidence, inf if
     there never was; unrest_s (T,): for how long nearly all of its ends have denied that it stands, less what
-    they did not; overhead (T,): seen only above the robot so far, with its lower part behind something
+    they did not; unproven_s (T,): since anything
+    proved motion; overhead (T,): seen only above the robot so far, with its lower part behind something
     nearer."""
 
     def __init__(self) -> None:
@@ -81,6 +85,7 @@ class Tracks:
         self.stands = np.empty(0, np.bool_)
         self.calm_s = np.empty(0)
         self.unrest_s = np.empty(0)
+        self.unproven_s = np.empty(0)
         self.overhead = np.empty(0, np.bool_)
         self._next_id = 1
 
@@ -154,6 +159,19 @@ class Tracks:
         way = ((self.state[:, :3] - self.trailing_m) * velocity).sum(axis=1) / behind_s
         result: NDArray[np.bool_] = way > _GOING_SHARE * np.square(velocity).sum(axis=1)
         return result
+
+    def overdue(self, elapsed_s: float) -> NDArray[np.bool_]:
+        """(T,) movers of which nothing has proved just now that they go on, and which by their velocity are
+        no longer where they were elapsed_s ago."""
+        way_m = elapsed_s * np.sqrt(np.square(self.state[:, 3:]).sum(axis=1))
+        gone = way_m >= _GONE_SHARE * self.extent_m[:, ::2].max(axis=1)
+        result: NDArray[np.bool_] = self.moving & (self.unproven_s >= _UNPROVEN_S) & gone
+        return result
+
+    def hide(self, chosen: NDArray[np.bool_]) -> None:
+        """Tracks of which nothing is to be seen any more, behind what stands there."""
+        self.sliver |= chosen
+        self.cells[chosen] = 0
 
     def locate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
         """The centres of tracks index (K,) were seen at position_m (K, 3) with covariance noise (K, 3, 3)."""

@@ -29,7 +29,7 @@ def memory(*views: tuple[int, FloatArray], pose: Pose = AT_ORIGIN) -> FreeMemory
 
 def arrived(kept: FreeMemory, depth_m: FloatArray, now_ms: int = 200, pose: Pose = AT_ORIGIN) -> BoolGrid:
     grid = grid_of(depth_m)
-    return kept.arrived(grid, grid.valid, pose, now_ms * MS)
+    return kept.changes(grid, grid.valid, pose, now_ms * MS).arrived
 
 
 def inner(depth_m: FloatArray) -> BoolGrid:
@@ -50,6 +50,23 @@ def test_what_stands_where_the_wall_was_seen_has_arrived() -> None:
 def test_what_stood_there_before_has_not() -> None:
     both = nearest(BODY, BACK)
     assert not arrived(memory((0, both)), both).any()
+
+
+@pytest.mark.parametrize(("age_ms", "known"), [(600, True), (320, True), (200, False)])
+def test_what_was_there_for_a_while_has_stayed(age_ms: int, known: bool) -> None:
+    """Half of 0.6 s at least; what was seen later only may have come since."""
+    before, now = nearest(BODY, BACK), nearest(BODY, plate(3.0, (0.4, 0.6), (-0.5, 0.5)), BACK)
+    grid = grid_of(now)
+    stayed = memory((0, before)).changes(grid, grid.valid, AT_ORIGIN, age_ms * MS).stayed
+    new = (now == 3.0) & (before != 3.0)
+    assert (stayed[inner(BODY)].all(), stayed[new].any()) == (known, False)
+
+
+def test_what_was_hidden_or_not_measured_has_not_stayed() -> None:
+    grid = grid_of(BACK)
+    for before in (nearest(BODY, BACK), np.where(BODY > 0.0, 0.0, BACK)):
+        stayed = memory((0, before)).changes(grid, grid.valid, AT_ORIGIN, 600 * MS).stayed
+        assert not stayed[inner(BODY)].any()
 
 
 def test_what_goes_leaves_nothing_that_has_arrived() -> None:
@@ -107,7 +124,7 @@ def test_only_cells_asked_for_are_told() -> None:
     grid = grid_of(nearest(BODY, BACK))
     left = grid.valid.copy()
     left[:, 40:] = False
-    found = memory((0, BACK)).arrived(grid, left, AT_ORIGIN, 200 * MS)
+    found = memory((0, BACK)).changes(grid, left, AT_ORIGIN, 200 * MS).arrived
     assert found.any()
     assert not found[:, 41:].any()
 

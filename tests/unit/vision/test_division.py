@@ -7,9 +7,20 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.support.grids import LEVEL_UP, X, grid_of, labelled, nearest, plate
-from vision.depth_grid import DepthGrid
-from vision.division import split
+from vision import division
+from vision.depth_grid import BoolGrid, DepthGrid
 from vision.grouping import join
+
+
+def split(
+    grid: DepthGrid, labels: NDArray[np.int32], track: int, stayed: BoolGrid | None = None
+) -> NDArray[np.intp] | None:
+    """Nothing has stayed where it was, unless said otherwise."""
+    return division.split(grid, labels, track, nothing(labels) if stayed is None else stayed)
+
+
+def nothing(labels: NDArray[np.int32]) -> BoolGrid:
+    return np.zeros(labels.shape, np.bool_)
 
 
 def two_people(gap_m: float, bridge: bool = True) -> tuple[DepthGrid, NDArray[np.int32]]:
@@ -45,11 +56,11 @@ def test_a_part_that_would_be_divided_from_one_goes_to_the_next() -> None:
     grid, labels = two_people(0.4)
     labels = np.where(labels == 0, 0, np.where(X < 0.0, 1, 2)[None, :]).astype(np.int32)
     labels[-labels.shape[0] // 2 :][labels[-labels.shape[0] // 2 :] == 2] = 3  # the right one's legs
-    joined, gone = join(grid, labels, [(1, 0), (2, 1)])
+    joined, gone = join(grid, labels, [(1, 0), (2, 1)], labels > 0)
     assert gone == [2]
     np.testing.assert_array_equal(joined, np.where(labels == 3, 2, labels))
     # Nothing goes where nothing is left.
-    assert join(grid, labels, [(2, 1), (2, 0), (1, 2)])[1] == [2]
+    assert join(grid, labels, [(2, 1), (2, 0), (1, 2)], labels > 0)[1] == [2]
 
 
 def test_only_the_cells_of_that_track_are_divided() -> None:
@@ -87,7 +98,20 @@ def test_what_is_seen_through_a_body_is_not_divided_from_it() -> None:
     beside = plate(3.2, (0.9, 1.3), (0.6, 1.0))
     for far, one in ((wheel, True), (beside, False)):
         depth_m = nearest(front, far)
-        assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None) == one
+        assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0, depth_m > 0.0) is None) == one
+
+
+@pytest.mark.parametrize(
+    ("low_m", "stayed_m", "divided"), [(0.9, 0.0, False), (1.05, 0.0, True), (0.9, 0.45, True)]
+)
+def test_what_is_low_beside_a_body_is_divided_from_it_if_it_stands(
+    low_m: float, stayed_m: float, divided: bool
+) -> None:
+    """A trolley before who pushes it, 1.6 m tall, joined by its handle; 0.6 m long."""
+    person, trolley = plate(3.0, (0.3, 0.7), (-0.7, 0.9)), plate(3.0, (-0.7, -0.1), (0.9 - low_m, 0.9))
+    depth_m = nearest(person, trolley, plate(3.0, (-0.1, 0.3), (0.2, 0.35)))
+    stayed = plate(3.0, (-0.7, -0.7 + stayed_m), (-0.7, 0.9)) > 0.0
+    assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0, stayed) is not None) == divided
 
 
 def test_one_body_behind_somebody_is_not_divided() -> None:

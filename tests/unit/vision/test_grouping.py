@@ -140,12 +140,23 @@ def test_what_stands_on_a_mover_in_the_image_and_goes_exactly_as_it_does_is_carr
 FAR_WHEEL = Body(0.1, y=0.5, z=2.0, width=0.2, height=0.4, deep=0.1, cells=40)  # 0.85 m behind the front
 
 
-def test_what_is_seen_through_a_mover_and_goes_exactly_as_it_does_is_its_own() -> None:
+def test_what_is_seen_through_a_mover_and_goes_much_as_it_does_is_its_own() -> None:
     assert merged(CART, FAR_WHEEL) == [(1, 0)]
+    assert merged(CART, FAR_WHEEL, velocity=[(0.8, 0.0, 0.0), (0.41, 0.0, 0.0)]) == [(1, 0)]
     assert merged(CART, replace(FAR_WHEEL, x=0.8)) == []  # beside it
     assert merged(CART, replace(FAR_WHEEL, z=2.9, y=0.6)) == []  # 1.75 m behind it
-    assert merged(CART, FAR_WHEEL, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
+    assert merged(CART, FAR_WHEEL, velocity=[(0.8, 0.0, 0.0), (0.39, 0.0, 0.0)]) == []
     assert merged(CART, FAR_WHEEL, sigma=0.4) == []
+
+
+def test_what_is_low_beside_a_mover_and_goes_much_as_it_does_is_what_it_pushes() -> None:
+    pusher = Body(0.0, y=0.1, width=0.4, height=1.6, cells=500)
+    trolley = Body(-0.78, y=0.45, width=1.0, height=0.9, cells=400)  # 0.08 m before him, 0.56 of his height
+    assert merged(pusher, trolley) == [(1, 0)]
+    assert merged(pusher, replace(trolley, y=0.4, height=1.0)) == []  # 0.62 of it
+    assert merged(pusher, replace(trolley, x=-0.82)) == []  # 0.12 m before him, as a child may walk
+    assert merged(pusher, trolley, velocity=[(0.8, 0.0, 0.0), (0.39, 0.0, 0.0)]) == []
+    assert merged(pusher, trolley, sigma=0.4) == []  # not known well enough
 
 
 def test_what_is_seen_through_a_mover_stays_with_it_while_most_of_it_was_there_before() -> None:

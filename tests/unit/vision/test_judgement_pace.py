@@ -46,7 +46,7 @@ def test_at_thirty_hertz_two_frames_are_enough_with_odometry_and_three_are_neede
     seen, evidence, moving = by_fragments(ACROSS, 4), np.zeros(1), np.zeros(1, np.bool_)
     frames = {}
     for reckoned in (True, False):
-        verdict = Verdict(evidence, moving, evidence, moving)
+        verdict = Verdict(evidence, moving, evidence, moving, moving)
         frames[reckoned] = 0
         while not verdict.moving[0]:
             known = replace(seen, reckoned=reckoned)

@@ -192,7 +192,7 @@ def pair(frame: int, gap_m: float) -> FloatArray:
     """A grown-up and, gap_m to the right, a child, who walk alike."""
     x_m = -1.1 + way_m(frame)
     grown = plate(3.0, (x_m, x_m + 0.5), (-0.9, 1.0))
-    child = plate(3.0, (x_m + 0.5 + gap_m, x_m + 0.9 + gap_m), (0.1, 1.0))
+    child = plate(3.0, (x_m + 0.5 + gap_m, x_m + 0.9 + gap_m), (-0.3, 1.0))
     return nearest(grown, child)
 
 

@@ -1,0 +1,53 @@
+"""New tracks, for parts of the view that no track claims. Terms: vision/__init__.py."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision import regions
+from vision.depth_grid import DepthGrid
+from vision.detection import Detection
+from vision.regions import IntGrid, Regions
+from vision.tracks import Tracks
+
+_MIN_CELLS = 12
+_SIGMA_M = 0.2
+
+
+def begin(
+    tracks: Tracks,
+    detection: Detection,
+    parts: IntGrid,
+    measured: Regions,
+    winner: NDArray[np.int32],
+    body_height_m: float,
+    max_speed_mps: float,
+) -> NDArray[np.int32]:
+    """winner (P,), track index + 1 of each part or 0, with new tracks: large parts nobody claims, if they
+    reach down to the robot or may. parts (h, w), measured: of them."""
+    grid = detection.grid
+    large = (winner == 0) & (measured.cells >= _MIN_CELLS)
+    overhead = large.copy()
+    if large.any():
+        overhead &= ~reaching_down(grid, parts, len(winner), body_height_m)
+        large &= ~overhead | regions.hidden_below(grid, parts, measured)
+    born = np.flatnonzero(large)
+    if len(born) == 0:
+        return winner
+    result = winner.copy()
+    result[born] = np.arange(1, len(born) + 1) + len(tracks)
+    position_m = detection.pose.apply(measured.position_m[born])
+    tracks.start(position_m, _SIGMA_M, max_speed_mps, 0.0, detection.captured_ns)
+    tracks.overhead[-len(born) :] = overhead[born]
+    return result
+
+
+def reaching_down(grid: DepthGrid, labels: IntGrid, count: int, body_height_m: float) -> NDArray[np.bool_]:
+    """(count,) parts 1..count of labels (h, w) seen below body_height_m; all where heights are not known."""
+    if grid.height_m is None:
+        return np.ones(count, np.bool_)
+    low = np.flatnonzero((labels > 0) & (grid.height_m < body_height_m))
+    cells = np.bincount(labels.ravel().take(low), minlength=count + 1)[1:]
+    result: NDArray[np.bool_] = cells >= _MIN_CELLS // 2
+    return result
