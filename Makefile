@@ -32,7 +32,7 @@ faults: $(VENV)/ready
 
 campaign-quick: $(VENV)/ready
 	rm -rf out/campaign-quick
-	$(BIN)/treadwatch campaign --missions 78 --seed 1 --report out/campaign-quick
+	$(BIN)/treadwatch campaign --missions 84 --seed 1 --report out/campaign-quick
 
 $(VENV)/ready: requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "treadwatch needs Python 3.11 or newer")'

@@ -8,6 +8,7 @@ that was there before, as far as the noise of depth tells: somebody close to a w
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -15,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.types import Pose
+from hal.types import FloatArray, Pose
 from vision.depth_grid import BoolGrid, DepthGrid, FloatGrid
 
 _KEEP_EVERY_S = 0.06
-LOOK_BACK_S = (0.2, 0.6)
+_LOOK_BACK_S = (0.2, 0.6)
 _MARGIN_M = 0.10
 _SIGMAS = 3.5
 # Of a cell over that of a pixel: a median over 25 cells of four samples each, of noise that neighbours share.
@@ -39,10 +40,11 @@ class _Memory:
 @dataclass(frozen=True, slots=True, eq=False)
 class Changes:
     """arrived (h, w): surfaces in space that was seen free. stayed (h, w): surfaces that were seen there
-    LOOK_BACK_S[-1] ago; what was hidden or not measured then is neither."""
+    before, stayed_s ago (0.0: no such look); what was hidden or not measured then is neither."""
 
     arrived: BoolGrid
     stayed: BoolGrid
+    stayed_s: float
 
 
 class FreeMemory:
@@ -60,24 +62,30 @@ class FreeMemory:
 
     def changes(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> Changes:
         """What has come and what has stayed, of the cells of mask (h, w)."""
-        result = Changes(np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_))
+        arrived, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
         cells = np.flatnonzero(mask)
         points = grid.points(cells)
         came = np.zeros(len(cells), np.bool_)
-        for wanted_s in LOOK_BACK_S:
+        for wanted_s in _LOOK_BACK_S:
             memory = self._memory_of(now_ns, wanted_s)
             if memory is None:
                 continue
             nearer, inside, margin = self._compare(grid, points, pose, memory)
             came |= inside & (nearer > margin)
-            if wanted_s == LOOK_BACK_S[-1]:
-                result.stayed.ravel()[cells] = inside & (np.abs(nearer) <= margin)
+            if wanted_s == _LOOK_BACK_S[-1]:
+                stayed.ravel()[cells] = inside & (np.abs(nearer) <= margin)
+                stayed_s = (now_ns - memory.stamp_ns) * 1e-9
         if not came.any():
-            return result
-        result.arrived.ravel()[cells] = came
+            return Changes(arrived, stayed, stayed_s)
+        arrived.ravel()[cells] = came
         block, outside = (3, 3), cv2.BORDER_CONSTANT
-        count = cv2.boxFilter(result.arrived.view(np.uint8), -1, block, normalize=False, borderType=outside)
-        np.logical_and(result.arrived, np.asarray(count) >= _NEIGHBOURS, out=result.arrived)
+        count = cv2.boxFilter(arrived.view(np.uint8), -1, block, normalize=False, borderType=outside)
+        return Changes(arrived & (np.asarray(count) >= _NEIGHBOURS), stayed, stayed_s)
+
+    def resolves_m(self, distance_m: FloatArray) -> FloatArray:
+        """(N,) how much nearer or farther a surface at distance_m (N,) has to be to be told from another."""
+        noise_1pm = _SIGMAS * math.sqrt(2.0) * _CELL_NOISE * self._noise.quadratic_per_m
+        result: FloatArray = _MARGIN_M + noise_1pm * np.square(distance_m)
         return result
 
     def remember(self, grid: DepthGrid, pose: Pose, now_ns: int) -> None:
@@ -89,7 +97,7 @@ class FreeMemory:
         nearest[grid.beyond] = self._range_inverse
         cv2.dilate(nearest, _BLOCK, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest))
-        horizon_ns = now_ns - int(1.5e9 * max(LOOK_BACK_S))
+        horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))
         self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
 
     def _memory_of(self, now_ns: int, wanted_s: float) -> _Memory | None:

@@ -1,9 +1,11 @@
 """Movers that connected depth hides in something larger: a person close to a wall is one part with it.
 
 Two kinds of cells are cut out of a large static track and become tracks of their own: cells that have arrived
-(vision/arrivals.py), and cells around fragments that no static surface explains. Such a track is only a
-suspect: without further evidence it ends, and its cells go back to the track around them. Likewise a mover
-that has grown over something it walks along is cut back to these cells. Terms: vision/__init__.py.
+(vision/arrivals.py), and cells around fragments that no static surface explains, two that move alike or one
+that has gone one way for a while. Such a track is only a suspect, which is then looked at more closely
+(vision/attention.py): without further evidence it ends, and its cells go back to the track around them.
+Likewise a mover that has grown over something it walks along is cut back to these cells. Terms:
+vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -13,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
+from hal.types import FloatArray
 from vision import obstacles, regions
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
+from vision.judgement import IMPLAUSIBLE
 from vision.obstacles import FragmentVelocities
 from vision.regions import IntGrid, Regions
 from vision.tracks import Tracks
@@ -28,6 +32,10 @@ _CALM_S = 0.9  # for so long, what has come to rest is where free space was seen
 _MIN_CELLS = 12
 _AROUND_M = 0.2
 _MIN_FRAGMENTS = 2
+# One alone, on somebody who walks along a wall: seen for so long, level, and surely so fast.
+_LONE_S = 0.25
+_LONE_MPS, _LONE_SIGMAS = 0.4, 4.0
+_LEVEL = 0.3
 _BLOCK = np.ones((3, 3), np.uint8)
 _AGREE_M = 0.3
 _AGREE_PER_M2 = 0.015
@@ -51,9 +59,9 @@ def carve(
         return labels
     grid = detection.grid
     suspicious = np.flatnonzero(obstacles.moving_candidates(detection.motion, detection.age_frames))
-    if len(suspicious) < _MIN_FRAGMENTS and not arrived.any():
+    if len(suspicious) == 0 and not arrived.any():
         return labels
-    mover = tracks.moving | (tracks.evidence > 0.0)
+    mover = tracks.mover
     # Where the lines of something wider than a body stand while a part of it arrives, somebody touches it.
     touched = tracks.stands & (tracks.calm_s >= _CALM_S) & (measured.extent_m[:, 0] > _BODY_M)
     compact = (measured.extent_m[:, 0] <= _COMPACT_M) & (
@@ -130,22 +138,37 @@ def _around_moving_fragments(
     config: PerceptionConfig,
 ) -> BoolGrid:
     """(h, w) those cells of looked_at (h, w) that are close to the ones of fragments chosen (K,) that move in
-    company, at their depth."""
+    company, or clearly, at their depth."""
     result = np.zeros(detection.grid.depth_m.shape, np.bool_)
     motion = detection.motion
-    if len(chosen) < _MIN_FRAGMENTS:
+    if len(chosen) == 0:
         return result
     velocity, covariance = velocities.velocity_mps[chosen], velocities.covariance[chosen]
     position = 0.5 * (motion.static_m[2 * chosen] + motion.static_m[2 * chosen + 1])
     sigma = depth_sigma_m(position[:, 2], config.depth_noise)
     group = obstacles.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
-    chosen = chosen[company]
+    seen_s = detection.age_frames[chosen].astype(float) * detection.dt_s
+    chosen = chosen[company | _alone(seen_s, velocity, covariance, config.motion.max_speed_mps)]
     if len(chosen) == 0:
         return result
     return _near_ends(
         detection.grid, looked_at, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
     )
+
+
+def _alone(
+    seen_s: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, max_speed_mps: float
+) -> NDArray[np.bool_]:
+    """(K,) fragments, seen for seen_s (K,), whose velocity (K, 3), in the camera's axes, with covariance
+    (K, 3, 3) needs no other one beside it to be believed."""
+    speed = np.sqrt(np.square(velocity_mps).sum(axis=1))
+    # Along its way: v' C v / v'v is the variance there.
+    along = np.einsum("ki,kij,kj->k", velocity_mps, covariance, velocity_mps)
+    sure = (speed >= _LONE_MPS) & (speed**2 > _LONE_SIGMAS * np.sqrt(along))
+    level = np.abs(velocity_mps[:, 1]) <= _LEVEL * speed
+    result: NDArray[np.bool_] = (seen_s >= _LONE_S) & sure & level & (speed <= IMPLAUSIBLE * max_speed_mps)
+    return result
 
 
 def _near_ends(

@@ -18,21 +18,23 @@ _PAIR_DISTANCE_M = 0.5
 _VALLEY = 0.35
 WITHIN = 0.9  # of a group of cells: it is seen through another one
 LOW_BESIDE = 0.6  # of the height of a body in the image: a trolley is, a child beside an adult is not
-_STANDING = 0.5
+_STANDING = 0.5  # of the share that would not have stayed
 LOW = 0.5  # of the height of that in the image; somebody behind somebody else is taller
 _HARDLY = 0.2  # of the image between two groups of cells
 _MIN_CELLS = 24
 _BINS = 12
 
 
-def split(grid: DepthGrid, labels: IntGrid, track: int, stayed: BoolGrid) -> NDArray[np.intp] | None:
+def split(
+    grid: DepthGrid, labels: IntGrid, track: int, stayed: BoolGrid, way_m: float
+) -> NDArray[np.intp] | None:
     """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one.
 
     The cells are laid along the line on which they spread most (seen from above). Two people leave a
     valley in between; a crate, however wide, does not, and where something nearer fills it, it is none. Nor
     is it one beside a piece that is too wide for anybody, where nothing is seen in it. What is seen through
     the larger group is no second body either. Nor is what is low beside it, a trolley before who pushes it,
-    unless it stands: most of it has stayed (h, w) where it was.
+    unless it stands: more of it has stayed (h, w) where it was than if it had gone way_m with the track.
     """
     cells = np.flatnonzero(labels.ravel() == track + 1)
     if len(cells) < 2 * _MIN_CELLS:
@@ -64,7 +66,8 @@ def split(grid: DepthGrid, labels: IntGrid, track: int, stayed: BoolGrid) -> NDA
         return None
     if _seen_through(cells[second], cells[~second], grid.depth_m.shape[1]):
         return None
-    stands = np.count_nonzero(stayed.ravel().take(cells[second])) >= _STANDING * np.count_nonzero(second)
+    stays = np.count_nonzero(stayed.ravel().take(cells[second])) / np.count_nonzero(second)
+    stands = stays >= 1.0 - _STANDING * min(way_m / max(float(np.ptp(along[second])), 0.1), 1.0)
     if not stands and _low_beside(cells[second], cells[~second], grid.depth_m.shape[1]):
         return None
     wide = max(float(np.ptp(along[second])), float(np.ptp(along[~second]))) > SINGLE_WIDTH_M

@@ -247,17 +247,17 @@ def _cells_between(
 
 
 def join(
-    grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]], stayed: BoolGrid
+    grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]], stayed: BoolGrid, way_m: FloatArray
 ) -> tuple[IntGrid, list[int]]:
     """labels (h, w), track index + 1, with the small track of a pair given to the large one, and which small
-    ones have gone so. Two that would be divided again, as stayed (h, w) may have it, stay two, and the small
-    one may be part of another."""
+    ones have gone so. Two that would be divided again, for which see split, stay two, and the small one may
+    be part of another. way_m (T,) of the tracks since stayed (h, w)."""
     gone: list[int] = []
     for small, large in pairs:
         if small in gone or large in gone:
             continue
         joined = np.where(labels == small + 1, np.int32(large + 1), labels)
-        if split(grid, joined, large, stayed) is None:
+        if split(grid, joined, large, stayed, float(way_m[large])) is None:
             labels = joined
             gone.append(small)
     return labels, gone

@@ -7,13 +7,14 @@ cells that it covered, and these vote:
    cell where they arrive belongs to the prediction if the depth measured there agrees.
 2. count_votes: each predicted cell is one vote of its track for the connected part in which it lies. A few
    stray votes do not count, and of several static tracks in a part only the strongest stays.
-3. release: the exception. A standing track loses a newly arrived part if the rest of the track was there
-   before: somebody who stood beside furniture has left it. The other way round in withdraw: a mover that
-   must have gone on loses what was there before and is claimed by what stands.
-4. divide: a part with one voter goes to that track as a whole. A part with several voters (at most one of
+3. withdraw: an exception. A mover that must have gone on loses what was there before and is claimed by what
+   stands: it went behind that, at about its depth.
+4. release: another one. A standing track loses a newly arrived part if the rest of the track was there
+   before: somebody who stood beside furniture has left it.
+5. divide: a part with one voter goes to that track as a whole. A part with several voters (at most one of
    them is static) is divided: each cell goes to the nearest vote.
 
-Between 3 and 4, vision/grouping.py corrects to which track a whole part goes.
+Between 4 and 5, vision/grouping.py corrects to which track a whole part goes.
 """
 
 from __future__ import annotations

@@ -64,8 +64,7 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
 
 def _expected(tracks: Tracks, unseen_s: FloatArray) -> NDArray[np.bool_]:
     """(T,) of which it is known well enough where they went since they were seen unseen_s (T,) ago."""
-    sigma_mps = np.sqrt(tracks.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
-    known = ~tracks.moving | (sigma_mps * unseen_s <= _WAY_SIGMA_M)
+    known = ~tracks.moving | (tracks.velocity_sigma_mps * unseen_s <= _WAY_SIGMA_M)
     # What was seen last of somebody who went behind something tells little of where he is now.
     known &= ~(tracks.moving & tracks.sliver) | (tracks.cells >= _LAST_CELLS)
     result: NDArray[np.bool_] = (unseen_s <= _LISTED_UNSEEN_S) & known

@@ -94,12 +94,12 @@ def up(detection: Detection) -> FloatArray | None:
 
 
 def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
-    """(T,) rate at which the direction to points at sight (T, 3) turns by the camera's own way."""
+    """(T,) rate at which the camera's way turns directions sight (T, 3) to what is distance_m (T,) off."""
     ego = detection.ego_motion
     if ego.dt_s <= 0.0:
         return np.zeros(len(sight))
     way = detection.pose.rotation @ ego.motion.translation_m / ego.dt_s
-    ahead = sight @ way / np.maximum(distance_m, 0.1)
+    ahead = sight @ way
     turn: FloatArray = np.sqrt(np.maximum(way @ way - ahead * ahead, 0.0))
     return turn / np.maximum(distance_m, 0.1)
 

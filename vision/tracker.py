@@ -27,7 +27,7 @@ from vision import (
     sightings,
 )
 from vision.adoption import adopt
-from vision.arrivals import LOOK_BACK_S, Changes, FreeMemory
+from vision.arrivals import Changes, FreeMemory
 from vision.attention import wanted
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.depth_guard import free_space
@@ -128,14 +128,15 @@ class Tracker:
     ) -> tuple[IntGrid, Regions]:
         """(h, w) track index + 1 of each cell, after births, and what the tracks' surfaces measure."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
-        mover = tracks.moving | (tracks.evidence > 0.0)
+        mover = tracks.mover
         shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
         index = tracks.index_of(self._surfaces.track_id)
         predicted = masks.predict(self._surfaces, index, shift, grid, pose)
         count, parts = regions.components(grid, standing)
         measured = regions.measure(grid, parts, count)
         ballot = masks.count_votes(parts, count, predicted, len(tracks), mover)
-        overdue = tracks.overdue(LOOK_BACK_S[-1])
+        sight, distance_m = tracks.sight(pose.translation_m)
+        overdue = tracks.overdue(changes.stayed_s, sight, self._free.resolves_m(distance_m))
         ballot, hidden = masks.withdraw(ballot, parts, predicted, changes.stayed, overdue, mover)
         tracks.hide(hidden)
         came = np.bincount(parts[changes.arrived], minlength=count + 1)[1:]
@@ -152,23 +153,25 @@ class Tracker:
         carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))
-        labels = self._regroup(detection, carved, measured, changes.stayed)
+        labels = self._regroup(detection, carved, measured, changes)
         if labels is not carved:
             measured = regions.measure(grid, labels, len(tracks))
         return labels, measured
 
-    def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, stayed: BoolGrid) -> IntGrid:
+    def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes) -> IntGrid:
         """Merge what is one body and split what is two; the same labels where there is nothing to do."""
         tracks, grid = self._tracks, detection.grid
         if not tracks.moving.any():
             return labels
-        sigma = np.sqrt(tracks.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
-        mover = tracks.moving | (tracks.evidence > 0.0)
-        pairs = grouping.merges(grid, measured, tracks.state[:, 3:], sigma, mover, tracks.moving)
-        labels, gone = grouping.join(grid, labels, pairs, stayed)
+        mover = tracks.mover
+        pairs = grouping.merges(
+            grid, measured, tracks.state[:, 3:], tracks.velocity_sigma_mps, mover, tracks.moving
+        )
+        way_m = tracks.speed_mps * changes.stayed_s
+        labels, gone = grouping.join(grid, labels, pairs, changes.stayed, way_m)
         tracks.seen_ns[gone] = 0
         for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
-            second = division.split(grid, labels, track, stayed)
+            second = division.split(grid, labels, track, changes.stayed, float(way_m[track]))
             if second is not None:
                 tracks.twin(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
                 labels = labels.copy()
@@ -200,7 +203,7 @@ class Tracker:
         if use.any():
             # Windows overlap: each frame brings dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
-            going = np.where(tracks.moving, np.sqrt(np.square(tracks.state[:, 3:]).sum(axis=1)), 0.0)
+            going = np.where(tracks.moving, tracks.speed_mps, 0.0)
             swing = limbs.variance(body, going)[use]
             noise = body.covariance[use] * (lag_s / detection.dt_s) + swing[:, None, None] * _IDENTITY
             tracks.state[use], tracks.covariance[use] = kalman.update(
@@ -213,10 +216,9 @@ class Tracker:
         restless = limbs.restless(body)
         longer = np.where(restless, detection.dt_s, -detection.dt_s)
         tracks.unrest_s = np.maximum(tracks.unrest_s + longer, 0.0)
-        sight = tracks.state[:, :3] - detection.pose.translation_m
-        distance = np.sqrt(np.square(sight).sum(axis=1))
+        sight, distance = tracks.sight(detection.pose.translation_m)
         seen = MotionEvidence(
-            sight=sight / np.maximum(distance, 0.1)[:, None],
+            sight=sight,
             distance_m=distance,
             depth_sigma_m=np.asarray(depth_sigma_m(distance, self._config.depth_noise), np.float64),
             velocity=tracks.state[:, 3:],

@@ -14,83 +14,74 @@ _TRAIL_S = 0.3
 _GOING_SHARE = 0.4
 _UNPROVEN_S = 0.05
 _GONE_SHARE = 0.6  # of its width
-_FIELDS = (
-    "ids",
-    "state",
-    "covariance",
-    "surface_state",
-    "surface_covariance",
-    "born_ns",
-    "seen_ns",
-    "sightings",
-    "evidence",
-    "moving",
-    "has_moved",
-    "confidence",
-    "bbox_px",
-    "box_m",
-    "extent_m",
-    "area_m2",
-    "cells",
-    "fragments",
-    "clean_s",
-    "growth_mps",
-    "sliver",
-    "trailing_m",
-    "stands",
-    "calm_s",
-    "unrest_s",
-    "unproven_s",
-    "overhead",
-)
 
 
 class Tracks:
-    """state (T, 6): position and velocity; covariance (T, 6, 6); surface_state and surface_covariance: the
-    same from the centres of the visible surface alone, without the fragments, as a second opinion; evidence
-    (T,) of motion; moving (T,); has_moved (T,): now or ever before; confidence (T,) 0..1; bbox_px (T, 4);
-    box_m (T, 4): edges of the last box that showed the whole body, at its depth, from its centre; extent_m
-    (T, 3); area_m2 (T,): averaged, up to a common factor; cells (T,) of the grid covered when last seen;
-    clean_s (T,): for how long the surface's centre has told of the velocity without a break; sliver (T,): a
-    mover of which hardly anything was left to see; trailing_m (T, 3): where the centre was of late, averaged;
-    stands (T,): its fragments are sure of it; calm_s (T,): since when there has been no evidence, inf if
-    there never was; unrest_s (T,): for how long nearly all of its ends have denied that it stands, less what
-    they did not; unproven_s (T,): since anything
-    proved motion; overhead (T,): seen only above the robot so far, with its lower part behind something
-    nearer."""
+    """Parallel arrays, one entry for each of T tracks; what each of them means is said where it is made."""
 
     def __init__(self) -> None:
-        self.ids = np.empty(0, np.int64)
+        self.ids = np.empty(0, np.int64)  # growing
+        # Position and velocity (T, 6); as a second opinion the same from the centres of the visible surface
+        # alone, without the fragments.
         self.state = np.empty((0, 6))
         self.covariance = np.empty((0, 6, 6))
         self.surface_state = np.empty((0, 6))
         self.surface_covariance = np.empty((0, 6, 6))
+        self.trailing_m = np.empty((0, 3))  # where the centre was of late, averaged
+        # When it was seen first and last, and in how many frames.
         self.born_ns = np.empty(0, np.int64)
         self.seen_ns = np.empty(0, np.int64)
         self.sightings = np.empty(0, np.intp)
+        # What was seen of it last: its box in the image, its size in the camera's axes, cells of the grid (0:
+        # it went behind something since), fragments on it.
+        self.bbox_px = np.empty((0, 4))
+        self.extent_m = np.empty((0, 3))
+        self.cells = np.empty(0, np.intp)
+        self.fragments = np.empty(0, np.intp)
+        # Edges of the last box that showed all of it, at its depth, from its centre.
+        self.box_m = np.empty((0, 4))
+        self.area_m2 = np.empty(0)  # averaged, up to a common factor
+        self.growth_mps = np.empty(
+            0
+        )  # how fast its centre may wander because it shows more or less of itself
+        self.clean_s = np.empty(
+            0
+        )  # for how long its surface's centre has told of the velocity without a break
+        self.sliver = np.empty(0, np.bool_)  # a mover of which hardly anything was left to see
+        self.overhead = np.empty(0, np.bool_)  # seen only above the robot; something nearer hides the rest
+        # The verdict (vision/judgement.py): the score it rests on, now, ever, how surely (0..1), and whether
+        # its fragments are sure that it stands.
         self.evidence = np.empty(0)
         self.moving = np.empty(0, np.bool_)
         self.has_moved = np.empty(0, np.bool_)
         self.confidence = np.empty(0)
-        self.bbox_px = np.empty((0, 4))
-        self.box_m = np.empty((0, 4))
-        self.extent_m = np.empty((0, 3))
-        self.area_m2 = np.empty(0)
-        self.cells = np.empty(0, np.intp)
-        self.fragments = np.empty(0, np.intp)
-        self.clean_s = np.empty(0)
-        self.growth_mps = np.empty(0)
-        self.sliver = np.empty(0, np.bool_)
-        self.trailing_m = np.empty((0, 3))
         self.stands = np.empty(0, np.bool_)
-        self.calm_s = np.empty(0)
+        self.calm_s = np.empty(0)  # since there was evidence; inf: there never was
+        self.unproven_s = np.empty(0)  # since a frame proved that it moves, or since its birth
+        # For how long nearly all ends denied that it stands, less how long they did not.
         self.unrest_s = np.empty(0)
-        self.unproven_s = np.empty(0)
-        self.overhead = np.empty(0, np.bool_)
+        self._fields = tuple(vars(self))
         self._next_id = 1
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    @property
+    def mover(self) -> NDArray[np.bool_]:
+        """(T,) who moves, or is suspected of it."""
+        return self.moving | (self.evidence > 0.0)
+
+    @property
+    def speed_mps(self) -> FloatArray:
+        """(T,) as filtered."""
+        result: FloatArray = np.sqrt(np.square(self.state[:, 3:]).sum(axis=1))
+        return result
+
+    @property
+    def velocity_sigma_mps(self) -> FloatArray:
+        """(T,) of the filtered velocities, over all directions."""
+        result: FloatArray = np.sqrt(self.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
+        return result
 
     def clear(self) -> None:
         """Forget all tracks; ids go on."""
@@ -100,7 +91,7 @@ class Tracks:
         """Drop all but the chosen tracks."""
         if chosen.all():
             return
-        for name in _FIELDS:
+        for name in self._fields:
             setattr(self, name, getattr(self, name)[chosen])
 
     def index_of(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
@@ -127,7 +118,7 @@ class Tracks:
         spread = np.diag([sigma_m**2] * 3 + [max_speed_mps**2] * 3)
         given["covariance"] = given["surface_covariance"] = spread
         self._next_id += count
-        for name in _FIELDS:
+        for name in self._fields:
             old = getattr(self, name)
             new = np.zeros((count, *old.shape[1:]), old.dtype)
             if name in given:
@@ -160,11 +151,23 @@ class Tracks:
         result: NDArray[np.bool_] = way > _GOING_SHARE * np.square(velocity).sum(axis=1)
         return result
 
-    def overdue(self, elapsed_s: float) -> NDArray[np.bool_]:
+    def sight(self, camera_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(T, 3) unit vectors from a camera at camera_m (3,) to the centres, and (T,) their distances."""
+        away_m = self.state[:, :3] - camera_m
+        distance_m = np.sqrt(np.square(away_m).sum(axis=1))
+        return away_m / np.maximum(distance_m, 0.1)[:, None], distance_m
+
+    def overdue(self, elapsed_s: float, sight: FloatArray, resolves_m: FloatArray) -> NDArray[np.bool_]:
         """(T,) movers of which nothing has proved just now that they go on, and which by their velocity are
-        no longer where they were elapsed_s ago."""
-        way_m = elapsed_s * np.sqrt(np.square(self.state[:, 3:]).sum(axis=1))
-        gone = way_m >= _GONE_SHARE * self.extent_m[:, ::2].max(axis=1)
+        clearly no longer where they were elapsed_s ago: across the line of sight by most of their width, or
+        along it by what depth can tell apart there, resolves_m (T,). sight (T, 3): unit vectors."""
+        if elapsed_s <= 0.0:
+            return np.zeros(len(self), np.bool_)
+        way_m = elapsed_s * self.state[:, 3:]
+        along_m = (way_m * sight).sum(axis=1)
+        across_m = np.sqrt(np.maximum(np.square(way_m).sum(axis=1) - np.square(along_m), 0.0))
+        gone = across_m >= _GONE_SHARE * self.extent_m[:, ::2].max(axis=1)
+        gone |= np.abs(along_m) >= np.maximum(resolves_m, _GONE_SHARE * self.extent_m[:, 2])
         result: NDArray[np.bool_] = self.moving & (self.unproven_s >= _UNPROVEN_S) & gone
         return result
 

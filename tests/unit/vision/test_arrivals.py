@@ -57,9 +57,12 @@ def test_what_was_there_for_a_while_has_stayed(age_ms: int, known: bool) -> None
     """Half of 0.6 s at least; what was seen later only may have come since."""
     before, now = nearest(BODY, BACK), nearest(BODY, plate(3.0, (0.4, 0.6), (-0.5, 0.5)), BACK)
     grid = grid_of(now)
-    stayed = memory((0, before)).changes(grid, grid.valid, AT_ORIGIN, age_ms * MS).stayed
+    changes = memory((0, before)).changes(grid, grid.valid, AT_ORIGIN, age_ms * MS)
+    assert changes.stayed_s == (pytest.approx(age_ms * 1e-3) if known else 0.0)
+    stayed = changes.stayed
     new = (now == 3.0) & (before != 3.0)
-    assert (stayed[inner(BODY)].all(), stayed[new].any()) == (known, False)
+    assert bool(stayed[inner(BODY)].all()) == known
+    assert not stayed[new].any()
 
 
 def test_what_was_hidden_or_not_measured_has_not_stayed() -> None:
@@ -150,3 +153,13 @@ def test_views_are_kept_no_closer_than_0_06_s() -> None:
     # The second view is too young to be kept: 0.2 s before 250 ms the wall alone was seen.
     assert arrived(memory((0, BACK), (50, both)), both, 250).any()
     assert not arrived(memory((0, BACK), (70, both)), both, 250).any()
+
+
+def test_what_depth_tells_apart_grows_with_the_square_of_the_distance() -> None:
+    """0.1 m, and 3.5 sigmas of the difference of two cells whose noise is 0.55 of a pixel's."""
+    hand = 0.1 + 3.5 * 2.0**0.5 * 0.55 * 0.0075 * np.array([0.0, 1.0, 16.0])
+    np.testing.assert_allclose(memory().resolves_m(np.array([0.0, 1.0, 4.0])), hand)
+    just = plate(4.0 - 0.9 * hand[2], (-0.5, 0.5), (-0.5, 0.5))
+    grid = grid_of(just)
+    stayed = memory((0, wall(4.0))).changes(grid, grid.valid, AT_ORIGIN, 600 * MS).stayed
+    assert stayed[inner(just)].all()

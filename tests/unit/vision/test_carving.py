@@ -208,9 +208,37 @@ def test_around_fragments_that_move_in_company_a_suspect_is_cut_out() -> None:
     assert columns.max() == pytest.approx(166 + 15, abs=8)
 
 
-def test_a_single_moving_fragment_cuts_nothing_out() -> None:
+def test_a_single_moving_fragment_cuts_nothing_out_at_first() -> None:
+    """6 frames of 30 a second are 0.2 s."""
     before, after = carve(one_track(), NOWHERE, seen=fragments([150], 0.8, 60.0))
     assert after is before
+
+
+@pytest.mark.parametrize(
+    ("frames", "speed_mps", "upwards", "sigma_m", "cut"),
+    [
+        (8, 0.8, 0.0, 0.003, True),
+        (7, 0.8, 0.0, 0.003, False),  # 0.23 s
+        (30, 0.39, 0.0, 0.003, False),
+        (30, 2.5, 0.0, 0.003, False),  # faster than is believed
+        (30, 0.8, 0.35, 0.003, False),  # a fourth of it, and more, upwards
+        (30, 0.8, 0.0, 0.1, False),  # not surely so fast
+    ],
+)
+def test_a_single_fragment_that_has_gone_one_way_for_a_while_is_enough(
+    frames: int, speed_mps: float, upwards: float, sigma_m: float, cut: bool
+) -> None:
+    """Somebody in plain clothes walks along a wall: depth cannot tell him from it."""
+    seen = fragments([150], speed_mps, 60.0)
+    miss_m = seen.motion.miss_m.copy()
+    miss_m[:, 1] = -upwards * miss_m[:, 0]
+    covariance = np.tile([sigma_m**2, 0.0, sigma_m**2], (2, 1))
+    motion = replace(seen.motion, miss_m=miss_m, covariance=covariance)
+    seen = replace(seen, motion=motion, age_frames=np.full(1, frames, np.intp))
+    tracks = one_track()
+    before, after = carve(tracks, NOWHERE, seen=seen)
+    assert (after is not before) == cut
+    assert tracks.evidence.tolist() == ([0.0, carving.SUSPECT_EVIDENCE] if cut else [0.0])
 
 
 def test_fragments_that_something_static_explains_cut_nothing_out() -> None:

@@ -13,10 +13,10 @@ from vision.grouping import join
 
 
 def split(
-    grid: DepthGrid, labels: NDArray[np.int32], track: int, stayed: BoolGrid | None = None
+    grid: DepthGrid, labels: NDArray[np.int32], track: int, stayed: BoolGrid | None = None, way_m: float = 1.0
 ) -> NDArray[np.intp] | None:
     """Nothing has stayed where it was, unless said otherwise."""
-    return division.split(grid, labels, track, nothing(labels) if stayed is None else stayed)
+    return division.split(grid, labels, track, nothing(labels) if stayed is None else stayed, way_m)
 
 
 def nothing(labels: NDArray[np.int32]) -> BoolGrid:
@@ -56,11 +56,11 @@ def test_a_part_that_would_be_divided_from_one_goes_to_the_next() -> None:
     grid, labels = two_people(0.4)
     labels = np.where(labels == 0, 0, np.where(X < 0.0, 1, 2)[None, :]).astype(np.int32)
     labels[-labels.shape[0] // 2 :][labels[-labels.shape[0] // 2 :] == 2] = 3  # the right one's legs
-    joined, gone = join(grid, labels, [(1, 0), (2, 1)], labels > 0)
+    joined, gone = join(grid, labels, [(1, 0), (2, 1)], labels > 0, np.ones(3))
     assert gone == [2]
     np.testing.assert_array_equal(joined, np.where(labels == 3, 2, labels))
     # Nothing goes where nothing is left.
-    assert join(grid, labels, [(2, 1), (2, 0), (1, 2)], labels > 0)[1] == [2]
+    assert join(grid, labels, [(2, 1), (2, 0), (1, 2)], labels > 0, np.ones(3))[1] == [2]
 
 
 def test_only_the_cells_of_that_track_are_divided() -> None:
@@ -102,16 +102,23 @@ def test_what_is_seen_through_a_body_is_not_divided_from_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("low_m", "stayed_m", "divided"), [(0.9, 0.0, False), (1.05, 0.0, True), (0.9, 0.45, True)]
+    ("low_m", "stayed_m", "way_m", "divided"),
+    [
+        (0.9, 0.0, 1.0, False),
+        (1.05, 0.0, 1.0, True),
+        (0.9, 0.45, 1.0, True),
+        (0.9, 0.45, 0.3, False),  # much of its bed is where its bed was before
+        (0.9, 0.6, 0.3, True),
+    ],
 )
 def test_what_is_low_beside_a_body_is_divided_from_it_if_it_stands(
-    low_m: float, stayed_m: float, divided: bool
+    low_m: float, stayed_m: float, way_m: float, divided: bool
 ) -> None:
     """A trolley before who pushes it, 1.6 m tall, joined by its handle; 0.6 m long."""
     person, trolley = plate(3.0, (0.3, 0.7), (-0.7, 0.9)), plate(3.0, (-0.7, -0.1), (0.9 - low_m, 0.9))
     depth_m = nearest(person, trolley, plate(3.0, (-0.1, 0.3), (0.2, 0.35)))
     stayed = plate(3.0, (-0.7, -0.7 + stayed_m), (-0.7, 0.9)) > 0.0
-    assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0, stayed) is not None) == divided
+    assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0, stayed, way_m) is not None) == divided
 
 
 def test_one_body_behind_somebody_is_not_divided() -> None:

@@ -1,0 +1,68 @@
+"""Tracking on exact depth grids: who goes behind something at about his depth, and who pushes something."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from config.perception import PerceptionConfig
+from hal.types import FloatArray
+from tests.support.detections import detection, track
+from tests.support.grids import grid_of, nearest, plate, wall
+from tests.unit.vision.test_tracker import moving, walker, way_m
+from vision import masks
+from vision.tracker import Tracker
+
+_BACK = wall(8.0)
+
+
+@pytest.mark.parametrize("hides", [True, False])
+def test_a_mover_that_lost_all_of_its_parts_is_not_shown_a_frame_longer(
+    monkeypatch: pytest.MonkeyPatch, hides: bool
+) -> None:
+    """Nor does it get them back by another way; what is merely not seen is shown for a moment."""
+
+    def withdraw(ballot: masks.Ballot, *_: object) -> tuple[masks.Ballot, NDArray[np.bool_]]:
+        nobody = np.zeros_like(ballot.present)
+        return masks.elect(nobody, ballot.cast), np.full(nobody.shape[1], hides)
+
+    tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
+    for k in range(30):
+        percept = tracker.step(detection(grid_of(nearest(walker(-0.7 + way_m(k)), _BACK)), k), None)
+    (before,) = moving(percept)
+    monkeypatch.setattr(masks, "withdraw", withdraw)
+    percept = tracker.step(detection(grid_of(nearest(walker(-0.7 + way_m(30)), _BACK)), 30), None)
+    assert [one.id for one in moving(percept)] == ([] if hides else [before.id])
+
+
+def test_behind_something_at_about_his_depth_nobody_is_shown() -> None:
+    """As connected depth he is one with the crate; in frame 42 0.1 m of him is left to see."""
+    crate = plate(3.94, (0.3, 1.5), (-0.7, 1.0))
+    percepts = track([nearest(crate, walker(-0.7 + way_m(k)), _BACK) for k in range(56)])
+    assert len(moving(percepts[36])) == 1
+    assert not any(moving(percept) for percept in percepts[46:])
+
+
+def pusher(frame: int) -> FloatArray:
+    """He walks to the left; a trolley half as tall before him, joined to him by its handle."""
+    x_m = 0.6 - way_m(frame)
+    person = plate(4.0, (x_m - 0.2, x_m + 0.2), (-0.6, 1.0))
+    trolley, handle = plate(4.0, (x_m - 1.2, x_m - 0.5), (0.2, 1.0)), plate(4.0, (x_m - 0.5, x_m), (0.2, 0.4))
+    return nearest(person, trolley, handle, _BACK)
+
+
+def test_who_pushes_something_is_one_obstacle_with_it() -> None:
+    percepts = track([pusher(k) for k in range(30)])
+    for percept in percepts[6:]:
+        (one,) = moving(percept)
+        assert one.extent_m[0] > 1.2
+
+
+def test_who_passes_something_low_that_stands_is_divided_from_it() -> None:
+    """A crate beside which he walks, at his depth: one part with it as long as he touches it."""
+    crate = plate(4.0, (0.0, 0.7), (0.3, 1.0))
+    percepts = track([nearest(crate, walker(-1.1 + way_m(k)), _BACK) for k in range(70)])
+    for percept in percepts[62:]:
+        (one,) = moving(percept)
+        assert one.extent_m[0] < 0.8
