@@ -1,9 +1,11 @@
-"""Does the base move as it is told? Its motors may be held, its encoders dead, its reports long old, and
-no fault bit says so: then the robot stands for ever, or drives on with nobody knowing how far."""
+"""Does the base move as it is told? Its motors may be held, its encoders dead, its reports long old, the
+scale of its speed wrong, and no fault bit says so: then the robot stands for ever, drives on with nobody
+knowing how far, or goes faster than it may."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
 from hal.chassis.command import is_zero
 from hal.clocks import NS_PER_S
@@ -24,6 +26,12 @@ _LEAST_SHARE = 0.05
 _TURN_SLACK_RAD = 0.6
 _TURN_RATIO = 0.5
 
+# How fast it may tell of going: this many times what was commanded at any time in the last seconds, whatever
+# its lag, and a little more; not twice in a row is it faster, over so long each.
+_FASTEST_SHARE, _FASTEST_MPS = 1.5, 0.15
+_LAG_NS = 6 * NS_PER_S
+_GLANCE_NS = NS_PER_S // 2
+
 
 class Following:
     """sentence: "" while the base follows, and as long as too little was commanded to tell."""
@@ -35,21 +43,30 @@ class Following:
         self._last_ns = self._since_ns = 0
         self._commanded_m = self._told_m = 0.0
         self._commanded_rad = self._turning_rad = self._told_rad = 0.0
+        self._lately: deque[tuple[int, float]] = deque()  # until when which speed was commanded
+        self._glance_ns, self._glanced_m, self._too_fast = 0, 0.0, False
 
     def step(self, pose: PlanarPose, now_ns: int) -> None:
         """What the base has told since the last step, beside what it was ordered since."""
         before, self._pose = self._pose, pose
         elapsed_s, self._last_ns = (now_ns - self._last_ns) / NS_PER_S, now_ns
+        self._lately.append((now_ns, abs(self._ordered.v_mps)))
         if before is None or is_zero(self._ordered):
             self.sentence = ""
             self._restart(now_ns)
+            self._glance_ns, self._glanced_m, self._too_fast = now_ns, 0.0, False
+            return
+        way_m = math.hypot(pose.x_m - before.x_m, pose.y_m - before.y_m)
+        overspeed = self._overspeed(way_m, now_ns)
+        if overspeed:
+            self.sentence = overspeed
             return
         self._commanded_m += (abs(self._ordered.v_mps) + _ARM_M * abs(self._ordered.w_radps)) * elapsed_s
         self._commanded_rad += self._ordered.w_radps * elapsed_s
         self._turning_rad += abs(self._ordered.w_radps) * elapsed_s
         turn_rad = wrap_angle_rad(pose.heading_rad - before.heading_rad)
         self._told_rad += turn_rad
-        self._told_m += math.hypot(pose.x_m - before.x_m, pose.y_m - before.y_m) + _ARM_M * abs(turn_rad)
+        self._told_m += way_m + _ARM_M * abs(turn_rad)
         if self._commanded_m < _JUDGED_M or now_ns - self._since_ns < _JUDGED_NS:
             return
         self.sentence = self._judged((now_ns - self._since_ns) / NS_PER_S)
@@ -58,6 +75,24 @@ class Following:
     def ordered(self, command: Setpoint) -> None:
         """What the base is told from now on; zero ends the comparison."""
         self._ordered = command
+
+    def _overspeed(self, way_m: float, now_ns: int) -> str:
+        """What is wrong if the base, way_m on, tells of going faster than it was told of late."""
+        self._glanced_m += way_m
+        if now_ns - self._glance_ns < _GLANCE_NS:
+            return ""
+        while self._lately[0][0] < self._glance_ns - _LAG_NS:
+            self._lately.popleft()
+        told_mps = self._glanced_m * NS_PER_S / (now_ns - self._glance_ns)
+        commanded_mps = max(mps for _, mps in self._lately)
+        before, self._too_fast = self._too_fast, told_mps > _FASTEST_SHARE * commanded_mps + _FASTEST_MPS
+        self._glance_ns, self._glanced_m = now_ns, 0.0
+        if not (before and self._too_fast):
+            return ""
+        return (
+            f"the base does not follow: it tells of {told_mps:.2f} m/s while at most {commanded_mps:.2f} m/s "
+            "was commanded; are the scales of its speed and of its counters right in chassis:?"
+        )
 
     def _judged(self, seconds: float) -> str:
         apart_rad = abs(self._told_rad - self._commanded_rad)

@@ -1,4 +1,4 @@
-"""A base that tells of no motion while it is told to move."""
+"""A base that tells of no motion while it is told to move, of a turn nobody commanded, of going too fast."""
 
 import math
 
@@ -87,3 +87,55 @@ def test_zero_ends_it() -> None:
 def test_a_sluggish_base_follows(lag_s: float, accel_mps2: float) -> None:
     speeds_mps = [min(accel_mps2 * period / 50, 1.0) for period in range(500)]
     assert_follows(lag_s, [(v_mps, 0.4 * v_mps) for v_mps in speeds_mps])
+
+
+def seconds_until_too_fast(scale: float, v_mps: float, lag_s: float = 0.2) -> float | None:
+    """How long a base that does scale times what it is told may go on; at most 20 s."""
+    following, plant = Following(), TrackedPlant(PlantConfig(lag_s=lag_s))
+    for period in range(20 * 50):
+        now_ns = period * PERIOD_NS
+        plant.advance_to(now_ns)
+        following.step(plant.pose, now_ns)
+        if following.sentence:
+            return period / 50
+        ramp_mps = min(0.3 * period / 50, v_mps)
+        plant.command(scale * ramp_mps, 0.0)
+        following.ordered(Setpoint(now_ns, ramp_mps, 0.0, 0.0))
+    return None
+
+
+@pytest.mark.parametrize("scale", [2.0, 3.0])
+def test_a_base_that_does_more_than_it_is_told_is_noticed_before_it_has_gone_far(scale: float) -> None:
+    noticed_s = seconds_until_too_fast(scale, 0.75)
+    assert noticed_s is not None
+    assert noticed_s < 4.5  # 2.5 s of which it still gets faster
+
+
+@pytest.mark.parametrize(("scale", "lag_s"), [(1.0, 0.2), (1.0, 2.0), (1.3, 0.2), (0.5, 0.2)])
+def test_a_base_that_does_about_what_it_is_told_is_not(scale: float, lag_s: float) -> None:
+    assert seconds_until_too_fast(scale, 0.75, lag_s) is None
+
+
+def test_what_a_base_coasts_after_faster_orders_is_not_too_fast() -> None:
+    """It lags by 2 s, and is told to creep after 1.5 m/s."""
+    following, plant = Following(), TrackedPlant(PlantConfig(lag_s=2.0))
+    for period in range(10 * 50):
+        now_ns, v_mps = period * PERIOD_NS, 1.5 if period < 250 else 0.05
+        plant.advance_to(now_ns)
+        following.step(plant.pose, now_ns)
+        assert following.sentence == "" or "m/s" not in following.sentence
+        plant.command(v_mps, 0.0)
+        following.ordered(Setpoint(now_ns, v_mps, 0.0, 0.0))
+
+
+def test_the_sentence_names_both_speeds_and_what_to_look_at() -> None:
+    following = Following()
+    for period in range(120):
+        following.step(PlanarPose(0.04 * period, 0.0, 0.0), period * PERIOD_NS)
+        if following.sentence:
+            break
+        following.ordered(Setpoint(period * PERIOD_NS, 1.0, 0.0, 0.0))
+    assert following.sentence == (
+        "the base does not follow: it tells of 2.00 m/s while at most 1.00 m/s was commanded; "
+        "are the scales of its speed and of its counters right in chassis:?"
+    )
