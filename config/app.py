@@ -98,7 +98,9 @@ class AppConfig(Section):
         if self.governor is not None and self.runner.kind != "realtime":
             raise ValueError("a 'governor' hears commands as they come and needs runner.kind 'realtime'")
         if simulated and self.path is not None:
-            raise ValueError("give the path in the scenario or here, not both")
+            raise ValueError("a simulation drives the path of its scenario: write it there, not here")
+        if not simulated:
+            self._check_real_robot()
         if self.runner.kind == "lockstep" and not simulated:
             raise ValueError(
                 "runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'"
@@ -109,6 +111,17 @@ class AppConfig(Section):
                 "which answers one request an exchange"
             )
         return self
+
+    def _check_real_robot(self) -> None:
+        """Another robot's size, mounting or speed would be a guess. Raises ValueError."""
+        missing = [
+            name for name in ("body", "limits", "camera_mount") if name not in self.robot.model_fields_set
+        ]
+        if missing:
+            raise ValueError(
+                f"camera.kind {self.camera.kind!r} needs robot.{', robot.'.join(missing)}: nothing of a real "
+                "robot is guessed; measure yours"
+            )
 
 
 def load_app(path: Path) -> AppConfig:

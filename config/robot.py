@@ -36,10 +36,10 @@ class Body(Section):
 class Limits(Section):
     """Speed, acceleration and jerk; the paper's values (Daeef 2020, problem statement) as defaults."""
 
-    max_speed_mps: float = Field(default=1.5, gt=0, le=5)
-    max_accel_mps2: float = Field(default=0.3, gt=0, le=5)
+    max_speed_mps: float = Field(default=1.5, ge=0.02, le=5)
+    max_accel_mps2: float = Field(default=0.3, ge=0.01, le=5)
     emergency_decel_mps2: float = Field(default=0.7, gt=0, le=10)
-    max_jerk_mps3: float = Field(default=0.6, gt=0, le=50)
+    max_jerk_mps3: float = Field(default=0.6, ge=0.01, le=50)
     emergency_jerk_mps3: float = Field(default=2.0, gt=0, le=100)
     max_yaw_rate_radps: float = Field(default=0.8, gt=0, le=5)
     max_obstacle_speed_mps: float = Field(default=1.5, ge=0, le=10, description="the paper's V_omax")

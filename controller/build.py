@@ -24,7 +24,7 @@ from controller.control import ControlLoop
 from controller.decide import DecisionMaker
 from controller.follow import PathFollower
 from controller.localise import Localiser
-from controller.path import Path
+from controller.path import Path, PathError
 from controller.perceive import Perceiver
 from controller.recorder import Surroundings
 from controller.shape import SpeedShaper
@@ -77,12 +77,16 @@ def build_path(config: AppConfig, config_path: FilePath) -> Path:
 
     A governed robot has none but in a simulation: straight on from where it stands.
     """
-    if config.path is not None:
-        return Path(config.path, config.robot)
-    if config.governor is not None and config.simulation is None:
+    if config.path is None and config.simulation is None:
         return straight_ahead(config.robot)
-    assert config.simulation is not None, "AppConfig asks for a path or a simulation"
-    return Path(scenario_of(config.simulation, config_path).path, config.robot)
+    where, spec = str(config_path), config.path
+    if spec is None:
+        assert config.simulation is not None
+        where, spec = config.simulation.scenario, scenario_of(config.simulation, config_path).path
+    try:
+        return Path(spec, config.robot)
+    except PathError as error:
+        raise PathError(f"{where}: {error}") from error
 
 
 def build_perceiver(

@@ -61,16 +61,18 @@ def _number(value: float, digits: int) -> float | None:
 
 
 class ObservationFile:
-    """Writes JSON lines to a file as they come. Context manager."""
+    """Writes JSON lines to a file as they come. Context manager. What the file held goes with the first line,
+    not before: where nothing is seen, nothing is lost."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._file: TextIO | None = None
+        self._has_written = False
 
     def __enter__(self) -> Self:
-        """Create the file. Raises UserError where that is not possible."""
+        """Open or create the file. Raises UserError where that is not possible."""
         try:
-            self._file = self._path.open("w", encoding="utf-8")
+            self._file = self._path.open("a", encoding="utf-8")
         except OSError as error:
             raise UserError(
                 f"{self._path}: observations cannot be written there ({error.strerror}); "
@@ -95,6 +97,9 @@ class ObservationFile:
         assert self._file is not None, "ObservationFile is used inside its with block"
         line = json.dumps(observation(scene, decision, timing_ms), separators=(", ", ": "), allow_nan=False)
         try:
+            if not self._has_written and self._path.is_file():
+                self._file.truncate(0)
+            self._has_written = True
             self._file.write(line + "\n")
         except OSError as error:
             raise self._failed(error) from error

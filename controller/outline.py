@@ -19,6 +19,8 @@ from hal.types import FloatArray
 
 # The outline may have no wider gap, in bands, or something of the body was not seen.
 _GAP_BANDS = 2.5
+# Beside whatever stands nearer, a stereo camera measures nothing for so many bands.
+_SHADOW_BANDS = 2
 # Nor may it begin farther behind the near side of the box: then it is something else, behind what gives none.
 _BEHIND_M = 0.15
 
@@ -54,7 +56,7 @@ def outline_of(
     offset = outline - bodies.xy_m[k]
     along, across = offset @ ahead, offset @ (-ahead[1], ahead[0])
     whole = _seen_throughout(across, half_band_m, float(bodies.half_across_m[k]))
-    whole &= float(along.min()) <= _BEHIND_M - float(bodies.half_view_m[k]) and not _cut_off(surfaces, own)
+    whole &= float(along.min()) <= _BEHIND_M - float(bodies.half_view_m[k]) and _ends_in_view(surfaces, own)
     if whole:
         hidden_m = max(depth_m - float(np.ptp(along)), 0.0)
         outline = np.concatenate((outline, outline + hidden_m * ahead))
@@ -70,7 +72,16 @@ def _seen_throughout(across_m: FloatArray, half_band_m: FloatArray, half_m: floa
     return bool(np.diff(edges).max() <= _GAP_BANDS * 2.0 * float(half_band_m.max()))
 
 
-def _cut_off(surfaces: Surfaces, own: NDArray[np.bool_]) -> bool:
-    """Whether the own ones of the points reach an edge of the view."""
-    bands = surfaces.bands[own]
-    return bool(bands[0] == 0 or bands[-1] == surfaces.count - 1)
+def _ends_in_view(surfaces: Surfaces, own: NDArray[np.bool_]) -> bool:
+    """Whether farther things are seen beside both ends of the own ones of the points: at the edge of the
+    view, beside what was not measured, or behind something nearer, the body may go on."""
+    bands, forward_m = surfaces.bands[own], surfaces.forward_m[own]
+    left = surfaces.seen_m[max(bands[0] - _SHADOW_BANDS, 0) : bands[0]][::-1]
+    right = surfaces.seen_m[bands[-1] + 1 : bands[-1] + 1 + _SHADOW_BANDS]
+    return _beyond(left, float(forward_m[0])) and _beyond(right, float(forward_m[-1]))
+
+
+def _beyond(seen_m: FloatArray, end_m: float) -> bool:
+    """Whether the first band that was measured of those beside an end, seen_m (K,), was seen beyond end_m."""
+    measured = seen_m[seen_m > 0.0]
+    return bool(len(measured) and measured[0] > end_m)

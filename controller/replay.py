@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections import Counter
 from contextlib import ExitStack
@@ -23,6 +24,7 @@ from controller.build import (
 from controller.console import Console
 from controller.decide import DecisionMaker
 from controller.decision import Decision
+from controller.errors import UserError
 from controller.path import OnPath, Path
 from controller.perceive import Look
 from controller.recorder import RecordingOptions, open_recorder
@@ -38,6 +40,8 @@ from vision.scene import CameraCondition, EgoMotion
 # A recording is looked at frame by frame, so the decision is as fresh as the frame.
 _STANDING = PlanarPose(0.0, 0.0, 0.0)
 _SPEED_FRAMES = 5
+# What a replay may have written into the recording's folder before.
+_OUTPUTS = frozenset({".jsonl", ".json", ".webm", ".mp4", ".avi"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +70,7 @@ class ReplayTally:
     moving_ids: set[int] = field(default_factory=set)
     nearest_m: float = math.inf
     conditions: Counter[CameraCondition] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
     actions: Counter[str] = field(default_factory=Counter)
 
     def take(self, look: Look, decision: Decision) -> None:
@@ -80,6 +85,8 @@ class ReplayTally:
         for obstacle in look.scene.obstacles:
             self.nearest_m = min(self.nearest_m, float(obstacle.position_m[2]))
         self.conditions[look.scene.health.condition] += 1
+        if look.scene.health.reason:
+            self.reasons[look.scene.health.reason] += 1
         self.actions[decision.action.value] += 1
 
 
@@ -101,6 +108,7 @@ class EgoSpeed:
 def run_replay(options: ReplayOptions) -> None:
     """Every frame through detect, track and decide. Raises ConfigError, HalError, UserError."""
     config = load_replay(options.config_path)
+    _refuse_overwriting(options)
     console = Console(options.quiet)
     source, odometry = open_replay(options.recording, options.odometry, options.topics)
     mount = recorded_mount(config, source.mount)
@@ -136,6 +144,19 @@ def run_replay(options: ReplayOptions) -> None:
     console.summary(_summary(options, tally, prior, skipped, source.notes))
 
 
+def _refuse_overwriting(options: ReplayOptions) -> None:
+    """Raises UserError where an output is the recording, a file of it, or the other output."""
+    outputs = [path for path in (options.observations, options.video) if path is not None]
+    if len({path.absolute() for path in outputs}) < len(outputs):
+        raise UserError(f"{outputs[0]}: is to hold the observations and the video; name two files")
+    recording = os.path.realpath(options.recording)
+    for path in outputs:
+        real = os.path.realpath(path)
+        inside = real.startswith(recording + os.sep) and path.suffix not in _OUTPUTS
+        if os.path.exists(real) and (real == recording or inside):
+            raise UserError(f"{path}: is part of the recording; name another file for the output")
+
+
 def recorded_mount(config: ReplayConfig, recorded: CameraMount | None) -> CameraMount | None:
     """The recording's own mounting, or the robot's if that may be assumed, or unknown."""
     if recorded is not None or not config.assume_mount:
@@ -151,6 +172,12 @@ def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Deci
     """As for a robot that stands at the start of a straight path and drives v_mps."""
     on_path = OnPath(0.0, 0.0, 0.0)
     return decide.step(Situation(look.scene, path, _STANDING, on_path, v_mps, 0.0, look.scene.captured_ns))
+
+
+def _camera(tally: ReplayTally) -> str:
+    """In how many frames the camera was worth how much, and the most frequent reason not to rely on it."""
+    worth = ", ".join(f"{count} {condition.value}" for condition, count in tally.conditions.items())
+    return "; mostly: ".join([worth, *(reason for reason, _ in tally.reasons.most_common(1))])
 
 
 def _summary(
@@ -169,10 +196,7 @@ def _summary(
             + (f"; nearest {tally.nearest_m:.2f} m ahead" if math.isfinite(tally.nearest_m) else ""),
         ),
         ("decisions", ", ".join(f"{count} {action}" for action, count in sorted(tally.actions.items()))),
-        (
-            "camera",
-            ", ".join(f"{count} {condition.value}" for condition, count in tally.conditions.items()),
-        ),
+        ("camera", _camera(tally)),
         ("perception", tally.timing.line()),
     ]
     rows.extend(("skipped", text) for text in skipped)

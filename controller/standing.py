@@ -52,7 +52,7 @@ class StandingLimits:
 
     def limits(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
         """For the robot at s_m."""
-        if known.bodies is not self._of:
+        if known.bodies is not self._of or known.corridor is not self._corridor:
             self._take_in(known, s_m)
         margins = self._config.margins
         found = []
@@ -78,15 +78,18 @@ class StandingLimits:
         return found
 
     def _take_in(self, known: Knowledge, s_m: float) -> None:
-        """Place what stands in a new scene, and leave out what is too far aside to matter."""
-        self._of = bodies = known.bodies
-        self._near = []
+        """Place what stands in a new scene, or beside a new path, and leave out what is too far aside to
+        matter. Outlines that were seen along another path say nothing here."""
+        before = self._outlines_m if known.corridor is self._corridor else {}
+        self._of, self._corridor = known.bodies, known.corridor
+        self._near, self._outlines_m = [], {}
+        bodies = known.bodies
         standing = ~bodies.moving
         if not standing.any():
             return
         sight, margins = self._config.sight, self._config.margins
         placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
-        clear_m = self._clear(known, placed, s_m)
+        clear_m = self._clear(known, placed, s_m, before)
         near = clear_m <= margins.lateral_m + margins.graze_m
         self._inside.difference_update(bodies.ids[standing & ~near].tolist())
         rows = (standing & near).nonzero()[0]
@@ -103,12 +106,10 @@ class StandingLimits:
         )
         self._near = [_Near(*of) for of in zip(*(one[rows].tolist() for one in columns), strict=True)]
 
-    def _clear(self, known: Knowledge, placed: Placed, s_m: float) -> FloatArray:
+    def _clear(self, known: Knowledge, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
         """(N,) free floor beside the swept corridor; in bends, by the outlines when they were last seen
-        whole, as long as nothing nearer is seen of them."""
+        whole, by number before this scene, as long as nothing nearer is seen of them."""
         clear_m: FloatArray = placed.clear_m[:, 0].copy()
-        before = self._outlines_m if known.corridor is self._corridor else {}
-        self._corridor, self._outlines_m = known.corridor, {}
         if known.corridor.straight:
             return clear_m
         standing, near_m = ~known.bodies.moving, self._config.margins.lateral_m + _BESIDE_M

@@ -20,11 +20,11 @@ _DEPTH_SIGMAS = 3.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surfaces:
-    """P points, left to right. bands (P,): of the free space, which they are of; count of its bands in all.
-    forward_m (P,) from the camera. half_band_m (P,): half of the width that a point stands for. points_m
-    (P, 2)."""
+    """P points, left to right. bands (P,): of the B bands of the free space, which they are of. forward_m
+    (P,) from the camera. half_band_m (P,): half of the width that a point stands for. points_m (P, 2). seen_m
+    (B,): how far each band was seen through, to a surface or over free floor; 0: nothing was measured."""
 
-    count: int
+    seen_m: FloatArray
     bands: NDArray[np.intp]
     forward_m: FloatArray
     half_band_m: FloatArray
@@ -36,7 +36,7 @@ class Surfaces:
         return bodies.covers(self.points_m, reach_m, AROUND_M)
 
 
-NO_SURFACES = Surfaces(0, np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+NO_SURFACES = Surfaces(np.zeros(0), np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
 
 
 def surfaces_of(free: FreeSpace, pose: PlanarPose, mount: CameraMount) -> Surfaces:
@@ -49,4 +49,5 @@ def surfaces_of(free: FreeSpace, pose: PlanarPose, mount: CameraMount) -> Surfac
     points = np.empty((len(forward), 2))
     points[:, 0] = pose.x_m + ahead * cos - left * sin
     points[:, 1] = pose.y_m + ahead * sin + left * cos
-    return Surfaces(len(free.nearest_m), bands, forward, forward * free.half_width_tan, points)
+    seen_m = np.where(np.isfinite(free.nearest_m), free.nearest_m, np.nan_to_num(free.known_m))
+    return Surfaces(seen_m, bands, forward, forward * free.half_width_tan, points)

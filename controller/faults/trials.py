@@ -13,7 +13,8 @@ from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
 from hal.types import ChassisMode, ChassisState, PlanarPose, Setpoint
 
-KINDS = ("agilex", "agilex-serial", "roboclaw", "roboteq", "kobuki")
+# Every base that can be emulated.
+KINDS = tuple(sorted(path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob("hil-*.yaml")))
 
 _PERIOD_NS = NS_PER_S // 50
 _SPEED_MPS = 0.5

@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from controller.faults.kills import KILLS, run_kill
+from controller.faults.trials import KINDS
 from tests.support.hil_missions import emulator, short_mission
 
 QUICK = "agilex"
 
 
-@pytest.mark.parametrize("kind", ["agilex", "agilex-serial", "roboclaw", "roboteq", "kobuki"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_mission_is_reached(kind: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     if kind != QUICK and not request.config.getoption("--hil"):
         pytest.skip("one kind is enough for every day; all of them with --hil")

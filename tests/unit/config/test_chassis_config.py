@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
 from config.app import load_app
 from config.chassis import (
@@ -135,6 +136,16 @@ def test_a_mirrored_motor_counts_backwards(tmp_path: Path) -> None:
     chassis = read(tmp_path, text)
     assert isinstance(chassis, RoboclawChassisConfig)
     assert (chassis.left_sign, chassis.right_sign) == (1, -1)
+
+
+@pytest.mark.parametrize("section", ["body", "limits", "camera_mount"])
+def test_nothing_of_a_real_robot_is_guessed(section: str, tmp_path: Path) -> None:
+    content = yaml.safe_load((CONFIG_DIR / "robot-roboteq.yaml").read_text())
+    del content["robot"][section]
+    changed = tmp_path / "robot.yaml"
+    changed.write_text(yaml.safe_dump(content))
+    with pytest.raises(ConfigError, match=f"'realsense' needs robot.{section}: nothing of a real robot"):
+        load_app(changed)
 
 
 @pytest.mark.parametrize("path", sorted(CONFIG_DIR.glob("robot-*.yaml")), ids=lambda path: path.stem)

@@ -13,6 +13,7 @@ from config.chassis import ChassisConfig
 from config.loader import CONFIG_DIR
 from controller.cli import emulate
 from controller.emulate import FAULTS
+from controller.faults.trials import KINDS as EVERY_BASE
 from hal.chassis.driver import ChassisDriver, Told
 from tests.support.contract_rigs import EMULATED
 from tests.support.page_chassis import CODE, page_module
@@ -99,7 +100,7 @@ STEPS = {
     "wrong device": lambda kind: f'"{kind}' in read("tests/contract/test_wrong_device.py"),
     "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/test_guard.py"),
     "emulate": lambda kind: kind in emulate.get_help(Context(emulate, info_name="emulate")),
-    "mission": lambda kind: f'"{kind}"' in read("tests/hil/test_hil_missions.py"),
+    "mission and faults": lambda kind: kind in EVERY_BASE,
     "README": lambda kind: kind.lower() in read("README.md").lower(),
 }
 

@@ -59,7 +59,7 @@ def test_an_unknown_key(tmp_path: Path) -> None:
 def test_a_wrong_value_and_a_missing_section_are_told_together(tmp_path: Path) -> None:
     config = changed_config(tmp_path, robot={"limits": {"max_accel_mps2": -0.3}}, chassis=None)
     message = refusal("run", "--config", config)
-    assert "robot.limits.max_accel_mps2: Input should be greater than 0, found -0.3" in message
+    assert "robot.limits.max_accel_mps2: Input should be greater than or equal to 0.01, found -0.3" in message
     assert "chassis: missing key" in message
 
 

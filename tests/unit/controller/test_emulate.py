@@ -138,6 +138,18 @@ def test_the_path_is_a_link_while_it_runs(tmp_path: Path) -> None:
     assert path.read_text() == "mine"
 
 
+def test_the_path_of_another_emulator_is_left_to_it(tmp_path: Path) -> None:
+    path, (master, slave) = tmp_path / "port", os.openpty()
+    try:
+        path.symlink_to(os.ttyname(slave))
+        with pytest.raises(UserError, match="another emulator is there"), _linked(str(path), "/dev/pts/7"):
+            pass
+        assert os.readlink(path) == os.ttyname(slave)
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -63,6 +63,18 @@ def test_the_file_holds_one_json_line_a_frame(tmp_path: Path) -> None:
     assert lines[1]["decision"] is None
 
 
+def test_what_was_in_the_file_goes_with_the_first_line_and_not_before(tmp_path: Path) -> None:
+    path = tmp_path / "out.jsonl"
+    path.write_text("of the last run\n")
+    with ObservationFile(path):
+        pass
+    assert path.read_text() == "of the last run\n"
+    with ObservationFile(path) as sink:
+        for number in (0, 1):
+            sink.write(scene(sequence=number), SLOW, {})
+    assert [json.loads(line)["frame"] for line in path.read_text().splitlines()] == [0, 1]
+
+
 def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path: Path) -> None:
     with (
         pytest.raises(UserError, match=r"none/out\.jsonl: observations cannot be written"),

@@ -8,12 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from config.robot import Body
+from config.decision import DecisionConfig
+from config.robot import Body, Robot
 from controller.corridor import Corridor
 from controller.decision import Decision
+from controller.knowledge import Knowledge
+from controller.limits import Motion
 from controller.outline import Outline, outline_of
 from controller.path import OnPath, Path
 from controller.situation import Situation
+from controller.standing import StandingLimits
 from controller.surfaces import Surfaces
 from hal.types import FloatArray, PlanarPose
 from tests.support.bodies import arc_path, box, line_path
@@ -33,14 +37,18 @@ HALF_BAND_M = 0.01
 BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)
 
 
-def outline(points_m: FloatArray, view_deg: float, first_band: int = 20) -> Outline:
+def outline(
+    points_m: FloatArray, view_deg: float, first_band: int = 20, seen_m: FloatArray | None = None
+) -> Outline:
     """Of the box seen in direction view_deg, beside a way of which the robot takes 0.4 m to either side."""
     one = replace(
         box(3.0, 1.0, half_view_m=0.3, half_across_m=0.3), view_rad=np.array([math.radians(view_deg)])
     )
     count = len(points_m)
     bands, half_band_m = np.arange(first_band, first_band + count), np.full(count, HALF_BAND_M)
-    seen = Surfaces(80, bands, points_m[:, 0], half_band_m, points_m)
+    seen = Surfaces(
+        np.full(80, 9.0) if seen_m is None else seen_m, bands, points_m[:, 0], half_band_m, points_m
+    )
     corridor = Corridor(line_path(), BODY)
     return outline_of(one, 0, seen.of(one)[:, 0], seen, corridor, (0.0, 8.0), depth_m=0.3)
 
@@ -80,6 +88,26 @@ def test_an_outline_that_may_go_on_outside_of_the_view_is_not_whole() -> None:
     assert not outline(CORNER_ON, 45.0, first_band=0).whole
     assert outline(CORNER_ON, 45.0, first_band=1).whole
     assert not outline(CORNER_ON, 45.0, first_band=80 - len(CORNER_ON)).whole
+
+
+@pytest.mark.parametrize(
+    ("beside", "whole"),
+    [
+        ([0.0, 0.0, 9.0], False),  # nothing was measured beside it
+        ([0.0, 9.0, 9.0], True),  # but for the shadow of what stands nearer
+        ([2.0, 9.0, 9.0], False),  # something nearer hides its end
+        ([0.0, 2.0, 9.0], False),
+        ([3.3, 3.3, 3.3], True),
+    ],
+)
+@pytest.mark.parametrize("end", [-1, 1])
+def test_beside_both_ends_something_farther_has_to_be_seen(
+    beside: list[float], whole: bool, end: int
+) -> None:
+    seen_m = np.full(80, 9.0)
+    edge = 20 if end < 0 else 20 + len(CORNER_ON) - 1
+    seen_m[[edge + end, edge + 2 * end, edge + 3 * end]] = beside
+    assert outline(CORNER_ON, 45.0, seen_m=seen_m).whole == whole
 
 
 BEND = arc_path(4.0, 80.0)  # to the left
@@ -142,12 +170,48 @@ def test_what_was_seen_whole_is_passed_while_it_leaves_the_view() -> None:
     assert look(Bench(), part, cut(seen)).reason.rule == "static"
 
 
+def test_what_lies_beside_a_band_without_depth_may_go_on_there() -> None:
+    """The same, where the image is wider than what depth is measured of."""
+    part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), cut(depth(corner_on=True))
+    last = np.arange(len(seen.nearest_m)) >= len(seen.nearest_m) - 2
+    nearest_m, known_m = np.where(last, math.inf, seen.nearest_m), np.where(last, 0.0, seen.known_m)
+    blind = FreeSpace(seen.bearing_tan, seen.half_width_tan, nearest_m, known_m)
+    assert look(Bench(), part, blind).reason.rule == "static"
+
+
+def test_what_goes_in_between_has_to_be_seen_whole_again() -> None:
+    """Nothing else stands there, so that no outline is taken while it goes."""
+    part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
+    bench = Bench()
+    look(bench, crate(), seen)
+    look(bench, replace(crate(), moving=True, velocity_mps=np.array([0.3, 0.0, 0.3])), seen)
+    assert look(bench, part, cut(seen)).reason.rule == "static"
+
+
 def test_what_then_shows_in_the_way_is_stopped_for() -> None:
     """The crate was the end of something longer, which goes on into the way."""
     part, seen = crate(HALF_DIAGONAL_M, CRATE_Y_M + 0.5 * HALF_DIAGONAL_M), depth(corner_on=True)
     bench = Bench()
     look(bench, crate(), seen)
     assert look(bench, part, cut(depth(corner_on=False))).reason.rule == "static"
+
+
+def test_on_another_path_what_stands_is_placed_anew_without_a_new_scene() -> None:
+    """As for a governor that gets another command between two frames; beside the line it is aside."""
+    bench, path = Bench(), arc_path(3.0, 80.0)
+    look(bench, obstacle(2.2, 1.0, size_m=(0.4, 0.8)), free_space(bands=80), line_path())
+    before = bench.maker._known
+    assert before is not None
+    known = Knowledge(path, Robot(), MOUNT, DecisionConfig(), 0.0)
+    known.go_on_from(before)
+    assert known.surfaces is before.surfaces
+    assert known.health is before.health
+    assert known.edge_tan == before.edge_tan
+    standing = StandingLimits(DecisionConfig(), Robot().limits, MOUNT, set())
+    motion = Motion(0.4, 0.0, 0.2)
+    assert standing.limits(before, 0.0, motion) == []
+    (limit,) = standing.limits(known, 0.0, motion)
+    assert limit.reason.rule == "static"
 
 
 def test_what_was_seen_along_one_path_says_nothing_of_another() -> None:

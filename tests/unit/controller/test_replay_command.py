@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 
 from config.loader import CONFIG_DIR
+from controller.errors import UserError
 from controller.replay import EgoSpeed, ReplayOptions, run_replay
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
@@ -128,3 +131,47 @@ def test_a_video_plays_at_the_pace_of_the_recording(tmp_path: Path) -> None:
     video = tmp_path / "v.mp4"
     run_replay(ReplayOptions(tmp_path / "slow", "auto", CONFIG_DIR / "replay.yaml", video=video, quiet=True))
     assert cv2.VideoCapture(str(video)).get(cv2.CAP_PROP_FPS) == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("name", ["camera.yaml", "rgb.txt", "rgb"])
+def test_an_output_that_is_part_of_the_recording_is_refused(name: str, tmp_path: Path) -> None:
+    recording = Path(shutil.copytree(DESK, tmp_path / "desk"))
+    target = recording / name
+    target = sorted(target.iterdir())[0] if target.is_dir() else target
+    before = target.read_bytes()
+    with pytest.raises(UserError, match="is part of the recording; name another file"):
+        run_replay(ReplayOptions(recording, "none", CONFIG_DIR / "replay.yaml", target, quiet=True))
+    assert target.read_bytes() == before
+    # Observations of an earlier replay beside it are no part of it.
+    (recording / "seen.jsonl").write_text("before")
+    run_replay(
+        ReplayOptions(recording, "none", CONFIG_DIR / "replay.yaml", recording / "seen.jsonl", quiet=True)
+    )
+    assert len((recording / "seen.jsonl").read_text().splitlines()) == 10
+
+
+def test_a_bag_is_not_overwritten_with_what_is_seen_in_it(tmp_path: Path) -> None:
+    bag = tmp_path / "r.bag"
+    bag.write_bytes(b"#ROSBAG V2.0")
+    with pytest.raises(UserError, match=r"r\.bag: is part of the recording"):
+        run_replay(ReplayOptions(bag, "none", CONFIG_DIR / "replay.yaml", video=bag, quiet=True))
+    assert bag.read_bytes() == b"#ROSBAG V2.0"
+
+
+def test_two_outputs_in_one_file_are_refused(tmp_path: Path) -> None:
+    both = tmp_path / "s.webm"
+    with pytest.raises(UserError, match="name two files"):
+        run_replay(ReplayOptions(DESK, "none", CONFIG_DIR / "replay.yaml", both, both, quiet=True))
+    assert not both.exists()
+
+
+def test_the_summary_says_why_the_camera_cannot_be_trusted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Depth in metres taken for millimetres, or the other way round, is a common mistake."""
+    recording = Path(shutil.copytree(DESK, tmp_path / "desk"))
+    camera = recording / "camera.yaml"
+    camera.write_text(re.sub("depth_factor: .*", "depth_factor: 1", camera.read_text()))
+    run_replay(ReplayOptions(recording, "none", CONFIG_DIR / "replay.yaml", quiet=True))
+    said = capsys.readouterr().out
+    assert re.search(r"camera +10 untrustworthy; mostly: only 0\.0% of the depth image", said), said
