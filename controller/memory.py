@@ -7,7 +7,7 @@ A body of the last scene that is missing in this one is kept while its place is 
 * Moving: goes on with its last velocity for 2 s, or for 6 s if that leads towards the robot's axis or along
   with the robot. Dropped earlier where its place is well within the view or lies 2 m behind the camera.
 * Judged standing (a verdict takes some frames), but clearly measured as coming (or as going anywhere,
-  if seen for less than 1 s): counts as moving, with the velocity measured last.
+  if seen for 0.5 to 1 s): counts as moving, with the velocity measured last, even if the robot stands.
 * Should have come in, but its place is seen to be free: moved sideways to the edge of the free space, and no
   longer coming (the velocity towards the axis becomes 0, the variance grows). The same 2 s or 6 s apply. Who
   was clearly coming may first be some decimetres late.
@@ -117,11 +117,12 @@ class OutOfView:
         """
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
         gone = _missing(before.ids, seen.ids)
+        before = _as_measured(before, self._mistaken_mps)
         gone &= before.moving | ((before.age_s >= SETTLED_S) & (not standing))
         if not len(self._since_s) and not gone.any():
             return no_bodies(seen.captured_ns)
         since = np.concatenate((self._since_s, np.zeros(int(gone.sum())))) + dt_s
-        bodies = self._bodies.joined(_as_measured(before.select(gone), self._mistaken_mps))
+        bodies = self._bodies.joined(before.select(gone))
         bodies = replace(
             bodies,
             captured_ns=seen.captured_ns,
@@ -250,7 +251,7 @@ def _as_measured(bodies: Bodies, mistaken_mps: float) -> Bodies:
     squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
     # Along its way: v' C v / v'v is the variance there.
     variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
-    goes = ~bodies.moving & (bodies.age_s < _NO_VERDICT_S)
+    goes = ~bodies.moving & (bodies.age_s >= SETTLED_S) & (bodies.age_s < _NO_VERDICT_S)
     goes &= (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
     goes &= squared <= mistaken_mps**2
     if not goes.any():

@@ -175,6 +175,19 @@ def test_who_was_certainly_going_goes_on_as_it_was_measured() -> None:
     assert found.xy_m[0].tolist() == pytest.approx([1.6 + 0.025, 0.1 + 0.3])
 
 
+@pytest.mark.parametrize(
+    ("left_mps", "age_s", "kept"), [(0.6, 0.6, True), (0.4, 0.6, False), (0.6, 0.4, False), (0.6, 1.1, False)]
+)
+def test_who_was_certainly_going_goes_on_though_the_robot_stands(
+    left_mps: float, age_s: float, kept: bool
+) -> None:
+    """What stands and vanishes then has gone by itself; who was going is somewhere."""
+    pallet = measured(box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=age_s), left_mps)
+    seen = replace(no_bodies(0), captured_ns=FRAME_NS)
+    found = memory().update(pallet, seen, HERE, EDGE, True, NOTHING_SEEN)
+    assert found.moving.tolist() == [True] * kept
+
+
 @pytest.mark.parametrize(("fastest_mps", "left_mps"), [(1.5, 2.4), (1.0, 1.6), (2.5, 4.0)])
 def test_however_certainly_nobody_goes_as_fast_as_a_mistake(fastest_mps: float, left_mps: float) -> None:
     """Which is 1.6 times as fast as any obstacle."""
