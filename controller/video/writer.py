@@ -95,8 +95,8 @@ class VideoWriter:
 def _codec_for(path: Path) -> str:
     codec = CODECS.get(path.suffix.lower())
     if codec is None:
-        found = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
-        raise VideoError(f"{path}: {found} names no kind of video; use one of {', '.join(CODECS)}")
+        found = f"{path.suffix!r} is no kind of video" if path.suffix else "which kind of video is not said"
+        raise VideoError(f"{path}: {found}; end its name with one of {', '.join(CODECS)}")
     return codec
 
 

@@ -30,6 +30,7 @@ from hal.types import CameraMount, Intrinsics, RgbdFrame
 
 _ANY_TOPICS = WantedTopics()
 _FIRST_IMAGES = 10
+_THE_REST = "the rest"
 
 
 class BagReplay:
@@ -124,9 +125,14 @@ class BagReplay:
                 return outcome
             self._skipped.append(outcome)
         if self._usable == 0:
-            why = f"; the first: {self._skipped[0]}" if self._skipped else "; check the times of its images"
-            raise BadRecording(f"{self._path}: not one frame is usable{why}")
+            raise BadRecording(f"{self._path}: not one frame is usable; {self._why_none()}")
         raise EndOfStream(f"{self._path}: no further frame")
+
+    def _why_none(self) -> str:
+        if not self._skipped:
+            return "check the times of its images"
+        first = self._skipped[0]
+        return first.reason if first.file == _THE_REST else f"the first: {first}"
 
     def pass_over(self, until_ns: int) -> None:
         """Leave out what another frame follows until then, without decoding it."""
@@ -150,7 +156,7 @@ class BagReplay:
             self._end()
         except BadRecording as error:
             # What came before the damage was whole, and is not lost for it.
-            self._skipped.append(SkippedFrame("the rest", str(error)))
+            self._skipped.append(SkippedFrame(_THE_REST, str(error)))
             self._ended = True
         else:
             self._taken += 1
@@ -165,7 +171,7 @@ class BagReplay:
         promised = self._topics.colour.messages + self._topics.depth.messages
         if self._taken < promised:
             why = f"{promised - self._taken} of {promised} images cannot be found; the bag is damaged"
-            self._skipped.append(SkippedFrame("the rest", why))
+            self._skipped.append(SkippedFrame(_THE_REST, why))
 
     def _load(self, colour: Stamped[Any], depth: Stamped[Any]) -> RgbdFrame | SkippedFrame:
         calibration = self._calibration

@@ -85,10 +85,10 @@ def _translated(error: Exception, config: SerialLinkConfig) -> HalError:
         return DeviceRefused(f"{where}: is not a serial port that takes {config.baud} baud ({reason(error)})")
     # pyserial's own text names the port again, and a number's meaning twice.
     why = reason(error).rpartition(f"{config.url}: ")[2] if number is None else os.strerror(number)
-    return DeviceNotFound(
-        f"{where}: cannot be opened ({why}); check the url and that the adapter is plugged in "
-        f"({_ports_here(_DEVICES)})"
-    )
+    there = f"that the adapter is plugged in ({_ports_here(_DEVICES)})"
+    if not config.url.startswith(f"{_DEVICES}/"):
+        there = "that what is to make this port, an emulator for example, runs already"
+    return DeviceNotFound(f"{where}: cannot be opened ({why}); check the url and {there}")
 
 
 def _group_of(path: str) -> str:

@@ -159,7 +159,10 @@ def test_an_empty_config() -> None:
 @pytest.mark.parametrize("command", ["run", "replay"])
 def test_a_video_of_an_unknown_kind(command: str) -> None:
     extra = [DESK] if command == "replay" else []
-    assert "use one of .mp4" in refusal(command, *extra, "--video", "film.gif")
+    told = refusal(command, *extra, "--video", "film.gif")
+    assert "film.gif: '.gif' is no kind of video; end its name with one of .mp4" in told
+    told = refusal(command, *extra, "--video", "film")
+    assert "film: which kind of video is not said; end its name with one of .mp4" in told
 
 
 def test_observations_in_a_folder_that_is_not_there(tmp_path: Path) -> None:

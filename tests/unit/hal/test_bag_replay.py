@@ -166,6 +166,16 @@ def test_what_comes_before_the_damage_is_not_lost_and_what_comes_after_it_is_tol
     assert told in str(replay.skipped[-1])
 
 
+def test_a_bag_that_is_damaged_before_its_first_frame_says_what_is_wrong_once(tmp_path: Path) -> None:
+    path = small_bag(tmp_path, "bag", count=20)
+    replay = BagReplay(path)
+    with path.open("r+b") as file:
+        file.seek(4300)  # behind the header and its padding
+        file.write(bytes(path.stat().st_size // 2))
+    with pytest.raises(BadRecording, match=r"not one frame is usable; (?!the first).*is damaged from here on"):
+        read_all(replay)
+
+
 @pytest.mark.parametrize("of", FORMATS)
 def test_a_file_that_is_no_bag_is_refused_in_one_line(of: Format, tmp_path: Path) -> None:
     path = tmp_path / f"notes.{of}"

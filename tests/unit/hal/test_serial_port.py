@@ -36,19 +36,21 @@ def test_a_url_alone_selects_a_loop() -> None:
 
 
 @pytest.mark.parametrize(
-    ("url", "reason"),
+    ("url", "reason", "advice"),
     [
-        ("/dev/ttyNotThere", "No such file"),
-        ("nothing://here", "not known"),
-        ("socket://127.0.0.1:1", "refused"),
+        ("/dev/ttyNotThere", "No such file", "that the adapter is plugged in"),
+        ("/tmp/no-emulator-runs", "No such file", "an emulator for example, runs already"),
+        ("nothing://here", "not known", "check the url"),
+        ("socket://127.0.0.1:1", "refused", "runs already"),
     ],
 )
-def test_a_port_that_is_not_there_is_one_clear_line(url: str, reason: str) -> None:
+def test_a_port_that_is_not_there_is_one_clear_line(url: str, reason: str, advice: str) -> None:
     with pytest.raises(DeviceNotFound) as caught:
         open_serial_link(config(url))
     message = str(caught.value)
     assert message.startswith(f"serial port {url}: cannot be opened (")
     assert reason in message
+    assert advice in message
     assert message.count(url) == 1
     assert "\n" not in message
     assert caught.value.__cause__ is not None
