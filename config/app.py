@@ -11,7 +11,7 @@ from config.camera import CameraConfig
 from config.chassis import ChassisConfig, PlantConfig
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
-from config.loader import Section, load
+from config.loader import Section, load, read_yaml
 from config.path import PathSpec
 from config.perception import PerceptionConfig
 from config.robot import Robot
@@ -148,5 +148,9 @@ class ReplayConfig(Section):
 
 
 def load_replay(path: Path) -> ReplayConfig:
-    """Read and check a replay's YAML. Raises ConfigError."""
+    """Read and check a replay's YAML, or that of a robot, which says more. Raises ConfigError."""
+    content = read_yaml(path)
+    if isinstance(content, dict) and "chassis" in content:
+        robot = load_app(path)
+        return ReplayConfig(robot=robot.robot, perception=robot.perception, decision=robot.decision)
     return load(path, ReplayConfig)

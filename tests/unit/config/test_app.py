@@ -33,3 +33,17 @@ def test_who_is_reckoned_with_must_be_believed(tmp_path: Path, base: dict[str, o
     load(written(tmp_path, base | speeds(1.5, 2.0)))
     with pytest.raises(ConfigError, match=r"max_speed_mps \(1\.5\) is less than .* \(2\)"):
         load(written(tmp_path, base | speeds(2.0, 1.5)))
+
+
+@pytest.mark.parametrize("path", sorted(CONFIG_DIR.glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_recording_may_be_looked_at_with_the_yaml_of_its_robot(path: Path) -> None:
+    replay = load_replay(path)
+    if path.stem == "replay":
+        return
+    robot = load_app(path)
+    assert (replay.robot, replay.perception, replay.decision) == (
+        robot.robot,
+        robot.perception,
+        robot.decision,
+    )
+    assert not replay.assume_mount
