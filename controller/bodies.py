@@ -36,7 +36,8 @@ class Bodies:
     perception says, whether it stands or moves. surprise_mps (N, 2) by how much the newest measurement
     differs from velocity_mps. covariance (N, 2, 2) of the velocity. half_view_m, half_across_m (N,) half
     sizes along and across view_rad (N,), the direction it was seen in. top_m (N,) height. moving (N,).
-    age_s, unseen_s (N,) since they were seen first and last, at captured_ns.
+    age_s, unseen_s (N,) since they were seen first and last, at captured_ns. tracked_s (N,) since they were
+    seen first under this number: for so long velocities were measured.
     """
 
     captured_ns: int
@@ -53,6 +54,7 @@ class Bodies:
     moving: NDArray[np.bool_]
     age_s: FloatArray
     unseen_s: FloatArray
+    tracked_s: FloatArray
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -97,6 +99,7 @@ _NOBODY = Bodies(
     moving=np.zeros(0, np.bool_),
     age_s=np.zeros(0),
     unseen_s=np.zeros(0),
+    tracked_s=np.zeros(0),
 )
 
 
@@ -148,6 +151,7 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
         moving=moving,
         age_s=seen_s[:, 0],
         unseen_s=seen_s[:, 1],
+        tracked_s=seen_s[:, 0],
     )
 
 

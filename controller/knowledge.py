@@ -167,7 +167,8 @@ class Knowledge:
         return ""
 
     def _recognise(self, bodies: Bodies) -> Bodies:
-        """What stands where something stood before is no newcomer, whatever number it has now."""
+        """What stands where something stood before is no newcomer, whatever number it has now: its age_s is
+        that of what is settled, its tracked_s stays."""
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
         if not self._places or not (bodies.age_s < SETTLED_S).any():

@@ -72,9 +72,8 @@ class OutOfView:
     def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
         """The bodies seen; standing ones that perception no longer sees but still expects, out of view,
         count as moving if they came towards the robot's axis: with the velocity measured last."""
-        # Not at the age that knowledge.py gives to whatever stands where something stood: its velocity was
-        # hardly measured.
-        settled = ~seen.moving & (seen.age_s > SETTLED_S) & self._wide_enough(seen)
+        # However long something stood there: the velocity of what has a new number was hardly measured.
+        settled = ~seen.moving & (seen.tracked_s > SETTLED_S) & self._wide_enough(seen)
         out = settled & (seen.unseen_s > 0.0)
         comes = settled & ~out & _clearly_comes(seen, pose)
         if not self._coming and not comes.any():
@@ -267,8 +266,7 @@ def _alike(bodies: Bodies, seen: Bodies) -> BoolArray:
     seen_spread = np.diagonal(seen.covariance, axis1=1, axis2=2)
     differs = bodies.velocity_mps[:, None] - seen.measured_mps
     same = np.all(differs**2 <= _APART_SIGMAS**2 * (spread + seen_spread), axis=2)
-    # Not at the age that knowledge.py gives to whatever stands where something stood.
-    return np.asarray(same & (seen.age_s > SETTLED_S))
+    return np.asarray(same & (seen.tracked_s > SETTLED_S))
 
 
 def _missing(ids: NDArray[np.int64], among: NDArray[np.int64]) -> BoolArray:

@@ -49,4 +49,5 @@ def box(
         moving=np.array([vx_mps != 0.0 or vy_mps != 0.0]),
         age_s=np.array([age_s]),
         unseen_s=np.zeros(1),
+        tracked_s=np.array([age_s]),
     )

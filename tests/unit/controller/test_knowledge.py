@@ -33,8 +33,9 @@ CRATE = [(obstacle(4.0, 0.0),)] * 10
 
 def age_s(y_m: float, seen_s: float) -> float:
     """For how long something was seen, by what is known, that shows where there was a crate before."""
-    found: float = after(*CRATE, (obstacle(4.0, y_m, age_s=seen_s, number=6),)).bodies.age_s.item()
-    return found
+    bodies = after(*CRATE, (obstacle(4.0, y_m, age_s=seen_s, number=6),)).bodies
+    assert bodies.tracked_s.item() == pytest.approx(seen_s)
+    return float(bodies.age_s.item())
 
 
 def test_what_stands_where_something_stood_is_no_newcomer() -> None:

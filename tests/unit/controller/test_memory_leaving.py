@@ -11,7 +11,7 @@ from config.decision import DecisionConfig
 from config.robot import Limits, Robot
 from controller.bodies import Bodies, no_bodies
 from controller.knowledge import Knowledge
-from controller.memory import SETTLED_S, OutOfView
+from controller.memory import OutOfView
 from controller.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
@@ -70,8 +70,8 @@ def test_nobody_was_never_wider_than_the_end_of_a_rack() -> None:
     assert after(AT_EDGE, coming, expected(narrow(AT_EDGE))).moving.tolist() == [True]
 
 
-AHEAD, YOUNG = box(4.4, 0.5), replace(AT_EDGE, age_s=np.array([0.4]))
-KNOWN = replace(AT_EDGE, age_s=np.array([SETTLED_S]))
+AHEAD, YOUNG = box(4.4, 0.5), box(4.4, 2.1, sigma_mps=0.1, age_s=0.4)
+KNOWN = replace(AT_EDGE, tracked_s=np.array([0.4]))
 EXACT = replace(AT_EDGE, covariance=np.zeros((1, 2, 2)))
 
 
@@ -128,6 +128,10 @@ def test_who_comes_into_view_as_expected_is_the_one_that_was_expected() -> None:
         pytest.param(box(2.5, 1.1, 0.4, -0.5, number=2, age_s=0.6), id="goes elsewhere"),
         pytest.param(box(2.5, 1.1, number=2), id="stands"),
         pytest.param(box(2.5, 1.1, 0.0, -0.5, number=2, age_s=0.5), id="too young to tell"),
+        pytest.param(
+            replace(box(2.5, 1.1, 0.0, -0.5, number=2), tracked_s=np.array([0.4])),
+            id="only its place was seen for long",
+        ),
     ],
 )
 def test_somebody_else_in_its_place_does_not_make_it_forgotten(newcomer: Bodies) -> None:
