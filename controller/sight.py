@@ -16,7 +16,7 @@ from config.decision import DecisionConfig
 from controller.blind_corners import BlindCorners
 from controller.bodies import Bodies
 from controller.corridor import Corridor
-from controller.surfaces import Surfaces
+from controller.surfaces import Surfaces, bands_at
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -152,13 +152,7 @@ class Sight:
         """(C,) share of the width of the cells first..last that was seen as free, or lies behind a surface in
         the corridor: that surface limits the speed itself."""
         px, py = self._lanes[:, first:last]
-        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        dx, dy = px - pose.x_m, py - pose.y_m
-        forward = dx * cos + dy * sin - self._mount.forward_m
-        right = self._mount.left_m + dx * sin - dy * cos
-        bearing = right / np.maximum(forward, 1e-3)
-        left_edge = free.bearing_tan[0] - free.half_width_tan
-        band = np.floor((bearing - left_edge) / (2.0 * free.half_width_tan)).astype(np.intp)
+        forward, band = bands_at(free, pose, self._mount, px, py)
         within = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
         in_view = (forward > 0.0) & (band == within)
         # The far edge of a cell, so that a cell is not known for the sake of its beginning.

@@ -45,9 +45,29 @@ def surfaces_of(free: FreeSpace, pose: PlanarPose, mount: CameraMount) -> Surfac
     forward = free.nearest_m[bands]
     ahead = forward + mount.forward_m
     left = mount.left_m - forward * free.bearing_tan[bands]
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    points = np.empty((len(forward), 2))
-    points[:, 0] = pose.x_m + ahead * cos - left * sin
-    points[:, 1] = pose.y_m + ahead * sin + left * cos
     seen_m = np.where(np.isfinite(free.nearest_m), free.nearest_m, np.nan_to_num(free.known_m))
+    points = floor_points(pose, ahead, left)
     return Surfaces(seen_m, bands, forward, forward * free.half_width_tan, points)
+
+
+def floor_points(pose: PlanarPose, ahead_m: FloatArray, left_m: FloatArray) -> FloatArray:
+    """(..., 2) the floor points that lie ahead_m (...) and left_m (...) of a body at pose."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    points = np.empty((*ahead_m.shape, 2))
+    points[..., 0] = pose.x_m + ahead_m * cos - left_m * sin
+    points[..., 1] = pose.y_m + ahead_m * sin + left_m * cos
+    return points
+
+
+def bands_at(
+    free: FreeSpace, pose: PlanarPose, mount: CameraMount, x_m: FloatArray, y_m: FloatArray
+) -> tuple[FloatArray, NDArray[np.intp]]:
+    """(...) each: how far ahead of the camera floor points x_m (...), y_m (...) lie, in metres, and in which
+    band of free. A number that none of them has is beside the view; behind the camera it means nothing."""
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    dx, dy = x_m - pose.x_m, y_m - pose.y_m
+    forward: FloatArray = dx * cos + dy * sin - mount.forward_m
+    right = mount.left_m + dx * sin - dy * cos
+    left_edge = free.bearing_tan[0] - free.half_width_tan
+    band = np.floor((right / np.maximum(forward, 1e-3) - left_edge) / (2.0 * free.half_width_tan))
+    return forward, band.astype(np.intp)

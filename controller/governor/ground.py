@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.robot import Robot
 from controller.bodies import Bodies
+from controller.surfaces import bands_at, floor_points, surfaces_of
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -94,7 +95,7 @@ class GroundMemory:
         body = self._body
         ahead = np.arange(-body.rear_m, body.front_m + CELL_M / 2, CELL_M / 2)
         left = np.arange(-body.width_m / 2, body.width_m / 2 + CELL_M / 2, CELL_M / 2)
-        at = self._cells(_from_body(pose, *np.meshgrid(ahead, left)))
+        at = self._cells(floor_points(pose, *np.meshgrid(ahead, left)))
         self._set_free(at, now_ns)
         self._hits[at] = 0
 
@@ -141,16 +142,9 @@ class GroundMemory:
         count = round(_LOOK_M / CELL_M)
         middle = np.floor(np.array((pose.x_m, pose.y_m)) / CELL_M) + 0.5
         points = (middle + self._around(count)) * CELL_M
-        cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        dx, dy = points[:, 0] - pose.x_m, points[:, 1] - pose.y_m
-        forward = dx * cos + dy * sin - self._mount.forward_m
-        right = self._mount.left_m + dx * sin - dy * cos
-        band = np.floor(
-            (right / np.maximum(forward, 1e-3) - (free.bearing_tan[0] - free.half_width_tan))
-            / (2.0 * free.half_width_tan)
-        )
+        forward, band = bands_at(free, pose, self._mount, points[:, 0], points[:, 1])
         ahead = (forward > 0.0) & (forward < _LOOK_M) & (band >= 0) & (band < len(free.bearing_tan))
-        points, forward, chosen = points[ahead], forward[ahead], band[ahead].astype(np.intp)
+        points, forward, chosen = points[ahead], forward[ahead], band[ahead]
         if self._stood:
             self._hidden[self._cells(points[forward > free.nearest_m[chosen]])] = True
         reach = np.minimum(free.known_m[chosen], free.nearest_m[chosen])
@@ -167,13 +161,11 @@ class GroundMemory:
         self._set_free((at[0][seen], at[1][seen]), captured_ns)
 
     def _mark_surfaces(self, free: FreeSpace, pose: PlanarPose, captured_ns: int, moving: Bodies) -> None:
-        bands = np.flatnonzero(np.isfinite(free.nearest_m) & (free.nearest_m <= _SURFACE_M))
-        if not len(bands):
+        surfaces = surfaces_of(free, pose, self._mount)
+        near = surfaces.forward_m <= _SURFACE_M
+        if not near.any():
             return
-        forward = free.nearest_m[bands]
-        points = _from_body(
-            pose, forward + self._mount.forward_m, self._mount.left_m - forward * free.bearing_tan[bands]
-        )
+        forward, points = surfaces.forward_m[near], surfaces.points_m[near]
         at = self._cells(points)
         moves = moving.covers(points, np.full(len(points), _AROUND_M), _AROUND_M).any(axis=1)
         self._hits[at] = np.minimum(self._hits[at] + _HIT, _MOST_HITS)
@@ -219,12 +211,3 @@ class GroundMemory:
         keys = np.floor(points_m / CELL_M).astype(np.int32)
         wrapped = (keys % _SIZE).astype(np.intp)
         return (wrapped[..., 0], wrapped[..., 1]), keys
-
-
-def _from_body(pose: PlanarPose, ahead_m: FloatArray, left_m: FloatArray) -> FloatArray:
-    """Floor points (..., 2) that lie ahead and to the left of a body at pose."""
-    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    points: FloatArray = np.stack(
-        (pose.x_m + ahead_m * cos - left_m * sin, pose.y_m + ahead_m * sin + left_m * cos), axis=-1
-    ).reshape(-1, 2)
-    return points

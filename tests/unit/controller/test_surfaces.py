@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from controller.surfaces import surfaces_of
+from controller.surfaces import bands_at, surfaces_of
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
 from vision.scene import FreeSpace
@@ -37,3 +37,18 @@ def test_a_band_was_seen_to_its_surface_or_over_free_floor_or_not_at_all() -> No
     assert seen.seen_m.tolist() == [3.0, 4.0, 0.0, 0.0]
     assert seen.bands.tolist() == [0]
     np.testing.assert_allclose(seen.points_m, [[3.5, 0.0]])
+
+
+def test_a_surface_stands_in_its_own_band_wherever_the_robot_does() -> None:
+    """To the right of the view is a number too many, to the left of it one below zero."""
+    free = ahead([3.0, math.inf, 2.0, 5.0], [10.0] * 4)
+    pose, mount = PlanarPose(1.0, -2.0, 2.5), CameraMount(0.5, 0.2, 0.6, 0.0)
+    surfaces = surfaces_of(free, pose, mount)
+    forward_m, band = bands_at(free, pose, mount, *surfaces.points_m.T)
+    np.testing.assert_allclose(forward_m, surfaces.forward_m)
+    assert band.tolist() == surfaces.bands.tolist() == [0, 2, 3]
+    right = np.array([math.sin(pose.heading_rad), -math.cos(pose.heading_rad)])
+    _, to_the_right = bands_at(free, pose, mount, *(surfaces.points_m + right).T)
+    _, to_the_left = bands_at(free, pose, mount, *(surfaces.points_m - right).T)
+    assert (to_the_right >= 4).all()
+    assert (to_the_left < 0).all()
