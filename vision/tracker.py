@@ -1,7 +1,7 @@
 """track: what was detected -> the Scene. Bodies with stable ids and filtered velocity, moving or static.
 
 Terms (cell, part, track, body, surface, region): vision/__init__.py. Order of the steps: obstacles (velocity
-of fragments), arrivals, regions, masks, grouping (cells to tracks), births, carving, grouping, division (cut
+of fragments), arrivals, regions, masks, grouping (cells to tracks), births, carving, merging, division (cut
 out, join, split), sightings (filters), adoption (fragments to tracks), obstacles (velocity of bodies),
 judgement, report.
 """
@@ -21,6 +21,7 @@ from vision import (
     kalman,
     limbs,
     masks,
+    merging,
     obstacles,
     regions,
     report,
@@ -164,11 +165,11 @@ class Tracker:
         if not tracks.moving.any():
             return labels
         mover = tracks.mover
-        pairs = grouping.merges(
+        pairs = merging.merges(
             grid, measured, tracks.state[:, 3:], tracks.velocity_sigma_mps, mover, tracks.moving
         )
         way_m = tracks.speed_mps * changes.stayed_s
-        labels, gone = grouping.join(grid, labels, pairs, changes.stayed, way_m)
+        labels, gone = merging.join(grid, labels, pairs, changes.stayed, way_m)
         tracks.seen_ns[gone] = 0
         for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
             second = division.split(grid, labels, track, changes.stayed, float(way_m[track]))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tests.support.grids import LEVEL_UP, X, grid_of, labelled, nearest, plate
 from vision import division
 from vision.depth_grid import BoolGrid, DepthGrid
-from vision.grouping import join
+from vision.merging import join
 
 
 def split(
