@@ -40,7 +40,7 @@ _MOSTLY = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bodies:
+class ExpectedBodies:
     """Where T bodies are expected, in the camera frame. centre_m (T, 3), extent_m (T, 3): of what was seen of
     them last; box_m (T, 4): edges of the whole ones from their centres, left, upper, right, lower; sigma_m
     (T,): of depth there."""
@@ -56,7 +56,7 @@ def expected_in(
     parts: Regions,
     winner: NDArray[np.int32],
     votes: NDArray[np.intp],
-    bodies: Bodies,
+    bodies: ExpectedBodies,
     mover: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """(P, T) which parts are what is seen of a mover on the other side of something nearer that divides it.

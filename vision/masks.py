@@ -41,7 +41,7 @@ _NOBODY = np.zeros(1, np.int32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surfaces:
+class TrackSurfaces:
     """What T tracks covered in one frame: points_m (3, K) in the camera axes of pose, owner (K,): which of
     the tracks, track_id (T,)."""
 
@@ -51,7 +51,7 @@ class Surfaces:
     pose: Pose
 
 
-NO_SURFACES = Surfaces(
+NO_TRACK_SURFACES = TrackSurfaces(
     np.empty((3, 0), np.float32),
     np.empty(0, np.int32),
     np.empty(0, np.int64),
@@ -59,14 +59,14 @@ NO_SURFACES = Surfaces(
 )
 
 
-def surfaces(grid: DepthGrid, labels: IntGrid, ids: NDArray[np.int64], pose: Pose) -> Surfaces:
+def surfaces(grid: DepthGrid, labels: IntGrid, ids: NDArray[np.int64], pose: Pose) -> TrackSurfaces:
     """The surfaces of tracks with ids (T,), where labels (h, w) holds index + 1, 0 for none."""
     cells = np.flatnonzero(labels > 0)
-    return Surfaces(grid.points(cells), labels.ravel().take(cells) - 1, ids, pose)
+    return TrackSurfaces(grid.points(cells), labels.ravel().take(cells) - 1, ids, pose)
 
 
 def predict(
-    before: Surfaces, index: NDArray[np.intp], shift_m: FloatArray, grid: DepthGrid, pose: Pose
+    before: TrackSurfaces, index: NDArray[np.intp], shift_m: FloatArray, grid: DepthGrid, pose: Pose
 ) -> IntGrid:
     """(h, w) track index + 1 that is expected, and found at the depth expected, in each cell; 0: none.
 

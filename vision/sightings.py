@@ -22,7 +22,7 @@ from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
-from vision.grouping import Bodies
+from vision.grouping import ExpectedBodies
 from vision.regions import Regions
 from vision.tracks import Tracks
 
@@ -80,11 +80,11 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     tracks.cells[seen] = measured.cells[seen]
 
 
-def bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> Bodies:
+def expected_bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> ExpectedBodies:
     """Where the bodies of tracks are expected by a camera at pose."""
     centre_m = pose.inverse().apply(tracks.state[:, :3])
     sigma_m: FloatArray = np.asarray(depth_sigma_m(np.maximum(centre_m[:, 2], 0.0), noise), np.float64)
-    return Bodies(centre_m, tracks.extent_m, tracks.box_m, sigma_m)
+    return ExpectedBodies(centre_m, tracks.extent_m, tracks.box_m, sigma_m)
 
 
 def up(detection: Detection) -> FloatArray | None:

@@ -56,7 +56,7 @@ class Tracker:
         self._clearance_m = clearance_m
         self._tracks = Tracks()
         self._free = FreeMemory(config.depth_noise, config.max_depth_m)
-        self._surfaces = masks.NO_SURFACES
+        self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
         self._fragment_owner = np.empty(0, np.int64)
         self._last_ns: int | None = None
@@ -66,7 +66,7 @@ class Tracker:
         tracks = self._tracks
         if detection.restarted:
             tracks.clear()
-            self._surfaces = masks.NO_SURFACES
+            self._surfaces = masks.NO_TRACK_SURFACES
         if detection.restarted or not detection.motion_known:
             self._free.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
@@ -142,7 +142,7 @@ class Tracker:
         tracks.hide(hidden)
         came = np.bincount(parts[changes.arrived], minlength=count + 1)[1:]
         ballot = masks.release(ballot, measured.cells, came, mover)
-        bodies = sightings.bodies(tracks, pose, self._config.depth_noise)
+        bodies = sightings.expected_bodies(tracks, pose, self._config.depth_noise)
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
         alive = mover | tracks.has_moved

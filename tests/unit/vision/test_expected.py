@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.support.grids import grid_of, nearest, plate
 from tests.support.parts import Body, regions
-from vision.grouping import Bodies, attach, detach, expected_in
+from vision.grouping import ExpectedBodies, attach, detach, expected_in
 
 NOWHERE = np.zeros((2, 1), np.bool_)  # no track is expected in either part
 
@@ -35,7 +35,7 @@ def behind(
     visible = [plate(b.z, (b.x - b.width / 2, b.x + b.width / 2), (-0.8, 0.8)) for b in (left, right)]
     if middle_m is not None:
         visible.append(plate(2.0, (middle_m - 0.1, middle_m + 0.1), (-0.8, 0.8)))
-    body = Bodies(
+    body = ExpectedBodies(
         np.array([[-0.4, 0.0, 4.0]]),
         np.array([[0.4, 1.6, 0.2]]),
         np.array([[-width_m / 2, -0.8, width_m / 2, 0.8]]),

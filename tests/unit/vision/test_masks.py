@@ -20,7 +20,7 @@ RIGHT_M = plate(3.0, (0.2, 0.8), (-0.4, 0.4))
 TWO = labelled(LEFT_M > 0.0, RIGHT_M > 0.0)
 
 
-def two_surfaces() -> masks.Surfaces:
+def two_surfaces() -> masks.TrackSurfaces:
     return masks.surfaces(grid_of(nearest(LEFT_M, RIGHT_M)), TWO, IDS, AT_ORIGIN)
 
 
@@ -75,7 +75,7 @@ def test_where_two_are_expected_the_nearer_one_is() -> None:
     """Depths so close that both would be taken for what is measured."""
     front = plate(3.0, (-0.4, 0.4), (-0.4, 0.4)) > 0.0
     back = grid_of(np.where(front, 3.1, 0.0))
-    both = masks.Surfaces(
+    both = masks.TrackSurfaces(
         np.concatenate(
             (
                 grid_of(np.where(front, 3.0, 0.0)).points(np.flatnonzero(front)),
@@ -94,7 +94,9 @@ def test_where_two_are_expected_the_nearer_one_is() -> None:
 
 def test_nothing_known_is_nothing_expected() -> None:
     none = np.empty(0, np.intp)
-    assert not masks.predict(masks.NO_SURFACES, none, np.empty((0, 3)), grid_of(wall(3.0)), AT_ORIGIN).any()
+    assert not masks.predict(
+        masks.NO_TRACK_SURFACES, none, np.empty((0, 3)), grid_of(wall(3.0)), AT_ORIGIN
+    ).any()
 
 
 def block(rows: tuple[int, int], columns: tuple[int, int]) -> NDArray[np.bool_]:
