@@ -71,7 +71,7 @@ class Prediction(Section):
     )
 
 
-class Sight(Section):
+class SightConfig(Section):
     """What the camera is trusted with."""
 
     range_m: float = Field(default=10.0, gt=0.5, le=100, description="beyond it nothing is seen for certain")
@@ -124,7 +124,7 @@ class DecisionConfig(Section):
 
     margins: Margins = Margins()
     prediction: Prediction = Prediction()
-    sight: Sight = Sight()
+    sight: SightConfig = SightConfig()
     release: Release = Release()
     chassis_delay_s: float = Field(
         default=0.2, ge=0, le=2, description="from a command until the chassis has followed it"

@@ -40,7 +40,7 @@ class Wait(Section):
 Step = Annotated[Go | Wait, Field(discriminator="kind")]
 
 
-class Motion(Section):
+class MotionPlan(Section):
     """A plan in time. start_jitter_s: the seed shifts the start by up to this much, either way."""
 
     start_s: Seconds = 0.0
@@ -70,7 +70,7 @@ class _Placed(Section):
     z_m: float = Field(default=0.0, ge=0, le=50)
     heading_deg: float = Field(default=0.0, ge=-360, le=360)
     texture: Texture = "fine"
-    motion: Motion | None = None
+    motion: MotionPlan | None = None
 
 
 class Crate(_Placed):

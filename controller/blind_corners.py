@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.decision import Sight as SightConfig
+from config.decision import SightConfig
 from hal.types import FloatArray
 
 IntArray = NDArray[np.intp]

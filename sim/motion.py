@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.scenario import Go, Motion
+from config.scenario import Go, MotionPlan
 from hal.geometry import wrap_angle_rad
 from hal.types import FloatArray, PlanarPose
 
@@ -66,7 +66,7 @@ class _Phase:
 class Trajectory:
     """A motion plan from a start pose, solved once into phases of constant acceleration."""
 
-    def __init__(self, start: PlanarPose, motion: Motion | None, shift_s: float = 0.0) -> None:
+    def __init__(self, start: PlanarPose, motion: MotionPlan | None, shift_s: float = 0.0) -> None:
         """shift_s moves the plan in time (the seed's jitter)."""
         self._phases: list[_Phase] = []
         self._cursor = start
@@ -148,7 +148,7 @@ class Trajectory:
         """When the last step is over; -inf for a body that never moves."""
         return self._phases[-1].start_s
 
-    def _plan(self, motion: Motion) -> None:
+    def _plan(self, motion: MotionPlan) -> None:
         run: list[Go] = []
         for step in motion.steps:
             if isinstance(step, Go):
@@ -171,7 +171,7 @@ class Trajectory:
             _Phase(self._time_s, leg, along_m, speed, accel, yaw_rate, heading, self._covered_m)
         )
 
-    def _drive(self, run: list[Go], motion: Motion) -> None:
+    def _drive(self, run: list[Go], motion: MotionPlan) -> None:
         legs = self._legs(run)
         turn_rate = math.radians(motion.turn_rate_degps)
         junctions = _junction_speeds(legs, motion.accel_mps2)

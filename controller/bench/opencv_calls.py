@@ -19,17 +19,17 @@ OnCall = Callable[[str, Callable[..., Any], tuple[Any, ...], dict[str, Any]], An
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class OpenCvCall:
     """One call of cv2.<name>. The arguments are copies of what they were before the call."""
 
     name: str
     args: tuple[Any, ...]
     kwargs: dict[str, Any]
 
-    def fresh(self) -> Call:
+    def fresh(self) -> OpenCvCall:
         """The same call with arguments of its own: some functions write into theirs."""
         args, kwargs = copy.deepcopy((self.args, self.kwargs))
-        return Call(self.name, args, kwargs)
+        return OpenCvCall(self.name, args, kwargs)
 
     def execute(self) -> Any:
         """Do it, once: what the function writes into the arguments stays there."""
@@ -72,19 +72,19 @@ def stand_in_for_cv2(modules: Sequence[ModuleType], on_call: OnCall) -> Iterator
 
 
 @contextmanager
-def recorded_calls(modules: Sequence[ModuleType]) -> Iterator[list[Call]]:
+def recorded_calls(modules: Sequence[ModuleType]) -> Iterator[list[OpenCvCall]]:
     """While inside, the OpenCV calls that modules make gather in the list, in order."""
-    calls: list[Call] = []
+    calls: list[OpenCvCall] = []
 
     def record(name: str, real: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        calls.append(Call(name, args, kwargs).fresh())
+        calls.append(OpenCvCall(name, args, kwargs).fresh())
         return real(*args, **kwargs)
 
     with stand_in_for_cv2(modules, record):
         yield calls
 
 
-def time_bare(calls: Sequence[Call], stopwatch_ns: Callable[[], int]) -> dict[str, int]:
+def time_bare(calls: Sequence[OpenCvCall], stopwatch_ns: Callable[[], int]) -> dict[str, int]:
     """Nanoseconds by function name of executing calls one after the other, with nothing in between.
 
     Copying the arguments and releasing the results' names is not counted; freeing the results is.

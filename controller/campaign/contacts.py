@@ -34,7 +34,7 @@ def _furthest(moves: FloatArray) -> FloatArray:
     return furthest
 
 
-class Clearance:
+class DriveClearance:
     """Distances between the robot and all bodies at its height, over the whole drive."""
 
     def __init__(self, stage: Stage, log: DriveLog) -> None:

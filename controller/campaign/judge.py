@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from controller.campaign.contacts import Clearance
+from controller.campaign.contacts import DriveClearance
 from controller.campaign.drive import DriveLog
 from controller.campaign.fault import at_fault
 from controller.campaign.oracle import OracleTime
@@ -63,7 +63,7 @@ class Yardstick:
 
 def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) -> Row:
     """Everything that missions.jsonl says of a drive."""
-    clearance = Clearance(stage, log)
+    clearance = DriveClearance(stage, log)
     contacts = clearance.contacts()
     case, tally = stage.case, log.setpoints
     faulty = [one for one in contacts if at_fault(one, stage, log, by.eye, by.reaction_s)]

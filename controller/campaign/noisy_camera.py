@@ -21,7 +21,7 @@ import numpy as np
 from config.camera import SimulatedCameraConfig
 from config.robot import Robot
 from controller.campaign.stage import Stage
-from controller.campaign.view import PlanarEye, View
+from controller.campaign.view import PlanarEye, PlanarView
 from hal.clocks import NS_PER_S
 from hal.geometry import camera_in_body
 from hal.types import CameraMount, FloatArray, PlanarPose, Pose
@@ -119,7 +119,7 @@ class NoisyCamera:
         self._velocity += np.where(seen[:, None], follows * (velocity - self._velocity), 0.0)
         self._centre += self._velocity * dt_s
 
-    def _sight(self, view: View, t_s: float, pose: PlanarPose) -> None:
+    def _sight(self, view: PlanarView, t_s: float, pose: PlanarPose) -> None:
         """Take in what this frame shows."""
         noise = self._noise
         missed = self._random.random(len(self._ids)).tolist()
@@ -217,7 +217,7 @@ class NoisyCamera:
             for k, age in enumerate(age_s.tolist())
         )
 
-    def _free_space(self, view: View) -> FreeSpace:
+    def _free_space(self, view: PlanarView) -> FreeSpace:
         """What the bands show: the nearest thing in the robot's height, and how far the floor is free."""
         noise, eye = self._noise, self.eye
         nearest = view.forward_m.take(self._scanned[view.bodies].nonzero()[0], 0).min(axis=0, initial=np.inf)

@@ -32,7 +32,7 @@ _HEAD = ("t_s", "s_m", "v_mps", "action", "free_m")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+class DriveRecording:
     """One drive, a row a control step (N,): time, way along the path and speed as they truly were, whether
     the decision was to go faster, and free_m, the true free way of the front (inf: nothing ahead)."""
 
@@ -66,7 +66,7 @@ class StopAndGo:
         return {key: value if math.isfinite(value) else None for key, value in asdict(self).items()}
 
 
-def record(stage: Stage, log: DriveLog) -> Recording:
+def record(stage: Stage, log: DriveLog) -> DriveRecording:
     """A drive beside the truth of its world."""
     times, s = np.array(log.times_s), np.array(log.s_m)
     free = np.full(len(times), np.inf)
@@ -74,10 +74,10 @@ def record(stage: Stage, log: DriveLog) -> Recording:
         ahead = [low - s[k] for low, high in stretches if high >= s[k]]
         free[k] = max(min(ahead), 0.0) if ahead else np.inf
     faster = np.array([action is Action.INCREASE for action in log.actions], np.bool_)
-    return Recording(times, s, np.array(log.v_mps), faster, free)
+    return DriveRecording(times, s, np.array(log.v_mps), faster, free)
 
 
-def write(path: Path, recording: Recording) -> None:
+def write(path: Path, recording: DriveRecording) -> None:
     """As CSV. Raises UserError."""
     try:
         with path.open("w", encoding="utf-8", newline="") as file:
@@ -92,7 +92,7 @@ def write(path: Path, recording: Recording) -> None:
         raise UserError(f"{path}: cannot be written ({error.strerror})") from error
 
 
-def read(path: Path) -> Recording:
+def read(path: Path) -> DriveRecording:
     """What write wrote. Raises UserError."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -105,10 +105,10 @@ def read(path: Path) -> Recording:
     except ValueError as error:
         raise UserError(f"{path}: is no recording of a drive ({error}); drive it again") from error
     t, s, v, faster, free = table.T
-    return Recording(t, s, v, faster > 0.5, free)
+    return DriveRecording(t, s, v, faster > 0.5, free)
 
 
-def measure(recording: Recording, robot: Robot, decision: DecisionConfig) -> StopAndGo:
+def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -> StopAndGo:
     """The four numbers of a drive in which at most one thing comes into the way and leaves it again."""
     comfort = braking.comfort(robot.limits)
     recording = _until_at_rest_for_good(recording)
@@ -159,13 +159,13 @@ def _must_stop(free_m: FloatArray, needs_m: FloatArray, v_mps: FloatArray, drivi
     return first if not len(roomy) else _first(free_m <= needs_m, first + int(roomy[-1]), certain=1)
 
 
-def _until_at_rest_for_good(recording: Recording) -> Recording:
+def _until_at_rest_for_good(recording: DriveRecording) -> DriveRecording:
     """Standing on the target is no stop. A drive that ends before something in its way is kept whole."""
     moving = np.flatnonzero(recording.v_mps > STOPPED_MPS)
     if not len(moving) or np.isfinite(recording.free_m[-1]):
         return recording
     end = int(moving[-1]) + 1
-    return Recording(*(getattr(recording, one.name)[:end] for one in fields(recording)))
+    return DriveRecording(*(getattr(recording, one.name)[:end] for one in fields(recording)))
 
 
 def _first(holds: NDArray[np.bool_], start: int, certain: int = SAMPLES) -> int:

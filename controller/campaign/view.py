@@ -19,7 +19,7 @@ _TOUCHING_M = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class PlanarView:
     """One look. bodies (M,): which ones were looked at. forward_m (M, B): where each band's ray meets each
     body, inf where it does not or is covered by something nearer. free_m (B,): where the first thing that
     hides what is behind it stands, the building included."""
@@ -51,7 +51,7 @@ class PlanarEye:
         self._outlines = np.empty((len(world) + 1, corners + 1, 2))
         self._outlines[-1, :4], self._outlines[-1, 4:-1], self._outlines[-1, -1] = room, room[-1], room[0]
 
-    def look(self, polygons: FloatArray, pose: PlanarPose) -> View:
+    def look(self, polygons: FloatArray, pose: PlanarPose) -> PlanarView:
         """polygons (N, K, 2) of all bodies now; pose of the robot."""
         self._outlines[:-1, :-1], self._outlines[:-1, -1] = polygons, polygons[:, 0]
         forward, right = self._in_camera(self._outlines, pose)
@@ -70,7 +70,7 @@ class PlanarEye:
         hiding = hits.take(self._hides[bodies].nonzero()[0], 0)
         free = np.minimum(hiding.min(axis=0, initial=np.inf), room)
         np.putmask(hits, (hits > free + _TOUCHING_M) | ~self._in_frame(bodies, hits), np.inf)
-        return View(bodies, hits, free)
+        return PlanarView(bodies, hits, free)
 
     def _in_camera(self, polygons: FloatArray, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
         """Forward and right (N, K) of the camera, on the level."""

@@ -14,7 +14,7 @@ from controller.evaluation.baselines.box_tracking import BoxTracking
 from controller.evaluation.baselines.dense_flow import DenseFlow
 from controller.evaluation.baselines.low_rank import LowRank
 from controller.evaluation.baselines.trajectories import Trajectories
-from controller.evaluation.drive import MOUNT, Drive
+from controller.evaluation.drive import MOUNT, ScriptedDrive
 from controller.evaluation.eligibility import Standing, calls
 from controller.evaluation.lidar_baseline import LidarTracker
 from controller.evaluation.lidar_scan import Lidar, LidarModel
@@ -86,7 +86,7 @@ class LidarContestant:
     """Scans the same world at its own rate; only clustering and tracking are timed."""
 
     def __init__(
-        self, sequence: Sequence, drive: Drive, intrinsics: Intrinsics, stopwatch_ns: Stopwatch
+        self, sequence: Sequence, drive: ScriptedDrive, intrinsics: Intrinsics, stopwatch_ns: Stopwatch
     ) -> None:
         self._model = LidarModel()
         self._lidar = Lidar(self._model, sequence.scenario().room, sequence.seed)

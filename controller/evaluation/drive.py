@@ -36,7 +36,7 @@ class OdometryError:
 SLIPPING = OdometryError(distance_ratio=1.03, yaw_ratio=1.10, drift_radps=0.02)
 
 
-class Drive:
+class ScriptedDrive:
     """A course over the floor as a pure function of time, and the course that the odometry tells."""
 
     def __init__(self, knots: tuple[Knot, ...], duration_s: float, error: OdometryError) -> None:

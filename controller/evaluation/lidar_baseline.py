@@ -15,7 +15,7 @@ from controller.evaluation.assignment import assign
 from controller.evaluation.lidar_clusters import find_clusters
 from controller.evaluation.lidar_matching import refine
 from controller.evaluation.lidar_scan import LidarModel, Scan
-from controller.evaluation.types import CALLED_MOVING, NO_BOX, Answer, Detection
+from controller.evaluation.types import CALLED_MOVING, NO_BOX, Answer, DetectedObject
 from hal.geometry import body_in_floor, camera_in_body
 from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose, Pose
 
@@ -125,7 +125,7 @@ class LidarTracker:
             velocity = np.array([track.state[2], track.state[3], 0.0]) @ camera.rotation
             position[1] = math.nan
             detections.append(
-                Detection(
+                DetectedObject(
                     track.id, NO_BOX, position, velocity, np.full(3, math.nan), _confidence(track)
                 )
             )  # fmt: skip

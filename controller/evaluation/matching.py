@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller.evaluation.assignment import Pairs, assign
-from controller.evaluation.types import Box, Detection, TrueObject
+from controller.evaluation.types import Box, DetectedObject, TrueObject
 from hal.types import FloatArray
 
 MIN_IOU = 0.3
@@ -26,14 +26,14 @@ def iou(a: Box, b: Box) -> float:
     return shared / ((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - shared)
 
 
-def distance_m(detection: Detection, true: TrueObject) -> float:
+def distance_m(detection: DetectedObject, true: TrueObject) -> float:
     """Between the middles, over the components that the method measures; inf where it measures none."""
     difference = detection.position_m - true.position_m
     known = np.isfinite(difference)
     return float(np.linalg.norm(difference[known])) if known.any() else np.inf
 
 
-def costs(detections: Sequence[Detection], objects: Sequence[TrueObject]) -> FloatArray:
+def costs(detections: Sequence[DetectedObject], objects: Sequence[TrueObject]) -> FloatArray:
     """(N, M): 0 for a perfect match up to 2 for the poorest one; inf where the two are not the same."""
     cost = np.full((len(detections), len(objects)), np.inf)
     for row, detection in enumerate(detections):
@@ -44,6 +44,6 @@ def costs(detections: Sequence[Detection], objects: Sequence[TrueObject]) -> Flo
     return cost
 
 
-def match(detections: Sequence[Detection], objects: Sequence[TrueObject]) -> Pairs:
+def match(detections: Sequence[DetectedObject], objects: Sequence[TrueObject]) -> Pairs:
     """Pairs (detection, object) by index, one to one."""
     return assign(costs(detections, objects))

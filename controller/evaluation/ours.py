@@ -8,7 +8,7 @@ import numpy as np
 
 from config.perception import PerceptionConfig
 from config.robot import Body
-from controller.evaluation.types import CALLED_MOVING, Answer, Detection
+from controller.evaluation.types import CALLED_MOVING, Answer, DetectedObject
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.perception import Perception
 from vision.scene import Fragments, Obstacle
@@ -31,9 +31,9 @@ class Treadwatch:
         return Answer(tuple(detection_of(obstacle) for obstacle in percept.scene.obstacles))
 
 
-def detection_of(obstacle: Obstacle) -> Detection:
+def detection_of(obstacle: Obstacle) -> DetectedObject:
     """An obstacle as the scores take it."""
-    return Detection(
+    return DetectedObject(
         obstacle.id,
         obstacle.bbox_px,
         obstacle.position_m,

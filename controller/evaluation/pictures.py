@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from controller.evaluation.chart import BLUE, GREEN, INK, ORANGE, SOFT_INK, blank
 from controller.evaluation.run_sequence import Snapshot
 from controller.evaluation.scoring import FrameScore
-from controller.evaluation.types import CALLED_MOVING, Box, Detection
+from controller.evaluation.types import CALLED_MOVING, Box, DetectedObject
 from controller.video import draw, text
 from controller.video.depth_view import colour_table
 from controller.video.labels import Label, draw_labels
@@ -125,7 +125,7 @@ def _draw_fragments(image: Image, fragments: Fragments) -> None:
     draw.lines(image, ends[fragments.moving], MOVING, 3)
 
 
-def _label(one: Detection, colour: Colour) -> Label:
+def _label(one: DetectedObject, colour: Colour) -> Label:
     speed_mps = float(np.linalg.norm(one.velocity_mps))
     words = f"#{one.id}  {speed_mps:.1f} m/s" if np.isfinite(speed_mps) else f"#{one.id}"
     return _box_label(words, one.box, colour)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from controller.evaluation.eligibility import MAX_DISTANCE_M
 from controller.evaluation.totals import PixelCounts
-from controller.evaluation.types import Detection
+from controller.evaluation.types import DetectedObject
 from hal.types import RgbdFrame
 
 STEP_PX = 2  # every second pixel of every second row is judged
@@ -23,7 +23,7 @@ _DEPTH_MARGIN_M = 0.15  # of measured depth around the surface, and
 _DEPTH_MARGIN_PER_M2 = 0.015  # two standard deviations of a real RealSense's
 
 
-def claimed(frame: RgbdFrame, detections: Sequence[Detection]) -> NDArray[np.uint8]:
+def claimed(frame: RgbdFrame, detections: Sequence[DetectedObject]) -> NDArray[np.uint8]:
     """(H / 2, W / 2) levels 0..255 by which the detections claim the pixels of a frame."""
     depth_m = frame.depth[::STEP_PX, ::STEP_PX].astype(np.float32) * np.float32(frame.depth_scale_m)
     levels = np.zeros(depth_m.shape, np.uint8)

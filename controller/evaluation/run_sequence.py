@@ -26,7 +26,7 @@ from controller.evaluation.sequences import Sequence
 from controller.evaluation.simulate import SimulatedFrame, simulate
 from controller.evaluation.totals import PixelCounts
 from controller.evaluation.truth import TruthTeller
-from controller.evaluation.types import Answer, Detection, FrameDetections, FrameTruth
+from controller.evaluation.types import Answer, DetectedObject, FrameDetections, FrameTruth
 from hal.types import ColourImage, RgbdFrame
 from sim.camera import intrinsics_of
 from vision.scene import Fragments
@@ -52,7 +52,7 @@ class Snapshot:
     colour: ColourImage
     depth_m: NDArray[np.float32]
     truth: FrameTruth
-    detections: tuple[Detection, ...]
+    detections: tuple[DetectedObject, ...]
     fragments: Fragments | None
     score: FrameScore
 

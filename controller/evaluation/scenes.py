@@ -17,7 +17,7 @@ from config.scenario import (
     Crate,
     Go,
     Light,
-    Motion,
+    MotionPlan,
     Pallet,
     Person,
     Pole,
@@ -29,7 +29,7 @@ from config.scenario import (
     Texture,
     Wall,
 )
-from controller.evaluation.drive import Drive
+from controller.evaluation.drive import ScriptedDrive
 from hal.types import FloatArray, PlanarPose
 
 Kind = Literal["person", "robot", "cart"]
@@ -91,7 +91,7 @@ def side_by_side(
 def build(
     name: str,
     place: Literal["hall", "aisle", "workshop"],
-    drive: Drive,
+    drive: ScriptedDrive,
     movers: Sequence[Mover],
     duration_s: float,
     seed: int,
@@ -127,7 +127,7 @@ def _point(pose: PlanarPose, ahead_m: float, left_m: float) -> FloatArray:
     return np.array([pose.x_m + ahead_m * c - left_m * s, pose.y_m + ahead_m * s + left_m * c])
 
 
-def _way(mover: Mover, drive: Drive, duration_s: float) -> _Way:
+def _way(mover: Mover, drive: ScriptedDrive, duration_s: float) -> _Way:
     pose = drive.pose(mover.at_s)
     through = _point(pose, mover.ahead_m, mover.left_m)
     heading = pose.heading_rad + math.radians(mover.course_deg)
@@ -140,7 +140,7 @@ def _way(mover: Mover, drive: Drive, duration_s: float) -> _Way:
 
 def _mover_body(index: int, mover: Mover, way: _Way) -> BodySpec:
     gently = mover.starts_s is not None or mover.stops_s is not None
-    motion = Motion(
+    motion = MotionPlan(
         start_s=0.0 if mover.starts_s is None else mover.starts_s,
         accel_mps2=1.5 if gently else _AT_ONCE_MPS2,
         steps=(Go(kind="go", x_m=float(way.end[0]), y_m=float(way.end[1]), speed_mps=mover.speed_mps),),

@@ -17,7 +17,7 @@ import numpy as np
 
 from controller.evaluation.eligibility import Call, Standing, calls
 from controller.evaluation.matching import costs, match
-from controller.evaluation.types import CALLED_MOVING, Detection, FrameDetections, FrameTruth, TrueObject
+from controller.evaluation.types import CALLED_MOVING, DetectedObject, FrameDetections, FrameTruth, TrueObject
 
 MIN_SHARE = 0.5
 WRONG_FRAMES = 3
@@ -104,7 +104,7 @@ def score(
     return SequenceScore(frames, _score_objects(truths, called, frames), wrong, _duration_s(truths))
 
 
-def _score_frame(truth: FrameTruth, call: dict[int, Call], detections: list[Detection]) -> FrameScore:
+def _score_frame(truth: FrameTruth, call: dict[int, Call], detections: list[DetectedObject]) -> FrameScore:
     eligible = [true for true in truth.objects if call[true.id].standing is Standing.ELIGIBLE]
     excused = [true for true in truth.objects if call[true.id].standing is Standing.EXCUSED]
     pairs = match(detections, eligible)
@@ -124,7 +124,7 @@ def _score_frame(truth: FrameTruth, call: dict[int, Call], detections: list[Dete
     )
 
 
-def _hit(detection: Detection, true: TrueObject, call: dict[int, Call]) -> Hit:
+def _hit(detection: DetectedObject, true: TrueObject, call: dict[int, Call]) -> Hit:
     difference = detection.velocity_mps - true.velocity_mps
     known = np.isfinite(difference)
     error = float(np.linalg.norm(difference[known])) if known.any() else math.nan

@@ -11,7 +11,7 @@ from typing import Literal
 
 from config.camera import SimulatedCameraConfig
 from config.scenario import Scenario
-from controller.evaluation.drive import SLIPPING, Drive, Knot, OdometryError
+from controller.evaluation.drive import SLIPPING, Knot, OdometryError, ScriptedDrive
 from controller.evaluation.scenes import Mover, build, side_by_side
 
 Split = Literal["tuning", "reporting"]
@@ -43,9 +43,9 @@ class Sequence:
         """Nothing moves but the camera."""
         return not self.movers
 
-    def drive(self) -> Drive:
+    def drive(self) -> ScriptedDrive:
         """The robot's course."""
-        return Drive(self.course, self.duration_s, self.error)
+        return ScriptedDrive(self.course, self.duration_s, self.error)
 
     def scenario(self) -> Scenario:
         """The world."""

@@ -55,7 +55,7 @@ class FrameTruth:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection:
+class DetectedObject:
     """What a method says about one thing.
 
     confidence: 0..1 that it is moving; from CALLED_MOVING on it is called moving. box: NaN where the
@@ -76,7 +76,7 @@ class FrameDetections:
     """Everything one method said about one frame, and how long that took."""
 
     stamp_s: float
-    detections: tuple[Detection, ...]
+    detections: tuple[DetectedObject, ...]
     duration_ms: float
 
 
@@ -85,7 +85,7 @@ class Answer:
     """detections of a frame; mask (H, W) uint8: 0..255, how surely each pixel moves, None for methods
     without a silhouette of their own."""
 
-    detections: tuple[Detection, ...]
+    detections: tuple[DetectedObject, ...]
     mask: NDArray[np.uint8] | None = None
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.video import draw, text
-from controller.video.corridor import Corridor
+from controller.video.corridor import DrawnCorridor
 from controller.video.labels import draw_labels
 from controller.video.moment import VideoMoment
 from controller.video.picture import Placement, placement
@@ -43,7 +43,9 @@ class ColourView:
         """What never changes."""
         text.caption(canvas, self._panel, "COLOUR")
 
-    def draw(self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: Corridor | None) -> None:
+    def draw(
+        self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: DrawnCorridor | None
+    ) -> None:
         """The image first, then what lies on the floor, the fragments, the obstacles, their labels."""
         view = self._panel.of(canvas)
         height, width = moment.frame.colour.shape[:2]
@@ -93,7 +95,7 @@ def _draw_image(view: Image, colour: Image, placed: Placement) -> None:
 
 def _draw_corridor(
     inside: Image,
-    corridor: Corridor,
+    corridor: DrawnCorridor,
     mount: CameraMount,
     intrinsics: Intrinsics,
     placed: Placement,

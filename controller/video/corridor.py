@@ -13,7 +13,7 @@ _STEP_M = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Corridor:
+class DrawnCorridor:
     """centre_m, left_m, right_m: (N, 2) in the body frame, nearest first.
 
     normal: (N, 2) of unit length, to the left of the path.
@@ -35,7 +35,7 @@ class Corridor:
         return np.concatenate([self.centre_m + offset_m, (self.centre_m - offset_m)[::-1]])
 
 
-def corridor_ahead(moment: VideoMoment, range_m: float) -> Corridor | None:
+def corridor_ahead(moment: VideoMoment, range_m: float) -> DrawnCorridor | None:
     """Up to range_m along the path; None where no path is planned. A width not known is zero."""
     path_m = moment.path_ahead_m
     if path_m is None or len(path_m) < 2:
@@ -53,4 +53,4 @@ def corridor_ahead(moment: VideoMoment, range_m: float) -> Corridor | None:
     normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
     normal /= np.maximum(np.hypot(normal[:, 0], normal[:, 1]), 1e-9)[:, np.newaxis]
     offset_m = normal * (moment.corridor_half_width_m or 0.0)
-    return Corridor(centre_m, centre_m + offset_m, centre_m - offset_m, normal)
+    return DrawnCorridor(centre_m, centre_m + offset_m, centre_m - offset_m, normal)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from config.robot import Body
 from controller.video import draw, text
-from controller.video.corridor import Corridor
+from controller.video.corridor import DrawnCorridor
 from controller.video.labels import draw_labels
 from controller.video.moment import VideoMoment
 from controller.video.seen import LEVEL_CAMERA, Seen
@@ -63,7 +63,9 @@ class TopView:
         text.caption(canvas, self._panel, "TOP VIEW")
         text.caption_note(canvas, self._panel, "distance from the camera")
 
-    def draw(self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: Corridor | None) -> None:
+    def draw(
+        self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: DrawnCorridor | None
+    ) -> None:
         """From the floor upwards."""
         view = self._panel.of(canvas)
         mount = moment.mount or LEVEL_CAMERA

@@ -14,7 +14,7 @@ from config.path import ArcSpec, LineSpec, PathSpec
 from config.scenario import (
     BodySpec,
     Go,
-    Motion,
+    MotionPlan,
     Person,
     RobotBody,
     Room,
@@ -101,7 +101,7 @@ def racks(random: Random, length_m: float, gaps_m: tuple[tuple[float, float], ..
     return tuple(shelves)
 
 
-def person(random: Random, name: str, start: tuple[float, float], motion: Motion | None) -> Person:
+def person(random: Random, name: str, start: tuple[float, float], motion: MotionPlan | None) -> Person:
     """Somebody of some height who stands at start and looks where he will go."""
     return Person(
         kind="person",
@@ -114,7 +114,7 @@ def person(random: Random, name: str, start: tuple[float, float], motion: Motion
     )
 
 
-def robot(random: Random, name: str, start: tuple[float, float], motion: Motion | None) -> RobotBody:
+def robot(random: Random, name: str, start: tuple[float, float], motion: MotionPlan | None) -> RobotBody:
     """Another transport robot, half of them loaded."""
     return RobotBody(
         kind="robot",
@@ -127,21 +127,21 @@ def robot(random: Random, name: str, start: tuple[float, float], motion: Motion 
     )
 
 
-def _first_heading_deg(start: tuple[float, float], motion: Motion | None) -> float:
+def _first_heading_deg(start: tuple[float, float], motion: MotionPlan | None) -> float:
     first = None if motion is None else next((one for one in motion.steps if isinstance(one, Go)), None)
     if first is None:
         return 180.0
     return math.degrees(math.atan2(first.y_m - start[1], first.x_m - start[0]))
 
 
-def walk(start_s: float, *steps: Step) -> Motion:
+def walk(start_s: float, *steps: Step) -> MotionPlan:
     """As people start and turn."""
-    return Motion(start_s=max(start_s, 0.0), steps=steps)
+    return MotionPlan(start_s=max(start_s, 0.0), steps=steps)
 
 
-def drive(start_s: float, *steps: Step, accel_mps2: float = 0.8) -> Motion:
+def drive(start_s: float, *steps: Step, accel_mps2: float = 0.8) -> MotionPlan:
     """As transport robots start and turn."""
-    return Motion(start_s=max(start_s, 0.0), accel_mps2=accel_mps2, turn_rate_degps=60.0, steps=steps)
+    return MotionPlan(start_s=max(start_s, 0.0), accel_mps2=accel_mps2, turn_rate_degps=60.0, steps=steps)
 
 
 def go(x_m: float, y_m: float, speed_mps: float) -> Go:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from config.scenario import Motion, Scenario, Step
+from config.scenario import MotionPlan, Scenario, Step
 from sim.families.layout import (
     Random,
     drive,
@@ -104,7 +104,10 @@ def turns_back(random: Random) -> Scenario:
         steps += [wait(float(random.uniform(0.5, 2.0))), go(x + 0.3, in_way, speed), wait(1.0)]
         steps += [go(x + 0.6, side * 3.5, speed)]
     who = person(
-        random, "person", (x, side * 2.6), Motion(start_s=float(random.uniform(0.5, 4.0)), steps=tuple(steps))
+        random,
+        "person",
+        (x, side * 2.6),
+        MotionPlan(start_s=float(random.uniform(0.5, 4.0)), steps=tuple(steps)),
     )
     return scenario("turns_back", length, (*racks(random, length, ((x - 1.3, x + 1.8),)), who))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from config.scenario import BodySpec, Motion, Scenario
+from config.scenario import BodySpec, MotionPlan, Scenario
 from sim.families.layout import (
     FRONT_M,
     Random,
@@ -68,7 +68,7 @@ def lead_brakes(random: Random) -> Scenario:
     length = float(random.uniform(14.0, 18.0))
     speed = float(random.uniform(0.5, 1.1))
     stop_x = float(random.uniform(6.0, 9.0))
-    way = Motion(
+    way = MotionPlan(
         start_s=float(random.uniform(0.0, 1.0)),
         accel_mps2=float(random.uniform(0.5, 1.0)),
         turn_rate_degps=60.0,

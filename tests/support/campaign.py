@@ -8,7 +8,7 @@ from config.app import AppConfig, load_app
 from config.loader import CONFIG_DIR
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from config.scenario import BodySpec, Crate, Go, Motion, RobotBody, Room, Scenario
+from config.scenario import BodySpec, Crate, Go, MotionPlan, RobotBody, Room, Scenario
 from controller.campaign.drive import DriveLog
 from controller.campaign.stage import Stage
 from controller.decision import Action, Decision, Reason
@@ -60,7 +60,7 @@ def mover(
 ) -> RobotBody:
     """A robot of 1.0 x 1.0 m that goes off at once at full speed (nearly)."""
     heading_deg = math.degrees(math.atan2(to_y_m - y_m, to_x_m - x_m))
-    motion = Motion(
+    motion = MotionPlan(
         start_s=start_s, accel_mps2=20.0, steps=(Go(kind="go", x_m=to_x_m, y_m=to_y_m, speed_mps=speed_mps),)
     )
     return RobotBody(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from controller.evaluation.types import (
     NO_BOX,
     Box,
-    Detection,
+    DetectedObject,
     FrameDetections,
     FrameTruth,
     TrueObject,
@@ -48,21 +48,21 @@ def detection(
     position_m: tuple[float, float, float] = (0.0, 0.0, 4.0),
     velocity_mps: tuple[float, float, float] = (1.0, 0.0, 0.0),
     confidence: float = 0.9,
-) -> Detection:
+) -> DetectedObject:
     """Of the person above, without any error."""
-    return Detection(
+    return DetectedObject(
         number, box, np.array(position_m), np.array(velocity_mps), np.array([0.5, 1.7, 0.3]), confidence
     )
 
 
-def far_detection(number: int = 9, confidence: float = 0.9) -> Detection:
+def far_detection(number: int = 9, confidence: float = 0.9) -> DetectedObject:
     """Of nothing that is there."""
     return detection(number, ELSEWHERE, (3.0, 0.0, 8.0), confidence=confidence)
 
 
-def bare_detection(position_m: tuple[float, float, float]) -> Detection:
+def bare_detection(position_m: tuple[float, float, float]) -> DetectedObject:
     """With a position and nothing else, as a lidar has it."""
-    return Detection(3, NO_BOX, np.array(position_m), unknown_vector(), unknown_vector(), 0.9)
+    return DetectedObject(3, NO_BOX, np.array(position_m), unknown_vector(), unknown_vector(), 0.9)
 
 
 def truths(frames: Sequence[Sequence[TrueObject]]) -> list[FrameTruth]:
@@ -70,7 +70,7 @@ def truths(frames: Sequence[Sequence[TrueObject]]) -> list[FrameTruth]:
     return [FrameTruth(index / FPS, tuple(objects)) for index, objects in enumerate(frames)]
 
 
-def answers(frames: Sequence[Sequence[Detection]], duration_ms: float = 5.0) -> list[FrameDetections]:
+def answers(frames: Sequence[Sequence[DetectedObject]], duration_ms: float = 5.0) -> list[FrameDetections]:
     """One after the other at FPS."""
     return [
         FrameDetections(index / FPS, tuple(detections), duration_ms)

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from controller.evaluation.baselines.masks import SCALE, half_depth_m, half_intrinsics
-from controller.evaluation.types import Answer, Box, Detection, unknown_vector
+from controller.evaluation.types import Answer, Box, DetectedObject, unknown_vector
 from hal.types import ColourImage, FloatArray, Intrinsics, Pose, RgbdFrame
 
 _SEED = 20200127
@@ -58,7 +58,9 @@ class BoxTracking:
         depth_m, k = half_depth_m(frame), half_intrinsics(frame.intrinsics)
         return Answer(
             tuple(
-                Detection(object_id, box, _position(box, depth_m, k), unknown_vector(), unknown_vector(), 1.0)
+                DetectedObject(
+                    object_id, box, _position(box, depth_m, k), unknown_vector(), unknown_vector(), 1.0
+                )
                 for object_id, box in boxes
             )
         )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.evaluation.assignment import assign
-from controller.evaluation.types import CALLED_MOVING, Answer, Box, Detection, unknown_vector
+from controller.evaluation.types import CALLED_MOVING, Answer, Box, DetectedObject, unknown_vector
 from hal.types import FloatArray, Intrinsics, RgbdFrame
 
 Mask = NDArray[np.uint8]
@@ -163,7 +163,7 @@ class Identities:
             confirmed = known.frames >= _CONFIRM_FRAMES
             confidence = CALLED_MOVING + room * one.level if confirmed else 0.99 * CALLED_MOVING * one.level
             detections.append(
-                Detection(known.id, one.box, one.position_m, unknown_vector(), one.extent_m, confidence)
+                DetectedObject(known.id, one.box, one.position_m, unknown_vector(), one.extent_m, confidence)
             )
         self._known = [known for known in self._known if known.unseen <= _FORGET_FRAMES]
         return Answer(tuple(detections), mask)

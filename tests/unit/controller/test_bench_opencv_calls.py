@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from controller.bench.opencv_calls import Call, recorded_calls, stand_in_for_cv2, time_bare
+from controller.bench.opencv_calls import OpenCvCall, recorded_calls, stand_in_for_cv2, time_bare
 
 SOURCE = """
 import cv2
@@ -90,7 +90,7 @@ def test_arguments_are_those_from_before_the_call() -> None:
 
 def test_a_fresh_call_spends_only_its_own_arguments() -> None:
     image = picture()
-    call = Call("add", (image, np.full_like(image, 5)), {"dst": image})
+    call = OpenCvCall("add", (image, np.full_like(image, 5)), {"dst": image})
     call.fresh().execute()
     np.testing.assert_array_equal(image, picture())
     call.execute()
@@ -151,9 +151,9 @@ def test_the_stand_in_asks_its_owner_to_make_the_call() -> None:
 
 def test_bare_time_is_added_up_by_function() -> None:
     calls = [
-        Call("norm", (np.ones(3),), {}),
-        Call("mean", (np.ones(3),), {}),
-        Call("norm", (np.ones(3),), {}),
+        OpenCvCall("norm", (np.ones(3),), {}),
+        OpenCvCall("mean", (np.ones(3),), {}),
+        OpenCvCall("norm", (np.ones(3),), {}),
     ]
     # Readings 1, 3 | 6, 10 | 15, 21: the calls take 2, 4 and 6 ns.
     assert time_bare(calls, Ticking()) == {"norm": 8, "mean": 4}
@@ -161,5 +161,5 @@ def test_bare_time_is_added_up_by_function() -> None:
 
 def test_bare_timing_does_not_use_up_the_record() -> None:
     image = picture()
-    time_bare([Call("add", (image, np.full_like(image, 5)), {"dst": image})], Ticking())
+    time_bare([OpenCvCall("add", (image, np.full_like(image, 5)), {"dst": image})], Ticking())
     np.testing.assert_array_equal(image, picture())

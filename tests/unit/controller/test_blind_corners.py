@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from config.decision import Sight as SightConfig
+from config.decision import SightConfig
 from controller.blind_corners import BlindCorners
 
 BANDS = 80

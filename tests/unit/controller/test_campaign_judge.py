@@ -8,7 +8,7 @@ import pytest
 
 from config.app import AppConfig
 from config.camera import SimulatedCameraConfig
-from config.scenario import Go, Motion, Wait
+from config.scenario import Go, MotionPlan, Wait
 from controller.campaign.drive import DriveLog
 from controller.campaign.judge import Row, false_stops, flaps, judge
 from controller.campaign.oracle import OracleTime
@@ -99,7 +99,7 @@ def test_nobody_sees_in_who_stands_that_it_will_go_on() -> None:
         Go(kind="go", x_m=4.5, y_m=-3.0, speed_mps=1.5),
     )
     who = mover(4.5, 3.5, 4.5, -3.0, 1.5)
-    made = stage(who.model_copy(update={"motion": Motion(accel_mps2=20.0, steps=steps)}), length_m=9.0)
+    made = stage(who.model_copy(update={"motion": MotionPlan(accel_mps2=20.0, steps=steps)}), length_m=9.0)
     row = judged(made, cruise(1.0, 8.0))
     assert (row.contacts, row.contacts_at_fault) == (1, 0)
 

@@ -8,7 +8,7 @@ import pytest
 from config.camera import SimulatedCameraConfig
 from config.robot import Mount
 from config.scenario import BodySpec, Pallet, Pole
-from controller.campaign.view import PlanarEye, View
+from controller.campaign.view import PlanarEye, PlanarView
 from hal.types import PlanarPose
 from tests.support.campaign import crate, stage
 
@@ -16,13 +16,13 @@ LEVEL = Mount(forward_m=0.0, left_m=0.0, height_m=0.6, pitch_deg=0.0)
 ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
 
-def look(*bodies: BodySpec, mount: Mount = LEVEL, pose: PlanarPose = ORIGIN) -> tuple[PlanarEye, View]:
+def look(*bodies: BodySpec, mount: Mount = LEVEL, pose: PlanarPose = ORIGIN) -> tuple[PlanarEye, PlanarView]:
     made = stage(*bodies)
     eye = PlanarEye(made.world, SimulatedCameraConfig(), mount)
     return eye, eye.look(made.world.look(0.0)[0], pose)
 
 
-def distances(view: View, body: int = 0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def distances(view: PlanarView, body: int = 0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     row = np.flatnonzero(view.bodies == body)
     return view.forward_m[row[0]] if len(row) else np.full(80, np.inf)
 

@@ -14,14 +14,14 @@ from controller.evaluation.baselines.low_rank import LowRank, robust_pca
 from controller.evaluation.baselines.masks import Identities, half_depth_m, half_intrinsics, things
 from controller.evaluation.baselines.trajectories import Trajectories
 from controller.evaluation.matching import iou
-from controller.evaluation.types import CALLED_MOVING, Box, Detection, Method
+from controller.evaluation.types import CALLED_MOVING, Box, DetectedObject, Method
 from tests.support.evaluation_cases import CAMERA, moving_square, square_left_px
 
 FRAMES = 14
 PAN_PX = 2.0
 
 
-def watch(method: Method, thing_px: float, size: tuple[int, int] = (120, 200)) -> list[Detection]:
+def watch(method: Method, thing_px: float, size: tuple[int, int] = (120, 200)) -> list[DetectedObject]:
     """What is called moving in the last frame of a panning camera's sequence."""
     for index in range(FRAMES):
         answer = method.observe(moving_square(index, thing_px, PAN_PX, size), None)

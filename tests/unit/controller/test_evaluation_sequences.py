@@ -9,7 +9,7 @@ import pytest
 
 from config.scenario import Person
 from controller.evaluation.contestants import build_world
-from controller.evaluation.drive import SLIPPING, Drive, Knot, OdometryError
+from controller.evaluation.drive import SLIPPING, Knot, OdometryError, ScriptedDrive
 from controller.evaluation.scenes import Mover, build, side_by_side
 from controller.evaluation.sequences import Sequence, arc, sequences, straight
 
@@ -43,27 +43,27 @@ def test_every_kind_of_drive_is_there() -> None:
 
 
 def test_a_straight_and_a_round_course() -> None:
-    assert Drive(straight(1.5), 4.0, EXACT).pose(2.0).x_m == pytest.approx(3.0)
-    round_ = Drive(arc(0.8, 0.5), 4.0, EXACT).pose(math.pi)
+    assert ScriptedDrive(straight(1.5), 4.0, EXACT).pose(2.0).x_m == pytest.approx(3.0)
+    round_ = ScriptedDrive(arc(0.8, 0.5), 4.0, EXACT).pose(math.pi)
     assert (round_.x_m, round_.y_m) == pytest.approx((1.6, 1.6), abs=1e-6)
     assert round_.heading_rad == pytest.approx(math.pi / 2)
 
 
 def test_speed_between_knots_is_linear() -> None:
-    drive = Drive((Knot(0.0, 0.0), Knot(4.0, 1.2)), 4.0, EXACT)
+    drive = ScriptedDrive((Knot(0.0, 0.0), Knot(4.0, 1.2)), 4.0, EXACT)
     assert drive.twist(1.0)[0] == pytest.approx(0.3)
     assert drive.pose(4.0).x_m == pytest.approx(2.4, abs=1e-6)
 
 
 def test_slipping_odometry_tells_a_tenth_more_of_the_turn() -> None:
-    drive = Drive(arc(0.8, 0.5), 4.0, SLIPPING)
+    drive = ScriptedDrive(arc(0.8, 0.5), 4.0, SLIPPING)
     told = drive.odometry(2.0).heading_rad
     assert told == pytest.approx(1.1 * 1.0 + 0.02 * 2.0)
     assert drive.pose(2.0).heading_rad == pytest.approx(1.0)
 
 
 def test_a_mover_goes_through_its_point_at_its_time() -> None:
-    drive = Drive(arc(0.8, 0.4), 4.0, EXACT)
+    drive = ScriptedDrive(arc(0.8, 0.4), 4.0, EXACT)
     mover = Mover("person", ahead_m=4.0, left_m=0.5, course_deg=90.0, speed_mps=1.2, at_s=2.0)
     scenario = build("case", "hall", drive, [mover], 4.0, seed=9)
     sequence = Sequence("case", "tuning", arc(0.8, 0.4), (mover,), "hall", "paper", 9, EXACT)
@@ -78,7 +78,7 @@ def test_a_mover_goes_through_its_point_at_its_time() -> None:
 
 
 def test_starting_and_stopping_movers() -> None:
-    drive = Drive(straight(0.0), 4.0, EXACT)
+    drive = ScriptedDrive(straight(0.0), 4.0, EXACT)
     mover = Mover("person", 4.0, 0.0, 90.0, 1.0, at_s=2.0, starts_s=1.0, stops_s=3.0)
     sequence = Sequence("case", "tuning", straight(0.0), (mover,), "hall", "paper", 9, EXACT)
     world = build_world(sequence)

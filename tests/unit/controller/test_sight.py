@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from config.decision import DecisionConfig
-from config.decision import Sight as SightConfig
+from config.decision import DecisionConfig, SightConfig
 from config.robot import Body
 from controller.bodies import Bodies, no_bodies
 from controller.corridor import Corridor

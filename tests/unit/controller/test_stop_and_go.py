@@ -14,7 +14,7 @@ from config.decision import DecisionConfig
 from config.loader import CONFIG_DIR
 from config.robot import Robot
 from controller import braking
-from controller.campaign.stop_and_go import Recording, StopAndGo, measure, read, write
+from controller.campaign.stop_and_go import DriveRecording, StopAndGo, measure, read, write
 from controller.campaign.stop_and_go_command import TARGETS, StopAndGoOptions, run_stop_and_go
 from controller.errors import UserError
 
@@ -24,7 +24,7 @@ ROBOT, DECISION = Robot(), DecisionConfig()
 
 def made_up(
     stops_s: float = 14.0, goes_s: float = 21.0, clears_s: float = 20.0, blip: bool = False
-) -> Recording:
+) -> DriveRecording:
     """Drives at 1 m/s from 1 s on; a wall in the way from 10 s until clears_s; stands from stops_s until
     goes_s, then drives to 30 s. blip: stands for 1 s at 5 s, for nothing."""
     t = np.arange(0.0, 31.0, DT_S)
@@ -33,10 +33,10 @@ def made_up(
     if blip:
         v = np.where((t >= 5.0) & (t < 6.0), 0.0, v)
     free = np.where((t >= 10.0) & (t < clears_s), 1.5, np.inf)
-    return Recording(t, np.cumsum(v) * DT_S, v, (v > 0.0) & (t >= goes_s - 0.5), free)
+    return DriveRecording(t, np.cumsum(v) * DT_S, v, (v > 0.0) & (t >= goes_s - 0.5), free)
 
 
-def measured(recording: Recording) -> StopAndGo:
+def measured(recording: DriveRecording) -> StopAndGo:
     return measure(recording, ROBOT, DECISION)
 
 
@@ -74,7 +74,7 @@ def test_who_never_stops_or_never_goes_on() -> None:
 
 def test_a_way_that_is_never_blocked_has_no_stop() -> None:
     recording = made_up(stops_s=30.0, goes_s=30.0)
-    free = Recording(
+    free = DriveRecording(
         recording.times_s,
         recording.s_m,
         recording.v_mps,
@@ -92,7 +92,7 @@ def test_slowing_down_early_puts_the_stop_off() -> None:
     t = np.arange(0.0, 30.0, DT_S)
     v = np.where(t < 10.2, 1.0, np.where(t < 18.0, 0.2, 0.0))
     free = np.where(t < 10.0, np.inf, np.where(t < 10.2, 1.9, np.maximum(1.9 - 0.2 * (t - 10.2), 0.45)))
-    found = measured(Recording(t, np.cumsum(v) * DT_S, v, v > 1.0, free))
+    found = measured(DriveRecording(t, np.cumsum(v) * DT_S, v, v > 1.0, free))
     needs_m = braking.required_distance(
         0.2, 0.0, 0.0, DECISION.chassis_delay_s, braking.comfort(ROBOT.limits), 0.45
     )

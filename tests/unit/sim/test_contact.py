@@ -7,7 +7,7 @@ import pytest
 
 from config.path import LineSpec, PathSpec
 from config.robot import Body
-from config.scenario import Beam, BodySpec, Column, Crate, Go, Motion, Pallet, Room, Scenario
+from config.scenario import Beam, BodySpec, Column, Crate, Go, MotionPlan, Pallet, Room, Scenario
 from hal.types import PlanarPose
 from sim.contact import nearest_body, polygon_distance, robot_footprint
 from sim.world import World
@@ -106,7 +106,7 @@ def test_the_buildings_walls_count() -> None:
 
 
 def test_movers_are_taken_where_they_are_at_that_time() -> None:
-    plan = Motion(accel_mps2=1.0, steps=(Go(kind="go", x_m=1.5, y_m=0.0, speed_mps=1.0),))
+    plan = MotionPlan(accel_mps2=1.0, steps=(Go(kind="go", x_m=1.5, y_m=0.0, speed_mps=1.0),))
     cart = Crate(kind="crate", name="cart", x_m=4.0, y_m=0.0, heading_deg=180.0, motion=plan)
     moving = world(cart)
     # 2.5 m: 1 s up, 1.5 s even, 1 s down.

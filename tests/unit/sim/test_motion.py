@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from config.scenario import Go, Motion, Wait
+from config.scenario import Go, MotionPlan, Wait
 from hal.types import PlanarPose
 from sim.motion import Trajectory
 
@@ -16,8 +16,8 @@ def go(x_m: float, y_m: float, speed_mps: float = 1.0) -> Go:
     return Go(kind="go", x_m=x_m, y_m=y_m, speed_mps=speed_mps)
 
 
-def motion(*steps: Go | Wait, start_s: float = 0.0, accel: float = 1.0, turn: float = 90.0) -> Motion:
-    return Motion(start_s=start_s, accel_mps2=accel, turn_rate_degps=turn, steps=steps)
+def motion(*steps: Go | Wait, start_s: float = 0.0, accel: float = 1.0, turn: float = 90.0) -> MotionPlan:
+    return MotionPlan(start_s=start_s, accel_mps2=accel, turn_rate_degps=turn, steps=steps)
 
 
 def test_a_body_without_a_plan_stands_where_it_was_put() -> None:

@@ -12,7 +12,7 @@ from config.scenario import (
     Column,
     Crate,
     Go,
-    Motion,
+    MotionPlan,
     Pallet,
     Person,
     Pole,
@@ -25,7 +25,7 @@ from sim.contact import polygon_distance
 from sim.planar import PlanarWorld, overlap, separation
 from sim.world import World
 
-MOTION = Motion(
+MOTION = MotionPlan(
     start_s=1.0,
     start_jitter_s=0.5,
     steps=(

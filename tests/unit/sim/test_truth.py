@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from config.path import LineSpec, PathSpec
-from config.scenario import BodySpec, Crate, Go, Motion, Person, Scenario, Wall
+from config.scenario import BodySpec, Crate, Go, MotionPlan, Person, Scenario, Wall
 from hal.geometry import body_in_floor, camera_in_floor
 from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose, Pose
 from sim.render import Picture, Renderer
@@ -16,8 +16,8 @@ MOUNT = CameraMount(0.45, 0.0, 0.6, 0.07)
 PATH = PathSpec(segments=(LineSpec(kind="line", length_m=5.0),))
 
 
-def drive(x_m: float, y_m: float, speed_mps: float = 1.0) -> Motion:
-    return Motion(accel_mps2=20.0, steps=(Go(kind="go", x_m=x_m, y_m=y_m, speed_mps=speed_mps),))
+def drive(x_m: float, y_m: float, speed_mps: float = 1.0) -> MotionPlan:
+    return MotionPlan(accel_mps2=20.0, steps=(Go(kind="go", x_m=x_m, y_m=y_m, speed_mps=speed_mps),))
 
 
 def eye(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Pose:

@@ -12,7 +12,7 @@ from config.scenario import (
     Column,
     Crate,
     Go,
-    Motion,
+    MotionPlan,
     Pallet,
     Person,
     Pole,
@@ -26,7 +26,7 @@ from config.scenario import (
 from sim.world import BUILDING_ID, World
 
 PATH = PathSpec(segments=(LineSpec(kind="line", length_m=5.0),))
-WALK = Motion(start_s=1.0, steps=(Go(kind="go", x_m=5.0, y_m=2.0, speed_mps=1.2),))
+WALK = MotionPlan(start_s=1.0, steps=(Go(kind="go", x_m=5.0, y_m=2.0, speed_mps=1.2),))
 AT: dict[str, Any] = {"x_m": 3.0, "y_m": 1.0, "heading_deg": 30.0}
 
 
@@ -131,7 +131,7 @@ def test_limbs_swing_with_the_distance_walked_and_rest_when_standing() -> None:
 
 
 def test_wheels_roll_without_slipping() -> None:
-    drive = Motion(accel_mps2=10.0, steps=(Go(kind="go", x_m=9.0, y_m=0.0, speed_mps=1.0),))
+    drive = MotionPlan(accel_mps2=10.0, steps=(Go(kind="go", x_m=9.0, y_m=0.0, speed_mps=1.0),))
     robot = world(RobotBody(kind="robot", name="r", x_m=0.0, y_m=0.0, motion=drive))
     drawn = [robot.geometry(t_s) for t_s in (2.0, 2.0 + 1e-4)]
     mine = drawn[0].body == 1
