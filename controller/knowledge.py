@@ -42,11 +42,17 @@ _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
 
 class Knowledge:
-    """Takes in scenes along one path.
+    """Takes in scenes along one path. Points are in metres, in the frame of the path.
 
-    bodies: boxes to reckon with. surfaces: what depth saw in the newest scene. fault: why the camera cannot
-    be relied on now, "" if it can. age_s: of the newest scene (inf: none yet). edge_tan: how wide the camera
-    looks.
+    bodies: N boxes to reckon with, those in view before those out of sight; remembered (N,) says which these
+    are, and controller/bodies.py what arrays tell of them. unboxed: M more in view, as surfaces only.
+    surfaces: P points (P, 2) that depth saw, and how far it saw in each of B bands (controller/surfaces.py).
+    corridor: what the robot sweeps along the path; sight: what was seen of that. edge_tan: how far the camera
+    looks to either side, as the tangent of the angle.
+
+    age_s: since the newest scene was captured; since_s: since the one that bodies are of, which was taken in
+    while the camera could be trusted; inf: none yet. health: of the camera in the newest scene. fault: why
+    the camera cannot be relied on now, "" if it can.
     """
 
     def __init__(
@@ -61,11 +67,13 @@ class Knowledge:
         self.age_s = self.since_s = float("inf")
         self._mount, self._config = mount, config
         self._poses = PoseHistory()
-        self._boxes = no_bodies(0)
+        # Of the K bodies that were seen, which became boxes (K,), and those, steadied.
         self._boxed = np.zeros(0, np.bool_)
+        self._boxes = no_bodies(0)
         self._steady = SteadyVelocities()
         self._memory = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
         self.edge_tan = 0.5
+        # Of the last scenes: when they were captured, and floor points (K, 2) where something was.
         self._places: deque[tuple[int, FloatArray]] = deque()
         self._captured_ns: int | None = None
         self._scene_fault = ""
