@@ -9,6 +9,7 @@ from enum import Enum
 from config.path import ArcSpec, LineSpec, PathSpec, StartSpec
 from config.robot import Robot
 from controller import braking
+from controller.decision import Reason
 from controller.governor.request import Twist
 from controller.path import Path
 from hal.types import PlanarPose
@@ -89,6 +90,15 @@ def understand(twist: Twist, robot: Robot) -> Wish:
     yaw_radps = _YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps
     top_mps = min(robot.limits.max_speed_mps, yaw_radps / max(abs(curvature), _STRAIGHT_1PM))
     return Wish(Kind.ARC, min(v, top_mps), curvature)
+
+
+def why_stop(wish: Wish, requested: Twist | None) -> Reason:
+    """Why the robot stops for a wish that is no arc, or not yet its motion; requested None: silence."""
+    if wish.kind is Kind.REFUSED:
+        return Reason("no command" if requested is None else "refused", f"{wish.why}: stop")
+    if wish.kind is Kind.STAND:
+        return Reason("requested", "asked to stand")
+    return Reason("requested", f"stands before it can {'turn in place' if wish.left else 'drive on'}")
 
 
 def driveable(wish: Wish, v_mps: float, robot: Robot) -> Wish:

@@ -17,7 +17,7 @@ from config.robot import Robot
 from controller.bodies import SceneError, bodies_of
 from controller.decide import DecisionMaker
 from controller.decision import Action, Decision, Reason
-from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand
+from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand, why_stop
 from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
 from controller.governor.surroundings import near_limits, turn_objection
@@ -250,7 +250,7 @@ class SpeedGovernor:
         stop = wish.kind in (Kind.STAND, Kind.REFUSED) or wish.kind is not self._motion.kind
         stop = stop or (wish.kind is Kind.TURN and wish.left != self._motion.left)
         if stop:
-            return self._with(decision, 0.0, self._why_stop(wish, requested), emergency=decision.emergency)
+            return self._with(decision, 0.0, why_stop(wish, requested), emergency=decision.emergency)
         assert requested is not None
         if wish.kind is Kind.TURN:
             return decision
@@ -268,13 +268,6 @@ class SpeedGovernor:
         elif reason.rule == "target":
             reason = Reason("robot", f"such an arc is looked along only so far: {target_mps:.2f} m/s")
         return self._with(decision, target_mps, reason, emergency=decision.emergency)
-
-    def _why_stop(self, wish: Wish, requested: Twist | None) -> Reason:
-        if wish.kind is Kind.REFUSED:
-            return Reason("no command" if requested is None else "refused", f"{wish.why}: stop")
-        if wish.kind is Kind.STAND:
-            return Reason("requested", "asked to stand")
-        return Reason("requested", f"stands before it can {'turn in place' if wish.left else 'drive on'}")
 
     def _with(self, decision: Decision, target_mps: float, reason: Reason, *, emergency: bool) -> Decision:
         v, band = self._shape.v_mps, self._decision.release.dead_band_mps

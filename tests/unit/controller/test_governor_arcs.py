@@ -11,6 +11,7 @@ from controller.governor.arcs import (
     driveable,
     tightest_m,
     understand,
+    why_stop,
 )
 from controller.governor.request import Twist
 from hal.types import PlanarPose
@@ -91,3 +92,18 @@ def test_at_speed_an_arc_is_only_as_tight_as_the_yaw_rate_admits() -> None:
     assert driveable(wish, 0.2, ROBOT) == wish
     assert driveable(wish, 1.0, ROBOT).curvature_1pm == pytest.approx(-0.8)
     assert driveable(wish, 1.0, ROBOT).speed_mps == wish.speed_mps
+
+
+@pytest.mark.parametrize(
+    ("wish", "requested", "rule", "sentence"),
+    [
+        (Wish(Kind.REFUSED, why="silence"), None, "no command", "silence: stop"),
+        (Wish(Kind.REFUSED, why="reverse"), Twist(-1.0, 0.0), "refused", "reverse: stop"),
+        (Wish(Kind.STAND), Twist(0.0, 0.0), "requested", "asked to stand"),
+        (Wish(Kind.TURN, 0.3, left=-1), Twist(0.0, -0.5), "requested", "stands before it can turn in place"),
+        (Wish(Kind.ARC, 0.5), Twist(0.5, 0.0), "requested", "stands before it can drive on"),
+    ],
+)
+def test_why_the_robot_stops(wish: Wish, requested: Twist | None, rule: str, sentence: str) -> None:
+    reason = why_stop(wish, requested)
+    assert (reason.rule, reason.sentence) == (rule, sentence)
