@@ -20,6 +20,9 @@ class DepthNoise(Section):
     quadratic_per_m: float = Field(default=0.0075, gt=0, le=0.1)
 
 
+TYPICAL_DEPTH_NOISE = DepthNoise()
+
+
 class FragmentSettings(Section):
     """Edges, contours, segments and their tracking."""
 
@@ -86,7 +89,7 @@ class PerceptionConfig(Section):
     min_depth_m: float = Field(default=0.25, gt=0, le=5)
     grid_step_px: int = Field(default=4, ge=1, le=16, description="every n-th pixel of depth is looked at")
     max_gap_s: float = Field(default=0.5, gt=0, le=5, description="frames further apart cannot be compared")
-    depth_noise: DepthNoise = DepthNoise()
+    depth_noise: DepthNoise = TYPICAL_DEPTH_NOISE
     fragments: FragmentSettings = FragmentSettings()
     ego_motion: EgoMotionSettings = EgoMotionSettings()
     motion: MotionSettings = MotionSettings()

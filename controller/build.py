@@ -108,7 +108,7 @@ def build_control(config: AppConfig, config_path: FilePath, chassis: Chassis) ->
     mount = mount_of(config)
     return ControlLoop(
         path=path,
-        decide=DecisionMaker(decision, robot, mount, period_s),
+        decide=DecisionMaker(decision, robot, mount, period_s, config.perception.depth_noise),
         shape=SpeedShaper(robot.limits, period_s, decision.chassis_delay_s),
         follow=PathFollower(path, robot.limits, decision.chassis_delay_s),
         localiser=Localiser(path.start, mount),
@@ -241,7 +241,8 @@ def build_replay_decision(config: ReplayConfig, mount: CameraMount | None) -> De
     """A decision for each frame; an unknown mounting is taken as level, at the robot's front."""
     front_m = config.robot.body.front_m
     level = CameraMount(front_m, 0.0, config.robot.camera_mount.height_m, 0.0)
-    return DecisionMaker(config.decision, config.robot, mount or level, 1.0 / REPLAY_FPS)
+    noise = config.perception.depth_noise
+    return DecisionMaker(config.decision, config.robot, mount or level, 1.0 / REPLAY_FPS, noise)
 
 
 def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: float | None) -> Surroundings:

@@ -11,6 +11,7 @@ import math
 from dataclasses import replace
 
 from config.decision import DecisionConfig
+from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Limits, Robot
 from controller import braking
 from controller.appraise import Appraiser
@@ -34,10 +35,17 @@ _AT_END_M = 0.02
 
 
 class DecisionMaker:
-    """One decision a control step. Keeps what hysteresis and memory need; calls no clock."""
+    """One decision a control step. Keeps what hysteresis and memory need; calls no clock. noise: of depth."""
 
-    def __init__(self, config: DecisionConfig, robot: Robot, mount: CameraMount, period_s: float) -> None:
-        self._config, self._robot, self._mount = config, robot, mount
+    def __init__(
+        self,
+        config: DecisionConfig,
+        robot: Robot,
+        mount: CameraMount,
+        period_s: float,
+        noise: DepthNoise = TYPICAL_DEPTH_NOISE,
+    ) -> None:
+        self._config, self._robot, self._mount, self._noise = config, robot, mount, noise
         self._comfort = braking.comfort(robot.limits)
         self._range_brake = braking.emergency(robot.limits) if config.emergency_caps_range else self._comfort
         self._latency_s = period_s + config.chassis_delay_s
@@ -53,6 +61,10 @@ class DecisionMaker:
     def take_path(self, path: Path, known: Knowledge) -> None:
         """Go on along another path, of which this is known already; what hysteresis needs is kept."""
         self._path, self._known = path, known
+
+    def knowledge(self, path: Path, start_s_m: float) -> Knowledge:
+        """Of a path of which nothing is known yet, for a robot that stands at start_s_m on it."""
+        return Knowledge(path, self._robot, self._mount, self._config, start_s_m, self._noise)
 
     def step(self, at: Situation) -> Decision:
         """The decision for at.now_ns."""
@@ -104,7 +116,7 @@ class DecisionMaker:
     def _knowledge(self, path: Path, on_path: OnPath) -> Knowledge:
         if self._known is None or path is not self._path:
             self._path = path
-            self._known = Knowledge(path, self._robot, self._mount, self._config, on_path.s_m)
+            self._known = self.knowledge(path, on_path.s_m)
         return self._known
 
     def _path_limits(self, path: Path, on_path: OnPath, motion: Motion) -> list[Limit]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
+from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.corridor import Corridor
@@ -56,7 +57,13 @@ class Knowledge:
     """
 
     def __init__(
-        self, path: Path, robot: Robot, mount: CameraMount, config: DecisionConfig, start_s_m: float
+        self,
+        path: Path,
+        robot: Robot,
+        mount: CameraMount,
+        config: DecisionConfig,
+        start_s_m: float,
+        noise: DepthNoise = TYPICAL_DEPTH_NOISE,
     ) -> None:
         self.corridor = Corridor(path, robot.body)
         self.sight = Sight(self.corridor, mount, config, start_s_m)
@@ -65,7 +72,7 @@ class Knowledge:
         self.health = _GOOD
         self.fault = "no scene yet"
         self.age_s = self.since_s = float("inf")
-        self._mount, self._config = mount, config
+        self._mount, self._config, self._noise = mount, config, noise
         self._poses = PoseHistory()
         # Of the K bodies that were seen, which became boxes (K,), and those, steadied.
         self._boxed = np.zeros(0, np.bool_)
@@ -161,7 +168,7 @@ class Knowledge:
             self.edge_tan = (
                 float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
             )
-        self.surfaces = surfaces = surfaces_of(scene.free_space, pose, self._mount)
+        self.surfaces = surfaces = surfaces_of(scene.free_space, pose, self._mount, self._noise)
         boxes = self._steady.update(self._recognise(seen.select(boxed)))
         boxes = self._memory.leaving(boxes, pose, self.edge_tan)
         standing = v_mps <= STANDING_MPS

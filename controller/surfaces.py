@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from controller.bodies import Bodies
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
 # A point this near to an obstacle's box is part of it: swinging limbs, a box that lags a little.
 AROUND_M = 0.3
-_DEPTH_SIGMA_1PM = 0.0075
 _DEPTH_SIGMAS = 3.5
 
 
@@ -22,32 +22,36 @@ _DEPTH_SIGMAS = 3.5
 class Surfaces:
     """P points, left to right. bands (P,): of the B bands of the free space, which they are of. forward_m
     (P,) from the camera. half_band_m (P,): half of the width that a point stands for. points_m (P, 2). seen_m
-    (B,): how far each band was seen through, to a surface or over free floor; 0: nothing was measured."""
+    (B,): how far each band was seen through, to a surface or over free floor; 0: nothing was measured.
+    noise: of the camera's depth."""
 
     seen_m: FloatArray
     bands: NDArray[np.intp]
     forward_m: FloatArray
     half_band_m: FloatArray
     points_m: FloatArray
+    noise: DepthNoise = TYPICAL_DEPTH_NOISE
 
     def of(self, bodies: Bodies) -> NDArray[np.bool_]:
         """(P, N) which points belong to which bodies: along the view, depth may be off."""
-        reach_m = AROUND_M + _DEPTH_SIGMAS * _DEPTH_SIGMA_1PM * self.forward_m**2
+        reach_m = AROUND_M + _DEPTH_SIGMAS * self.noise.quadratic_per_m * self.forward_m**2
         return bodies.covers(self.points_m, reach_m, AROUND_M)
 
 
 NO_SURFACES = Surfaces(np.zeros(0), np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
 
 
-def surfaces_of(free: FreeSpace, pose: PlanarPose, mount: CameraMount) -> Surfaces:
-    """What was seen of free by a camera that a body at pose carried."""
+def surfaces_of(
+    free: FreeSpace, pose: PlanarPose, mount: CameraMount, noise: DepthNoise = TYPICAL_DEPTH_NOISE
+) -> Surfaces:
+    """What was seen of free by a camera that a body at pose carried. noise: of its depth."""
     bands = (np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan)).nonzero()[0]
     forward = free.nearest_m[bands]
     ahead = forward + mount.forward_m
     left = mount.left_m - forward * free.bearing_tan[bands]
     seen_m = np.where(np.isfinite(free.nearest_m), free.nearest_m, np.nan_to_num(free.known_m))
     points = floor_points(pose, ahead, left)
-    return Surfaces(seen_m, bands, forward, forward * free.half_width_tan, points)
+    return Surfaces(seen_m, bands, forward, forward * free.half_width_tan, points, noise)
 
 
 def floor_points(pose: PlanarPose, ahead_m: FloatArray, left_m: FloatArray) -> FloatArray:

@@ -18,7 +18,8 @@ OURS, PAPER, ZONES, FIELD = "ours", "paper", "zones", "field"
 
 def _ours(config: AppConfig, _: Stage) -> Decides:
     period_s = 1.0 / config.runner.control_rate_hz
-    return DecisionMaker(config.decision, config.robot, mount_of(config.robot), period_s)
+    mount, noise = mount_of(config.robot), config.perception.depth_noise
+    return DecisionMaker(config.decision, config.robot, mount, period_s, noise)
 
 
 _BUILDERS: dict[str, Callable[[AppConfig, Stage], Decides]] = {

@@ -23,6 +23,7 @@ def build_governor(config: AppConfig) -> SpeedGovernor:
         config.robot,
         mount_of(config),
         1.0 / config.runner.control_rate_hz,
+        config.perception.depth_noise,
     )
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
+from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.bodies import SceneError, bodies_of
 from controller.decide import DecisionMaker
@@ -70,10 +71,11 @@ class SpeedGovernor:
         robot: Robot,
         mount: CameraMount,
         period_s: float,
+        noise: DepthNoise = TYPICAL_DEPTH_NOISE,
     ) -> None:
         self._config, self._decision, self._robot, self._mount = config, decision, robot, mount
         self._latency_s = period_s + decision.chassis_delay_s
-        self._decide = DecisionMaker(decision, robot, mount, period_s)
+        self._decide = DecisionMaker(decision, robot, mount, period_s, noise)
         self._shape = SpeedShaper(robot.limits, period_s, decision.chassis_delay_s)
         self._ground = GroundMemory(robot, mount, decision)
         self._poses = PoseHistory()
@@ -204,7 +206,7 @@ class SpeedGovernor:
         path = arc_path(pose, *wanted, self._decision.sight.range_m, self._robot)
         on_start = OnPath(0.0, 0.0, 0.0)
         before = self._known
-        known = Knowledge(path, self._robot, self._mount, self._decision, _NEAR_EXTRA_M)
+        known = self._decide.knowledge(path, _NEAR_EXTRA_M)
         for scene in self._scenes:
             assert scene.robot_pose is not None
             if before is None or before.has_taken_in(scene):

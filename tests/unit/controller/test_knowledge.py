@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from config.app import ReplayConfig
 from config.decision import DecisionConfig
+from config.perception import DepthNoise, PerceptionConfig
 from config.robot import Robot
+from controller.build import build_replay_decision
 from controller.knowledge import Knowledge
 from controller.path import OnPath
 from hal.types import PlanarPose
@@ -61,3 +64,12 @@ def test_of_what_leaves_the_view_the_last_strip_is_not_all_that_is_remembered() 
     assert known.bodies.ids.tolist() == [5]
     assert known.remembered.tolist() == [True]
     assert known.bodies.half_across_m.tolist() == [0.25]
+
+
+def test_depth_is_as_noisy_as_the_configuration_says() -> None:
+    noise = DepthNoise(quadratic_per_m=0.002)
+    config = ReplayConfig(perception=PerceptionConfig(depth_noise=noise))
+    known = build_replay_decision(config, MOUNT).knowledge(PATH, 0.0)
+    bench = Bench()
+    known.update(bench.scene(), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
+    assert known.surfaces.noise == noise

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from config.perception import DepthNoise
 from controller.surfaces import bands_at, surfaces_of
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
@@ -30,6 +31,14 @@ def test_behind_a_body_depth_may_be_off_by_its_noise(forward_m: float, behind_m:
     """0.3 m, and 3.5 sigmas of 0.0075 z^2: 0.96 m 5 m away, 0.33 m 1 m away."""
     one = box(0.5 + forward_m - behind_m, 0.0, half_view_m=0.0, half_across_m=0.2)
     assert surfaces_of(ahead([forward_m], [forward_m]), HERE, MOUNT).of(one)[0, 0] == own
+
+
+def test_the_noise_is_that_of_the_camera() -> None:
+    """3.5 sigmas of 0.002 z^2 and 0.3 m are 0.475 m 5 m away."""
+    seen = surfaces_of(ahead([5.0], [5.0]), HERE, MOUNT, DepthNoise(quadratic_per_m=0.002))
+    for behind_m, own in ((0.47, True), (0.48, False)):
+        one = box(5.5 - behind_m, 0.0, half_view_m=0.0, half_across_m=0.2)
+        assert seen.of(one)[0, 0] == own
 
 
 def test_a_band_was_seen_to_its_surface_or_over_free_floor_or_not_at_all() -> None:
