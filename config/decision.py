@@ -79,6 +79,12 @@ class SightConfig(Section):
         default=1.3, ge=0, le=10, description="ahead of the camera, nearer than this the floor is not seen"
     )
     stale_s: float = Field(default=0.3, gt=0, le=5, description="an older scene leads to a stop")
+    blind_s: float = Field(
+        default=0.6,
+        ge=0,
+        le=5,
+        description="the robot brakes hard once the camera was not to be trusted for so long",
+    )
     degraded_mps: float = Field(default=0.5, ge=0, le=5, description="top speed with a degraded camera")
     memory_s: float = Field(
         default=1.0, ge=0, le=10, description="how long floor that was seen free counts as free"

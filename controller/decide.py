@@ -146,9 +146,10 @@ class DecisionMaker:
     def _camera_limits(self, known: Knowledge) -> list[Limit]:
         sight, limits = self._config.sight, self._robot.limits
         if known.fault:
-            # Blind among people who were moving a moment ago: comfort would be at their cost.
-            people = bool(known.bodies.moving.any())
-            return [Limit(0.0, Reason("camera", f"{known.fault}: stop"), urgent=people)]
+            # Blind among people who were moving a moment ago, or for so long that somebody may have come
+            # since: comfort would be at their cost.
+            urgent = bool(known.bodies.moving.any()) or known.since_s > sight.blind_s
+            return [Limit(0.0, Reason("camera", f"{known.fault}: stop"), urgent=urgent)]
         found = [self._range_limit(known, limits)]
         if known.health.condition is CameraCondition.DEGRADED:
             sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"

@@ -250,7 +250,7 @@ def _as_measured(bodies: Bodies, mistaken_mps: float) -> Bodies:
     squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
     # Along its way: v' C v / v'v is the variance there.
     variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
-    goes = ~bodies.moving & (bodies.age_s >= SETTLED_S) & (bodies.age_s < _NO_VERDICT_S)
+    goes = ~bodies.moving & (bodies.tracked_s >= SETTLED_S) & (bodies.tracked_s < _NO_VERDICT_S)
     goes &= (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
     goes &= squared <= mistaken_mps**2
     if not goes.any():

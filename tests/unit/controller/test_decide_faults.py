@@ -123,6 +123,20 @@ def test_a_blind_camera_teaches_nothing() -> None:
     assert seen.target_speed_mps < 0.5
 
 
+def test_who_sees_nothing_for_long_brakes_hard_though_nobody_was_there() -> None:
+    """A frozen camera, with a new stamp every 20 ms, and one that falls silent."""
+    covered = CameraHealth(CameraCondition.UNTRUSTWORTHY, "frozen", 0.9)
+    for silent in (False, True):
+        bench = Bench()
+        bench.settle()
+        last = bench.scene()
+        bench.step(last)
+        blind = [bench.step(last if silent else bench.scene(health=covered)) for _ in range(40)]
+        hard_s = [(AGE_NS + (2 + k) * STEP_NS) / 1e9 for k, found in enumerate(blind) if found.emergency]
+        assert min(hard_s) == pytest.approx(0.62)
+        assert not bench.step(bench.scene(), 0.1).emergency
+
+
 def test_the_pose_and_the_place_on_the_path_are_each_needed() -> None:
     nowhere = PlanarPose(math.nan, 0.0, 0.0)
     for pose, on_path, word in (

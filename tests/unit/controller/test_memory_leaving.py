@@ -215,6 +215,15 @@ def test_how_fast_any_obstacle_is_the_robots_limits_say(fastest_mps: float, goes
     assert known.bodies.moving.tolist() == [goes]
 
 
+def test_what_stood_where_something_stood_is_not_believed_before_it_was_measured_for_as_long() -> None:
+    pallet = measured(box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=0.6), 0.6)
+    renumbered = replace(pallet, tracked_s=np.array([0.4]))
+    for before, goes in ((pallet, True), (renumbered, False)):
+        seen = replace(no_bodies(0), captured_ns=FRAME_NS)
+        found = memory().update(before, seen, HERE, EDGE, False, NOTHING_SEEN)
+        assert found.moving.tolist() == [goes]
+
+
 def test_however_certainly_hardly_any_speed_is_no_going() -> None:
     assert out_of_view_after(0.5, left_mps=0.18, sigma_mps=0.02).moving.tolist() == [False]
     assert out_of_view_after(0.5, left_mps=0.22, sigma_mps=0.02).moving.tolist() == [True]
