@@ -72,6 +72,14 @@ def scenario_of(simulation: SimulationConfig, config_path: FilePath) -> Scenario
     return load_scenario(simulation.scenario)
 
 
+def path_spec(config: AppConfig, config_path: FilePath) -> tuple[str, PathSpec]:
+    """Where the route is written, and what is: the program's YAML, or the scenario. Raises ConfigError."""
+    if config.path is not None:
+        return str(config_path), config.path
+    assert config.simulation is not None, "AppConfig asks for a path or a simulation"
+    return config.simulation.scenario, scenario_of(config.simulation, config_path).path
+
+
 def build_path(config: AppConfig, config_path: FilePath) -> Path:
     """The route, from the program's YAML or from the scenario. Raises ConfigError, PathError.
 
@@ -79,10 +87,7 @@ def build_path(config: AppConfig, config_path: FilePath) -> Path:
     """
     if config.path is None and config.simulation is None:
         return straight_ahead(config.robot)
-    where, spec = str(config_path), config.path
-    if spec is None:
-        assert config.simulation is not None
-        where, spec = config.simulation.scenario, scenario_of(config.simulation, config_path).path
+    where, spec = path_spec(config, config_path)
     try:
         return Path(spec, config.robot)
     except PathError as error:

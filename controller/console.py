@@ -19,7 +19,8 @@ STEPS_SHOWN = 10
 
 
 class Console:
-    """Events and summary go to standard output, progress to standard error and only if that is a terminal."""
+    """Events and summary go to standard output; warnings to standard error, and progress if that is a
+    terminal."""
 
     def __init__(self, quiet: bool) -> None:
         self._quiet = quiet
@@ -72,6 +73,11 @@ class Console:
         if not self._quiet:
             self._clear()
             click.echo(line)
+
+    def warning(self, line: str) -> None:
+        """What a person should know before the drive: on standard error, and though the rest is quiet."""
+        self._clear()
+        click.echo(f"treadwatch: warning: {line}", err=True)
 
     def summary(self, rows: list[tuple[str, str]]) -> None:
         """The result, one row a subject."""

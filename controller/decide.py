@@ -17,7 +17,7 @@ from controller import braking
 from controller.appraise import Appraiser
 from controller.decision import Action, Decision, Reason
 from controller.knowledge import Knowledge
-from controller.limits import BLOCKING_RULES, STANDING_MPS, Limit, Motion, allowed
+from controller.limits import BLOCKING_RULES, STANDING_MPS, Limit, Motion, allowed, starts_at_mps
 from controller.path import OnPath, Path
 from controller.release import ReleaseGate
 from controller.situation import Situation
@@ -198,11 +198,10 @@ class DecisionMaker:
         release = self._config.release
         least = release.creep_mps
         if motion.v_mps <= STANDING_MPS:
-            go_mps = braking.speed_for_distance(release.go_m, self._comfort)
+            least = starts_at_mps(release, self._comfort)
             if limit.reason.rule == "worst case":
                 # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
-                go_mps = min(go_mps, self._config.prediction.beside_mps)
-            least = max(least, go_mps)
+                least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
     def _reason(self, watched: Limit, on_way: Limit, raw_mps: float, gated_mps: float) -> Reason:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from config.decision import Release
 from controller import braking
 from controller.braking import BrakeLimits
 from controller.decision import Reason
@@ -85,6 +86,11 @@ def stop_before(
     sentence = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: {allowed(speed)}"
     reason = Reason(rule, sentence, gap.obstacle_id, gap.distance_m, gap.closing_mps, required, spare)
     return Limit(speed, reason, urgent=motion.v_mps > 0.0 and spare < least_m - margin_m)
+
+
+def starts_at_mps(release: Release, comfort: BrakeLimits) -> float:
+    """No start from rest, where something blocks the way, for a way that allows less than this."""
+    return max(release.creep_mps, braking.speed_for_distance(release.go_m, comfort))
 
 
 def allowed(speed_mps: float) -> str:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path as FilePath
 
 from config.app import AppConfig, LockstepRunner, load_app
+from controller.blind_bends import blind_bend_warning
 from controller.build import (
     build_control,
     build_path,
@@ -39,6 +40,9 @@ def run_mission(options: MissionOptions) -> int:
             f"{options.config_path}: has a 'governor' and no path to drive; use `treadwatch govern`"
         )
     console = Console(options.quiet)
+    warning = blind_bend_warning(config, options.config_path)
+    if warning is not None:
+        console.warning(warning)
     if isinstance(config.runner, LockstepRunner):
         result = drive_lockstep(config, config.runner, options, console)
     else:
