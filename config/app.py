@@ -42,6 +42,11 @@ class LockstepRunner(Section):
         default=0.060, ge=0, le=1, description="from exposure until the decision can use the scene"
     )
     max_duration_s: float = Field(default=300.0, gt=0, description="give up after this much time")
+    max_standing_s: float = Field(
+        default=120.0,
+        gt=0,
+        description="give up once the robot has stood for so long; nobody comes to help it",
+    )
 
 
 class RealtimeRunner(Section):

@@ -18,6 +18,7 @@ from controller.build import (
 )
 from controller.build_chassis import build_base
 from controller.console import Console
+from controller.ending import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.realtime_mission import drive_realtime
@@ -110,6 +111,9 @@ def drive_lockstep(
                 run_recorder.saw(look)
             run_recorder.decided(step)
             report(console, result, step)
+            if result.standstill.lasted_s(step.now_ns) >= runner.max_standing_s:
+                given_up = f"stood for runner.max_standing_s of {runner.max_standing_s:g} s"
+                loop.request_stop(given_up, Outcome.BROKEN_OFF)
             if stop:
                 loop.request_stop(f"{stop.reason} received")
         run_recorder.finish()

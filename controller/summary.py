@@ -70,7 +70,8 @@ def punctuality_text(punctuality: Punctuality) -> str:
 
 def _mission_text(config: AppConfig, result: MissionResult) -> str:
     outcome = result.loop.ending.outcome
-    ended = "given up: max_duration_s is over" if outcome is None else outcome.value
+    over = f"given up: runner.max_duration_s of {config.runner.max_duration_s} s is over"
+    ended = over if outcome is None else outcome.value
     if outcome is not Outcome.REACHED and result.loop.ending.stop_reason:
         ended += f" ({result.loop.ending.stop_reason})"
     length_m = 0.0 if result.last is None else result.last.progress_m

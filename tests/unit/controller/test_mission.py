@@ -6,6 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
+
+from config.loader import CONFIG_DIR
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
@@ -54,10 +57,20 @@ def test_a_contact_is_told_and_makes_the_exit_code_1() -> None:
     assert rows(done)["contacts"].startswith("1 with hurrier")
 
 
+def test_a_simulated_robot_that_waits_without_end_is_given_up(tmp_path: Path) -> None:
+    config = yaml.safe_load((CONFIG_DIR / "sim.yaml").read_text())
+    config["runner"]["max_standing_s"] = 3.0
+    (tmp_path / "sim.yaml").write_text(yaml.safe_dump(config))
+    done = run("--config", tmp_path / "sim.yaml", "--scenario", SCENARIOS / "blocked.yaml", "--quiet")
+    assert done.returncode == 1, done.stdout + done.stderr
+    told = rows(done)
+    assert "broken off (stood for runner.max_standing_s of 3 s)" in told["mission"]
+    # It waits for the last 3 s, and for half a second of being sure that it stands.
+    assert float(told["mission"].partition(" m in ")[2].partition(" s")[0]) < 12.0
+
+
 @pytest.mark.parametrize("config", ["sim-roboclaw.yaml"])
 def test_another_chassis_is_another_yaml(config: str) -> None:
-    from config.loader import CONFIG_DIR
-
     done = run("--config", CONFIG_DIR / config, "--scenario", SCENARIOS / "short_crossing.yaml", "--quiet")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "target reached" in rows(done)["mission"]
