@@ -86,15 +86,21 @@ def _target_text(result: MissionResult) -> str:
     if result.last is None:
         return "not known"
     left_m = result.loop.path.length_m - result.last.progress_m
-    text = (
-        f"{100 * left_m:+.1f} cm to go by odometry, {100 * abs(result.last.lateral_m):.1f} cm beside the path"
-    )
+    beside_m = abs(result.last.lateral_m)
+    text = f"{length_text(left_m, '+')} to go by odometry, {length_text(beside_m)} beside the path"
     if result.simulation is not None:
         target = result.loop.path.pose(result.loop.path.length_m)
         truth = result.simulation.body_pose
         off_m = math.hypot(target.x_m - truth.x_m, target.y_m - truth.y_m)
-        text += f"; truly {100 * off_m:.1f} cm from the target point"
+        text += f"; truly {length_text(off_m)} from the target point"
     return text
+
+
+def length_text(length_m: float, sign: str = "") -> str:
+    """In centimetres, where they matter, and in metres from one metre on. sign: "+" writes that, too."""
+    if round(abs(length_m), 3) < 1.0:
+        return f"{100.0 * length_m:{sign}.1f} cm"
+    return f"{length_m:{sign}.2f} m"
 
 
 def contact_text(simulation: Simulation) -> str:

@@ -8,7 +8,7 @@ from controller.build import build_control
 from controller.console import Console
 from controller.result import MissionResult
 from controller.shape import SpeedShaper
-from controller.summary import report, summary_rows
+from controller.summary import length_text, report, summary_rows
 from controller.tally import SetpointTally, TimingTally
 from hal.types import ChassisState, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
@@ -50,6 +50,18 @@ def test_a_mission_that_gets_nowhere_tells_why(capsys: pytest.CaptureFixture[str
     assert all(line.endswith(reason) for line in told)
     rows = dict(summary_rows(load_app(CONFIG_PATH), result))
     assert rows["standing"] == f"for the last 21.0 s: {reason}"
+    left_m = result.loop.path.length_m - result.last.progress_m
+    assert left_m > 1.0
+    assert rows["target"].startswith(f"+{left_m:.2f} m to go by odometry, 0.0 cm beside the path")
+
+
+def test_far_is_told_in_metres_and_near_in_centimetres() -> None:
+    assert length_text(5.023, "+") == "+5.02 m"
+    assert length_text(-1.0, "+") == "-1.00 m"
+    assert length_text(0.9996) == "1.00 m"
+    assert length_text(0.0213, "+") == "+2.1 cm"
+    assert length_text(-0.004, "+") == "-0.4 cm"
+    assert length_text(0.994) == "99.4 cm"
 
 
 def test_a_shaper_that_had_to_brake_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
