@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from controller.result import MissionOptions
 
 FILE = click.Path(path_type=Path, dir_okay=False)
+FILE_OR_DASH = click.Path(path_type=Path, dir_okay=False, allow_dash=True)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 FOLDER_OR_FILE = click.Path(path_type=Path)
 BASES = click.Choice(["agilex", "roboclaw", "roboteq", "kobuki"])
@@ -57,7 +58,9 @@ def recording_options(command: Callable[..., None]) -> Callable[..., None]:
     return _in_this_order(
         command,
         click.option(
-            "--observations", type=FILE, help="Write what is seen and decided, one JSON line a frame."
+            "--observations",
+            type=FILE_OR_DASH,
+            help="Write what is seen and decided, one JSON line a frame; -: to standard output.",
         ),
         click.option("--video", type=FILE, help="Write an annotated video (.mp4, .webm or .avi)."),
         click.option("--quiet", is_flag=True, help="Only the summary."),

@@ -20,10 +20,10 @@ STEPS_SHOWN = 10
 
 class Console:
     """Events and summary go to standard output; warnings to standard error, and progress if that is a
-    terminal."""
+    terminal. aside: all of it to standard error, since standard output is for the observations."""
 
-    def __init__(self, quiet: bool) -> None:
-        self._quiet = quiet
+    def __init__(self, quiet: bool, aside: bool = False) -> None:
+        self._quiet, self._aside = quiet, aside
         self._live = sys.stderr.isatty() and not quiet
         self._calls = 0
         self._said: tuple[str, int | None] | None = None
@@ -72,7 +72,7 @@ class Console:
         """A line that stays."""
         if not self._quiet:
             self._clear()
-            click.echo(line)
+            click.echo(line, err=self._aside)
 
     def warning(self, line: str) -> None:
         """What a person should know before the drive: on standard error, and though the rest is quiet."""
@@ -84,7 +84,7 @@ class Console:
         self._clear()
         width = max(len(name) for name, _ in rows)
         for name, text in rows:
-            click.echo(f"{name:<{width}}  {text}")
+            click.echo(f"{name:<{width}}  {text}", err=self._aside)
 
     def _clear(self) -> None:
         if self._live:

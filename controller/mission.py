@@ -21,6 +21,7 @@ from controller.console import Console
 from controller.ending import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
+from controller.observations import STANDARD_OUTPUT
 from controller.realtime_mission import drive_realtime
 from controller.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.result import MissionOptions, MissionResult
@@ -40,7 +41,7 @@ def run_mission(options: MissionOptions) -> int:
         raise UserError(
             f"{options.config_path}: has a 'governor' and no path to drive; use `treadwatch govern`"
         )
-    console = Console(options.quiet)
+    console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     warning = blind_bend_warning(config, options.config_path)
     if warning is not None:
         console.warning(warning)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TextIO
@@ -13,6 +14,10 @@ from controller.errors import UserError
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray
 from vision.scene import Obstacle, Scene
+
+# `--observations -`.
+STANDARD_OUTPUT = Path("-")
+_STDOUT_FD = 1
 
 
 def observation(scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> dict[str, Any]:
@@ -62,20 +67,27 @@ def _number(value: float, digits: int) -> float | None:
 
 class ObservationFile:
     """Writes JSON lines to a file as they come. Context manager. What the file held goes with the first line,
-    not before: where nothing is seen, nothing is lost."""
+    not before: where nothing is seen, nothing is lost.
+
+    path: STANDARD_OUTPUT writes there, each line at once, for the program at the other end of a pipe.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._streams = path == STANDARD_OUTPUT
+        self._name = "standard output" if self._streams else str(path)
         self._file: TextIO | None = None
         self._has_written = False
 
     def __enter__(self) -> Self:
         """Open or create the file. Raises UserError where that is not possible."""
         try:
-            self._file = self._path.open("a", encoding="utf-8")
+            # A file object of its own: what a reader who has gone leaves unwritten is nobody else's to write.
+            where = os.dup(_STDOUT_FD) if self._streams else self._path
+            self._file = open(where, "a", encoding="utf-8")
         except OSError as error:
             raise UserError(
-                f"{self._path}: observations cannot be written there ({error.strerror}); "
+                f"{self._name}: observations cannot be written there ({error.strerror}); "
                 "name a file in a folder that exists and that you may write to"
             ) from error
         return self
@@ -97,14 +109,18 @@ class ObservationFile:
         assert self._file is not None, "ObservationFile is used inside its with block"
         line = json.dumps(observation(scene, decision, timing_ms), separators=(", ", ": "), allow_nan=False)
         try:
-            if not self._has_written and self._path.is_file():
+            if not (self._has_written or self._streams) and self._path.is_file():
                 self._file.truncate(0)
             self._has_written = True
             self._file.write(line + "\n")
+            if self._streams:
+                self._file.flush()
         except OSError as error:
             raise self._failed(error) from error
 
     def _failed(self, error: OSError) -> UserError:
+        if isinstance(error, BrokenPipeError):
+            return UserError(f"{self._name}: whoever read the observations has gone; name a file for them")
         return UserError(
-            f"{self._path}: nothing more can be written ({error.strerror}); make room or name another file"
+            f"{self._name}: nothing more can be written ({error.strerror}); make room or name another file"
         )

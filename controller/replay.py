@@ -25,6 +25,7 @@ from controller.console import Console
 from controller.decide import DecisionMaker
 from controller.decision import Decision
 from controller.errors import UserError
+from controller.observations import STANDARD_OUTPUT
 from controller.path import OnPath, Path
 from controller.perceive import Look
 from controller.recorder import RecordingOptions, open_recorder
@@ -109,7 +110,7 @@ def run_replay(options: ReplayOptions) -> None:
     """Every frame through detect, track and decide. Raises ConfigError, HalError, UserError."""
     config = load_replay(options.config_path)
     _refuse_overwriting(options)
-    console = Console(options.quiet)
+    console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     source, odometry = open_replay(options.recording, options.odometry, options.topics)
     mount = recorded_mount(config, source.mount)
     perceiver = build_replay_perceiver(config, mount, odometry, time.perf_counter_ns)
@@ -146,7 +147,8 @@ def run_replay(options: ReplayOptions) -> None:
 
 def _refuse_overwriting(options: ReplayOptions) -> None:
     """Raises UserError where an output is the recording, a file of it, or the other output."""
-    outputs = [path for path in (options.observations, options.video) if path is not None]
+    given = (options.observations, options.video)
+    outputs = [path for path in given if path is not None and path != STANDARD_OUTPUT]
     if len({path.absolute() for path in outputs}) < len(outputs):
         raise UserError(f"{outputs[0]}: is to hold the observations and the video; name two files")
     recording = os.path.realpath(options.recording)

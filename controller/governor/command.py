@@ -15,6 +15,7 @@ from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
 from controller.mission import with_overrides
+from controller.observations import STANDARD_OUTPUT
 from controller.realtime import Punctuality
 from controller.realtime_rig import realtime_rig
 from controller.result import MissionOptions
@@ -65,7 +66,7 @@ def run_governor(options: MissionOptions) -> int:
     if config.governor is None:
         raise UserError(f"{options.config_path}: has no 'governor' section; add one (docs/governor.md)")
     assert isinstance(config.runner, RealtimeRunner), "a governor in lock-step is refused by AppConfig"
-    console = Console(options.quiet)
+    console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
     governing = _govern(config, config.governor, config.runner, options, console)
     console.summary(_summary_rows(config, governing))
     return 0 if governing.succeeded else 1

@@ -1,12 +1,17 @@
 import json
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
+from config.loader import CONFIG_DIR
 from controller.decision import Action, Decision, Reason
 from controller.errors import UserError
-from controller.observations import ObservationFile, observation
+from controller.observations import STANDARD_OUTPUT, ObservationFile, observation
 from tests.support.scenes import obstacle, scene
 
 SLOW = Decision(Action.DECREASE, 0.61999, Reason("crossing", "person 3 crosses in 2.1 s", obstacle_id=3))
@@ -99,3 +104,51 @@ def write_frames(count: int) -> None:
     with ObservationFile(Path("/dev/full")) as sink:
         for number in range(count):
             sink.write(scene(sequence=number), SLOW, {})
+
+
+def test_standard_output_gets_each_line_at_once(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "-").write_text("a file of this name is another thing\n")
+    with ObservationFile(STANDARD_OUTPUT) as sink:
+        for number in (0, 1):
+            sink.write(scene(sequence=number), SLOW, {})
+            assert json.loads(capfd.readouterr().out)["frame"] == number
+    os.write(1, b"still open\n")
+    assert capfd.readouterr().out == "still open\n"
+    assert (tmp_path / "-").read_text() == "a file of this name is another thing\n"
+
+
+@pytest.mark.parametrize("command", ["replay", "run"])
+def test_a_pipe_gets_observations_and_nothing_else(command: str, tmp_path: Path) -> None:
+    recording = Path(__file__).resolve().parents[2] / "recordings" / "desk_rpy"
+    config = yaml.safe_load((CONFIG_DIR / "sim.yaml").read_text())
+    config["runner"]["max_duration_s"] = 0.7
+    (tmp_path / "sim.yaml").write_text(yaml.safe_dump(config))
+    arguments = [str(recording)] if command == "replay" else ["--config", str(tmp_path / "sim.yaml")]
+    done = subprocess.run(
+        [sys.executable, "-m", "controller", command, *arguments, "--observations", "-"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    frames = [json.loads(line)["frame"] for line in done.stdout.splitlines()]
+    assert len(frames) >= 10
+    assert frames == sorted(frames)
+    assert "perception" in done.stderr
+
+
+def test_a_reader_that_leaves_is_told_in_one_line() -> None:
+    recording = Path(__file__).resolve().parents[2] / "recordings" / "desk_rpy"
+    command = [sys.executable, "-m", "controller", "replay", str(recording), "--observations", "-", "--quiet"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        told = process.stderr.read()
+        assert process.wait(timeout=120) == 2
+    assert told == (
+        "treadwatch: standard output: whoever read the observations has gone; name a file for them\n"
+    )
