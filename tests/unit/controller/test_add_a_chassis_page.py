@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 from typing import get_args
 
 import pytest
+import yaml
 from click import Context
 
 from config.chassis import ChassisConfig
@@ -16,7 +22,7 @@ from controller.emulate import FAULTS
 from controller.faults.trials import KINDS as EVERY_BASE
 from hal.chassis.driver import ChassisDriver, Told
 from tests.support.contract_rigs import EMULATED
-from tests.support.page_chassis import CODE, page_module
+from tests.support.page_chassis import CHANGES, FILES, page_module, paste
 
 ROOT = CONFIG_DIR.parent
 PAGE = (ROOT / "docs" / "add-a-chassis.md").read_text()
@@ -73,14 +79,50 @@ def test_the_commands_it_gives() -> None:
 
 
 def test_the_code_of_the_page_is_one_chassis_in_the_contract_suite() -> None:
-    assert len(CODE) == 5, "config, bytes, feedback, driver, emulator"
-    assert max(len(line) for block in CODE for line in block.splitlines()) <= 110
+    assert len(FILES) == 4, "bytes, feedback, driver, emulator"
+    assert len(CHANGES) == 3, "config, composition, kinds"
+    assert PAGE.count("```python") + PAGE.count("```diff") == 7, "every block says which file it is"
     assert {"page-scripted", "page-pty"} < set(EMULATED)
     page = page_module()
     assert issubclass(page.MinitrackChassis, ChassisDriver)
     assert page.drive(0.5, -0.25) == b"D 500 -250*DD\n"
     assert page.parse(b"S 1 -2 3 240*2C") == page.Status(1, -2, 3, 24.0)
     assert page.parse(b"S 1 -2 3 240*FC") is None
+
+
+def test_what_is_pasted_from_the_page_passes_the_checks_and_drives(tmp_path: Path) -> None:
+    paste(tmp_path)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    ruff = [sys.executable, "-m", "ruff"]
+    for check in (["check", "--no-cache", "."], ["format", "--no-cache", "--check", "."]):
+        done = subprocess.run([*ruff, *check], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    config = yaml.safe_load(read("config/sim.yaml"))
+    config["chassis"] = {
+        "kind": "minitrack",
+        "link": {"url": "loop://"},
+        "counts_per_m": 2000.0,
+        "track_width_m": 0.555,
+        "slip_factor": 1.1,
+    }
+    config["runner"]["max_duration_s"] = 3.0
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(config))
+    command = [sys.executable, "-P", "-m", "controller", "run", "--config", "mine.yaml", "--quiet"]
+    done = subprocess.run(
+        command,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    # It does not get to the end in 3 s, but it drives, as it is told to.
+    assert done.returncode == 1, done.stdout + done.stderr
+    driven_m = re.search(r"is over; ([0-9.]+) m in", done.stdout)
+    assert driven_m is not None, done.stdout + done.stderr
+    assert float(driven_m[1]) > 0.5
+    assert "limits      kept" in done.stdout
 
 
 STEPS = {
