@@ -15,6 +15,7 @@ from controller.cli_options import (
     BASES,
     FOLDER_OR_FILE,
     ODOMETRY,
+    WholeNumber,
     config_option,
     mission_options,
     recording_options,
@@ -111,7 +112,7 @@ def envelope(config_path: Path) -> None:
     help="CAN: can0, vcan0, a multicast group. Serial: a path that becomes the port. Default: as in FILE.",
 )
 @click.option("--interface", help="CAN: another python-can interface than the channel suggests.")
-@click.option("--port", type=click.IntRange(1024, 65535), help="CAN over multicast: the UDP port.")
+@click.option("--port", type=WholeNumber(1024, 65535), help="CAN over multicast: the UDP port.")
 @config_option("whose chassis and simulation.plant it plays", None, "the hil-KIND.yaml that ships")
 @click.option("--tell", is_flag=True, help="Say ten times a second how the base moves.")
 def emulate(

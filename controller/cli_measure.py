@@ -16,6 +16,7 @@ from controller.cli_options import (
     FOLDER,
     FOLDER_OR_FILE,
     ODOMETRY,
+    WholeNumber,
     config_option,
     first_seed,
     no_progress_bar,
@@ -27,14 +28,14 @@ from controller.errors import UserError
 @click.command()
 @click.option("--json", "json_path", type=FILE, help="Also write every figure as JSON.")
 @click.option(
-    "--frames", type=click.IntRange(min=10), default=150, show_default=True,
+    "--frames", type=WholeNumber(min=10), default=150, show_default=True,
     help="Length of each simulated reel.",
 )  # fmt: skip
 @click.option(
     "--period", is_flag=True, help="Instead: the command period in real time, perception at full load."
 )
 @click.option(
-    "--seconds", type=click.IntRange(5, 60), default=30, show_default=True,
+    "--seconds", type=WholeNumber(5, 60), default=30, show_default=True,
     help="With --period: how long, with ordinary scheduling and again with SCHED_FIFO.",
 )  # fmt: skip
 def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> None:
@@ -71,7 +72,7 @@ def bench(json_path: Path | None, frames: int, period: bool, seconds: float) -> 
 )  # fmt: skip
 @click.option("--only", multiple=True, metavar="NAME", help="Simulated set: this sequence; may be repeated.")
 @click.option(
-    "--workers", type=click.IntRange(1, 64), default=min(os.cpu_count() or 1, 8), show_default=True,
+    "--workers", type=WholeNumber(1, 64), default=min(os.cpu_count() or 1, 8), show_default=True,
     help="Processes that share the simulated set.",
 )  # fmt: skip
 @no_progress_bar
@@ -100,14 +101,14 @@ def evaluate(
 @click.command()
 @config_option("of robot, camera, chassis, perception and decision")
 @click.option(
-    "--missions", type=click.IntRange(min=1), default=260, show_default=True,
+    "--missions", type=WholeNumber(min=1), default=260, show_default=True,
     help="How many, spread evenly over the families.",
 )  # fmt: skip
 @click.option("--families", metavar="A,B,...", help="Scenario families; all of them by default.")
 @click.option("--policies", metavar="A,B,...", help="ours, paper, zones, field; all of them by default.")
 @perception_mode("noise")
 @click.option(
-    "--workers", type=click.IntRange(1, 256), default=min(os.cpu_count() or 1, 8), show_default=True,
+    "--workers", type=WholeNumber(1, 256), default=min(os.cpu_count() or 1, 8), show_default=True,
     help="Processes that share the missions.",
 )  # fmt: skip
 @first_seed(1)
@@ -160,7 +161,7 @@ def _names(option: str, text: str | None) -> tuple[str, ...]:
 
 @click.command("stop-and-go")
 @config_option("of robot, camera, chassis, perception and decision")
-@click.option("--drives", type=click.IntRange(1, 10_000), default=8, show_default=True, help="How often.")
+@click.option("--drives", type=WholeNumber(1, 10_000), default=8, show_default=True, help="How often.")
 @first_seed(0)
 @perception_mode("camera")
 @click.option(

@@ -15,6 +15,13 @@ from config.loader import CONFIG_DIR
 if TYPE_CHECKING:
     from controller.result import MissionOptions
 
+
+class WholeNumber(click.IntRange):
+    """click.IntRange, which calls what is no number at all no valid "integer range"."""
+
+    name = "whole number"
+
+
 FILE = click.Path(path_type=Path, dir_okay=False)
 FILE_OR_DASH = click.Path(path_type=Path, dir_okay=False, allow_dash=True)
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -41,7 +48,7 @@ def config_option(
 def first_seed(default: int) -> Option:
     """--seed of the first of many drives."""
     return click.option(
-        "--seed", type=click.IntRange(min=0), default=default, show_default=True, help="The first seed."
+        "--seed", type=WholeNumber(min=0), default=default, show_default=True, help="The first seed."
     )
 
 
@@ -95,7 +102,7 @@ def mission_options(command: Callable[[MissionOptions], None]) -> Callable[..., 
         click.option(
             "--scenario", help="Simulation only: another world, a YAML file or the name of one that ships."
         ),
-        click.option("--seed", type=click.IntRange(min=0), help="Simulation only: another seed."),
+        click.option("--seed", type=WholeNumber(min=0), help="Simulation only: another seed."),
         click.option(
             "--record", type=FOLDER, help="Write the frames and the odometry, for `treadwatch replay`."
         ),

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from os.path import realpath
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from config.robot import Body
 from controller.control import ControlStep
 from controller.decision import Decision
+from controller.errors import UserError
 from controller.frame_recorder import FrameRecorder
 from controller.observations import ObservationFile
 from controller.path import Path
@@ -99,8 +101,15 @@ class Recorder:
             self._video.write(self._composer.compose(moment))
 
 
+def require_two_files(observations: FilePath | None, video: FilePath | None) -> None:
+    """Raises UserError where both name the same file: each would write over the other."""
+    if observations is not None and video is not None and realpath(observations) == realpath(video):
+        raise UserError(f"{observations}: is to hold the observations and the video; name two files")
+
+
 def require_writable(options: RecordingOptions) -> None:
     """Before a robot is armed for a drive that another process records. Raises UserError, HalError."""
+    require_two_files(options.observations, options.video)
     if options.observations is not None:
         with ObservationFile(options.observations):
             pass
@@ -113,6 +122,7 @@ def require_writable(options: RecordingOptions) -> None:
 @contextmanager
 def open_recorder(options: RecordingOptions, surroundings: Surroundings) -> Iterator[Recorder]:
     """A recorder whose files are complete when the block ends. Raises VideoError, UserError, HalError."""
+    require_two_files(options.observations, options.video)
     with ExitStack() as files:
         observations = video = frames = None
         if options.observations is not None:

@@ -28,7 +28,7 @@ from controller.errors import UserError
 from controller.observations import STANDARD_OUTPUT
 from controller.path import OnPath, Path
 from controller.perceive import Look
-from controller.recorder import RecordingOptions, open_recorder
+from controller.recorder import RecordingOptions, open_recorder, require_two_files
 from controller.situation import Situation
 from controller.tally import TimingTally
 from hal.cameras.bag_topics import WantedTopics
@@ -149,8 +149,7 @@ def _refuse_overwriting(options: ReplayOptions) -> None:
     """Raises UserError where an output is the recording, a file of it, or the other output."""
     given = (options.observations, options.video)
     outputs = [path for path in given if path is not None and path != STANDARD_OUTPUT]
-    if len({path.absolute() for path in outputs}) < len(outputs):
-        raise UserError(f"{outputs[0]}: is to hold the observations and the video; name two files")
+    require_two_files(options.observations, options.video)
     recording = os.path.realpath(options.recording)
     for path in outputs:
         real = os.path.realpath(path)

@@ -133,6 +133,9 @@ def test_a_scenario_file_is_looked_for_where_the_shell_stands(
     ("arguments", "words"),
     [
         (("run", "--sed", "3"), "No such option '--sed'"),
+        (("run", "--seed", "two"), "Invalid value for '--seed': 'two' is not a valid whole number"),
+        (("run", "--seed", "-2"), "Invalid value for '--seed': -2 is not in the range x>=0"),
+        (("campaign", "--missions", "x", "--report", "r"), "'x' is not a valid whole number"),
         (("run", "--config", "/"), "Invalid value for '--config': File '/' is a directory"),
         (("fly",), "No such command 'fly'"),
         (("replay",), "Missing argument 'RECORDING'"),
@@ -204,6 +207,15 @@ def test_what_cannot_be_recorded_is_told_before_a_robot_is_armed(
 ) -> None:
     message = refusal("run", "--config", CONFIG_DIR / "sim-realtime.yaml", option, recording / name)
     assert told in message
+
+
+@pytest.mark.parametrize("config", ["sim.yaml", "sim-realtime.yaml"])
+def test_two_outputs_of_a_drive_in_one_file(config: str, tmp_path: Path) -> None:
+    (tmp_path / "also.mp4").symlink_to(tmp_path / "both.mp4")
+    outputs = ("--observations", tmp_path / "both.mp4", "--video", tmp_path / "also.mp4")
+    message = refusal("run", "--config", CONFIG_DIR / config, *outputs)
+    assert "both.mp4: is to hold the observations and the video; name two files" in message
+    assert not (tmp_path / "both.mp4").exists()
 
 
 def test_a_recording_in_place_of_the_camera_that_is_none(tmp_path: Path) -> None:
