@@ -8,6 +8,10 @@ from pydantic import Field, model_validator
 
 from config.loader import Section
 
+# A D435i's colour camera, 1920x1080: its focal length in image heights, and no mode is wider than all of it.
+_D435I_FOCAL = 1.28
+_D435I_ASPECT = 16.0 / 9.0
+
 # Of a recording's poses; auto: odometry.txt if the recording has one.
 OdometryChoice = Literal["auto", "file", "none", "groundtruth"]
 
@@ -27,6 +31,11 @@ class ReplayCameraConfig(Section):
         default=None, min_length=1, description="bags: the colour images, if they are not found"
     )
     depth_topic: str | None = Field(default=None, min_length=1, description="bags: the same of depth")
+
+    @property
+    def edge_tangents(self) -> None:
+        """See SimulatedCameraConfig: only the recording knows, once it is open."""
+        return None
 
 
 class RealsenseCameraConfig(Section):
@@ -49,6 +58,12 @@ class RealsenseCameraConfig(Section):
     start_timeout_s: float = Field(
         default=5.0, gt=0, le=60, description="how long to wait for the first frame"
     )
+
+    @property
+    def edge_tangents(self) -> tuple[float, float]:
+        """See SimulatedCameraConfig; nominal: the camera tells its own only once it runs."""
+        half = 0.5 * min(self.width / self.height, _D435I_ASPECT) / _D435I_FOCAL
+        return half, half
 
 
 class SimulatedCameraConfig(Section):
@@ -82,6 +97,11 @@ class SimulatedCameraConfig(Section):
     colour_noise: bool = True
     vibration_deg: float = Field(default=0.0, ge=0, le=5, description="amplitude of a pitching to and fro")
     vibration_hz: float = Field(default=8.0, gt=0, le=100)
+
+    @property
+    def edge_tangents(self) -> tuple[float, float]:
+        """Tangents of the angles from the axis to the left and the right edge of the image, both positive."""
+        return (self.cx + 0.5) / self.fx, (self.width - 0.5 - self.cx) / self.fx
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -15,7 +15,6 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from config.app import AppConfig
-from config.camera import CameraConfig, RealsenseCameraConfig, SimulatedCameraConfig
 from config.decision import DecisionConfig
 from config.path import ArcSpec, LineSpec, PathSpec
 from config.robot import Robot
@@ -37,9 +36,6 @@ _RUN_IN_M = 3.0
 # Floor is known in cells of 0.2 m, and no drive is as straight, no scan as complete as in thought.
 _SPARE_M = 0.2
 _BANDS = 80
-# A D435i's colour camera, 1920x1080: its focal length in image heights, and no mode is wider than all of it.
-_D435I_FOCAL = 1.28
-_D435I_ASPECT = 16.0 / 9.0
 _WIDEST_BEND_M = 20.0
 _TO_THE_CM = 0.05
 
@@ -72,23 +68,12 @@ class BlindBend:
 
 def view_of(config: AppConfig) -> View | None:
     """What the camera of this configuration sees at most; None: only its recording knows."""
-    tangents = _tangents(config.camera)
+    tangents = config.camera.edge_tangents
     if tangents is None:
         return None
     level = math.cos(config.robot.camera_mount.pitch_rad)
     range_m = min(config.decision.sight.range_m, config.perception.max_depth_m)
     return View(tangents[0] / level, tangents[1] / level, range_m)
-
-
-def _tangents(camera: CameraConfig) -> tuple[float, float] | None:
-    match camera:
-        case SimulatedCameraConfig():
-            return (camera.cx + 0.5) / camera.fx, (camera.width - 0.5 - camera.cx) / camera.fx
-        case RealsenseCameraConfig():
-            half = 0.5 * min(camera.width / camera.height, _D435I_ASPECT) / _D435I_FOCAL
-            return half, half
-        case _:
-            return None
 
 
 def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
