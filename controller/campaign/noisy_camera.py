@@ -1,7 +1,8 @@
 """Scenes made from the truth, with the errors of a real perception: fast, in place of camera and vision.
 
 What is modelled, and from where the numbers are:
-* the field of view, the depth range, what stands before what (controller/campaign/view.py);
+* the field of view, the depth range, what stands before what (controller/campaign/view.py); of what is nearer
+  than the least depth nothing is measured;
 * depth noise sigma = 0.0075 z^2 per pixel (measured on a real RealSense), of which a tracked body keeps a
   quarter as a wandering error, and of which the nearest surface of a band, being the third smallest of some
   twenty cells, shows its near tail;
@@ -67,7 +68,7 @@ class NoisyCamera:
         self, stage: Stage, camera: SimulatedCameraConfig, seed: int, noise: NoiseModel | None = None
     ) -> None:
         self._stage, self._noise = stage, noise or NoiseModel()
-        self._period_s = 1.0 / camera.fps
+        self._period_s, self._least_m = 1.0 / camera.fps, camera.depth_min_m
         unmoved = Pose(np.eye(3), np.zeros(3))
         self._ego_motion = EgoMotion(unmoved, self._period_s, "none", math.nan, math.nan, math.nan)
         mount = stage.robot.camera_mount
@@ -123,7 +124,7 @@ class NoisyCamera:
         """Take in what this frame shows."""
         noise = self._noise
         missed = self._random.random(len(self._ids)).tolist()
-        hits = view.forward_m
+        hits = np.where(view.forward_m >= self._least_m, view.forward_m, np.inf)
         rows = ((hits.min(axis=1) < np.inf) & ~self._glass[view.bodies]).nonzero()[0]
         z = hits.take(rows, 0)
         shown = z < np.inf
@@ -227,9 +228,11 @@ class NoisyCamera:
         nearest = np.where(hidden < nearest, np.inf, nearest)
         z = np.where(np.isfinite(nearest), nearest, 0.0)
         errors = noise.surface_sigmas * self._random.standard_normal(len(z)) - noise.surface_bias_sigmas
-        nearest = np.maximum(nearest + noise.depth_sigma_1pm * z * z * errors, 0.1)
+        nearest = nearest + noise.depth_sigma_1pm * z * z * errors
         nearest = np.where(nearest < eye.range_m, nearest, np.inf)
         known = np.minimum(np.minimum(np.minimum(view.free_m, hidden), eye.range_m), nearest)
+        blind = nearest < self._least_m
+        nearest, known = np.where(blind, np.inf, nearest), np.where(blind, 0.0, known)
         return FreeSpace(eye.bearing_tan, eye.half_width_tan, nearest, known)
 
 

@@ -140,6 +140,16 @@ def test_what_the_robot_can_drive_over_or_under_is_no_surface() -> None:
         assert np.isinf(scenes(stage(body), 1, QUIET)[0].free_space.nearest_m).all()
 
 
+def test_of_what_is_nearer_than_the_least_depth_nothing_is_measured() -> None:
+    """A crate of 0.6 m before a camera that sits 0.45 m ahead of the robot's middle."""
+    for gap_m, seen in ((CAMERA.depth_min_m + 0.02, True), (CAMERA.depth_min_m - 0.02, False)):
+        last = scenes(stage(crate(0.45 + gap_m + 0.3)), 5, QUIET)[-1]
+        assert len(last.obstacles) == seen
+        middle = len(last.free_space.nearest_m) // 2
+        assert np.isfinite(last.free_space.nearest_m[middle]) == seen
+        assert last.free_space.known_m[middle] <= (gap_m if seen else 0.0)
+
+
 def test_glass_is_neither_obstacle_nor_surface_and_nothing_is_known_behind_it() -> None:
     made = stage(crate(5.0, size_m=1.0), faults=Faults(glass=("crate",)))
     last = scenes(made, 5, QUIET)[-1]
