@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import os
 import re
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import get_args
 
@@ -22,11 +18,9 @@ from controller.emulate import FAULTS
 from controller.faults.trials import KINDS as EVERY_BASE
 from hal.chassis.driver import ChassisDriver, Told
 from tests.support.contract_rigs import EMULATED
-from tests.support.page_chassis import CHANGES, FILES, page_module, paste
+from tests.support.page_chassis import PAGE, page_module
+from tests.support.pages import ROOT, complaints_of_ruff, python_in
 
-ROOT = CONFIG_DIR.parent
-PAGE = (ROOT / "docs" / "add-a-chassis.md").read_text()
-QUOTED = re.findall(r"`([^`\n]+)`", PAGE)
 CONFIGS = get_args(get_args(ChassisConfig)[0])
 KINDS = {get_args(config.model_fields["kind"].annotation)[0]: config for config in CONFIGS}
 
@@ -36,52 +30,48 @@ def read(path: str) -> str:
 
 
 def test_the_page_was_read() -> None:
-    assert len(QUOTED) > 30
+    assert len(PAGE.quoted) > 30
     assert set(KINDS) >= {"agilex", "roboclaw", "roboteq", "kobuki"}
 
 
-def quoted(pattern: str) -> list[str]:
-    return sorted({word for word in QUOTED if re.fullmatch(pattern, word)})
-
-
-@pytest.mark.parametrize("path", quoted(r"[\w./-]+\.(py|yaml)"))
+@pytest.mark.parametrize("path", PAGE.names(r"[\w./-]+\.(py|yaml)"))
 def test_every_file_it_names_is_there(path: str) -> None:
     assert (ROOT / path).is_file()
 
 
-@pytest.mark.parametrize("name", quoted(r"[a-z]+(\.\w+)+(?<!\.py)(?<!\.yaml)"))
+@pytest.mark.parametrize("name", PAGE.names(r"[a-z]+(\.\w+)+(?<!\.py)(?<!\.yaml)"))
 def test_every_name_it_names_can_be_imported(name: str) -> None:
     module, _, attribute = name.rpartition(".")
     assert hasattr(importlib.import_module(module), attribute)
 
 
-@pytest.mark.parametrize("method", quoted(r"_\w+"))
+@pytest.mark.parametrize("method", PAGE.names(r"_\w+"))
 def test_every_method_it_names_is_the_driver_s(method: str) -> None:
     assert hasattr(ChassisDriver, method)
 
 
 @pytest.mark.parametrize("word", ["disobeys", "stop_cause", "silence"])
 def test_what_told_asks_for(word: str) -> None:
-    assert word in QUOTED
+    assert word in PAGE.quoted
     assert hasattr(Told, word)
 
 
 def test_the_faults_to_type() -> None:
-    assert set(FAULTS) <= set(QUOTED)
+    assert set(FAULTS) <= set(PAGE.quoted)
 
 
 def test_the_commands_it_gives() -> None:
-    assert "treadwatch emulate roboteq" in QUOTED
-    assert "treadwatch run --config config/hil-roboteq.yaml" in QUOTED
+    assert "treadwatch emulate roboteq" in PAGE.quoted
+    assert "treadwatch run --config config/hil-roboteq.yaml" in PAGE.quoted
     for option in ("--hil", "--channel", "--base", "--attended"):
-        assert option in PAGE
+        assert option in PAGE.text
         assert f'"{option}"' in read("tests/conftest.py"), option
 
 
 def test_the_code_of_the_page_is_one_chassis_in_the_contract_suite() -> None:
-    assert len(FILES) == 4, "bytes, feedback, driver, emulator"
-    assert len(CHANGES) == 3, "config, composition, kinds"
-    assert PAGE.count("```python") + PAGE.count("```diff") == 7, "every block says which file it is"
+    assert len(PAGE.files) == 4, "bytes, feedback, driver, emulator"
+    assert len(PAGE.changes) == 3, "config, composition, kinds"
+    assert PAGE.every_block_names_its_file()
     assert {"page-scripted", "page-pty"} < set(EMULATED)
     page = page_module()
     assert issubclass(page.MinitrackChassis, ChassisDriver)
@@ -91,12 +81,8 @@ def test_the_code_of_the_page_is_one_chassis_in_the_contract_suite() -> None:
 
 
 def test_what_is_pasted_from_the_page_passes_the_checks_and_drives(tmp_path: Path) -> None:
-    paste(tmp_path)
-    shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    ruff = [sys.executable, "-m", "ruff"]
-    for check in (["check", "--no-cache", "."], ["format", "--no-cache", "--check", "."]):
-        done = subprocess.run([*ruff, *check], cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stdout + done.stderr
+    PAGE.paste(tmp_path)
+    assert not complaints_of_ruff(tmp_path)
     config = yaml.safe_load(read("config/sim.yaml"))
     config["chassis"] = {
         "kind": "minitrack",
@@ -107,16 +93,7 @@ def test_what_is_pasted_from_the_page_passes_the_checks_and_drives(tmp_path: Pat
     }
     config["runner"]["max_duration_s"] = 3.0
     (tmp_path / "mine.yaml").write_text(yaml.safe_dump(config))
-    command = [sys.executable, "-P", "-m", "controller", "run", "--config", "mine.yaml", "--quiet"]
-    done = subprocess.run(
-        command,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = python_in(tmp_path, "-m", "controller", "run", "--config", "mine.yaml", "--quiet")
     # It does not get to the end in 3 s, but it drives, as it is told to.
     assert done.returncode == 1, done.stdout + done.stderr
     driven_m = re.search(r"is over; ([0-9.]+) m in", done.stdout)
