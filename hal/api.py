@@ -27,13 +27,16 @@ class Clock(Protocol):
 
 
 class FrameSource(Closing, Protocol):
-    """A camera, simulated, recorded or real."""
+    """A camera, simulated, recorded or real. Entering raises DeviceNotFound, DeviceRefused."""
 
     @property
-    def intrinsics(self) -> Intrinsics: ...
+    def intrinsics(self) -> Intrinsics:
+        """Of every frame. A device that tells them itself raises DeviceRefused before it is open."""
+        ...
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """The next frame. Raises FrameTimeout, EndOfStream, LinkLost."""
+        """The next frame, waited for at most timeout_s. Raises FrameTimeout, EndOfStream, LinkLost, and
+        BadRecording where a recording proves to hold none."""
         ...
 
 
