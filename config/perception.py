@@ -66,6 +66,11 @@ class EgoMotionSettings(Section):
     steady_speed_mps: float = Field(
         default=0.5, gt=0, description="without odometry: change of the velocity between two frames"
     )
+    rolling_speed_mps: float = Field(
+        default=0.15,
+        gt=0,
+        description="the same of a camera on a robot, which gathers speed slowly: along its way",
+    )
     unknown_factor: float = Field(
         default=3.0, ge=1, description="how much more where not even the motion before is known"
     )

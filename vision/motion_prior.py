@@ -68,7 +68,8 @@ def rolling_prior(
     """A prior without odometry: the robot goes on ahead and turns as it did; last_dt_s 0: not even that.
 
     Across its way the camera moves only as the turn swings it around the turning centre, and it tilts
-    only as far as it vibrates. What crosses the view therefore does not pass for the robot's own motion.
+    only as far as it vibrates. What crosses the view therefore does not pass for the robot's own motion; nor
+    does, since tracks gather and lose speed slowly, what goes ahead of it at its own pace.
     """
     known = last_dt_s > 0
     share = dt_s / last_dt_s if known else 0.0
@@ -81,7 +82,7 @@ def rolling_prior(
     )
     factor = 1.0 if known else settings.unknown_factor
     turn = settings.steady_rotation_radps * factor
-    speed = settings.steady_speed_mps * factor
+    speed = settings.rolling_speed_mps if known else settings.steady_speed_mps * factor
     swing = abs(mount.forward_m) * turn
     sigma = np.array(
         [

@@ -55,7 +55,7 @@ def test_a_camera_that_looks_down_goes_along_the_floor() -> None:
 
 def test_sigma_per_axis() -> None:
     known = rolling_prior(IDENTITY, DT_S, DT_S, LEVEL, SETTINGS).sigma / DT_S
-    np.testing.assert_allclose(known, [0.25, 0.6, 0.25, math.hypot(0.1, 0.3 * 0.6), 0.1, 0.5])
+    np.testing.assert_allclose(known, [0.25, 0.6, 0.25, math.hypot(0.1, 0.3 * 0.6), 0.1, 0.15])
     # Where not even the motion before is known, speed and turn are wider; what robots cannot do is not.
     first = rolling_prior(motion((0.0, 0.1, 0.0), (0.0, 0.0, 1.0)), 0.0, DT_S, LEVEL, SETTINGS)
     np.testing.assert_array_equal(first.motion.rotation, np.eye(3))
@@ -63,8 +63,9 @@ def test_sigma_per_axis() -> None:
     np.testing.assert_allclose(first.sigma / DT_S, [0.25, 1.8, 0.25, math.hypot(0.1, 0.3 * 1.8), 0.1, 1.5])
 
 
-def sideways_mps(prior: MotionPrior) -> float:
-    """The robot drives 0.5 m/s ahead; two thirds of what is seen go 0.7 m/s to the right."""
+def seen_mps(prior: MotionPrior, ahead_mps: float, crowd_mps: tuple[float, float]) -> FloatArray:
+    """(3,) how fast the camera seems to go, which drives ahead_mps; two thirds of what is seen go crowd_mps
+    to the right and ahead."""
     rng = np.random.default_rng(3)
     pixels = rng.uniform((20.0, 20.0), (620.0, 460.0), (90, 2))
     direction = rays(pixels, CAMERA)
@@ -72,18 +73,30 @@ def sideways_mps(prior: MotionPrior) -> float:
     covariance = np.tile([0.02, 0.0, 0.02], (90, 1))
     anchors = Anchors(points, direction, np.full(90, 0.02), covariance, np.ones(90, np.bool_))
     now: FloatArray = points.copy()
-    now[:60, 0] += 0.7 * DT_S
-    now[:, 2] -= 0.5 * DT_S
+    now[:60, 0] += crowd_mps[0] * DT_S
+    now[:60, 2] += crowd_mps[1] * DT_S
+    now[:, 2] -= ahead_mps * DT_S
     found = estimate(anchors, project(now, CAMERA), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA)
-    return float(found.pose.translation_m[0]) / DT_S
+    return np.asarray(found.pose.translation_m / DT_S)
 
 
 def test_a_crowd_that_crosses_does_not_pass_for_the_robots_own_motion() -> None:
     last = motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.5 * DT_S))
-    mount = CameraMount(0.0, 0.0, 0.5, 0.0)
-    assert sideways_mps(rolling_prior(last, DT_S, DT_S, mount, SETTINGS)) == pytest.approx(0.0, abs=0.1)
+    rolling = rolling_prior(last, DT_S, DT_S, CameraMount(0.0, 0.0, 0.5, 0.0), SETTINGS)
+    by_hand = steady_prior(last, DT_S, DT_S, SETTINGS)
+    assert seen_mps(rolling, 0.5, (0.7, 0.0))[0] == pytest.approx(0.0, abs=0.1)
     # A camera carried by hand may well have gone to the left: then the majority decides.
-    assert sideways_mps(steady_prior(last, DT_S, DT_S, SETTINGS)) == pytest.approx(-0.7, abs=0.1)
+    assert seen_mps(by_hand, 0.5, (0.7, 0.0))[0] == pytest.approx(-0.7, abs=0.1)
+
+
+@pytest.mark.parametrize("before_mps", [0.7, 0.8, 0.9])
+def test_nor_does_a_crowd_that_goes_ahead_at_its_pace(before_mps: float) -> None:
+    """Beside which it seems to stand; a frame ago it went before_mps, and may have gathered speed since."""
+    last = motion((0.0, 0.0, 0.0), (0.0, 0.0, before_mps * DT_S))
+    rolling = rolling_prior(last, DT_S, DT_S, LEVEL, SETTINGS)
+    by_hand = steady_prior(last, DT_S, DT_S, SETTINGS)
+    assert seen_mps(rolling, 0.8, (0.0, 0.8))[2] == pytest.approx(0.8, abs=0.1)
+    assert seen_mps(by_hand, 0.8, (0.0, 0.8))[2] == pytest.approx(0.0, abs=0.1)
 
 
 def test_odometry_prior_by_hand() -> None:
