@@ -41,7 +41,7 @@ _TO_THE_CM = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class CameraView:
     """Tangents of the bearing of the image's edges to the left and to the right of its axis, both positive,
     and how far the floor is seen."""
 
@@ -66,14 +66,14 @@ class BlindBend:
     enough_m: float | None
 
 
-def view_of(config: AppConfig) -> View | None:
+def view_of(config: AppConfig) -> CameraView | None:
     """What the camera of this configuration sees at most; None: only its recording knows."""
     tangents = config.camera.edge_tangents
     if tangents is None:
         return None
     level = math.cos(config.robot.camera_mount.pitch_rad)
     range_m = min(config.decision.sight.range_m, config.perception.max_depth_m)
-    return View(tangents[0] / level, tangents[1] / level, range_m)
+    return CameraView(tangents[0] / level, tangents[1] / level, range_m)
 
 
 def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
@@ -99,7 +99,7 @@ def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
 
 
 def first_blind_bend(
-    spec: PathSpec, path: Path, robot: Robot, mount: CameraMount, view: View, decision: DecisionConfig
+    spec: PathSpec, path: Path, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
 ) -> BlindBend | None:
     """The first bend of path, which is spec's, in which a robot that has come to stand would not go on."""
     ends = np.cumsum([segment.length_m for segment in spec.segments])
@@ -136,7 +136,7 @@ def _stands_at(
     path: Path,
     robot: Robot,
     mount: CameraMount,
-    view: View,
+    view: CameraView,
     decision: DecisionConfig,
     begin_m: float,
     end_m: float,
@@ -170,7 +170,7 @@ def _stands_at(
 
 
 def _enough_m(
-    bend: ArcSpec, robot: Robot, mount: CameraMount, view: View, decision: DecisionConfig
+    bend: ArcSpec, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
 ) -> float | None:
     """The least radius that this camera sees round in a half turn, to 5 cm upwards; None above 20 m."""
     low_m, high_m = bend.radius_m, _WIDEST_BEND_M
@@ -186,7 +186,7 @@ def _enough_m(
 
 
 def _half_turn_blind(
-    radius_m: float, robot: Robot, mount: CameraMount, view: View, decision: DecisionConfig
+    radius_m: float, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
 ) -> bool:
     line = LineSpec(kind="line", length_m=_RUN_IN_M)
     turn = ArcSpec(kind="arc", radius_m=radius_m, angle_deg=180.0)
