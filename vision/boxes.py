@@ -63,10 +63,11 @@ def seen_through(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
 
 
 def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
-    """(K,) share of box a[k] that box b[k] covers in the image; (K, 4) each: u0, v0, u1, v1."""
-    size = np.minimum(a[:, 2:], b[:, 2:]) - np.maximum(a[:, :2], b[:, :2])
-    shared = np.maximum(size, 0.0).prod(axis=1)
-    result: FloatArray = shared / np.maximum((a[:, 2:] - a[:, :2]).prod(axis=1), 1.0)
+    """(K,) share of box a[k] that box b[k] covers in the image; (K, 4) each: u0, v0, u1, v1; or of any
+    shape (..., 4) that a and b are broadcast to."""
+    size = np.minimum(a[..., 2:], b[..., 2:]) - np.maximum(a[..., :2], b[..., :2])
+    shared = np.maximum(size, 0.0).prod(axis=-1)
+    result: FloatArray = shared / np.maximum((a[..., 2:] - a[..., :2]).prod(axis=-1), 1.0)
     return result
 
 

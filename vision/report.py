@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
+from vision.boxes import overlaps
 from vision.detection import Detection
 from vision.obstacles import FragmentVelocities
 from vision.scene import Fragments, Obstacle
@@ -17,6 +18,12 @@ _WAY_SIGMA_M = 0.06
 _STATIC_SCORE = 0.5
 _LAST_CELLS = 12  # less of a sliver is no sight of anybody
 _OVERHEAD_CELLS = 24  # half of a head, 6 m away
+# For so long, with so much of its box in that of a mover so many times as large, and so far before or behind
+# it, a new mover may be a piece of that one: a wheel under a cart, a trolley's front, a torso.
+_PIECE_S = 0.3
+_PIECE_SHARE = 0.3
+_PIECE_OF_CELLS = 2
+_PIECE_M = 1.5
 
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
@@ -40,9 +47,10 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
         expected_px[rest, :2] = np.minimum(expected_px[rest, :2], bbox[rest, :2])
         expected_px[rest, 2:] = np.maximum(expected_px[rest, 2:], bbox[rest, 2:])
         bbox = np.where(whole[:, None], expected_px, bbox)
+    told = tracks.moving & ~_pieces(tracks, listed, bbox, local[:, 2], detection.captured_ns)
     result = []
     for t in np.flatnonzero(listed).tolist():
-        moving = bool(tracks.moving[t])
+        moving = bool(told[t])
         u0, v0, u1, v1 = bbox[t].tolist()
         result.append(
             Obstacle(
@@ -60,6 +68,22 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
             )
         )
     return tuple(result)
+
+
+def _pieces(
+    tracks: Tracks, listed: NDArray[np.bool_], bbox_px: FloatArray, depth_m: FloatArray, now_ns: int
+) -> NDArray[np.bool_]:
+    """(T,) movers so new that they may be a piece of a larger one, which is told of already."""
+    movers = tracks.moving & listed
+    new = np.flatnonzero(movers & (now_ns - tracks.born_ns < _PIECE_S * 1e9))
+    result = np.zeros(len(tracks), np.bool_)
+    if len(new) and np.count_nonzero(movers) > 1:
+        larger = movers & (tracks.cells >= _PIECE_OF_CELLS * tracks.cells[new, None])
+        larger[np.arange(len(new)), new] = False
+        larger &= np.abs(depth_m - depth_m[new, None]) <= _PIECE_M
+        larger &= overlaps(bbox_px[new, None], bbox_px) >= _PIECE_SHARE
+        result[new] = larger.any(axis=1)
+    return result
 
 
 def _expected(tracks: Tracks, unseen_s: FloatArray) -> NDArray[np.bool_]:

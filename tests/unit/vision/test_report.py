@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -180,3 +181,56 @@ def test_what_is_seen_above_the_robot_only_is_listed_when_much_of_it_moves(
     made = tracks(BEFORE_ME)
     made.overhead[0], made.moving[0], made.cells[0] = overhead, moving, cells
     assert len(report.obstacles(made, now())) == listed
+
+
+def mover_and_newcomer(
+    box_px: tuple[float, float, float, float] = (130.0, 150.0, 150.0, 170.0),
+    depth_m: float = 4.5,
+    cells: int = 20,
+    age_s: float = 0.2,
+) -> Tracks:
+    """A mover of 200 cells, seen for long, and a second one."""
+    made = tracks(BEFORE_ME, (0.2, -0.1, depth_m))
+    made.moving[:] = True
+    made.born_ns[:] = NOW_NS - np.array([round(2e9), round(age_s * 1e9)])
+    made.bbox_px[:] = (100.0, 50.0, 140.0, 180.0), box_px
+    made.cells[:] = 200, cells
+    return made
+
+
+def told_moving(made: Tracks) -> list[bool]:
+    return [one.moving for one in report.obstacles(made, now())]
+
+
+def test_a_new_mover_at_a_larger_one_may_be_a_piece_of_it_and_is_listed_without_a_verdict() -> None:
+    old, new = report.obstacles(mover_and_newcomer(), now())
+    assert (old.moving, new.moving, new.score) == (True, False, 0.5)
+
+
+@pytest.mark.parametrize(
+    "apart",
+    [
+        {"age_s": 0.31},
+        {"box_px": (135.0, 150.0, 155.0, 170.0)},  # a quarter of it
+        {"depth_m": 5.6},
+        {"depth_m": 2.4},
+        {"cells": 101},
+    ],
+    ids=["seen for longer", "beside", "behind", "before", "no smaller"],
+)
+def test_a_new_mover_apart_from_a_larger_one_is_told_at_once(apart: dict[str, Any]) -> None:
+    assert told_moving(mover_and_newcomer(**apart)) == [True, True]
+
+
+def test_a_new_mover_at_something_large_that_stands_or_is_not_listed_is_told_at_once() -> None:
+    stands, unlisted = mover_and_newcomer(), mover_and_newcomer()
+    stands.moving[0] = False
+    unlisted.sightings[0] = 2
+    assert told_moving(stands) == [False, True]
+    assert told_moving(unlisted) == [True]
+
+
+def test_of_two_new_movers_the_larger_one_is_told() -> None:
+    made = mover_and_newcomer()
+    made.born_ns[0] = made.born_ns[1]
+    assert told_moving(made) == [True, False]
