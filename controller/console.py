@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
+from typing import TextIO
 
 import click
 
@@ -37,7 +39,7 @@ class Console:
         if self._live and self._calls % STEPS_SHOWN == 1:
             done = round(BAR * min(max(share, 0.0), 1.0))
             bar = "#" * done + "." * (BAR - done)
-            click.echo(f"\r\033[K[{bar}] {text[:90]}", nl=False, err=True)
+            self._echo(f"\r\033[K[{bar}] {text[:90]}", nl=False, err=True)
 
     def decision(self, stamp_s: float, decision: Decision, speed_mps: float) -> None:
         """One line whenever another rule or another obstacle has decided for half a second."""
@@ -72,20 +74,36 @@ class Console:
         """A line that stays."""
         if not self._quiet:
             self._clear()
-            click.echo(line, err=self._aside)
+            self._echo(line, err=self._aside)
 
     def warning(self, line: str) -> None:
         """What a person should know before the drive: on standard error, and though the rest is quiet."""
         self._clear()
-        click.echo(f"treadwatch: warning: {line}", err=True)
+        self._echo(f"treadwatch: warning: {line}", err=True)
 
     def summary(self, rows: list[tuple[str, str]]) -> None:
         """The result, one row a subject."""
         self._clear()
         width = max(len(name) for name, _ in rows)
         for name, text in rows:
-            click.echo(f"{name:<{width}}  {text}", err=self._aside)
+            self._echo(f"{name:<{width}}  {text}", err=self._aside)
 
     def _clear(self) -> None:
         if self._live:
-            click.echo("\r\033[K", nl=False, err=True)
+            self._echo("\r\033[K", nl=False, err=True)
+
+    def _echo(self, text: str, nl: bool = True, err: bool = False) -> None:
+        """A reader that goes, or a disk that is full, is no reason to stop a robot: the words are lost."""
+        try:
+            click.echo(text, nl=nl, err=err)
+        except OSError as error:
+            _write_to_nobody(sys.stderr if err else sys.stdout)
+            if not err:
+                self.warning(f"nothing more can be written to standard output ({error.strerror})")
+
+
+def _write_to_nobody(stream: TextIO) -> None:
+    """Whatever is written to it from now on, what it still holds included, vanishes."""
+    nobody = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nobody, stream.fileno())
+    os.close(nobody)

@@ -46,12 +46,14 @@ class Punctuality:
 
 
 class PerceptionLink:
-    """The newest scene of the perception process. Once it is gone it stays gone: lost_reason says why."""
+    """The newest scene of the perception process. Once it is gone it stays gone: lost_reason says why, and
+    refused_reason, too, if it took its leave before it had seen anything."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
         self.newest: SceneMessage | None = None
         self.lost_reason: str | None = None
+        self.refused_reason: str | None = None
 
     def receive(self) -> list[SceneMessage]:
         """All scenes that have arrived since the last call, oldest first."""
@@ -65,6 +67,8 @@ class PerceptionLink:
                 else:
                     assert isinstance(message, Farewell), f"perception sent {type(message).__name__}"
                     self.lost_reason = message.reason
+                    if self.newest is None and not arrived:
+                        self.refused_reason = message.reason
         except PeerGone as gone:
             self.lost_reason = str(gone)
         if arrived:

@@ -17,7 +17,7 @@ from controller.build_chassis import build_base
 from controller.channel import Channel, channel_sockets
 from controller.console import Console
 from controller.control import Drive
-from controller.ending import Ending
+from controller.ending import Ending, Outcome
 from controller.perception_process import perceive_forever
 from controller.punctual import PunctualChassis
 from controller.realtime import PerceptionLink, Punctuality, RealtimeMoment, run_realtime
@@ -27,6 +27,7 @@ from controller.scheduling import become_realtime
 from controller.service import ServiceManager, stop_on_signals
 from controller.workers import held_ctrl_c
 from hal.clocks import NS_PER_S, MonotonicClock
+from hal.errors import DeviceRefused
 from sim.simulation import Simulation
 
 # The perception process needs a moment to import and open the camera; a simulated world starts after that.
@@ -85,7 +86,10 @@ def _told(
     service: ServiceManager,
     on_ready: Callable[[ServiceManager], None],
 ) -> Iterator[RealtimeMoment]:
-    """Tells the service manager when the drive is ready, and when it is about to end."""
+    """Tells the service manager when the drive is ready, and when it is about to end.
+
+    Raises DeviceRefused at the end where perception could not even begin: without a scene nothing moves.
+    """
     told_ready = told_stopping = False
     for moment in moments:
         if link.newest is not None and not told_ready:
@@ -95,6 +99,8 @@ def _told(
             told_stopping = True
             service.stopping(ending.stop_reason)
         yield moment
+    if link.refused_reason is not None and ending.outcome is Outcome.BROKEN_OFF:
+        raise DeviceRefused(f"{link.refused_reason}; nothing has moved")
 
 
 @contextmanager

@@ -1,3 +1,5 @@
+import os
+
 import pytest
 
 from controller.console import Console
@@ -53,3 +55,34 @@ def test_quiet_leaves_only_the_summary(capsys: pytest.CaptureFixture[str]) -> No
     captured = capsys.readouterr()
     assert captured.out == "a       1\nlonger  2\n"
     assert captured.err == ""
+
+
+def test_a_reader_that_has_gone_is_told_once_on_standard_error_and_stops_nothing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as gone:
+        monkeypatch.setattr("sys.stdout", gone)
+        console = Console(quiet=False)
+        console.event("first")
+        console.event("second")
+        console.summary([("mission", "target reached")])
+        gone.flush()
+    assert capsys.readouterr().err.splitlines() == [
+        "treadwatch: warning: nothing more can be written to standard output (Broken pipe)"
+    ]
+
+
+def test_a_standard_error_that_cannot_be_written_stops_nothing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as gone:
+        monkeypatch.setattr("sys.stderr", gone)
+        console = Console(quiet=False)
+        console.warning("the bend is blind")
+        console.event("driving")
+        gone.flush()
+    assert capsys.readouterr().out.splitlines() == ["driving"]

@@ -82,6 +82,18 @@ def test_perception_that_ends_says_why_and_the_robot_stops(ends: Ends) -> None:
     steps_of(loop, link, LateClock({}))
     assert loop.stop_reasons == ["perception is lost: camera: unplugged"]
     assert loop.endings == [Outcome.BROKEN_OFF]
+    assert link.refused_reason == "camera: unplugged"
+
+
+@pytest.mark.parametrize("received_before", [True, False])
+def test_perception_that_has_seen_something_did_not_refuse(ends: Ends, received_before: bool) -> None:
+    link, there = ends
+    there.send(SceneMessage(scene(), {}))
+    if received_before:
+        link.receive()
+    there.send(Farewell("camera: unplugged"))
+    link.receive()
+    assert (link.lost_reason, link.refused_reason) == ("camera: unplugged", None)
 
 
 def test_perception_that_dies_without_a_word_stops_the_robot_too(ends: Ends) -> None:
