@@ -16,6 +16,8 @@ from config.known_keys import advice, written
 CONFIG_DIR = Path(__file__).resolve().parent
 # A file with more mistakes than this is another kind of file, and one line is for reading.
 _MOST_MISTAKES = 8
+# So many unknown sections, and fewer that are known: it is not a file with mistakes.
+_ANOTHER_KIND = 3
 # Where pydantic speaks of itself instead of the file.
 _IN_OTHER_WORDS = {
     "union_tag_not_found": "its key kind is missing",
@@ -99,6 +101,12 @@ def load(path: Path, model: type[SectionT]) -> SectionT:
         raise ConfigError(f"{path}: is empty; it must hold keys and values")
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: must hold keys and values, found {type(content).__name__}")
+    unknown = [str(key) for key in content if key not in model.model_fields]
+    if len(unknown) >= _ANOTHER_KIND and 2 * len(unknown) > len(content):
+        raise ConfigError(
+            f"{path}: is another kind of file: {', '.join(unknown[:_MOST_MISTAKES])} mean nothing here; "
+            f"known are {', '.join(sorted(model.model_fields))}"
+        )
     try:
         return model.model_validate(content)
     except ValidationError as error:

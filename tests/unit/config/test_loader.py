@@ -91,7 +91,10 @@ def test_every_mistake_is_named_with_its_key(tmp_path: Path) -> None:
         ("count: 3\ninner: {speed_mps: '1.5'}", "found '1.5', which is text: write 1.5"),
         ("- 3", "must hold keys and values, found list"),
         ("", "is empty; it must hold keys and values"),
-        ("\n".join(f"k{n}: 1" for n in range(12)), "; and 5 more mistakes"),
+        ("inner: {" + ", ".join(f"k{n}: 1" for n in range(12)) + "}", "; and 5 more mistakes"),
+        ("name: a\nroom: {}\nbodies: []\ncount: 3", "another kind of file: name, room, bodies mean nothing"),
+        ("count: 3\ninner: {}\nmany: []\nname: a\nroom: {}\nbodies: []", "name: unknown key"),
+        ("count: 3\nname: a\nroom: {}", "name: unknown key"),
     ],
 )
 def test_wrong_content_is_refused_in_one_line(tmp_path: Path, text: str, reason: str) -> None:
