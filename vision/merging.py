@@ -44,8 +44,7 @@ class _Pairs:
     small_px, large_px (K, 4): their boxes in the image, u0, v0, u1, v1. gap_m (K,): between their boxes in
     space. overlapping (K,): half of the small one's box in the image is within the other. fits (K,): by their
     size they could be one. perhaps_alike (K,): their velocities do not contradict; much_alike, exactly_alike
-    (K,): they surely go so. stands_on (K,): small ends where large begins in the image, and goes exactly as
-    it does.
+    (K,): they surely go so.
     """
 
     small: NDArray[np.intp]
@@ -58,7 +57,6 @@ class _Pairs:
     perhaps_alike: BoolArray
     much_alike: BoolArray
     exactly_alike: BoolArray
-    stands_on: BoolArray
 
 
 def merges(
@@ -113,7 +111,6 @@ def _paired(
     difference = np.sqrt(np.square(velocity_mps[small] - velocity_mps[large]).sum(axis=1))
     spread = np.hypot(sigma_mps[small], sigma_mps[large])
     known = np.maximum(sigma_mps[small], sigma_mps[large]) <= _KNOWN_SIGMA_MPS
-    exactly = known & (difference <= _EXACTLY_MPS)
     right_m = np.maximum(box.high_m[small, 0], box.high_m[large, 0])
     left_m = np.minimum(box.low_m[small, 0], box.low_m[large, 0])
     overlapping = overlaps(small_px, large_px) >= _OVERLAP
@@ -129,8 +126,7 @@ def _paired(
         | overlapping,
         perhaps_alike=difference <= _MUCH_MPS + _ALIKE_SIGMAS * spread,
         much_alike=known & (difference <= _MUCH_MPS),
-        exactly_alike=exactly,
-        stands_on=exactly & stacked(small_px, large_px),
+        exactly_alike=known & (difference <= _EXACTLY_MPS),
     )
 
 
@@ -142,13 +138,14 @@ def _beside(pairs: _Pairs) -> BoolArray:
 
 def _carried(pairs: _Pairs) -> BoolArray:
     """(K,) a load on its carrier, even if it is farther back: the mast of a cart."""
-    return pairs.stands_on & pairs.fits & (pairs.gap_m <= LOAD_M)
+    on_top = stacked(pairs.small_px, pairs.large_px)
+    return on_top & pairs.exactly_alike & pairs.fits & (pairs.gap_m <= LOAD_M)
 
 
 def _seen_through(pairs: _Pairs) -> BoolArray:
-    """(K,) what is seen through a vehicle, not on it, and surely goes much as it does: its own far side."""
-    within = pairs.much_alike & ~pairs.stands_on & seen_through(pairs.small_px, pairs.large_px)
-    return within & (pairs.gap_m <= THROUGH_M)
+    """(K,) what is seen through a vehicle and surely goes much as it does: its own far side."""
+    within = seen_through(pairs.small_px, pairs.large_px)
+    return within & pairs.much_alike & (pairs.gap_m <= THROUGH_M)
 
 
 def _pushed(pairs: _Pairs) -> BoolArray:

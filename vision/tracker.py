@@ -41,7 +41,7 @@ from vision.regions import IntGrid, Regions
 from vision.scene import CameraCondition, Scene
 from vision.tracks import Tracks
 
-_ACCEL_DENSITY = 0.12  # (m/s^2)^2 s: how briskly people start, stop and turn
+_ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: 0.28 m/s in the first second
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
 _IDENTITY = np.eye(3)
