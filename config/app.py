@@ -72,6 +72,16 @@ def _check_speeds(robot: Robot, perception: PerceptionConfig) -> None:
         )
 
 
+def _check_range(perception: PerceptionConfig, decision: DecisionConfig) -> None:
+    """What the speed counts on having seen must be looked at. Raises ValueError."""
+    counted_on_m, looked_at_m = decision.sight.range_m, perception.max_depth_m
+    if counted_on_m > looked_at_m:
+        raise ValueError(
+            f"decision.sight.range_m ({counted_on_m:g}) is more than perception.max_depth_m "
+            f"({looked_at_m:g}), beyond which nothing is looked at: give both the same value"
+        )
+
+
 class AppConfig(Section):
     """What `treadwatch run` and `treadwatch govern` read with --config FILE."""
 
@@ -91,6 +101,7 @@ class AppConfig(Section):
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         _check_speeds(self.robot, self.perception)
+        _check_range(self.perception, self.decision)
         simulated = self.camera.kind == "simulated"
         if simulated and self.simulation is None:
             raise ValueError("camera.kind 'simulated' needs a 'simulation' section with a scenario")
@@ -149,6 +160,7 @@ class ReplayConfig(Section):
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         _check_speeds(self.robot, self.perception)
+        _check_range(self.perception, self.decision)
         return self
 
 

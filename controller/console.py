@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import sys
-from collections.abc import Sequence
-from typing import TextIO
-
-import click
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from controller.decision import Decision
+from controller.outlet import Outlet, Words, write
 
 BAR = 24
 # A reason that holds for less than this is not worth a line of its own.
@@ -32,6 +30,17 @@ class Console:
         self._heard: tuple[str, int | None] | None = None
         self._heard_at_s = 0.0
         self._stuck_told_s = 0.0
+        self._write = write
+
+    @contextmanager
+    def beside_a_drive(self) -> Iterator[None]:
+        """While the block runs, nobody who does not read holds up whoever speaks."""
+        with Outlet() as outlet:
+            self._write = outlet.write
+            try:
+                yield
+            finally:
+                self._write = write
 
     def progress(self, share: float, text: str) -> None:
         """share: 0..1 of the whole."""
@@ -39,7 +48,7 @@ class Console:
         if self._live and self._calls % STEPS_SHOWN == 1:
             done = round(BAR * min(max(share, 0.0), 1.0))
             bar = "#" * done + "." * (BAR - done)
-            self._echo(f"\r\033[K[{bar}] {text[:90]}", nl=False, err=True)
+            self._write(Words(f"\r\033[K[{bar}] {text[:90]}", to_stderr=True, whole=False))
 
     def decision(self, stamp_s: float, decision: Decision, speed_mps: float) -> None:
         """One line whenever another rule or another obstacle has decided for half a second."""
@@ -74,36 +83,20 @@ class Console:
         """A line that stays."""
         if not self._quiet:
             self._clear()
-            self._echo(line, err=self._aside)
+            self._write(Words(line, self._aside))
 
     def warning(self, line: str) -> None:
         """What a person should know before the drive: on standard error, and though the rest is quiet."""
         self._clear()
-        self._echo(f"treadwatch: warning: {line}", err=True)
+        self._write(Words(f"treadwatch: warning: {line}", to_stderr=True))
 
     def summary(self, rows: list[tuple[str, str]]) -> None:
         """The result, one row a subject."""
         self._clear()
         width = max(len(name) for name, _ in rows)
         for name, text in rows:
-            self._echo(f"{name:<{width}}  {text}", err=self._aside)
+            self._write(Words(f"{name:<{width}}  {text}", self._aside))
 
     def _clear(self) -> None:
         if self._live:
-            self._echo("\r\033[K", nl=False, err=True)
-
-    def _echo(self, text: str, nl: bool = True, err: bool = False) -> None:
-        """A reader that goes, or a disk that is full, is no reason to stop a robot: the words are lost."""
-        try:
-            click.echo(text, nl=nl, err=err)
-        except OSError as error:
-            _write_to_nobody(sys.stderr if err else sys.stdout)
-            if not err:
-                self.warning(f"nothing more can be written to standard output ({error.strerror})")
-
-
-def _write_to_nobody(stream: TextIO) -> None:
-    """Whatever is written to it from now on, what it still holds included, vanishes."""
-    nobody = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nobody, stream.fileno())
-    os.close(nobody)
+            self._write(Words("\r\033[K", to_stderr=True, whole=False))

@@ -100,7 +100,8 @@ class ControlLoop:
         self._learn(scene)
         pose = self.localiser.pose
         on_path = self.path.project(pose, self._progress_m)
-        self._progress_m = on_path.s_m
+        if math.isfinite(on_path.s_m):
+            self._progress_m = on_path.s_m
         decision = self._decide.step(
             Situation(scene, self.path, pose, on_path, self._speed_mps(), self._shape.a_mps2, now_ns)
         )

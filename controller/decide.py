@@ -82,8 +82,7 @@ class DecisionMaker:
         way = self._path_limits(path, on_path, motion)
         limits = self._camera_limits(known)
         base_mps = min(limit.speed_mps for limit in (*way, *limits))
-        if known.age_s >= 0.0:
-            limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
+        limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(way, limits, motion, now_ns)
 
     def _input_fault(self, at: Situation) -> str:

@@ -123,8 +123,9 @@ class Knowledge:
             self._scene_fault = self._order_fault(scene) or self._learn(scene, on_path, v_mps)
         if self._captured_ns is not None:
             self.age_s = (now_ns - self._captured_ns) / NS_PER_S
-            self.since_s = (now_ns - self.bodies.captured_ns) / NS_PER_S
+            self.since_s = max((now_ns - self.bodies.captured_ns) / NS_PER_S, 0.0)
         self.fault = self._judge()
+        self.age_s = max(self.age_s, 0.0)
 
     def _order_fault(self, scene: Scene) -> str:
         """An older scene after a newer one is not taken in."""

@@ -52,6 +52,7 @@ class MovingLimits:
     def nobody(self) -> None:
         """Nothing moves: nothing to remember."""
         self._goes_first.clear()
+        self._leaves_s.clear()
 
     def limits(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import time
+from contextlib import suppress
 from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner
@@ -111,14 +112,11 @@ def _look_until_the_end(
         run_recorder = RunRecorder(recorder, build_path(config, config_path))
         try:
             while True:
-                try:
+                # Without a frame the scene ages and the robot stops; the camera may come back.
+                with suppress(FrameTimeout):
                     look = perceiver.look(camera.read(timeout_s))
-                except FrameTimeout:
-                    # The scene ages and the robot stops; the camera may come back.
-                    body.listen()
-                    continue
-                channel.send(SceneMessage(look.scene, look.timing_ms))
-                run_recorder.saw(look)
+                    channel.send(SceneMessage(look.scene, look.timing_ms))
+                    run_recorder.saw(look)
                 for step in body.take_steps():
                     run_recorder.decided(step)
         except (PeerGone, EndOfStream):

@@ -6,6 +6,7 @@ frozen, this loop goes on at its rate, the scene ages, and the decision ends in 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -15,6 +16,7 @@ from controller.control import ControlStep, Drive
 from controller.ending import Outcome
 from controller.lockstep import Outside
 from controller.service import ServiceManager, StopRequest
+from controller.tally import MOST_SAMPLES
 from hal.api import Clock
 from hal.clocks import NS_PER_S
 from vision.scene import Scene
@@ -37,11 +39,12 @@ class Farewell:
 
 @dataclass
 class Punctuality:
-    """How late the control steps began, in nanoseconds, when each of their commands had gone out, and how
-    many periods were skipped."""
+    """How late the control steps began, in nanoseconds, and when each of their commands had gone out: of the
+    last MOST_SAMPLES, since a robot may be governed for days. steps began, skipped periods had none."""
 
-    late_ns: list[int] = field(default_factory=list)
-    commanded_ns: list[int] = field(default_factory=list)
+    late_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
+    commanded_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
+    steps: int = 0
     skipped: int = 0
 
 
@@ -113,6 +116,7 @@ def run_realtime(
     while not loop.finished:
         clock.sleep_until_ns(deadline_ns)
         now_ns = clock.now_ns()
+        punctuality.steps += 1
         punctuality.late_ns.append(now_ns - deadline_ns)
         arrived = perception.receive()
         if stop:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from controller.recorder import RecordingOptions, require_writable
 from controller.result import MissionOptions
 from controller.scheduling import become_realtime
 from controller.service import ServiceManager, stop_on_signals
-from controller.workers import held_ctrl_c
+from controller.workers import held
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import DeviceRefused
 from sim.simulation import Simulation
@@ -69,6 +70,7 @@ class RealtimeRig:
         with (
             perception_beside(self.config, self.options.config_path, self.start_ns, recording) as link,
             stop_on_signals() as stop,
+            console.beside_a_drive(),
         ):
             # Last, so that the processes and threads started before keep ordinary scheduling.
             for refused in become_realtime(self.runner.priority):
@@ -76,7 +78,12 @@ class RealtimeRig:
             moments = run_realtime(
                 self.runner, self.clock, self.simulation, link, loop, service, stop, self.punctuality
             )
-            yield _told(moments, loop.ending, link, service, on_ready)
+            try:
+                yield _told(moments, loop.ending, link, service, on_ready)
+            except BaseException:
+                # To end the perception process takes seconds; the base must not go on meanwhile.
+                self.chassis.stop(self.clock.now_ns())
+                raise
 
 
 def _told(
@@ -140,7 +147,8 @@ def perception_beside(
         name="perception",
         daemon=True,
     )
-    with held_ctrl_c():
+    # A terminal that goes would end the camera before the robot has come to rest.
+    with held(signal.SIGINT, signal.SIGHUP):
         process.start()
     # Ours must be the only open copy of the other end, or its death would not show.
     there.close()

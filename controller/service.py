@@ -64,7 +64,7 @@ def _watchdog_interval_ns(environment: Mapping[str, str], pid: int) -> int | Non
 
 
 class StopRequest:
-    """Set by SIGTERM or SIGINT; read by the runner once per control step."""
+    """Set by SIGTERM, SIGINT or SIGHUP; read by the runner once per control step."""
 
     def __init__(self) -> None:
         self.reason: str | None = None
@@ -79,9 +79,12 @@ class StopRequest:
 
 @contextmanager
 def stop_on_signals() -> Iterator[StopRequest]:
-    """Turn SIGTERM and SIGINT into a StopRequest while the body runs."""
+    """Turn SIGTERM, SIGINT and SIGHUP into a StopRequest while the body runs; SIGHUP not under nohup."""
     request = StopRequest()
-    before = {number: signal.signal(number, request.handle) for number in (signal.SIGTERM, signal.SIGINT)}
+    numbers = [signal.SIGTERM, signal.SIGINT]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        numbers.append(signal.SIGHUP)
+    before = {number: signal.signal(number, request.handle) for number in numbers}
     try:
         yield request
     finally:

@@ -64,7 +64,7 @@ def punctuality_text(punctuality: Punctuality) -> str:
     late_ms = np.array(punctuality.late_ns) / 1e6
     return (
         f"steps began {np.median(late_ms):.2f} ms late (median), {np.percentile(late_ms, 99):.2f} ms (p99), "
-        f"{late_ms.max():.2f} ms at worst; {punctuality.skipped} of {len(late_ms)} skipped"
+        f"{late_ms.max():.2f} ms at worst; {punctuality.skipped} of {punctuality.steps} skipped"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -13,6 +14,8 @@ from hal.clocks import NS_PER_S
 from hal.types import LATCHED_MODES, ChassisMode, Setpoint
 
 TOLERANCE = 1e-6
+# Of what is told of durations: an hour at 50 a second.
+MOST_SAMPLES = 180_000
 
 
 @dataclass
@@ -126,14 +129,14 @@ class Standstill:
 
 @dataclass
 class TimingTally:
-    """Durations of named stages, in milliseconds."""
+    """Durations of named stages, in milliseconds: the last MOST_SAMPLES of each."""
 
-    samples_ms: dict[str, list[float]] = field(default_factory=dict)
+    samples_ms: dict[str, deque[float]] = field(default_factory=dict)
 
     def add(self, timing_ms: dict[str, float]) -> None:
         """One frame's durations."""
         for stage, duration_ms in timing_ms.items():
-            self.samples_ms.setdefault(stage, []).append(duration_ms)
+            self.samples_ms.setdefault(stage, deque(maxlen=MOST_SAMPLES)).append(duration_ms)
 
     def line(self) -> str:
         """Median and 99th percentile of the sum, medians of the stages."""

@@ -1,4 +1,4 @@
-"""Processes beside this one: one core each, and deaf to a terminal's Ctrl-C, which is this one's business."""
+"""Processes beside this one: one core each, and deaf to what a terminal tells all of them."""
 
 from __future__ import annotations
 
@@ -23,14 +23,16 @@ Result = TypeVar("Result")
 
 
 @contextmanager
-def held_ctrl_c() -> Iterator[None]:
-    """Processes started in the block never hear SIGINT, not even while they import; this one after it.
+def held(*numbers: signal.Signals) -> Iterator[None]:
+    """Processes started in the block never hear these signals, not even while they import; this one hears
+    them after it.
 
-    A terminal sends it to all of them, and only the one that the user started knows what is to be done.
+    A terminal sends SIGINT, and SIGHUP when it goes, to all of them, and only the one that the user started
+    knows what is to be done.
     """
     # It is started with the first process, and leaves SIGINT unblocked for that one.
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
     try:
         yield
     finally:
@@ -66,7 +68,7 @@ class _Pool(ProcessPoolExecutor):
     def submit(
         self, task: Callable[Given, Result], /, *args: Given.args, **kwargs: Given.kwargs
     ) -> Future[Result]:
-        with held_ctrl_c():
+        with held(signal.SIGINT):
             return super().submit(task, *args, **kwargs)
 
 

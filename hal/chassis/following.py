@@ -50,7 +50,7 @@ class Following:
         """What the base has told since the last step, beside what it was ordered since."""
         before, self._pose = self._pose, pose
         elapsed_s, self._last_ns = (now_ns - self._last_ns) / NS_PER_S, now_ns
-        self._lately.append((now_ns, abs(self._ordered.v_mps)))
+        self._note_speed(now_ns)
         if before is None or is_zero(self._ordered):
             self.sentence = ""
             self._restart(now_ns)
@@ -76,13 +76,20 @@ class Following:
         """What the base is told from now on; zero ends the comparison."""
         self._ordered = command
 
+    def _note_speed(self, now_ns: int) -> None:
+        """What was commanded until now_ns. A change is enough: a base may stand for days."""
+        speed_mps = abs(self._ordered.v_mps)
+        if self._lately and self._lately[-1][1] == speed_mps:
+            self._lately.pop()
+        self._lately.append((now_ns, speed_mps))
+        while self._lately[0][0] < self._glance_ns - _LAG_NS:
+            self._lately.popleft()
+
     def _overspeed(self, way_m: float, now_ns: int) -> str:
         """What is wrong if the base, way_m on, tells of going faster than it was told of late."""
         self._glanced_m += way_m
         if now_ns - self._glance_ns < _GLANCE_NS:
             return ""
-        while self._lately[0][0] < self._glance_ns - _LAG_NS:
-            self._lately.popleft()
         told_mps = self._glanced_m * NS_PER_S / (now_ns - self._glance_ns)
         commanded_mps = max(mps for _, mps in self._lately)
         before, self._too_fast = self._too_fast, told_mps > _FASTEST_SHARE * commanded_mps + _FASTEST_MPS

@@ -47,3 +47,19 @@ def test_a_recording_may_be_looked_at_with_the_yaml_of_its_robot(path: Path) -> 
         robot.decision,
     )
     assert not replay.assume_mount
+
+
+@pytest.mark.parametrize("base", [SIM, {}], ids=["robot", "replay"])
+def test_what_the_speed_counts_on_having_seen_must_be_looked_at(
+    tmp_path: Path, base: dict[str, object]
+) -> None:
+    def ranges(counted_on_m: float, looked_at_m: float) -> dict[str, object]:
+        return base | {
+            "decision": {"sight": {"range_m": counted_on_m}},
+            "perception": {"max_depth_m": looked_at_m},
+        }
+
+    load = load_app if base else load_replay
+    load(written(tmp_path, ranges(5.0, 5.0)))
+    with pytest.raises(ConfigError, match=r"range_m \(10\) is more than perception\.max_depth_m \(5\)"):
+        load(written(tmp_path, ranges(10.0, 5.0)))

@@ -14,7 +14,7 @@ from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path import Path
 from controller.shape import SpeedShaper
-from hal.types import CameraMount, ChassisMode, ChassisState, Setpoint
+from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
 from tests.support.scenes import scene
 
@@ -137,3 +137,19 @@ def test_scenes_that_stop_coming_stop_the_robot() -> None:
     assert speeds[0] > 0.5
     assert speeds[-1] == 0.0
     assert all(math.isfinite(speed) for speed in speeds)
+
+
+class LosingChassis(ObedientChassis):
+    """For three exchanges on its way nobody knows where it is."""
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        state = super().exchange(setpoint, now_ns)
+        lost = 100 <= len(self.sent) < 103
+        return replace(state, pose=PlanarPose(math.nan, math.nan, math.nan)) if lost else state
+
+
+def test_a_robot_that_knows_not_where_it_is_stops_and_the_loop_goes_on() -> None:
+    taken = drive(loop_on(LosingChassis()), 140)
+    assert len(taken) == 140
+    assert any("where the robot is is not known" in step.decision.reason.sentence for step in taken)
+    assert all(math.isfinite(step.setpoint.v_mps + step.setpoint.w_radps) for step in taken)

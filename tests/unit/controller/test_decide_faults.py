@@ -218,3 +218,13 @@ def test_a_fault_ends_being_stuck() -> None:
     after = bench.step(bench.scene(obstacle(1.2, 0.0)), 0.0)
     assert before.stuck_since_ns is not None
     assert after.stuck_since_ns == bench.now_ns
+
+
+def test_a_scene_from_a_moment_ahead_is_reckoned_with_like_one_of_now() -> None:
+    """Two clocks may differ by a few milliseconds; more is a fault, less no reason to drive on."""
+    bench = Bench()
+    for age_ns in (0, -3_000_000):
+        decision = bench.step(bench.scene(obstacle(1.6, 0.0), age_ns=age_ns - STEP_NS))
+        assert decision.action is Action.DECREASE
+        assert decision.reason.obstacle_id == 5
+    assert stops(bench.step(bench.scene(age_ns=-6_000_000 - STEP_NS)), "camera", "from the future")

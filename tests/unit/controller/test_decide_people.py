@@ -186,3 +186,20 @@ def test_nobody_is_started_past_with_hardly_a_hand_between() -> None:
     assert Bench().settle(close, v_mps=0.0).target_speed_mps == 0.0
     assert Bench().settle(wide, v_mps=0.0).target_speed_mps > 0.0
     assert Bench().settle(close, v_mps=0.3).target_speed_mps > 0.0
+
+
+def test_who_waited_and_walks_on_is_reckoned_with_anew() -> None:
+    """When he would have left the way, had he not stopped, is long past: the robot slows for him at once."""
+    bench, robot_mps, left_m = Bench(), 1.4, 3.0
+
+    def walks(age_s: float) -> float:
+        nonlocal left_m
+        decision = bench.step(bench.scene(obstacle(5.0, left_m, vy_mps=-0.6, age_s=age_s)), robot_mps)
+        left_m -= 0.6 * 0.02
+        return decision.target_speed_mps
+
+    while left_m > 1.2:
+        walks(age_s=3.0)
+    for _ in range(400):
+        bench.step(bench.scene(obstacle(5.0, left_m, age_s=6.0)), robot_mps)
+    assert max(walks(age_s=14.0) for _ in range(3)) < 0.8

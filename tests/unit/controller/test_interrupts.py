@@ -17,7 +17,7 @@ from controller.campaign.judge import Row
 from controller.campaign.plan import run_here
 from controller.campaign.task import Task
 from controller.errors import UserError
-from controller.workers import held_ctrl_c, worker_processes
+from controller.workers import held, worker_processes
 
 
 def ended(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
@@ -95,22 +95,23 @@ def test_the_very_first_process_does_not_hear_it(tmp_path: Path) -> None:
     script = tmp_path / "first.py"
     script.write_text(
         "import multiprocessing, signal\n"
-        "from controller.workers import held_ctrl_c\n"
+        "from controller.workers import held\n"
         "def tell() -> None:\n"
-        "    print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ()), flush=True)\n"
+        "    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())\n"
+        "    print(signal.SIGINT in blocked, signal.SIGHUP in blocked, flush=True)\n"
         "if __name__ == '__main__':\n"
         "    child = multiprocessing.get_context('spawn').Process(target=tell)\n"
-        "    with held_ctrl_c():\n"
+        "    with held(signal.SIGINT, signal.SIGHUP):\n"
         "        child.start()\n"
         "    child.join()\n"
         "    tell()\n"
     )
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["True", "False"]
+    assert done.stdout.split() == ["True", "True", "False", "False"]
 
 
 def test_one_that_came_meanwhile_is_not_lost() -> None:
-    with pytest.raises(KeyboardInterrupt), held_ctrl_c():
+    with pytest.raises(KeyboardInterrupt), held(signal.SIGINT):
         signal.raise_signal(signal.SIGINT)
 
 

@@ -83,11 +83,22 @@ def test_a_manager_that_is_gone_is_counted_not_raised(tmp_path: Path) -> None:
     assert service.lost_notices == 1
 
 
-def test_a_signal_becomes_a_wish_and_the_old_handler_comes_back() -> None:
-    before = signal.getsignal(signal.SIGTERM)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_becomes_a_wish_and_the_old_handler_comes_back(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
     with stop_on_signals() as request:
         assert not request
-        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), number)
         assert request
-        assert request.reason == "SIGTERM"
-    assert signal.getsignal(signal.SIGTERM) is before
+        assert request.reason == number.name
+    assert signal.getsignal(number) is before
+
+
+def test_under_nohup_a_terminal_may_go() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stop_on_signals() as request:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert not request
+    finally:
+        signal.signal(signal.SIGHUP, before)

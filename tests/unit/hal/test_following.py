@@ -1,6 +1,7 @@
 """A base that tells of no motion while it is told to move, of a turn nobody commanded, of going too fast."""
 
 import math
+import tracemalloc
 
 import pytest
 
@@ -139,3 +140,17 @@ def test_the_sentence_names_both_speeds_and_what_to_look_at() -> None:
         "the base does not follow: it tells of 2.00 m/s while at most 1.00 m/s was commanded; "
         "are the scales of its speed and of its counters right in chassis:?"
     )
+
+
+def test_a_base_that_stands_for_hours_takes_no_memory_for_it() -> None:
+    """Nor is the first step after it a long one, with everything to be forgotten at once."""
+    following = Following()
+    tracemalloc.start()
+    try:
+        for period in range(20_000):
+            following.step(STANDS, period * PERIOD_NS)
+            following.ordered(Setpoint(period * PERIOD_NS, 0.0, 0.0, 0.0))
+        kept_bytes, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert kept_bytes < 10_000

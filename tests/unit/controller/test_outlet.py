@@ -1,0 +1,74 @@
+"""Words hold nobody up: not when nobody reads them, not when they cannot be shown, not when they are many."""
+
+import io
+import os
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from controller.outlet import Outlet, Words, write
+
+PATIENCE_S = 30.0
+
+
+def returns(speak: Callable[[], None]) -> bool:
+    """Whether speak comes to its end, even if nobody reads."""
+    thread = threading.Thread(target=speak, daemon=True)
+    thread.start()
+    thread.join(PATIENCE_S)
+    return not thread.is_alive()
+
+
+def test_what_was_said_is_written_in_order_before_the_outlet_is_closed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with Outlet() as outlet:
+        for number in range(100):
+            outlet.write(Words(f"line {number}"))
+        outlet.write(Words("[###]", to_stderr=True, whole=False))
+    said = capsys.readouterr()
+    assert said.out.splitlines() == [f"line {number}" for number in range(100)]
+    assert said.err == "[###]"
+
+
+def test_who_stops_reading_holds_nobody_up_and_learns_how_much_was_left_out(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader, writer = os.pipe()
+    with os.fdopen(writer, "w") as unread, os.fdopen(reader) as reads:
+        monkeypatch.setattr("sys.stdout", unread)
+
+        def speak() -> None:
+            for number in range(3000):
+                outlet.write(Words(f"{number:>99}"))
+
+        with Outlet() as outlet:
+            assert returns(speak)
+            # Reading is taken up again.
+            assert [int(reads.readline()) for _ in range(400)] == list(range(400))
+    left_out = capsys.readouterr().err
+    assert "lines were not read and left out" in left_out
+
+
+def test_who_never_reads_again_does_not_keep_a_drive_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:
+    reader, writer = os.pipe()
+    with os.fdopen(writer, "w") as unread:
+        monkeypatch.setattr("sys.stdout", unread)
+
+        def drive() -> None:
+            with Outlet() as outlet:
+                for number in range(3000):
+                    outlet.write(Words(f"{number:>99}"))
+
+        assert returns(drive)
+        os.close(reader)
+
+
+def test_what_cannot_be_shown_is_spelled_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = io.BytesIO()
+    with io.TextIOWrapper(shown, encoding="latin-1", write_through=True) as narrow:
+        monkeypatch.setattr("sys.stdout", narrow)
+        write(Words("küche"))
+        write(Words("küche \u2192"))
+        assert shown.getvalue().decode("latin-1") == "küche\nk\\xfcche \\u2192\n"
