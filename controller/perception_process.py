@@ -13,11 +13,11 @@ from controller.channel import Channel, PeerGone
 from controller.control import ControlStep
 from controller.errors import UserError
 from controller.localise import PoseHistory
-from controller.realtime import Farewell, SceneMessage
+from controller.realtime import Farewell, SceneMessage, StepMessage
 from controller.recorder import RecordingOptions, RunRecorder, open_recorder
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import EndOfStream, FrameTimeout, HalError
-from hal.geometry import advance_pose, camera_in_floor
+from hal.geometry import advance_pose, body_in_floor, camera_in_floor, planar
 from hal.types import CameraMount, PlanarPose, Pose
 
 # Odometry is asked for between two control steps: carried on with its last twist for at most this long.
@@ -25,11 +25,16 @@ REACH_S = 0.25
 
 
 class RemoteBody:
-    """The robot's motion as the control process tells it (hal.api.OdometrySource)."""
+    """The robot's motion as the control process tells it (hal.api.OdometrySource). start: where on the path's
+    floor it begins."""
 
-    def __init__(self, channel: Channel, mount: CameraMount) -> None:
+    def __init__(self, channel: Channel, mount: CameraMount, start: PlanarPose) -> None:
         self._channel = channel
         self._mount = mount
+        self._start = body_in_floor(start)
+        self._from_odometry: Pose | None = None
+        self._true = PoseHistory(reach_s=0.0)
+        self._newest_true = start
         self._fused = PoseHistory(reach_s=0.0)
         self._odometry = PoseHistory(reach_s=0.0)
         self._newest: ControlStep | None = None
@@ -38,11 +43,13 @@ class RemoteBody:
     def listen(self) -> None:
         """Take in every control step that has arrived. Raises PeerGone."""
         while (message := self._channel.receive()) is not None:
-            assert isinstance(message, ControlStep), f"control sent {type(message).__name__}"
-            self._newest = message
-            self._unread.append(message)
-            self._fused.append(message.now_ns, message.pose)
-            self._odometry.append(message.now_ns, message.chassis.pose)
+            assert isinstance(message, StepMessage), f"control sent {type(message).__name__}"
+            step = self._newest = message.control
+            self._unread.append(step)
+            self._fused.append(step.now_ns, step.pose)
+            self._odometry.append(step.now_ns, step.chassis.pose)
+            self._newest_true = message.true_pose or self._by_odometry(step.chassis.pose)
+            self._true.append(step.now_ns, self._newest_true)
 
     def take_steps(self) -> list[ControlStep]:
         """The control steps that have arrived since the last call."""
@@ -58,6 +65,16 @@ class RemoteBody:
             return self._carried_on(self._newest.pose, stamp_ns)
         return known
 
+    def true_pose(self, stamp_ns: int) -> PlanarPose | None:
+        """The body on the path's floor, for a simulated camera to see from: where its world has it, or, with
+        a base outside of this program, where that reports to be. Never where the robot believes to be: its
+        belief follows what the camera sees."""
+        self.listen()
+        known = self._true.at(stamp_ns)
+        if known is None and self._newest is not None:
+            return self._carried_on(self._newest_true, stamp_ns)
+        return known
+
     def camera_pose(self, stamp_ns: int) -> Pose | None:
         """The camera by the chassis' dead reckoning."""
         self.listen()
@@ -65,6 +82,12 @@ class RemoteBody:
         if known is None and self._newest is not None:
             known = self._carried_on(self._newest.chassis.pose, stamp_ns)
         return None if known is None else camera_in_floor(known, self._mount)
+
+    def _by_odometry(self, odometry: PlanarPose) -> PlanarPose:
+        """On the path's floor; the first odometry is that of its start."""
+        if self._from_odometry is None:
+            self._from_odometry = self._start @ body_in_floor(odometry).inverse()
+        return planar(self._from_odometry @ body_in_floor(odometry))
 
     def _carried_on(self, pose: PlanarPose, stamp_ns: int) -> PlanarPose | None:
         """pose of the newest step, moved on to stamp_ns with its twist; None if that is too far."""
@@ -103,13 +126,14 @@ def _look_until_the_end(
 ) -> None:
     assert isinstance(config.runner, RealtimeRunner)
     timeout_s = config.runner.frame_timeout_s
-    body = RemoteBody(channel, mount_of(config))
+    path = build_path(config, config_path)
+    body = RemoteBody(channel, mount_of(config), path.start)
     with (
-        open_camera(config, config_path, MonotonicClock(), body.body_pose, start_ns) as camera,
+        open_camera(config, config_path, MonotonicClock(), body.true_pose, start_ns) as camera,
         open_recorder(recording, surroundings(config)) as recorder,
     ):
         perceiver = build_perceiver(config, body, body.body_pose, time.perf_counter_ns)
-        run_recorder = RunRecorder(recorder, build_path(config, config_path))
+        run_recorder = RunRecorder(recorder, path)
         try:
             while True:
                 # Without a frame the scene ages and the robot stops; the camera may come back.

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from config.app import RealtimeRunner
 from controller.channel import Channel, PeerGone
@@ -19,6 +20,7 @@ from controller.service import ServiceManager, StopRequest
 from controller.tally import MOST_SAMPLES
 from hal.api import Clock
 from hal.clocks import NS_PER_S
+from hal.types import PlanarPose
 from vision.scene import Scene
 
 
@@ -28,6 +30,15 @@ class SceneMessage:
 
     scene: Scene
     timing_ms: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepMessage:
+    """Control to perception: a step, and where the robot of a simulated world truly was at its time, which a
+    simulated camera sees from; None where no world knows it."""
+
+    control: ControlStep
+    true_pose: PlanarPose | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +57,13 @@ class Punctuality:
     commanded_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
     steps: int = 0
     skipped: int = 0
+
+
+class SimulatedWorld(Outside, Protocol):
+    """What a simulated robot moves in."""
+
+    @property
+    def body_pose(self) -> PlanarPose: ...
 
 
 class PerceptionLink:
@@ -78,12 +96,12 @@ class PerceptionLink:
             self.newest = arrived[-1]
         return arrived
 
-    def send(self, step: ControlStep) -> None:
+    def send(self, message: StepMessage) -> None:
         """Tell perception where the robot is and what was decided; a full buffer drops the message."""
         if self.lost_reason is not None:
             return
         try:
-            self._channel.send(step)
+            self._channel.send(message)
         except PeerGone as gone:
             self.lost_reason = str(gone)
 
@@ -99,7 +117,7 @@ class RealtimeMoment:
 def run_realtime(
     config: RealtimeRunner,
     clock: Clock,
-    outside: Outside | None,
+    outside: SimulatedWorld | None,
     perception: PerceptionLink,
     loop: Drive,
     service: ServiceManager,
@@ -130,7 +148,7 @@ def run_realtime(
         step = loop.step(None if perception.newest is None else perception.newest.scene, now_ns)
         if step.chassis.sent is not None:
             punctuality.commanded_ns.append(clock.now_ns())
-        perception.send(step)
+        perception.send(StepMessage(step, None if outside is None else outside.body_pose))
         service.feed_watchdog(now_ns)
         yield RealtimeMoment(tuple(arrived), step)
         deadline_ns += period_ns

@@ -34,6 +34,12 @@ def body_in_floor(pose: PlanarPose) -> Pose:
     )
 
 
+def planar(pose: Pose) -> PlanarPose:
+    """The body that stands at pose on the floor; the inverse of body_in_floor."""
+    x_m, y_m, _ = pose.translation_m.tolist()
+    return PlanarPose(x_m, y_m, math.atan2(pose.rotation[1, 0], pose.rotation[0, 0]))
+
+
 def camera_in_floor(pose: PlanarPose, mount: CameraMount) -> Pose:
     """The optical frame in the floor's frame for a body standing at pose."""
     return body_in_floor(pose) @ camera_in_body(mount)

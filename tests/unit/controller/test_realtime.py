@@ -5,8 +5,16 @@ import pytest
 from config.app import RealtimeRunner
 from controller.channel import Channel, channel_sockets
 from controller.ending import Outcome
-from controller.realtime import Farewell, PerceptionLink, Punctuality, SceneMessage, run_realtime
+from controller.realtime import (
+    Farewell,
+    PerceptionLink,
+    Punctuality,
+    SceneMessage,
+    StepMessage,
+    run_realtime,
+)
 from controller.service import ServiceManager, StopRequest
+from hal.types import PlanarPose
 from tests.support.drives import NotingDrive, control_step
 from tests.support.scenes import scene
 
@@ -63,7 +71,7 @@ def test_an_overrun_skips_whole_periods_and_keeps_the_phase(ends: Ends) -> None:
     punctuality = steps_of(loop, link, LateClock({20: 50}))
     assert [now_ns // MS for now_ns, _ in loop.seen] == [0, 70, 80]
     assert punctuality.skipped == 2
-    assert punctuality.late_ns == [0, 50 * MS, 0]
+    assert list(punctuality.late_ns) == [0, 50 * MS, 0]
 
 
 def test_the_newest_scene_is_used_and_none_is_lost(ends: Ends) -> None:
@@ -129,13 +137,46 @@ def test_perception_hears_every_step(ends: Ends) -> None:
     link, there = ends
     steps_of(NotingDrive(steps=3), link, LateClock({}))
     heard = [there.receive() for _ in range(4)]
-    assert [getattr(step, "now_ns", None) for step in heard] == [0, 20 * MS, 40 * MS, None]
+    assert heard.pop() is None
+    steps = [message for message in heard if isinstance(message, StepMessage)]
+    assert [step.control.now_ns for step in steps] == [0, 20 * MS, 40 * MS]
+    assert [step.true_pose for step in steps] == [None, None, None]
+
+
+class Merry:
+    """A simulated world that turns the robot round."""
+
+    def __init__(self) -> None:
+        self.body_pose = PlanarPose(0.0, 0.0, 0.0)
+
+    def advance_to(self, now_ns: int) -> None:
+        self.body_pose = PlanarPose(0.0, 0.0, now_ns * 1e-9)
+
+
+def test_perception_hears_where_the_world_has_the_robot(ends: Ends) -> None:
+    link, there = ends
+    moments = run_realtime(
+        RUNNER,
+        LateClock({}),
+        Merry(),
+        link,
+        NotingDrive(steps=3),
+        ServiceManager({}, 1),
+        StopRequest(),
+        Punctuality(),
+    )
+    assert len(list(moments)) == 3
+    heard = [there.receive() for _ in range(3)]
+    headings_rad = [
+        one.true_pose.heading_rad for one in heard if isinstance(one, StepMessage) and one.true_pose
+    ]
+    assert headings_rad == pytest.approx([0.0, 0.02, 0.04])
 
 
 def test_telling_a_peer_that_is_gone_is_noticed_not_raised(ends: Ends) -> None:
     link, there = ends
     there.close()
-    link.send(control_step(0, None))
+    link.send(StepMessage(control_step(0, None), None))
     assert link.lost_reason is not None
 
 

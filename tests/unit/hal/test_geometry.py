@@ -5,7 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hal.geometry import advance_pose, camera_in_body, camera_in_floor, wrap_angle_rad
+from hal.geometry import (
+    advance_pose,
+    body_in_floor,
+    camera_in_body,
+    camera_in_floor,
+    planar,
+    wrap_angle_rad,
+)
 from hal.types import CameraMount, PlanarPose, Pose
 
 LEVEL = CameraMount(forward_m=0.4, left_m=0.1, height_m=0.6, pitch_rad=0.0)
@@ -60,3 +67,9 @@ def test_a_wrapped_angle_is_the_same_angle_in_one_turn(angle_rad: float) -> None
     assert -math.pi <= wrapped < math.pi + 1e-12
     assert math.cos(wrapped) == pytest.approx(math.cos(angle_rad), abs=1e-9)
     assert math.sin(wrapped) == pytest.approx(math.sin(angle_rad), abs=1e-9)
+
+
+@pytest.mark.parametrize("heading_rad", [-3.0, -0.5, 0.0, 2.0])
+def test_a_body_on_the_floor_is_found_again(heading_rad: float) -> None:
+    found = planar(body_in_floor(PlanarPose(1.5, -2.0, heading_rad)))
+    assert (found.x_m, found.y_m, found.heading_rad) == pytest.approx((1.5, -2.0, heading_rad))
