@@ -102,6 +102,11 @@ class AppConfig(Section):
     def _fits_together(self) -> Self:
         _check_speeds(self.robot, self.perception)
         _check_range(self.perception, self.decision)
+        if self.robot.limits.max_speed_mps > self.chassis.top_speed_mps:
+            raise ValueError(
+                f"robot.limits.max_speed_mps ({self.robot.limits.max_speed_mps:g}) is more than the base "
+                f"makes by its section chassis, {self.chassis.top_speed_mps:g} m/s"
+            )
         simulated = self.camera.kind == "simulated"
         if simulated and self.simulation is None:
             raise ValueError("camera.kind 'simulated' needs a 'simulation' section with a scenario")

@@ -97,6 +97,19 @@ NO_SERIAL: Mapping[AgilexModelName, str] = MappingProxyType(
 )
 
 
+# What a model makes; where the numbers are from: hal/chassis/agilex_models.py.
+AGILEX_TOP_SPEED_MPS: Mapping[AgilexModelName, float] = MappingProxyType(
+    {
+        "bunker": 3.0,
+        "bunker_mini": 1.5,
+        "bunker_pro": 1.5,
+        "scout": 1.5,
+        "scout_mini": 3.0,
+        "tracer": 1.5,
+    }
+)
+
+
 def _wire(link: object) -> str:
     """Which of the two link sections this is: a serial port has a url."""
     if isinstance(link, dict):
@@ -132,6 +145,11 @@ class AgilexChassisConfig(Section):
     track_width_m: float | None = Field(default=None, gt=0.05, le=5)
     slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
     actuators: int | None = Field(default=None, ge=1, le=8)
+
+    @property
+    def top_speed_mps(self) -> float:
+        """No command goes beyond it."""
+        return AGILEX_TOP_SPEED_MPS[self.model]
 
     @model_validator(mode="after")
     def _has_that_wire(self) -> Self:
@@ -185,6 +203,11 @@ class RoboclawChassisConfig(_TwoChannelConfig):
     accel_qpps2: int = Field(gt=0, le=100_000_000)
     timeout_ms: int = Field(default=300, ge=100, le=2000, multiple_of=100)
 
+    @property
+    def top_speed_mps(self) -> float:
+        """No command goes beyond it."""
+        return self.max_qpps / self.counts_per_m
+
 
 class RoboteqChassisConfig(_TwoChannelConfig):
     """A base with one two-channel Roboteq controller in closed-loop speed mode, channel 1 left, 2 right.
@@ -200,6 +223,11 @@ class RoboteqChassisConfig(_TwoChannelConfig):
     encoder: Literal["quadrature", "hall"] = "quadrature"
     watchdog_ms: int = Field(default=300, ge=100, le=2000)
     command_period_ms: int = Field(default=20, ge=10, le=100)
+
+    @property
+    def top_speed_mps(self) -> float:
+        """No command goes beyond it."""
+        return self.full_speed_mps
 
 
 class KobukiChassisConfig(Section):
@@ -219,6 +247,11 @@ class KobukiChassisConfig(Section):
     command_timeout_ms: int = Field(default=200, ge=40, le=1000)
     feedback_timeout_ms: int = Field(default=200, ge=60, le=2000, description="of its stream, 50 a second")
     arming_timeout_ms: int = Field(default=3000, ge=200, le=60_000)
+
+    @property
+    def top_speed_mps(self) -> float:
+        """No command goes beyond it."""
+        return self.max_speed_mps
 
 
 AnyChassisConfig = AgilexChassisConfig | RoboclawChassisConfig | RoboteqChassisConfig | KobukiChassisConfig

@@ -24,6 +24,7 @@ _IN_OTHER_WORDS = {
     "tuple_type": "Input should be a list",
     "model_type": "Input should be keys and values",
     "model_attributes_type": "Input should be keys and values",
+    "invalid_key": "a key must be a word; a decimal has a point, not a comma",
 }
 
 
@@ -132,6 +133,10 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
         unknown = detail["type"] == "extra_forbidden"
         key = written(model, detail["loc"], last_is_key=unknown)
         reason = _IN_OTHER_WORDS.get(detail["type"], detail["msg"].removeprefix("Value error, "))
+        if detail["type"] == "union_tag_invalid":
+            reason = "its {discriminator} is {tag!r}, which is none of {expected_tags}".format(
+                **detail["ctx"]
+            )
         if unknown:
             hint = advice(model, detail["loc"])
             # Several keys of another kind of file: what is known is said once.
@@ -140,15 +145,17 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
         elif detail["type"] == "missing":
             reason = "missing key"
         elif not isinstance(detail["input"], dict | list):
-            reason = f"{reason}, found {detail['input']!r}" + _as_number(detail)
+            reason = f"{reason}, found {detail['input']!r}" + _what_to_write(detail)
         parts.append(f"{key}: {reason}" if key else reason)
     if len(parts) > _MOST_MISTAKES:
         parts[_MOST_MISTAKES:] = [f"and {len(parts) - _MOST_MISTAKES} more mistakes"]
     return "; ".join(parts)
 
 
-def _as_number(detail: ErrorDetails) -> str:
-    """YAML 1.1 reads `15e-1` and '"1.5"' as text: what to write."""
+def _what_to_write(detail: ErrorDetails) -> str:
+    """YAML 1.1 reads `15e-1` and '"1.5"' as text, and a serial number as a number."""
+    if detail["type"] == "string_type" and isinstance(detail["input"], int | float):
+        return f", which is no text: put it in quotes, '{detail['input']}'"
     if detail["type"] not in ("float_type", "int_type") or not isinstance(detail["input"], str):
         return ""
     try:

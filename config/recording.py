@@ -70,7 +70,7 @@ class RecordingCamera(Section):
     ) = None
     depth_registered: bool = True
     fps: Positive | None = None
-    camera_height_m: Positive | None = None
+    camera_height_m: Annotated[Number, Field(gt=0, le=5)] | None = None
     camera_pitch_deg: Annotated[Number, Field(ge=-90, le=90)] = 0.0
     camera_forward_m: Number = 0.0
     camera_left_m: Number = 0.0

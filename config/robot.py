@@ -47,9 +47,15 @@ class Limits(Section):
     @model_validator(mode="after")
     def _emergency_is_harder(self) -> Self:
         if self.emergency_decel_mps2 < self.max_accel_mps2:
-            raise ValueError("emergency_decel_mps2 must not be smaller than max_accel_mps2")
+            raise ValueError(
+                f"emergency_decel_mps2 ({self.emergency_decel_mps2:g}) must not be smaller than "
+                f"max_accel_mps2 ({self.max_accel_mps2:g})"
+            )
         if self.emergency_jerk_mps3 < self.max_jerk_mps3:
-            raise ValueError("emergency_jerk_mps3 must not be smaller than max_jerk_mps3")
+            raise ValueError(
+                f"emergency_jerk_mps3 ({self.emergency_jerk_mps3:g}) must not be smaller than "
+                f"max_jerk_mps3 ({self.max_jerk_mps3:g})"
+            )
         return self
 
 

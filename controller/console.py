@@ -30,6 +30,7 @@ class Console:
         self._heard: tuple[str, int | None] | None = None
         self._heard_at_s = 0.0
         self._stuck_told_s = 0.0
+        self._stop_told = False
         self._write = write
 
     @contextmanager
@@ -61,6 +62,12 @@ class Console:
             self.event(
                 f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  {decision.action.value:8}  {reason.sentence}"
             )
+
+    def stopping(self, stamp_s: float, speed_mps: float, reason: str) -> None:
+        """Once: why the robot comes to rest now, whatever the way ahead would allow."""
+        if not self._stop_told:
+            self._stop_told = True
+            self.event(f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  stops     {reason}")
 
     def standing(self, stamp_s: float, lasted_s: float, decision: Decision) -> None:
         """Why the robot still stands: after ten seconds, and whenever that has doubled."""

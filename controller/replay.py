@@ -6,6 +6,7 @@ import math
 import os
 import time
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
@@ -142,7 +143,8 @@ def run_replay(options: ReplayOptions) -> None:
         if tally.without_pose:
             prior += f"; of the time of {tally.without_pose} of {tally.frames} frames there is none"
     skipped = [str(skip) for skip in source.skipped]
-    console.summary(_summary(options, tally, prior, skipped, source.notes))
+    notes = (*source.notes, *_mount_notes(options, config, source.mount))
+    console.summary(_summary(options, tally, prior, skipped, notes))
 
 
 def _refuse_overwriting(options: ReplayOptions) -> None:
@@ -181,6 +183,25 @@ def _camera(tally: ReplayTally) -> str:
     return "; mostly: ".join([worth, *(reason for reason, _ in tally.reasons.most_common(1))])
 
 
+def _counts(tally: ReplayTally) -> str:
+    return ", ".join(f"{count} {action}" for action, count in sorted(tally.actions.items()))
+
+
+def _mount_notes(options: ReplayOptions, config: ReplayConfig, recorded: CameraMount | None) -> Iterator[str]:
+    """That a mounting which was given is not used."""
+    given = config.robot.camera_mount
+    if recorded is None or "camera_mount" not in config.robot.model_fields_set:
+        return
+    if not np.allclose(
+        (recorded.height_m, recorded.pitch_rad), (given.height_m, given.pitch_rad), atol=0.002
+    ):
+        yield (
+            f"the camera is where the recording says, {recorded.height_m:.2f} m high and tipped by "
+            f"{math.degrees(recorded.pitch_rad):.1f} degrees, not where {options.config_path} does: "
+            f"{given.height_m:.2f} m, {math.degrees(given.pitch_rad):.1f} degrees"
+        )
+
+
 def _summary(
     options: ReplayOptions, tally: ReplayTally, odometry: str, skipped: list[str], notes: tuple[str, ...]
 ) -> list[tuple[str, str]]:
@@ -196,7 +217,7 @@ def _summary(
             f"{len(tally.ids)} seen, {len(tally.moving_ids)} of them moving"
             + (f"; nearest {tally.nearest_m:.2f} m ahead" if math.isfinite(tally.nearest_m) else ""),
         ),
-        ("decisions", ", ".join(f"{count} {action}" for action, count in sorted(tally.actions.items()))),
+        ("decisions", f"{_counts(tally)}; of a robot that goes straight ahead"),
         ("camera", _camera(tally)),
         ("perception", tally.timing.line()),
     ]

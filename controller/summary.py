@@ -19,15 +19,22 @@ from sim.simulation import Simulation
 
 def report(console: Console, result: MissionResult, step: ControlStep) -> None:
     """Progress, the decision if it is a new one, and that the robot does not get on."""
-    length_m = result.loop.path.length_m
+    length_m, stops = result.loop.path.length_m, result.loop.ending.stop_reason
+    does = (
+        f"{step.decision.action.value}: {step.decision.reason.sentence}"
+        if stops is None
+        else f"stops: {stops}"
+    )
     console.progress(
         step.progress_m / length_m,
-        f"{step.progress_m:5.1f}/{length_m:.1f} m  {step.setpoint.v_mps:4.2f} m/s  "
-        f"{step.decision.action.value}: {step.decision.reason.sentence}",
+        f"{step.progress_m:5.1f}/{length_m:.1f} m  {step.setpoint.v_mps:4.2f} m/s  {does}",
     )
     seconds = (step.now_ns - result.started_ns) / NS_PER_S
-    console.decision(seconds, step.decision, step.setpoint.v_mps)
-    console.standing(seconds, result.standstill.lasted_s(step.now_ns), step.decision)
+    if stops is None:
+        console.decision(seconds, step.decision, step.setpoint.v_mps)
+        console.standing(seconds, result.standstill.lasted_s(step.now_ns), step.decision)
+    else:
+        console.stopping(seconds, step.setpoint.v_mps, stops)
     console.complaints(seconds, result.complaints.add(step.chassis.faults))
 
 

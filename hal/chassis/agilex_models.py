@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from config.chassis import AgilexChassisConfig, SerialLinkConfig
+from config.chassis import AGILEX_TOP_SPEED_MPS, AgilexChassisConfig, SerialLinkConfig
 
 VEHICLE_NORMAL = 0
 VEHICLE_ESTOP = 1
@@ -89,21 +89,30 @@ def _describe(bits: int, names: Mapping[int, str], what: str) -> tuple[str, ...]
 
 # Limits: the vendor's SDK for BUNKER (robot_limits). Its fault table was published as pictures only,
 # so every bit is reported by number until it has been checked on a robot.
-BUNKER = AgilexModel(name="bunker", max_speed_mps=3.0, max_yaw_rate_radps=2.5235)
+BUNKER = AgilexModel(name="bunker", max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker"], max_yaw_rate_radps=2.5235)
 
 # BUNKER MINI manual pp. 7-9: CAN only, and 0x421 every 20 ms, taken back by the base after 500 ms without it.
 # No limits were found: held at what the paper's task needs.
 BUNKER_MINI = AgilexModel(
-    name="bunker_mini", max_speed_mps=1.5, max_yaw_rate_radps=1.0, mode_serial=None, mode_period_ms=20
+    name="bunker_mini",
+    max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker_mini"],
+    max_yaw_rate_radps=1.0,
+    mode_serial=None,
+    mode_period_ms=20,
 )
 
 # BUNKER PRO 2.0: CAN only, 0x211 every 200 ms. No limits were found: as for BUNKER MINI.
-BUNKER_PRO = AgilexModel(name="bunker_pro", max_speed_mps=1.5, max_yaw_rate_radps=1.0, mode_serial=None)
+BUNKER_PRO = AgilexModel(
+    name="bunker_pro",
+    max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker_pro"],
+    max_yaw_rate_radps=1.0,
+    mode_serial=None,
+)
 
 # SCOUT user manual v1.3.0: tables 3.2 and 3.9, section 1.2 (wheels 576 mm apart). Limits: the vendor's SDK.
 SCOUT = AgilexModel(
     name="scout",
-    max_speed_mps=1.5,
+    max_speed_mps=AGILEX_TOP_SPEED_MPS["scout"],
     max_yaw_rate_radps=0.5235,
     actuators=4,
     system_faults=MappingProxyType(
@@ -126,13 +135,18 @@ SCOUT = AgilexModel(
 )
 
 # Limits: the vendor's SDK. Its fault table was not found.
-SCOUT_MINI = AgilexModel(name="scout_mini", max_speed_mps=3.0, max_yaw_rate_radps=2.5235, actuators=4)
+SCOUT_MINI = AgilexModel(
+    name="scout_mini",
+    max_speed_mps=AGILEX_TOP_SPEED_MPS["scout_mini"],
+    max_yaw_rate_radps=2.5235,
+    actuators=4,
+)
 
 # TRACER user manual v1.2, tables 3.1 and 3.2: mode 0 is the remote control, and no value says standby. Its
 # serial line carries percentages.
 TRACER = AgilexModel(
     name="tracer",
-    max_speed_mps=1.5,
+    max_speed_mps=AGILEX_TOP_SPEED_MPS["tracer"],
     max_yaw_rate_radps=0.7853,
     mode_names=MappingProxyType({0: "remote control or standby", 1: "CAN", 2: "serial"}),
     mode_serial=None,

@@ -63,3 +63,41 @@ def test_what_the_speed_counts_on_having_seen_must_be_looked_at(
     load(written(tmp_path, ranges(5.0, 5.0)))
     with pytest.raises(ConfigError, match=r"range_m \(10\) is more than perception\.max_depth_m \(5\)"):
         load(written(tmp_path, ranges(10.0, 5.0)))
+
+
+@pytest.mark.parametrize(
+    ("shipped", "too_fast_mps", "makes"),
+    [
+        ("hil-kobuki.yaml", 0.8, "0.7"),
+        ("hil-roboclaw.yaml", 1.2, "1.16667"),
+        ("hil-roboteq.yaml", 1.6, "1.5"),
+        ("hil-agilex.yaml", 3.5, "3"),
+    ],
+)
+def test_a_speed_that_the_base_does_not_make_is_refused(
+    tmp_path: Path, shipped: str, too_fast_mps: float, makes: str
+) -> None:
+    content = yaml.safe_load((CONFIG_DIR / shipped).read_text())
+    content["robot"] = {"limits": {"max_speed_mps": too_fast_mps}}
+    with pytest.raises(ConfigError, match=rf"max_speed_mps \({too_fast_mps:g}\) is more than .* {makes} m/s"):
+        load_app(written(tmp_path, content))
+
+
+@pytest.mark.parametrize(
+    ("section", "told"),
+    [
+        ({"chassis": {"kind": "bunker"}}, "chassis: its 'kind' is 'bunker', which is none of 'agilex', 'ro"),
+        ({"camera": {"kind": "realsense", "serial": 912112073118}}, "put it in quotes, '912112073118'"),
+        ({"robot": {"limits": {"max_speed_mps": 1, 0: None}}}, "a decimal has a point, not a comma"),
+        (
+            {"robot": {"limits": {"max_accel_mps2": 1.0}}},
+            "emergency_decel_mps2 (0.7) must not be smaller than",
+        ),
+    ],
+)
+def test_mistakes_are_told_in_the_words_of_the_file(
+    tmp_path: Path, section: dict[str, object], told: str
+) -> None:
+    with pytest.raises(ConfigError) as refused:
+        load_app(written(tmp_path, SIM | section))
+    assert told in str(refused.value)

@@ -86,3 +86,10 @@ def test_a_standard_error_that_cannot_be_written_stops_nothing(
         console.event("driving")
         gone.flush()
     assert capsys.readouterr().out.splitlines() == ["driving"]
+
+
+def test_why_the_robot_comes_to_rest_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
+    console = Console(quiet=False)
+    for step in range(3):
+        console.stopping(14.6 + step * 0.02, 0.9, "SIGTERM received")
+    assert capsys.readouterr().out.splitlines() == ["  14.60 s  0.90 m/s  stops     SIGTERM received"]

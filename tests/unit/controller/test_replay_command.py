@@ -175,3 +175,18 @@ def test_the_summary_says_why_the_camera_cannot_be_trusted(
     run_replay(ReplayOptions(recording, "none", CONFIG_DIR / "replay.yaml", quiet=True))
     said = capsys.readouterr().out
     assert re.search(r"camera +10 untrustworthy; mostly: only 0\.0% of the depth image", said), said
+
+
+@pytest.mark.parametrize(("pitch_deg", "told"), [(4.0, False), (14.0, True)])
+def test_a_mounting_that_the_recording_knows_better_is_told(
+    pitch_deg: float, told: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = Path(shutil.copytree(DESK, tmp_path / "rec"))
+    camera = recording / "camera.yaml"
+    camera.write_text(camera.read_text() + "camera_height_m: 0.6\ncamera_pitch_deg: 4.0\n")
+    config = tmp_path / "mine.yaml"
+    config.write_text(f"robot: {{camera_mount: {{height_m: 0.6, pitch_deg: {pitch_deg}}}}}\n")
+    run_replay(ReplayOptions(recording, "none", config, quiet=True))
+    summary = capsys.readouterr().out
+    assert ("0.60 m high and tipped by 4.0 degrees, not where" in summary) is told
+    assert re.search(r"decisions   10 keep; of a robot that goes straight ahead", summary)
