@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 import time
 from contextlib import suppress
@@ -48,8 +49,10 @@ class RemoteBody:
             self._unread.append(step)
             self._fused.append(step.now_ns, step.pose)
             self._odometry.append(step.now_ns, step.chassis.pose)
-            self._newest_true = message.true_pose or self._by_odometry(step.chassis.pose)
-            self._true.append(step.now_ns, self._newest_true)
+            true_pose = message.true_pose or self._by_odometry(step.chassis.pose)
+            if true_pose is not None:
+                self._newest_true = true_pose
+                self._true.append(step.now_ns, true_pose)
 
     def take_steps(self) -> list[ControlStep]:
         """The control steps that have arrived since the last call."""
@@ -83,8 +86,10 @@ class RemoteBody:
             known = self._carried_on(self._newest.chassis.pose, stamp_ns)
         return None if known is None else camera_in_floor(known, self._mount)
 
-    def _by_odometry(self, odometry: PlanarPose) -> PlanarPose:
-        """On the path's floor; the first odometry is that of its start."""
+    def _by_odometry(self, odometry: PlanarPose) -> PlanarPose | None:
+        """On the path's floor; the first odometry is that of its start. None while the base knows of none."""
+        if not math.isfinite(odometry.x_m + odometry.y_m + odometry.heading_rad):
+            return None
         if self._from_odometry is None:
             self._from_odometry = self._start @ body_in_floor(odometry).inverse()
         return planar(self._from_odometry @ body_in_floor(odometry))

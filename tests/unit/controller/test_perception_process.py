@@ -77,7 +77,8 @@ def test_or_from_where_a_base_outside_of_this_program_reports_to_be(
 ) -> None:
     """By its odometry, which begins anywhere, from where the path begins; not from where it is believed."""
     body, control = ends
-    control.send(step_at(0, 1.0, 1.0))
+    control.send(step_at(0, math.nan, 1.0))
+    control.send(step_at(10, 1.0, 1.0))
     control.send(step_at(20, 1.5, 1.0))
     pose = body.true_pose(20 * MS)
     assert pose is not None
