@@ -21,6 +21,7 @@ from vision.fragments import FragmentStore
 from vision.health import Continuity, HealthMonitor
 from vision.lens import project, rays, vector_from_rotation
 from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
+from vision.mount_check import MountCheck
 from vision.optical_flow import Pyramid, pyramid
 from vision.percept import Percept
 from vision.renewal import Renewal
@@ -46,6 +47,7 @@ class Detector:
         self._attention = Attention(config)
         self._health = HealthMonitor(config)
         self._floor = FloorFinder()
+        self._mount_check = MountCheck()
         self._images: Pyramid = ()
         self._last_ns = 0
         self._pose = _IDENTITY
@@ -65,15 +67,18 @@ class Detector:
         grid = self._grid(frame)
         check = self._health.check(frame, grey, grid)
         usable = check.usable_colour and check.usable_depth
+        health = check.health
+        if self._mount is not None and usable:
+            health = self._mount_check.judge(grid, frame.captured_ns, health)
         known = len(self._images) > 0 and self._images[0].shape == grey.shape
         if not usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
-            return self._blind(frame, grid, check.health)
+            return self._blind(frame, grid, health)
         if check.continuity is not Continuity.NEXT or not known:
-            return self._restart(frame, grey, grid, odometry, check.health)
+            return self._restart(frame, grey, grid, odometry, health)
         dt_s = (frame.captured_ns - self._last_ns) * 1e-9
         if dt_s > self._config.max_gap_s:
-            return self._restart(frame, grey, grid, odometry, check.health)
-        return self._follow(frame, grey, grid, odometry, previous, dt_s, check.health)
+            return self._restart(frame, grey, grid, odometry, health)
+        return self._follow(frame, grey, grid, odometry, previous, dt_s, health)
 
     def _follow(
         self,

@@ -23,7 +23,7 @@ _EVERY = 3  # cells, in both directions
 _TRIES = 96
 _LEAST_SHARE = 0.06  # of the cells looked at: less floor than this is no floor
 _BELOW_COSTS = 3.0  # cells seen under a plane speak against it more than cells on it speak for it
-_TOLERANCE = 0.012  # 1/m, four standard deviations of a cell
+TOLERANCE = 0.012  # 1/m, four standard deviations of a cell
 _LEAST_UPRIGHT = 0.7  # cosine: a camera held more askew than 45 degrees is not expected
 _HEIGHT_M = (0.15, 2.5)
 _REFINEMENTS = 3
@@ -119,7 +119,7 @@ def _refined(
 ) -> FloatArray | None:
     """plane (3,) fitted to the cells on it; None: it is no floor."""
     for _ in range(_REFINEMENTS):
-        on_it = np.abs(plane @ cells - inverse) <= _TOLERANCE
+        on_it = np.abs(plane @ cells - inverse) <= TOLERANCE
         if np.count_nonzero(on_it) < max(3.0, least_cells):
             return None
         # Three unknowns of one size: the normal equations will do. A row of cells only is no plane.
@@ -134,8 +134,8 @@ def _score(planes: FloatArray, cells: FloatArray, inverse: FloatArray) -> FloatA
     """(P,) cells on each plane (P, 3), less those seen through it."""
     above = planes @ cells
     np.subtract(inverse, above, out=above)  # positive: nearer than the plane
-    below = np.count_nonzero(above < -2.0 * _TOLERANCE, axis=1)
-    on_it = np.count_nonzero(np.abs(above, out=above) <= _TOLERANCE, axis=1)
+    below = np.count_nonzero(above < -2.0 * TOLERANCE, axis=1)
+    on_it = np.count_nonzero(np.abs(above, out=above) <= TOLERANCE, axis=1)
     result: FloatArray = on_it - _BELOW_COSTS * below
     return result
 
