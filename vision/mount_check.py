@@ -1,4 +1,4 @@
-"""Is the camera where its mounting says? With a pitch that is wrong by 20 degrees nothing is an obstacle, since
+"""Is the camera where its mounting says? With a pitch wrong by 20 degrees nothing is an obstacle, since
 everything passes for the floor, or the floor itself is one."""
 
 from __future__ import annotations

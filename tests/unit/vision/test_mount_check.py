@@ -1,0 +1,78 @@
+"""A camera that is not where its mounting says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hal.types import FloatArray
+from tests.support.grids import grid_of, nearest, no_depth, plane, plate, wall
+from tests.support.scenes import GOOD
+from vision.mount_check import MountCheck
+from vision.scene import CameraCondition, CameraHealth
+
+HALF_S = 500_000_000
+HEIGHT_M = 0.6
+
+
+def up(pitch_deg: float) -> FloatArray:
+    """The world's up in the axes of a camera that looks down by so much."""
+    return np.array([0.0, -math.cos(math.radians(pitch_deg)), -math.sin(math.radians(pitch_deg))])
+
+
+def floor(pitch_deg: float = 4.0, height_m: float = HEIGHT_M) -> FloatArray:
+    return plane(up(pitch_deg), height_m)
+
+
+def judged(*depths_m: FloatArray, check: MountCheck | None = None, first: int = 0) -> CameraHealth:
+    """After looks at these, half a second apart, by a camera that should look down by 4 degrees."""
+    check = check or MountCheck()
+    for number, depth_m in enumerate(depths_m, start=first):
+        health = check.judge(grid_of(depth_m, up(4.0), HEIGHT_M), number * HALF_S, GOOD)
+    return health
+
+
+def test_a_camera_in_its_place_is_good() -> None:
+    assert judged(*[floor()] * 8) is GOOD
+
+
+@pytest.mark.parametrize("pitch_deg", [-8.0, 1.0, 7.0, 20.0])
+def test_a_wrong_pitch_is_told_with_the_right_one_beyond_5_degrees(pitch_deg: float) -> None:
+    health = judged(*[floor(pitch_deg)] * 3)
+    if abs(pitch_deg - 4.0) < 5.0:
+        assert health is GOOD
+    else:
+        assert health.condition is CameraCondition.DEGRADED
+        assert f"the camera is 0.60 m high and looks down by {pitch_deg:.0f} degrees" in health.reason
+
+
+@pytest.mark.parametrize(("height_m", "told"), [(0.75, False), (0.9, True), (0.3, True)])
+def test_so_is_a_wrong_height_beyond_20_cm(height_m: float, told: bool) -> None:
+    health = judged(*[floor(height_m=height_m)] * 3)
+    assert (f"the camera is {height_m:.2f} m high" in health.reason) is told
+
+
+def test_two_looks_are_no_reason_yet() -> None:
+    assert judged(*[floor(20.0)] * 2) is GOOD
+    assert judged(floor(), floor(20.0), floor(), floor(20.0), floor()) is GOOD
+
+
+def test_a_table_over_a_floor_in_its_place_is_a_table() -> None:
+    """Its top is the lowest plane on one side; the floor beside it lies where it should."""
+    table = np.where(np.arange(80) < 30, plane(up(4.0), 0.25), 0.0)
+    assert judged(*[nearest(floor(), table)] * 8) is GOOD
+
+
+def test_where_no_floor_is_seen_nothing_is_said() -> None:
+    before_a_wall = nearest(wall(1.0), plate(0.9, (-1.0, 1.0), (-1.0, 1.0)))
+    assert judged(*[before_a_wall, no_depth()] * 4) is GOOD
+
+
+def test_once_it_was_found_in_its_place_it_is_looked_at_every_five_seconds() -> None:
+    check = MountCheck()
+    assert judged(*[floor()] * 5, check=check) is GOOD
+    # Knocked askew: three looks, five seconds until the first of them, half a second to the others.
+    assert judged(*[floor(20.0)] * 11, check=check, first=5) is GOOD
+    assert judged(*[floor(20.0)] * 20, check=check, first=16).condition is CameraCondition.DEGRADED
