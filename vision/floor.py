@@ -23,7 +23,7 @@ _EVERY = 3  # cells, in both directions
 _TRIES = 96
 _LEAST_SHARE = 0.06  # of the cells looked at: less floor than this is no floor
 _BELOW_COSTS = 3.0  # cells seen under a plane speak against it more than cells on it speak for it
-TOLERANCE = 0.012  # 1/m, four standard deviations of a cell
+_TOLERANCE = 0.012  # 1/m, four standard deviations of a cell
 _LEAST_UPRIGHT = 0.7  # cosine: a camera held more askew than 45 degrees is not expected
 _HEIGHT_M = (0.15, 2.5)
 _REFINEMENTS = 3
@@ -99,6 +99,13 @@ def on_floor(grid: DepthGrid, floor: Floor, noise: DepthNoise) -> DepthGrid:
     )
 
 
+def cells_on(grid: DepthGrid, floor: Floor) -> int:
+    """How many cells of grid lie on floor."""
+    plane = -floor.up / floor.camera_height_m
+    inverse = plane[0] * grid.x[None, :] + (plane[1] * grid.y + plane[2])[:, None]
+    return int(np.count_nonzero(grid.valid & (np.abs(inverse - grid.inverse_depth) <= _TOLERANCE)))
+
+
 def _best_plane(cells: FloatArray, inverse: FloatArray, before: FloatArray | None) -> FloatArray | None:
     """(3,) a, b, c of what is most likely the floor of cells (3, K) with inverse depth (K,)."""
     chosen = (_picks() * len(inverse)).astype(np.intp)
@@ -119,7 +126,7 @@ def _refined(
 ) -> FloatArray | None:
     """plane (3,) fitted to the cells on it; None: it is no floor."""
     for _ in range(_REFINEMENTS):
-        on_it = np.abs(plane @ cells - inverse) <= TOLERANCE
+        on_it = np.abs(plane @ cells - inverse) <= _TOLERANCE
         if np.count_nonzero(on_it) < max(3.0, least_cells):
             return None
         # Three unknowns of one size: the normal equations will do. A row of cells only is no plane.
@@ -134,8 +141,8 @@ def _score(planes: FloatArray, cells: FloatArray, inverse: FloatArray) -> FloatA
     """(P,) cells on each plane (P, 3), less those seen through it."""
     above = planes @ cells
     np.subtract(inverse, above, out=above)  # positive: nearer than the plane
-    below = np.count_nonzero(above < -2.0 * TOLERANCE, axis=1)
-    on_it = np.count_nonzero(np.abs(above, out=above) <= TOLERANCE, axis=1)
+    below = np.count_nonzero(above < -2.0 * _TOLERANCE, axis=1)
+    on_it = np.count_nonzero(np.abs(above, out=above) <= _TOLERANCE, axis=1)
     result: FloatArray = on_it - _BELOW_COSTS * below
     return result
 

@@ -6,10 +6,8 @@ from __future__ import annotations
 import math
 from collections import deque
 
-import numpy as np
-
 from vision.depth_grid import DepthGrid
-from vision.floor import TOLERANCE, Floor, FloorFinder
+from vision.floor import Floor, FloorFinder, cells_on
 from vision.health import worsened
 from vision.scene import CameraCondition, CameraHealth
 
@@ -49,17 +47,10 @@ def _complaint(grid: DepthGrid, floor: Floor) -> str:
     tilt_rad = math.acos(min(max(float(floor.up @ grid.up), -1.0), 1.0))
     if tilt_rad <= _TILT_RAD and abs(floor.camera_height_m - grid.camera_height_m) <= _HEIGHT_M:
         return ""
-    if _cells_on(grid, Floor(grid.up, grid.camera_height_m)) >= _STILL_FLOOR * _cells_on(grid, floor):
+    if cells_on(grid, Floor(grid.up, grid.camera_height_m)) >= _STILL_FLOOR * cells_on(grid, floor):
         return ""
     pitch_deg = math.degrees(math.asin(min(max(-float(floor.up[2]), -1.0), 1.0)))
     return (
         f"by the floor that it sees the camera is {floor.camera_height_m:.2f} m high and looks down by "
         f"{pitch_deg:.0f} degrees: is its mounting right?"
     )
-
-
-def _cells_on(grid: DepthGrid, floor: Floor) -> int:
-    """How many cells lie on the floor."""
-    plane = -floor.up / floor.camera_height_m
-    inverse = plane[0] * grid.x[None, :] + (plane[1] * grid.y + plane[2])[:, None]
-    return int(np.count_nonzero(grid.valid & (np.abs(inverse - grid.inverse_depth) <= TOLERANCE)))

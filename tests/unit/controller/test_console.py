@@ -1,4 +1,6 @@
 import os
+from collections.abc import Iterator
+from typing import TextIO
 
 import pytest
 
@@ -57,34 +59,37 @@ def test_quiet_leaves_only_the_summary(capsys: pytest.CaptureFixture[str]) -> No
     assert captured.err == ""
 
 
-def test_a_reader_that_has_gone_is_told_once_on_standard_error_and_stops_nothing(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def unread() -> Iterator[TextIO]:
+    """A stream whose reader has gone."""
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as gone:
-        monkeypatch.setattr("sys.stdout", gone)
-        console = Console(quiet=False)
-        console.event("first")
-        console.event("second")
-        console.summary([("mission", "target reached")])
-        gone.flush()
+        yield gone
+
+
+def test_a_reader_that_has_gone_is_told_once_on_standard_error_and_stops_nothing(
+    unread: TextIO, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdout", unread)
+    console = Console(quiet=False)
+    console.event("first")
+    console.event("second")
+    console.summary([("mission", "target reached")])
+    unread.flush()
     assert capsys.readouterr().err.splitlines() == [
         "treadwatch: warning: nothing more can be written to standard output (Broken pipe)"
     ]
 
 
 def test_a_standard_error_that_cannot_be_written_stops_nothing(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    unread: TextIO, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    reader, writer = os.pipe()
-    os.close(reader)
-    with os.fdopen(writer, "w") as gone:
-        monkeypatch.setattr("sys.stderr", gone)
-        console = Console(quiet=False)
-        console.warning("the bend is blind")
-        console.event("driving")
-        gone.flush()
+    monkeypatch.setattr("sys.stderr", unread)
+    console = Console(quiet=False)
+    console.warning("the bend is blind")
+    console.event("driving")
+    unread.flush()
     assert capsys.readouterr().out.splitlines() == ["driving"]
 
 
