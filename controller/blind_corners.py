@@ -22,7 +22,8 @@ _LOOK_AHEAD_M = 5.0
 _STEP_ASIDE_M = 0.3
 # Between two bands a face that is seen at a flat angle goes on for so much, and a half.
 _SLACK = 1.5
-_JUMP_M = 0.8
+# Out of a narrower gap nobody steps: between the goods of a rack there are many.
+_PASSAGE_M = 0.8
 _SAME_M = 0.6
 _SURE_M = 3.2
 _SIGHTINGS, _MOST_SIGHTINGS = 3, 8
@@ -98,8 +99,9 @@ class BlindCorners:
         if not len(rows):
             return []
         along, aside, number = np.diff(s_m[rows]), np.diff(d_m[rows]), np.diff(bands[rows])
-        here = rows[:-1]
-        flat_m = _SLACK * forward_m[here] ** 2 * band_tan / np.maximum(np.abs(d_m[here]), 0.1) + _STEP_ASIDE_M
+        # So much of a face that runs along the way lies between two bands.
+        step_m = forward_m**2 * band_tan / np.maximum(np.abs(d_m), 0.1)
+        flat_m = _SLACK * step_m[rows[:-1]] + _STEP_ASIDE_M
         goes_on = (np.abs(number) == 1) & (along > -_STEP_ASIDE_M) & (along < flat_m)
         goes_on &= np.abs(aside) < _STEP_ASIDE_M
         last = [*(~goes_on).nonzero()[0].tolist(), len(rows) - 1]
@@ -108,16 +110,19 @@ class BlindCorners:
         return [
             end
             for began, end in faces
-            if s_m[end] - s_m[began] >= _FACE_M and self._opens(end, bands, forward_m, rows)
+            if s_m[end] - s_m[began] >= _FACE_M
+            and self._opens(end, bands, forward_m, rows, _PASSAGE_M + float(step_m[end]))
         ]
 
-    def _opens(self, here: int, bands: IntArray, forward_m: FloatArray, rows: IntArray) -> bool:
-        """Whether the view past the end goes on into the distance: what is behind the face is hidden."""
+    def _opens(
+        self, here: int, bands: IntArray, forward_m: FloatArray, rows: IntArray, least_m: float
+    ) -> bool:
+        """Whether the view past the end goes on for more than least_m: what is behind the face is hidden."""
         inward = 1 if rows[-1] > rows[0] or len(rows) == 1 else -1
         beyond = here + inward
         if not 0 <= beyond < len(bands) or abs(bands[beyond] - bands[here]) != 1:
             return True
-        return bool(forward_m[beyond] - forward_m[here] > _JUMP_M)
+        return bool(forward_m[beyond] - forward_m[here] > least_m)
 
     def _note(self, s_m: float, left: bool, beside_m: float) -> None:
         for corner in self._corners:

@@ -16,12 +16,14 @@ BEARING = np.linspace(-EDGE_TAN, EDGE_TAN, 2 * BANDS + 1)[1::2]
 
 class Aisle:
     """A rack from x = 0 to end_m, its face beside_m beside the swept width, on the left (1) or right (-1);
-    behind it the room goes on for 9 m."""
+    behind it the room goes on for 9 m, or another rack stands in line gap_m behind."""
 
-    def __init__(self, end_m: float, beside_m: float, side: int, start_m: float = 0.0) -> None:
+    def __init__(
+        self, end_m: float, beside_m: float, side: int, start_m: float = 0.0, gap_m: float = 9.0
+    ) -> None:
         self.corners = BlindCorners(SightConfig())
         self.start_m, self.end_m, self.side = start_m, end_m, side
-        self.face_m = HALF_WIDTH_M + beside_m
+        self.face_m, self.next_m = HALF_WIDTH_M + beside_m, end_m + gap_m
 
     def look(self, s_m: float, times: int = 1, stands: bool = True) -> None:
         """From s_m along a straight path."""
@@ -30,6 +32,10 @@ class Aisle:
             hit = right / BEARING
         at = hit + s_m + CAMERA_M
         forward = np.where((hit > 0.0) & (at < self.end_m) & (at > self.start_m), hit, 9.0)
+        # Who looks past the end into the gap sees the next rack's end, or its face.
+        behind = (hit > 0.0) & (at >= self.end_m)
+        to_next = np.maximum(hit, self.next_m - s_m - CAMERA_M)
+        forward = np.where(behind & (to_next < 9.0), to_next, forward)
         for _ in range(times):
             self.corners.look(
                 np.arange(BANDS),
@@ -74,6 +80,14 @@ def test_a_crate_is_no_corner() -> None:
     aisle = Aisle(4.4, 0.3, 1, start_m=3.8)
     aisle.look(1.0, times=5)
     assert aisle.corners.nearest(1.51) is None
+
+
+@pytest.mark.parametrize(("gap_m", "corner"), [(0.3, False), (0.7, False), (1.5, True)])
+def test_what_is_between_two_goods_in_a_rack_is_no_passage(gap_m: float, corner: bool) -> None:
+    aisle = Aisle(5.0, 0.4, 1, gap_m=gap_m)
+    for s_m in np.arange(0.5, 2.5, 0.05):
+        aisle.look(float(s_m))
+    assert (aisle.corners.nearest(2.5 + FRONT_M) is not None) == corner
 
 
 def test_people_one_behind_the_other_are_no_face() -> None:
