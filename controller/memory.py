@@ -13,6 +13,8 @@ A body of the last scene that is missing in this one is kept while its place is 
   was clearly coming may first be some decimetres late.
 * Another body is seen where a moving one was expected: the kept one is dropped only if the other has been
   seen for more than 0.5 s, with the same velocity within 2 sigma. Else both count: they may be two people.
+* A strip that was seen to move for less than 0.5 s within 0.5 m of a mover that is kept for longer, with the
+  same velocity within 2 sigma, was the last of that one to be in view.
 """
 
 from __future__ import annotations
@@ -49,6 +51,7 @@ _TOUCHING = 1e-6
 _CLEAR_SIGMAS, _CLEAR_MPS = 3.3, 0.2
 # Nobody is as narrow as this, and ends of racks are: half of the greatest width that was seen.
 _NOBODY_HALF_M = 0.1
+_REST_M = 0.5
 # So certainly it goes that it will not be found where it was seen last. Who has been looked at for longer
 # stands by a verdict that had time: what sinks below the view may well seem to move.
 _CERTAIN_SIGMAS, _NO_VERDICT_S = 5.0, 1.0
@@ -135,6 +138,7 @@ class OutOfView:
             kept &= ~bodies.moving | (
                 since <= np.where(_may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
             )
+            kept &= ~_rests(bodies)
         kept &= ~part_of.any(axis=1)
         self._since_s = since[kept]
         self._bodies = self._kept_out(bodies.select(kept), pose, free)
@@ -267,6 +271,17 @@ def _alike(bodies: Bodies, seen: Bodies) -> BoolArray:
     differs = bodies.velocity_mps[:, None] - seen.measured_mps
     same = np.all(differs**2 <= _APART_SIGMAS**2 * (spread + seen_spread), axis=2)
     return np.asarray(same & (seen.tracked_s > SETTLED_S))
+
+
+def _rests(bodies: Bodies) -> BoolArray:
+    """(N,) strips hardly seen beside another of these that was seen for longer and may go just as they do."""
+    older = bodies.moving & (bodies.tracked_s > SETTLED_S)
+    rests = bodies.moving & ~older & (bodies.half_across_m < _NOBODY_HALF_M)
+    if not (older.any() and rests.any()):
+        return np.zeros(len(bodies), np.bool_)
+    others = bodies.select(older)
+    beside = others.covers(bodies.xy_m, bodies.half_view_m, _REST_M) & _alike(bodies, others)
+    return np.asarray(rests & beside.any(axis=1))
 
 
 def _missing(ids: NDArray[np.int64], among: NDArray[np.int64]) -> BoolArray:

@@ -227,3 +227,44 @@ def test_what_stood_where_something_stood_is_not_believed_before_it_was_measured
 def test_however_certainly_hardly_any_speed_is_no_going() -> None:
     assert out_of_view_after(0.5, left_mps=0.18, sigma_mps=0.02).moving.tolist() == [False]
     assert out_of_view_after(0.5, left_mps=0.22, sigma_mps=0.02).moving.tolist() == [True]
+
+
+WALKER = box(2.0, 1.5, 0.0, 1.0, sigma_mps=0.1)
+
+
+def strip(
+    y_m: float = 1.3,
+    vy_mps: float = 0.01,
+    half_across_m: float = 0.02,
+    sigma_mps: float = 1.5,
+    age_s: float = 0.07,
+) -> Bodies:
+    """Of which two frames told that it moves, though not where to."""
+    return box(2.0, y_m, 0.0, vy_mps, number=2, half_across_m=half_across_m, sigma_mps=sigma_mps, age_s=age_s)
+
+
+def left_behind(*bodies: Bodies) -> list[int]:
+    """The ids of who is reckoned with once all of them are out of view."""
+    view, before = memory(), bodies[0]
+    for one in bodies[1:]:
+        before = before.joined(one)
+    kept = view.update(before, no_bodies(FRAME_NS), HERE, EDGE, False, NOTHING_SEEN)
+    return [int(one) for one in kept.ids]
+
+
+def test_the_last_strip_of_a_walker_to_be_in_view_goes_with_him() -> None:
+    assert left_behind(WALKER, strip()) == [1]
+
+
+@pytest.mark.parametrize(
+    "bodies",
+    [
+        pytest.param((WALKER, strip(half_across_m=0.15)), id="as wide as somebody"),
+        pytest.param((WALKER, strip(age_s=0.6)), id="seen for long enough"),
+        pytest.param((WALKER, strip(vy_mps=-1.0, sigma_mps=0.2)), id="goes elsewhere"),
+        pytest.param((WALKER, strip(y_m=0.7)), id="not beside him"),
+        pytest.param((box(2.0, 1.5), strip()), id="beside what stands"),
+    ],
+)
+def test_no_other_strip_does(bodies: tuple[Bodies, ...]) -> None:
+    assert 2 in left_behind(*bodies)
