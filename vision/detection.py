@@ -52,6 +52,12 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> Camera
         return worsened(health, CameraCondition.DEGRADED, reason)
     if ego.source == "visual":
         return health
+    if ego.source == "disputed":
+        reason = (
+            "the images and the odometry tell of two motions of the camera:"
+            " do the tracks slip, or is the odometry wrong?"
+        )
+        return worsened(health, CameraCondition.DEGRADED, reason)
     if ego.source == "odometry":
         reason = "too few static fragments: the camera's motion rests on the odometry alone"
         return worsened(health, CameraCondition.DEGRADED, reason)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +28,7 @@ from vision.optical_flow import Pyramid, pyramid
 from vision.percept import Percept
 from vision.renewal import Renewal
 from vision.rolling_shutter import ReadOut
-from vision.scene import CameraHealth, EgoMotion, Fragments
+from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
 from vision.velocities import PointMotion
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
@@ -46,6 +48,7 @@ class Detector:
         self._renewal = Renewal(config)
         self._attention = Attention(config)
         self._health = HealthMonitor(config)
+        self._told = CameraHealth(CameraCondition.GOOD, "", float("nan"))
         self._floor = FloorFinder()
         self._mount_check = MountCheck()
         self._images: Pyramid = ()
@@ -71,6 +74,9 @@ class Detector:
         if self._mount is not None and usable:
             health = self._mount_check.judge(grid, frame.captured_ns, health)
         known = len(self._images) > 0 and self._images[0].shape == grey.shape
+        if check.continuity is Continuity.REPEATED and health.condition is CameraCondition.GOOD:
+            # An image that was told of before is worth no more than it was then.
+            health = replace(self._told, valid_depth_ratio=health.valid_depth_ratio)
         if not usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
             return self._blind(frame, grid, health)
         if check.continuity is not Continuity.NEXT or not known:
@@ -136,14 +142,14 @@ class Detector:
         health = camera_health(health, ego, blurred)
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
-        known = ego.source != "none" and not blurred
+        known = ego.source in ("visual", "odometry") and not blurred
         detection = self._detection(
             frame, grid, dt_s, motion, ego, health, False, known, prior.source != "none"
         )
         self._renew(frame, grey)
         if previous is not None:
             self._look_closer(frame, grey, previous.wanted)
-        if ego.source == "none":
+        if ego.source != "visual" or blurred:
             self._store.break_history()
         self._commit(frame, images, odometry, result.sweep_rad)
         return detection
@@ -210,7 +216,7 @@ class Detector:
         motion_known: bool = False,
         reckoned: bool = False,
     ) -> Detection:
-        store = self._store
+        store, self._told = self._store, health
         return Detection(
             frame.captured_ns,
             frame.sequence,
@@ -265,7 +271,7 @@ def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) ->
     return EgoMotion(
         step,
         dt_s,
-        "visual" if result.visual else prior.source,
+        "visual" if result.visual else "disputed" if result.disputed else prior.source,
         result.inlier_ratio,
         float(np.sqrt(variance[3:].sum())),
         float(np.sqrt(variance[:3].sum())),

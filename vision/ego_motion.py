@@ -13,7 +13,8 @@ depth still measures across it.
 Gate: a point enters only if its error at the start has a chi-square of 9.21 at most (99 % of static points),
 widened by the uncertainty of the prior. Therefore a person who fills half of the view cannot outvote the
 odometry. If the result contradicts a binding prior, it is solved again with a tighter one; if that fails or
-too few points agree, the prior alone is the answer.
+too few points agree, the prior alone is the answer. But if nearly all points agree on what contradicts the
+prior, it is no longer plain which is wrong: the tracks may slip, or all that is seen may move.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ _ANNEAL = (32.0, 4.0)  # robust scale of the first iterations, falling to 1
 _MIN_POINTS = 8
 _MIN_INLIER_RATIO = 0.25
 _MIN_BACKGROUND_RATIO = 0.10
+_UNANIMOUS_RATIO = 0.9
+_LOOSE_SHARE = np.array([5.0] * 6 + [1.0] * 2)  # of the prior's sigma
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, where it decides
 _BENT_CHI2 = 16.0  # four sigmas
@@ -51,7 +54,8 @@ class CameraEstimate:
     """pose: the camera in the fixed frame, when the middle row was read. sweep_rad (2,): how far it turned
     about x and y from the first row to the last. covariance (8, 8) of a small motion of it and of
     sweep_rad. bend_rad, bend_variance (2,): the sweep as the image alone tells it, inf where it tells
-    nothing. inlier_ratio: NaN where not estimated. visual: False where only the prior speaks."""
+    nothing. inlier_ratio: NaN where not estimated. visual: False where only the prior speaks. disputed:
+    nearly all points contradict the prior; the pose is theirs, and neither is to be relied on."""
 
     pose: Pose
     sweep_rad: FloatArray
@@ -60,6 +64,7 @@ class CameraEstimate:
     covariance: FloatArray
     inlier_ratio: float
     visual: bool
+    disputed: bool = False
 
 
 def estimate(
@@ -90,20 +95,29 @@ def estimate(
             bend_rad, bend_variance = _bend(found)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
     torn = prior.binding and _conflict(found.pose, start, prior.sigma)
+    disputed = False
     if torn:
-        # Something large moves, and the data follow it. What agrees with the prior is the ground.
-        found = _solve(view, start, sigma * _TRUSTED_SHARE)
+        # Where the prior is far off, its gate shuts out what denies it.
+        freely = _solve(view, start, sigma * _LOOSE_SHARE)
+        disputed = freely.inliers >= _UNANIMOUS_RATIO * len(use)
+        if disputed:
+            found = freely
+        else:
+            # Something large moves, and the data follow it. What agrees with the prior is the ground.
+            found = _solve(view, start, sigma * _TRUSTED_SHARE)
+            least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
+            # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
+            torn = _conflict(found.pose, start, prior.sigma)
         bend_rad, bend_variance = _bend(found)
-        least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
-        # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
-        torn = _conflict(found.pose, start, prior.sigma)
     ratio = found.inliers / len(use)
     # OpenCV answers zeros where there is no inverse: the least that is known would seem the most.
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
-    if found.inliers < least or torn or not regular:
+    if found.inliers < least or (torn and not disputed) or not regular:
         return _unseen(start, sigma, ratio)
     spread = np.asarray(covariance, np.float64)
-    return CameraEstimate(found.pose, found.sweep_rad, bend_rad, bend_variance, spread, ratio, True)
+    return CameraEstimate(
+        found.pose, found.sweep_rad, bend_rad, bend_variance, spread, ratio, not disputed, disputed
+    )
 
 
 def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:

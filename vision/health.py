@@ -43,17 +43,17 @@ class FrameCheck:
 
 
 class HealthMonitor:
-    """Looks at each frame once. Keeps the time and a few pixels of the frame before."""
+    """Looks at each frame once. Keeps the time and the image of the frame before."""
 
     def __init__(self, config: PerceptionConfig) -> None:
         self._config = config
         self._last_ns: int | None = None
-        self._last_pixels: bytes = b""
+        self._last_grey: GreyImage | None = None
         self._same = 0
 
     def check(self, frame: RgbdFrame, grey: GreyImage, grid: DepthGrid) -> FrameCheck:
         """The worst finding decides the condition; each finding has its sentence."""
-        sample = np.ascontiguousarray(grey[_STEP // 2 :: _STEP, _STEP // 2 :: _STEP])
+        sample = grey[_STEP // 2 :: _STEP, _STEP // 2 :: _STEP]
         continuity, gap_s = self._continuity(frame)
         problems: list[tuple[CameraCondition, str]] = []
         bad, poor = CameraCondition.UNTRUSTWORTHY, CameraCondition.DEGRADED
@@ -64,8 +64,8 @@ class HealthMonitor:
         elif continuity is Continuity.GAP:
             problems.append((poor, f"{gap_s:.2f} s without a frame: motion cannot be compared across it"))
         # Colour alone: a sensor's noise never repeats, whatever depth does beside it.
-        pixels = sample.tobytes()
-        self._same = self._same + 1 if pixels == self._last_pixels else 0
+        repeated = self._repeats(grey, sample)
+        self._same = self._same + 1 if repeated else 0
         if self._same >= _FROZEN_FRAMES:
             problems.append((bad, f"image has not changed by a single grey level for {self._same} frames"))
         dark = float(np.count_nonzero(sample <= _BLACK_LEVEL)) / sample.size
@@ -83,8 +83,19 @@ class HealthMonitor:
             problems.append((poor, f"only {share:.0%} of the depth image holds data"))
         if continuity is not Continuity.BACKWARD:
             self._last_ns = frame.captured_ns
-            self._last_pixels = pixels
+            self._last_grey = grey
+        if repeated and continuity is Continuity.NEXT:
+            continuity = Continuity.REPEATED
         return FrameCheck(usable_colour, usable_depth, continuity, _verdict(problems, share))
+
+    def _repeats(self, grey: GreyImage, sample: GreyImage) -> bool:
+        """Whether this is the image of the frame before. Hardly any gets past the first comparison."""
+        before = self._last_grey
+        if before is None or before.shape != grey.shape:
+            return False
+        if (before[_STEP // 2 :: _STEP, _STEP // 2 :: _STEP] != sample).any():
+            return False
+        return bool((before == grey).all())
 
     def _continuity(self, frame: RgbdFrame) -> tuple[Continuity, float]:
         if self._last_ns is None:

@@ -79,9 +79,9 @@ class EgoMotion:
     """The camera's own motion between the frame before and this one.
 
     motion: the camera now, in the camera before (p_before = motion.apply(p_now)). dt_s: between the
-    two exposures. source: which of "visual", "odometry", "none" it rests on. inlier_ratio: share of the
-    fragments that agree with it as static, NaN where not estimated. sigma_translation_m and
-    sigma_rotation_rad: one standard deviation over the whole interval.
+    two exposures. source: which of "visual", "odometry", "none" it rests on; "disputed": on the images, which
+    the odometry contradicts. inlier_ratio: share of the fragments that agree with it as static, NaN where not
+    estimated. sigma_translation_m and sigma_rotation_rad: one standard deviation over the whole interval.
     """
 
     motion: Pose

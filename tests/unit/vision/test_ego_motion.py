@@ -123,6 +123,20 @@ def test_the_odometry_decides_when_a_near_body_fills_most_of_the_view(
     assert found.inlier_ratio < 1.05 - ratio
 
 
+@pytest.mark.parametrize("way_m", [(0.05, 0.0, 0.0), (0.0, 0.0, -0.03)])
+def test_what_nearly_all_deny_is_disputed(way_m: tuple[float, float, float]) -> None:
+    """Also where the odometry is so wrong that nearly no point is where it expects it."""
+    static = anchors()
+    now = static.points_m + np.where(share(160, 0.95)[:, None], way_m, 0.0)
+    found = estimate(static, seen(now, noise_px=0.1), IDENTITY, odometry(), GLOBAL_SHUTTER, CAMERA)
+    metres, radians = off(found, Pose(np.eye(3), -np.array(way_m)) @ TRUE)
+    assert found.disputed
+    assert not found.visual
+    assert metres < 5e-3
+    assert radians < 2e-3
+    assert found.inlier_ratio > 0.9
+
+
 def test_points_marked_as_not_usable_have_no_say() -> None:
     static = anchors()
     moving = share(160, 0.8)
