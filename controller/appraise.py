@@ -143,9 +143,9 @@ class Appraiser:
             return []
         ahead_m = corner.s_m - front_m
         slow_mps = self._config.sight.blind_corner_mps
-        speed = braking.speed_before_section(
-            ahead_m - motion.v_mps * motion.latency_s, slow_mps, self._comfort
-        )
+        rolls_m = motion.v_mps * motion.latency_s
+        rolls_m += braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
+        speed = braking.speed_before_section(ahead_m - rolls_m, slow_mps, self._comfort)
         sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
         return [Limit(speed, Reason("corner", sentence + allowed(speed), distance_m=ahead_m))]
 

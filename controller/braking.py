@@ -137,6 +137,17 @@ def speed_before_section(distance_m: float, section_mps: float, limits: BrakeLim
     return low
 
 
+def letting_go_distance(v_mps: float, a_mps2: float, limits: BrakeLimits) -> float:
+    """How far an accelerating robot comes until its speed is steady, if it lets go of a at once, in metres.
+
+    v T + a^3 / 3J^2 with T = a / J: the terms of a in stop(). 0 for one that brakes.
+    """
+    if a_mps2 <= 0.0:
+        return 0.0
+    ease_s = a_mps2 / limits.jerk_mps3
+    return v_mps * ease_s + a_mps2 * ease_s * ease_s / 3.0
+
+
 def paper_braking_distance(v_mps: float, decel_mps2: float) -> float:
     """S_r of Daeef 2020, eq. 2: stop() with infinite jerk."""
     return stop(v_mps, 0.0, BrakeLimits(decel_mps2, math.inf)).distance_m

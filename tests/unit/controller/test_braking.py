@@ -235,6 +235,14 @@ def test_slowing_to_a_section() -> None:
     assert braking.speed_before_section(-0.1, 0.5, limits) == 0.5
 
 
+def test_how_far_it_comes_while_it_lets_go_of_its_acceleration() -> None:
+    """From 1 m/s with a 0.3 under J 0.6: 0.5 s at 1 m/s, and 0.025 m more."""
+    limits = BrakeLimits(0.3, 0.6)
+    assert braking.letting_go_distance(1.0, 0.3, limits) == pytest.approx(0.525)
+    assert braking.letting_go_distance(1.0, 0.0, limits) == 0.0
+    assert braking.letting_go_distance(1.0, -0.3, limits) == 0.0
+
+
 @pytest.mark.parametrize(
     ("v", "a"), [(-0.1, 0.0), (math.nan, 0.0), (math.inf, 0.0), (1.0, math.nan), (1.0, -math.inf)]
 )

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from config.path import LineSpec, PathSpec
+from config.robot import Robot
+from controller.path import Path
 from tests.support.closed_loop import (
     Log,
     Mission,
@@ -20,7 +23,20 @@ from tests.support.closed_loop import (
 )
 from vision.scene import Scene
 
+# Of the chassis, and one control step.
+REACTION_S = 0.22
 REAL = Noise(depth_1pm=0.0075, velocity_mps=0.1)
+
+
+def slow_end(before_m: float, slow_mps: float) -> Path:
+    """A line, and a metre more at slow_mps."""
+    last = LineSpec(kind="line", length_m=1.0, max_speed_mps=slow_mps)
+    return Path(PathSpec(segments=(LineSpec(kind="line", length_m=before_m), last)), Robot())
+
+
+def slow_start(slow_m: float, slow_mps: float) -> Path:
+    first = LineSpec(kind="line", length_m=slow_m, max_speed_mps=slow_mps)
+    return Path(PathSpec(segments=(first, LineSpec(kind="line", length_m=12.0))), Robot())
 
 
 def limits_hold(log: Log) -> bool:
@@ -50,6 +66,29 @@ def test_an_empty_path_takes_no_more_than_one_per_cent_longer_than_the_optimum()
     assert mission.reached
     # 0.06 s pass until the first scene is there.
     assert mission.t - 0.06 <= 1.01 * optimum_s(mission.path, mission)
+
+
+@pytest.mark.parametrize("before_m", [1.0, 3.0, 8.0])
+@pytest.mark.parametrize("slow_mps", [0.1, 0.3])
+def test_a_slow_section_is_entered_slowly_also_by_who_still_accelerates(
+    before_m: float, slow_mps: float
+) -> None:
+    log = drive(Mission(slow_end(before_m, slow_mps), []))
+    speeds = np.array(log.v_mps)
+    inside = np.array(log.s_m) >= before_m
+    assert speeds[inside].max() <= slow_mps + 1e-3
+    # Nor is it crept up to.
+    assert speeds[~inside].max() > min(slow_mps, 0.3)
+
+
+def test_no_slow_section_is_left_before_its_end() -> None:
+    """Faster beyond: the acceleration begins there."""
+    mission = Mission(slow_start(1.5, 0.4), [])
+    log = drive(mission)
+    # What is commanded now acts a little later; speeds are kept every 5 cm.
+    inside = np.array(log.s_m) < 1.5 - 0.05 - 0.4 * REACTION_S
+    assert np.array(log.v_mps)[inside].max() <= 0.4 + 1e-3
+    assert max(log.v_mps) > 1.0
 
 
 def test_a_crate_beside_the_path_costs_at_most_two_per_cent() -> None:
