@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import dataclass
 
 from vision.depth_grid import DepthGrid
 from vision.floor import Floor, FloorFinder, cells_on
@@ -15,9 +16,20 @@ from vision.scene import CameraCondition, CameraHealth
 _OFTEN_NS, _RARELY_NS = 500_000_000, 5_000_000_000
 _LOOKS = 5
 _MOST_WRONG = 2
+
+
+@dataclass(frozen=True, slots=True)
+class _Bounds:
+    tilt_rad: float
+    height_m: float
+
+
 # Slopes, vibration and a rough measure are less; tables and pallets do not hide most of the floor.
-_TILT_RAD = math.radians(5.0)
-_HEIGHT_M = 0.2
+_PLAINLY_WRONG = _Bounds(math.radians(5.0), 0.2)
+# A pallet is lost in the floor, or the floor becomes a surface some metres ahead. One look tells to 0.3
+# degrees and 6 mm; slopes are as much, but not the same in all looks.
+_WRONG = _Bounds(math.radians(1.5), 0.05)
+_SAME = _Bounds(math.radians(0.5), 0.03)
 _STILL_FLOOR = 0.5  # of the cells of the plane that was found
 
 
@@ -25,32 +37,56 @@ class MountCheck:
     """Finds the floor in the depth now and then, and compares it with where the mounting puts it."""
 
     def __init__(self) -> None:
-        # Of the last looks at a floor: "" where it lay in its place.
-        self._complaints: deque[str] = deque(maxlen=_LOOKS)
+        self._looks: deque[_Look] = deque(maxlen=_LOOKS)
         self._next_ns: int | None = None
 
     def judge(self, grid: DepthGrid, captured_ns: int, health: CameraHealth) -> CameraHealth:
-        """health, or worse if most looks have found the floor elsewhere. grid: with the mounting's floor."""
+        """health, or worse if most looks have found the floor plainly elsewhere, or all of them at one other
+        place. grid: with the mounting's floor."""
         if self._next_ns is None or captured_ns >= self._next_ns:
             floor = FloorFinder().find(grid)
             if floor is not None:
-                self._complaints.append(_complaint(grid, floor))
-            settled = len(self._complaints) == _LOOKS and not any(self._complaints)
+                self._looks.append(_look(grid, floor))
+            settled = len(self._looks) == _LOOKS and not any(look.off for look in self._looks)
             self._next_ns = captured_ns + (_RARELY_NS if settled else _OFTEN_NS)
-        wrong = [complaint for complaint in self._complaints if complaint]
-        return worsened(health, CameraCondition.DEGRADED, wrong[-1]) if len(wrong) > _MOST_WRONG else health
+        plain = [look for look in self._looks if look.plainly_off]
+        if len(plain) > _MOST_WRONG:
+            return worsened(health, CameraCondition.DEGRADED, _sentence(plain[-1].floor))
+        if len(self._looks) == _LOOKS and all(look.off for look in self._looks) and self._agree():
+            return worsened(health, CameraCondition.DEGRADED, _sentence(self._looks[-1].floor))
+        return health
+
+    def _agree(self) -> bool:
+        last = self._looks[-1].floor
+        return not any(_apart(look.floor, last, _SAME) for look in self._looks)
 
 
-def _complaint(grid: DepthGrid, floor: Floor) -> str:
-    """What is wrong with the mounting by this floor, "" if nothing is."""
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """off, plainly_off: by how much the floor is not where the mounting puts it."""
+
+    floor: Floor
+    off: bool
+    plainly_off: bool
+
+
+def _look(grid: DepthGrid, floor: Floor) -> _Look:
     assert grid.up is not None, "a camera whose mounting is known"
-    tilt_rad = math.acos(min(max(float(floor.up @ grid.up), -1.0), 1.0))
-    if tilt_rad <= _TILT_RAD and abs(floor.camera_height_m - grid.camera_height_m) <= _HEIGHT_M:
-        return ""
-    if cells_on(grid, Floor(grid.up, grid.camera_height_m)) >= _STILL_FLOOR * cells_on(grid, floor):
-        return ""
+    told = Floor(grid.up, grid.camera_height_m)
+    off = _apart(floor, told, _WRONG)
+    if off and cells_on(grid, told) >= _STILL_FLOOR * cells_on(grid, floor):
+        off = False
+    return _Look(floor, off, off and _apart(floor, told, _PLAINLY_WRONG))
+
+
+def _apart(one: Floor, other: Floor, bounds: _Bounds) -> bool:
+    tilt_rad = math.acos(min(max(float(one.up @ other.up), -1.0), 1.0))
+    return tilt_rad > bounds.tilt_rad or abs(one.camera_height_m - other.camera_height_m) > bounds.height_m
+
+
+def _sentence(floor: Floor) -> str:
     pitch_deg = math.degrees(math.asin(min(max(-float(floor.up[2]), -1.0), 1.0)))
     return (
         f"by the floor that it sees the camera is {floor.camera_height_m:.2f} m high and looks down by "
-        f"{pitch_deg:.0f} degrees: is its mounting right?"
+        f"{pitch_deg:.1f} degrees: is its mounting right?"
     )
