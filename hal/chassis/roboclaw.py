@@ -92,6 +92,9 @@ class RoboclawChassis(ChassisDriver):
         if not self._port.idle(now_ns):
             return None
         stops = self._moving and is_zero(command)
+        if self._arming.mode is not ChassisMode.ARMING:
+            # Of an arming that a lost link or a fault ended: nobody consents to it any more.
+            self._setup.clear()
         if self._setup:
             self._port.start(self._setup.popleft(), now_ns)
             return None

@@ -99,18 +99,20 @@ class RoboteqChassis(ChassisDriver):
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         stops = self._moving and is_zero(command)
-        if not (stops or self._setup or due(self._motion_sent_ns, self._period_ns, now_ns)):
+        # It ends with !MG: said after a lost link, it would end an emergency stop nobody consented to end.
+        setup = self._setup if self._arming.mode is ChassisMode.ARMING else b""
+        if not (stops or setup or due(self._motion_sent_ns, self._period_ns, now_ns)):
             return None
+        self._setup = b""
         motion, sent = self._motion(command)
-        said = self._first_after_a_gap(now_ns) + self._setup + motion
+        said = self._first_after_a_gap(now_ns) + setup + motion
         if self._defies(now_ns):
             said += lines.EMERGENCY_STOP
         query = None
         if self._asked_query is None and now_ns >= self._quiet_until_ns:
-            query = lines.QUERIES[lines.WATCHDOG] if self._setup else next(self._queries)
+            query = lines.QUERIES[lines.WATCHDOG] if setup else next(self._queries)
             said += query.line
         self._write(said, now_ns)
-        self._setup = b""
         self._moving = not is_zero(command)
         if query is not None:
             self._asked_query, self._asked_ns = query, now_ns

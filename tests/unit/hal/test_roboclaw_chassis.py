@@ -64,6 +64,20 @@ def test_a_lost_setting_is_repeated() -> None:
     assert bench.emulator.timeout_ms == 300
 
 
+def test_a_consent_that_a_lost_link_ended_sets_nothing_later() -> None:
+    bench = Bench()
+    bench.run(10)
+    bench.chassis.arm(bench.now_ns)
+    bench.near.unplug()
+    assert bench.step().mode is ChassisMode.LOST
+    bench.near.plug()
+    bench.near.sent.clear()
+    bench.run(100)
+    assert b"\x80\x28" in bench.near.sent, "it speaks again"
+    assert b"\x80\x0e" not in bench.near.sent
+    assert bench.emulator.timeout_ms == 0
+
+
 def test_a_motion_command_whose_answer_is_lost_is_not_repeated() -> None:
     bench = Bench()
     bench.arm()

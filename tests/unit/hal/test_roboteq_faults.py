@@ -54,6 +54,29 @@ def test_consent_while_the_button_is_pressed_leads_nowhere() -> None:
     assert bench.run(100).mode is ChassisMode.ESTOP, "!MG was said once, with the consent, and never again"
 
 
+@pytest.mark.parametrize("ends", ["reading", "writing"])
+def test_a_consent_that_a_lost_link_ended_resets_nothing_later(ends: str) -> None:
+    """Pressed and released meanwhile: the controller's latch is not the one that was consented to end."""
+    bench = Bench()
+    bench.run(10)
+    bench.chassis.arm(bench.now_ns)
+    if ends == "reading":
+        bench.near.unplug()
+    else:
+        bench.near.fail_writes(1)
+    assert bench.step().mode is ChassisMode.LOST
+    bench.emulator.press_estop()
+    bench.emulator.release_estop()
+    bench.near.plug()
+    lines: list[bytes] = []
+    for _ in range(100):
+        bench.step()
+        lines += bench.written()
+    assert b"!M 0 0" in lines, "it speaks again"
+    assert b"!MG" not in lines
+    assert bench.emulator.fault_flags == 0x10
+
+
 def test_a_fault_beside_the_emergency_stop_is_not_reset() -> None:
     bench = Bench()
     bench.arm()
