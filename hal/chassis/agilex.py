@@ -108,7 +108,8 @@ class AgilexChassis(ChassisDriver):
         self._send_mode(self._model.mode_standby, now_ns)
 
     def _begin_arming(self) -> None:
-        # Nothing to forget: arming counts only a 0x211 that arrives from now on. But speak at once.
+        # Arming counts only a 0x211 that arrives from now on, so no mode need be forgotten. Speak at once.
+        self._feedback.await_setup()
         self._mode_sent_ns = None
 
     def _mode_to_send(self, now_ns: int) -> int | None:
@@ -123,7 +124,7 @@ class AgilexChassis(ChassisDriver):
             return None
         if mode is ChassisMode.ARMING:
             return self._obeying
-        return None if self._feedback.disobeys else self._model.mode_standby
+        return self._model.mode_standby if self._feedback.in_command_mode else None
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> None:
         # The base turns slip_factor times less than its tracks say, so ask for that much more.
