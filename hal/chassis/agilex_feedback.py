@@ -40,6 +40,10 @@ _STATES_AT_ONCE = 2
 # Travel that two feedbacks cannot be apart, even where frames were lost or came late.
 _JUMP_SLACK_M = 0.2
 
+# How far a track may go otherwise than it just went, between two odometers, by stopping or rolling back.
+_COURSE_SLACK_M = 0.01
+_ODOMETER_S = 0.02
+
 # 0x221 and 0x311 tell of the same tracks. Past this difference since the last comparison, one of them lies.
 _DISAGREEMENT_M = 0.15
 _DISAGREEMENT_RATIO = 0.3
@@ -234,7 +238,16 @@ class AgilexFeedback:
             self._model.max_speed_mps + self._geometry.to_tracks(0.0, self._model.max_yaw_rate_radps)[1]
         )
         limit_mm = 1000.0 * (fastest_mps * elapsed_s + _JUMP_SLACK_M)
-        steps = self._counter.increments(odometer.left_mm, odometer.right_mm, limit_mm)
+        # Of several at once the later ones have a period each, too.
+        left_mps, right_mps = self._geometry.to_tracks(self.v_mps, self.w_radps)
+        ms = 1000.0 * max(elapsed_s, _ODOMETER_S)
+        steps = self._counter.increments(
+            odometer.left_mm,
+            odometer.right_mm,
+            limit_mm,
+            (left_mps * ms, right_mps * ms),
+            1000.0 * _COURSE_SLACK_M,
+        )
         if steps is None:
             self._restart = "its odometer jumped: restarted"
             self._disagreement.restart(now_ns)

@@ -84,9 +84,10 @@ class RoboteqChassis(ChassisDriver):
         arrived = self._link.read()
         self._feedback.bytes_heard += len(arrived)
         for line in self._reader.feed(arrived):
-            if isinstance(line, Reply):
-                if line is not Reply.ECHO:
-                    self._feedback.note_reply(line is Reply.ACCEPTED)
+            if line is Reply.ECHO:
+                self._feedback.note_echo()
+            elif isinstance(line, Reply):
+                self._feedback.note_reply(line is Reply.ACCEPTED)
             elif self._asked_query is not None and line.name == self._asked_query.name:
                 self._asked_query = None
                 self._feedback.take(line.name, line.values, self._asked_ns, now_ns)

@@ -11,6 +11,9 @@ from hal.chassis.tracks import TrackGeometry
 # Single refusals are noise on the line; so many in a row are a controller that takes no commands.
 _MOST_REFUSALS = 5
 
+# A controller that echoes says two lines back between two answers, a command and a query; one may be noise.
+_ECHOING = 2
+
 
 class RoboteqFeedback(EncoderFeedback):
     """The newest of everything the controller says. Speed is counter steps over the time between answers."""
@@ -23,14 +26,19 @@ class RoboteqFeedback(EncoderFeedback):
         self._motors = MotorFlags((), ())
         self._watchdog_ms: int | None = None
         self._refusals = 0
+        self._echoes = 0
+        self._quiet = False
+        self._echoes_again = False
 
     @property
     def disobeys(self) -> str:
-        """Why the controller must not be driven: its own watchdog is not what was set."""
+        """Why the controller must not be driven: its own watchdog is not what was set, or it restarted."""
         if not self._wanted:
             return "nobody asked it to"
         if self._restarted:
             return "its counters jumped: restarted"
+        if self._echoes_again:
+            return "it echoes again: restarted"
         if self._watchdog_ms is None:
             return "its watchdog is not set"
         if self._watchdog_ms != self._config.watchdog_ms:
@@ -75,6 +83,13 @@ class RoboteqFeedback(EncoderFeedback):
         super().await_setup()
         self._watchdog_ms = None
         self._refusals = 0
+        self._quiet = False
+        self._echoes_again = False
+
+    def note_echo(self) -> None:
+        """A written line came back: what ^ECHOF 1 has switched off is on again after a restart."""
+        self._echoes += 1
+        self._echoes_again = self._echoes_again or (self._quiet and self._echoes >= _ECHOING)
 
     def note_reply(self, accepted: bool) -> None:
         """A command was accepted or refused."""
@@ -82,6 +97,9 @@ class RoboteqFeedback(EncoderFeedback):
 
     def take(self, name: str, values: tuple[int, ...], asked_ns: int, now_ns: int) -> None:
         """Take in the answer to a query that was written at asked_ns."""
+        # The first answer about the watchdog comes behind ^ECHOF 1; only what is quiet after that is quiet.
+        self._quiet = self._quiet or (self._watchdog_ms is not None and self._echoes == 0)
+        self._echoes = 0
         match name:
             case lines.ENCODERS | lines.HALL_COUNTERS:
                 self._count(values[0], values[1], asked_ns, now_ns)

@@ -56,6 +56,18 @@ def test_an_odometer_that_jumps_latches_until_consent() -> None:
     bench.arm()
 
 
+def test_a_restart_soon_after_setting_off_is_no_travel_backwards() -> None:
+    """54 mm at 0.3 m/s, then 3 mm: less than an odometer may jump, but against its way."""
+    bench = mini(track_width_m=0.5)
+    bench.arm()
+    for k in range(1, 10):
+        gone_m = drive(bench, 6 * k).pose.x_m
+    seen = drive(bench, 3)
+    assert seen.mode is ChassisMode.ESTOP
+    assert seen.pose.x_m == pytest.approx(gone_m)
+    assert "its odometer jumped: restarted" in seen.reason
+
+
 def test_what_jumped_before_the_consent_does_not_count() -> None:
     bench = mini(track_width_m=0.5)
     for millimetres in (50_000, 50_010, 0, 10):

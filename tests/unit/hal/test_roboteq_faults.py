@@ -134,17 +134,41 @@ def test_a_controller_that_refuses_commands_is_told() -> None:
     )
 
 
-def test_a_restart_shows_in_the_counters_or_in_the_watchdog() -> None:
-    driving, standing = Bench(), Bench()
-    driving.arm()
-    driving.run(100, 0.5)
-    driving.emulator.restart()
-    assert driving.run(20, 0.5).reason.startswith("the base no longer obeys: its counters jumped: restarted")
-    standing.arm()
-    standing.emulator.restart()
-    state = standing.run(40)
+@pytest.mark.parametrize(
+    ("v_mps", "echo", "watchdog_ms", "words"),
+    [
+        (0.5, False, 300, "its counters jumped: restarted"),
+        (None, False, 1000, "its watchdog reads 1000 ms, not 300 ms"),
+        (None, True, 300, "it echoes again: restarted"),
+    ],
+)
+def test_a_restart_shows_in_one_way_or_another(
+    v_mps: float | None, echo: bool, watchdog_ms: int, words: str
+) -> None:
+    """Echo and watchdog may have been saved to come back as they were set, and standing no counter jumps."""
+    bench = Bench()
+    bench.arm()
+    bench.run(100, v_mps)
+    bench.emulator.restart()
+    bench.emulator.echo, bench.emulator.watchdog_ms = echo, watchdog_ms
+    state = bench.run(40, v_mps)
     assert state.mode is ChassisMode.ESTOP
-    assert state.reason.startswith("the base no longer obeys: its watchdog reads 1000 ms, not 300 ms")
+    assert state.reason.startswith(f"the base no longer obeys: {words}")
+    bench.arm()
+
+
+@pytest.mark.parametrize("periods", [10, 20])
+def test_a_restart_soon_after_setting_off_is_no_travel_backwards(periods: int) -> None:
+    """From some centimetres to 0 a track could jump; against its way it cannot."""
+    bench = Bench()
+    bench.arm()
+    gone_m = bench.run(periods, 0.5).pose.x_m
+    bench.emulator.restart()
+    bench.emulator.echo, bench.emulator.watchdog_ms = False, 300
+    state = bench.run(6, 0.5)
+    assert gone_m > 0.02
+    assert state.reason.startswith("the base no longer obeys: its counters jumped: restarted")
+    assert state.pose.x_m >= gone_m
 
 
 @pytest.mark.parametrize(
