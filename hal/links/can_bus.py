@@ -11,6 +11,7 @@ from collections import deque
 from typing import Any
 
 import can
+from can.interfaces.slcan import slcanBus
 
 from config.chassis import CanLinkConfig
 from hal.errors import DeviceNotFound, DeviceRefused
@@ -64,6 +65,7 @@ class CanBusLink(ReopeningLink[can.BusABC]):
                 message = bus.recv(timeout=0)
             except (can.CanError, OSError) as error:
                 if _is_foreign_datagram(error):
+                    self._drop_partial(bus)
                     continue
                 raise self._lost("receiving", error) from error
             except (ValueError, IndexError):  # slcan: noise on the line that is no frame
@@ -82,6 +84,16 @@ class CanBusLink(ReopeningLink[can.BusABC]):
                 continue
             return frame
         return None
+
+    def _drop_partial(self, bus: can.BusABC) -> None:
+        """python-can 4.6.1's slcan decodes a line before it clears it: noise that is no ASCII would stay and
+        spoil every line to come. Raises LinkLost."""
+        if not isinstance(bus, slcanBus):
+            return
+        try:
+            bus.flush()
+        except (can.CanError, OSError) as error:
+            raise self._lost("receiving", error) from error
 
     def _open(self) -> can.BusABC:
         return _open(self._config, self._where)
@@ -160,6 +172,7 @@ def _errno(error: BaseException | None) -> int | None:
 
 
 def _is_foreign_datagram(error: Exception) -> bool:
-    """udp_multicast: anybody may send to the group; what does not unpack is not a fault of the bus."""
+    """What arrived does not unpack: anybody may send to a group of udp_multicast, and slcan's line has noise.
+    It is no fault of the bus."""
     cause = error.__cause__
     return cause is not None and not isinstance(cause, OSError)

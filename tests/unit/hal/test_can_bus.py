@@ -258,6 +258,20 @@ def test_slcan_adapter_on_a_serial_port() -> None:
                 wait_for(link)
 
 
+@pytest.mark.parametrize("noise", [b"\xff", b"\x80\r", b"t22\xc3"])
+def test_a_slcan_adapter_is_heard_again_after_noise_that_is_no_ascii(noise: bytes) -> None:
+    with PseudoTerminal() as adapter, CanBusLink(config("slcan", adapter.path)) as link:
+        adapter.write(noise)
+        adapter.write(b"t2218FE0C00FA00000000\r")
+        give_up_s = time.monotonic() + PATIENCE_S
+        heard = None
+        while heard is None and time.monotonic() < give_up_s:
+            heard = link.receive()
+            if heard is None:
+                adapter.write(b"t2218FE0C00FA00000000\r")
+        assert heard == CanFrame(0x221, bytes.fromhex("FE0C00FA00000000"))
+
+
 def hear(adapter: PseudoTerminal, until: bytes) -> bytes:
     """All that the adapter is told, up to these bytes."""
     heard = b""
