@@ -63,6 +63,8 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         for _ in range(_MAX_FOREIGN):
             try:
                 message = bus.recv(timeout=0)
+                if message is None and _has_more(bus):
+                    continue
             except (can.CanError, OSError) as error:
                 if _is_foreign_datagram(error):
                     self._drop_partial(bus)
@@ -161,6 +163,11 @@ def _advice(config: CanLinkConfig, number: int | None) -> str:
     if config.interface == "udp_multicast":
         return "check that the channel is a multicast address and that the machine has a multicast route"
     return "check interface and channel in the configuration, and that the adapter is plugged in"
+
+
+def _has_more(bus: can.BusABC) -> bool:
+    """slcan: what acknowledges a sent frame reads as silence, and behind it others may wait."""
+    return isinstance(bus, slcanBus) and bus.serialPortOrig.in_waiting > 0
 
 
 def _errno(error: BaseException | None) -> int | None:

@@ -17,7 +17,7 @@ from hal.links.can_bus import CanBusLink
 from hal.links.pseudo_terminal import PseudoTerminal
 from hal.types import CanFrame
 from tests.support.chassis_rig import can_link_config, udp_link_config
-from tests.support.wires import open_can_link
+from tests.support.wires import SettledTerminal, open_can_link
 
 FRAME = CanFrame(0x111, b"\x00\x96")
 # The kernel carries bytes through a pseudo-terminal when a core is free, which may take a while.
@@ -270,6 +270,19 @@ def test_a_slcan_adapter_is_heard_again_after_noise_that_is_no_ascii(noise: byte
             if heard is None:
                 adapter.write(b"t2218FE0C00FA00000000\r")
         assert heard == CanFrame(0x221, bytes.fromhex("FE0C00FA00000000"))
+
+
+def test_what_a_slcan_adapter_acknowledges_hides_no_frames() -> None:
+    """Two acknowledgements for each exchange, and one read of them: frames would wait longer and longer."""
+    with SettledTerminal() as adapter, CanBusLink(config("slcan", adapter.path)) as link:
+        adapter.write(b"z\rz\r\a\rt2211AA\rz\rt2211BB\rt22")
+        assert [link.receive() for _ in range(3)] == [
+            CanFrame(0x221, b"\xaa"),
+            CanFrame(0x221, b"\xbb"),
+            None,
+        ]
+        adapter.write(b"11CC\r")
+        assert link.receive() == CanFrame(0x221, b"\xcc")
 
 
 def hear(adapter: PseudoTerminal, until: bytes) -> bytes:
