@@ -68,7 +68,7 @@ class CanLink(Closing, Protocol):
     """Whole CAN frames. Knows nothing of chassis."""
 
     def send(self, frame: CanFrame) -> None:
-        """Queue one frame, without blocking. Raises LinkLost."""
+        """Queue one frame within a short bound. Raises LinkLost."""
         ...
 
     def receive(self) -> CanFrame | None:

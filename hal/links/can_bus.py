@@ -18,8 +18,11 @@ from hal.errors import DeviceNotFound, DeviceRefused
 from hal.links.reopening import ReopeningLink, reason
 from hal.types import CanFrame
 
-# Positive, because with 0 pyserial (below slcan) spins for ever on a full port.
+# How long a send waits for room. Positive, because with 0 pyserial (below slcan) spins for ever on a full
+# port. There it asks for room for more even after it has written all, so with 2 ms a process that is held up
+# by others takes its port for lost. Hence as long as hal.links.serial_port: a tenth of a CAN base's time.
 _SEND_TIMEOUT_S = 0.002
+_SERIAL_SEND_TIMEOUT_S = 0.05
 
 # So many messages in a row that are none of ours end one receive(): a flood must not hold the control loop.
 _MAX_FOREIGN = 256
@@ -44,14 +47,15 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         self._echoes: deque[CanFrame] | None = (
             deque(maxlen=_MAX_FOREIGN) if config.interface == "udp_multicast" else None
         )
+        self._send_timeout_s = _SERIAL_SEND_TIMEOUT_S if config.interface == "slcan" else _SEND_TIMEOUT_S
 
     def send(self, frame: CanFrame) -> None:
-        """Queue one frame; waits for room at most 2 ms. Raises LinkLost."""
+        """Queue one frame; waits for room at most 2 ms, 50 ms over slcan. Raises LinkLost."""
         message = can.Message(
             arbitration_id=frame.arbitration_id, data=frame.data, is_extended_id=False, check=True
         )
         try:
-            self._opened().send(message, timeout=_SEND_TIMEOUT_S)
+            self._opened().send(message, timeout=self._send_timeout_s)
         except (can.CanError, OSError) as error:
             raise self._lost("sending", error) from error
         if self._echoes is not None:
@@ -127,13 +131,17 @@ def _open(config: CanLinkConfig, where: str) -> can.BusABC:
         options = {"bitrate": config.bitrate}
     try:
         # ignore_config: else files and environment variables of the machine would add options unseen.
-        return can.Bus(
+        bus = can.Bus(
             channel=config.channel,
             interface=config.interface,
             ignore_config=True,
             receive_own_messages=False,
             **options,
         )
+        if isinstance(bus, slcanBus):
+            # It would wait behind every frame until the adapter has taken it: for ever, from one that hangs.
+            bus.serialPortOrig.flush = _wait_for_nothing  # type: ignore[method-assign]
+        return bus
     except _OPEN_ERRORS as error:
         number = _errno(error)
         if number in (errno.EACCES, errno.EPERM):
@@ -163,6 +171,10 @@ def _advice(config: CanLinkConfig, number: int | None) -> str:
     if config.interface == "udp_multicast":
         return "check that the channel is a multicast address and that the machine has a multicast route"
     return "check interface and channel in the configuration, and that the adapter is plugged in"
+
+
+def _wait_for_nothing() -> None:
+    """In place of pyserial's flush(), which has no time-out."""
 
 
 def _has_more(bus: can.BusABC) -> bool:

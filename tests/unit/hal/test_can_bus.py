@@ -4,6 +4,7 @@ import errno
 import logging
 import os
 import socket
+import termios
 import time
 from collections.abc import Iterator
 
@@ -31,6 +32,7 @@ class FaultyBus(can.BusABC):
         self.error: Exception | None = None
         self.messages: list[can.Message] = []
         self.sent: list[can.Message] = []
+        self.timeouts_s: list[float | None] = []
         self.shut = 0
         super().__init__(channel="faulty")
 
@@ -41,6 +43,7 @@ class FaultyBus(can.BusABC):
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         assert timeout, "0 makes pyserial below slcan spin, None may wait for ever"
         self._fail()
+        self.timeouts_s.append(timeout)
         self.sent.append(msg)
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
@@ -270,6 +273,23 @@ def test_a_slcan_adapter_is_heard_again_after_noise_that_is_no_ascii(noise: byte
             if heard is None:
                 adapter.write(b"t2218FE0C00FA00000000\r")
         assert heard == CanFrame(0x221, bytes.fromhex("FE0C00FA00000000"))
+
+
+@pytest.mark.parametrize(
+    ("interface", "timeout_s"), [("slcan", 0.05), ("socketcan", 0.002), ("gs_usb", 0.002)]
+)
+def test_how_long_a_send_waits_for_room(bus: FaultyBus, interface: str, timeout_s: float) -> None:
+    """pyserial counts the time until there is room for more: 2 ms are over when another process runs."""
+    CanBusLink(config(interface, "x")).send(FRAME)
+    assert bus.timeouts_s == [timeout_s]
+
+
+def test_a_slcan_adapter_that_takes_nothing_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """python-can drains the port behind every frame, without a time-out."""
+    with PseudoTerminal() as adapter, CanBusLink(config("slcan", adapter.path)) as link:
+        monkeypatch.setattr(termios, "tcdrain", lambda port: pytest.fail("waits for the adapter"))
+        link.send(FRAME)
+        hear(adapter, until=b"t11120096\r")
 
 
 def test_what_a_slcan_adapter_acknowledges_hides_no_frames() -> None:
