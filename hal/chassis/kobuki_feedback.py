@@ -36,7 +36,8 @@ _JUMP_SLACK_M = 0.02
 _DISAGREEMENT_RAD = 0.3
 _DISAGREEMENT_RATIO = 0.4
 
-# The base's clock and ours may disagree by what a frame waits in buffers, not by this.
+# A frame waits in buffers, so less time may have passed for the base than for us; never more than this more,
+# and never less than none.
 _CLOCKS_APART_MS = 500
 
 
@@ -147,7 +148,8 @@ class KobukiFeedback:
         elapsed_ms = 0
         if last is not None and last_ns is not None:
             elapsed_ms = wrapped_difference(core.clock_ms, last.clock_ms, CLOCK_BITS)
-            if abs(elapsed_ms - (now_ns - last_ns) / NS_PER_MS) > _CLOCKS_APART_MS:
+            most_ms = (now_ns - last_ns) / NS_PER_MS + _CLOCKS_APART_MS
+            if not -_CLOCKS_APART_MS <= elapsed_ms <= most_ms:
                 self._jumped(core)
                 return
         limit_m = _JUMP_RATIO * self._fastest_mps() * abs(elapsed_ms) / 1000.0 + _JUMP_SLACK_M

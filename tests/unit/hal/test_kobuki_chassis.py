@@ -169,6 +169,24 @@ def test_a_restart_shows_in_clock_or_ticks() -> None:
     standing.arm()
 
 
+@pytest.mark.parametrize(
+    ("stall_ms", "mode", "reason"),
+    [
+        (480, ChassisMode.ARMED, "armed"),
+        (520, ChassisMode.ARMED, "armed"),
+        (600, ChassisMode.ARMED, "armed"),
+        (620, ChassisMode.ESTOP, "the control loop stood still for 620 ms"),
+    ],
+)
+def test_a_loop_that_stood_still_is_no_restart(stall_ms: int, mode: ChassisMode, reason: str) -> None:
+    """Its frames waited: the first of them is a period after the last one that was read, by its own clock."""
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.4)
+    state = bench.step(0.4, after_ms=stall_ms)
+    assert (state.mode, state.reason) == (mode, reason)
+
+
 def test_wrong_checksums_on_the_line_are_survived() -> None:
     bench = Bench()
     bench.arm()
