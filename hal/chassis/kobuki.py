@@ -13,6 +13,7 @@ from hal.chassis.command import CommandLimits, due, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.kobuki_feedback import KobukiFeedback
 from hal.chassis.kobuki_packets import FrameReader, base_control, parse
+from hal.chassis.reading import read_all
 from hal.clocks import NS_PER_MS
 from hal.types import Setpoint
 
@@ -41,7 +42,7 @@ class KobukiChassis(ChassisDriver):
         self._moving = False
 
     def _listen(self, now_ns: int) -> None:
-        arrived = self._link.read()
+        arrived = read_all(self._link)
         self._feedback.bytes_heard += len(arrived)
         for payload in self._reader.feed(arrived):
             told = parse(payload)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hal.api import SerialLink
+from hal.chassis.reading import read_all
 from hal.chassis.roboclaw_packets import Request
 from hal.clocks import NS_PER_MS
 
@@ -60,7 +61,7 @@ class RoboclawPort:
 
         Raises LinkLost.
         """
-        arrived = self._link.read()
+        arrived = read_all(self._link)
         self.bytes_heard += len(arrived)
         request = self._request
         if request is None:

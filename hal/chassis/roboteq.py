@@ -16,6 +16,7 @@ from hal.chassis import roboteq_lines as lines
 from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero
 from hal.chassis.driver import ChassisDriver
+from hal.chassis.reading import read_all
 from hal.chassis.roboteq_feedback import RoboteqFeedback
 from hal.chassis.roboteq_lines import LineReader, Query, Reply
 from hal.chassis.tracks import TrackGeometry, scale_to_fit
@@ -81,7 +82,7 @@ class RoboteqChassis(ChassisDriver):
         self._moving = False
 
     def _listen(self, now_ns: int) -> None:
-        arrived = self._link.read()
+        arrived = read_all(self._link)
         self._feedback.bytes_heard += len(arrived)
         for line in self._reader.feed(arrived):
             if line is Reply.ECHO:

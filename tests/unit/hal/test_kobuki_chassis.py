@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import count
 
 import pytest
 
@@ -185,6 +186,36 @@ def test_a_loop_that_stood_still_is_no_restart(stall_ms: int, mode: ChassisMode,
     bench.run(50, 0.4)
     state = bench.step(0.4, after_ms=stall_ms)
     assert (state.mode, state.reason) == (mode, reason)
+
+
+@pytest.mark.parametrize("bytes_a_read", [1, 9, 60])
+def test_short_reads_leave_nothing_to_grow_old(bytes_a_read: int) -> None:
+    bench = Bench()
+    bench.near.read_at_most(bytes_a_read)
+    bench.arm()
+    bench.run(200, 0.4)
+    bench.emulator.bumper = 2
+    assert "bumper pressed" in bench.step(0.4).reason
+
+
+def test_frames_that_come_later_and_later_are_no_feedback() -> None:
+    """A line that loses time passes on what was true seconds ago, and the bumper's news with it."""
+    bench = Bench()
+    bench.arm()
+    bench.run(50, 0.4)
+    waiting: list[bytes] = []
+    numbers = count(1)
+
+    def late(data: bytes) -> bytes:
+        """Two of three frames; the rest waits."""
+        waiting.append(data)
+        return waiting.pop(0) if next(numbers) % 3 else b""
+
+    bench.near.hear_through(late)
+    states = [bench.step(0.4) for _ in range(60)]
+    lost = next(state for state in states if state.mode is ChassisMode.LOST)
+    assert lost.reason.startswith("no motion feedback for 2")
+    assert bench.near.written == [STOP]
 
 
 def test_wrong_checksums_on_the_line_are_survived() -> None:

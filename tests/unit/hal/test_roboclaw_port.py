@@ -41,10 +41,11 @@ class TestPort:
 
     def test_short_reads_are_put_together(self) -> None:
         link, port = asked(packets.ENCODERS_REQUEST)
-        link.read_at_most(1)
         data = struct.pack(">II", 1, 2)
-        link.deliver(data + crc(78, data))
-        answers = [port.poll(k * MS) for k in range(10)]
+        answers = []
+        for k, byte in enumerate(data + crc(78, data)):
+            link.deliver(bytes((byte,)))
+            answers.append(port.poll(k * MS))
         assert answers[:-1] == [None] * 9
         assert answers[-1] == Answer(packets.ENCODERS_REQUEST, data, 0)
 
