@@ -75,13 +75,15 @@ class AgilexChassis(ChassisDriver):
         self._moving = False
         self._mode_sent_ns: int | None = None
 
-    def _listen(self, now_ns: int) -> None:
+    def _listen(self, now_ns: int) -> bool:
         messages: list[AgilexMessage] = []
+        heard = False
         try:
             for _ in range(_MAX_FRAMES):
                 frame = self._link.receive()
                 if frame is None:
                     break
+                heard = True
                 if frame.arbitration_id in _NOT_NEEDED:
                     self._feedback.note_actuator(frame.arbitration_id - _FIRST_ACTUATOR)
                     continue
@@ -93,6 +95,7 @@ class AgilexChassis(ChassisDriver):
         finally:
             # What came before the link went is still true.
             self._feedback.update(messages, now_ns)
+        return heard
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         goes_out = due(self._motion_sent_ns, self._period_ns, now_ns) or (self._moving and is_zero(command))

@@ -137,8 +137,10 @@ class AgilexFeedback:
         return self._no_frames()
 
     def await_setup(self) -> None:
-        """Arming begins: whatever restarted before, it is this base that is to be armed."""
+        """Arming begins: whatever restarted before, it is this base that is to be armed, and its odometer is
+        counted anew: it does not follow on what waited in buffers."""
         self._restart = ""
+        self._counter = TrackCounter()
 
     def note_foreign(self, arbitration_id: int) -> None:
         """A frame came that is none of protocol V2. The first of V1 is remembered, else the newest."""

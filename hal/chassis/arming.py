@@ -38,6 +38,7 @@ class Evidence:
     standing: measured speed is zero; False when unknown. command_is_zero: what is asked at this step.
     silence: while no status was ever heard, what came instead and what to check. resettable: stop_cause is
     one that the base keeps until arming resets it, so it stands in the way of being armed, not of arming.
+    unread: more waits than could be read, so what is known may be long over.
     """
 
     now_ns: int
@@ -50,6 +51,7 @@ class Evidence:
     command_is_zero: bool
     silence: str = ""
     resettable: bool = False
+    unread: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +160,8 @@ def _armed(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
 def _refusal(state: Arming, seen: Evidence, limits: ArmingLimits) -> str:
     if state.mode is ChassisMode.STOPPING:
         return "still stopping"
+    if seen.unread:
+        return "more came than can be read at once, and it may be old; what floods the line?"
     if problem := _loss(seen, limits) or ("" if seen.resettable else seen.stop_cause):
         return problem
     if not seen.command_is_zero:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -23,6 +24,9 @@ from hal.types import ChassisState, PlanarPose, Setpoint
 
 # How often a lost link is tried again. Opening a port can take milliseconds, so not at every exchange.
 _RETRY_NS = 500 * NS_PER_MS
+
+# How often arm() reads on while anything comes, each time as much as one exchange does at the most.
+_MOST_READS = 32
 
 
 class Told(Protocol):
@@ -104,9 +108,10 @@ class ChassisDriver(ABC):
         """See hal.api.Chassis. A refusal is told in the state's reason."""
         self._now_ns = now_ns
         # What has waited in the port since who knows when must not count as an answer to this consent.
-        self._hear(now_ns)
+        unread = all(self._hear(now_ns) for _ in range(_MOST_READS))
         before = self._arming.mode
-        self._arming = arming.consent(self._arming, self._evidence(now_ns), self._limits)
+        seen = replace(self._evidence(now_ns), unread=unread)
+        self._arming = arming.consent(self._arming, seen, self._limits)
         if self._arming.mode is not before:
             self._begin_arming()
 
@@ -120,9 +125,9 @@ class ChassisDriver(ABC):
             self._lose(error, now_ns)
 
     @abstractmethod
-    def _listen(self, now_ns: int) -> None:
-        """Read what has arrived, without waiting, and keep it. Must touch the link, so that a
-        link that works again is noticed. May raise LinkLost."""
+    def _listen(self, now_ns: int) -> bool:
+        """Read what has arrived, without waiting and up to a bound, and keep it; whether anything had. Must
+        touch the link, so that a link that works again is noticed. May raise LinkLost."""
 
     @abstractmethod
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
@@ -143,15 +148,17 @@ class ChassisDriver(ABC):
         """The base keeps its stop cause until arming resets it."""
         return False
 
-    def _hear(self, now_ns: int) -> None:
+    def _hear(self, now_ns: int) -> bool:
+        """Whether anything came."""
         if self._link_error and now_ns < self._retry_ns:
-            return
+            return False
         try:
-            self._listen(now_ns)
+            heard = self._listen(now_ns)
         except LinkLost as error:
             self._lose(error, now_ns)
-        else:
-            self._link_error = ""
+            return False
+        self._link_error = ""
+        return heard
 
     def _say(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         if self._link_error:

@@ -41,13 +41,14 @@ class KobukiChassis(ChassisDriver):
         self._motion_sent_ns: int | None = None
         self._moving = False
 
-    def _listen(self, now_ns: int) -> None:
+    def _listen(self, now_ns: int) -> bool:
         arrived = read_all(self._link)
         self._feedback.bytes_heard += len(arrived)
         for payload in self._reader.feed(arrived):
             told = parse(payload)
             if told is not None:
                 self._feedback.take(told, now_ns)
+        return bool(arrived)
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         stops = self._moving and is_zero(command)

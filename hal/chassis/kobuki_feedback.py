@@ -37,8 +37,8 @@ _JUMP_SLACK_M = 0.02
 _DISAGREEMENT_RAD = 0.3
 _DISAGREEMENT_RATIO = 0.4
 
-# A frame waits in buffers, so less time may have passed for the base than for us; never more than this more,
-# and never less than none.
+# A frame waits in buffers, so less time may have passed for the base than for us, if not less than none; more
+# only by what the frame before had waited, which is never this.
 _CLOCKS_APART_MS = 500
 
 
@@ -57,6 +57,7 @@ class KobukiFeedback:
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter(ENCODER_BITS)
         self._core: Core | None = None
+        self._counted: Core | None = None  # what the next one follows on
         self._angle_rad: float | None = None
         self._disagreement = Disagreement(
             "gyro and wheels disagree", "rad", _DISAGREEMENT_RAD, _DISAGREEMENT_RATIO
@@ -130,9 +131,12 @@ class KobukiFeedback:
         return _named("error: motor over-current", over_current, _MOTORS)
 
     def await_setup(self) -> None:
-        """Arming begins."""
+        """Arming begins: what is told from now on does not follow on what waited in buffers before."""
         self._wanted = True
         self._restarted = False
+        self._counted = None
+        self._counter = TrackCounter(ENCODER_BITS)
+        self._age.restart()
 
     def forget_setup(self) -> None:
         """The base is no longer asked to obey."""
@@ -146,14 +150,14 @@ class KobukiFeedback:
             self._count(told.core, told.inertia, now_ns)
 
     def _count(self, core: Core, inertia: Inertia | None, now_ns: int) -> None:
-        last, self._core = self._core, core
+        last, self._core, self._counted = self._counted, core, core
         last_ns, self._arrived_ns = self._arrived_ns, now_ns
         last_rad, self._angle_rad = self._angle_rad, None if inertia is None else inertia.angle_rad
         elapsed_ms = 0
         if last is not None:
             elapsed_ms = wrapped_difference(core.clock_ms, last.clock_ms, CLOCK_BITS)
             most_ms = (now_ns - last_ns) / NS_PER_MS + _CLOCKS_APART_MS
-            if not -_CLOCKS_APART_MS <= elapsed_ms <= most_ms:
+            if not 0 <= elapsed_ms <= most_ms:
                 self._jumped(core, now_ns)
                 return
         self.pose_ns = now_ns - self._age.step(elapsed_ms, now_ns)

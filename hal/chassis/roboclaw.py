@@ -21,7 +21,7 @@ from hal.chassis.command import CommandLimits, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.roboclaw_feedback import RoboclawFeedback
 from hal.chassis.roboclaw_packets import Request
-from hal.chassis.roboclaw_port import RoboclawPort
+from hal.chassis.roboclaw_port import Answer, RoboclawPort
 from hal.chassis.tracks import TrackGeometry, scale_to_fit
 from hal.clocks import NS_PER_MS
 from hal.types import ChassisMode, Setpoint
@@ -76,11 +76,15 @@ class RoboclawChassis(ChassisDriver):
         self._heeded = True
         self._moving = False
 
-    def _listen(self, now_ns: int) -> None:
+    def _listen(self, now_ns: int) -> bool:
+        before = self._port.bytes_heard
         answer = self._port.poll(now_ns)
         self._feedback.bytes_heard = self._port.bytes_heard
-        if answer is None:
-            return
+        if answer is not None:
+            self._take(answer, now_ns)
+        return self._port.bytes_heard > before
+
+    def _take(self, answer: Answer, now_ns: int) -> None:
         if answer.request.command == packets.RAMPED_SPEEDS:
             self._heeded = answer.data is not None
         if answer.data is not None:

@@ -81,7 +81,7 @@ class RoboteqChassis(ChassisDriver):
         self._motion_sent_ns: int | None = None
         self._moving = False
 
-    def _listen(self, now_ns: int) -> None:
+    def _listen(self, now_ns: int) -> bool:
         arrived = read_all(self._link)
         self._feedback.bytes_heard += len(arrived)
         for line in self._reader.feed(arrived):
@@ -98,6 +98,7 @@ class RoboteqChassis(ChassisDriver):
             self._asked_query = None
             self._reader.forget()
             self._quiet_until_ns = now_ns + _SILENCE_NS
+        return bool(arrived)
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         stops = self._moving and is_zero(command)

@@ -68,6 +68,37 @@ def test_a_restart_soon_after_setting_off_is_no_travel_backwards() -> None:
     assert "its odometer jumped: restarted" in seen.reason
 
 
+@pytest.mark.parametrize("seconds", [1, 5, 20])
+def test_however_much_waited_none_of_it_is_an_answer_to_the_consent(seconds: int) -> None:
+    """It obeyed for long, nobody read it, and just now it restarted into standby."""
+    bench = Bench(track_width_m=0.5)
+    for k in range(50 * seconds):
+        bench.say(MotionFeedback(0.0, 0.0), Odometer(k, k), state(CAN))
+    bench.chassis.arm(bench.now_ns)
+    for _ in range(20):
+        bench.say(MotionFeedback(0.0, 0.0), Odometer(0, 0), state(STANDBY))
+        seen = bench.exchange()
+        assert seen.mode is ChassisMode.ARMING
+    assert seen.reason == "arming: the base does not take commands: control mode is standby"
+    bench.say(MotionFeedback(0.0, 0.0), Odometer(0, 0), state(CAN))
+    assert bench.exchange().mode is ChassisMode.ARMED
+
+
+def test_a_flood_refuses_the_consent() -> None:
+    bench = Bench()
+    for _ in range(9000):
+        bench.say(MotionFeedback(0.0, 0.0))
+    bench.chassis.arm(bench.now_ns)
+    seen = bench.exchange()
+    assert (seen.mode, seen.reason) == (
+        ChassisMode.STANDBY,
+        "not armed; arming refused: more came than can be read at once, and it may be old; what floods "
+        "the line?",
+    )
+    bench.chassis.arm(bench.now_ns)
+    assert bench.exchange().mode is ChassisMode.ARMING, "it has ended"
+
+
 def test_what_jumped_before_the_consent_does_not_count() -> None:
     bench = mini(track_width_m=0.5)
     for millimetres in (50_000, 50_010, 0, 10):

@@ -188,6 +188,24 @@ def test_a_loop_that_stood_still_is_no_restart(stall_ms: int, mode: ChassisMode,
     assert (state.mode, state.reason) == (mode, reason)
 
 
+def test_what_waited_in_a_full_buffer_before_the_consent_is_no_restart() -> None:
+    """Of five seconds the port kept the first: the base's clock jumps, behind what had waited."""
+    bench = Bench()
+    kept = 0
+
+    def keep(data: bytes) -> bytes:
+        nonlocal kept
+        kept += len(data)
+        return data if kept < 2000 else b""
+
+    bench.near.hear_through(keep)
+    bench.now_ns += 5000 * MS
+    bench.emulator.advance_to(bench.now_ns)
+    bench.near.hear_all()
+    bench.chassis.arm(bench.now_ns)
+    assert bench.run(3).mode is ChassisMode.ARMED
+
+
 @pytest.mark.parametrize("bytes_a_read", [1, 9, 60])
 def test_short_reads_leave_nothing_to_grow_old(bytes_a_read: int) -> None:
     bench = Bench()
