@@ -59,7 +59,11 @@ def _is_multicast(address: str) -> bool:
 
 
 class SerialLinkConfig(Section):
-    """A serial port: a device path, or a pyserial URL such as ``socket://host:port``."""
+    """A serial port: a device path, or a pyserial URL such as ``socket://host:port``.
+
+    Over a network, opening waits for the other side for up to 5 s: at the start; a connection that was lost
+    is made anew beside the control loop, which goes on.
+    """
 
     url: str = Field(min_length=1)
     baud: int = Field(default=115_200, ge=1_200, le=4_000_000)
@@ -71,6 +75,11 @@ class SerialLinkConfig(Section):
         if scheme in _NETWORK_SCHEMES and not _names_host_and_port(url):
             raise ValueError(f"needs a host and a port, such as {scheme}://192.168.0.7:4001")
         return url
+
+    @property
+    def over_network(self) -> bool:
+        """The port is at the other end of a network."""
+        return self.url.partition("://")[0] in _NETWORK_SCHEMES
 
 
 # pyserial's ports at the other end of a network; what is wrong with such a URL, it does not tell.

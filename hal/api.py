@@ -49,7 +49,7 @@ class OdometrySource(Protocol):
 
 
 class Chassis(Closing, Protocol):
-    """A tracked base. Stepped by the control loop; never blocks, starts no thread."""
+    """A tracked base. Stepped by the control loop; waits for nothing but a link's short bound to write."""
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """Send what is due, read what has arrived. None asks for no motion: an explicit zero."""

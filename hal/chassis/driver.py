@@ -22,7 +22,8 @@ from hal.errors import LinkLost
 from hal.geometry import advance_pose
 from hal.types import ChassisState, PlanarPose, Setpoint
 
-# How often a lost link is tried again. Opening a port can take milliseconds, so not at every exchange.
+# How long a lost link is left alone before it is tried again, from the exchange after the last try: opening a
+# port can take milliseconds, or more.
 _RETRY_NS = 500 * NS_PER_MS
 
 # How often arm() reads on while anything comes, each time as much as one exchange does at the most.
@@ -75,7 +76,7 @@ class ChassisDriver(ABC):
         self._asked: Setpoint | None = None
         self._objection = ""
         self._link_error = ""
-        self._retry_ns = 0
+        self._retry_ns: int | None = None
         self._now_ns = 0
 
     def __enter__(self) -> Self:
@@ -150,7 +151,7 @@ class ChassisDriver(ABC):
 
     def _hear(self, now_ns: int) -> bool:
         """Whether anything came."""
-        if self._link_error and now_ns < self._retry_ns:
+        if self._link_error and not self._tries_again(now_ns):
             return False
         try:
             heard = self._listen(now_ns)
@@ -159,6 +160,12 @@ class ChassisDriver(ABC):
             return False
         self._link_error = ""
         return heard
+
+    def _tries_again(self, now_ns: int) -> bool:
+        """A lost link is due to be tried. The first exchange after a try tells when that ended."""
+        if self._retry_ns is None:
+            self._retry_ns = now_ns + _RETRY_NS
+        return now_ns >= self._retry_ns
 
     def _say(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         if self._link_error:
@@ -172,7 +179,7 @@ class ChassisDriver(ABC):
     def _lose(self, error: LinkLost, now_ns: int) -> None:
         """Told to the machine at once: the state of this very exchange says lost."""
         self._link_error = str(error)
-        self._retry_ns = now_ns + _RETRY_NS
+        self._retry_ns = None
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
 
     def _evidence(self, now_ns: int) -> Evidence:

@@ -41,7 +41,9 @@ class CanBusLink(ReopeningLink[can.BusABC]):
     """hal.api.CanLink over python-can."""
 
     def __init__(self, config: CanLinkConfig) -> None:
-        super().__init__(f"CAN {config.interface} {config.channel!r}", (can.CanError, OSError))
+        # slcan sleeps for 0.1 s in between, and writes to the adapter without a time-out.
+        slow = config.interface == "slcan"
+        super().__init__(f"CAN {config.interface} {config.channel!r}", (can.CanError, OSError), slow)
         self._config = config
         # python-can's udp_multicast hears what it sends itself, and cannot be told not to.
         self._echoes: deque[CanFrame] | None = (

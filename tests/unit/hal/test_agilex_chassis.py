@@ -222,6 +222,26 @@ def test_a_lost_link_is_tried_again_twice_a_second() -> None:
     assert link.sent == [CanFrame(0x111, bytes(8))], "speaks again, but zero"
 
 
+def test_a_lost_link_is_left_alone_after_a_try_that_took_long() -> None:
+    """Two seconds for a port that does not answer, and the loop goes on for half a second before the next."""
+    bench = Bench()
+    tries = []
+
+    class SlowLink(ScriptedCanLink):
+        def receive(self) -> CanFrame | None:
+            tries.append(bench.now_ns // MS)
+            return super().receive()
+
+    link = SlowLink()
+    bench.chassis = AgilexChassis(link, agilex_config())
+    link.unplug()
+    bench.exchange()
+    bench.exchange(after_ms=2000)
+    for _ in range(40):
+        bench.exchange()
+    assert tries == [20, 2520]
+
+
 def test_a_flood_does_not_hold_the_loop() -> None:
     bench = Bench()
     for _ in range(1000):

@@ -187,7 +187,7 @@ def test_a_lost_bus_says_what_to_do(bus: FaultyBus, error: Exception, words: str
 
 
 def test_a_bus_that_cannot_be_opened_again_stays_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    link = CanBusLink(config("slcan", "/dev/ttyNotThere"))
+    link = CanBusLink(config("socketcan", "nocan0"))
     for _ in range(2):
         with pytest.raises(LinkLost, match="cannot be opened"):
             link.receive()
