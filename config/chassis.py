@@ -224,7 +224,7 @@ class RoboteqChassisConfig(_TwoChannelConfig):
     full_speed_mps: what a track makes at command 1000, which is MXRPM through gear and sprocket. encoder:
     what the controller counts, a quadrature encoder (?C) or the motor's hall sensors (?CB). watchdog_ms:
     after so long without a command the controller itself stops the motors (RWD); set and read back before
-    arming.
+    arming. More than twice the time between two commands: after half of it the driver says zero first.
     """
 
     kind: Literal["roboteq"]
