@@ -115,6 +115,9 @@ class AgilexChassis(ChassisDriver):
         self._feedback.await_setup()
         self._mode_sent_ns = None
 
+    def _no_feedback(self) -> str:
+        return self._feedback.no_feedback
+
     def _mode_to_send(self, now_ns: int) -> int | None:
         """The 0x421 that is due: while arming, command mode; else standby, until the base is there."""
         mode = self._arming.mode

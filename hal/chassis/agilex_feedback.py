@@ -136,6 +136,15 @@ class AgilexFeedback:
             return f"only foreign frames came, such as 0x{self._foreign_id:X}; is this the base's bus?"
         return self._no_frames()
 
+    @property
+    def no_feedback(self) -> str:
+        """What came instead of all that dead reckoning needs, and what to do; "" if nothing is missing."""
+        if self.motion_ns is None:
+            return "0x211 came, but no 0x221"
+        if self.feedback_ns is None:
+            return "0x221 came, but no odometer 0x311; set chassis.track_width_m: null to reckon by speeds"
+        return ""
+
     def await_setup(self) -> None:
         """Arming begins: whatever restarted before, it is this base that is to be armed, and its odometer is
         counted anew: it does not follow on what waited in buffers."""

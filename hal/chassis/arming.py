@@ -36,9 +36,9 @@ class Evidence:
     newest status arrived (None: never). disobeys: why the base does not take our commands, as that
     status tells ("" when it takes them). stop_cause: why the robot must not move ("" for none).
     standing: measured speed is zero; False when unknown. command_is_zero: what is asked at this step.
-    silence: while no status was ever heard, what came instead and what to check. resettable: stop_cause is
-    one that the base keeps until arming resets it, so it stands in the way of being armed, not of arming.
-    unread: more waits than could be read, so what is known may be long over.
+    silence: while no status or no motion feedback was ever heard, what came instead and what to check.
+    resettable: stop_cause is one that the base keeps until arming resets it, so it stands in the way of being
+    armed, not of arming. unread: more waits than could be read, so what is known may be long over.
     """
 
     now_ns: int

@@ -149,6 +149,15 @@ class ChassisDriver(ABC):
         """The base keeps its stop cause until arming resets it."""
         return False
 
+    def _no_feedback(self) -> str:
+        """A status was heard, but never motion feedback: what came instead, and what to do; "": not known."""
+        return ""
+
+    def _silence(self) -> str:
+        if self._told.status_ns is None:
+            return self._told.silence
+        return self._no_feedback() if self._told.feedback_ns is None else ""
+
     def _hear(self, now_ns: int) -> bool:
         """Whether anything came."""
         if self._link_error and not self._tries_again(now_ns):
@@ -193,7 +202,7 @@ class ChassisDriver(ABC):
             stop_cause=told.stop_cause or self._objection or self._following.sentence,
             standing=told.standing,
             command_is_zero=is_zero(self._asked),
-            silence="" if told.status_ns is not None else told.silence,
+            silence=self._silence(),
             resettable=self._resettable(),
         )
 

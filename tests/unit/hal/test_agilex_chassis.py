@@ -9,10 +9,12 @@ import pytest
 from hal.chassis.agilex import AgilexChassis
 from hal.chassis.agilex_messages import (
     ActuatorSlow,
+    AgilexMessage,
     Battery,
     ControlModeCommand,
     MotionCommand,
     MotionFeedback,
+    Odometer,
     SystemState,
     encode,
 )
@@ -284,6 +286,27 @@ def test_what_came_instead_is_told_when_arming_gives_up(frames: list[CanFrame], 
     assert seen.mode is ChassisMode.STANDBY
     assert seen.reason.startswith("arming gave up after 3.0 s: no status heard from the base: ")
     assert hint in seen.reason
+
+
+@pytest.mark.parametrize(
+    ("heard", "hint"),
+    [
+        (
+            MotionFeedback(0.0, 0.0),
+            "0x221 came, but no odometer 0x311; set chassis.track_width_m: null to reckon",
+        ),
+        (Odometer(0, 0), "0x211 came, but no 0x221"),
+    ],
+)
+def test_what_dead_reckoning_lacks_is_told_when_arming_gives_up(heard: AgilexMessage, hint: str) -> None:
+    bench = Bench(track_width_m=0.5)
+    bench.chassis.arm(0)
+    for _ in range(160):
+        bench.say(state(), heard)
+        seen = bench.exchange()
+    assert seen.mode is ChassisMode.STANDBY
+    begins = "arming gave up after 3.0 s: no motion feedback heard from the base: "
+    assert seen.reason.startswith(begins + hint)
 
 
 def test_two_lives_alike_to_the_bit() -> None:
