@@ -45,6 +45,10 @@ _QUERIES = (
 
 _SETTINGS = frozenset({packets.SET_TIMEOUT, packets.GET_TIMEOUT})
 
+# So many turns of zeros and queries before a setting that was not answered is said again: encoders and status
+# must not grow old meanwhile.
+_TURNS_BETWEEN = 4
+
 
 class RoboclawChassis(ChassisDriver):
     """hal.api.Chassis for RoboClaw. Motor 1 drives the left track, motor 2 the right one."""
@@ -71,6 +75,7 @@ class RoboclawChassis(ChassisDriver):
         self._max_track_mps = max_track_mps
         self._port = RoboclawPort(link, config.address)
         self._setup: deque[Request] = deque()
+        self._turns_before_setup = 0
         self._queries = cycle(_QUERIES)
         self._queries_turn = False
         self._heeded = True
@@ -87,10 +92,13 @@ class RoboclawChassis(ChassisDriver):
     def _take(self, answer: Answer, now_ns: int) -> None:
         if answer.request.command == packets.RAMPED_SPEEDS:
             self._heeded = answer.data is not None
+        if answer.request.command in _SETTINGS:
+            self._feedback.note_setting(answer.request.command, answer.data is not None)
         if answer.data is not None:
             self._feedback.take(answer.request.command, answer.data, answer.asked_ns, now_ns)
         elif answer.request.command in _SETTINGS and self._arming.mode is ChassisMode.ARMING:
             self._setup.appendleft(answer.request)
+            self._turns_before_setup = _TURNS_BETWEEN
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         if not self._port.idle(now_ns):
@@ -99,9 +107,10 @@ class RoboclawChassis(ChassisDriver):
         if self._arming.mode is not ChassisMode.ARMING:
             # Of an arming that a lost link or a fault ended: nobody consents to it any more.
             self._setup.clear()
-        if self._setup:
+        if self._setup and self._turns_before_setup == 0:
             self._port.start(self._setup.popleft(), now_ns)
             return None
+        self._turns_before_setup = max(0, self._turns_before_setup - 1)
         self._queries_turn = not self._queries_turn and not stops and self._heeded
         if self._queries_turn:
             self._port.start(next(self._queries), now_ns)
@@ -118,6 +127,7 @@ class RoboclawChassis(ChassisDriver):
 
     def _begin_arming(self) -> None:
         self._feedback.await_setup()
+        self._turns_before_setup = 0
         self._setup = deque((packets.set_timeout(self._config.timeout_ms), packets.GET_TIMEOUT_REQUEST))
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> Setpoint:
