@@ -23,6 +23,8 @@ class RoboteqFeedback(EncoderFeedback):
         super().__init__(geometry, config.counts_per_m, signs, config.full_speed_mps)
         self._config = config
         self._flags = 0
+        self._flags_ns: int | None = None
+        self._motors_ns: int | None = None
         self._motors = MotorFlags((), ())
         self._watchdog_ms: int | None = None
         self._refusals = 0
@@ -52,6 +54,8 @@ class RoboteqFeedback(EncoderFeedback):
         """What came instead of a status, and what to check."""
         if self.bytes_heard == 0:
             return "not one byte came; check port, power, baud and the crossed lines"
+        if self._flags_ns is not None:
+            return "it answers ?FF, but not ?FM (motor flags) for two motors; is it a two-channel controller?"
         return (
             f"{self.bytes_heard} bytes came, none an answer to ?FF; check baud and that it is a Roboteq "
             "whose serial input takes ASCII commands"
@@ -104,12 +108,15 @@ class RoboteqFeedback(EncoderFeedback):
             case lines.ENCODERS | lines.HALL_COUNTERS:
                 self._count(values[0], values[1], asked_ns, now_ns)
             case lines.FAULT_FLAGS:
-                self._flags, self.status_ns = values[0], now_ns
+                self._flags, self._flags_ns = values[0], now_ns
             case lines.MOTOR_FLAGS:
-                self._motors = lines.describe_motors(values)
+                self._motors, self._motors_ns = lines.describe_motors(values), now_ns
             case lines.WATCHDOG:
                 self._watchdog_ms = values[0]
             case lines.VOLTAGES:
                 self.battery_v = values[1] / 10.0
             case lines.CURRENTS:
                 self.currents_a = (values[0] / 10.0, values[1] / 10.0)
+        # Either may tell of a stop, so the status is as old as the older of the two.
+        if self._flags_ns is not None and self._motors_ns is not None:
+            self.status_ns = min(self._flags_ns, self._motors_ns)

@@ -89,6 +89,29 @@ def test_a_fault_beside_the_emergency_stop_is_not_reset() -> None:
     assert state.faults == ("error: short circuit",)
 
 
+@pytest.mark.parametrize("refused", [True, False])
+def test_a_base_whose_motor_flags_are_not_told_is_not_armed(refused: bool) -> None:
+    """A stalled motor, or one that stopped for safety, would not show."""
+    bench = Bench()
+    bench.far.hear_through(lambda data: data.replace(b"?FM\r", b"?FMX\r" if refused else b""))
+    bench.chassis.arm(0)
+    for _ in range(155):
+        assert bench.step().mode is not ChassisMode.ARMED
+    assert bench.step().reason == (
+        "arming gave up after 3.0 s: no status heard from the base: it answers ?FF, but not ?FM (motor "
+        "flags) for two motors; is it a two-channel controller?"
+    )
+
+
+def test_motor_flags_that_are_no_longer_told_are_a_loss() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.far.hear_through(lambda data: data.replace(b"?FM\r", b"?FMX\r"))
+    states = [bench.step(0.3) for _ in range(70)]
+    lost = next(state for state in states if state.mode is not ChassisMode.ARMED)
+    assert (lost.mode, lost.reason[:13]) == (ChassisMode.LOST, "no status for")
+
+
 @pytest.mark.parametrize(
     ("flags", "mode", "faults"),
     [
