@@ -239,17 +239,23 @@ class RoboteqChassisConfig(_TwoChannelConfig):
         return self.full_speed_mps
 
 
+# What a wheel of a Kobuki makes (its user guide: 70 cm/s).
+KOBUKI_TOP_SPEED_MPS = 0.7
+
+
 class KobukiChassisConfig(Section):
     """A Kobuki, the base of Turtlebot 2. Its geometry is fixed: the base itself turns a twist into speeds.
 
-    slip_factor: as for AgileX. base_timeout_ms: after so long without a command the base is taken to have
-    stopped by itself. The firmware's time is not documented: measure it with the wheels off the floor.
+    max_speed_mps, max_yaw_rate_radps: of the base; a bend in which a wheel would be faster than it makes,
+    0.7 m/s, is driven slower. slip_factor: as for AgileX. base_timeout_ms: after so long without a command
+    the base is taken to have stopped by itself. The firmware's time is not documented: measure it with the
+    wheels off the floor.
     """
 
     kind: Literal["kobuki"]
     link: SerialLinkConfig
     slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
-    max_speed_mps: float = Field(default=0.7, gt=0, le=0.7)
+    max_speed_mps: float = Field(default=KOBUKI_TOP_SPEED_MPS, gt=0, le=KOBUKI_TOP_SPEED_MPS)
     max_yaw_rate_radps: float = Field(default=1.9, gt=0, le=3.1, description="faster, and the gyro is off")
     base_timeout_ms: int = Field(default=600, ge=100, le=5000)
     command_period_ms: int = Field(default=20, ge=10, le=100)

@@ -55,8 +55,11 @@ class AgilexChassis(ChassisDriver):
     ) -> None:
         model = model_of(config)
         feedback = AgilexFeedback(config, model, no_frames)
+        # The model's limit is of what it is told, which is slip_factor times what it makes.
         commands = CommandLimits(
-            model.max_speed_mps, model.max_yaw_rate_radps, config.command_timeout_ms * NS_PER_MS
+            max_speed_mps=model.max_speed_mps,
+            max_yaw_rate_radps=model.max_yaw_rate_radps / config.slip_factor,
+            timeout_ns=config.command_timeout_ms * NS_PER_MS,
         )
         limits = ArmingLimits(
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,

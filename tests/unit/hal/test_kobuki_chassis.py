@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from itertools import count
 
 import pytest
@@ -268,6 +269,19 @@ def test_the_fastest_is_the_wire_s_too() -> None:
     bench.arm()
     bench.step(9.0)
     assert bench.near.written == [base_control(0.7, 0.0)]
+
+
+def test_no_wheel_is_told_to_be_faster_than_it_can() -> None:
+    """0.7 m/s and 1 rad/s are 0.84375 m/s of the outer wheel, by 0.115 m and slip."""
+    bench = Bench(slip_factor=1.25)
+    bench.arm()
+    sent = bench.step(0.7, 1.0).sent
+    ratio = 0.7 / (0.7 + 0.115 * 1.25)
+    assert sent is not None
+    assert (sent.v_mps, sent.w_radps) == pytest.approx((0.7 * ratio, ratio))
+    assert bench.near.written == [base_control(0.7 * ratio, 1.25 * ratio)]
+    speed, radius = struct.unpack_from("<hh", bench.near.written[0], 5)
+    assert (speed, radius) == (700, 560)
 
 
 @pytest.mark.parametrize("gain", [0.0, -1.0, 3.0])
