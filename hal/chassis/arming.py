@@ -111,7 +111,9 @@ def release(state: Arming, now_ns: int) -> Arming:
 def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     loss = _loss(seen, limits)
     if state.latched:
-        return replace(state, cleared=not loss and not seen.stop_cause)
+        # A link that works again is not yet a base that answers.
+        heard = seen.status_ns is not None and seen.feedback_ns is not None
+        return replace(state, cleared=heard and not loss and not seen.stop_cause)
     if loss:
         return Arming(ChassisMode.LOST, loss, seen.now_ns)
     if seen.stop_cause and not (state.mode is ChassisMode.ARMING and seen.resettable):
