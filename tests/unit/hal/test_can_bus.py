@@ -4,8 +4,6 @@ import errno
 import logging
 import os
 import socket
-import termios
-import time
 from collections.abc import Iterator
 
 import can
@@ -15,10 +13,9 @@ from config.chassis import CanLinkConfig
 from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
 from hal.links import reopening
 from hal.links.can_bus import CanBusLink
-from hal.links.pseudo_terminal import PseudoTerminal
 from hal.types import CanFrame
 from tests.support.chassis_rig import can_link_config, udp_link_config
-from tests.support.wires import SettledTerminal, open_can_link
+from tests.support.wires import open_can_link
 
 FRAME = CanFrame(0x111, b"\x00\x96")
 # The kernel carries bytes through a pseudo-terminal when a core is free, which may take a while.
@@ -247,34 +244,6 @@ def test_a_datagram_that_is_no_frame_does_not_lose_the_bus() -> None:
         assert link.receive() == FRAME
 
 
-def test_slcan_adapter_on_a_serial_port() -> None:
-    """The text protocol of cheap USB adapters, at the bit rate of AgileX; noise is passed over."""
-    with PseudoTerminal() as adapter:
-        slcan = config("slcan", adapter.path)
-        with CanBusLink(slcan) as link:
-            link.send(FRAME)
-            assert hear(adapter, until=b"t11120096\r").count(b"S6\r") == 1, "500 kbit/s"
-            adapter.write(b"t22x\rt2\rt2218FE0C00FA00000000\r")
-            assert wait_for(link) == CanFrame(0x221, bytes.fromhex("FE0C00FA00000000"))
-            adapter.unplug()
-            with pytest.raises(LinkLost, match="lost while receiving"):
-                wait_for(link)
-
-
-@pytest.mark.parametrize("noise", [b"\xff", b"\x80\r", b"t22\xc3"])
-def test_a_slcan_adapter_is_heard_again_after_noise_that_is_no_ascii(noise: bytes) -> None:
-    with PseudoTerminal() as adapter, CanBusLink(config("slcan", adapter.path)) as link:
-        adapter.write(noise)
-        adapter.write(b"t2218FE0C00FA00000000\r")
-        give_up_s = time.monotonic() + PATIENCE_S
-        heard = None
-        while heard is None and time.monotonic() < give_up_s:
-            heard = link.receive()
-            if heard is None:
-                adapter.write(b"t2218FE0C00FA00000000\r")
-        assert heard == CanFrame(0x221, bytes.fromhex("FE0C00FA00000000"))
-
-
 @pytest.mark.parametrize(
     ("interface", "timeout_s"), [("slcan", 0.05), ("socketcan", 0.002), ("gs_usb", 0.002)]
 )
@@ -282,45 +251,3 @@ def test_how_long_a_send_waits_for_room(bus: FaultyBus, interface: str, timeout_
     """pyserial counts the time until there is room for more: 2 ms are over when another process runs."""
     CanBusLink(config(interface, "x")).send(FRAME)
     assert bus.timeouts_s == [timeout_s]
-
-
-def test_a_slcan_adapter_that_takes_nothing_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """python-can drains the port behind every frame, without a time-out."""
-    with PseudoTerminal() as adapter, CanBusLink(config("slcan", adapter.path)) as link:
-        monkeypatch.setattr(termios, "tcdrain", lambda port: pytest.fail("waits for the adapter"))
-        link.send(FRAME)
-        hear(adapter, until=b"t11120096\r")
-
-
-def test_what_a_slcan_adapter_acknowledges_hides_no_frames() -> None:
-    """Two acknowledgements for each exchange, and one read of them: frames would wait longer and longer."""
-    with SettledTerminal() as adapter, CanBusLink(config("slcan", adapter.path)) as link:
-        adapter.write(b"z\rz\r\a\rt2211AA\rz\rt2211BB\rt22")
-        assert [link.receive() for _ in range(3)] == [
-            CanFrame(0x221, b"\xaa"),
-            CanFrame(0x221, b"\xbb"),
-            None,
-        ]
-        adapter.write(b"11CC\r")
-        assert link.receive() == CanFrame(0x221, b"\xcc")
-
-
-def hear(adapter: PseudoTerminal, until: bytes) -> bytes:
-    """All that the adapter is told, up to these bytes."""
-    heard = b""
-    give_up_s = time.monotonic() + PATIENCE_S
-    while time.monotonic() < give_up_s:
-        heard += adapter.read()
-        if heard.endswith(until):
-            return heard
-    raise AssertionError(f"heard {heard!r}")
-
-
-def wait_for(link: CanBusLink) -> CanFrame | None:
-    """The next frame; the kernel takes its time to carry bytes through a pseudo-terminal."""
-    give_up_s = time.monotonic() + PATIENCE_S
-    while time.monotonic() < give_up_s:
-        frame = link.receive()
-        if frame is not None:
-            return frame
-    return None
