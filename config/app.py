@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from config.camera import CameraConfig
-from config.chassis import ChassisConfig, PlantConfig
+from config.chassis import ChassisConfig, PlantConfig, RoboteqChassisConfig
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.loader import Section, load, read_yaml
@@ -82,6 +83,19 @@ def _check_range(perception: PerceptionConfig, decision: DecisionConfig) -> None
         )
 
 
+def _check_watchdog(chassis: RoboteqChassisConfig, rate_hz: float) -> None:
+    """The driver says zero first after half of the watchdog: it must not come to that with every command, or
+    the robot is told to stop all the time. Raises ValueError."""
+    exchange_ms = 1000.0 / rate_hz
+    apart_ms = exchange_ms * math.ceil(chassis.command_period_ms / exchange_ms - 1e-9)
+    if 2.0 * apart_ms >= chassis.watchdog_ms:
+        raise ValueError(
+            f"chassis.watchdog_ms ({chassis.watchdog_ms}) must be more than twice the {apart_ms:g} ms from "
+            f"one command to the next (chassis.command_period_ms {chassis.command_period_ms}, in whole steps "
+            f"of runner.control_rate_hz {rate_hz:g}): raise it, or command more often"
+        )
+
+
 class AppConfig(Section):
     """What `treadwatch run` and `treadwatch govern` read with --config FILE."""
 
@@ -131,6 +145,8 @@ class AppConfig(Section):
                 f"runner.control_rate_hz must be at least {ROBOCLAW_RATE_HZ:g} with a RoboClaw, "
                 "which answers one request an exchange"
             )
+        if self.chassis.kind == "roboteq":
+            _check_watchdog(self.chassis, self.runner.control_rate_hz)
         return self
 
     def _check_real_robot(self) -> None:

@@ -59,7 +59,11 @@ def _is_multicast(address: str) -> bool:
 
 
 class SerialLinkConfig(Section):
-    """A serial port: a device path, or a pyserial URL such as ``socket://host:port``."""
+    """A serial port: a device path, or a pyserial URL such as ``socket://host:port``.
+
+    Over a network, opening waits for the other side for up to 5 s: at the start; a connection that was lost
+    is made anew beside the control loop, which goes on.
+    """
 
     url: str = Field(min_length=1)
     baud: int = Field(default=115_200, ge=1_200, le=4_000_000)
@@ -71,6 +75,11 @@ class SerialLinkConfig(Section):
         if scheme in _NETWORK_SCHEMES and not _names_host_and_port(url):
             raise ValueError(f"needs a host and a port, such as {scheme}://192.168.0.7:4001")
         return url
+
+    @property
+    def over_network(self) -> bool:
+        """The port is at the other end of a network."""
+        return self.url.partition("://")[0] in _NETWORK_SCHEMES
 
 
 # pyserial's ports at the other end of a network; what is wrong with such a URL, it does not tell.
@@ -215,7 +224,7 @@ class RoboteqChassisConfig(_TwoChannelConfig):
     full_speed_mps: what a track makes at command 1000, which is MXRPM through gear and sprocket. encoder:
     what the controller counts, a quadrature encoder (?C) or the motor's hall sensors (?CB). watchdog_ms:
     after so long without a command the controller itself stops the motors (RWD); set and read back before
-    arming.
+    arming. More than twice the time between two commands: after half of it the driver says zero first.
     """
 
     kind: Literal["roboteq"]
@@ -230,17 +239,23 @@ class RoboteqChassisConfig(_TwoChannelConfig):
         return self.full_speed_mps
 
 
+# What a wheel of a Kobuki makes (its user guide: 70 cm/s).
+KOBUKI_TOP_SPEED_MPS = 0.7
+
+
 class KobukiChassisConfig(Section):
     """A Kobuki, the base of Turtlebot 2. Its geometry is fixed: the base itself turns a twist into speeds.
 
-    slip_factor: as for AgileX. base_timeout_ms: after so long without a command the base is taken to have
-    stopped by itself. The firmware's time is not documented: measure it with the wheels off the floor.
+    max_speed_mps, max_yaw_rate_radps: of the base; a bend in which a wheel would be faster than it makes,
+    0.7 m/s, is driven slower. slip_factor: as for AgileX. base_timeout_ms: after so long without a command
+    the base is taken to have stopped by itself. The firmware's time is not documented: measure it with the
+    wheels off the floor.
     """
 
     kind: Literal["kobuki"]
     link: SerialLinkConfig
     slip_factor: float = Field(default=1.0, ge=1.0, le=3.0)
-    max_speed_mps: float = Field(default=0.7, gt=0, le=0.7)
+    max_speed_mps: float = Field(default=KOBUKI_TOP_SPEED_MPS, gt=0, le=KOBUKI_TOP_SPEED_MPS)
     max_yaw_rate_radps: float = Field(default=1.9, gt=0, le=3.1, description="faster, and the gyro is off")
     base_timeout_ms: int = Field(default=600, ge=100, le=5000)
     command_period_ms: int = Field(default=20, ge=10, le=100)

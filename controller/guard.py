@@ -146,14 +146,19 @@ class GuardedChassis(Enclosing):
         self._armed = False
         self._violation = ""
         self._refusal = ""
+        self._consented = False
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """See hal.api.Chassis."""
         problem = self._objection(setpoint, now_ns)
-        if problem and not self._violation:
+        consented, self._consented = self._consented, False
+        if problem and (consented or not self._violation):
             self._latch(problem, now_ns)
-        passed = None if self._violation else setpoint
+            consented = False
+        passed = setpoint if consented or not self._violation else None
         state = self._chassis.exchange(passed, now_ns)
+        if consented:
+            self._unlatch_if_followed(state)
         self._armed = state.mode is ChassisMode.ARMED
         self._last = (passed or Setpoint(now_ns, 0.0, 0.0, 0.0)) if self._armed else None
         self._asked_zero = setpoint is None or (setpoint.v_mps == 0.0 and setpoint.w_radps == 0.0)
@@ -167,7 +172,7 @@ class GuardedChassis(Enclosing):
         elif self._violation and not self._asked_zero:
             self._refusal = "the command is not zero"
         else:
-            self._violation = ""
+            self._consented = True
             self._last_ns = None
             self._chassis.arm(now_ns)
 
@@ -186,6 +191,13 @@ class GuardedChassis(Enclosing):
     def _latch(self, problem: str, now_ns: int) -> None:
         self._violation = problem
         self._chassis.stop(now_ns)
+
+    def _unlatch_if_followed(self, state: ChassisState) -> None:
+        """The driver may refuse the consent: then it ends nothing here either."""
+        if state.mode in (ChassisMode.ARMING, ChassisMode.ARMED):
+            self._violation = ""
+        elif state.mode not in LATCHED_MODES:  # whose reason is told beside ours
+            self._refusal = state.reason.rpartition("arming refused: ")[2]
 
     def _told(self, state: ChassisState) -> ChassisState:
         if not self._violation:

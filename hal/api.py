@@ -49,7 +49,7 @@ class OdometrySource(Protocol):
 
 
 class Chassis(Closing, Protocol):
-    """A tracked base. Stepped by the control loop; never blocks, starts no thread."""
+    """A tracked base. Stepped by the control loop; waits for nothing but a link's short bound to write."""
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """Send what is due, read what has arrived. None asks for no motion: an explicit zero."""
@@ -68,7 +68,7 @@ class CanLink(Closing, Protocol):
     """Whole CAN frames. Knows nothing of chassis."""
 
     def send(self, frame: CanFrame) -> None:
-        """Queue one frame, without blocking. Raises LinkLost."""
+        """Queue one frame within a short bound. Raises LinkLost."""
         ...
 
     def receive(self) -> CanFrame | None:

@@ -55,8 +55,11 @@ class AgilexChassis(ChassisDriver):
     ) -> None:
         model = model_of(config)
         feedback = AgilexFeedback(config, model, no_frames)
+        # The model's limit is of what it is told, which is slip_factor times what it makes.
         commands = CommandLimits(
-            model.max_speed_mps, model.max_yaw_rate_radps, config.command_timeout_ms * NS_PER_MS
+            max_speed_mps=model.max_speed_mps,
+            max_yaw_rate_radps=model.max_yaw_rate_radps / config.slip_factor,
+            timeout_ns=config.command_timeout_ms * NS_PER_MS,
         )
         limits = ArmingLimits(
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
@@ -75,13 +78,15 @@ class AgilexChassis(ChassisDriver):
         self._moving = False
         self._mode_sent_ns: int | None = None
 
-    def _listen(self, now_ns: int) -> None:
+    def _listen(self, now_ns: int) -> bool:
         messages: list[AgilexMessage] = []
+        heard = False
         try:
             for _ in range(_MAX_FRAMES):
                 frame = self._link.receive()
                 if frame is None:
                     break
+                heard = True
                 if frame.arbitration_id in _NOT_NEEDED:
                     self._feedback.note_actuator(frame.arbitration_id - _FIRST_ACTUATOR)
                     continue
@@ -93,6 +98,7 @@ class AgilexChassis(ChassisDriver):
         finally:
             # What came before the link went is still true.
             self._feedback.update(messages, now_ns)
+        return heard
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         goes_out = due(self._motion_sent_ns, self._period_ns, now_ns) or (self._moving and is_zero(command))
@@ -108,8 +114,12 @@ class AgilexChassis(ChassisDriver):
         self._send_mode(self._model.mode_standby, now_ns)
 
     def _begin_arming(self) -> None:
-        # Nothing to forget: arming counts only a 0x211 that arrives from now on. But speak at once.
+        # Arming counts only a 0x211 that arrives from now on, so no mode need be forgotten. Speak at once.
+        self._feedback.await_setup()
         self._mode_sent_ns = None
+
+    def _no_feedback(self) -> str:
+        return self._feedback.no_feedback
 
     def _mode_to_send(self, now_ns: int) -> int | None:
         """The 0x421 that is due: while arming, command mode; else standby, until the base is there."""
@@ -123,7 +133,7 @@ class AgilexChassis(ChassisDriver):
             return None
         if mode is ChassisMode.ARMING:
             return self._obeying
-        return None if self._feedback.disobeys else self._model.mode_standby
+        return self._model.mode_standby if self._feedback.in_command_mode else None
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> None:
         # The base turns slip_factor times less than its tracks say, so ask for that much more.

@@ -33,8 +33,16 @@ _STANDING_RADPS = 0.002
 # How the vendor's SDK tells a base of protocol V1.
 _V1_STATE_ID = 0x151
 
+# How often 0x211 may come at the most: the shortest period in any manual is 20 ms (TRACER v1.2).
+_LEAST_STATE_NS = 10 * NS_PER_MS
+_STATES_AT_ONCE = 2
+
 # Travel that two feedbacks cannot be apart, even where frames were lost or came late.
 _JUMP_SLACK_M = 0.2
+
+# How far a track may go otherwise than it just went, between two odometers, by stopping or rolling back.
+_COURSE_SLACK_M = 0.01
+_ODOMETER_S = 0.02
 
 # 0x221 and 0x311 tell of the same tracks. Past this difference since the last comparison, one of them lies.
 _DISAGREEMENT_M = 0.15
@@ -47,6 +55,10 @@ class AgilexFeedback:
     Dead reckoning: with the track width known, the odometer 0x311 is counted: it loses nothing
     when frames are lost or late, and its 1 mm steps do not add up. Without it the speeds 0x221 are
     integrated over the time of their arrival: they need no geometry.
+
+    A restart shows in the control mode, which is standby again. Where 0x421 is repeated that may put the base
+    back before it tells: then in an odometer that no track can have driven, or in the count of 0x211 (byte 7,
+    0..255), where it begins anew.
 
     no_frames: what came and what to check, for the case that not one frame was understood.
     """
@@ -72,6 +84,7 @@ class AgilexFeedback:
         self._driver_bits: dict[int, int] = {}
         self._foreign_id: int | None = None
         self._highest_actuator = 0
+        self._restart = ""
         self.motion_ns: int | None = None
         self.status_ns: int | None = None
         self.v_mps = math.nan
@@ -97,12 +110,20 @@ class AgilexFeedback:
 
     @property
     def disobeys(self) -> str:
-        """Why the base does not take commands, as its newest system state tells; "" when it does."""
+        """Why the base does not take commands, as its newest system state tells, or is not the one any more
+        that was armed; "" when it obeys."""
         if self._state is None:
             return "no system state heard"
-        if self._state.control_mode == self._obeying:
+        if self._restart:
+            return self._restart
+        if self.in_command_mode:
             return ""
         return f"control mode is {self._model.describe_mode(self._state.control_mode)}"
+
+    @property
+    def in_command_mode(self) -> bool:
+        """The newest system state says that commands of this wire are followed."""
+        return self._state is not None and self._state.control_mode == self._obeying
 
     @property
     def silence(self) -> str:
@@ -114,6 +135,21 @@ class AgilexFeedback:
         if self._foreign_id is not None:
             return f"only foreign frames came, such as 0x{self._foreign_id:X}; is this the base's bus?"
         return self._no_frames()
+
+    @property
+    def no_feedback(self) -> str:
+        """What came instead of all that dead reckoning needs, and what to do; "" if nothing is missing."""
+        if self.motion_ns is None:
+            return "0x211 came, but no 0x221"
+        if self.feedback_ns is None:
+            return "0x221 came, but no odometer 0x311; set chassis.track_width_m: null to reckon by speeds"
+        return ""
+
+    def await_setup(self) -> None:
+        """Arming begins: whatever restarted before, it is this base that is to be armed, and its odometer is
+        counted anew: it does not follow on what waited in buffers."""
+        self._restart = ""
+        self._counter = TrackCounter()
 
     def note_foreign(self, arbitration_id: int) -> None:
         """A frame came that is none of protocol V2. The first of V1 is remembered, else the newest."""
@@ -170,6 +206,7 @@ class AgilexFeedback:
                 case Odometer():
                     self._count(message, now_ns)
                 case SystemState():
+                    self._follow_count(message, now_ns)
                     self._state, self.status_ns = message, now_ns
                     self._list_faults()
                 case ActuatorSlow():
@@ -181,6 +218,14 @@ class AgilexFeedback:
                     self._battery = message
         if motions:
             self._integrate(motions, now_ns)
+
+    def _follow_count(self, state: SystemState, now_ns: int) -> None:
+        # Other models stay in standby after a restart, and not every manual says what their byte 7 counts.
+        if self._model.mode_period_ms is None or self._state is None or self.status_ns is None:
+            return
+        most = _STATES_AT_ONCE + (now_ns - self.status_ns) // _LEAST_STATE_NS
+        if (state.count - self._state.count) % 256 > most and state.count <= most:
+            self._restart = "the count of its 0x211 began anew: restarted"
 
     def _integrate(self, motions: Sequence[MotionFeedback], now_ns: int) -> None:
         # Several at once waited somewhere: each stands for an equal part of the time since the last.
@@ -204,8 +249,18 @@ class AgilexFeedback:
             self._model.max_speed_mps + self._geometry.to_tracks(0.0, self._model.max_yaw_rate_radps)[1]
         )
         limit_mm = 1000.0 * (fastest_mps * elapsed_s + _JUMP_SLACK_M)
-        steps = self._counter.increments(odometer.left_mm, odometer.right_mm, limit_mm)
+        # Of several at once the later ones have a period each, too.
+        left_mps, right_mps = self._geometry.to_tracks(self.v_mps, self.w_radps)
+        ms = 1000.0 * max(elapsed_s, _ODOMETER_S)
+        steps = self._counter.increments(
+            odometer.left_mm,
+            odometer.right_mm,
+            limit_mm,
+            (left_mps * ms, right_mps * ms),
+            1000.0 * _COURSE_SLACK_M,
+        )
         if steps is None:
+            self._restart = "its odometer jumped: restarted"
             self._disagreement.restart(now_ns)
             return
         distance_m, turn_rad = self._geometry.to_twist(steps[0] / 1000.0, steps[1] / 1000.0)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from hal.api import SerialLink
+from hal.chassis.reading import read_all
 from hal.enclosing import Enclosing
 from hal.types import CanFrame
 
@@ -130,7 +131,7 @@ class AgilexSerialBus(Enclosing):
     def receive(self) -> CanFrame | None:
         """See hal.api.CanLink."""
         if not self._arrived:
-            data = self._link.read()
+            data = read_all(self._link)
             self._bytes_heard += len(data)
             self._arrived.extend(self._reader.feed(data))
         return self._arrived.popleft() if self._arrived else None

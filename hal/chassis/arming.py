@@ -36,8 +36,9 @@ class Evidence:
     newest status arrived (None: never). disobeys: why the base does not take our commands, as that
     status tells ("" when it takes them). stop_cause: why the robot must not move ("" for none).
     standing: measured speed is zero; False when unknown. command_is_zero: what is asked at this step.
-    silence: while no status was ever heard, what came instead and what to check. resettable: stop_cause is
-    one that the base keeps until arming resets it, so it stands in the way of being armed, not of arming.
+    silence: while no status or no motion feedback was ever heard, what came instead and what to check.
+    resettable: stop_cause is one that the base keeps until arming resets it, so it stands in the way of being
+    armed, not of arming. unread: more waits than could be read, so what is known may be long over.
     """
 
     now_ns: int
@@ -50,6 +51,7 @@ class Evidence:
     command_is_zero: bool
     silence: str = ""
     resettable: bool = False
+    unread: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +111,9 @@ def release(state: Arming, now_ns: int) -> Arming:
 def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     loss = _loss(seen, limits)
     if state.latched:
-        return replace(state, cleared=not loss and not seen.stop_cause)
+        # A link that works again is not yet a base that answers.
+        heard = seen.status_ns is not None and seen.feedback_ns is not None
+        return replace(state, cleared=heard and not loss and not seen.stop_cause)
     if loss:
         return Arming(ChassisMode.LOST, loss, seen.now_ns)
     if seen.stop_cause and not (state.mode is ChassisMode.ARMING and seen.resettable):
@@ -158,6 +162,8 @@ def _armed(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
 def _refusal(state: Arming, seen: Evidence, limits: ArmingLimits) -> str:
     if state.mode is ChassisMode.STOPPING:
         return "still stopping"
+    if seen.unread:
+        return "more came than can be read at once, and it may be old; what floods the line?"
     if problem := _loss(seen, limits) or ("" if seen.resettable else seen.stop_cause):
         return problem
     if not seen.command_is_zero:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -21,8 +22,12 @@ from hal.errors import LinkLost
 from hal.geometry import advance_pose
 from hal.types import ChassisState, PlanarPose, Setpoint
 
-# How often a lost link is tried again. Opening a port can take milliseconds, so not at every exchange.
+# How long a lost link is left alone before it is tried again, from the exchange after the last try: opening a
+# port can take milliseconds, or more.
 _RETRY_NS = 500 * NS_PER_MS
+
+# How often arm() reads on while anything comes, each time as much as one exchange does at the most.
+_MOST_READS = 32
 
 
 class Told(Protocol):
@@ -71,7 +76,7 @@ class ChassisDriver(ABC):
         self._asked: Setpoint | None = None
         self._objection = ""
         self._link_error = ""
-        self._retry_ns = 0
+        self._retry_ns: int | None = None
         self._now_ns = 0
 
     def __enter__(self) -> Self:
@@ -104,9 +109,10 @@ class ChassisDriver(ABC):
         """See hal.api.Chassis. A refusal is told in the state's reason."""
         self._now_ns = now_ns
         # What has waited in the port since who knows when must not count as an answer to this consent.
-        self._hear(now_ns)
+        unread = all(self._hear(now_ns) for _ in range(_MOST_READS))
         before = self._arming.mode
-        self._arming = arming.consent(self._arming, self._evidence(now_ns), self._limits)
+        seen = replace(self._evidence(now_ns), unread=unread)
+        self._arming = arming.consent(self._arming, seen, self._limits)
         if self._arming.mode is not before:
             self._begin_arming()
 
@@ -120,9 +126,9 @@ class ChassisDriver(ABC):
             self._lose(error, now_ns)
 
     @abstractmethod
-    def _listen(self, now_ns: int) -> None:
-        """Read what has arrived, without waiting, and keep it. Must touch the link, so that a
-        link that works again is noticed. May raise LinkLost."""
+    def _listen(self, now_ns: int) -> bool:
+        """Read what has arrived, without waiting and up to a bound, and keep it; whether anything had. Must
+        touch the link, so that a link that works again is noticed. May raise LinkLost."""
 
     @abstractmethod
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
@@ -143,15 +149,32 @@ class ChassisDriver(ABC):
         """The base keeps its stop cause until arming resets it."""
         return False
 
-    def _hear(self, now_ns: int) -> None:
-        if self._link_error and now_ns < self._retry_ns:
-            return
+    def _no_feedback(self) -> str:
+        """A status was heard, but never motion feedback: what came instead, and what to do; "": not known."""
+        return ""
+
+    def _silence(self) -> str:
+        if self._told.status_ns is None:
+            return self._told.silence
+        return self._no_feedback() if self._told.feedback_ns is None else ""
+
+    def _hear(self, now_ns: int) -> bool:
+        """Whether anything came."""
+        if self._link_error and not self._tries_again(now_ns):
+            return False
         try:
-            self._listen(now_ns)
+            heard = self._listen(now_ns)
         except LinkLost as error:
             self._lose(error, now_ns)
-        else:
-            self._link_error = ""
+            return False
+        self._link_error = ""
+        return heard
+
+    def _tries_again(self, now_ns: int) -> bool:
+        """A lost link is due to be tried. The first exchange after a try tells when that ended."""
+        if self._retry_ns is None:
+            self._retry_ns = now_ns + _RETRY_NS
+        return now_ns >= self._retry_ns
 
     def _say(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         if self._link_error:
@@ -165,7 +188,7 @@ class ChassisDriver(ABC):
     def _lose(self, error: LinkLost, now_ns: int) -> None:
         """Told to the machine at once: the state of this very exchange says lost."""
         self._link_error = str(error)
-        self._retry_ns = now_ns + _RETRY_NS
+        self._retry_ns = None
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
 
     def _evidence(self, now_ns: int) -> Evidence:
@@ -179,7 +202,7 @@ class ChassisDriver(ABC):
             stop_cause=told.stop_cause or self._objection or self._following.sentence,
             standing=told.standing,
             command_is_zero=is_zero(self._asked),
-            silence="" if told.status_ns is not None else told.silence,
+            silence=self._silence(),
             resettable=self._resettable(),
         )
 

@@ -12,6 +12,9 @@ from hal.types import PlanarPose
 _JUMP_RATIO = 1.5
 _JUMP_SLACK_M = 0.05
 
+# How far a track may go otherwise than it just went, between two answers, by stopping or rolling back.
+_COURSE_SLACK_M = 0.01
+
 _STANDING_MPS = 0.005
 _STANDING_RADPS = 0.01
 
@@ -67,7 +70,13 @@ class EncoderFeedback:
         last_ns, self.pose_ns = self.pose_ns, asked_ns
         elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / NS_PER_S
         limit_m = _JUMP_RATIO * self._fastest_mps * elapsed_s + _JUMP_SLACK_M
-        steps = self._counter.increments(left, right, limit_m * self._counts_per_m)
+        steps = self._counter.increments(
+            left,
+            right,
+            limit_m * self._counts_per_m,
+            self._expected(elapsed_s),
+            _COURSE_SLACK_M * self._counts_per_m,
+        )
         if steps is None:
             self._restarted = True
             self.v_mps = self.w_radps = math.nan
@@ -80,3 +89,9 @@ class EncoderFeedback:
         self._reckoning.advance(distance_m, turn_rad)
         self.v_mps, self.w_radps = distance_m / elapsed_s, turn_rad / elapsed_s
         self.feedback_ns = now_ns
+
+    def _expected(self, elapsed_s: float) -> tuple[float, float]:
+        """Counts (left, right) in this time at the speed measured last; NaN while unknown."""
+        left_mps, right_mps = self._geometry.to_tracks(self.v_mps, self.w_radps)
+        counts = self._counts_per_m * elapsed_s
+        return self._signs[0] * left_mps * counts, self._signs[1] * right_mps * counts

@@ -6,13 +6,17 @@ stop. Here a command goes out every period whatever comes back: a zero above all
 
 from __future__ import annotations
 
-from config.chassis import KobukiChassisConfig
+from dataclasses import replace
+
+from config.chassis import KOBUKI_TOP_SPEED_MPS, KobukiChassisConfig
 from hal.api import SerialLink
 from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.kobuki_feedback import KobukiFeedback
-from hal.chassis.kobuki_packets import FrameReader, base_control, parse
+from hal.chassis.kobuki_packets import WHEEL_BASE_M, FrameReader, base_control, parse
+from hal.chassis.reading import read_all
+from hal.chassis.tracks import TrackGeometry, scale_to_fit
 from hal.clocks import NS_PER_MS
 from hal.types import Setpoint
 
@@ -34,29 +38,31 @@ class KobukiChassis(ChassisDriver):
         super().__init__(link, feedback, commands, limits)
         self._link = link
         self._feedback = feedback
-        self._slip_factor = config.slip_factor
+        self._geometry = TrackGeometry(WHEEL_BASE_M, config.slip_factor)
         self._period_ns = config.command_period_ms * NS_PER_MS
         self._reader = FrameReader()
         self._motion_sent_ns: int | None = None
         self._moving = False
 
-    def _listen(self, now_ns: int) -> None:
-        arrived = self._link.read()
+    def _listen(self, now_ns: int) -> bool:
+        arrived = read_all(self._link)
         self._feedback.bytes_heard += len(arrived)
         for payload in self._reader.feed(arrived):
             told = parse(payload)
             if told is not None:
                 self._feedback.take(told, now_ns)
+        return bool(arrived)
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         stops = self._moving and is_zero(command)
         if not (stops or due(self._motion_sent_ns, self._period_ns, now_ns)):
             return None
+        fitted = self._fitted(command)
         # The base turns slip_factor times less than its wheels say, so ask for that much more.
-        self._link.write(base_control(command.v_mps, command.w_radps * self._slip_factor))
+        self._link.write(base_control(fitted.v_mps, fitted.w_radps * self._geometry.slip_factor))
         self._motion_sent_ns = now_ns
         self._moving = not is_zero(command)
-        return command
+        return fitted
 
     def _speak_stop(self, now_ns: int) -> None:
         self._feedback.forget_setup()
@@ -66,3 +72,12 @@ class KobukiChassis(ChassisDriver):
 
     def _begin_arming(self) -> None:
         self._feedback.await_setup()
+
+    def _fitted(self, command: Setpoint) -> Setpoint:
+        """The command slowed until no wheel is too fast."""
+        wanted = self._geometry.to_tracks(command.v_mps, command.w_radps)
+        fitted = scale_to_fit(*wanted, KOBUKI_TOP_SPEED_MPS, KOBUKI_TOP_SPEED_MPS)
+        if fitted == wanted:
+            return command
+        v_mps, w_radps = self._geometry.to_twist(*fitted)
+        return replace(command, v_mps=v_mps, w_radps=w_radps)

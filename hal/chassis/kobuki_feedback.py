@@ -6,6 +6,7 @@ import math
 
 from config.chassis import KobukiChassisConfig
 from hal.chassis.disagreement import Disagreement
+from hal.chassis.frame_age import FrameAge
 from hal.chassis.kobuki_packets import (
     CLOCK_BITS,
     ENCODER_BITS,
@@ -36,7 +37,8 @@ _JUMP_SLACK_M = 0.02
 _DISAGREEMENT_RAD = 0.3
 _DISAGREEMENT_RATIO = 0.4
 
-# The base's clock and ours may disagree by what a frame waits in buffers, not by this.
+# A frame waits in buffers, so less time may have passed for the base than for us, if not less than none; more
+# only by what the frame before had waited, which is never this.
 _CLOCKS_APART_MS = 500
 
 
@@ -45,7 +47,8 @@ class KobukiFeedback:
 
     Distance is wheel ticks; yaw is the gyro's, which no slip fools, where a frame has one; the wheels' yaw is
     compared with it, and past a difference the base stops. Time between
-    two frames is the base's own clock: frames wait in buffers, ticks do not.
+    two frames is the base's own clock: frames wait in buffers, ticks do not. What is told holds for when its
+    frame was made, as far as the two clocks tell: ever older frames are no feedback.
     """
 
     def __init__(self, config: KobukiChassisConfig) -> None:
@@ -54,10 +57,13 @@ class KobukiFeedback:
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter(ENCODER_BITS)
         self._core: Core | None = None
+        self._counted: Core | None = None  # what the next one follows on
         self._angle_rad: float | None = None
         self._disagreement = Disagreement(
             "gyro and wheels disagree", "rad", _DISAGREEMENT_RAD, _DISAGREEMENT_RATIO
         )
+        self._age = FrameAge()
+        self._arrived_ns = 0
         self._restarted = False
         self._wanted = False
         self.bytes_heard = 0
@@ -125,9 +131,12 @@ class KobukiFeedback:
         return _named("error: motor over-current", over_current, _MOTORS)
 
     def await_setup(self) -> None:
-        """Arming begins."""
+        """Arming begins: what is told from now on does not follow on what waited in buffers before."""
         self._wanted = True
         self._restarted = False
+        self._counted = None
+        self._counter = TrackCounter(ENCODER_BITS)
+        self._age.restart()
 
     def forget_setup(self) -> None:
         """The base is no longer asked to obey."""
@@ -141,19 +150,21 @@ class KobukiFeedback:
             self._count(told.core, told.inertia, now_ns)
 
     def _count(self, core: Core, inertia: Inertia | None, now_ns: int) -> None:
-        last, self._core = self._core, core
-        last_ns, self.pose_ns = self.pose_ns, now_ns
+        last, self._core, self._counted = self._counted, core, core
+        last_ns, self._arrived_ns = self._arrived_ns, now_ns
         last_rad, self._angle_rad = self._angle_rad, None if inertia is None else inertia.angle_rad
         elapsed_ms = 0
-        if last is not None and last_ns is not None:
+        if last is not None:
             elapsed_ms = wrapped_difference(core.clock_ms, last.clock_ms, CLOCK_BITS)
-            if abs(elapsed_ms - (now_ns - last_ns) / NS_PER_MS) > _CLOCKS_APART_MS:
-                self._jumped(core)
+            most_ms = (now_ns - last_ns) / NS_PER_MS + _CLOCKS_APART_MS
+            if not 0 <= elapsed_ms <= most_ms:
+                self._jumped(core, now_ns)
                 return
+        self.pose_ns = now_ns - self._age.step(elapsed_ms, now_ns)
         limit_m = _JUMP_RATIO * self._fastest_mps() * abs(elapsed_ms) / 1000.0 + _JUMP_SLACK_M
         steps = self._counter.increments(core.left_ticks, core.right_ticks, limit_m / TICK_M)
         if steps is None:
-            self._jumped(core)
+            self._jumped(core, now_ns)
             return
         if elapsed_ms <= 0:
             return
@@ -168,13 +179,14 @@ class KobukiFeedback:
                 self._disagreement.compare(turn_rad, now_ns)
         self._reckoning.advance(distance_m, turn_rad)
         self.v_mps = distance_m / elapsed_s
-        self.feedback_ns = now_ns
+        self.feedback_ns = self.pose_ns
 
-    def _jumped(self, core: Core) -> None:
+    def _jumped(self, core: Core, now_ns: int) -> None:
         """What happened meanwhile is not known; counting begins anew."""
         self._restarted = True
-        if self.pose_ns is not None:
-            self._disagreement.restart(self.pose_ns)
+        self.pose_ns = now_ns
+        self._age.restart()
+        self._disagreement.restart(now_ns)
         self._counter = TrackCounter(ENCODER_BITS)
         self._counter.increments(core.left_ticks, core.right_ticks, math.inf)
         self.v_mps = self.w_radps = math.nan

@@ -21,7 +21,7 @@ from hal.chassis.command import CommandLimits, is_zero
 from hal.chassis.driver import ChassisDriver
 from hal.chassis.roboclaw_feedback import RoboclawFeedback
 from hal.chassis.roboclaw_packets import Request
-from hal.chassis.roboclaw_port import RoboclawPort
+from hal.chassis.roboclaw_port import Answer, RoboclawPort
 from hal.chassis.tracks import TrackGeometry, scale_to_fit
 from hal.clocks import NS_PER_MS
 from hal.types import ChassisMode, Setpoint
@@ -44,6 +44,10 @@ _QUERIES = (
 )
 
 _SETTINGS = frozenset({packets.SET_TIMEOUT, packets.GET_TIMEOUT})
+
+# So many turns of zeros and queries before a setting that was not answered is said again: encoders and status
+# must not grow old meanwhile.
+_TURNS_BETWEEN = 4
 
 
 class RoboclawChassis(ChassisDriver):
@@ -71,30 +75,42 @@ class RoboclawChassis(ChassisDriver):
         self._max_track_mps = max_track_mps
         self._port = RoboclawPort(link, config.address)
         self._setup: deque[Request] = deque()
+        self._turns_before_setup = 0
         self._queries = cycle(_QUERIES)
         self._queries_turn = False
         self._heeded = True
         self._moving = False
 
-    def _listen(self, now_ns: int) -> None:
+    def _listen(self, now_ns: int) -> bool:
+        before = self._port.bytes_heard
         answer = self._port.poll(now_ns)
         self._feedback.bytes_heard = self._port.bytes_heard
-        if answer is None:
-            return
+        if answer is not None:
+            self._take(answer, now_ns)
+        return self._port.bytes_heard > before
+
+    def _take(self, answer: Answer, now_ns: int) -> None:
         if answer.request.command == packets.RAMPED_SPEEDS:
             self._heeded = answer.data is not None
+        if answer.request.command in _SETTINGS:
+            self._feedback.note_setting(answer.request.command, answer.data is not None)
         if answer.data is not None:
             self._feedback.take(answer.request.command, answer.data, answer.asked_ns, now_ns)
         elif answer.request.command in _SETTINGS and self._arming.mode is ChassisMode.ARMING:
             self._setup.appendleft(answer.request)
+            self._turns_before_setup = _TURNS_BETWEEN
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         if not self._port.idle(now_ns):
             return None
         stops = self._moving and is_zero(command)
-        if self._setup:
+        if self._arming.mode is not ChassisMode.ARMING:
+            # Of an arming that a lost link or a fault ended: nobody consents to it any more.
+            self._setup.clear()
+        if self._setup and self._turns_before_setup == 0:
             self._port.start(self._setup.popleft(), now_ns)
             return None
+        self._turns_before_setup = max(0, self._turns_before_setup - 1)
         self._queries_turn = not self._queries_turn and not stops and self._heeded
         if self._queries_turn:
             self._port.start(next(self._queries), now_ns)
@@ -111,6 +127,7 @@ class RoboclawChassis(ChassisDriver):
 
     def _begin_arming(self) -> None:
         self._feedback.await_setup()
+        self._turns_before_setup = 0
         self._setup = deque((packets.set_timeout(self._config.timeout_ms), packets.GET_TIMEOUT_REQUEST))
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> Setpoint:

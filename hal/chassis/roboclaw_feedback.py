@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from config.chassis import RoboclawChassisConfig
 from hal.chassis import roboclaw_packets as packets
 from hal.chassis.encoder_feedback import EncoderFeedback
 from hal.chassis.roboclaw_packets import Status
 from hal.chassis.tracks import TrackGeometry
+
+_UNANSWERED: Mapping[int, str] = MappingProxyType(
+    {
+        packets.SET_TIMEOUT: "it does not acknowledge its time-out (command 14); is its firmware too old?",
+        packets.GET_TIMEOUT: "it does not tell its time-out (command 15); is its firmware too old?",
+    }
+)
 
 
 class RoboclawFeedback(EncoderFeedback):
@@ -22,19 +32,22 @@ class RoboclawFeedback(EncoderFeedback):
         self._config = config
         self._status: Status | None = None
         self._timeout_ms: int | None = None
+        self._unanswered: int | None = None
 
     @property
     def disobeys(self) -> str:
-        """Why the controller must not be driven: its own time-out is not what was set."""
+        """Why the controller must not be driven: its own time-out is not what was set, or it restarted."""
         if not self._wanted:
             return "nobody asked it to"
         if self._restarted:
             return "its encoders jumped: restarted"
+        if self._timeout_ms == self._config.timeout_ms:
+            return ""
+        if self._unanswered is not None:
+            return _UNANSWERED[self._unanswered]
         if self._timeout_ms is None:
             return "its time-out is not set"
-        if self._timeout_ms != self._config.timeout_ms:
-            return f"its time-out reads {self._timeout_ms} ms, not {self._config.timeout_ms} ms"
-        return ""
+        return f"its time-out reads {self._timeout_ms} ms, not {self._config.timeout_ms} ms"
 
     @property
     def silence(self) -> str:
@@ -66,6 +79,14 @@ class RoboclawFeedback(EncoderFeedback):
     def await_setup(self) -> None:
         super().await_setup()
         self._timeout_ms = None
+        self._unanswered = None
+
+    def note_setting(self, command: int, answered: bool) -> None:
+        """Its time-out was set or asked for, with an answer or without."""
+        if not answered:
+            self._unanswered = command
+        elif self._unanswered == command:
+            self._unanswered = None
 
     def take(self, command: int, data: bytes, asked_ns: int, now_ns: int) -> None:
         """Take in the valid answer to a request that was written at asked_ns."""
@@ -76,6 +97,8 @@ class RoboclawFeedback(EncoderFeedback):
                 self._status, self.status_ns = packets.status(data), now_ns
             case packets.GET_TIMEOUT:
                 self._timeout_ms = packets.timeout_ms(data)
+                if self._timeout_ms == self._config.timeout_ms:
+                    self._unanswered = None
             case packets.MAIN_BATTERY:
                 self.battery_v = packets.main_battery_v(data)
             case packets.CURRENTS:

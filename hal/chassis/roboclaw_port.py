@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hal.api import SerialLink
+from hal.chassis.reading import read_all
 from hal.chassis.roboclaw_packets import Request
 from hal.clocks import NS_PER_MS
 
@@ -60,7 +61,7 @@ class RoboclawPort:
 
         Raises LinkLost.
         """
-        arrived = self._link.read()
+        arrived = read_all(self._link)
         self.bytes_heard += len(arrived)
         request = self._request
         if request is None:
@@ -70,8 +71,9 @@ class RoboclawPort:
         if arrived:
             self._received += arrived
             self._heard_ns = now_ns
-        data = self._complete(request, now_ns)
-        failed = len(self._received) >= request.longest_reply or now_ns - self._sent_ns >= _REPLY_TIMEOUT_NS
+        too_late = now_ns - self._sent_ns >= _REPLY_TIMEOUT_NS
+        data = self._complete(request, now_ns, too_late)
+        failed = len(self._received) >= request.longest_reply or too_late
         if data is None and not failed:
             return None
         self._request = None
@@ -79,10 +81,12 @@ class RoboclawPort:
             self._quiet_until_ns = now_ns + _SILENCE_NS
         return Answer(request, data, self._sent_ns)
 
-    def _complete(self, request: Request, now_ns: int) -> bytes | None:
+    def _complete(self, request: Request, now_ns: int, last_chance: bool) -> bytes | None:
         """The data once the answer is whole. A shorter variant is whole when silence follows it:
-        until then it may be the beginning of the longer one."""
+        until then it may be the beginning of the longer one. Polled for the last time, its checksum decides:
+        what came since the poll before has not had its silence yet."""
         received = bytes(self._received)
-        if len(received) < request.longest_reply and now_ns - self._heard_ns < _SILENCE_NS:
+        silent = now_ns - self._heard_ns >= _SILENCE_NS
+        if len(received) < request.longest_reply and not silent and not last_chance:
             return None
         return request.accept(self._address, received)

@@ -16,6 +16,7 @@ from hal.chassis import roboteq_lines as lines
 from hal.chassis.arming import ArmingLimits
 from hal.chassis.command import CommandLimits, due, is_zero
 from hal.chassis.driver import ChassisDriver
+from hal.chassis.reading import read_all
 from hal.chassis.roboteq_feedback import RoboteqFeedback
 from hal.chassis.roboteq_lines import LineReader, Query, Reply
 from hal.chassis.tracks import TrackGeometry, scale_to_fit
@@ -80,13 +81,14 @@ class RoboteqChassis(ChassisDriver):
         self._motion_sent_ns: int | None = None
         self._moving = False
 
-    def _listen(self, now_ns: int) -> None:
-        arrived = self._link.read()
+    def _listen(self, now_ns: int) -> bool:
+        arrived = read_all(self._link)
         self._feedback.bytes_heard += len(arrived)
         for line in self._reader.feed(arrived):
-            if isinstance(line, Reply):
-                if line is not Reply.ECHO:
-                    self._feedback.note_reply(line is Reply.ACCEPTED)
+            if line is Reply.ECHO:
+                self._feedback.note_echo()
+            elif isinstance(line, Reply):
+                self._feedback.note_reply(line is Reply.ACCEPTED)
             elif self._asked_query is not None and line.name == self._asked_query.name:
                 self._asked_query = None
                 self._feedback.take(line.name, line.values, self._asked_ns, now_ns)
@@ -96,21 +98,24 @@ class RoboteqChassis(ChassisDriver):
             self._asked_query = None
             self._reader.forget()
             self._quiet_until_ns = now_ns + _SILENCE_NS
+        return bool(arrived)
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         stops = self._moving and is_zero(command)
-        if not (stops or self._setup or due(self._motion_sent_ns, self._period_ns, now_ns)):
+        # It ends with !MG: said after a lost link, it would end an emergency stop nobody consented to end.
+        setup = self._setup if self._arming.mode is ChassisMode.ARMING else b""
+        if not (stops or setup or due(self._motion_sent_ns, self._period_ns, now_ns)):
             return None
+        self._setup = b""
         motion, sent = self._motion(command)
-        said = self._first_after_a_gap(now_ns) + self._setup + motion
+        said = self._first_after_a_gap(now_ns) + setup + motion
         if self._defies(now_ns):
             said += lines.EMERGENCY_STOP
         query = None
         if self._asked_query is None and now_ns >= self._quiet_until_ns:
-            query = lines.QUERIES[lines.WATCHDOG] if self._setup else next(self._queries)
+            query = lines.QUERIES[lines.WATCHDOG] if setup else next(self._queries)
             said += query.line
         self._write(said, now_ns)
-        self._setup = b""
         self._moving = not is_zero(command)
         if query is not None:
             self._asked_query, self._asked_ns = query, now_ns

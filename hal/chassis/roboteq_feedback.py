@@ -11,6 +11,9 @@ from hal.chassis.tracks import TrackGeometry
 # Single refusals are noise on the line; so many in a row are a controller that takes no commands.
 _MOST_REFUSALS = 5
 
+# A controller that echoes says two lines back between two answers, a command and a query; one may be noise.
+_ECHOING = 2
+
 
 class RoboteqFeedback(EncoderFeedback):
     """The newest of everything the controller says. Speed is counter steps over the time between answers."""
@@ -20,17 +23,24 @@ class RoboteqFeedback(EncoderFeedback):
         super().__init__(geometry, config.counts_per_m, signs, config.full_speed_mps)
         self._config = config
         self._flags = 0
+        self._flags_ns: int | None = None
+        self._motors_ns: int | None = None
         self._motors = MotorFlags((), ())
         self._watchdog_ms: int | None = None
         self._refusals = 0
+        self._echoes = 0
+        self._quiet = False
+        self._echoes_again = False
 
     @property
     def disobeys(self) -> str:
-        """Why the controller must not be driven: its own watchdog is not what was set."""
+        """Why the controller must not be driven: its own watchdog is not what was set, or it restarted."""
         if not self._wanted:
             return "nobody asked it to"
         if self._restarted:
             return "its counters jumped: restarted"
+        if self._echoes_again:
+            return "it echoes again: restarted"
         if self._watchdog_ms is None:
             return "its watchdog is not set"
         if self._watchdog_ms != self._config.watchdog_ms:
@@ -44,6 +54,8 @@ class RoboteqFeedback(EncoderFeedback):
         """What came instead of a status, and what to check."""
         if self.bytes_heard == 0:
             return "not one byte came; check port, power, baud and the crossed lines"
+        if self._flags_ns is not None:
+            return "it answers ?FF, but not ?FM (motor flags) for two motors; is it a two-channel controller?"
         return (
             f"{self.bytes_heard} bytes came, none an answer to ?FF; check baud and that it is a Roboteq "
             "whose serial input takes ASCII commands"
@@ -75,6 +87,13 @@ class RoboteqFeedback(EncoderFeedback):
         super().await_setup()
         self._watchdog_ms = None
         self._refusals = 0
+        self._quiet = False
+        self._echoes_again = False
+
+    def note_echo(self) -> None:
+        """A written line came back: what ^ECHOF 1 has switched off is on again after a restart."""
+        self._echoes += 1
+        self._echoes_again = self._echoes_again or (self._quiet and self._echoes >= _ECHOING)
 
     def note_reply(self, accepted: bool) -> None:
         """A command was accepted or refused."""
@@ -82,16 +101,22 @@ class RoboteqFeedback(EncoderFeedback):
 
     def take(self, name: str, values: tuple[int, ...], asked_ns: int, now_ns: int) -> None:
         """Take in the answer to a query that was written at asked_ns."""
+        # The first answer about the watchdog comes behind ^ECHOF 1; only what is quiet after that is quiet.
+        self._quiet = self._quiet or (self._watchdog_ms is not None and self._echoes == 0)
+        self._echoes = 0
         match name:
             case lines.ENCODERS | lines.HALL_COUNTERS:
                 self._count(values[0], values[1], asked_ns, now_ns)
             case lines.FAULT_FLAGS:
-                self._flags, self.status_ns = values[0], now_ns
+                self._flags, self._flags_ns = values[0], now_ns
             case lines.MOTOR_FLAGS:
-                self._motors = lines.describe_motors(values)
+                self._motors, self._motors_ns = lines.describe_motors(values), now_ns
             case lines.WATCHDOG:
                 self._watchdog_ms = values[0]
             case lines.VOLTAGES:
                 self.battery_v = values[1] / 10.0
             case lines.CURRENTS:
                 self.currents_a = (values[0] / 10.0, values[1] / 10.0)
+        # Either may tell of a stop, so the status is as old as the older of the two.
+        if self._flags_ns is not None and self._motors_ns is not None:
+            self.status_ns = min(self._flags_ns, self._motors_ns)

@@ -7,6 +7,7 @@ virtual contact points the ICRs; this is the symmetric case).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from hal.geometry import advance_pose
@@ -67,16 +68,28 @@ class DeadReckoning:
 class TrackCounter:
     """Increments of two wrapping counters; a jump that no track can make is a restart of the base.
 
-    limit: the largest believable increment in one step, counts.
+    So is a return to 0 that the motion before does not explain: a base that restarts soon after it set off
+    has not far to jump.
     """
 
     def __init__(self, bits: int = 32) -> None:
         self._bits = bits
         self._last: tuple[int, int] | None = None
 
-    def increments(self, left: int, right: int, limit: float) -> tuple[int, int] | None:
+    def increments(
+        self,
+        left: int,
+        right: int,
+        limit: float,
+        expected: tuple[float, float] = (0.0, 0.0),
+        slack: float = math.inf,
+    ) -> tuple[int, int] | None:
         """Counts since the last call; (0, 0) at the first; None after an unbelievable jump, from
-        which counting starts anew."""
+        which counting starts anew.
+
+        limit: the largest believable increment. expected: counts (left, right) at the speed measured before,
+        NaN where unknown. slack: counts that a track may go otherwise; inf: whoever knows restarts otherwise.
+        """
         last, self._last = self._last, (left, right)
         if last is None:
             return 0, 0
@@ -84,4 +97,23 @@ class TrackCounter:
         right_step = wrapped_difference(right, last[1], self._bits)
         if max(abs(left_step), abs(right_step)) > limit:
             return None
+        if self._begins_anew(last, (left, right), expected, slack):
+            return None
         return left_step, right_step
+
+    def _begins_anew(
+        self, last: tuple[int, int], new: tuple[int, int], expected: tuple[float, float], slack: float
+    ) -> bool:
+        """Both are near 0, at least one came back there by more than its motion explains, and neither was
+        elsewhere without that."""
+        back = False
+        for before, after, ahead in zip(last, new, expected, strict=True):
+            was, now = (wrapped_difference(count, 0, self._bits) for count in (before, after))
+            known = ahead if math.isfinite(ahead) else 0.0
+            near = slack + abs(known)  # since it restarted it has gone no farther than that
+            homewards = max(0.0, -known if was > 0 else known)
+            returned = abs(was) - abs(now) > slack + 2.0 * homewards
+            if abs(now) > near or (not returned and abs(was) > near):
+                return False
+            back = back or returned
+        return back

@@ -11,14 +11,18 @@ from collections import deque
 from typing import Any
 
 import can
+from can.interfaces.slcan import slcanBus
 
 from config.chassis import CanLinkConfig
 from hal.errors import DeviceNotFound, DeviceRefused
 from hal.links.reopening import ReopeningLink, reason
 from hal.types import CanFrame
 
-# Positive, because with 0 pyserial (below slcan) spins for ever on a full port.
+# How long a send waits for room. Positive, because with 0 pyserial (below slcan) spins for ever on a full
+# port. There it asks for room for more even after it has written all, so with 2 ms a process that is held up
+# by others takes its port for lost. Hence as long as hal.links.serial_port: a tenth of a CAN base's time.
 _SEND_TIMEOUT_S = 0.002
+_SERIAL_SEND_TIMEOUT_S = 0.05
 
 # So many messages in a row that are none of ours end one receive(): a flood must not hold the control loop.
 _MAX_FOREIGN = 256
@@ -37,20 +41,23 @@ class CanBusLink(ReopeningLink[can.BusABC]):
     """hal.api.CanLink over python-can."""
 
     def __init__(self, config: CanLinkConfig) -> None:
-        super().__init__(f"CAN {config.interface} {config.channel!r}", (can.CanError, OSError))
+        # slcan sleeps for 0.1 s in between, and writes to the adapter without a time-out.
+        slow = config.interface == "slcan"
+        super().__init__(f"CAN {config.interface} {config.channel!r}", (can.CanError, OSError), slow)
         self._config = config
         # python-can's udp_multicast hears what it sends itself, and cannot be told not to.
         self._echoes: deque[CanFrame] | None = (
             deque(maxlen=_MAX_FOREIGN) if config.interface == "udp_multicast" else None
         )
+        self._send_timeout_s = _SERIAL_SEND_TIMEOUT_S if config.interface == "slcan" else _SEND_TIMEOUT_S
 
     def send(self, frame: CanFrame) -> None:
-        """Queue one frame; waits for room at most 2 ms. Raises LinkLost."""
+        """Queue one frame; waits for room at most 2 ms, 50 ms over slcan. Raises LinkLost."""
         message = can.Message(
             arbitration_id=frame.arbitration_id, data=frame.data, is_extended_id=False, check=True
         )
         try:
-            self._opened().send(message, timeout=_SEND_TIMEOUT_S)
+            self._opened().send(message, timeout=self._send_timeout_s)
         except (can.CanError, OSError) as error:
             raise self._lost("sending", error) from error
         if self._echoes is not None:
@@ -62,8 +69,11 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         for _ in range(_MAX_FOREIGN):
             try:
                 message = bus.recv(timeout=0)
+                if message is None and _has_more(bus):
+                    continue
             except (can.CanError, OSError) as error:
                 if _is_foreign_datagram(error):
+                    self._drop_partial(bus)
                     continue
                 raise self._lost("receiving", error) from error
             except (ValueError, IndexError):  # slcan: noise on the line that is no frame
@@ -82,6 +92,16 @@ class CanBusLink(ReopeningLink[can.BusABC]):
                 continue
             return frame
         return None
+
+    def _drop_partial(self, bus: can.BusABC) -> None:
+        """python-can 4.6.1's slcan decodes a line before it clears it: noise that is no ASCII would stay and
+        spoil every line to come. Raises LinkLost."""
+        if not isinstance(bus, slcanBus):
+            return
+        try:
+            bus.flush()
+        except (can.CanError, OSError) as error:
+            raise self._lost("receiving", error) from error
 
     def _open(self) -> can.BusABC:
         return _open(self._config, self._where)
@@ -113,13 +133,17 @@ def _open(config: CanLinkConfig, where: str) -> can.BusABC:
         options = {"bitrate": config.bitrate}
     try:
         # ignore_config: else files and environment variables of the machine would add options unseen.
-        return can.Bus(
+        bus = can.Bus(
             channel=config.channel,
             interface=config.interface,
             ignore_config=True,
             receive_own_messages=False,
             **options,
         )
+        if isinstance(bus, slcanBus):
+            # It would wait behind every frame until the adapter has taken it: for ever, from one that hangs.
+            bus.serialPortOrig.flush = _wait_for_nothing  # type: ignore[method-assign]
+        return bus
     except _OPEN_ERRORS as error:
         number = _errno(error)
         if number in (errno.EACCES, errno.EPERM):
@@ -151,6 +175,15 @@ def _advice(config: CanLinkConfig, number: int | None) -> str:
     return "check interface and channel in the configuration, and that the adapter is plugged in"
 
 
+def _wait_for_nothing() -> None:
+    """In place of pyserial's flush(), which has no time-out."""
+
+
+def _has_more(bus: can.BusABC) -> bool:
+    """slcan: what acknowledges a sent frame reads as silence, and behind it others may wait."""
+    return isinstance(bus, slcanBus) and bus.serialPortOrig.in_waiting > 0
+
+
 def _errno(error: BaseException | None) -> int | None:
     while error is not None:
         if isinstance(error, OSError) and error.errno is not None:
@@ -160,6 +193,7 @@ def _errno(error: BaseException | None) -> int | None:
 
 
 def _is_foreign_datagram(error: Exception) -> bool:
-    """udp_multicast: anybody may send to the group; what does not unpack is not a fault of the bus."""
+    """What arrived does not unpack: anybody may send to a group of udp_multicast, and slcan's line has noise.
+    It is no fault of the bus."""
     cause = error.__cause__
     return cause is not None and not isinstance(cause, OSError)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Generic, Self, TypeVar
@@ -17,12 +18,18 @@ _log = logging.getLogger(__name__)
 class ReopeningLink(ABC, Generic[DeviceT]):
     """After LinkLost the next use opens the device anew, so that a re-plugged adapter is found again; whoever
     uses the link decides how often. where: how messages name it. gone: what closing a lost device may raise.
+
+    slow: opening and closing it may take long, over a network above all. Then both are done by a thread after
+    it was lost, and meanwhile every use raises LinkLost; ``with`` waits.
     """
 
-    def __init__(self, where: str, gone: tuple[type[Exception], ...]) -> None:
+    def __init__(self, where: str, gone: tuple[type[Exception], ...], slow: bool = False) -> None:
         self._where = where
         self._gone = gone
+        self._slow = slow
         self._device: DeviceT | None = None
+        self._opening: _Opening[DeviceT] | None = None
+        self._why = f"{where}: is being opened"
         self._closed = False
 
     def __enter__(self) -> Self:
@@ -36,7 +43,12 @@ class ReopeningLink(ABC, Generic[DeviceT]):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closed = True
-        self._shut()
+        opening, self._opening = self._opening, None
+        if opening is not None:
+            opening.abandon()
+        device, self._device = self._device, None
+        if device is not None:
+            self._shut(device)
 
     @abstractmethod
     def _open(self) -> DeviceT:
@@ -55,24 +67,76 @@ class ReopeningLink(ABC, Generic[DeviceT]):
             raise LinkLost(f"{self._where}: the link is closed")
         if self._device is None:
             try:
-                self._device = self._open()
+                self._device = self._opened_by_thread() if self._slow else self._open()
             except HalError as error:
-                raise LinkLost(str(error)) from error
+                self._why = str(error)
+                raise LinkLost(self._why) from error
         return self._device
 
-    def _lost(self, doing: str, error: Exception) -> LinkLost:
-        self._shut()
-        return LinkLost(f"{self._where}: lost while {doing} ({reason(error)}); {self._remedy(error)}")
+    def _opened_by_thread(self) -> DeviceT:
+        """Raises LinkLost while it is being opened, with what went wrong last."""
+        if self._opening is None:
+            self._opening = _Opening(self)
+        if not self._opening.done:
+            raise LinkLost(self._why)
+        opening, self._opening = self._opening, None
+        return opening.device()
 
-    def _shut(self) -> None:
+    def _lost(self, doing: str, error: Exception) -> LinkLost:
         device, self._device = self._device, None
-        if device is None:
-            return
+        if device is not None and self._slow:
+            threading.Thread(target=self._shut, args=(device,), daemon=True).start()
+        elif device is not None:
+            self._shut(device)
+        self._why = f"{self._where}: lost while {doing} ({reason(error)}); {self._remedy(error)}"
+        return LinkLost(self._why)
+
+    def _shut(self, device: DeviceT) -> None:
         try:
             self._close(device)
         except self._gone as error:
             # It is gone anyway; python-can raises here after an unplug.
             _log.debug("closing %s: %s", self._where, error)
+
+
+class _Opening(Generic[DeviceT]):
+    """One attempt to open a link's device, in a thread that nobody waits for."""
+
+    def __init__(self, link: ReopeningLink[DeviceT]) -> None:
+        self._link = link
+        self._lock = threading.Lock()
+        self._wanted = True
+        self._device: DeviceT | None = None
+        self._error: HalError | None = None
+        self.done = False
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def device(self) -> DeviceT:
+        """What was opened, once done. Raises what opening raised."""
+        if self._device is None:
+            raise self._error or LinkLost(f"{self._link._where}: could not be opened")
+        return self._device
+
+    def abandon(self) -> None:
+        """Nobody wants it any more: closed now, or as soon as it is open."""
+        with self._lock:
+            self._wanted = False
+            device = self._device
+        if device is not None:
+            self._link._shut(device)
+
+    def _run(self) -> None:
+        device = None
+        try:
+            device = self._link._open()
+        except HalError as error:
+            self._error = error
+        finally:
+            with self._lock:
+                self._device = device if self._wanted else None
+                self.done = True
+        if device is not None and self._device is None:
+            self._link._shut(device)
 
 
 def reason(error: BaseException) -> str:

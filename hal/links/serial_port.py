@@ -30,7 +30,7 @@ class SerialPortLink(ReopeningLink[serial.SerialBase]):
     """hal.api.SerialLink over pyserial: exclusive, raw, 8N1."""
 
     def __init__(self, config: SerialLinkConfig) -> None:
-        super().__init__(f"serial port {config.url}", _ERRORS)
+        super().__init__(f"serial port {config.url}", _ERRORS, slow=config.over_network)
         self._config = config
 
     def write(self, data: bytes) -> None:

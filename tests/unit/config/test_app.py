@@ -84,6 +84,37 @@ def test_a_speed_that_the_base_does_not_make_is_refused(
 
 
 @pytest.mark.parametrize(
+    ("watchdog_ms", "command_period_ms", "rate_hz", "apart_ms"),
+    [
+        (100, 20, 50.0, None),
+        (130, 60, 50.0, None),
+        (100, 10, 30.0, None),
+        (300, 50, 50.0, None),
+        (100, 50, 50.0, 60),  # every third exchange
+        (100, 20, 20.0, 50),
+        (200, 20, 10.0, 100),
+        (200, 100, 500.0, 100),
+    ],
+)
+def test_a_roboteq_is_not_told_to_stop_with_every_command(
+    tmp_path: Path, watchdog_ms: int, command_period_ms: int, rate_hz: float, apart_ms: int | None
+) -> None:
+    content = yaml.safe_load((CONFIG_DIR / "hil-roboteq.yaml").read_text())
+    content["chassis"] |= {"watchdog_ms": watchdog_ms, "command_period_ms": command_period_ms}
+    content["runner"]["control_rate_hz"] = rate_hz
+    if apart_ms is None:
+        load_app(written(tmp_path, content))
+        return
+    with pytest.raises(ConfigError) as refused:
+        load_app(written(tmp_path, content))
+    words = (
+        f"watchdog_ms ({watchdog_ms}) must be more than twice the {apart_ms} ms from one command to the next"
+    )
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
     ("section", "told"),
     [
         ({"chassis": {"kind": "bunker"}}, "chassis: its 'kind' is 'bunker', which is none of 'agilex', 'ro"),

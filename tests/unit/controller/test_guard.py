@@ -204,6 +204,36 @@ def test_the_driver_s_own_latch_is_told_too() -> None:
         assert state.reason.endswith("unplugged")
 
 
+def test_a_consent_that_the_driver_refuses_ends_no_latch() -> None:
+    """Latched while it drove, and consent comes before it stands: the driver is still stopping."""
+    with agilex_rig("scripted") as rig:
+        rig.chassis = GuardedChassis(rig.chassis, LIMITS)
+        rig.run(0.2)
+        rig.arm()
+        accelerate(rig, 100)
+        assert rig.step(0.7).reason.startswith("output guard: accelerates too hard: ")
+        why = rig.step().reason
+        rig.chassis.arm(rig.now_ns)
+        state = rig.step()
+        assert (state.mode, state.reason) == (ChassisMode.ESTOP, f"{why}; arming refused: still stopping")
+        assert rig.run(2.0).mode is ChassisMode.ESTOP
+        rig.emulator.press_estop()
+        rig.run(0.2)
+        rig.chassis.arm(rig.now_ns)
+        state = rig.step()
+        assert state.mode is ChassisMode.ESTOP
+        assert state.reason.startswith(why)
+        assert state.reason.endswith("arming refused: emergency stop is pressed")
+        rig.emulator.release_estop()
+        rig.run(0.2)
+        rig.chassis.arm(rig.now_ns)
+        state = rig.step(0.5)
+        assert state.mode is ChassisMode.ARMING
+        assert state.reason.startswith("arming: ")
+        rig.run(0.2)
+        assert rig.step().mode is ChassisMode.ARMED
+
+
 def test_only_what_is_on_the_list_is_sent() -> None:
     wire = ScriptedCanLink()
     with GuardedCanLink(wire, COMMANDS) as link:

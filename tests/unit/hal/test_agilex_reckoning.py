@@ -24,6 +24,16 @@ def test_slip_is_asked_for_and_taken_off() -> None:
     assert bench.exchange(0.5, 0.4).w_radps == pytest.approx(0.4)
 
 
+def test_the_limit_of_the_model_is_of_what_it_is_told() -> None:
+    """2.5235 rad/s on the wire, of which slip leaves two thirds, and sent says so."""
+    bench = Bench(slip_factor=1.5)
+    bench.arm()
+    sent = bench.exchange(1.0, 2.0).sent
+    assert bench.sent() == [MotionCommand(0.841, 2.524)]
+    assert sent is not None
+    assert (sent.v_mps, sent.w_radps) == pytest.approx((2.5235 / 3.0, 2.5235 / 1.5))
+
+
 def test_speeds_are_integrated_over_the_time_they_stand_for() -> None:
     bench = Bench()
     bench.say(MotionFeedback(1.0, 0.0))

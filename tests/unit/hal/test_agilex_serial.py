@@ -99,6 +99,16 @@ def test_another_layout_with_a_right_checksum_is_a_stranger() -> None:
     assert reader.strangers == 1
 
 
+def test_short_reads_leave_no_frame_behind() -> None:
+    link = ScriptedSerialLink()
+    link.read_at_most(3)
+    bus = AgilexSerialBus(link)
+    frames = [encode(MotionFeedback(0.1 * k, 0.0)) for k in range(3)]
+    for frame in frames:
+        link.deliver(wrap(frame, 0) or b"")
+    assert [bus.receive() for _ in range(4)] == [*frames, None]
+
+
 class Bench:
     """The driver on a serial line, and a hand that says what the base says."""
 

@@ -161,6 +161,15 @@ def test_lost_stays_lost_while_the_link_or_the_feedback_is_missing() -> None:
     assert consent(state, at(320), LIMITS).mode is ChassisMode.ARMING
 
 
+@pytest.mark.parametrize("heard", [{"status_ns": None}, {"feedback_ns": None}])
+def test_a_link_that_works_again_is_no_base_that_answers(heard: dict[str, object]) -> None:
+    """Bus-off because nobody is there to acknowledge: to arm again would not help yet."""
+    state = step(Arming(), at(20, link_error="bus-off", **heard), LIMITS)
+    assert (state.mode, state.reason) == (ChassisMode.LOST, "bus-off")
+    assert step(state, at(540, **heard), LIMITS).reason == "bus-off"
+    assert step(state, at(560), LIMITS).reason == "bus-off; gone now, arm again to go on"
+
+
 def test_stop_ends_in_standby_once_the_base_stands_and_has_let_go() -> None:
     state = release(armed(), 60 * MS)
     assert state.mode is ChassisMode.STOPPING

@@ -61,3 +61,57 @@ def test_turning_on_the_spot_is_not_standing() -> None:
     told.answer(2, 2)
     assert told.v_mps == 0.0
     assert not told.standing
+
+
+def counted(*counts: int) -> Answers:
+    """Both tracks ahead alike, every 0.1 s."""
+    told = Answers()
+    for count in counts:
+        told.answer(count, -count)
+    return told
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [
+        (0, 10, 40, 70, 0),
+        (0, 10, 40, 70, 12),  # it set off again at once
+        (0, 10, 40, 70, 70, 70, 3),  # it stood
+        (0, 0, 11, 0),
+    ],
+)
+def test_back_at_zero_against_its_way_is_a_restart(counts: tuple[int, ...]) -> None:
+    told = counted(*counts)
+    assert math.isnan(told.v_mps)
+    assert told.pose.x_m == pytest.approx(counts[-2] / 1000.0), "no travel backwards"
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [
+        (0, 10, 40, 70, 72, 70, 66),  # it stops, and rolls back a little
+        (0, 10, 8, 0),  # less than a track may roll back
+        (200, 170, 130, 90, 50, 10, -30, -70),  # it comes backwards through 0
+        (60, 50, 30, 5, -25),
+        (0, 10, 90, 95, 40),  # far back, but not to 0
+    ],
+)
+def test_other_ways_through_zero_are_travel(counts: tuple[int, ...]) -> None:
+    told = counted(*counts)
+    assert math.isfinite(told.v_mps)
+    assert told.pose.x_m == pytest.approx((counts[-1] - counts[0]) / 1000.0)
+
+
+def test_turning_back_on_the_spot_through_zero_is_travel() -> None:
+    told = Answers()
+    for count in (0, 20, 50, 60, 55, 35, 10, -15):
+        told.answer(-count, -count)
+    assert math.isfinite(told.w_radps)
+    assert told.pose.heading_rad == pytest.approx(2 * -0.015 / 0.5)
+
+
+def test_one_track_alone_at_zero_is_no_restart() -> None:
+    told = Answers()
+    for left, right in ((0, 0), (10, 0), (40, 20), (25, 50)):
+        told.answer(left, -right)
+    assert math.isfinite(told.v_mps)

@@ -3,26 +3,16 @@
 from __future__ import annotations
 
 import math
+import struct
 
 import pytest
 
 from hal.chassis.kobuki import KobukiChassis
 from hal.chassis.kobuki_packets import TICK_M, base_control
 from hal.types import ChassisMode
-from sim.kobuki_emulator import KobukiEmulator
 from tests.support.chassis_rig import KOBUKI_PLANT, MS, kobuki_config
-from tests.support.serial_bench import SerialBench, every, reason_for_giving_up
-
-STOP = bytes.fromhex("AA 55 06 01 04 00 00 00 00 03")
-
-
-class Bench(SerialBench[KobukiEmulator]):
-    def __init__(self, **changes: object) -> None:
-        super().__init__(
-            KOBUKI_PLANT,
-            lambda link, plant: KobukiEmulator(link, plant, boot_ms=0),
-            lambda link: KobukiChassis(link, kobuki_config(**changes)),
-        )
+from tests.support.kobuki_bench import STOP, Bench
+from tests.support.serial_bench import every, reason_for_giving_up
 
 
 def test_standby_says_zero_every_period() -> None:
@@ -201,6 +191,19 @@ def test_the_fastest_is_the_wire_s_too() -> None:
     bench.arm()
     bench.step(9.0)
     assert bench.near.written == [base_control(0.7, 0.0)]
+
+
+def test_no_wheel_is_told_to_be_faster_than_it_can() -> None:
+    """0.7 m/s and 1 rad/s are 0.84375 m/s of the outer wheel, by 0.115 m and slip."""
+    bench = Bench(slip_factor=1.25)
+    bench.arm()
+    sent = bench.step(0.7, 1.0).sent
+    ratio = 0.7 / (0.7 + 0.115 * 1.25)
+    assert sent is not None
+    assert (sent.v_mps, sent.w_radps) == pytest.approx((0.7 * ratio, ratio))
+    assert bench.near.written == [base_control(0.7 * ratio, 1.25 * ratio)]
+    speed, radius = struct.unpack_from("<hh", bench.near.written[0], 5)
+    assert (speed, radius) == (700, 560)
 
 
 @pytest.mark.parametrize("gain", [0.0, -1.0, 3.0])

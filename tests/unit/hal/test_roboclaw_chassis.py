@@ -64,6 +64,47 @@ def test_a_lost_setting_is_repeated() -> None:
     assert bench.emulator.timeout_ms == 300
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (packets.SET_TIMEOUT, "it does not acknowledge its time-out (command 14)"),
+        (packets.GET_TIMEOUT, "it does not tell its time-out (command 15)"),
+    ],
+)
+def test_a_setting_that_is_never_answered_is_named_and_starves_nothing(command: int, words: str) -> None:
+    bench = Bench()
+    bench.run(10)
+    bench.far.hear_through(lambda data: b"" if data[1] == command else data)
+    bench.chassis.arm(bench.now_ns)
+    said: list[int] = []
+    for _ in range(150):
+        state = bench.step()
+        assert state.mode is ChassisMode.ARMING
+        said += [packet[1] for packet in bench.near.written]
+    assert state.reason.startswith(f"arming: the base does not take commands: {words}")
+    assert said.count(command) >= 10
+    assert said.count(packets.RAMPED_SPEEDS) >= 20, "zeros"
+    assert said.count(packets.ENCODERS) >= 10
+    assert said.count(packets.STATUS) >= 5
+    assert bench.run(5).reason.startswith(
+        f"arming gave up after 3.0 s: the base does not take commands: {words}"
+    )
+
+
+def test_a_consent_that_a_lost_link_ended_sets_nothing_later() -> None:
+    bench = Bench()
+    bench.run(10)
+    bench.chassis.arm(bench.now_ns)
+    bench.near.unplug()
+    assert bench.step().mode is ChassisMode.LOST
+    bench.near.plug()
+    bench.near.sent.clear()
+    bench.run(100)
+    assert b"\x80\x28" in bench.near.sent, "it speaks again"
+    assert b"\x80\x0e" not in bench.near.sent
+    assert bench.emulator.timeout_ms == 0
+
+
 def test_a_motion_command_whose_answer_is_lost_is_not_repeated() -> None:
     bench = Bench()
     bench.arm()

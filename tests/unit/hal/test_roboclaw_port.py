@@ -41,10 +41,11 @@ class TestPort:
 
     def test_short_reads_are_put_together(self) -> None:
         link, port = asked(packets.ENCODERS_REQUEST)
-        link.read_at_most(1)
         data = struct.pack(">II", 1, 2)
-        link.deliver(data + crc(78, data))
-        answers = [port.poll(k * MS) for k in range(10)]
+        answers = []
+        for k, byte in enumerate(data + crc(78, data)):
+            link.deliver(bytes((byte,)))
+            answers.append(port.poll(k * MS))
         assert answers[:-1] == [None] * 9
         assert answers[-1] == Answer(packets.ENCODERS_REQUEST, data, 0)
 
@@ -93,6 +94,19 @@ class TestPort:
         link.deliver(b"\x00\x04" + crc(90, b"\x00\x04"))
         assert port.poll(4 * MS) is None, "it may be the beginning of the long one"
         assert port.poll(14 * MS) == Answer(packets.STATUS_REQUEST, b"\x00\x04", 0)
+
+    def test_the_short_status_of_a_slow_line_is_taken_at_the_last_poll(self) -> None:
+        """50 Hz: it came between 20 and 40 ms, and there is no third poll to hear the silence behind it."""
+        link, port = asked(packets.STATUS_REQUEST)
+        assert port.poll(20 * MS) is None
+        link.deliver(b"\x00\x04" + crc(90, b"\x00\x04"))
+        assert port.poll(40 * MS) == Answer(packets.STATUS_REQUEST, b"\x00\x04", 0)
+        assert port.idle(40 * MS)
+
+    def test_the_beginning_of_the_long_status_is_no_short_one(self) -> None:
+        link, port = asked(packets.STATUS_REQUEST)
+        link.deliver(bytes.fromhex("00 00 00 01 97 9D")[:4])
+        assert port.poll(40 * MS) == Answer(packets.STATUS_REQUEST, None, 0)
 
     def test_the_long_status_is_whole_at_once(self) -> None:
         link, port = asked(packets.STATUS_REQUEST)

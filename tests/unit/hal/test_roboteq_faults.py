@@ -54,6 +54,29 @@ def test_consent_while_the_button_is_pressed_leads_nowhere() -> None:
     assert bench.run(100).mode is ChassisMode.ESTOP, "!MG was said once, with the consent, and never again"
 
 
+@pytest.mark.parametrize("ends", ["reading", "writing"])
+def test_a_consent_that_a_lost_link_ended_resets_nothing_later(ends: str) -> None:
+    """Pressed and released meanwhile: the controller's latch is not the one that was consented to end."""
+    bench = Bench()
+    bench.run(10)
+    bench.chassis.arm(bench.now_ns)
+    if ends == "reading":
+        bench.near.unplug()
+    else:
+        bench.near.fail_writes(1)
+    assert bench.step().mode is ChassisMode.LOST
+    bench.emulator.press_estop()
+    bench.emulator.release_estop()
+    bench.near.plug()
+    lines: list[bytes] = []
+    for _ in range(100):
+        bench.step()
+        lines += bench.written()
+    assert b"!M 0 0" in lines, "it speaks again"
+    assert b"!MG" not in lines
+    assert bench.emulator.fault_flags == 0x10
+
+
 def test_a_fault_beside_the_emergency_stop_is_not_reset() -> None:
     bench = Bench()
     bench.arm()
@@ -64,6 +87,29 @@ def test_a_fault_beside_the_emergency_stop_is_not_reset() -> None:
     assert state.mode is ChassisMode.ESTOP
     assert "arming refused: error: short circuit" in state.reason
     assert state.faults == ("error: short circuit",)
+
+
+@pytest.mark.parametrize("refused", [True, False])
+def test_a_base_whose_motor_flags_are_not_told_is_not_armed(refused: bool) -> None:
+    """A stalled motor, or one that stopped for safety, would not show."""
+    bench = Bench()
+    bench.far.hear_through(lambda data: data.replace(b"?FM\r", b"?FMX\r" if refused else b""))
+    bench.chassis.arm(0)
+    for _ in range(155):
+        assert bench.step().mode is not ChassisMode.ARMED
+    assert bench.step().reason == (
+        "arming gave up after 3.0 s: no status heard from the base: it answers ?FF, but not ?FM (motor "
+        "flags) for two motors; is it a two-channel controller?"
+    )
+
+
+def test_motor_flags_that_are_no_longer_told_are_a_loss() -> None:
+    bench = Bench()
+    bench.arm()
+    bench.far.hear_through(lambda data: data.replace(b"?FM\r", b"?FMX\r"))
+    states = [bench.step(0.3) for _ in range(70)]
+    lost = next(state for state in states if state.mode is not ChassisMode.ARMED)
+    assert (lost.mode, lost.reason[:13]) == (ChassisMode.LOST, "no status for")
 
 
 @pytest.mark.parametrize(
@@ -111,17 +157,41 @@ def test_a_controller_that_refuses_commands_is_told() -> None:
     )
 
 
-def test_a_restart_shows_in_the_counters_or_in_the_watchdog() -> None:
-    driving, standing = Bench(), Bench()
-    driving.arm()
-    driving.run(100, 0.5)
-    driving.emulator.restart()
-    assert driving.run(20, 0.5).reason.startswith("the base no longer obeys: its counters jumped: restarted")
-    standing.arm()
-    standing.emulator.restart()
-    state = standing.run(40)
+@pytest.mark.parametrize(
+    ("v_mps", "echo", "watchdog_ms", "words"),
+    [
+        (0.5, False, 300, "its counters jumped: restarted"),
+        (None, False, 1000, "its watchdog reads 1000 ms, not 300 ms"),
+        (None, True, 300, "it echoes again: restarted"),
+    ],
+)
+def test_a_restart_shows_in_one_way_or_another(
+    v_mps: float | None, echo: bool, watchdog_ms: int, words: str
+) -> None:
+    """Echo and watchdog may have been saved to come back as they were set, and standing no counter jumps."""
+    bench = Bench()
+    bench.arm()
+    bench.run(100, v_mps)
+    bench.emulator.restart()
+    bench.emulator.echo, bench.emulator.watchdog_ms = echo, watchdog_ms
+    state = bench.run(40, v_mps)
     assert state.mode is ChassisMode.ESTOP
-    assert state.reason.startswith("the base no longer obeys: its watchdog reads 1000 ms, not 300 ms")
+    assert state.reason.startswith(f"the base no longer obeys: {words}")
+    bench.arm()
+
+
+@pytest.mark.parametrize("periods", [10, 20])
+def test_a_restart_soon_after_setting_off_is_no_travel_backwards(periods: int) -> None:
+    """From some centimetres to 0 a track could jump; against its way it cannot."""
+    bench = Bench()
+    bench.arm()
+    gone_m = bench.run(periods, 0.5).pose.x_m
+    bench.emulator.restart()
+    bench.emulator.echo, bench.emulator.watchdog_ms = False, 300
+    state = bench.run(6, 0.5)
+    assert gone_m > 0.02
+    assert state.reason.startswith("the base no longer obeys: its counters jumped: restarted")
+    assert state.pose.x_m >= gone_m
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@ from __future__ import annotations
 import grp
 import os
 import termios
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -174,6 +176,25 @@ def test_a_port_that_comes_back_is_opened_again(tmp_path: Path) -> None:
             name.symlink_to(second.path)
             assert link.read() == b""
             link.write(b"back")
+
+
+@pytest.mark.parametrize(("url", "elsewhere"), [("socket://10.0.0.7:4001", True), ("/dev/ttyUSB0", False)])
+def test_over_a_network_it_is_opened_again_beside_the_control_loop(
+    monkeypatch: pytest.MonkeyPatch, url: str, elsewhere: bool
+) -> None:
+    """A host that does not answer is waited for, for seconds."""
+    threads: list[threading.Thread] = []
+
+    def note(*arguments: object, **options: object) -> None:
+        threads.append(threading.current_thread())
+        raise serial.SerialException("timed out")
+
+    monkeypatch.setattr(serial, "serial_for_url", note)
+    with pytest.raises(LinkLost):
+        SerialPortLink(config(url)).read()
+    while not threads:
+        time.sleep(0.001)
+    assert (threads[0] is not threading.current_thread()) is elsewhere
 
 
 def test_a_closed_link_says_so_and_closing_twice_is_fine() -> None:
