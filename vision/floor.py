@@ -25,7 +25,7 @@ _LEAST_SHARE = 0.06  # of the cells looked at: less floor than this is no floor
 _BELOW_COSTS = 3.0  # cells seen under a plane speak against it more than cells on it speak for it
 _TOLERANCE = 0.012  # 1/m, four standard deviations of a cell
 _LEAST_UPRIGHT = 0.7  # cosine: a camera held more askew than 45 degrees is not expected
-_HEIGHT_M = (0.15, 2.5)
+_HELD_M = (0.15, 2.5)
 _REFINEMENTS = 3
 _KEEP_FRAMES = 5
 _SEARCH_EVERY = 5  # frames, while a floor is followed
@@ -44,9 +44,10 @@ class Floor:
 class FloorFinder:
     """Follows the floor from frame to frame. Every few frames, and at once when it is lost, all of the view
     is searched for planes; that of the frame before is compared with them. Until one is found that is done in
-    every frame."""
+    every frame. heights_m: the least and the greatest height of the camera that is possible."""
 
-    def __init__(self) -> None:
+    def __init__(self, heights_m: tuple[float, float] = _HELD_M) -> None:
+        self._heights_m = heights_m
         self._plane: FloatArray | None = None
         self._unsearched = _SEARCH_EVERY
         self._missed = 0
@@ -71,14 +72,14 @@ class FloorFinder:
         self._unsearched += 1
         due = self._plane is None or self._unsearched >= _SEARCH_EVERY
         if self._plane is not None and not due:
-            plane = _refined(self._plane, cells, inverse, least_cells)
+            plane = _refined(self._plane, cells, inverse, least_cells, self._heights_m)
             if plane is not None:
                 return plane
             if self._missed > 0:
                 return None
         self._unsearched = 0
-        best = _best_plane(cells, inverse, self._plane)
-        return None if best is None else _refined(best, cells, inverse, least_cells)
+        best = _best_plane(cells, inverse, self._plane, self._heights_m)
+        return None if best is None else _refined(best, cells, inverse, least_cells, self._heights_m)
 
 
 def on_floor(grid: DepthGrid, floor: Floor, noise: DepthNoise) -> DepthGrid:
@@ -106,7 +107,9 @@ def cells_on(grid: DepthGrid, floor: Floor) -> int:
     return int(np.count_nonzero(grid.valid & (np.abs(inverse - grid.inverse_depth) <= _TOLERANCE)))
 
 
-def _best_plane(cells: FloatArray, inverse: FloatArray, before: FloatArray | None) -> FloatArray | None:
+def _best_plane(
+    cells: FloatArray, inverse: FloatArray, before: FloatArray | None, heights_m: tuple[float, float]
+) -> FloatArray | None:
     """(3,) a, b, c of what is most likely the floor of cells (3, K) with inverse depth (K,)."""
     chosen = (_picks() * len(inverse)).astype(np.intp)
     corners = cells[:, chosen].transpose(1, 2, 0)
@@ -114,7 +117,7 @@ def _best_plane(cells: FloatArray, inverse: FloatArray, before: FloatArray | Non
     planes = np.linalg.solve(corners[flat], inverse[chosen[flat]][:, :, None])[:, :, 0]
     if before is not None:
         planes = np.concatenate((planes, before[None]))
-    planes = planes[_possible(planes)]
+    planes = planes[_possible(planes, heights_m)]
     if len(planes) == 0:
         return None
     best: FloatArray = planes[_score(planes, cells, inverse).argmax()]
@@ -122,7 +125,11 @@ def _best_plane(cells: FloatArray, inverse: FloatArray, before: FloatArray | Non
 
 
 def _refined(
-    plane: FloatArray, cells: FloatArray, inverse: FloatArray, least_cells: float
+    plane: FloatArray,
+    cells: FloatArray,
+    inverse: FloatArray,
+    least_cells: float,
+    heights_m: tuple[float, float],
 ) -> FloatArray | None:
     """plane (3,) fitted to the cells on it; None: it is no floor."""
     for _ in range(_REFINEMENTS):
@@ -133,7 +140,7 @@ def _refined(
         chosen = cells * on_it
         _, found = cv2.solve(chosen @ cells.T, chosen @ inverse[:, None], flags=cv2.DECOMP_SVD)
         plane = np.asarray(found, np.float64)[:, 0]
-    good = _possible(plane[None])[0] and _score(plane[None], cells, inverse)[0] > 0.0
+    good = _possible(plane[None], heights_m)[0] and _score(plane[None], cells, inverse)[0] > 0.0
     return plane if good else None
 
 
@@ -147,11 +154,12 @@ def _score(planes: FloatArray, cells: FloatArray, inverse: FloatArray) -> FloatA
     return result
 
 
-def _possible(planes: FloatArray) -> NDArray[np.bool_]:
+def _possible(planes: FloatArray, heights_m: tuple[float, float]) -> NDArray[np.bool_]:
     """(P,) which planes (P, 3) lie below a camera held more or less upright."""
+    low_m, high_m = heights_m
     size = np.sqrt(np.square(planes).sum(axis=1))
     result: NDArray[np.bool_] = (
-        (planes[:, 1] >= _LEAST_UPRIGHT * size) & (size >= 1.0 / _HEIGHT_M[1]) & (size <= 1.0 / _HEIGHT_M[0])
+        (planes[:, 1] >= _LEAST_UPRIGHT * size) & (size >= 1.0 / high_m) & (size <= 1.0 / low_m)
     )
     return result
 

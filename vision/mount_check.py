@@ -30,6 +30,9 @@ _PLAINLY_WRONG = _Bounds(math.radians(5.0), 0.2)
 # degrees and 6 mm; slopes are as much, but not the same in all looks.
 _WRONG = _Bounds(math.radians(1.5), 0.05)
 _SAME = _Bounds(math.radians(0.5), 0.03)
+# Also where depth is in another unit, five times as much or as little.
+_HEIGHTS_M = (0.05, 8.0)
+_OTHER_UNIT = 1.8
 _STILL_FLOOR = 0.5  # of the cells of the plane that was found
 
 
@@ -44,16 +47,16 @@ class MountCheck:
         """health, or worse if most looks have found the floor plainly elsewhere, or all of them at one other
         place. grid: with the mounting's floor."""
         if self._next_ns is None or captured_ns >= self._next_ns:
-            floor = FloorFinder().find(grid)
+            floor = FloorFinder(_HEIGHTS_M).find(grid)
             if floor is not None:
                 self._looks.append(_look(grid, floor))
             settled = len(self._looks) == _LOOKS and not any(look.off for look in self._looks)
             self._next_ns = captured_ns + (_RARELY_NS if settled else _OFTEN_NS)
         plain = [look for look in self._looks if look.plainly_off]
         if len(plain) > _MOST_WRONG:
-            return worsened(health, CameraCondition.DEGRADED, _sentence(plain[-1].floor))
+            return worsened(health, CameraCondition.DEGRADED, _sentence(plain[-1].floor, grid))
         if len(self._looks) == _LOOKS and all(look.off for look in self._looks) and self._agree():
-            return worsened(health, CameraCondition.DEGRADED, _sentence(self._looks[-1].floor))
+            return worsened(health, CameraCondition.DEGRADED, _sentence(self._looks[-1].floor, grid))
         return health
 
     def _agree(self) -> bool:
@@ -84,9 +87,11 @@ def _apart(one: Floor, other: Floor, bounds: _Bounds) -> bool:
     return tilt_rad > bounds.tilt_rad or abs(one.camera_height_m - other.camera_height_m) > bounds.height_m
 
 
-def _sentence(floor: Floor) -> str:
+def _sentence(floor: Floor, grid: DepthGrid) -> str:
+    ratio = floor.camera_height_m / grid.camera_height_m
+    what = "its mounting" if 1.0 / _OTHER_UNIT < ratio < _OTHER_UNIT else "the unit of its depth"
     pitch_deg = math.degrees(math.asin(min(max(-float(floor.up[2]), -1.0), 1.0)))
     return (
         f"by the floor that it sees the camera is {floor.camera_height_m:.2f} m high and looks down by "
-        f"{pitch_deg:.1f} degrees: is its mounting right?"
+        f"{pitch_deg:.1f} degrees: is {what} right?"
     )
