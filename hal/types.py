@@ -37,7 +37,8 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True)
 class GyroSamples:
-    """Gyro readings since the frame before: stamps_ns (N,), rates_radps (N, 3) in optical axes."""
+    """Gyro readings that arrived since the frame before, and no others: stamps_ns (N,), rates_radps (N, 3) in
+    optical axes. A frame arrives after its exposure, so some are of a later time than the frame is."""
 
     stamps_ns: NDArray[np.int64]
     rates_radps: FloatArray
