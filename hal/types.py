@@ -85,6 +85,11 @@ class Pose:
             self.rotation @ other.translation_m + self.translation_m,
         )
 
+    @property
+    def finite(self) -> bool:
+        """Every number is one."""
+        return bool(np.isfinite(self.rotation).all() and np.isfinite(self.translation_m).all())
+
     def apply(self, points_m: FloatArray) -> FloatArray:
         """Points (N, 3) of the inner frame, in the outer one."""
         return points_m @ self.rotation.T + self.translation_m

@@ -67,6 +67,7 @@ class Detector:
         """
         if frame.gyro is not None:
             self._gyro.add(frame.gyro)
+        odometry = odometry if odometry is None or odometry.finite else None
         grey = np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         grid = self._grid(frame)
         check = self._health.check(frame, grey, grid)
