@@ -81,7 +81,8 @@ class Detector:
         if check.continuity is not Continuity.NEXT or not known:
             return self._restart(frame, grey, grid, odometry, health)
         dt_s = (frame.captured_ns - self._last_ns) * 1e-9
-        if dt_s > self._config.max_gap_s:
+        # Not after it: time stepped back at a frame that was of no use.
+        if not 0.0 < dt_s <= self._config.max_gap_s:
             return self._restart(frame, grey, grid, odometry, health)
         return self._follow(frame, grey, grid, odometry, previous, dt_s, health)
 
@@ -186,7 +187,7 @@ class Detector:
         odometry: Pose | None,
         health: CameraHealth,
     ) -> Detection:
-        """Begin anew: after the first frame, a gap, or a change of the image's size."""
+        """Begin anew: after the first frame, a gap, a step back of time, or a change of the image's size."""
         self._store.clear()
         self._read_out.lose()
         self._motion, self._motion_dt_s = _IDENTITY, 0.0

@@ -69,6 +69,7 @@ class Tracker:
         if detection.restarted:
             tracks.clear()
             self._surfaces = masks.NO_TRACK_SURFACES
+            self._last_ns = None  # time itself may have stepped back
         if detection.restarted or not detection.motion_known:
             self._free.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
