@@ -81,10 +81,13 @@ class HealthMonitor:
             problems.append((bad, f"{dark:.0%} of the colour image is black: is the lens covered?"))
         elif bright >= _BAD_SHARE:
             problems.append((bad, f"{bright:.0%} of the colour image is saturated"))
-        share = float(np.count_nonzero(grid.valid)) / grid.valid.size
-        usable_depth = share >= _MIN_DEPTH_SHARE
+        # What is beyond the depth mask was measured, too, but tells of nothing that could be touched.
+        near_share = float(np.count_nonzero(grid.valid)) / grid.valid.size
+        share = near_share + float(np.count_nonzero(grid.beyond)) / grid.beyond.size
+        usable_depth = near_share >= _MIN_DEPTH_SHARE
         if not usable_depth:
-            problems.append((bad, f"only {share:.1%} of the depth image holds data"))
+            within = f"data nearer than {grid.range_m:.3g} m"
+            problems.append((bad, f"only {near_share:.1%} of the depth image holds {within}"))
         elif share < _POOR_DEPTH_SHARE:
             problems.append((poor, f"only {share:.0%} of the depth image holds data"))
         if continuity is not Continuity.BACKWARD:
