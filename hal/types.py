@@ -37,7 +37,8 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True)
 class GyroSamples:
-    """Gyro readings since the frame before: stamps_ns (N,), rates_radps (N, 3) in optical axes."""
+    """Gyro readings that arrived since the frame before, and no others: stamps_ns (N,), rates_radps (N, 3) in
+    optical axes. A frame arrives after its exposure, so some are of a later time than the frame is."""
 
     stamps_ns: NDArray[np.int64]
     rates_radps: FloatArray
@@ -83,6 +84,11 @@ class Pose:
             self.rotation @ other.rotation,
             self.rotation @ other.translation_m + self.translation_m,
         )
+
+    @property
+    def finite(self) -> bool:
+        """Every number is one."""
+        return bool(np.isfinite(self.rotation).all() and np.isfinite(self.translation_m).all())
 
     def apply(self, points_m: FloatArray) -> FloatArray:
         """Points (N, 3) of the inner frame, in the outer one."""

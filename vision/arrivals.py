@@ -94,7 +94,7 @@ class FreeMemory:
             return
         nearest = np.full(grid.inverse_depth.shape, _UNKNOWN)
         cv2.copyTo(grid.inverse_depth, grid.valid.view(np.uint8), nearest)
-        nearest[grid.beyond] = self._range_inverse
+        nearest[grid.beyond] = max(self._range_inverse, np.float32(1.0 / grid.range_m))
         cv2.dilate(nearest, _BLOCK, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest))
         horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
-from vision.depth_mask import depth_sigma_m
+from vision.depth_mask import depth_sigma_m, measurable_m
 
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
@@ -30,7 +30,8 @@ class DepthGrid:
     """Cell (i, j) stands for the pixels around (offset + step i, offset + step j) of the image.
 
     depth_m (h, w): 0 where not valid. inverse_depth (h, w): 0 where not valid. valid (h, w).
-    beyond (h, w): measured, but farther than the depth mask: seen through up to there at least.
+    beyond (h, w): measured, but farther than range_m: seen through up to there at least. range_m: the depth
+    mask's, or as far as 16 bits go in the camera's unit.
     x (w,), y (h,): ray at z = 1 m. forward_m (h, w): distance along the floor. height_m (h, w) over the
     floor, height_sigma_m (h, w) and up (3,), the floor's normal in optical axes: None where the floor is not
     known. pitch_rad: of the mounting, NaN where the mounting is not known.
@@ -50,6 +51,7 @@ class DepthGrid:
     camera_height_m: float
     pitch_rad: float
     up: FloatArray | None
+    range_m: float
 
     def columns(self, pixels_u: FloatArray) -> NDArray[np.intp]:
         """Grid columns of image columns, clipped to the grid."""
@@ -94,7 +96,8 @@ class DepthGrid:
 
 @np.errstate(divide="ignore")  # what comes of a division by zero is left out; once, for it takes a while
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
-    """Sub-sample the depth of frame; depth outside [min_depth_m, max_depth_m] is not valid."""
+    """Sub-sample the depth of frame; depth outside [min_depth_m, max_depth_m] is not valid, nor is the
+    largest number, at which far depth is cut off."""
     step = config.grid_step_px
     scale_m = frame.depth_scale_m
     if step >= 4:
@@ -102,7 +105,8 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     else:
         raw, offset = frame.depth[step // 2 :: step, step // 2 :: step], float(step // 2)
     depth_m = raw * np.float32(scale_m)
-    beyond = depth_m > config.max_depth_m
+    range_m = measurable_m(config.max_depth_m, scale_m)
+    beyond = depth_m > range_m
     valid = (depth_m >= config.min_depth_m) & ~beyond
     inverse = _smooth(raw, scale_m, _inverted(depth_m, valid), valid)
     depth_m = _inverted(inverse, valid)
@@ -111,7 +115,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     if mount is None:
         nan = float("nan")
         return DepthGrid(
-            step, offset, depth_m, inverse, valid, beyond, x, y, depth_m, None, None, nan, nan, None
+            step, offset, depth_m, inverse, valid, beyond, x, y, depth_m, None, None, nan, nan, None, range_m
         )
     sigma_m = np.float32(CELL_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
     return DepthGrid(
@@ -129,6 +133,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
         mount.height_m,
         mount.pitch_rad,
         np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
+        range_m,
     )
 
 

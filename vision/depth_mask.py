@@ -25,6 +25,7 @@ _MIN_SUPPORT = 4
 _NO_DATA_M = np.float32(1e6)  # sorts behind everything that is valid
 _HOLES = 0.25  # of the surroundings: so much without depth may be another surface
 UNSEEN_M = 12.0  # how far that is taken to be
+_CUT_OFF = np.iinfo(np.uint16).max  # what is as far as this, or farther
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +48,11 @@ def depth_sigma_m(depth_m: Depths, noise: DepthNoise) -> Depths:
     return sigma_m
 
 
+def measurable_m(max_m: float, scale_m: float) -> float:
+    """How far surfaces are measured: up to max_m, or, with a small unit scale_m, as far as 16 bits go."""
+    return min(max_m, (_CUT_OFF - 0.5) * scale_m)
+
+
 def surface_depth(
     depth: DepthImage,
     scale_m: float,
@@ -63,7 +69,7 @@ def surface_depth(
     sample_m[sample_m < min_m] = _NO_DATA_M
     # One column per point: sums over the samples then run along the memory.
     ordered = np.ascontiguousarray(np.sort(sample_m, axis=1).T)
-    within, measured = ordered <= max_m, ordered < _NO_DATA_M
+    within, measured = ordered <= measurable_m(max_m, scale_m), ordered < _NO_DATA_M
     count = _count(within)
     # With holes around, the same share of what is valid decides.
     rank = np.minimum(_NEAR_RANK, count // 3)

@@ -20,6 +20,7 @@ from vision.ego_motion import CameraEstimate, estimate
 from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
 from vision.floor import FloorFinder, on_floor
 from vision.fragments import FragmentStore
+from vision.gyro import GyroMemory
 from vision.health import Continuity, HealthMonitor
 from vision.lens import project, rays, vector_from_rotation
 from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
@@ -57,6 +58,7 @@ class Detector:
         self._odometry: Pose | None = None
         self._motion = _IDENTITY
         self._motion_dt_s = 0.0
+        self._gyro = GyroMemory()
         self._read_out = ReadOut(config.ego_motion.vibration_radps)
         self._variance_scale = 1.0
 
@@ -66,6 +68,9 @@ class Detector:
         previous: what tracking made of the frame before, so that fragments on moving things are kept out of
         the ego-motion and searched for where their obstacle goes, and more are looked for where wanted.
         """
+        if frame.gyro is not None:
+            self._gyro.add(frame.gyro)
+        odometry = odometry if odometry is None or odometry.finite else None
         grey = np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         grid = self._grid(frame)
         check = self._health.check(frame, grey, grid)
@@ -82,7 +87,8 @@ class Detector:
         if check.continuity is not Continuity.NEXT or not known:
             return self._restart(frame, grey, grid, odometry, health)
         dt_s = (frame.captured_ns - self._last_ns) * 1e-9
-        if dt_s > self._config.max_gap_s:
+        # Not after it: time stepped back at a frame that was of no use.
+        if not 0.0 < dt_s <= self._config.max_gap_s:
             return self._restart(frame, grey, grid, odometry, health)
         return self._follow(frame, grey, grid, odometry, previous, dt_s, health)
 
@@ -177,6 +183,7 @@ class Detector:
     ) -> None:
         self._store.commit(frame.captured_ns, self._pose, frame.intrinsics, sweep_rad)
         self._images, self._last_ns, self._odometry = images, frame.captured_ns, odometry
+        self._gyro.forget(frame.captured_ns)
 
     def _restart(
         self,
@@ -186,7 +193,7 @@ class Detector:
         odometry: Pose | None,
         health: CameraHealth,
     ) -> Detection:
-        """Begin anew: after the first frame, a gap, or a change of the image's size."""
+        """Begin anew: after the first frame, a gap, a step back of time, or a change of the image's size."""
         self._store.clear()
         self._read_out.lose()
         self._motion, self._motion_dt_s = _IDENTITY, 0.0
@@ -244,9 +251,8 @@ class Detector:
             prior = rolling_prior(self._motion, self._motion_dt_s, dt_s, self._mount, settings)
         else:
             prior = steady_prior(self._motion, self._motion_dt_s, dt_s, settings)
-        if frame.gyro is not None:
-            prior = with_gyro(prior, frame.gyro, self._last_ns, frame.captured_ns, settings)
-        return prior
+        turn_rad = self._gyro.turn_rad(self._last_ns, frame.captured_ns)
+        return prior if turn_rad is None else with_gyro(prior, turn_rad, dt_s, settings)
 
     def _guess(
         self, motion: Pose, velocity: FloatArray, dt_s: float, camera: Intrinsics

@@ -20,6 +20,7 @@ _BAD_SHARE = 0.9
 _MIN_DEPTH_SHARE = 0.02
 _POOR_DEPTH_SHARE = 0.25
 _FROZEN_FRAMES = 2
+_STEPPED_FRAMES = 3  # so many in a row from before, in order, and it is time itself that has gone back
 
 
 class Continuity(Enum):
@@ -29,6 +30,7 @@ class Continuity(Enum):
     NEXT = "next"
     REPEATED = "repeated"
     BACKWARD = "backward"
+    STEPPED = "stepped"
     GAP = "gap"
 
 
@@ -50,6 +52,8 @@ class HealthMonitor:
         self._last_ns: int | None = None
         self._last_grey: GreyImage | None = None
         self._same = 0
+        self._earlier_ns: int | None = None
+        self._earlier_frames = 0
 
     def check(self, frame: RgbdFrame, grey: GreyImage, grid: DepthGrid) -> FrameCheck:
         """The worst finding decides the condition; each finding has its sentence."""
@@ -59,6 +63,8 @@ class HealthMonitor:
         bad, poor = CameraCondition.UNTRUSTWORTHY, CameraCondition.DEGRADED
         if continuity is Continuity.BACKWARD:
             problems.append((bad, f"frame is {-gap_s:.3f} s older than the one before"))
+        elif continuity is Continuity.STEPPED:
+            problems.append((bad, f"time has gone back by {-gap_s:.3f} s: everything begins anew"))
         elif continuity is Continuity.REPEATED:
             problems.append((bad, "frame has the time of the one before: it is a repetition"))
         elif continuity is Continuity.GAP:
@@ -75,10 +81,13 @@ class HealthMonitor:
             problems.append((bad, f"{dark:.0%} of the colour image is black: is the lens covered?"))
         elif bright >= _BAD_SHARE:
             problems.append((bad, f"{bright:.0%} of the colour image is saturated"))
-        share = float(np.count_nonzero(grid.valid)) / grid.valid.size
-        usable_depth = share >= _MIN_DEPTH_SHARE
+        # What is beyond the depth mask was measured, too, but tells of nothing that could be touched.
+        near_share = float(np.count_nonzero(grid.valid)) / grid.valid.size
+        share = near_share + float(np.count_nonzero(grid.beyond)) / grid.beyond.size
+        usable_depth = near_share >= _MIN_DEPTH_SHARE
         if not usable_depth:
-            problems.append((bad, f"only {share:.1%} of the depth image holds data"))
+            within = f"data nearer than {grid.range_m:.3g} m"
+            problems.append((bad, f"only {near_share:.1%} of the depth image holds {within}"))
         elif share < _POOR_DEPTH_SHARE:
             problems.append((poor, f"only {share:.0%} of the depth image holds data"))
         if continuity is not Continuity.BACKWARD:
@@ -102,10 +111,21 @@ class HealthMonitor:
             return Continuity.FIRST, 0.0
         gap_s = (frame.captured_ns - self._last_ns) * 1e-9
         if gap_s < 0:
-            return Continuity.BACKWARD, gap_s
+            return self._backward(frame.captured_ns), gap_s
+        self._earlier_ns = None
         if gap_s == 0:
             return Continuity.REPEATED, 0.0
         return (Continuity.GAP if gap_s > self._config.max_gap_s else Continuity.NEXT), gap_s
+
+    def _backward(self, captured_ns: int) -> Continuity:
+        """A frame from before the last one: late, or one of several that follow each other from there on."""
+        earlier_ns, self._earlier_ns = self._earlier_ns, captured_ns
+        follows = earlier_ns is not None and 0 < captured_ns - earlier_ns <= self._config.max_gap_s * 1e9
+        self._earlier_frames = self._earlier_frames + 1 if follows else 1
+        if self._earlier_frames < _STEPPED_FRAMES:
+            return Continuity.BACKWARD
+        self._earlier_ns = None
+        return Continuity.STEPPED
 
 
 def worsened(health: CameraHealth, condition: CameraCondition, reason: str) -> CameraHealth:

@@ -2,8 +2,8 @@
 
 A prior has a mean (a Pose) and six standard deviations. From odometry: odometry_prior. Without odometry:
 rolling_prior for a camera on a robot (a tracked base rolls ahead and turns, never sideways), steady_prior for
-any other camera (it goes on as it did). A gyro replaces the rotation of any of them: with_gyro. The sweep,
-the camera's turn while the rows of one image are read, has a prior of its own: SweepPrior.
+any other camera (it goes on as it did). A gyro (vision/gyro.py) replaces the rotation of any of them:
+with_gyro. The sweep, the camera's turn while the rows of one image are read, has its own: SweepPrior.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.perception import EgoMotionSettings
-from hal.types import CameraMount, FloatArray, GyroSamples, Pose
+from hal.types import CameraMount, FloatArray, Pose
 from vision.lens import rotation_from_vector, vector_from_rotation
 
-_NS_PER_S = 1e9
 _ASIDE_MPS = 0.10  # one sigma across the way: vibration, and slip while it turns
 
 
@@ -98,14 +97,10 @@ def rolling_prior(
 
 
 def with_gyro(
-    prior: MotionPrior, gyro: GyroSamples, from_ns: int, to_ns: int, settings: EgoMotionSettings
+    prior: MotionPrior, turn_rad: FloatArray, dt_s: float, settings: EgoMotionSettings
 ) -> MotionPrior:
-    """The prior with its rotation taken from the gyro's mean rate over the interval."""
-    inside = (gyro.stamps_ns > from_ns) & (gyro.stamps_ns <= to_ns)
-    if not inside.any() or not np.isfinite(gyro.rates_radps[inside]).all():
-        return prior
-    dt_s = (to_ns - from_ns) / _NS_PER_S
-    turn = rotation_from_vector(gyro.rates_radps[inside].mean(axis=0) * dt_s)
+    """The prior with its rotation taken from turn_rad (3,), what a gyro told of the interval dt_s."""
     sigma = prior.sigma.copy()
     sigma[:3] = settings.gyro_radps * dt_s
-    return MotionPrior(Pose(turn, prior.motion.translation_m), sigma, prior.source, prior.binding)
+    motion = Pose(rotation_from_vector(turn_rad), prior.motion.translation_m)
+    return MotionPrior(motion, sigma, prior.source, prior.binding)

@@ -46,7 +46,8 @@ class MountCheck:
     def judge(self, grid: DepthGrid, captured_ns: int, health: CameraHealth) -> CameraHealth:
         """health, or worse if most looks have found the floor plainly elsewhere, or all of them at one other
         place. grid: with the mounting's floor."""
-        if self._next_ns is None or captured_ns >= self._next_ns:
+        # Where time has stepped back, the next look is not as far away as it was.
+        if self._next_ns is None or not self._next_ns - _RARELY_NS <= captured_ns < self._next_ns:
             floor = FloorFinder(_HEIGHTS_M).find(grid)
             if floor is not None:
                 self._looks.append(_look(grid, floor))

@@ -67,7 +67,8 @@ class CameraCondition(Enum):
 
 @dataclass(frozen=True, slots=True)
 class CameraHealth:
-    """condition, and why in a plain sentence ("" when good). valid_depth_ratio: 0..1."""
+    """condition, and why in a plain sentence ("" when good). valid_depth_ratio: share of the depth
+    image that was measured, also beyond the depth mask, 0..1."""
 
     condition: CameraCondition
     reason: str

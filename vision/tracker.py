@@ -30,15 +30,16 @@ from vision import (
 from vision.adoption import adopt
 from vision.arrivals import Changes, FreeMemory
 from vision.attention import wanted
-from vision.depth_grid import BoolGrid, DepthGrid
+from vision.depth_grid import BoolGrid
 from vision.depth_guard import free_space
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.judgement import MotionEvidence, judge
+from vision.near_floor import NearFloor
 from vision.obstacles import FragmentVelocities
 from vision.percept import Percept
 from vision.regions import IntGrid, Regions
-from vision.scene import CameraCondition, Scene
+from vision.scene import CameraCondition, FreeSpace, Scene
 from vision.tracks import Tracks
 
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: 0.28 m/s in the first second
@@ -56,6 +57,7 @@ class Tracker:
         self._clearance_m = clearance_m
         self._tracks = Tracks()
         self._free = FreeMemory(config.depth_noise, config.max_depth_m)
+        self._near_floor = NearFloor(config.min_depth_m)
         self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
         self._fragment_owner = np.empty(0, np.int64)
@@ -67,6 +69,7 @@ class Tracker:
         if detection.restarted:
             tracks.clear()
             self._surfaces = masks.NO_TRACK_SURFACES
+            self._last_ns = None  # time itself may have stepped back
         if detection.restarted or not detection.motion_known:
             self._free.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
@@ -263,7 +266,7 @@ class Tracker:
             detection.captured_ns,
             detection.sequence,
             report.obstacles(tracks, detection),
-            free_space(detection.grid, self._in_the_way(detection.grid, standing), self._config.max_depth_m),
+            self._free_space(detection, standing),
             detection.ego_motion,
             detection.health,
             robot_pose,
@@ -277,5 +280,9 @@ class Tracker:
             wanted(tracks, detection, self._config),
         )
 
-    def _in_the_way(self, grid: DepthGrid, standing: BoolGrid) -> BoolGrid:
-        return standing if grid.height_m is None else standing & (grid.height_m < self._body_height_m)
+    def _free_space(self, detection: Detection, standing: BoolGrid) -> FreeSpace:
+        grid = detection.grid
+        trusted = detection.health.condition is not CameraCondition.UNTRUSTWORTHY
+        unmeasured_m = self._near_floor.unmeasured_m(grid, trusted)
+        in_the_way = standing if grid.height_m is None else standing & (grid.height_m < self._body_height_m)
+        return free_space(grid, in_the_way, self._config.max_depth_m, unmeasured_m)

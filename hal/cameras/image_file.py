@@ -16,6 +16,7 @@ from hal.types import ColourImage, DepthImage
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _PNG_HEADER = struct.Struct(">II")  # width, height: the first fields of the IHDR chunk
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+_TO_BGR: dict[int, int | None] = {1: cv2.COLOR_GRAY2BGR, 3: None, 4: cv2.COLOR_BGRA2BGR}  # None: it is
 
 
 class ImageError(Exception):
@@ -33,11 +34,18 @@ def read_depth(path: Path, width: int, height: int) -> DepthImage:
 
 
 def decode_colour(data: bytes, width: int, height: int) -> ColourImage:
-    """Of a whole PNG or JPEG file: (height, width, 3) uint8, BGR. Raises ImageError."""
+    """Of a whole PNG or JPEG file: (height, width, 3) uint8, BGR. Raises ImageError.
+
+    Grey becomes BGR, alpha is dropped, of 16 bits a channel the upper 8 are taken.
+    """
     image = _decode(data, width, height)
-    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
-        raise ImageError(f"is {_describe(image)}, a colour image has 8 bits and 3 channels")
-    return image.astype(np.uint8, copy=False)
+    channels = 1 if image.ndim == 2 else image.shape[2]
+    # One channel of 16 bits is depth in the wrong place, and no grey image.
+    if channels not in _TO_BGR or (image.dtype == np.uint16 and channels == 1):
+        raise ImageError(f"is {_describe(image)}, a colour image has 3 or 4 channels, or 8 bits of grey")
+    pixels = np.asarray(image >> 8 if image.dtype == np.uint16 else image, np.uint8)
+    to_bgr = _TO_BGR[channels]
+    return pixels if to_bgr is None else np.asarray(cv2.cvtColor(pixels, to_bgr), np.uint8)
 
 
 def decode_depth(data: bytes, width: int, height: int) -> DepthImage:

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from hal.types import DepthImage, FloatArray, Intrinsics, Pose
 
-_UNSEEN = np.uint16(65535)
+_FARTHEST = np.uint16(65535)  # so far or farther: where 16 bits end
+_UNSEEN = np.int32(65536)
 _FAR_OUTSIDE_PX = 1e6
 # A little more than half: noise moves neighbours apart, and a surface must not get pinholes from it.
 _HALF_PIXEL = 0.65
@@ -38,6 +39,8 @@ class DepthRegistration:
         units = depth.reshape(-1)[measured].astype(np.float32)
         u0, v0, distance = self._project(self._first_corner[:, measured] * units)
         u1, v1, _ = self._project(self._last_corner[:, measured] * units)
+        # What is cut off stays so: moved by the offset, it would be a wall just before there.
+        distance[units >= _FARTHEST] = _FARTHEST
         # A depth camera that is built in turned swaps the corners.
         first_u, first_v = np.minimum(u0, u1), np.minimum(v0, v1)
         end_u, end_v = np.maximum(u0, u1), np.maximum(v0, v1)
@@ -49,21 +52,21 @@ class DepthRegistration:
                 covered &= (u >= 0) & (u < width) & (v >= 0) & (v < height)
                 np.minimum.at(image, (v * width + u)[covered], distance[covered])
         image[image == _UNSEEN] = 0
-        return image.reshape(height, width)
+        return image.astype(np.uint16).reshape(height, width)
 
     def _project(
         self, points: NDArray[np.float32]
-    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.uint16]]:
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
         """Points (3, N) in depth units -> first pixel centre right of and below each, distance (0: none)."""
         x, y, z = points + self._offset[:, None]
-        ahead = (z >= 1.0) & (z < _UNSEEN)
+        ahead = z >= 1.0
         z = np.where(ahead, z, np.float32(1.0))
         u = np.ceil(np.float32(self._colour.fx) * x / z + np.float32(self._colour.cx))
         v = np.ceil(np.float32(self._colour.fy) * y / z + np.float32(self._colour.cy))
         return (
             np.clip(u, -_FAR_OUTSIDE_PX, _FAR_OUTSIDE_PX).astype(np.int32),
             np.clip(v, -_FAR_OUTSIDE_PX, _FAR_OUTSIDE_PX).astype(np.int32),
-            np.where(ahead, np.rint(z), 0).astype(np.uint16),
+            np.where(ahead, np.rint(np.minimum(z, _FARTHEST)), 0).astype(np.int32),
         )
 
 

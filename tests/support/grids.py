@@ -76,6 +76,7 @@ def grid_of(
         nan,
         nan,
         None,
+        most_m,
     )
     if up is None:
         return grid

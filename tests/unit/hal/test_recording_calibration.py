@@ -111,6 +111,19 @@ def test_no_data_stays_no_data() -> None:
     assert not DepthRegistration(CAMERA, CAMERA, STILL, 0.001)(depth).any()
 
 
+@pytest.mark.parametrize("ahead_m", [-0.05, 0.0, 0.05])
+def test_depth_that_is_cut_off_stays_so(ahead_m: float) -> None:
+    """65535 is as far or farther, wherever the colour camera is: no wall before it, and data."""
+    depth = np.full((480, 640), 65_535, np.uint16)
+    registration = DepthRegistration(CAMERA, CAMERA, Pose(np.eye(3), np.array([0.0, 0.0, ahead_m])), 1e-4)
+    np.testing.assert_array_equal(registration(depth)[5:-5, 5:-5], 65_535)
+    # What comes to lie beyond is cut off, too, and hides nothing nearer.
+    depth[:, 320:] = 65_500
+    moved = registration(depth)
+    assert moved[240, 500] == min(65_500 + round(1e4 * ahead_m), 65_535)
+    assert moved[240, 100] == 65_535
+
+
 def test_what_lies_behind_the_colour_camera_is_not_drawn() -> None:
     depth = np.full((480, 640), 500, np.uint16)
     registration = DepthRegistration(CAMERA, CAMERA, Pose(np.eye(3), np.array([0.0, 0.0, -1.0])), 0.001)

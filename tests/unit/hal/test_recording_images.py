@@ -129,15 +129,31 @@ def test_depth_of_the_wrong_type_is_refused(tmp_path: Path, image: np.ndarray, t
 
 
 @pytest.mark.parametrize(
-    ("image", "told"),
+    "image",
     [
-        (np.zeros((HEIGHT, WIDTH), np.uint8), "is 8-bit with 1 channel,"),
-        (np.zeros((HEIGHT, WIDTH, 4), np.uint8), "is 8-bit with 4 channels,"),
-        (np.zeros((HEIGHT, WIDTH), np.uint16), "is 16-bit with 1 channel,"),
+        np.full((HEIGHT, WIDTH), 90, np.uint8),
+        np.full((HEIGHT, WIDTH, 4), (90, 90, 90, 0), np.uint8),
+        np.full((HEIGHT, WIDTH, 3), 90 * 257, np.uint16),
+        np.full((HEIGHT, WIDTH, 4), (90 * 257, 90 * 257, 90 * 257, 7), np.uint16),
     ],
+    ids=["grey", "alpha", "16 bits", "16 bits and alpha"],
 )
-def test_colour_of_the_wrong_type_is_refused(tmp_path: Path, image: np.ndarray, told: str) -> None:
+def test_grey_alpha_and_16_bits_become_colour_of_8_bits(tmp_path: Path, image: np.ndarray) -> None:
+    """As renderers and some cameras write it; what is transparent is seen all the same."""
     path = tmp_path / "colour.png"
     assert cv2.imwrite(str(path), image)
-    with pytest.raises(ImageError, match=f"{told} a colour image has 8 bits and 3 channels"):
-        read_colour(path, WIDTH, HEIGHT)
+    found = read_colour(path, WIDTH, HEIGHT)
+    assert found.dtype == np.uint8
+    assert found.shape == (HEIGHT, WIDTH, 3)
+    assert np.all(found == 90)
+
+
+def test_alpha_does_not_change_the_order_of_the_colours(tmp_path: Path) -> None:
+    path = tmp_path / "blue.png"
+    assert cv2.imwrite(str(path), np.full((HEIGHT, WIDTH, 4), (255, 20, 3, 128), np.uint8))
+    assert np.all(read_colour(path, WIDTH, HEIGHT) == (255, 20, 3))
+
+
+def test_depth_in_the_place_of_colour_is_refused(depth: Path) -> None:
+    with pytest.raises(ImageError, match=r"^is 16-bit with 1 channel, a colour image has .* 8 bits of grey$"):
+        read_colour(depth, WIDTH, HEIGHT)

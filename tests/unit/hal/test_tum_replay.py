@@ -157,8 +157,8 @@ def spoil_colour_size(folder: Path) -> str:
 
 
 def spoil_colour_kind(folder: Path) -> str:
-    assert cv2.imwrite(str(colour_files(folder)[1]), np.zeros((48, 64), np.uint8))
-    return "is 8-bit with 1 channel, a colour image has 8 bits and 3 channels"
+    assert cv2.imwrite(str(colour_files(folder)[1]), np.zeros((48, 64), np.uint16))
+    return "is 16-bit with 1 channel, a colour image has 3 or 4 channels, or 8 bits of grey"
 
 
 def spoil_colour_gone(folder: Path) -> str:

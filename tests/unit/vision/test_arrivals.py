@@ -91,6 +91,13 @@ def test_a_wall_that_comes_into_range_has_not_arrived() -> None:
     assert not arrived(memory((0, wall(10.2))), wall(9.9), pose=ahead).any()
 
 
+def test_nor_has_one_that_comes_to_where_16_bits_end() -> None:
+    """With units of 0.1 mm a wall 6.9 m away was cut off to 6.55 m, and was not seen through up to 10 m."""
+    ahead, kept = Pose(np.eye(3), np.array([0.0, 0.0, 0.6])), FreeMemory(NOISE, RANGE_M)
+    kept.remember(grid_of(wall(6.9), most_m=6.55), AT_ORIGIN, 0)
+    assert not arrived(kept, wall(6.3), pose=ahead).any()
+
+
 def test_a_step_within_the_noise_proves_nothing() -> None:
     """In inverse depth 3.5 times root 2 times 0.55 times 0.0075 = 0.0204, and 0.1 m at 3.2 m = 0.0098."""
     assert not arrived(memory((0, wall(3.515))), wall(3.2)).any()  # 0.028 apart

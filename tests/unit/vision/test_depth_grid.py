@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from tests.support.grids import COLUMNS, OFFSET_PX, ROWS, STEP_PX, grid_of
+from config.perception import PerceptionConfig
+from hal.types import CameraMount, RgbdFrame
+from tests.support.grids import CAMERA, COLUMNS, OFFSET_PX, ROWS, STEP_PX, grid_of
+from vision.depth_grid import make_grid
 
 GRID = grid_of(np.random.default_rng(1).uniform(2.0, 4.0, (ROWS, COLUMNS)))
 
@@ -29,3 +33,19 @@ def test_the_points_of_cells_fall_into_these_cells() -> None:
     assert inside.all()
     np.testing.assert_array_equal(found, cells)
     np.testing.assert_allclose(inverse, GRID.inverse_depth.ravel(), rtol=1e-6)
+
+
+@pytest.mark.parametrize("mount", [None, CameraMount(0.0, 0.0, 0.5, 0.0)])
+@pytest.mark.parametrize(("scale_m", "range_m"), [(1e-4, 6.5535), (1.5e-4, 9.83), (0.001, 10.0)])
+def test_depth_that_is_cut_off_lies_beyond(scale_m: float, range_m: float, mount: CameraMount | None) -> None:
+    """65535 is what is as far or farther: neither a wall there nor a place without data."""
+    raw = np.full((CAMERA.height, CAMERA.width), 65_535, np.uint16)
+    raw[: CAMERA.height // 2] = round(6.0 / scale_m)
+    colour = np.zeros((*raw.shape, 3), np.uint8)
+    grid = make_grid(RgbdFrame(colour, raw, scale_m, 0, 0.0, 0, CAMERA), PerceptionConfig(), mount)
+    upper = slice(0, ROWS // 2)
+    assert grid.valid[upper].all()
+    np.testing.assert_allclose(grid.depth_m[upper], 6.0, rtol=1e-4)
+    np.testing.assert_array_equal(grid.beyond, ~grid.valid)
+    assert not grid.valid[ROWS // 2 :].any()
+    assert grid.range_m == pytest.approx(range_m, abs=0.001)

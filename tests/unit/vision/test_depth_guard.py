@@ -205,7 +205,12 @@ def test_nothing_is_known_beyond_the_upper_rim_of_a_steep_view() -> None:
     reach_m = 1.0 / math.tan(math.radians(45.0) - math.atan(239.5 / 610.0))
     assert np.isinf(space.nearest_m).all()
     assert (space.known_m <= reach_m + 0.05).all()
-    assert (space.known_m >= reach_m - 0.2).all()
+    # The uppermost row sees as far, and less to the sides than the rows below it.
+    farthest = 319.5 / 610.0 / (math.cos(math.radians(45.0)) * (1.0 + 239.5 / 610.0))
+    within = np.abs(space.bearing_tan) <= farthest - space.half_width_tan
+    assert np.count_nonzero(within) > 50
+    assert (space.known_m[within] >= reach_m - 0.2).all()
+    assert (space.known_m[np.abs(space.bearing_tan) >= farthest + 0.1] < reach_m - 0.2).all()
 
 
 def test_bearings_of_a_tipped_camera_are_levelled() -> None:
@@ -216,6 +221,39 @@ def test_bearings_of_a_tipped_camera_are_levelled() -> None:
     # From y = -0.7 to -1.3 at x = 4, right is positive; the image's rows differ a little in their bearing.
     assert space.bearing_tan[hit].min() == pytest.approx(0.7 / 4.0, abs=0.03)
     assert space.bearing_tan[hit].max() == pytest.approx(1.3 / 4.0, abs=0.03)
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, 4.0, 10.0, 20.0, 30.0])
+@pytest.mark.parametrize("foot_m", [0.0, 0.45])
+def test_an_edge_beside_the_way_is_told_where_it_is(pitch_deg: float, foot_m: float) -> None:
+    """Within a band, low and high in the image; columns of the image told its inner side at 0.44 m."""
+    mount = CameraMount(0.0, 0.0, 1.2, math.radians(pitch_deg))
+    post = box(vector(2.5, -0.45, foot_m), vector(0.1, 0.1, 0.3), 10)
+    space = space_of(frame_of(floor() + post, mount), mount)
+    hit = np.isfinite(space.nearest_m)
+    inner = space.nearest_m[hit] * (space.bearing_tan[hit] - space.half_width_tan)
+    outer = space.nearest_m[hit] * (space.bearing_tan[hit] + space.half_width_tan)
+    assert 0.40 - 0.06 <= inner.min() <= 0.405
+    assert 0.495 <= outer.max() <= 0.50 + 0.06
+
+
+def test_low_in_a_steep_view_what_is_beside_the_bands_is_in_the_outermost_one() -> None:
+    steep = CameraMount(0.0, 0.0, 1.0, math.radians(30.0))
+    # At 0.9 m the view is 0.76 m wide to the side; the bands end at 0.58 m.
+    post = box(vector(0.92, -0.68, 0.0), vector(0.05, 0.06, 0.12), 10)
+    space = space_of(frame_of(floor() + post, steep), steep)
+    assert np.flatnonzero(np.isfinite(space.nearest_m)).tolist() == [len(space.nearest_m) - 1]
+    assert space.nearest_m[-1] == pytest.approx(0.9, abs=0.03)
+
+
+def test_floor_beside_the_view_of_the_upper_rows_is_unknown() -> None:
+    steep = CameraMount(0.0, 0.0, 1.0, 0.45)
+    space = space_of(frame_of(floor(), steep), steep)
+    # The uppermost row goes 1.07 m along the floor for a metre of depth, that in the middle 0.90 m.
+    outside = np.abs(space.bearing_tan) > 319.5 / 610.0 / 1.07 + 0.04
+    assert np.count_nonzero(outside) >= 4
+    assert (space.known_m[outside] < 6.0).all()
+    assert (space.known_m[~outside][6:-6] > 9.0).all()
 
 
 def test_the_whole_view_is_scanned_at_848_pixels_too() -> None:

@@ -80,6 +80,13 @@ def test_the_limit_is_10_metres() -> None:
     np.testing.assert_allclose(at_middle(flat(9990)).near_m, [9.99], rtol=1e-6)
 
 
+def test_with_a_small_unit_depth_ends_where_16_bits_do() -> None:
+    """65535 units of 0.1 mm are 6.55 m or anything beyond."""
+    found = [surface_depth(flat(raw), 1e-4, MIDDLE, 0.25, 10.0, NOISE).near_m[0] for raw in (65_000, 65_535)]
+    assert found[0] == pytest.approx(6.5)
+    assert np.isnan(found[1])
+
+
 def test_holes_do_not_pull_the_depth_towards_zero() -> None:
     depth = flat(3000)
     depth[::2] = 0

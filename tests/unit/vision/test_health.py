@@ -112,11 +112,21 @@ def test_little_depth_degrades() -> None:
     assert health.valid_depth_ratio == pytest.approx(0.15, abs=0.02)
 
 
-def test_depth_beyond_the_depth_mask_is_not_valid_depth() -> None:
+def test_depth_beyond_the_depth_mask_alone_is_not_to_be_trusted() -> None:
     far = replace(FRAMES[0], depth=np.full_like(FRAMES[0].depth, 12_000))
     health = scenes([far])[0].health
     assert health.condition is UNTRUSTWORTHY
-    assert health.valid_depth_ratio == 0.0
+    assert "only 0.0% of the depth image holds data nearer than 10 m" in health.reason
+    assert health.valid_depth_ratio == 1.0
+
+
+def test_depth_beyond_the_depth_mask_is_data() -> None:
+    """As in a hall whose far wall fills most of the view."""
+    depth = FRAMES[4].depth.copy()
+    depth[:, : round(0.85 * depth.shape[1])] = 12_000
+    health = scenes([*FRAMES[:4], replace(FRAMES[4], depth=depth)])[4].health
+    assert health.condition is GOOD
+    assert health.valid_depth_ratio > 0.95
 
 
 def test_a_repeated_stamp() -> None:

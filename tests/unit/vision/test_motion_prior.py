@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.perception import EgoMotionSettings
-from hal.types import CameraMount, FloatArray, GyroSamples, Intrinsics, Pose
+from hal.types import CameraMount, FloatArray, Intrinsics, Pose
 from vision.ego_motion import estimate
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
 from vision.motion_prior import (
@@ -127,25 +127,11 @@ def test_steady_prior_goes_on_as_before() -> None:
     np.testing.assert_allclose(blind.sigma, 3.0 * prior.sigma)
 
 
-def gyro(*samples: tuple[int, float]) -> GyroSamples:
-    stamps = np.array([stamp for stamp, _ in samples], np.int64)
-    return GyroSamples(stamps, np.array([[0.0, rate, 0.0] for _, rate in samples]))
-
-
-def test_gyro_gives_the_rotation_of_the_interval_only() -> None:
-    prior = odometry_prior(motion((0.002, 0.01, -0.001), (0.0, 0.0, 0.02)), DT_S, SETTINGS)
-    # The first sample belongs to the interval before.
-    readings = gyro((1_000_000_000, 9.0), (1_050_000_000, 0.4), (1_100_000_000, 0.6))
-    turned = with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS)
+def test_a_gyro_gives_the_rotation_and_how_sure_it_is() -> None:
+    prior = odometry_prior(motion((0.002, 0.01, -0.001), (0.0, 0.0, 0.02)), 0.1, SETTINGS)
+    turned = with_gyro(prior, np.array([0.0, 0.05, 0.0]), 0.1, SETTINGS)
     np.testing.assert_allclose(vector_from_rotation(turned.motion.rotation), [0.0, 0.05, 0.0])
     np.testing.assert_allclose(turned.motion.translation_m, prior.motion.translation_m)
     np.testing.assert_allclose(turned.sigma[:3], 0.02 * 0.1)
     np.testing.assert_allclose(turned.sigma[3:], prior.sigma[3:])
-
-
-@pytest.mark.parametrize("readings", [gyro(), gyro((999_999_999, 0.5)), gyro((1_050_000_000, float("nan")))])
-def test_a_gyro_without_a_usable_reading_changes_nothing(readings: GyroSamples) -> None:
-    prior = odometry_prior(motion((0.002, 0.01, -0.001), (0.0, 0.0, 0.02)), DT_S, SETTINGS)
-    if len(readings.stamps_ns) == 0:
-        readings = GyroSamples(np.empty(0, np.int64), np.empty((0, 3)))
-    assert with_gyro(prior, readings, 1_000_000_000, 1_100_000_000, SETTINGS) is prior
+    assert (turned.source, turned.binding) == (prior.source, prior.binding)

@@ -24,7 +24,7 @@ def grid_of(depth_m: NDArray[np.float32]) -> DepthGrid:
     valid = depth_m > 0
     inverse = np.where(valid, 1.0 / np.maximum(depth_m, 1e-3), 0.0).astype(np.float32)
     nan = float("nan")
-    return DepthGrid(4, 2.0, depth_m, inverse, valid, ~valid, x, y, depth_m, None, None, nan, nan, None)
+    return DepthGrid(4, 2.0, depth_m, inverse, valid, ~valid, x, y, depth_m, None, None, nan, nan, None, 10.0)
 
 
 def flat(depth_m: float) -> NDArray[np.float32]:
