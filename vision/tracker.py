@@ -45,6 +45,7 @@ from vision.tracks import Tracks
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: 0.28 m/s in the first second
 _FORGET_S = 0.5
 _FORGET_YOUNG_S = 0.15
+_LONG_AGO_NS = 10**9
 _IDENTITY = np.eye(3)
 
 
@@ -75,7 +76,8 @@ class Tracker:
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
         elapsed_s = min(max(elapsed_s, 0.0), self._config.max_gap_s)
         tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.up(detection))
-        self._last_ns = max(detection.captured_ns, self._last_ns or 0)
+        before_ns = detection.captured_ns if self._last_ns is None else self._last_ns
+        self._last_ns = max(detection.captured_ns, before_ns)
         owner = self._owners(detection.ids)
         standing = regions.standing(detection.grid, self._clearance_m)
         velocities = obstacles.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
@@ -173,7 +175,7 @@ class Tracker:
         )
         way_m = tracks.speed_mps * changes.stayed_s
         labels, gone = merging.join(grid, labels, pairs, changes.stayed, way_m)
-        tracks.seen_ns[gone] = 0
+        tracks.seen_ns[gone] = detection.captured_ns - _LONG_AGO_NS
         for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
             second = division.split(grid, labels, track, changes.stayed, float(way_m[track]))
             if second is not None:

@@ -192,6 +192,16 @@ def test_the_same_frames_give_the_same_scenes_to_the_last_bit() -> None:
     assert any(one.moving for one in first[-1].scene.obstacles)
 
 
+@pytest.mark.parametrize("since_ns", [0, -(10**12), 1_700_000_000 * 10**9])
+def test_when_time_began_is_all_the_same(since_ns: int) -> None:
+    take = sideways(0.5, 0.1)
+    eyes, start_ns = perception(), take.frames[0].captured_ns
+    for frame, expected in zip(take.frames, watch(take, False), strict=True):
+        shown = replace(frame, captured_ns=frame.captured_ns - start_ns + since_ns)
+        scene = eyes.perceive(shown, None, None).scene
+        assert values(scene.obstacles) == values(expected.scene.obstacles)
+
+
 def test_robot_pose_time_and_number_are_handed_on() -> None:
     frame = sideways(0.0, 0.0).frames[3]
     pose = PlanarPose(1.0, 2.0, 0.3)
