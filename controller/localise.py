@@ -34,7 +34,8 @@ PRIOR_RATIO_SIGMA = 0.15
 
 
 class PoseHistory:
-    """The last poses with their times, interpolated; nothing is extrapolated beyond a short reach."""
+    """The last poses with their times, interpolated. Beyond the last, for a short reach, what moved goes on
+    as it did for as long as the last two are apart: to stand there would be a jolt in every other frame."""
 
     def __init__(self, reach_s: float = 0.1) -> None:
         self._stamps_ns: deque[int] = deque()
@@ -58,8 +59,7 @@ class PoseHistory:
             return None
         after = bisect_left(self._stamps_ns, stamp_ns)
         if after == len(self._stamps_ns):
-            newest_ns = self._stamps_ns[-1]
-            return self._poses[-1] if stamp_ns - newest_ns <= self._reach_ns else None
+            return self._beyond(stamp_ns)
         if self._stamps_ns[after] == stamp_ns:
             return self._poses[after]
         return _interpolate(
@@ -69,6 +69,16 @@ class PoseHistory:
             self._poses[after],
             stamp_ns,
         )
+
+    def _beyond(self, stamp_ns: int) -> PlanarPose | None:
+        newest_ns, newest = self._stamps_ns[-1], self._poses[-1]
+        if stamp_ns - newest_ns > self._reach_ns:
+            return None
+        if len(self._poses) < 2:
+            return newest
+        before_ns = self._stamps_ns[-2]
+        goes_on_ns = min(stamp_ns, 2 * newest_ns - before_ns)
+        return _interpolate(before_ns, self._poses[-2], newest_ns, newest, goes_on_ns)
 
 
 def _interpolate(t0_ns: int, p0: PlanarPose, t1_ns: int, p1: PlanarPose, t_ns: int) -> PlanarPose:

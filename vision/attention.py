@@ -121,7 +121,8 @@ class Attention:
         if not ids:
             return None
         self._looked_ns = {one: at for one, at in self._looked_ns.items() if now_ns - at < _IDLE_NS}
-        waited_ns = np.array([now_ns - self._looked_ns.get(number, 0) for number in ids])
+        never_ns = now_ns - 2 * _IDLE_NS
+        waited_ns = np.array([now_ns - self._looked_ns.get(number, never_ns) for number in ids])
         due = waited_ns >= np.where(bodies.urgent, _URGENT_NS, _IDLE_NS)
         if not due.any():
             return None

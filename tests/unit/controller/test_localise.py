@@ -39,6 +39,19 @@ def test_what_lies_outside_the_history_is_not_known() -> None:
     assert history.at(1101 * MS) is None
 
 
+def test_what_moves_goes_on_for_as_long_as_the_last_two_poses_are_apart() -> None:
+    """A frame that is exposed between two steps of the control loop is looked at before the second."""
+    history = PoseHistory(reach_s=0.1)
+    history.append(1000 * MS, ORIGIN)
+    history.append(1020 * MS, PlanarPose(0.02, 0.0, 0.01))
+    between, later = history.at(1030 * MS), history.at(1060 * MS)
+    assert between is not None
+    assert later is not None
+    assert (between.x_m, between.heading_rad) == pytest.approx((0.03, 0.015))
+    assert (later.x_m, later.heading_rad) == pytest.approx((0.04, 0.02))
+    assert history.at(1121 * MS) is None
+
+
 def test_a_stamp_that_does_not_advance_replaces() -> None:
     history = PoseHistory()
     history.append(5, ORIGIN)
