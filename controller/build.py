@@ -14,7 +14,12 @@ from typing import assert_never
 import cv2
 
 from config.app import AppConfig, ReplayConfig, SimulationConfig
-from config.camera import OdometryChoice, RealsenseCameraConfig, ReplayCameraConfig, SimulatedCameraConfig
+from config.camera import (
+    OdometryChoice,
+    RealsenseCameraConfig,
+    ReplayCameraConfig,
+    SimulatedCameraConfig,
+)
 from config.governor import InputConfig, UdpInputConfig, UnixInputConfig
 from config.loader import resolve
 from config.path import LineSpec, PathSpec

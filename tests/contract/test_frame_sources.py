@@ -13,7 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from config.camera import RealsenseCameraConfig, SimulatedCameraConfig
+from config.camera import (
+    RealsenseCameraConfig,
+    SimulatedCameraConfig,
+)
 from config.path import LineSpec, PathSpec
 from config.scenario import Scenario
 from hal.api import Clock, FrameSource
@@ -78,7 +81,11 @@ def simulated(folder: Path) -> Case:
 
 
 HALL = Scenario(name="hall", path=PathSpec(segments=(LineSpec(kind="line", length_m=10.0),)))
-LIVE = [realsense, simulated, paced_recording]
+LIVE = [
+    realsense,
+    simulated,
+    paced_recording,
+]
 ENDING = [small_recording, small_recording_without_thread, small_ros_bag]
 SOURCES = [*LIVE, *ENDING, real_recording]
 
