@@ -16,6 +16,7 @@ from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
 from controller.mission import with_overrides
 from controller.observations import STANDARD_OUTPUT
+from controller.possible_world import require_possible_world
 from controller.realtime import Punctuality
 from controller.realtime_rig import realtime_rig
 from controller.result import MissionOptions
@@ -67,6 +68,7 @@ def run_governor(options: MissionOptions) -> int:
         raise UserError(f"{options.config_path}: has no 'governor' section; add one (docs/governor.md)")
     assert isinstance(config.runner, RealtimeRunner), "a governor in lock-step is refused by AppConfig"
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
+    require_possible_world(config, options.config_path)
     governing = _govern(config, config.governor, config.runner, options, console)
     console.summary(_summary_rows(config, governing))
     return 0 if governing.succeeded else 1
