@@ -22,7 +22,7 @@ from controller.realtime_rig import realtime_rig
 from controller.result import MissionOptions
 from controller.service import ServiceManager
 from controller.summary import contact_text, limits_text, punctuality_text
-from controller.tally import Complaints, SetpointTally, ShaperFaults, Standstill, TimingTally
+from controller.tally import Complaints, FrameTally, SetpointTally, ShaperFaults, Standstill, TimingTally
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
@@ -42,6 +42,7 @@ class Governing:
     standstill: Standstill = field(default_factory=Standstill)
     shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
     complaints: Complaints = field(default_factory=Complaints)
+    frames: FrameTally = field(default_factory=FrameTally)
 
     @property
     def succeeded(self) -> bool:
@@ -96,6 +97,7 @@ def _govern(
                 governing.take(moment.control)
                 for message in moment.arrived:
                     governing.timing.add(message.timing_ms)
+                    governing.frames.add(message.scene.sequence)
                 _report(console, governing, moment.control)
     return governing
 
@@ -123,6 +125,8 @@ def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, st
     if governing.complaints.told:
         rows.append(("base", governing.complaints.line()))
     rows.append(("perception", governing.timing.line()))
+    if governing.frames.line():
+        rows.append(("frames", governing.frames.line()))
     if governing.punctuality.late_ns:
         rows.append(("control", punctuality_text(governing.punctuality)))
     return rows
