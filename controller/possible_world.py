@@ -9,10 +9,9 @@ import numpy as np
 from config.app import AppConfig
 from config.loader import ConfigError
 from config.scenario import Room
-from controller.build import build_path, path_spec, scenario_of
+from controller.build import build_path, build_world, path_spec
 from controller.path import Path
 from sim.contact import BUILDING, nearest_body
-from sim.world import World
 
 _LOOKED_AT_EVERY_M = 0.1
 
@@ -26,7 +25,7 @@ def require_possible_world(config: AppConfig, config_path: FilePath) -> None:
         return
     where, _ = path_spec(config, config_path)
     path = build_path(config, config_path)
-    world = World(scenario_of(config.simulation, config_path), config.simulation.seed)
+    world = build_world(config, config_path)
     start = f"{where}: path.start: at x {path.start.x_m:g}, y {path.start.y_m:g}"
     room = world.scenario.room
     if not _is_in(room, path.start.x_m, path.start.y_m):
