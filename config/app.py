@@ -96,6 +96,15 @@ def _check_watchdog(chassis: RoboteqChassisConfig, rate_hz: float) -> None:
         )
 
 
+def _check_latency(runner: LockstepRunner | RealtimeRunner, decision: DecisionConfig) -> None:
+    """A scene that is too old before it is known lets nothing ever move. Raises ValueError."""
+    if isinstance(runner, LockstepRunner) and runner.perception_latency_s >= decision.sight.stale_s:
+        raise ValueError(
+            f"runner.perception_latency_s ({runner.perception_latency_s:g}) must be less than "
+            f"decision.sight.stale_s ({decision.sight.stale_s:g}): every scene would be stale when it comes"
+        )
+
+
 class AppConfig(Section):
     """What `treadwatch run` and `treadwatch govern` read with --config FILE."""
 
@@ -116,6 +125,7 @@ class AppConfig(Section):
     def _fits_together(self) -> Self:
         _check_speeds(self.robot, self.perception)
         _check_range(self.perception, self.decision)
+        _check_latency(self.runner, self.decision)
         if self.robot.limits.max_speed_mps > self.chassis.top_speed_mps:
             raise ValueError(
                 f"robot.limits.max_speed_mps ({self.robot.limits.max_speed_mps:g}) is more than the base "

@@ -112,6 +112,9 @@ class SimulatedCameraConfig(Section):
         return self
 
 
-CameraConfig = Annotated[
-    ReplayCameraConfig | RealsenseCameraConfig | SimulatedCameraConfig, Field(discriminator="kind")
-]
+AnyCameraConfig = (
+    ReplayCameraConfig  # one a line: a kind more is a line more
+    | RealsenseCameraConfig
+    | SimulatedCameraConfig
+)
+CameraConfig = Annotated[AnyCameraConfig, Field(discriminator="kind")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 from urllib.parse import urlsplit
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
@@ -269,7 +269,15 @@ class KobukiChassisConfig(Section):
         return self.max_speed_mps
 
 
-AnyChassisConfig = AgilexChassisConfig | RoboclawChassisConfig | RoboteqChassisConfig | KobukiChassisConfig
+AnyChassisConfig = (
+    AgilexChassisConfig  # one a line: a kind more is a line more
+    | RoboclawChassisConfig
+    | RoboteqChassisConfig
+    | KobukiChassisConfig
+)
+CHASSIS_KINDS: tuple[str, ...] = tuple(
+    get_args(config.model_fields["kind"].annotation)[0] for config in get_args(AnyChassisConfig)
+)
 ChassisConfig = Annotated[AnyChassisConfig, Field(discriminator="kind")]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os.path
+from datetime import date
 from pathlib import Path
 from typing import TypeVar
 
@@ -24,6 +25,8 @@ _IN_OTHER_WORDS = {
     "tuple_type": "Input should be a list",
     "model_type": "Input should be keys and values",
     "model_attributes_type": "Input should be keys and values",
+    "too_short": "the list must hold at least {min_length}, found {actual_length}",
+    "too_long": "the list must hold at most {max_length}, found {actual_length}",
     "invalid_key": "a key must be a word; a decimal has a point, not a comma",
 }
 
@@ -132,7 +135,9 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
             continue  # a default that follows from a key that is wrong itself
         unknown = detail["type"] == "extra_forbidden"
         key = written(model, detail["loc"], last_is_key=unknown)
-        reason = _IN_OTHER_WORDS.get(detail["type"], detail["msg"].removeprefix("Value error, "))
+        reason = detail["msg"].removeprefix("Value error, ")
+        if detail["type"] in _IN_OTHER_WORDS:
+            reason = _IN_OTHER_WORDS[detail["type"]].format(**detail.get("ctx", {}))
         if detail["type"] == "union_tag_invalid":
             reason = "its {discriminator} is {tag!r}, which is none of {expected_tags}".format(
                 **detail["ctx"]
@@ -145,7 +150,9 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
         elif detail["type"] == "missing":
             reason = "missing key"
         elif not isinstance(detail["input"], dict | list):
-            reason = f"{reason}, found {detail['input']!r}" + _what_to_write(detail)
+            found = detail["input"]
+            shown = str(found) if isinstance(found, date) else repr(found)
+            reason = f"{reason}, found {shown}" + _what_to_write(detail)
         parts.append(f"{key}: {reason}" if key else reason)
     if len(parts) > _MOST_MISTAKES:
         parts[_MOST_MISTAKES:] = [f"and {len(parts) - _MOST_MISTAKES} more mistakes"]
@@ -153,8 +160,8 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _what_to_write(detail: ErrorDetails) -> str:
-    """YAML 1.1 reads `15e-1` and '"1.5"' as text, and a serial number as a number."""
-    if detail["type"] == "string_type" and isinstance(detail["input"], int | float):
+    """YAML 1.1 reads `15e-1` and '"1.5"' as text, a serial number as a number, and 2024-01-02 as a date."""
+    if detail["type"] == "string_type" and isinstance(detail["input"], int | float | date):
         return f", which is no text: put it in quotes, '{detail['input']}'"
     if detail["type"] not in ("float_type", "int_type") or not isinstance(detail["input"], str):
         return ""

@@ -205,9 +205,10 @@ class Light(Section):
 
 
 class Scenario(Section):
-    """One world. duration_s: how long a mission in it may take at most.
+    """One world. duration_s and outcome are for campaigns: `treadwatch run` ends by the section runner.
 
-    outcome: whether a robot that drives well reaches its target, or something never leaves its path.
+    duration_s: after so long a campaign gives a mission up. outcome: whether a robot that drives well reaches
+    its target, or something never leaves its path, and a campaign expects no arrival.
     """
 
     name: str = Field(min_length=1)

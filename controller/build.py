@@ -14,7 +14,12 @@ from typing import assert_never
 import cv2
 
 from config.app import AppConfig, ReplayConfig, SimulationConfig
-from config.camera import OdometryChoice, RealsenseCameraConfig, ReplayCameraConfig, SimulatedCameraConfig
+from config.camera import (
+    OdometryChoice,
+    RealsenseCameraConfig,
+    ReplayCameraConfig,
+    SimulatedCameraConfig,
+)
 from config.governor import InputConfig, UdpInputConfig, UnixInputConfig
 from config.loader import resolve
 from config.path import LineSpec, PathSpec
@@ -158,7 +163,7 @@ def open_simulated_camera(
     assert isinstance(config.camera, SimulatedCameraConfig)
     start = build_path(config, config_path).start
     return SimulatedCamera(
-        _world(config, config_path),
+        build_world(config, config_path),
         config.camera,
         mount_of(config),
         clock,
@@ -171,10 +176,11 @@ def build_simulation(
     config: AppConfig, config_path: FilePath, emulator: Emulator, start_ns: int
 ) -> Simulation:
     """The emulated base in the scenario's world, with a referee. start_ns: the world's time zero."""
-    return Simulation(emulator, Referee(_world(config, config_path), config.robot.body, start_ns))
+    return Simulation(emulator, Referee(build_world(config, config_path), config.robot.body, start_ns))
 
 
-def _world(config: AppConfig, config_path: FilePath) -> World:
+def build_world(config: AppConfig, config_path: FilePath) -> World:
+    """The scenario that is simulated. Raises ConfigError."""
     assert config.simulation is not None, "AppConfig asks for a simulation"
     return World(scenario_of(config.simulation, config_path), config.simulation.seed)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import click
 
 from config.camera import OdometryChoice
+from config.chassis import CHASSIS_KINDS
 from config.loader import CONFIG_DIR
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 FILE_OR_DASH = click.Path(path_type=Path, dir_okay=False, allow_dash=True)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 FOLDER_OR_FILE = click.Path(path_type=Path)
-BASES = click.Choice(["agilex", "roboclaw", "roboteq", "kobuki"])
+BASES = click.Choice(CHASSIS_KINDS)
 
 Option = Callable[[Callable[..., None]], Callable[..., None]]
 

@@ -22,6 +22,7 @@ from controller.ending import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
 from controller.observations import STANDARD_OUTPUT
+from controller.possible_world import require_possible_world
 from controller.realtime_mission import drive_realtime
 from controller.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.result import MissionOptions, MissionResult
@@ -42,6 +43,7 @@ def run_mission(options: MissionOptions) -> int:
             f"{options.config_path}: has a 'governor' and no path to drive; use `treadwatch govern`"
         )
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
+    require_possible_world(config, options.config_path)
     warning = blind_bend_warning(config, options.config_path)
     if warning is not None:
         console.warning(warning)

@@ -35,6 +35,7 @@ def drive_realtime(
                 was_armed = was_armed or moment.control.chassis.mode is ChassisMode.ARMED
                 for message in moment.arrived:
                     result.timing.add(message.timing_ms)
+                    result.frames.add(message.scene.sequence)
                 report(console, result, moment.control)
     if loop.ending.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
         raise DeviceRefused(f"{describe_base(config.chassis)}: {loop.ending.stop_reason}; nothing has moved")

@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from controller.control import ControlLoop, ControlStep
 from controller.ending import Outcome
 from controller.realtime import Punctuality
-from controller.tally import Complaints, SetpointTally, ShaperFaults, Standstill, TimingTally
+from controller.tally import Complaints, FrameTally, SetpointTally, ShaperFaults, Standstill, TimingTally
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
@@ -42,6 +42,7 @@ class MissionResult:
     standstill: Standstill = field(default_factory=Standstill)
     shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
     complaints: Complaints = field(default_factory=Complaints)
+    frames: FrameTally = field(default_factory=FrameTally)
 
     @property
     def duration_s(self) -> float:

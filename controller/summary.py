@@ -53,6 +53,8 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
     if result.complaints.told:
         rows.append(("base", result.complaints.line()))
     rows.append(("perception", result.timing.line()))
+    if result.frames.line():
+        rows.append(("frames", result.frames.line()))
     if math.isfinite(result.wall_s):
         ratio = result.duration_s / result.wall_s
         rows.append(

@@ -148,6 +148,30 @@ class TimingTally:
         return f"{median_ms:.1f} ms median, {p99_ms:.1f} ms p99 a frame ({stages})"
 
 
+@dataclass
+class FrameTally:
+    """How many of the frames that the camera counted were looked at."""
+
+    looked_at: int = 0
+    counted: int = 0
+    _last: int | None = None
+
+    def add(self, sequence: int) -> None:
+        """The camera's number of a frame that was looked at. One that goes back: the camera began anew."""
+        self.looked_at += 1
+        self.counted += sequence - self._last if self._last is not None and sequence > self._last else 1
+        self._last = sequence
+
+    def line(self) -> str:
+        """For the summary; "" if none was left out."""
+        if self.looked_at == self.counted:
+            return ""
+        return (
+            f"{self.looked_at} of the camera's {self.counted} were looked at: perception did not keep up "
+            "(a video or a recording takes time from it), or the camera lost them"
+        )
+
+
 def mean_speed_mps(distance_m: float, duration_s: float) -> float:
     """NaN when no time has passed."""
     return distance_m / duration_s if duration_s > 0.0 else math.nan

@@ -35,8 +35,8 @@ class FrameSource(Closing, Protocol):
         ...
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """The next frame, waited for at most timeout_s. Raises FrameTimeout, EndOfStream, LinkLost, and
-        BadRecording where a recording proves to hold none."""
+        """The next frame, of a camera the newest, waited for at most timeout_s. Raises FrameTimeout,
+        EndOfStream, LinkLost, DeviceRefused once closed, BadRecording where a recording holds none."""
         ...
 
 

@@ -10,7 +10,7 @@ from typing import Self
 from config.camera import SimulatedCameraConfig
 from hal.api import Clock
 from hal.clocks import NS_PER_S
-from hal.errors import FrameTimeout
+from hal.errors import DeviceRefused, FrameTimeout
 from hal.geometry import camera_in_floor
 from hal.types import CameraMount, ColourImage, Intrinsics, PlanarPose, Pose, RgbdFrame
 from sim.colour_noise import ColourSensor
@@ -45,14 +45,16 @@ class SimulatedCamera:
         self._depth = DepthSensor(config, self._intrinsics, world.seed)
         self._sensor = ColourSensor(self._intrinsics, world.seed)
         self._picture: Picture | None = None
+        self._is_closed = False
 
     def __enter__(self) -> Self:
+        self._is_closed = False
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        return None
+        self._is_closed = True
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -70,10 +72,13 @@ class SimulatedCamera:
         return self._picture
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """Wait for the next exposure and draw it. Raises FrameTimeout if it is not due in time.
+        """Wait for the next exposure and draw it. Raises FrameTimeout if it is not due in time, DeviceRefused
+        once it was closed.
 
         Exposures that were missed meanwhile are lost, as with a real camera; sequence shows the gap.
         """
+        if self._is_closed:
+            raise DeviceRefused("simulated camera: is closed; read it inside a with block")
         missed_ns = self._clock.now_ns() - self.next_capture_ns
         if missed_ns > 0:
             self._index += int(missed_ns * self._config.fps / NS_PER_S)

@@ -74,24 +74,21 @@ def _on_terminal(config: AppConfig) -> tuple[Chassis, Emulator]:
 
 
 def wires() -> tuple[Wire, ...]:
-    """Buses and ports are drawn anew at each call."""
+    """Of every hil-*.yaml. Buses and ports are drawn anew at each call."""
     virtual = CanLinkConfig(interface="virtual", channel=f"bench-{uuid4().hex}")
     multicast = CanLinkConfig(
         interface="udp_multicast", channel="239.74.163.90", port=20_000 + uuid4().int % 40_000
     )
-    return (
-        Wire("agilex_in_memory", "agilex", _in_memory),
-        Wire("agilex_virtual_can", "agilex", _on_bus(virtual)),
-        Wire("agilex_multicast_can", "agilex", _on_bus(multicast)),
-        *(
-            wire
-            for kind in ("agilex-serial", "roboclaw", "roboteq", "kobuki")
-            for wire in (
-                Wire(f"{kind.replace('-', '_')}_in_memory", kind, _in_memory),
-                Wire(f"{kind.replace('-', '_')}_pty", kind, _on_terminal, asynchronous=True),
-            )
-        ),
-    )
+    found = []
+    for file in sorted(path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob("hil-*.yaml")):
+        name = file.replace("-", "_")
+        found.append(Wire(f"{name}_in_memory", file, _in_memory))
+        if isinstance(load_app(CONFIG_DIR / f"hil-{file}.yaml").chassis.link, CanLinkConfig):
+            found.append(Wire(f"{name}_virtual_can", file, _on_bus(virtual)))
+            found.append(Wire(f"{name}_multicast_can", file, _on_bus(multicast)))
+        else:
+            found.append(Wire(f"{name}_pty", file, _on_terminal, asynchronous=True))
+    return tuple(found)
 
 
 def measure_exchanges(exchanges: int, stopwatch_ns: Callable[[], int]) -> dict[str, Durations]:

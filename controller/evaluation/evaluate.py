@@ -22,7 +22,7 @@ from controller.evaluation.recording_report import (
     recordings_json,
     write_recording_pictures,
 )
-from controller.evaluation.recordings import RecordingRecord, evaluate_recording
+from controller.evaluation.recordings import RecordingRecord, distinct_names, evaluate_recording
 from controller.evaluation.report import prepare_folder, write_failures, write_figures, write_texts
 from controller.evaluation.report_text import simulated_lines
 from controller.evaluation.run_sequence import SequenceRecord
@@ -57,6 +57,7 @@ def run_evaluation(options: EvaluationOptions) -> None:
     chosen = choose(options.only)
     for folder in options.recordings:
         open_replay(folder, options.odometry)  # a mistake is told now, not after minutes
+    names = distinct_names(options.recordings)
     prepare_folder(options.report)
     result: dict[str, Any] = {}
     lines: list[str] = []
@@ -69,7 +70,7 @@ def run_evaluation(options: EvaluationOptions) -> None:
         lines.extend(simulated_lines(summary, records, failures, _command(options)))
         _say_figures(summary)
     if options.recordings:
-        looked = [_recording(options, folder) for folder in options.recordings]
+        looked = [_recording(options, *one) for one in zip(options.recordings, names, strict=True)]
         write_recording_pictures(options.report, looked)
         result["recordings"] = recordings_json(looked)
         lines.extend(recording_lines(looked))
@@ -96,13 +97,13 @@ def _simulated(options: EvaluationOptions, chosen: tuple[Sequence, ...]) -> tupl
         return run_campaign(tasks, options.workers, lambda _: bar.update(1))
 
 
-def _recording(options: EvaluationOptions, folder: Path) -> RecordingRecord:
+def _recording(options: EvaluationOptions, folder: Path, name: str) -> RecordingRecord:
     source, _ = open_replay(folder, options.odometry)
     with click.progressbar(
-        length=source.frame_count, label=folder.name, file=sys.stderr, hidden=_hidden(options)
+        length=source.frame_count, label=name, file=sys.stderr, hidden=_hidden(options)
     ) as bar:
         return evaluate_recording(
-            folder, options.odometry, options.static, ReplayConfig(), lambda: bar.update(1)
+            folder, options.odometry, options.static, ReplayConfig(), lambda: bar.update(1), name
         )
 
 
@@ -140,4 +141,5 @@ def _say_recordings(records: ReadOnly[RecordingRecord]) -> None:
     for record in records:
         moving = f"{len(record.moving_objects)} of {record.objects} objects called moving"
         false = f", {fixed(record.false_per_minute, 2)} false a minute" if record.static else ""
-        click.echo(f"recording     {record.folder.name}: {record.frames} frames, {moving}{false}")
+        skipped = f", {record.skipped} skipped" if record.skipped else ""
+        click.echo(f"recording     {record.name}: {record.frames} frames{skipped}, {moving}{false}")

@@ -22,7 +22,7 @@ def recordings_json(records: Sequence[RecordingRecord]) -> list[dict[str, Any]]:
     """Plain JSON values, one entry a recording."""
     return [
         {
-            "recording": record.folder.name,
+            "recording": record.name,
             "odometry": record.odometry,
             "assumed_static": record.static,
             "frames": record.frames,
@@ -55,9 +55,10 @@ def recording_lines(records: Sequence[RecordingRecord]) -> list[str]:
     """report.md about recordings."""
     rows = [
         (
-            record.folder.name,
+            record.name,
             record.odometry,
             str(record.frames),
+            str(record.skipped),
             fixed(record.seconds, 1),
             str(record.objects),
             str(len(record.moving_objects)),
@@ -69,19 +70,19 @@ def recording_lines(records: Sequence[RecordingRecord]) -> list[str]:
         for record in records
     ]
     head = (
-        "recording", "odometry", "frames", "seconds", "objects", "called moving", "frames with a moving one",
-        "false a minute", "ms a frame, median", "p99",
+        "recording", "odometry", "frames", "skipped", "seconds", "objects", "called moving",
+        "frames with a moving one", "false a minute", "ms a frame, median", "p99",
     )  # fmt: skip
     lines = ["# Recordings", "", " ".join(_WHAT.split()), "", *table(head, rows)]
     for record in records:
         if record.pictures:
-            lines += [f"{record.folder.name}: the second frame, and frames with something called moving.", ""]
-            lines += picture(record.folder.name, _file(record))
+            lines += [f"{record.name}: the second frame, and frames with something called moving.", ""]
+            lines += picture(record.name, _file(record))
     return lines
 
 
 def _file(record: RecordingRecord) -> str:
-    return f"recording-{record.folder.name}-{record.odometry}.png"
+    return f"recording-{record.name.replace('/', '-')}-{record.odometry}.png"
 
 
 def _percentile(record: RecordingRecord, percent: float) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import numpy as np
 from config.app import ReplayConfig
 from config.camera import OdometryChoice
 from controller.build import build_replay_perceiver, open_replay
+from controller.errors import UserError
 from controller.evaluation.ours import detection_of
 from controller.evaluation.run_sequence import Snapshot
 from controller.evaluation.scoring import WRONG_FRAMES, FrameScore
@@ -33,7 +34,8 @@ _APART_FRAMES = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingRecord:
-    """One recording. moving_objects: identities that were called moving in three frames or more.
+    """One recording. name: see distinct_names. moving_objects: identities that were called moving in three
+    frames or more.
 
     odometry: file, none or groundtruth, whichever was used.
     seconds: of recording. ms: of detect and track together, per frame. pictures: the first frame, and
@@ -41,6 +43,7 @@ class RecordingRecord:
     """
 
     folder: Path
+    name: str
     odometry: str
     static: bool
     frames: int
@@ -97,14 +100,34 @@ class _Tally:
         return span_s * len(self.stamps_ns) / (len(self.stamps_ns) - 1)
 
 
+def distinct_names(folders: Sequence[Path]) -> list[str]:
+    """What each recording is called: the end of its path, as long as it takes to tell it from the others.
+
+    Raises UserError for one that is given twice.
+    """
+    paths = [folder.resolve() for folder in folders]
+    for given, path in zip(folders, paths, strict=True):
+        if paths.count(path) > 1:
+            raise UserError(f"{given}: is given twice; once is enough")
+    names = []
+    for path in paths:
+        count = 1
+        while sum(other.parts[-count:] == path.parts[-count:] for other in paths) > 1:
+            count += 1
+        names.append("/".join(path.parts[-count:]))
+    return names
+
+
 def evaluate_recording(
     folder: Path,
     odometry: OdometryChoice,
     static: bool,
     config: ReplayConfig,
     on_frame: Callable[[], None] = lambda: None,
+    name: str | None = None,
 ) -> RecordingRecord:
-    """Every usable frame through detect and track. Raises HalError."""
+    """Every usable frame through detect and track. name: the folder's, if not given. Raises HalError."""
+    name = folder.name if name is None else name
     source, poses = open_replay(folder, odometry)
     perceiver = build_replay_perceiver(config, source.mount, poses, time.perf_counter_ns)
     tally = _Tally()
@@ -114,10 +137,11 @@ def evaluate_recording(
                 frame = source.read(timeout_s=0.0)
             except EndOfStream:
                 break
-            tally.add(folder.name, perceiver.look(frame))
+            tally.add(name, perceiver.look(frame))
             on_frame()
     return RecordingRecord(
         folder,
+        name,
         "none" if poses is None else ("file" if odometry == "auto" else odometry),
         static,
         len(tally.stamps_ns),

@@ -16,12 +16,13 @@ from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
 from controller.mission import with_overrides
 from controller.observations import STANDARD_OUTPUT
+from controller.possible_world import require_possible_world
 from controller.realtime import Punctuality
 from controller.realtime_rig import realtime_rig
 from controller.result import MissionOptions
 from controller.service import ServiceManager
 from controller.summary import contact_text, limits_text, punctuality_text
-from controller.tally import Complaints, SetpointTally, ShaperFaults, Standstill, TimingTally
+from controller.tally import Complaints, FrameTally, SetpointTally, ShaperFaults, Standstill, TimingTally
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 
@@ -41,6 +42,7 @@ class Governing:
     standstill: Standstill = field(default_factory=Standstill)
     shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
     complaints: Complaints = field(default_factory=Complaints)
+    frames: FrameTally = field(default_factory=FrameTally)
 
     @property
     def succeeded(self) -> bool:
@@ -67,6 +69,7 @@ def run_governor(options: MissionOptions) -> int:
         raise UserError(f"{options.config_path}: has no 'governor' section; add one (docs/governor.md)")
     assert isinstance(config.runner, RealtimeRunner), "a governor in lock-step is refused by AppConfig"
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
+    require_possible_world(config, options.config_path)
     governing = _govern(config, config.governor, config.runner, options, console)
     console.summary(_summary_rows(config, governing))
     return 0 if governing.succeeded else 1
@@ -94,6 +97,7 @@ def _govern(
                 governing.take(moment.control)
                 for message in moment.arrived:
                     governing.timing.add(message.timing_ms)
+                    governing.frames.add(message.scene.sequence)
                 _report(console, governing, moment.control)
     return governing
 
@@ -121,6 +125,8 @@ def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, st
     if governing.complaints.told:
         rows.append(("base", governing.complaints.line()))
     rows.append(("perception", governing.timing.line()))
+    if governing.frames.line():
+        rows.append(("frames", governing.frames.line()))
     if governing.punctuality.late_ns:
         rows.append(("control", punctuality_text(governing.punctuality)))
     return rows

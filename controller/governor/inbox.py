@@ -23,6 +23,8 @@ from hal.types import Sender
 _MOST_A_POLL = 64
 # Two clocks drift apart by less than this; the fastest message so far is forgotten at this rate.
 _DRIFT = 1e-3
+# Of what is allowed: so late the message before a late one was where lateness grows.
+_GROWN = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,13 +37,19 @@ class Asked:
 
 @dataclass(slots=True)
 class _Session:
-    """One planner while it has the command. least_offset_s: our clock minus its, of its fastest message."""
+    """One planner while it has the command. least_offset_s: our clock minus its, of its fastest message.
+    late_s: how much later than that one the last one came."""
 
     sender: Sender | None
     began_ns: int
     last: Request
     last_ns: int
     least_offset_s: float
+    late_s: float = 0.0
+
+    def lateness_s(self, offset_s: float, now_ns: int) -> float:
+        """Of a message that comes now."""
+        return offset_s - self.least_offset_s - _DRIFT * (now_ns - self.last_ns) / NS_PER_S
 
 
 class Inbox:
@@ -115,8 +123,8 @@ class Inbox:
             session = self._session = _Session(sender, now_ns, request, now_ns, offset_s)
         elif not self._in_order(session, request, sender, offset_s, now_ns):
             return
-        waited_s = (now_ns - session.last_ns) / NS_PER_S
-        session.least_offset_s = min(offset_s, session.least_offset_s + _DRIFT * waited_s)
+        session.late_s = max(session.lateness_s(offset_s, now_ns), 0.0)
+        session.least_offset_s = offset_s - session.late_s
         session.last, session.last_ns = request, now_ns
         self._heard, self._heard_ns = (sender, request), now_ns
         self._to_answer = request
@@ -135,10 +143,12 @@ class Inbox:
         if request.t_s < session.last.t_s:
             back_s = session.last.t_s - request.t_s
             return self._drop("clock went back", f"t_s of seq {request.seq} went back by {back_s:.3f} s")
-        waited_s = (now_ns - session.last_ns) / NS_PER_S
-        late_s = offset_s - session.least_offset_s - _DRIFT * waited_s
+        late_s = session.lateness_s(offset_s, now_ns)
         if late_s > self._config.late_s:
-            return self._drop("late", f"seq {request.seq} came {late_s:.2f} s late")
+            # A message that was held up comes after one in time. Where each is later, it is rather the clock.
+            grows = session.late_s > _GROWN * self._config.late_s
+            slow = ", each later than the one before: does its clock run slow?" if grows else ""
+            return self._drop("late", f"seq {request.seq} came {late_s:.2f} s late{slow}")
         return True
 
     def _drop(self, kind: str, why: str) -> bool:

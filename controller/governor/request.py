@@ -36,8 +36,8 @@ class Twist:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a planner asks for. seq: grows from message to message; t_s: the planner's own clock, which only
-    must not run backwards."""
+    """What a planner asks for. seq: grows from message to message; t_s: the planner's own clock, of any zero,
+    which must not run backwards and must run at the rate of real time."""
 
     seq: int
     t_s: float

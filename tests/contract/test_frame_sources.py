@@ -13,7 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from config.camera import RealsenseCameraConfig, SimulatedCameraConfig
+from config.camera import (
+    RealsenseCameraConfig,
+    SimulatedCameraConfig,
+)
 from config.path import LineSpec, PathSpec
 from config.scenario import Scenario
 from hal.api import Clock, FrameSource
@@ -22,7 +25,7 @@ from hal.cameras.paced_recording import PacedRecording
 from hal.cameras.realsense import RealsenseCamera
 from hal.cameras.tum_replay import TumReplay
 from hal.clocks import SimulatedClock
-from hal.errors import EndOfStream, FrameTimeout
+from hal.errors import DeviceRefused, EndOfStream, FrameTimeout
 from hal.types import CameraMount, Intrinsics, PlanarPose, RgbdFrame
 from sim.camera import SimulatedCamera
 from sim.world import World
@@ -78,7 +81,11 @@ def simulated(folder: Path) -> Case:
 
 
 HALL = Scenario(name="hall", path=PathSpec(segments=(LineSpec(kind="line", length_m=10.0),)))
-LIVE = [realsense, simulated, paced_recording]
+LIVE = [
+    realsense,
+    simulated,
+    paced_recording,
+]
 ENDING = [small_recording, small_recording_without_thread, small_ros_bag]
 SOURCES = [*LIVE, *ENDING, real_recording]
 
@@ -178,6 +185,24 @@ def test_too_early_is_a_timeout_after_the_time_given_and_loses_no_frame(live: Ca
             live.source.read(SHORT_S)
         assert live.clock.now_ns() - before_ns == round(SHORT_S * 1e9)
         assert live.source.read(LONG_S).sequence == first.sequence + 1
+
+
+def test_whoever_does_not_keep_up_gets_the_newest_and_no_queue(live: Case) -> None:
+    with live.source:
+        frames = [live.source.read(LONG_S) for _ in range(2)]
+        delay_ns = live.clock.now_ns() - frames[1].captured_ns
+        period_ns = frames[1].captured_ns - frames[0].captured_ns
+        live.clock.sleep_until_ns(live.clock.now_ns() + 7 * period_ns // 2)
+        late = live.source.read(LONG_S)
+        assert live.clock.now_ns() - late.captured_ns <= delay_ns + period_ns
+        assert late.sequence >= frames[1].sequence + 3, "the gap shows what was left out"
+
+
+def test_what_is_closed_gives_nothing_until_it_is_opened_again(case: Case) -> None:
+    with case.source:
+        case.source.read(LONG_S)
+    with pytest.raises(DeviceRefused):
+        case.source.read(LONG_S)
 
 
 def test_a_recording_gives_its_frames_whatever_the_timeout_and_then_ends(ending: Case) -> None:

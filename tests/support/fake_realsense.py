@@ -275,6 +275,11 @@ class FakeRealsense:
     def pipeline(self, context: object) -> FakePipeline:
         return FakePipeline(self)
 
+    def _has_been_replaced(self) -> bool:
+        """The original keeps one frameset: one that nobody fetched is gone when the next one arrives."""
+        after = next((event for event in self.events if not isinstance(event, FakeGyro)), None)
+        return isinstance(after, FakeFrameset) and after.arrival_ms * NS_PER_MS <= self._clock.now_ns()
+
     def wait(self, timeout_ms: int) -> tuple[bool, FakeFrameset | None]:
         deadline_ns = self._clock.now_ns() + timeout_ms * NS_PER_MS
         while self.events:
@@ -289,6 +294,8 @@ class FakeRealsense:
             if event.arrival_ms * NS_PER_MS > deadline_ns:
                 break
             self.events.popleft()
+            if self._has_been_replaced():
+                continue
             self._clock.sleep_until_ns(round(event.arrival_ms * NS_PER_MS))
             return True, event
         self._clock.sleep_until_ns(deadline_ns)

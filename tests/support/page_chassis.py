@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from importlib import import_module
+from itertools import takewhile
 from types import ModuleType
 
 from tests.support.chassis_rig import COUNTS_PER_M, PLANT, SLIP_FACTOR, Rig, serial_ends
@@ -33,7 +34,7 @@ def page_module() -> ModuleType:
 def _added_lines(name: str) -> list[tuple[str, str]]:
     """The class of the configuration, without the union that it is added to."""
     change = dict(PAGE.changes)[name]
-    added = [line[1:] for line in change.partition("\n-")[0].splitlines()]
+    added = [line[1:] for line in takewhile(lambda line: line.startswith("+"), change.splitlines())]
     return [(name, "\n".join(added) + "\n")]
 
 

@@ -47,28 +47,46 @@ class Page:
             (project / name).write_text(text, encoding="utf-8")
         for name, change in self.changes:
             path = project / name
-            path.write_text(changed(path.read_text(encoding="utf-8"), change), encoding="utf-8")
+            where = f"{self.name}: {name}"
+            path.write_text(changed(path.read_text(encoding="utf-8"), change, where), encoding="utf-8")
+        _sort_imports(project, [name for name, _ in self.changes])
 
 
-def changed(text: str, change: str) -> str:
-    """text with the lines of a change: + comes in, - goes, and the others are found in this order."""
+def changed(text: str, change: str, where: str) -> str:
+    """text with the lines of a change: + comes in, - goes, and the others are found in this order.
+
+    Raises LookupError for a line that is not in text; where: the page and the file, to say so.
+    """
     lines, at = text.splitlines(), 0
+
+    def find(line: str, begin: int) -> int:
+        try:
+            return lines.index(line, begin)
+        except ValueError:
+            raise LookupError(f"{where}: this line has changed, change it on the page too: {line}") from None
+
     for index, line in enumerate(change.splitlines()):
         mark, content = line[:1], line[1:]
         if mark == "+":
             if index == 0:
                 # What comes before the first line that is found goes right before it.
                 first = next(line[1:] for line in change.splitlines() if line[:1] in "- ")
-                at = lines.index(first)
+                at = find(first, 0)
             lines.insert(at, content)
             at += 1
             continue
-        at = lines.index(content, at)
+        at = find(content, at)
         if mark == "-":
             del lines[at]
         else:
             at += 1
     return "\n".join(lines) + "\n"
+
+
+def _sort_imports(project: Path, names: list[str]) -> None:
+    """A page says below which import its own goes, and whoever has added a kind may have one between them."""
+    done = python_in(project, "-m", "ruff", "check", "--no-cache", "--select", "I", "--fix", *names)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def python_in(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

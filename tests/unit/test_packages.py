@@ -24,7 +24,13 @@ def test_no_package_imports_the_tests(name: str) -> None:
 
 
 # Neither devices nor emulators: what to look for in a bag, a folder on the disk, the simulated outside.
-NO_DEVICES = {"hal.cameras.bag_topics", "hal.cameras.tum_writer", "sim.plant", "sim.simulation"}
+NO_DEVICES = {
+    "hal.cameras.bag_topics",
+    "hal.cameras.tum_writer",
+    "sim.contact",
+    "sim.plant",
+    "sim.simulation",
+}
 
 
 def test_only_build_names_concrete_devices() -> None:

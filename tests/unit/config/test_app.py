@@ -132,3 +132,12 @@ def test_mistakes_are_told_in_the_words_of_the_file(
     with pytest.raises(ConfigError) as refused:
         load_app(written(tmp_path, SIM | section))
     assert told in str(refused.value)
+
+
+def test_a_latency_with_which_every_scene_is_stale_is_refused(tmp_path: Path) -> None:
+    def late(latency_s: float) -> dict[str, object]:
+        return {**SIM, "runner": {**SIM["runner"], "perception_latency_s": latency_s}}
+
+    load_app(written(tmp_path, late(0.29)))
+    with pytest.raises(ConfigError, match=r"latency_s \(0\.3\) must be less than decision\.sight\.stale_s"):
+        load_app(written(tmp_path, late(0.3)))

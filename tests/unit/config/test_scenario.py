@@ -55,9 +55,15 @@ def test_the_default_mission_ships() -> None:
         (GOOD + "room: {x_min_m: 9.0, x_max_m: 1.0}\n", "room", "smaller"),
         (GOOD + "outcome: lost\n", "outcome", "'lost'"),
         (
+            GOOD.replace("name: test", "name: 2024-01-02"),
+            "name",
+            "found 2024-01-02, which is no text: put it in quotes, '2024-01-02'",
+        ),
+        (GOOD.replace("x_m: 3.0", "x_m: 2024-01-02"), "bodies.0.x_m", "a valid number, found 2024-01-02"),
+        (
             GOOD.replace("y_m: 1.0", "y_m: 1.0, motion: {steps: []}"),
             "bodies.0.motion.steps",
-            "at least 1",
+            "the list must hold at least 1, found 0",
         ),
         (
             GOOD.replace("y_m: 1.0", "y_m: 1.0, motion: {steps: [{kind: go, x_m: 1.0, y_m: 1.0}]}"),

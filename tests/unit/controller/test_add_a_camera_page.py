@@ -24,7 +24,7 @@ from hal.clocks import MonotonicClock
 from hal.types import CameraMount, PlanarPose
 from sim.camera import SimulatedCamera
 from sim.world import World
-from tests.support.pages import PROGRAM, ROOT, Page, complaints_of_ruff, python_in
+from tests.support.pages import PROGRAM, ROOT, Page, changed, complaints_of_ruff, python_in
 
 PAGE = Page("docs/add-a-camera.md")
 WRITER = "tests/support/frame_writer.py"
@@ -45,6 +45,21 @@ def pasted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_code_of_the_page_is_one_camera() -> None:
     assert len(PAGE.files) == 3, "driver, other end, test"
     assert len(PAGE.changes) == 3, "config, composition, contract suite"
+
+
+@pytest.mark.parametrize(
+    ("file", "last", "mine"),
+    [
+        ("config/camera.py", "    | SimulatedCameraConfig\n", "    | MyConfig\n"),
+        ("controller/build.py", "    SimulatedCameraConfig,\n)", "\nfrom hal.cameras.mine import Mine"),
+        ("tests/contract/test_frame_sources.py", "    paced_recording,\n", "    mine,\n"),
+    ],
+)
+def test_its_lines_still_fit_once_another_kind_was_added(file: str, last: str, mine: str) -> None:
+    text = (ROOT / file).read_text()
+    assert last in text
+    fits = changed(text.replace(last, last + mine), dict(PAGE.changes)[file], f"{PAGE.name}: {file}")
+    assert mine in fits
 
 
 def test_ruff_is_content(pasted: Path) -> None:

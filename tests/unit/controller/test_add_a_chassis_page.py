@@ -8,20 +8,20 @@ from typing import get_args
 
 import pytest
 import yaml
-from click import Context
 
-from config.chassis import ChassisConfig
+from config.chassis import CHASSIS_KINDS, AnyChassisConfig
 from config.loader import CONFIG_DIR
-from controller.cli import emulate
 from controller.emulate import FAULTS
 from controller.faults.trials import KINDS as EVERY_BASE
 from hal.chassis.driver import ChassisDriver, Told
+from hal.links.scripted import serial_pair
+from hal.types import Setpoint
+from tests.support.chassis_rig import MS
 from tests.support.contract_rigs import EMULATED
 from tests.support.page_chassis import PAGE, page_module
-from tests.support.pages import ROOT, complaints_of_ruff, python_in
+from tests.support.pages import ROOT, changed, complaints_of_ruff, python_in
 
-CONFIGS = get_args(get_args(ChassisConfig)[0])
-KINDS = {get_args(config.model_fields["kind"].annotation)[0]: config for config in CONFIGS}
+KINDS = dict(zip(CHASSIS_KINDS, get_args(AnyChassisConfig), strict=True))
 
 
 def read(path: str) -> str:
@@ -57,13 +57,45 @@ def test_the_commands_it_gives() -> None:
 
 def test_the_code_of_the_page_is_one_chassis_in_the_contract_suite() -> None:
     assert len(PAGE.files) == 4, "bytes, feedback, driver, emulator"
-    assert len(PAGE.changes) == 3, "config, composition, kinds"
+    assert len(PAGE.changes) == 2, "config, composition"
     assert {"page-scripted", "page-pty"} < set(EMULATED)
     page = page_module()
     assert issubclass(page.MinitrackChassis, ChassisDriver)
     assert page.drive(0.5, -0.25) == b"D 500 -250*DD\n"
     assert page.parse(b"S 1 -2 3 240*2C") == page.Status(1, -2, 3, 24.0)
     assert page.parse(b"S 1 -2 3 240*FC") is None
+
+
+@pytest.mark.parametrize(("noise", "advice"), [(b"", "check port, power"), (b"~" * 50, "check baud")])
+def test_a_line_where_nobody_of_its_kind_answers_is_told(noise: bytes, advice: str) -> None:
+    """As tests/contract/test_wrong_device.py asks of every kind that ships."""
+    page = page_module()
+    link, _ = serial_pair()
+    config = {"kind": "minitrack", "link": {"url": "loop://"}, "counts_per_m": 2000.0, "track_width_m": 0.5}
+    chassis = page.MinitrackChassis(link, page.MinitrackConfig.model_validate(config))
+    chassis.arm(0)
+    link.deliver(noise)
+    for now_ns in range(20 * MS, 5000 * MS, 20 * MS):
+        state = chassis.exchange(Setpoint(now_ns, 0.0, 0.0, 0.0), now_ns)
+    assert advice in state.reason
+
+
+def test_its_lines_still_fit_once_another_kind_was_added() -> None:
+    name, change = PAGE.changes[0]
+    last = "    | KobukiChassisConfig\n"
+    text = read(name).replace(last, f"{last}    | MyConfig\n")
+    assert f"{last}    | MinitrackConfig\n    | MyConfig\n)" in changed(text, change, name)
+
+
+def test_a_line_that_has_changed_is_told_with_its_page_and_file() -> None:
+    name, change = PAGE.changes[0]
+    text = read(name).replace("    | KobukiChassisConfig\n", "")
+    with pytest.raises(LookupError) as told:
+        changed(text, change, f"{PAGE.name}: {name}")
+    assert str(told.value) == (
+        "docs/add-a-chassis.md: config/chassis.py: this line has changed, change it on the page too: "
+        "    | KobukiChassisConfig"
+    )
 
 
 def test_what_is_pasted_from_the_page_passes_the_checks_and_drives(tmp_path: Path) -> None:
@@ -102,9 +134,8 @@ STEPS = {
     "property": lambda kind: (
         f"def test_{kind}_driver_survives_any_" in read(f"tests/property/test_{kind}_properties.py")
     ),
-    "wrong device": lambda kind: f'"{kind}' in read("tests/contract/test_wrong_device.py"),
+    "own time-out": lambda kind: f'"{kind}": ' in read("tests/unit/controller/test_faults.py"),
     "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/test_guard.py"),
-    "emulate": lambda kind: kind in emulate.get_help(Context(emulate, info_name="emulate")),
     "mission and faults": lambda kind: kind in EVERY_BASE,
     "README": lambda kind: kind.lower() in read("README.md").lower(),
 }

@@ -9,9 +9,10 @@ import pytest
 from config.loader import CONFIG_DIR
 from controller.bench import exchanges
 from controller.bench.exchanges import measure_exchanges, wires
+from controller.faults.trials import KINDS
 from hal.errors import DeviceNotFound
 
-SERIAL = ("agilex_serial", "roboclaw", "roboteq", "kobuki")
+SERIAL = [kind.replace("-", "_") for kind in KINDS if kind != "agilex"]
 NAMES = ["agilex_in_memory", "agilex_virtual_can", "agilex_multicast_can"]
 NAMES += [f"{kind}_{wire}" for kind in SERIAL for wire in ("in_memory", "pty")]
 

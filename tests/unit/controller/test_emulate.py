@@ -17,6 +17,7 @@ from config.chassis import CanLinkConfig, SerialLinkConfig
 from config.loader import CONFIG_DIR
 from controller.emulate import EmulateOptions, _linked, can_link, run_in_real_time, with_wire
 from controller.errors import UserError
+from controller.faults.trials import KINDS
 from controller.service import StopRequest
 from hal.chassis.agilex_messages import ControlModeCommand, MotionCommand, encode
 from hal.clocks import SimulatedClock
@@ -169,7 +170,7 @@ def test_mistakes_are_one_line(arguments: list[str], words: str) -> None:
     assert words in done.stderr
 
 
-@pytest.mark.parametrize("kind", ["agilex", "agilex-serial", "roboclaw", "roboteq", "kobuki"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_files_that_ship_fit_their_emulator(kind: str) -> None:
     """The emulated base is driven with its own geometry: what the driver believes is what the plant is."""
     config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")

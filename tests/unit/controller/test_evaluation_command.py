@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from config.app import ReplayConfig
 from controller.cli import cli
 from controller.errors import UserError
 from controller.evaluation.evaluate import EvaluationOptions, choose, run_evaluation
-from controller.evaluation.recordings import evaluate_recording
+from controller.evaluation.recordings import distinct_names, evaluate_recording
 from controller.evaluation.sequences import sequences
 from hal.errors import BadRecording
 
@@ -34,8 +35,33 @@ def test_a_recording_without_truth_is_reported_by_what_is_called_moving(tmp_path
     )
     assert entry["ms_per_frame"]["median"] > 0.0
     text = (tmp_path / "out" / "report.md").read_text()
-    assert "| desk_rpy | none | 10 |" in text
+    assert "| desk_rpy | none | 10 | 0 |" in text
     assert (tmp_path / "out" / "recording-desk_rpy-none.png").exists()
+
+
+def test_two_folders_of_one_name_are_told_apart_and_what_was_skipped_is_told(tmp_path: Path) -> None:
+    for parent in ("one", "other"):
+        shutil.copytree(DESK, tmp_path / parent / "walk")
+    broken = sorted((tmp_path / "other" / "walk" / "rgb").iterdir())[2]
+    broken.write_bytes(broken.read_bytes()[:20_000])
+    folders = [str(tmp_path / parent / "walk") for parent in ("one", "other")]
+    out = tmp_path / "out"
+    result = CliRunner().invoke(cli, ["evaluate", *folders, "--odometry", "none", "--report", str(out)])
+    assert result.exit_code == 0, result.output
+    assert "recording     one/walk: 10 frames, " in result.output
+    assert "recording     other/walk: 9 frames, 1 skipped, " in result.output
+    entries = json.loads((out / "summary.json").read_text())["recordings"]
+    assert [entry["recording"] for entry in entries] == ["one/walk", "other/walk"]
+    assert "| other/walk | none | 9 | 1 |" in (out / "report.md").read_text()
+    assert (out / "recording-one-walk-none.png").exists()
+    assert (out / "recording-other-walk-none.png").exists()
+
+
+def test_names_are_as_long_as_it_takes_and_a_recording_given_twice_is_refused() -> None:
+    folders = [Path("/a/b/x"), Path("/c/b/x"), Path("/a/b/y")]
+    assert distinct_names(folders) == ["a/b/x", "c/b/x", "y"]
+    with pytest.raises(UserError, match="/a/b/x: is given twice; once is enough"):
+        distinct_names([Path("/a/b/x"), Path("/a/../a/b/x")])
 
 
 def test_without_static_nothing_is_called_false() -> None:

@@ -157,9 +157,20 @@ def test_messages_that_were_held_up_are_not_obeyed() -> None:
     talk.say(3, 1030, 0.9)
     asked = talk.poll(245)
     assert talk.inbox.dropped == {"late": 1}
+    assert talk.warnings[0].endswith("seq 3 came 0.21 s late; more of the kind are only counted")
     assert asked.twist == Twist(0.5, 0.1)
     talk.say(4, 1250, 0.7)
     assert talk.poll(260).twist == Twist(0.7, 0.1)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.5])
+def test_a_clock_that_stands_still_or_runs_slow_is_asked_about(rate: float) -> None:
+    talk = Talk()
+    for k in range(12):
+        talk.say(k, rate * 50 * k)
+        talk.poll(50 * k)
+    assert talk.inbox.dropped["late"] > 0
+    assert "late, each later than the one before: does its clock run slow?" in talk.warnings[0]
 
 
 def test_clocks_that_drift_apart_do_not_become_late() -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import socket
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,12 +15,14 @@ from config.governor import GovernorConfig, UnixInputConfig
 from config.loader import CONFIG_DIR
 from controller.__main__ import main
 from controller.decision import Action, Decision, Reason
+from controller.governor.governor import Governed
 from controller.governor.ground import _TRAVEL_M
 from controller.governor.request import MOST_BYTES, MOST_MPS, Request, Twist, answer, parse_request
-from tests.support.scenes import ORIGIN, scene
 
 ROOT = CONFIG_DIR.parent
 PAGE = (ROOT / "docs" / "governor.md").read_text()
+KEEP = Decision(Action.KEEP, 0.5, Reason("requested", "as asked"))
+ANSWER = answer(Request(1, 0.0, Twist(0.5, 0.02)), 0.5, 0.02, KEEP, "armed", 0)
 PYTHON = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 
 
@@ -41,14 +45,40 @@ def test_the_client_has_about_thirty_lines_and_compiles() -> None:
     compile(PYTHON[0], "client.py", "exec")
 
 
-def test_the_python_call_works(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("kind", ["udp", "unix"])
+def test_the_client_waits_for_a_governor_and_outlives_it(kind: str, tmp_path: Path) -> None:
+    unix = kind == "unix"
+    where = str(tmp_path / "governor.sock") if unix else "127.0.0.1:0"
+    with socket.socket(socket.AF_UNIX if unix else socket.AF_INET, socket.SOCK_DGRAM) as governor:
+        if not unix:
+            governor.bind(("127.0.0.1", 0))
+            where = f"127.0.0.1:{governor.getsockname()[1]}"
+        command = [sys.executable, "-u", "-c", PYTHON[0], where, "1.5"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as client:
+            assert client.stdout is not None
+            assert "is `treadwatch govern` running?" in client.stdout.readline()
+            if unix:
+                governor.bind(where)
+            governor.settimeout(10.0)
+            _, sender = governor.recvfrom(1000)
+            governor.sendto(ANSWER, sender)
+            assert client.stdout.readline() == "0.50 m/s, 0.02 rad/s: as asked\n"
+            governor.close()
+            if unix:
+                Path(where).unlink()
+            assert "is `treadwatch govern` running?" in client.stdout.readline()
+    assert client.returncode == 0
+
+
+def test_the_python_example_drives(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    names: dict[str, object] = {
-        "now_ns": 0, "scene": scene(), "pose": ORIGIN, "measured_mps": 0.0,
-    }  # fmt: skip
+    names: dict[str, object] = {}
     exec(PYTHON[1], names)
     governed = names["governed"]
-    assert "as asked: 0.50 m/s, 0.10 rad/s" in str(governed)
+    assert isinstance(governed, Governed)
+    assert governed.decision.reason.sentence == "as asked: 0.50 m/s, 0.10 rad/s"
+    assert governed.v_mps > 0.01
+    assert governed.w_radps == pytest.approx(0.2 * governed.v_mps)
 
 
 def test_the_keys_it_names_exist() -> None:

@@ -77,6 +77,14 @@ def test_a_shaper_that_had_to_brake_is_told(monkeypatch: pytest.MonkeyPatch) -> 
     assert rows["shaper"] == "braked by the stop profile in 96 steps; first: ruckig: no profile"
 
 
+def test_frames_that_were_left_out_are_told_and_otherwise_nothing_is() -> None:
+    config, result = load_app(CONFIG_PATH), drive(1.0, sees=True)
+    assert "frames" not in dict(summary_rows(config, result))
+    for sequence in (1, 4):
+        result.frames.add(sequence)
+    assert dict(summary_rows(config, result))["frames"].startswith("2 of the camera's 4 were looked at")
+
+
 def test_a_mission_that_gets_on_says_nothing_of_standing(capsys: pytest.CaptureFixture[str]) -> None:
     result = drive(12.0, sees=True)
     assert "standing" not in capsys.readouterr().out

@@ -5,6 +5,7 @@ import pytest
 from config.robot import Limits
 from controller.tally import (
     Complaints,
+    FrameTally,
     SetpointTally,
     ShaperFaults,
     Standstill,
@@ -141,3 +142,12 @@ def test_standing_is_counted_from_the_first_zero_on() -> None:
     assert standstill.lasted_s(10_000 * MS) == 4.0
     standstill.add(Setpoint(10_000 * MS, 0.01, 0.3, 0.0))
     assert standstill.lasted_s(11_000 * MS) == 0.0
+
+
+def test_frames_that_were_not_looked_at_are_told_and_a_camera_that_begins_anew_loses_none() -> None:
+    frames = FrameTally()
+    for sequence in (7, 8, 9, 0, 1):
+        frames.add(sequence)
+    assert (frames.looked_at, frames.counted, frames.line()) == (5, 5, "")
+    frames.add(4)
+    assert frames.line().startswith("6 of the camera's 8 were looked at: perception did not keep up")
