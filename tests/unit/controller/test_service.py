@@ -85,13 +85,17 @@ def test_a_manager_that_is_gone_is_counted_not_raised(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_becomes_a_wish_and_the_old_handler_comes_back(number: signal.Signals) -> None:
-    before = signal.getsignal(number)
-    with stop_on_signals() as request:
-        assert not request
-        os.kill(os.getpid(), number)
-        assert request
-        assert request.reason == number.name
-    assert signal.getsignal(number) is before
+    # Under nohup, SIGHUP would be ignored.
+    before = signal.signal(number, signal.SIG_DFL)
+    try:
+        with stop_on_signals() as request:
+            assert not request
+            os.kill(os.getpid(), number)
+            assert request
+            assert request.reason == number.name
+        assert signal.getsignal(number) is signal.SIG_DFL
+    finally:
+        signal.signal(number, before)
 
 
 def test_under_nohup_a_terminal_may_go() -> None:
