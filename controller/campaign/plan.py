@@ -44,7 +44,7 @@ def run_there(tasks: list[Task], scheduler: str) -> Generator[list[Row], None, N
         from distributed import Client
     except ImportError as error:
         raise UserError(
-            "--scheduler needs Dask distributed, which is not installed: pip install 'treadwatch[campaign]'"
+            "--scheduler needs Dask distributed, which is not installed: pip install -e '.[campaign]'"
         ) from error
     try:
         client = Client(scheduler, timeout="10s")

@@ -113,6 +113,6 @@ def _load_vendor() -> tuple[Any, Any]:
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise DeviceNotFound(
-            f"ROS bags: rosbags cannot be imported ({error}); install treadwatch[ros]"
+            f"ROS bags: rosbags cannot be imported ({error}); install it with pip install -e '.[ros]'"
         ) from error
     return AnyReader, get_typestore(Stores.ROS2_HUMBLE)

@@ -234,7 +234,7 @@ def _load_vendor() -> Any:
         import pyrealsense2
     except ImportError as error:
         raise DeviceNotFound(
-            f"RealSense: pyrealsense2 cannot be imported ({error}); install treadwatch[realsense] and, "
+            f"RealSense: pyrealsense2 cannot be imported ({error}); pip install -e '.[realsense]' and, "
             "on Debian and Ubuntu, the system package libusb-1.0-0"
         ) from error
     return pyrealsense2

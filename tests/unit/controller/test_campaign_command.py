@@ -254,7 +254,7 @@ def test_without_dask_a_scheduler_is_refused_with_what_to_install(tmp_path: Path
 
 @pytest.mark.skipif(
     importlib.util.find_spec("distributed") is None,
-    reason="Dask distributed is not installed: pip install 'treadwatch[campaign]'",
+    reason="Dask distributed is not installed: pip install -e '.[campaign]'",
 )
 @pytest.mark.filterwarnings("default")
 def test_a_local_cluster_finds_what_this_machine_finds(small: Path, tmp_path: Path) -> None:

@@ -211,7 +211,7 @@ def test_a_missing_bag_is_refused(tmp_path: Path) -> None:
 def test_without_rosbags_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = small_bag(tmp_path)
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
-    with pytest.raises(DeviceNotFound, match=r"install treadwatch\[ros\]"):
+    with pytest.raises(DeviceNotFound, match=r"pip install -e '\.\[ros\]'"):
         BagReplay(path)
 
 

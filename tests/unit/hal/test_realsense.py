@@ -199,7 +199,7 @@ def test_intrinsics_are_refused_before_opening() -> None:
 def test_without_the_driver_package_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyrealsense2", None)
     camera = RealsenseCamera(RealsenseCameraConfig(), SimulatedClock())
-    with pytest.raises(DeviceNotFound, match=r"treadwatch\[realsense\].*libusb-1.0-0"):
+    with pytest.raises(DeviceNotFound, match=r"'\.\[realsense\]'.*libusb-1.0-0"):
         camera.__enter__()
 
 
