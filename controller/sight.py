@@ -154,7 +154,9 @@ class Sight:
         px, py = self._lanes[:, first:last]
         forward, band = bands_at(free, pose, self._mount, px, py)
         within = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
-        in_view = (forward > 0.0) & (band == within)
+        # What is too near to be measured was not seen, however far the scan goes beyond it.
+        least_m = free.blind_m + 0.5 * _CELL_M if free.blind_m > 0.0 else 0.0
+        in_view = (forward > least_m) & (band == within)
         # The far edge of a cell, so that a cell is not known for the sake of its beginning.
         far_edge = forward + 0.5 * _CELL_M
         surface_m = np.where(surface_in_corridor, free.nearest_m, np.inf)

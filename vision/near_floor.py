@@ -21,6 +21,7 @@ _NEVER_BEYOND_M = 0.6  # farther away it has another reason; sight.near_m of the
 _MARGIN = 1.15  # the least depth is no sharp line, and the robot shakes
 _SHARE = 0.25  # of a row's cells: so many have to show floor
 _FRAMES_SHARE = 0.1  # so often; a bump, after which the lowest rows look farther, is much shorter
+_FRAMES = 900  # of which that is a share: hours before a pallet are not counted against the floor behind it
 
 
 def floor_depth_m(grid: DepthGrid) -> FloatArray:
@@ -56,6 +57,8 @@ class NearFloor:
             floor = grid.valid[low] & (grid.depth_m[low] <= self._limit_m)
             self._shown += np.count_nonzero(floor, axis=1) >= _SHARE * floor.shape[1]
             self._frames += 1
+            if self._frames >= _FRAMES:
+                self._shown, self._frames = self._shown // 2, self._frames // 2
         often = np.flatnonzero(self._shown > _FRAMES_SHARE * self._frames)
         if len(often) == 0:
             return self._most_m

@@ -45,16 +45,19 @@ class Obstacle:
 class FreeSpace:
     """A scan made of the depth image: what stands between the floor and the robot's height.
 
-    For each of N image columns bands, left to right: bearing_tan (N,) is x/z of its centre in the
+    For each of N upright bands, left to right: bearing_tan (N,) is x/z of its centre in the
     optical frame levelled to the floor; nearest_m (N,) the forward distance z to the nearest
     obstacle surface (inf: none seen); known_m (N,) how far the space was really seen, so that
     whatever lies beyond is unknown and therefore not free. half_width_tan: half a band's width.
+    blind_m: floor in the view nearer than this forward distance was too near to be measured, and is no part
+    of what is known; 0.0: all of it can be measured.
     """
 
     bearing_tan: FloatArray
     half_width_tan: float
     nearest_m: FloatArray
     known_m: FloatArray
+    blind_m: float = 0.0
 
 
 class CameraCondition(Enum):

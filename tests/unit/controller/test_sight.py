@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -174,3 +175,14 @@ def test_unknown_numbers_are_not_free() -> None:
 def test_no_bands_at_all_are_not_free() -> None:
     empty = FreeSpace(np.zeros(0), 0.01, np.zeros(0), np.zeros(0))
     assert Watch().look(empty, times=5).known_s_m < 2.2
+
+
+def test_floor_too_near_to_be_measured_was_not_seen_by_seeing_beyond_it() -> None:
+    """Nor does it become so once the robot stands before it: what was a hole from afar is not free now."""
+    beyond = replace(free(), blind_m=0.6)
+    assert Watch().look(beyond, s_m=8.0, times=5).known_s_m < 8.0 + 0.4 + 0.6
+    watch = Watch()
+    for s_m in np.arange(0.0, 8.0, 0.1):
+        watch.look(beyond, s_m=float(s_m))
+    # Seen from farther away, it stays known.
+    assert watch.look(beyond, s_m=8.0).known_s_m > 15.0

@@ -126,3 +126,22 @@ def test_where_the_lowest_row_shows_floor_there_is_nothing_to_excuse() -> None:
     high = CameraMount(0.45, 0.0, 0.6, 0.07)
     assert learner.unmeasured_m(make_grid(seen_by(high), CONFIG, high), True) == 0.0
     assert learner.unmeasured_m(make_grid(seen_by(high), CONFIG, None), True) == 0.0
+
+
+def test_how_near_the_floor_was_too_near_is_told() -> None:
+    """0.42 m of least depth and a little more, and nothing for a camera that measures all that it sees."""
+    (*_, space) = spaces(*[measured_from(0.42)] * 5)
+    assert 0.42 <= space.blind_m <= 0.6
+    (*_, whole) = spaces(*[measured_from(0.25)] * 5)
+    assert whole.blind_m == 0.0
+
+
+def test_hours_before_a_pallet_are_not_counted_against_the_floor_behind_it() -> None:
+    grid = make_grid(seen_by(LOW), CONFIG, LOW)
+    nothing = make_grid(measured_from(0.9), CONFIG, LOW)
+    near = NearFloor(CONFIG.min_depth_m)
+    for _ in range(20_000):
+        near.unmeasured_m(nothing, trusted=True)
+    assert near.unmeasured_m(nothing, trusted=True) == 0.6
+    told = [near.unmeasured_m(grid, trusted=True) for _ in range(120)]
+    assert told[-1] == 0.0
