@@ -138,8 +138,8 @@ class OutOfView:
             kept &= ~bodies.moving | (
                 since <= np.where(_may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
             )
-            kept &= ~_rests(bodies)
         kept &= ~part_of.any(axis=1)
+        kept &= ~_rests(bodies, kept)
         self._since_s = since[kept]
         self._bodies = self._kept_out(bodies.select(kept), pose, free)
         return self._bodies
@@ -273,10 +273,10 @@ def _alike(bodies: Bodies, seen: Bodies) -> BoolArray:
     return np.asarray(same & (seen.tracked_s > SETTLED_S))
 
 
-def _rests(bodies: Bodies) -> BoolArray:
-    """(N,) strips hardly seen beside another of these that was seen for longer and may go just as they do."""
-    older = bodies.moving & (bodies.tracked_s > SETTLED_S)
-    rests = bodies.moving & ~older & (bodies.half_across_m < _NOBODY_HALF_M)
+def _rests(bodies: Bodies, kept: BoolArray) -> BoolArray:
+    """(N,) strips hardly seen beside one that is kept, was seen for longer and may go just as they do."""
+    older = kept & bodies.moving & (bodies.tracked_s > SETTLED_S)
+    rests = bodies.moving & (bodies.tracked_s <= SETTLED_S) & (bodies.half_across_m < _NOBODY_HALF_M)
     if not (older.any() and rests.any()):
         return np.zeros(len(bodies), np.bool_)
     others = bodies.select(older)

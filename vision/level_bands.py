@@ -19,6 +19,7 @@ from vision.depth_grid import BoolGrid, DepthGrid
 
 BANDS = 80
 _FAN_BANDS = 1.5  # columns will do where no cell is farther than so many bands from where it belongs
+_PITCH_RAD = math.radians(0.1)
 _LEAST_AHEAD = 0.05  # metres along the floor per metre of depth; less is straight down, or behind
 
 
@@ -57,11 +58,12 @@ class LevelBands:
 def level_bands(grid: DepthGrid) -> LevelBands:
     """At most 80 bands across the view of grid; the same object for one camera."""
     x, y = grid.x, grid.y
-    pitch_rad = grid.pitch_rad if math.isfinite(grid.pitch_rad) else None
+    # A camera in the hand has another pitch in each frame: a tenth of a degree is exact enough.
+    pitch_rad = _PITCH_RAD * round(grid.pitch_rad / _PITCH_RAD) if math.isfinite(grid.pitch_rad) else None
     return _bands(float(x[0]), float(x[1] - x[0]), len(x), float(y[0]), float(y[-1]), len(y), pitch_rad)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=64)
 def _bands(
     x0: float, step: float, columns: int, y0: float, y1: float, rows: int, pitch_rad: float | None
 ) -> LevelBands:

@@ -264,6 +264,7 @@ def test_the_last_strip_of_a_walker_to_be_in_view_goes_with_him() -> None:
         pytest.param((WALKER, strip(vy_mps=-1.0, sigma_mps=0.2)), id="goes elsewhere"),
         pytest.param((WALKER, strip(y_m=0.7)), id="not beside him"),
         pytest.param((box(2.0, 1.5), strip()), id="beside what stands"),
+        pytest.param((box(2.0, 0.2, 0.0, 1.0), strip(y_m=0.8)), id="beside who is in view, and has gone"),
     ],
 )
 def test_no_other_strip_does(bodies: tuple[Bodies, ...]) -> None:
