@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from config.camera import CameraConfig
-from config.chassis import ChassisConfig, PlantConfig, RoboteqChassisConfig
+from config.chassis import COMMAND_EARLY, ChassisConfig, PlantConfig, RoboteqChassisConfig
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.loader import Section, load, read_yaml
@@ -87,12 +87,14 @@ def _check_watchdog(chassis: RoboteqChassisConfig, rate_hz: float) -> None:
     """The driver says zero first after half of the watchdog: it must not come to that with every command, or
     the robot is told to stop all the time. Raises ValueError."""
     exchange_ms = 1000.0 / rate_hz
-    apart_ms = exchange_ms * math.ceil(chassis.command_period_ms / exchange_ms - 1e-9)
+    exchanges = math.ceil(COMMAND_EARLY * chassis.command_period_ms / exchange_ms - 1e-9)
+    apart_ms = exchange_ms * max(exchanges, 1)
     if 2.0 * apart_ms >= chassis.watchdog_ms:
         raise ValueError(
             f"chassis.watchdog_ms ({chassis.watchdog_ms}) must be more than twice the {apart_ms:g} ms from "
-            f"one command to the next (chassis.command_period_ms {chassis.command_period_ms}, in whole steps "
-            f"of runner.control_rate_hz {rate_hz:g}): raise it, or command more often"
+            f"one command to the next (chassis.command_period_ms {chassis.command_period_ms}, a quarter "
+            f"early at most, in whole steps of runner.control_rate_hz {rate_hz:g}): raise it, or command "
+            "more often"
         )
 
 

@@ -12,6 +12,9 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from config.loader import Section
 
+# A command may be early by a quarter of its period: a loop with jitter would else miss every other one.
+COMMAND_EARLY = 0.75
+
 CanInterface = Literal["virtual", "udp_multicast", "socketcan", "slcan", "pcan", "gs_usb"]
 
 # Interfaces whose bit rate is set by python-can; SocketCAN's is set with `ip link`, the others have none.

@@ -190,13 +190,14 @@ class GuardedChassis(Enclosing):
 
     def _latch(self, problem: str, now_ns: int) -> None:
         self._violation = problem
+        self._refusal = ""
         self._chassis.stop(now_ns)
 
     def _unlatch_if_followed(self, state: ChassisState) -> None:
         """The driver may refuse the consent: then it ends nothing here either."""
         if state.mode in (ChassisMode.ARMING, ChassisMode.ARMED):
             self._violation = ""
-        elif state.mode not in LATCHED_MODES:  # whose reason is told beside ours
+        elif self._violation and state.mode not in LATCHED_MODES:  # whose reason is told beside ours
             self._refusal = state.reason.rpartition("arming refused: ")[2]
 
     def _told(self, state: ChassisState) -> ChassisState:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +46,10 @@ def recordings_json(records: Sequence[RecordingRecord]) -> list[dict[str, Any]]:
 
 def write_recording_pictures(folder: Path, records: Sequence[RecordingRecord]) -> None:
     """One picture a recording: scene, depth, result. Raises UserError."""
-    for record in records:
+    for record, file in zip(records, _files(records), strict=True):
         if record.pictures:
             image = pictures.scene_depth_result(record.pictures)
-            write_picture(folder / _file(record), image)
+            write_picture(folder / file, image)
 
 
 def recording_lines(records: Sequence[RecordingRecord]) -> list[str]:
@@ -74,15 +75,21 @@ def recording_lines(records: Sequence[RecordingRecord]) -> list[str]:
         "frames with a moving one", "false a minute", "ms a frame, median", "p99",
     )  # fmt: skip
     lines = ["# Recordings", "", " ".join(_WHAT.split()), "", *table(head, rows)]
-    for record in records:
+    for record, file in zip(records, _files(records), strict=True):
         if record.pictures:
             lines += [f"{record.name}: the second frame, and frames with something called moving.", ""]
-            lines += picture(record.name, _file(record))
+            lines += picture(record.name, file)
     return lines
 
 
-def _file(record: RecordingRecord) -> str:
-    return f"recording-{record.name.replace('/', '-')}-{record.odometry}.png"
+def _files(records: Sequence[RecordingRecord]) -> list[str]:
+    """One name for each; numbered where it is taken, as that of a-b is by a/b."""
+    files: list[str] = []
+    for record in records:
+        stem = f"recording-{record.name.replace('/', '-')}-{record.odometry}"
+        names = chain([stem], (f"{stem}-{index}" for index in count(2)))
+        files.append(next(f"{name}.png" for name in names if f"{name}.png" not in files))
+    return files
 
 
 def _percentile(record: RecordingRecord, percent: float) -> float:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from config.chassis import COMMAND_EARLY
 from hal.chassis.tracks import scale_to_fit
 from hal.clocks import NS_PER_MS
 from hal.types import Setpoint
-
-# A due time may be early by a quarter of the period: a loop with jitter would else miss every other one.
-_EARLY = 0.75
 
 
 def is_zero(setpoint: Setpoint | None) -> bool:
@@ -25,7 +23,7 @@ def zero(now_ns: int) -> Setpoint:
 
 def due(last_ns: int | None, period_ns: int, now_ns: int) -> bool:
     """What is sent every period_ns, last at last_ns (None: never), is to be sent now."""
-    return last_ns is None or not 0 <= now_ns - last_ns < _EARLY * period_ns
+    return last_ns is None or not 0 <= now_ns - last_ns < COMMAND_EARLY * period_ns
 
 
 @dataclass(frozen=True, slots=True)

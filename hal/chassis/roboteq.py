@@ -24,15 +24,17 @@ from hal.clocks import NS_PER_MS
 from hal.errors import LinkLost
 from hal.types import ChassisMode, Setpoint
 
-# The counters every other turn. The watchdog is asked for again and again because a restart forgets it.
+# The counters every other turn, ?FF and ?FM every sixth each: the status is as old as the older of the two.
+# The watchdog is asked for again and again because a restart forgets it.
 _BETWEEN = (
     lines.FAULT_FLAGS,
     lines.MOTOR_FLAGS,
     lines.WATCHDOG,
     lines.FAULT_FLAGS,
-    lines.VOLTAGES,
     lines.MOTOR_FLAGS,
+    lines.VOLTAGES,
     lines.FAULT_FLAGS,
+    lines.MOTOR_FLAGS,
     lines.CURRENTS,
 )
 

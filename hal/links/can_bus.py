@@ -7,7 +7,9 @@ command while the program hangs): the control loop sends and receives by itself.
 from __future__ import annotations
 
 import errno
+import termios
 from collections import deque
+from contextlib import suppress
 from typing import Any
 
 import can
@@ -108,6 +110,13 @@ class CanBusLink(ReopeningLink[can.BusABC]):
 
     def _close(self, device: can.BusABC) -> None:
         device.shutdown()
+
+    def _close_lost(self, device: can.BusABC) -> None:
+        if isinstance(device, slcanBus):
+            # An adapter that hung must not send old commands when it wakes.
+            with suppress(OSError, termios.error):
+                device.serialPortOrig.reset_output_buffer()
+        super()._close_lost(device)
 
     def _remedy(self, error: Exception) -> str:
         number = _errno(error)

@@ -19,8 +19,9 @@ class ReopeningLink(ABC, Generic[DeviceT]):
     """After LinkLost the next use opens the device anew, so that a re-plugged adapter is found again; whoever
     uses the link decides how often. where: how messages name it. gone: what closing a lost device may raise.
 
-    slow: opening and closing it may take long, over a network above all. Then both are done by a thread after
-    it was lost, and meanwhile every use raises LinkLost; ``with`` waits.
+    slow: opening and closing it may take long, over a network above all. Then one thread after it was lost
+    closes it and opens it anew, in this order, for what closing says late would reach the new one. Meanwhile
+    every use raises LinkLost; ``with`` waits.
     """
 
     def __init__(self, where: str, gone: tuple[type[Exception], ...], slow: bool = False) -> None:
@@ -35,6 +36,10 @@ class ReopeningLink(ABC, Generic[DeviceT]):
     def __enter__(self) -> Self:
         """Open the device. Raises DeviceNotFound, DeviceRefused."""
         self._closed = False
+        if self._opening is not None:
+            self._opening.abandon()
+            self._opening.wait()
+            self._opening = None
         if self._device is None:
             self._device = self._open()
         return self
@@ -43,9 +48,8 @@ class ReopeningLink(ABC, Generic[DeviceT]):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closed = True
-        opening, self._opening = self._opening, None
-        if opening is not None:
-            opening.abandon()
+        if self._opening is not None:
+            self._opening.abandon()
         device, self._device = self._device, None
         if device is not None:
             self._shut(device)
@@ -57,6 +61,10 @@ class ReopeningLink(ABC, Generic[DeviceT]):
     @abstractmethod
     def _close(self, device: DeviceT) -> None:
         """Close it."""
+
+    def _close_lost(self, device: DeviceT) -> None:
+        """Close one that was lost."""
+        self._close(device)
 
     def _remedy(self, error: Exception) -> str:
         """What to do about a device that worked until this error."""
@@ -85,31 +93,36 @@ class ReopeningLink(ABC, Generic[DeviceT]):
     def _lost(self, doing: str, error: Exception) -> LinkLost:
         device, self._device = self._device, None
         if device is not None and self._slow:
-            threading.Thread(target=self._shut, args=(device,), daemon=True).start()
+            self._opening = _Opening(self, device)
         elif device is not None:
-            self._shut(device)
+            self._shut(device, lost=True)
         self._why = f"{self._where}: lost while {doing} ({reason(error)}); {self._remedy(error)}"
         return LinkLost(self._why)
 
-    def _shut(self, device: DeviceT) -> None:
+    def _shut(self, device: DeviceT, lost: bool = False) -> None:
         try:
-            self._close(device)
+            if lost:
+                self._close_lost(device)
+            else:
+                self._close(device)
         except self._gone as error:
             # It is gone anyway; python-can raises here after an unplug.
             _log.debug("closing %s: %s", self._where, error)
 
 
 class _Opening(Generic[DeviceT]):
-    """One attempt to open a link's device, in a thread that nobody waits for."""
+    """One attempt to open a link's device, in a thread that nobody waits for. lost: is closed before."""
 
-    def __init__(self, link: ReopeningLink[DeviceT]) -> None:
+    def __init__(self, link: ReopeningLink[DeviceT], lost: DeviceT | None = None) -> None:
         self._link = link
+        self._lost = lost
         self._lock = threading.Lock()
         self._wanted = True
         self._device: DeviceT | None = None
         self._error: HalError | None = None
         self.done = False
-        threading.Thread(target=self._run, daemon=True).start()
+        self._thread = threading.Thread(target=self._run, name=f"reopen {link._where}", daemon=True)
+        self._thread.start()
 
     def device(self) -> DeviceT:
         """What was opened, once done. Raises what opening raised."""
@@ -121,14 +134,22 @@ class _Opening(Generic[DeviceT]):
         """Nobody wants it any more: closed now, or as soon as it is open."""
         with self._lock:
             self._wanted = False
-            device = self._device
+            device, self._device = self._device, None
         if device is not None:
             self._link._shut(device)
+
+    def wait(self) -> None:
+        """Until nothing is opened or closed by it any more."""
+        self._thread.join()
 
     def _run(self) -> None:
         device = None
         try:
-            device = self._link._open()
+            lost, self._lost = self._lost, None
+            if lost is not None:
+                self._link._shut(lost, lost=True)
+            if self._wanted:
+                device = self._link._open()
         except HalError as error:
             self._error = error
         finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,8 @@ import yaml
 
 from config.app import load_app, load_replay
 from config.loader import CONFIG_DIR, ConfigError
+from hal.chassis.command import due
+from hal.clocks import NS_PER_MS, NS_PER_S
 
 SIM = yaml.safe_load((CONFIG_DIR / "sim.yaml").read_text())
 
@@ -83,6 +86,12 @@ def test_a_speed_that_the_base_does_not_make_is_refused(
         load_app(written(tmp_path, content))
 
 
+def gap_between_commands_ns(command_period_ms: int, rate_hz: float) -> int:
+    """By the driver's own rule."""
+    exchanges = (round(number * NS_PER_S / rate_hz) for number in count(1))
+    return next(now_ns for now_ns in exchanges if due(0, command_period_ms * NS_PER_MS, now_ns))
+
+
 @pytest.mark.parametrize(
     ("watchdog_ms", "command_period_ms", "rate_hz", "apart_ms"),
     [
@@ -90,10 +99,15 @@ def test_a_speed_that_the_base_does_not_make_is_refused(
         (130, 60, 50.0, None),
         (100, 10, 30.0, None),
         (300, 50, 50.0, None),
-        (100, 50, 50.0, 60),  # every third exchange
+        (100, 30, 40.0, None),  # every exchange, 25 ms
+        (100, 40, 60.0, None),  # every other one, 33 ms
+        (120, 50, 50.0, None),
+        (300, 100, 12.0, None),
+        (100, 60, 50.0, 60),  # every third exchange
         (100, 20, 20.0, 50),
         (200, 20, 10.0, 100),
-        (200, 100, 500.0, 100),
+        (200, 100, 10.0, 100),
+        (150, 100, 500.0, 76),
     ],
 )
 def test_a_roboteq_is_not_told_to_stop_with_every_command(
@@ -102,6 +116,9 @@ def test_a_roboteq_is_not_told_to_stop_with_every_command(
     content = yaml.safe_load((CONFIG_DIR / "hil-roboteq.yaml").read_text())
     content["chassis"] |= {"watchdog_ms": watchdog_ms, "command_period_ms": command_period_ms}
     content["runner"]["control_rate_hz"] = rate_hz
+    gap_ns = gap_between_commands_ns(command_period_ms, rate_hz)
+    assert (2 * gap_ns < watchdog_ms * NS_PER_MS) is (apart_ms is None), "what the driver really does"
+    assert apart_ms in (None, pytest.approx(gap_ns / NS_PER_MS))
     if apart_ms is None:
         load_app(written(tmp_path, content))
         return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from config.app import ReplayConfig
 from controller.cli import cli
 from controller.errors import UserError
 from controller.evaluation.evaluate import EvaluationOptions, choose, run_evaluation
+from controller.evaluation.recording_report import recording_lines, write_recording_pictures
 from controller.evaluation.recordings import distinct_names, evaluate_recording
 from controller.evaluation.sequences import sequences
 from hal.errors import BadRecording
@@ -62,6 +64,17 @@ def test_names_are_as_long_as_it_takes_and_a_recording_given_twice_is_refused() 
     assert distinct_names(folders) == ["a/b/x", "c/b/x", "y"]
     with pytest.raises(UserError, match="/a/b/x: is given twice; once is enough"):
         distinct_names([Path("/a/b/x"), Path("/a/../a/b/x")])
+
+
+def test_each_recording_has_a_picture_of_its_own(tmp_path: Path) -> None:
+    """The name of the folder a/b reads like that of the folder a-b."""
+    one = evaluate_recording(DESK, "none", False, ReplayConfig())
+    records = [replace(one, name=name) for name in ("a/b", "a-b", "c", "a/b")]
+    write_recording_pictures(tmp_path, records)
+    files = [f"recording-{stem}.png" for stem in ("a-b-none", "a-b-none-2", "c-none", "a-b-none-3")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(files)
+    shown = [line for line in recording_lines(records) if line.startswith("![")]
+    assert shown == [f"![{record.name}]({file})" for record, file in zip(records, files, strict=True)]
 
 
 def test_without_static_nothing_is_called_false() -> None:

@@ -234,6 +234,20 @@ def test_a_consent_that_the_driver_refuses_ends_no_latch() -> None:
         assert rig.step().mode is ChassisMode.ARMED
 
 
+def test_a_latch_tells_no_refusal_from_before_it() -> None:
+    """The driver refused a consent while it stopped; what latches later was refused nothing."""
+    with agilex_rig("scripted") as rig:
+        rig.chassis = GuardedChassis(rig.chassis, LIMITS)
+        rig.run(0.2)
+        rig.arm()
+        accelerate(rig, 100)
+        rig.chassis.stop(rig.now_ns)
+        rig.chassis.arm(rig.now_ns)
+        assert rig.step().reason.endswith("arming refused: still stopping")
+        rig.run(2.0)
+        assert rig.step(2.0).reason == "output guard: too fast: 2.000 m/s, at most 1.5"
+
+
 def test_only_what_is_on_the_list_is_sent() -> None:
     wire = ScriptedCanLink()
     with GuardedCanLink(wire, COMMANDS) as link:

@@ -65,6 +65,8 @@ def test_the_governor_s_socket_has_a_folder() -> None:
         assert "path: /run/treadwatch/governor.sock" in text
 
 
-@pytest.mark.parametrize("group", ["ttyUSB", "ttyACM", "ttyS", "ttyAMA", "ttyTHS", "hidraw", "iio"])
-def test_ports_and_gyro_may_be_opened(group: str) -> None:
+@pytest.mark.parametrize(
+    "group", ["ttyUSB", "ttyACM", "ttyS", "ttyAMA", "ttyTHS", "video4linux", "usb_device"]
+)
+def test_ports_and_cameras_may_be_opened(group: str) -> None:
     assert f"DeviceAllow=char-{group} rw" in UNIT.read_text().splitlines()

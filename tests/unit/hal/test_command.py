@@ -55,6 +55,8 @@ def test_what_was_never_sent_is_due_and_what_was_is_so_again_a_period_later() ->
     assert due(None, 20 * MS, 0)
     assert not due(1000 * MS, 20 * MS, 1000 * MS)
     assert not due(1000 * MS, 20 * MS, 1010 * MS)
+    assert not due(1000 * MS, 20 * MS, 1015 * MS - 1)
+    assert due(1000 * MS, 20 * MS, 1015 * MS), "early by a quarter of the period"
     assert due(1000 * MS, 20 * MS, 1020 * MS)
     assert due(1000 * MS, 20 * MS, 999 * MS), "a clock that went back keeps nothing waiting"
 

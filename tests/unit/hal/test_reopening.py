@@ -82,10 +82,11 @@ def test_lost_and_opened_again_without_waiting(link: SlowLink) -> None:
     lost = str(link.lose())
     assert [reason_of(link.use) for _ in range(3)] == [lost] * 3, "under way, and nobody waits"
     link.may_open.set()
-    assert eventually(link.use) == "device 2"
-    assert link.closed == [], "closing is still under way"
+    assert [reason_of(link.use) for _ in range(3)] == [lost] * 3, "closing is still under way"
+    assert (link.opened, link.closed) == (1, [])
     link.may_close.set()
-    wait_until(lambda: link.closed == ["device 1"])
+    assert eventually(link.use) == "device 2"
+    assert link.closed == ["device 1"]
     link.__exit__(None, None, None)
     assert link.closed == ["device 1", "device 2"]
 
@@ -113,3 +114,32 @@ def test_what_opens_after_the_end_is_closed(link: SlowLink, early: bool) -> None
     link.may_open.set()
     wait_until(lambda: sorted(link.closed) == ["device 1", "device 2"])
     assert reason_of(link.use) == "port: the link is closed"
+
+
+def test_the_end_while_the_lost_one_is_closed_opens_nothing(link: SlowLink) -> None:
+    link.may_open.set()
+    link.lose()
+    link.__exit__(None, None, None)
+    assert link.closed == [], "nobody waits"
+    link.may_close.set()
+    wait_until(lambda: not reopening_threads())
+    assert (link.opened, link.closed) == (1, ["device 1"])
+
+
+def test_what_is_begun_again_waits_until_the_lost_one_is_closed(link: SlowLink) -> None:
+    link.may_open.set()
+    link.lose()
+    link.__exit__(None, None, None)
+    again = threading.Thread(target=link.__enter__, daemon=True)
+    again.start()
+    again.join(0.02)
+    assert link.opened == 1
+    link.may_close.set()
+    again.join(PATIENCE_S)
+    assert (link.use(), link.closed) == ("device 2", ["device 1"])
+    link.__exit__(None, None, None)
+    assert link.closed == ["device 1", "device 2"]
+
+
+def reopening_threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "reopen port"]

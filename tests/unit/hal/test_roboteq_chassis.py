@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from hal.types import ChassisMode
@@ -28,7 +30,7 @@ def test_one_motion_line_and_one_question_each_period() -> None:
     motion = f"!M {round(500 - 1000 * half_mps)} {round(500 + 1000 * half_mps)}".encode()
     assert motion == b"!M 378 622"
     asked = set()
-    for _ in range(16):
+    for _ in range(18):
         state = bench.step(0.5, 0.4)
         assert bench.written()[0] == motion
         assert len(bench.written()) == 2
@@ -38,11 +40,23 @@ def test_one_motion_line_and_one_question_each_period() -> None:
     assert asked == {b"?C", b"?FF", b"?FM", b"~RWD", b"?V", b"?A"}
 
 
+@pytest.mark.parametrize(("query", "apart"), [(b"?C", 2), (b"?FF", 6), (b"?FM", 6), (b"~RWD", 18)])
+def test_either_half_of_the_status_is_asked_for_as_often(query: bytes, apart: int) -> None:
+    bench = Bench()
+    bench.arm()
+    asked: list[bytes] = []
+    for _ in range(54):
+        bench.step(0.5)
+        asked.append(bench.written()[1])
+    turns = [turn for turn, question in enumerate(asked) if question == query]
+    assert {later - turn for turn, later in pairwise(turns)} == {apart}
+
+
 def test_hall_sensors_are_asked_for_by_their_own_name() -> None:
     bench = Bench(encoder="hall")
     bench.arm()
     lines: list[bytes] = []
-    for _ in range(16):
+    for _ in range(18):
         bench.step(0.3)
         lines += bench.written()
     assert b"?CB" in lines

@@ -70,6 +70,34 @@ def test_what_a_slcan_adapter_acknowledges_hides_no_frames() -> None:
         assert link.receive() == CanFrame(0x221, b"\xcc")
 
 
+def test_what_waits_to_be_written_is_dropped_with_a_lost_adapter_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One that hung would send old motion frames when it wakes; the last zero of a drive has to arrive."""
+    dropped: list[int] = []
+    flush = termios.tcflush
+
+    def watched(port: int, queue: int) -> None:
+        if queue == termios.TCOFLUSH:
+            dropped.append(queue)
+            raise termios.error(5, "Input/output error")
+        flush(port, queue)
+
+    monkeypatch.setattr(termios, "tcflush", watched)
+    with PseudoTerminal() as adapter:
+        with CanBusLink(slcan(adapter)) as link:
+            link.send(FRAME)
+        assert dropped == []
+        with CanBusLink(slcan(adapter)) as link:
+            adapter.unplug()
+            with pytest.raises(LinkLost, match="lost while receiving"):
+                wait_for(link)
+            give_up_s = time.monotonic() + PATIENCE_S
+            while not dropped and time.monotonic() < give_up_s:
+                time.sleep(0.001)
+    assert dropped == [termios.TCOFLUSH]
+
+
 def hear(adapter: PseudoTerminal, until: bytes) -> bytes:
     """All that the adapter is told, up to these bytes."""
     heard = b""
