@@ -82,6 +82,7 @@ class Attention:
     def __init__(self, config: PerceptionConfig) -> None:
         self._config = config
         self._looked_ns: dict[int, int] = {}
+        self._began_ns: int | None = None
 
     def find(
         self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], bodies: Wanted
@@ -117,12 +118,13 @@ class Attention:
 
     def _next(self, bodies: Wanted, now_ns: int) -> int | None:
         """Index of the body whose turn it is: an urgent one, of these the one that has waited for longest."""
+        # At the very beginning everything is new, and waits for its turn.
+        self._began_ns = now_ns if self._began_ns is None else min(self._began_ns, now_ns)
         ids = bodies.ids.tolist()
         if not ids:
             return None
         self._looked_ns = {one: at for one, at in self._looked_ns.items() if now_ns - at < _IDLE_NS}
-        never_ns = now_ns - 2 * _IDLE_NS
-        waited_ns = np.array([now_ns - self._looked_ns.get(number, never_ns) for number in ids])
+        waited_ns = np.array([now_ns - self._looked_ns.get(number, self._began_ns) for number in ids])
         due = waited_ns >= np.where(bodies.urgent, _URGENT_NS, _IDLE_NS)
         if not due.any():
             return None

@@ -29,6 +29,7 @@ NO_ENDS = np.empty((0, 2, 2), np.float32)
 BODY_M = vector(0.3, 0.5, 0.9)  # 76 px by 137 px at 4 m
 FRONT_M = 4.0
 FRAME_S = 1.0 / 30.0
+NOBODY = Wanted(np.empty(0, np.int64), np.empty((0, 4)), np.empty(0), np.empty(0), np.empty(0, np.bool_))
 
 
 def one_body(depth_m: float = FRONT_M, number: int = 7, urgent: bool = True) -> Wanted:
@@ -54,11 +55,18 @@ def grey_of(frame: RgbdFrame) -> NDArray[np.uint8]:
 def look(frame: RgbdFrame, body: Wanted, attention: Attention | None = None, after_s: float = 0.0) -> int:
     """How many fragments are found after_s later."""
     later = replace(frame, captured_ns=frame.captured_ns + round(after_s * 1e9))
-    return len((attention or Attention(CONFIG)).find(later, grey_of(frame), NO_ENDS, body).ends_px)
+    return len((attention or awake(frame)).find(later, grey_of(frame), NO_ENDS, body).ends_px)
+
+
+def awake(frame: RgbdFrame, config: PerceptionConfig = CONFIG) -> Attention:
+    """One that began a second before this frame, when there was nobody."""
+    attention, earlier = Attention(config), replace(frame, captured_ns=frame.captured_ns - 10**9)
+    attention.find(earlier, grey_of(frame), NO_ENDS, NOBODY)
+    return attention
 
 
 def find(frame: RgbdFrame) -> NewFragments:
-    return Attention(CONFIG).find(frame, grey_of(frame), NO_ENDS, one_body())
+    return awake(frame).find(frame, grey_of(frame), NO_ENDS, one_body())
 
 
 def test_a_body_gets_fragments_of_its_own(frame: RgbdFrame) -> None:
@@ -76,7 +84,7 @@ def test_what_is_at_another_depth_is_not_its_own(frame: RgbdFrame) -> None:
 def test_where_there_is_a_fragment_already_there_is_no_second_one(frame: RgbdFrame) -> None:
     present = find(frame).ends_px
     assert len(present)
-    more = Attention(CONFIG).find(frame, grey_of(frame), present, one_body()).ends_px
+    more = awake(frame).find(frame, grey_of(frame), present, one_body()).ends_px
     gap = np.abs(more.reshape(-1, 1, 2) - present.reshape(1, -1, 2)).max(axis=2)
     assert (gap > 0.0).all()
 
@@ -119,7 +127,7 @@ def test_no_more_than_there_is_room_for(frame: RgbdFrame) -> None:
     taken = np.zeros((20, 2, 2), np.float32)
     for spare, most in ((0, 0), (1, 1), (9, 4)):
         settings = FragmentSettings(max_fragments=20, closer_fragments=spare)
-        attention = Attention(PerceptionConfig(fragments=settings))
+        attention = awake(frame, PerceptionConfig(fragments=settings))
         found = attention.find(frame, grey_of(frame), taken, one_body()).ends_px
         assert len(found) <= most
         assert (len(found) > 0) == (most > 0)
@@ -127,8 +135,18 @@ def test_no_more_than_there_is_room_for(frame: RgbdFrame) -> None:
 
 @pytest.mark.parametrize(("urgent", "pause_s"), [(True, 0.1), (False, 0.5)])
 def test_everybody_is_looked_at_only_now_and_then(frame: RgbdFrame, urgent: bool, pause_s: float) -> None:
-    attention, body = Attention(CONFIG), one_body(urgent=urgent)
+    attention, body = awake(frame), one_body(urgent=urgent)
     assert look(frame, body, attention) > 0
+    assert look(frame, body, attention, pause_s - FRAME_S) == 0
+    assert look(frame, body, attention, pause_s) > 0
+
+
+@pytest.mark.parametrize(("urgent", "pause_s"), [(True, 0.1), (False, 0.5)])
+def test_at_the_very_beginning_everybody_waits_as_long(
+    frame: RgbdFrame, urgent: bool, pause_s: float
+) -> None:
+    attention, body = Attention(CONFIG), one_body(urgent=urgent)
+    assert look(frame, body, attention) == 0
     assert look(frame, body, attention, pause_s - FRAME_S) == 0
     assert look(frame, body, attention, pause_s) > 0
 
@@ -144,7 +162,7 @@ def test_the_urgent_one_comes_first_then_who_has_waited_for_longest(frame: RgbdF
 
     assert look(frame, both(away, here, (False, True))) > 0
     assert look(frame, both(away, here, (True, False))) == 0
-    attention, equal = Attention(CONFIG), both(away, here, (True, True))
+    attention, equal = awake(frame), both(away, here, (True, True))
     assert look(frame, equal, attention) == 0
     assert look(frame, equal, attention, FRAME_S) > 0
     assert look(frame, equal, attention, 2.0 * FRAME_S) == 0  # neither has waited for long
@@ -217,7 +235,7 @@ def witnesses(config: PerceptionConfig, monkeypatch: pytest.MonkeyPatch) -> list
 
 
 def test_the_cameras_motion_does_not_rest_on_witnesses(monkeypatch: pytest.MonkeyPatch) -> None:
-    few = SMALL.fragments.model_copy(update={"max_fragments": 40})
+    few = SMALL.fragments.model_copy(update={"max_fragments": 16})
     found = witnesses(SMALL.model_copy(update={"fragments": few}), monkeypatch)
     assert max(present for present, _ in found) >= 4
     assert max(asked for _, asked in found) == 0
