@@ -33,8 +33,9 @@ _ENOUGH_OF_A_MOVER = 2  # to follow it, its surface helps
 _MIN_CELLS = 12
 _REACH_M = 9.0
 _URGENT_SIGHTINGS = 45  # who is new in view, or under suspicion, is looked at more often
-_URGENT_NS = 100_000_000
-_IDLE_NS = 500_000_000
+# Beside no whole number of frames at 30, 15 or 10 Hz, or the rounding of a stamp would decide.
+_URGENT_NS = 95_000_000
+_IDLE_NS = 495_000_000
 _MARGIN_PX = 6
 _MIN_SIDE_PX = 16
 _MIN_LENGTH = 0.5  # of the length of other fragments
