@@ -263,8 +263,7 @@ class FakeRealsense:
             "depth": FakeStream("Depth", "z16"),
             "gyro": FakeStream("Gyro", "motion_xyz32f", rate=200),
         }
-        self.refuse_video = ""
-        self.refuse_gyro = ""
+        self.refuse_video = self.refuse_gyro = ""
         self.pipelines: list[FakePipeline] = []
         self.configs: list[FakeConfig] = []
         self.gyro_queue = FakeGyroQueue(1, False)
@@ -294,9 +293,8 @@ class FakeRealsense:
             if event.arrival_ms * NS_PER_MS > deadline_ns:
                 break
             self.events.popleft()
-            if self._has_been_replaced():
-                continue
-            self._clock.sleep_until_ns(round(event.arrival_ms * NS_PER_MS))
-            return True, event
+            if not self._has_been_replaced():
+                self._clock.sleep_until_ns(round(event.arrival_ms * NS_PER_MS))
+                return True, event
         self._clock.sleep_until_ns(deadline_ns)
         return False, None

@@ -4,7 +4,6 @@ import grp
 import os
 import termios
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -184,16 +183,17 @@ def test_over_a_network_it_is_opened_again_beside_the_control_loop(
 ) -> None:
     """A host that does not answer is waited for, for seconds."""
     threads: list[threading.Thread] = []
+    opened = threading.Event()
 
     def note(*arguments: object, **options: object) -> None:
         threads.append(threading.current_thread())
+        opened.set()
         raise serial.SerialException("timed out")
 
     monkeypatch.setattr(serial, "serial_for_url", note)
     with pytest.raises(LinkLost):
         SerialPortLink(config(url)).read()
-    while not threads:
-        time.sleep(0.001)
+    assert opened.wait(5.0)
     assert (threads[0] is not threading.current_thread()) is elsewhere
 
 
