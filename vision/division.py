@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.types import FloatArray
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.order import median, quantile, quantiles
 from vision.regions import IntGrid
@@ -20,6 +21,9 @@ WITHIN = 0.9  # of a group of cells: it is seen through another one
 LOW_BESIDE = 0.6  # of the height of a body in the image: a trolley is, a child beside an adult is not
 _STANDING = 0.5  # of the share that would not have stayed
 LOW = 0.5  # of the height of that in the image; somebody behind somebody else is taller
+_DIP_M = 0.15  # between two heads; a shoulder is lower still
+_HEAD_M, _HEAD_WIDTH_M = 0.15, 0.30  # of a head, so much from its top down; a load or a mast is wider
+_LEAST_APART_M, _MOST_APART_M = 0.35, 0.8  # two heads; who walks farther apart leaves a valley
 _HARDLY = 0.2  # of the image between two groups of cells
 _MIN_CELLS = 24
 _BINS = 12
@@ -32,9 +36,10 @@ def split(
 
     The cells are laid along the line on which they spread most (seen from above). Two people leave a
     valley in between; a crate, however wide, does not, and where something nearer fills it, it is none. Nor
-    is it one beside a piece that is too wide for anybody, where nothing is seen in it. What is seen through
-    the larger group is no second body either. Nor is what is low beside it, a trolley before who pushes it,
-    unless it stands: more of it has stayed (h, w) where it was than if it had gone way_m with the track.
+    is it one beside a piece that is too wide for anybody, where nothing is seen in it, unless there are two
+    heads: then it is two, with or without a valley. What is seen through the larger group is no second body
+    either. Nor is what is low beside it, a trolley before who pushes it, unless it stands: more of it has
+    stayed (h, w) where it was than if it had gone way_m with the track.
     """
     cells = np.flatnonzero(labels.ravel() == track + 1)
     if len(cells) < 2 * _MIN_CELLS:
@@ -48,6 +53,34 @@ def split(
     low, high = quantiles(along, (0.03, 0.97))
     if high - low < SINGLE_WIDTH_M:
         return None
+    beyond = _beyond_valley(points, along, low, high)
+    second = _second_head(grid, cells) if beyond is None else beyond
+    if second is None:
+        return None
+    if _seen_through(cells[second], cells[~second], grid.depth_m.shape[1]):
+        return None
+    stays = np.count_nonzero(stayed.ravel().take(cells[second])) / np.count_nonzero(second)
+    stands = stays >= 1.0 - _STANDING * min(way_m / max(float(np.ptp(along[second])), 0.1), 1.0)
+    if not stands and _low_beside(cells[second], cells[~second], grid.depth_m.shape[1]):
+        return None
+    # Two heads are two bodies, however little is seen between these.
+    wide = beyond is not None and _reach(along, second) > SINGLE_WIDTH_M
+    if _hidden_between(grid, cells[second], cells[~second], wide):
+        return None
+    cut_off: NDArray[np.intp] = cells[second]
+    return cut_off
+
+
+def _reach(along: FloatArray, second: NDArray[np.bool_]) -> float:
+    """How far the longer of two groups reaches."""
+    return max(float(np.ptp(along[second])), float(np.ptp(along[~second])))
+
+
+def _beyond_valley(
+    points: FloatArray, along: FloatArray, low: float, high: float
+) -> NDArray[np.bool_] | None:
+    """(K,) which of points (K, 2), seen from above, along (K,) their line, are beyond a valley, the fewer;
+    None: there is none."""
     # A far cell stands for more surface than a near one.
     weight = np.square(points[:, 1])
     counts, edges = np.histogram(along, _BINS, (low, high), weights=weight)
@@ -57,24 +90,54 @@ def split(
     if smooth[valley] > _VALLEY * min(left, right):
         return None
     cut = 0.5 * (edges[valley] + edges[valley + 1])
-    second = along > cut
-    if np.count_nonzero(second) * 2 > len(cells):
-        second = ~second
+    second = _fewer(along > cut)
     if np.count_nonzero(second) < _MIN_CELLS:
         return None
-    if abs(median(along[second]) - median(along[~second])) < _PAIR_DISTANCE_M:
+    apart_m = abs(median(along[second]) - median(along[~second]))
+    return second if apart_m >= _PAIR_DISTANCE_M else None
+
+
+def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] | None:
+    """(K,) which of flat cells (K,), in rising order, are beside a dip between two heads, the fewer; None:
+    there are no two. People who walk so close that their arms touch are still two at the top."""
+    row, column = np.divmod(cells, grid.depth_m.shape[1])
+    column -= column.min()
+    top = np.full(int(column.max()) + 1, len(grid.y) - 1, np.intp)
+    top[column[::-1]] = row[::-1]  # what is written last stays
+    depth_m = median(grid.depth_m.ravel().take(cells))
+    cell_m = float(grid.x[1] - grid.x[0]) * depth_m
+    height_m: FloatArray = -grid.y.take(top).astype(float) * depth_m
+    # One stray cell is no head.
+    height_m[1:-1] = np.median((height_m[:-2], height_m[1:-1], height_m[2:]), axis=0)
+    from_left, from_right = np.maximum.accumulate(height_m), np.maximum.accumulate(height_m[::-1])[::-1]
+    dip_m = np.minimum(from_left, from_right) - height_m
+    deepest_m = dip_m.max()
+    if deepest_m < _DIP_M + cell_m:
         return None
-    if _seen_through(cells[second], cells[~second], grid.depth_m.shape[1]):
+    # In the middle of what is about as low.
+    low = np.flatnonzero(dip_m >= deepest_m - cell_m)
+    valley = int(low[len(low) // 2])
+    one, other = int(height_m[:valley].argmax()), valley + int(height_m[valley:].argmax())
+    if not _LEAST_APART_M <= (other - one) * cell_m <= _MOST_APART_M:
         return None
-    stays = np.count_nonzero(stayed.ravel().take(cells[second])) / np.count_nonzero(second)
-    stands = stays >= 1.0 - _STANDING * min(way_m / max(float(np.ptp(along[second])), 0.1), 1.0)
-    if not stands and _low_beside(cells[second], cells[~second], grid.depth_m.shape[1]):
-        return None
-    wide = max(float(np.ptp(along[second])), float(np.ptp(along[~second]))) > SINGLE_WIDTH_M
-    if _hidden_between(grid, cells[second], cells[~second], wide):
-        return None
-    cut_off: NDArray[np.intp] = cells[second]
-    return cut_off
+    for head in (one, other):
+        if _head_width(height_m, head) * cell_m > _HEAD_WIDTH_M + cell_m:
+            return None
+    second = _fewer(column > valley)
+    return second if np.count_nonzero(second) >= _MIN_CELLS else None
+
+
+def _head_width(height_m: FloatArray, head: int) -> int:
+    """How many columns around head are nearly as high."""
+    high = height_m >= height_m[head] - _HEAD_M
+    right = len(high) if high[head:].all() else head + int(high[head:].argmin())
+    left = 0 if high[: head + 1].all() else head + 1 - int(high[head::-1].argmin())
+    return right - left
+
+
+def _fewer(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(K,) chosen, or the others, whichever are fewer."""
+    return ~chosen if np.count_nonzero(chosen) * 2 > len(chosen) else chosen
 
 
 def _low_beside(small: NDArray[np.intp], large: NDArray[np.intp], width: int) -> bool:

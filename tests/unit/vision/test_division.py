@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from hal.types import FloatArray
 from tests.support.grids import LEVEL_UP, X, grid_of, labelled, nearest, plate
 from vision import division
 from vision.depth_grid import BoolGrid, DepthGrid
@@ -143,3 +144,44 @@ def test_between_a_piece_wider_than_anybody_and_another_something_has_to_be_seen
     body = nearest(left, right, plate(3.0, (-0.3, 0.3), (-0.7, -0.6)))
     depth_m = np.where(body > 0.0, body, behind_m)
     assert (split(grid_of(depth_m), labelled(body > 0.0), 0) is not None) == divided
+
+
+def people(apart_m: float, tall_m: tuple[float, float] = (1.7, 1.7), head_m: float = 0.2) -> FloatArray:
+    """Depth of two, 3 m away, whose heads are apart_m from each other; their bodies, 0.45 m wide, touch."""
+    seen = [plate(3.0, (-apart_m / 2, apart_m / 2), (-0.2, 0.8))]
+    for x_m, height_m in zip((-apart_m / 2, apart_m / 2), tall_m, strict=True):
+        top_m = 0.9 - height_m
+        seen.append(plate(3.0, (x_m - head_m / 2, x_m + head_m / 2), (top_m, top_m + 0.3)))
+        seen.append(plate(3.0, (x_m - 0.225, x_m + 0.225), (top_m + 0.3, 0.9)))
+    return nearest(*seen)
+
+
+@pytest.mark.parametrize(
+    ("apart_m", "tall_m", "head_m", "divided"),
+    [
+        (0.5, (1.7, 1.7), 0.2, True),
+        (0.7, (1.7, 1.5), 0.2, True),
+        (0.9, (1.7, 1.7), 0.2, False),  # whose arms do not touch leaves a valley
+        (0.5, (1.7, 1.7), 0.45, False),  # two loads, not two heads
+        (0.6, (1.7, 0.95), 0.2, False),  # low beside him: what he pushes, and its handle
+    ],
+)
+def test_two_heads_are_two_people_however_close_they_walk(
+    apart_m: float, tall_m: tuple[float, float], head_m: float, divided: bool
+) -> None:
+    depth_m = people(apart_m, tall_m, head_m)
+    second = split(grid_of(depth_m), labelled(depth_m > 0.0), 0)
+    assert (second is not None) == divided
+    if second is not None:
+        columns = second % depth_m.shape[1]
+        side = np.sign(X[columns[0]])
+        assert (np.sign(X[columns]) == side).all()
+        assert len(second) >= 0.8 * np.count_nonzero((depth_m > 0.0) & (np.sign(X) == side)[None, :])
+
+
+def test_an_arm_raised_is_no_second_head() -> None:
+    body, head = plate(3.0, (-0.225, 0.225), (-0.5, 0.9)), plate(3.0, (-0.1, 0.1), (-0.8, -0.5))
+    arms = plate(3.0, (0.225, 0.7), (-0.5, -0.4))
+    for hand in (plate(3.0, (0.6, 0.7), (-0.6, -0.4)), plate(3.0, (0.55, 0.7), (-0.8, -0.4))):
+        depth_m = nearest(body, head, arms, hand)
+        assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
