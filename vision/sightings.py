@@ -67,7 +67,8 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
         doubt = covariance + np.square(shift_m)[:, None, None] * np.eye(3)
     tracks.locate(seen[located], position[located], doubt[located])
     tracks.relocate(seen[cut], position[cut], covariance[cut])
-    tracks.clean_s[seen] = np.where(smooth & measured.tall[seen], tracks.clean_s[seen] + detection.dt_s, 0.0)
+    clean = smooth & measured.whole[seen]
+    tracks.clean_s[seen] = np.where(clean, tracks.clean_s[seen] + detection.dt_s, 0.0)
     tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S
     gain = -math.expm1(-detection.dt_s / _AREA_MEMORY_S)
     tracks.area_m2[seen] = np.where(sliver, usual_m2, usual_m2 + gain * (area_m2 - usual_m2))

@@ -7,7 +7,7 @@ import pytest
 
 from config.perception import DepthNoise
 from tests.support.detections import detection
-from tests.support.grids import grid_of, labelled, plate
+from tests.support.grids import grid_of, labelled, nearest, plate
 from vision import regions, sightings
 from vision.tracks import Tracks
 
@@ -61,3 +61,19 @@ def reaching_in(moving: bool) -> float:
 def test_a_surface_that_is_cut_tells_roughly_of_the_velocity_of_what_is_known_to_move() -> None:
     assert 0.3 < reaching_in(moving=True) < 1.2  # its middle goes half as fast as its rim
     assert reaching_in(moving=False) == 0.0  # of what stands a new rim is no motion
+
+
+@pytest.mark.parametrize(("board_m", "whole"), [(9.0, True), (1.5, False)])
+def test_a_surface_that_something_nearer_reaches_over_tells_nothing_of_its_motion_by_itself(
+    board_m: float, whole: bool
+) -> None:
+    """Somebody who passes before a crate hides more and more of it: its middle goes, but it stands."""
+    tracks = Tracks()
+    tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 0.0, 0)
+    for frame in range(6):
+        crate, board = plate(3.0, (-0.3, 0.3), (-0.3, 0.3)), plate(board_m, (0.12, 1.0), (-1.0, 1.0))
+        depth_m = nearest(crate, board)
+        grid, labels = grid_of(depth_m), labelled(depth_m == 3.0)
+        measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
+        sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
+    assert (tracks.clean_s[0] > 0.1) == whole
