@@ -18,8 +18,8 @@ too fast or too wide to be true prove nothing.
 
 Hysteresis: evidence is a score from 0 to 1.5. A frame with proof raises it by dt / 0.06 s (0.07 s without
 odometry) or more, by 0.5 at most. Without proof it falls by dt / 0.30 s, by dt / 2 s while the motion seems
-to go on, by dt / 0.12 s with proof of standing still. A track becomes moving at 1.0 and static
-again at 0.
+to go on, and by dt / 0.12 s where fragments, or of a mover the filter, prove that it stands still, or where
+nothing tells a mover from what stands around it. A track becomes moving at 1.0 and static again at 0.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.types import FloatArray
 from vision.line_of_sight import Split, second_opinion, split
+from vision.motion_evidence import MotionEvidence
 
 _RISE_S = 0.06
 # Without odometry an error of the camera's motion stays for some frames: one more of them is asked for.
@@ -57,6 +58,7 @@ _ARRIVED_CELLS = 8
 _ARRIVED_SHARE = 0.05
 _MUCH_CELLS = 20
 _MUCH_SHARE = 0.2
+_STANDING_SHARE = 0.6  # of the least speed: what is slower stands
 _KNOWN_SPEED = 2.0  # of the least speed: with less doubt than this, a slow mover has stopped
 IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
 _CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
@@ -68,48 +70,6 @@ _COMPACT_M = 2.2
 _WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
 _SURE_SQUARED_SIGMAS = 30.0
 _LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them is carved out
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MotionEvidence:
-    """Of T tracks, along the axes of the fixed frame.
-
-    sight (T, 3): unit vector from the camera; distance_m (T,); depth_sigma_m (T,): of one pixel's depth
-    there. velocity (T, 3), covariance (T, 3, 3): as filtered. own_velocity, own_covariance: of this
-    frame's fragments alone, from ends (T,) points of which agreement (T,) agree; restless (T,): by these it
-    does not stand still, whether they agree or not; unrest_s (T,): for how long it has not.
-    surface_velocity, surface_covariance: from the surface's centre alone.
-    arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
-    its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
-    another side; growth_mps (T,): how fast its centre may wander because its visible part grows or shrinks.
-    goes (T,): its centre really goes about as fast as the velocity says. up (3,): the floor's normal, None
-    where it is not known. trusted: the camera's motion is known. reckoned: odometry says it, too, not the
-    images alone.
-    """
-
-    sight: FloatArray
-    distance_m: FloatArray
-    depth_sigma_m: FloatArray
-    velocity: FloatArray
-    covariance: FloatArray
-    own_velocity: FloatArray
-    own_covariance: FloatArray
-    surface_velocity: FloatArray
-    surface_covariance: FloatArray
-    ends: NDArray[np.intp]
-    agreement: FloatArray
-    restless: NDArray[np.bool_]
-    unrest_s: FloatArray
-    arrived: NDArray[np.intp]
-    cells: NDArray[np.intp]
-    size_m: FloatArray
-    clean_s: FloatArray
-    view_radps: FloatArray
-    growth_mps: FloatArray
-    goes: NDArray[np.bool_]
-    up: FloatArray | None
-    trusted: bool
-    reckoned: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,8 +124,10 @@ def judge(
     stopped = moving & ~fast & (sigma_mps < _KNOWN_SPEED * read.least_mps)
     rising = possible & ((evident & fast) | (much & ~stopped)) & seen.trusted
     stands = _stands(seen, read)
+    slow = read.speed_mps < _STANDING_SHARE * read.least_mps
+    over = stands | (stopped & slow) | (moving & _lost(seen, read))
     kept = _holds(seen, read, moving) | (possible & _waits(seen, read)) | (seen.restless & ~moving)
-    falling = np.where(stands, dt_s / _STOP_S, np.where(kept, dt_s / _HOLD_S, dt_s / _FALL_S))
+    falling = np.where(over, dt_s / _STOP_S, np.where(kept, dt_s / _HOLD_S, dt_s / _FALL_S))
     change = np.where(rising & ~stands, _rise(seen, read, dt_s), -falling)
     new_evidence = np.minimum(np.maximum(evidence + change, 0.0), _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
@@ -230,7 +192,7 @@ def _holds(seen: MotionEvidence, read: _Reading, moving: NDArray[np.bool_]) -> N
     """(T,) movers that still go, though nothing new proves it."""
     result: NDArray[np.bool_] = (
         moving
-        & (read.speed_mps > 0.6 * read.least_mps)
+        & (read.speed_mps > _STANDING_SHARE * read.least_mps)
         & ((seen.goes & (read.filtered.total > _HOLDING_SQUARED_SIGMAS)) | read.arrived)
     )
     return result
@@ -245,12 +207,21 @@ def _waits(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     return result
 
 
+def _lost(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
+    """(T,) what nothing tells apart from what stands around it, and no fragment tells of: its cells would go
+    on over a wall for as long as its velocity has them go."""
+    result: NDArray[np.bool_] = seen.guessed & (seen.ends == 0) & ~read.arrived
+    return result
+
+
 def _stands(seen: MotionEvidence, read: _Reading) -> NDArray[np.bool_]:
     """(T,) whether this frame's fragments are sure that it stands."""
     speed = np.sqrt(np.square(seen.own_velocity).sum(axis=1))
     sigma = np.sqrt(seen.own_covariance.trace(axis1=1, axis2=2))
     result: NDArray[np.bool_] = (
-        (speed < 0.6 * read.least_mps) & (sigma < 0.5 * read.least_mps) & (read.agreeing >= _ENDS_ACROSS)
+        (speed < _STANDING_SHARE * read.least_mps)
+        & (sigma < 0.5 * read.least_mps)
+        & (read.agreeing >= _ENDS_ACROSS)
     )
     return result
 

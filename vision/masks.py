@@ -160,6 +160,16 @@ def elect(present: NDArray[np.bool_], cast: NDArray[np.intp]) -> Ballot:
     return Ballot(present, cast, ((best + 1) * claimed).astype(np.int32), cast[each, best] * claimed)
 
 
+def guessed(ballot: Ballot, mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(T,) movers, mover (T,), all of whose parts something that stands claims as well: where such a mover
+    ends is a guess."""
+    shared = np.any(ballot.present & ~mover, axis=1, keepdims=True)
+    result: NDArray[np.bool_] = (
+        mover & np.any(ballot.present, axis=0) & ~np.any(ballot.present & ~shared, axis=0)
+    )
+    return result
+
+
 def release(
     ballot: Ballot, cells: NDArray[np.intp], arrived: NDArray[np.intp], mover: NDArray[np.bool_]
 ) -> Ballot:

@@ -29,6 +29,8 @@ from vision.regions import IntGrid, Regions
 BoolArray = NDArray[np.bool_]
 
 _CLOSE_M, _CLOSE_OVERLAPPING_M, _TOUCHING_M, _PIECES_M = 0.25, 0.40, 0.1, 0.8
+_PARTED_M, _SAME_DEPTH_M = 1.0, 0.4  # of pieces one above the other: what parts them hides no more
+_OVER = 0.5  # of the narrower one's width: so much of it is above or below the other
 _SMALL_SHARE = 0.5
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
 _EXACTLY_MPS, _MUCH_MPS = 0.25, 0.4
@@ -43,8 +45,8 @@ class _Pairs:
 
     small_px, large_px (K, 4): their boxes in the image, u0, v0, u1, v1. gap_m (K,): between their boxes in
     space. overlapping (K,): half of the small one's box in the image is within the other. fits (K,): by their
-    size they could be one. perhaps_alike (K,): their velocities do not contradict; much_alike, exactly_alike
-    (K,): they surely go so.
+    size they could be one; slim (K,): together they are no wider than anybody. perhaps_alike (K,): their
+    velocities do not contradict; much_alike, exactly_alike (K,): they surely go so.
     """
 
     small: NDArray[np.intp]
@@ -54,6 +56,7 @@ class _Pairs:
     gap_m: FloatArray
     overlapping: BoolArray
     fits: BoolArray
+    slim: BoolArray
     perhaps_alike: BoolArray
     much_alike: BoolArray
     exactly_alike: BoolArray
@@ -77,7 +80,7 @@ def merges(
         return []
     pairs = _paired(regions, velocity_mps, sigma_mps, small, large)
     one = _beside(pairs) | _carried(pairs) | _seen_through(pairs) | _pushed(pairs)
-    pieces = _pieces(pairs, regions, velocity_mps) & ~one
+    pieces = (_pieces(pairs, regions, velocity_mps) | _above(pairs, regions)) & ~one
     if pieces.any():
         one |= pieces & ~_seen_between(grid, regions, small, large)
     small, large = small[one], large[one]
@@ -114,6 +117,7 @@ def _paired(
     right_m = np.maximum(box.high_m[small, 0], box.high_m[large, 0])
     left_m = np.minimum(box.low_m[small, 0], box.low_m[large, 0])
     overlapping = overlaps(small_px, large_px) >= _OVERLAP
+    slim = right_m - left_m <= SINGLE_WIDTH_M
     return _Pairs(
         small,
         large,
@@ -121,9 +125,8 @@ def _paired(
         large_px,
         gap_m=gaps_m(box, small, box, large),
         overlapping=overlapping,
-        fits=(cells[small] <= _SMALL_SHARE * cells[large])
-        | (right_m - left_m <= SINGLE_WIDTH_M)
-        | overlapping,
+        fits=(cells[small] <= _SMALL_SHARE * cells[large]) | slim | overlapping,
+        slim=slim,
         perhaps_alike=difference <= _MUCH_MPS + _ALIKE_SIGMAS * spread,
         much_alike=known & (difference <= _MUCH_MPS),
         exactly_alike=known & (difference <= _EXACTLY_MPS),
@@ -160,6 +163,18 @@ def _pieces(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolAr
     goes = np.square(velocity_mps[pairs.large]).sum(axis=1) > _GOES_MPS**2
     wide = np.maximum(regions.extent_m[pairs.small, 0], regions.extent_m[pairs.large, 0]) > SINGLE_WIDTH_M
     result: BoolArray = pairs.exactly_alike & goes & wide & (pairs.gap_m <= _PIECES_M)
+    return result
+
+
+def _above(pairs: _Pairs, regions: Regions) -> BoolArray:
+    """(K,) pieces of somebody, one above the other, that together are no wider than anybody, with velocities
+    that do not contradict; one if nothing farther is seen between them."""
+    small_px, large_px = pairs.small_px, pairs.large_px
+    shared_px = np.minimum(small_px[:, 2], large_px[:, 2]) - np.maximum(small_px[:, 0], large_px[:, 0])
+    narrower_px = np.minimum(small_px[:, 2] - small_px[:, 0], large_px[:, 2] - large_px[:, 0])
+    away_m = np.abs(regions.position_m[pairs.small, 2] - regions.position_m[pairs.large, 2])
+    over = (shared_px >= _OVER * narrower_px) & (away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _PARTED_M)
+    result: BoolArray = over & pairs.slim & pairs.perhaps_alike
     return result
 
 

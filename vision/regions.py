@@ -54,6 +54,20 @@ class Regions:
         return self.wide & self.tall & ~self.overlapped
 
 
+def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> Regions:
+    """regions, where chosen (R,) those of others."""
+    return Regions(
+        np.where(chosen, others.cells, regions.cells),
+        np.where(chosen, others.rows, regions.rows),
+        np.where(chosen[:, None], others.bbox_px, regions.bbox_px),
+        np.where(chosen[:, None], others.position_m, regions.position_m),
+        np.where(chosen[:, None], others.extent_m, regions.extent_m),
+        np.where(chosen, others.wide, regions.wide),
+        np.where(chosen, others.tall, regions.tall),
+        np.where(chosen, others.overlapped, regions.overlapped),
+    )
+
+
 def standing(grid: DepthGrid, clearance_m: float) -> BoolGrid:
     """(h, w) cells that stand out of the floor; every valid cell where the floor is not known."""
     if grid.height_m is None or grid.height_sigma_m is None:

@@ -1,9 +1,9 @@
 """track: what was detected -> the Scene. Bodies with stable ids and filtered velocity, moving or static.
 
 Terms (cell, part, track, body, surface, region): vision/__init__.py. Order of the steps: obstacles (velocity
-of fragments), arrivals, regions, masks, grouping (cells to tracks), births, carving, merging, division (cut
-out, join, split), sightings (filters), adoption (fragments to tracks), obstacles (velocity of bodies),
-judgement, report.
+of fragments), arrivals, regions, masks, grouping (cells to tracks), births, carving, grounding, merging,
+division (cut out, reach down, join, split), sightings (filters), adoption (fragments to tracks), obstacles
+(velocity of bodies), judgement, report.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from vision import (
     births,
     carving,
     division,
+    grounding,
     grouping,
     kalman,
     limbs,
@@ -34,7 +35,8 @@ from vision.depth_grid import BoolGrid
 from vision.depth_guard import free_space
 from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
-from vision.judgement import MotionEvidence, judge
+from vision.judgement import judge
+from vision.motion_evidence import MotionEvidence
 from vision.near_floor import NearFloor
 from vision.obstacles import FragmentVelocities
 from vision.percept import Percept
@@ -113,11 +115,11 @@ class Tracker:
         changes = self._free.changes(grid, standing, pose, detection.captured_ns)
         if detection.motion_known or detection.restarted:
             self._free.remember(grid, pose, detection.captured_ns)
-        labels, measured = self._label(detection, standing, changes, velocities, elapsed_s)
+        labels, whole, measured = self._label(detection, standing, changes, velocities, elapsed_s)
         sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
         if tracks.overhead.any():
-            tracks.overhead &= ~births.reaching_down(grid, labels, len(tracks), self._body_height_m)
-        owner = adopt(tracks, detection, labels, owner, self._config.depth_noise)
+            tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
+        owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)
         arrivals = np.bincount(labels[changes.arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
             self._measure_velocities(detection, owner, velocities, arrivals, measured.cells)
@@ -131,8 +133,9 @@ class Tracker:
         changes: Changes,
         velocities: FragmentVelocities,
         elapsed_s: float,
-    ) -> tuple[IntGrid, Regions]:
-        """(h, w) track index + 1 of each cell, after births, and what the tracks' surfaces measure."""
+    ) -> tuple[IntGrid, IntGrid, Regions]:
+        """(h, w) track index + 1 of each cell, after births; the same with what stands below movers given to
+        them, which is no vote in the next frame, and what the tracks' surfaces measure with that."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         mover = tracks.mover
         shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
@@ -147,6 +150,7 @@ class Tracker:
         tracks.hide(hidden)
         came = np.bincount(parts[changes.arrived], minlength=count + 1)[1:]
         ballot = masks.release(ballot, measured.cells, came, mover)
+        tracks.guessed = masks.guessed(ballot, mover)
         bodies = sightings.expected_bodies(tracks, pose, self._config.depth_noise)
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
@@ -156,13 +160,17 @@ class Tracker:
         winner = births.begin(tracks, detection, parts, measured, winner, self._body_height_m, speed_mps)
         labels = masks.divide(parts, predicted, ballot, winner)
         measured = regions.measure(grid, labels, len(tracks))
+        known = len(tracks)
         carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
+        tracks.guessed[known:] = tracks.mover[known:]
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))
-        labels = self._regroup(detection, carved, measured, changes)
+        whole, standing_up = grounding.ground(grid, carved, measured, tracks.guessed, tracks.mover)
+        labels = self._regroup(detection, carved, standing_up, changes)
         if labels is not carved:
             measured = regions.measure(grid, labels, len(tracks))
-        return labels, measured
+            whole, standing_up = grounding.ground(grid, labels, measured, tracks.guessed, tracks.mover)
+        return labels, whole, standing_up
 
     def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes) -> IntGrid:
         """Merge what is one body and split what is two; the same labels where there is nothing to do."""
@@ -245,6 +253,7 @@ class Tracker:
             up=sightings.up(detection),
             view_radps=sightings.view_radps(detection, sight, distance),
             goes=tracks.follow_trails(detection.dt_s),
+            guessed=tracks.guessed,
             trusted=detection.motion_known,
             reckoned=detection.reckoned,
         )

@@ -48,6 +48,9 @@ class Tracks:
             0
         )  # for how long its surface's centre has told of the velocity without a break
         self.sliver = np.empty(0, np.bool_)  # a mover of which hardly anything was left to see
+        self.guessed = np.empty(
+            0, np.bool_
+        )  # a mover that ends in what stands around it where a guess has it
         self.overhead = np.empty(0, np.bool_)  # seen only above the robot; something nearer hides the rest
         # The verdict (vision/judgement.py): the score it rests on, now, ever, how surely (0..1), and whether
         # its fragments are sure that it stands.

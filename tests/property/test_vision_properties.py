@@ -12,8 +12,9 @@ from tests.support.grids import grid_of, plane
 from tests.support.point_motion import static_miss
 from vision import kalman
 from vision.floor import FloorFinder
-from vision.judgement import MotionEvidence, judge
+from vision.judgement import judge
 from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
+from vision.motion_evidence import MotionEvidence
 from vision.perception import Perception
 from vision.scene import Scene
 from vision.velocities import PointMotion, normal_equations
@@ -222,6 +223,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         view_radps=rng.uniform(0.0, 1.0, count),
         growth_mps=rng.uniform(0.0, 1.0, count),
         goes=rng.random(count) < 0.5,
+        guessed=rng.random(count) < 0.5,
         up=np.array([0.0, -1.0, 0.0]) if rng.random() < 0.5 else None,
         trusted=trusted,
         reckoned=bool(rng.random() < 0.5),

@@ -13,7 +13,8 @@ import numpy as np
 
 from config.perception import MotionSettings
 from hal.types import FloatArray
-from vision.judgement import MotionEvidence, Verdict, judge
+from vision.judgement import Verdict, judge
+from vision.motion_evidence import MotionEvidence
 
 SETTINGS = MotionSettings(max_speed_mps=1.5, min_speed_mps=0.15, sigmas=4.0)
 DT_S = 0.05
@@ -54,6 +55,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),
         goes=np.array([True]),
+        guessed=np.array([False]),
         up=LEVEL_UP,
         trusted=True,
         reckoned=True,

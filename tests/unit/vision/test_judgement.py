@@ -25,7 +25,8 @@ from tests.support.judging import (
     surface,
     verdict,
 )
-from vision.judgement import MotionEvidence, judge
+from vision.judgement import judge
+from vision.motion_evidence import MotionEvidence
 
 
 def test_nothing_said_is_nothing_proved() -> None:

@@ -20,7 +20,8 @@ from tests.support.judging import (
     rises,
     verdict,
 )
-from vision.judgement import MotionEvidence, Verdict, judge
+from vision.judgement import Verdict, judge
+from vision.motion_evidence import MotionEvidence
 
 
 def rise_s(seen: MotionEvidence) -> float:
@@ -84,8 +85,9 @@ def test_moving_from_full_evidence_on_until_none_is_left() -> None:
     few, step = by_fragments(ACROSS, 4), min(DT_S / PLAIN_S, 0.5)
     assert not verdict(few, 0.99 - step).moving[0]
     assert verdict(few, 1.01 - step).moving[0]
-    assert verdict(one(), 0.2, True).moving[0]
-    assert not verdict(one(), 0.1, True).moving[0]
+    doubtful = one(ACROSS, covariance=covariance(0.2))
+    assert verdict(doubtful, 0.2, True).moving[0]
+    assert not verdict(doubtful, 0.1, True).moving[0]
 
 
 def test_evidence_has_a_ceiling() -> None:
@@ -98,7 +100,7 @@ def test_without_new_proof_a_fast_mover_is_held_for_long() -> None:
 
 @pytest.mark.parametrize(
     "seen",
-    [one((0.12, 0.0, 0.0)), one(ACROSS, covariance=covariance(0.2))],
+    [one((0.13, 0.0, 0.0)), one(ACROSS, covariance=covariance(0.2))],
     ids=["slow", "doubtful"],
 )
 def test_a_mover_that_is_slow_or_doubtful_is_not_held(seen: MotionEvidence) -> None:
@@ -138,6 +140,27 @@ def test_fragments_that_stand_still_end_a_motion_fastest() -> None:
         {"own_velocity": np.array([[0.13, 0.0, 0.0]])},  # more than 0.6 of 0.21
     ):
         assert verdict(replace(stopped, **changes), 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 2.0)
+
+
+def test_a_filter_that_knows_that_it_stands_ends_a_motion_as_fast() -> None:
+    stopped = one((0.12, 0.0, 0.0), covariance=covariance(0.05))  # sigma 0.39 m/s, less than twice 0.21
+    assert verdict(stopped, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 0.12)
+    for changes in (
+        {"velocity": np.array([[0.13, 0.0, 0.0]])},  # more than 0.6 of 0.21
+        {"covariance": covariance(0.065)},  # sigma 0.44 m/s
+    ):
+        assert verdict(replace(stopped, **changes), 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 0.3)
+    assert verdict(stopped, 0.5, False).evidence[0] == pytest.approx(0.5 - DT_S / 0.3)  # it never went
+
+
+def test_nothing_holds_a_mover_that_nothing_tells_from_what_stands_around_it() -> None:
+    """Its cells would go on over the wall that it went by, and bear out the velocity that has them go."""
+    ghost = one(ACROSS, guessed=np.array([True]))
+    assert verdict(ghost, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 0.12)
+    told = replace(ghost, ends=np.array([2]), agreement=np.array([1.0]))
+    for seen in (told, replace(ghost, arrived=np.array([10])), one(ACROSS)):
+        assert verdict(seen, 1.0, True).evidence[0] >= 1.0 - DT_S / 2.0 - 1e-9
+    assert verdict(ghost, 0.5, False).evidence[0] == pytest.approx(0.5 - DT_S / 0.3)
 
 
 def test_a_verdict_tells_who_stands_for_sure() -> None:

@@ -49,3 +49,17 @@ def test_who_is_in_sight_somewhere_else_is_not_hidden() -> None:
     left, lost = masks.withdraw(before, parts, labelled(*expected), parts > 0, OVERDUE, MOVES)
     np.testing.assert_array_equal(left.present, [[True, False], [False, True]])
     assert not lost.any()
+
+
+def test_a_mover_ends_where_a_guess_has_it_if_what_stands_claims_all_of_its_parts() -> None:
+    expected = (PART > 0) & ~HALF, HALF
+    both = vote(*expected, mover=(False, True))
+    np.testing.assert_array_equal(masks.guessed(both, MOVES), [False, True])
+    np.testing.assert_array_equal(masks.guessed(both, np.array([True, True])), [False, False])
+    # Some of it is seen by itself.
+    parts = labelled(block((10, 30), (10, 50)), block((35, 45), (10, 20)))
+    seen = vote((parts == 1) & ~HALF, HALF | (parts == 2), mover=(False, True), parts=parts)
+    np.testing.assert_array_equal(masks.guessed(seen, MOVES), [False, False])
+    # Who claims nothing ends nowhere.
+    alone = vote(PART > 0, np.zeros_like(HALF), mover=(False, True))
+    np.testing.assert_array_equal(masks.guessed(alone, MOVES), [False, False])

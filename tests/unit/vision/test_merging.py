@@ -151,5 +151,27 @@ def test_pieces_of_something_wide_with_nothing_seen_between_them_are_one() -> No
     assert merged(REAR, WHEEL, behind_m=0.0, velocity=[(0.29, 0.0, 0.0)] * 2) == []
 
 
+LEGS = Body(0.0, y=0.6, z=4.0, height=0.6, cells=200)
+HEAD = Body(0.05, y=-0.55, z=4.1, width=0.2, height=0.25, cells=40)  # 0.72 m above the legs
+
+
+def test_pieces_one_above_the_other_with_nothing_farther_seen_between_them_are_one() -> None:
+    """Somebody behind a board, of whom head and legs are seen."""
+    assert merged(LEGS, HEAD, behind_m=2.0) == [(1, 0)]
+    assert merged(LEGS, HEAD, behind_m=4.1) == [(1, 0)]
+    assert merged(LEGS, HEAD, behind_m=0.0) == [(1, 0)]
+    assert merged(LEGS, HEAD, behind_m=6.0) == []  # whoever is seen over him stands behind him
+    assert merged(LEGS, replace(HEAD, z=4.35), behind_m=2.0) == [(1, 0)]
+    assert merged(LEGS, replace(HEAD, z=4.45), behind_m=2.0) == []
+    assert merged(LEGS, replace(HEAD, y=-0.8), behind_m=2.0) == [(1, 0)]  # 0.98 m
+    assert merged(LEGS, replace(HEAD, y=-0.9), behind_m=2.0) == []  # 1.08 m
+    assert merged(LEGS, replace(HEAD, x=0.2), behind_m=2.0) == [(1, 0)]
+    assert merged(LEGS, replace(HEAD, x=0.25), behind_m=2.0) == []  # less than half of it above the legs
+    wide = replace(LEGS, x=0.25, width=0.9)  # together wider than anybody
+    assert merged(wide, HEAD, behind_m=2.0, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == []
+    assert merged(LEGS, HEAD, behind_m=2.0, velocity=[(0.8, 0.0, 0.0), (-0.8, 0.0, 0.0)]) == []
+    assert merged(LEGS, HEAD, behind_m=2.0, velocity=[(0.8, 0.0, 0.0), (0.5, 0.0, 0.0)]) == [(1, 0)]
+
+
 def test_tracks_that_are_not_seen_take_no_part() -> None:
     assert merged(PERSON, Body(0.45, y=-0.3, width=0.3, height=0.3, cells=0)) == []
