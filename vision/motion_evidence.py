@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from config.perception import DepthNoise
 from hal.types import FloatArray
+from vision import sightings
+from vision.depth_mask import depth_sigma_m
+from vision.detection import Detection
+from vision.limbs import believable, restless
+from vision.obstacles import BodyVelocities
+from vision.tracks import Tracks
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,3 +59,44 @@ class MotionEvidence:
     up: FloatArray | None
     trusted: bool
     reckoned: bool
+
+
+def evidence_of(
+    tracks: Tracks,
+    detection: Detection,
+    body: BodyVelocities,
+    goes: NDArray[np.bool_],
+    arrived: NDArray[np.intp],
+    cells: NDArray[np.intp],
+    noise: DepthNoise,
+) -> MotionEvidence:
+    """What detection, and body, the velocities of the tracks by their fragments, say of the tracks, whose
+    filters have taken these in. goes, arrived and cells (T,): see MotionEvidence."""
+    rotation = detection.pose.rotation
+    sight, distance_m = tracks.sight(detection.pose.translation_m)
+    return MotionEvidence(
+        sight=sight,
+        distance_m=distance_m,
+        depth_sigma_m=np.asarray(depth_sigma_m(distance_m, noise), np.float64),
+        velocity=tracks.state[:, 3:],
+        covariance=tracks.covariance[:, 3:, 3:],
+        own_velocity=body.velocity_mps @ rotation.T,
+        own_covariance=rotation @ body.covariance @ rotation.T,
+        surface_velocity=tracks.surface_state[:, 3:],
+        surface_covariance=tracks.surface_covariance[:, 3:, 3:],
+        ends=np.where(believable(body), body.ends, 0),
+        agreement=body.agreement,
+        restless=restless(body),
+        unrest_s=tracks.unrest_s,
+        arrived=arrived,
+        cells=cells,
+        size_m=tracks.extent_m.max(axis=1),
+        clean_s=tracks.clean_s,
+        growth_mps=tracks.growth_mps,
+        up=sightings.up(detection),
+        view_radps=sightings.view_radps(detection, sight, distance_m),
+        goes=goes,
+        guessed=tracks.guessed,
+        trusted=detection.motion_known,
+        reckoned=detection.reckoned,
+    )

@@ -33,10 +33,9 @@ from vision.arrivals import Changes, FreeMemory
 from vision.attention import wanted
 from vision.depth_grid import BoolGrid
 from vision.depth_guard import free_space
-from vision.depth_mask import depth_sigma_m
 from vision.detection import Detection
 from vision.judgement import judge
-from vision.motion_evidence import MotionEvidence
+from vision.motion_evidence import evidence_of
 from vision.near_floor import NearFloor
 from vision.obstacles import FragmentVelocities
 from vision.percept import Percept
@@ -135,7 +134,24 @@ class Tracker:
         elapsed_s: float,
     ) -> tuple[IntGrid, IntGrid, Regions]:
         """(h, w) track index + 1 of each cell, after births; the same with what stands below movers given to
-        them, which is no vote in the next frame, and what the tracks' surfaces measure with that."""
+        them, which is no vote in the next frame; and what the tracks' surfaces measure with that."""
+        tracks, grid = self._tracks, detection.grid
+        labels = self._claim(detection, standing, changes, elapsed_s)
+        measured = regions.measure(grid, labels, len(tracks))
+        known = len(tracks)
+        carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
+        tracks.guessed[known:] = tracks.mover[known:]
+        if carved is not labels:
+            measured = regions.measure(grid, carved, len(tracks))
+        whole, upright = grounding.ground(grid, carved, measured, tracks.guessed, tracks.mover)
+        labels = self._regroup(detection, carved, upright, changes)
+        if labels is not carved:
+            measured = regions.measure(grid, labels, len(tracks))
+            whole, upright = grounding.ground(grid, labels, measured, tracks.guessed, tracks.mover)
+        return labels, whole, upright
+
+    def _claim(self, detection: Detection, standing: BoolGrid, changes: Changes, elapsed_s: float) -> IntGrid:
+        """(h, w) track index + 1 of each cell, by what each track covered in the frame before; births."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         mover = tracks.mover
         shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
@@ -158,19 +174,7 @@ class Tracker:
         winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, alive, expected)
         speed_mps = self._config.motion.max_speed_mps
         winner = births.begin(tracks, detection, parts, measured, winner, self._body_height_m, speed_mps)
-        labels = masks.divide(parts, predicted, ballot, winner)
-        measured = regions.measure(grid, labels, len(tracks))
-        known = len(tracks)
-        carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
-        tracks.guessed[known:] = tracks.mover[known:]
-        if carved is not labels:
-            measured = regions.measure(grid, carved, len(tracks))
-        whole, standing_up = grounding.ground(grid, carved, measured, tracks.guessed, tracks.mover)
-        labels = self._regroup(detection, carved, standing_up, changes)
-        if labels is not carved:
-            measured = regions.measure(grid, labels, len(tracks))
-            whole, standing_up = grounding.ground(grid, labels, measured, tracks.guessed, tracks.mover)
-        return labels, whole, standing_up
+        return masks.divide(parts, predicted, ballot, winner)
 
     def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes) -> IntGrid:
         """Merge what is one body and split what is two; the same labels where there is nothing to do."""
@@ -227,36 +231,10 @@ class Tracker:
                 rotation @ noise @ rotation.T,
                 3,
             )
-        restless = limbs.restless(body)
-        longer = np.where(restless, detection.dt_s, -detection.dt_s)
+        longer = np.where(limbs.restless(body), detection.dt_s, -detection.dt_s)
         tracks.unrest_s = np.maximum(tracks.unrest_s + longer, 0.0)
-        sight, distance = tracks.sight(detection.pose.translation_m)
-        seen = MotionEvidence(
-            sight=sight,
-            distance_m=distance,
-            depth_sigma_m=np.asarray(depth_sigma_m(distance, self._config.depth_noise), np.float64),
-            velocity=tracks.state[:, 3:],
-            covariance=tracks.covariance[:, 3:, 3:],
-            own_velocity=body.velocity_mps @ rotation.T,
-            own_covariance=rotation @ body.covariance @ rotation.T,
-            surface_velocity=tracks.surface_state[:, 3:],
-            surface_covariance=tracks.surface_covariance[:, 3:, 3:],
-            ends=np.where(use, body.ends, 0),
-            agreement=body.agreement,
-            restless=restless,
-            unrest_s=tracks.unrest_s,
-            arrived=arrivals,
-            cells=cells,
-            size_m=tracks.extent_m.max(axis=1),
-            clean_s=tracks.clean_s,
-            growth_mps=tracks.growth_mps,
-            up=sightings.up(detection),
-            view_radps=sightings.view_radps(detection, sight, distance),
-            goes=tracks.follow_trails(detection.dt_s),
-            guessed=tracks.guessed,
-            trusted=detection.motion_known,
-            reckoned=detection.reckoned,
-        )
+        goes = tracks.follow_trails(detection.dt_s)
+        seen = evidence_of(tracks, detection, body, goes, arrivals, cells, self._config.depth_noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
         tracks.unproven_s = np.where(verdict.proven, 0.0, tracks.unproven_s + detection.dt_s)
