@@ -76,7 +76,10 @@ class SightConfig(Section):
 
     range_m: float = Field(default=10.0, gt=0.5, le=100, description="beyond it nothing is seen for certain")
     near_m: float = Field(
-        default=1.3, ge=0, le=10, description="ahead of the camera, nearer than this the floor is not seen"
+        default=1.3,
+        ge=0,
+        le=10,
+        description="ahead of the camera, nearer than this the floor is not seen (nor below its view)",
     )
     stale_s: float = Field(default=0.3, gt=0, le=5, description="an older scene leads to a stop")
     blind_s: float = Field(

@@ -159,7 +159,8 @@ def _row(name: str, value: float, unit: str, note: str) -> str:
 def _not_covered(config: AppConfig) -> Iterator[str]:
     sight = config.decision.sight
     yield "Not covered: the sides and the rear; what comes into view nearer than S_n; glass and mirrors"
-    yield f"that give a false depth; low things nearer than {sight.near_m:g} m to the camera that were never"
-    yield f"seen; what is nearer than {config.perception.min_depth_m:g} m; obstacles faster than V_o."
+    yield f"that give a false depth; low things nearer than {sight.near_m:g} m to the camera, or below its"
+    yield f"view, that were never seen; what is nearer than {config.perception.min_depth_m:g} m; obstacles"
+    yield "faster than V_o."
     yield "This is no safety rating: it does not replace a certified detection of persons (ISO 3691-4)"
     yield "nor an emergency stop."

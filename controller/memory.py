@@ -61,10 +61,11 @@ _APART_SIGMAS = 2.0
 
 class OutOfView:
     """Call leaving, then update, once a scene. near_m: nearer than this ahead of the camera the floor is not
-    seen. max_obstacle_speed_mps: a velocity that was measured as much greater is a mistake."""
+    seen; to be set before, where the scene tells. max_obstacle_speed_mps: a velocity that was measured as
+    much greater is a mistake."""
 
     def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
-        self._mount, self._near_m = mount, near_m
+        self._mount, self.near_m = mount, near_m
         self._mistaken_mps = IMPLAUSIBLE * max_obstacle_speed_mps
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
@@ -193,7 +194,7 @@ class OutOfView:
 
     def _lowest_seen_m(self, ahead_m: FloatArray) -> FloatArray:
         """(N,) height of the lower edge of the view at ahead_m (N,)."""
-        return self._mount.height_m * (1.0 - ahead_m / self._near_m)
+        return self._mount.height_m * (1.0 - ahead_m / self.near_m)
 
     def _hidden(self, bodies: Bodies, pose: PlanarPose, edge_tan: float) -> BoolArray:
         """(N,) beside the view or below it, and not yet behind the camera by more than a robot's length."""
@@ -202,7 +203,7 @@ class OutOfView:
         ahead = dx * cos + dy * sin - self._mount.forward_m
         left = dy * cos - dx * sin - self._mount.left_m
         near_face = ahead - bodies.half_view_m
-        below = (near_face < self._near_m) & (bodies.top_m < self._lowest_seen_m(near_face) + _UNCERTAIN_M)
+        below = (near_face < self.near_m) & (bodies.top_m < self._lowest_seen_m(near_face) + _UNCERTAIN_M)
         # At the edge of the view it may be outside by what is not known of it: of who goes, more and more.
         late_m = np.where(bodies.moving, _EDGE_MPS * bodies.unseen_s, 0.0)
         edge_m = edge_tan * np.maximum(ahead, 0.0) - _EDGE_M - late_m

@@ -24,6 +24,7 @@ from vision.scene import FreeSpace
 _CELL_M = 0.2
 _NEVER_NS = -(2**62)
 _LANES = 5
+_MOST_CONSENT_M = 2.5
 # One frame's outlier must not brake; three frames of five are a tenth of a second.
 _FRAMES = 5
 
@@ -47,7 +48,8 @@ class Sight:
         self._lanes = self._lanes_of(self._cells)
         self._seen_ns = np.full(len(self._cells), _NEVER_NS, np.int64)
         # Under the nose and beside it nothing can be seen: what the robot stands before is free by consent.
-        self._consent_s_m = start_s_m + mount.forward_m + self._sight.near_m + _CELL_M
+        self._near_m = self._sight.near_m
+        self._consent_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = math.inf
         self.surface_s_m = math.inf
@@ -66,6 +68,7 @@ class Sight:
     ) -> None:
         """Take in one scene. surfaces: those of free. pose, s_m: of the robot when it was captured. standing:
         it was at rest then."""
+        self._take_near(free.floor_from_m)
         bands, forward, points = surfaces.bands, surfaces.forward_m, surfaces.points_m
         surface_s, surface_d = self._corridor.path.project_points(
             points, s_m, s_m + self._sight.range_m + 2.0
@@ -93,6 +96,14 @@ class Sight:
         in_corridor[bands] = inside
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
+    def _take_near(self, floor_from_m: float) -> None:
+        """What is below the view of a camera that is higher than usual cannot be seen before the start
+        either; a stretch that is too long for consent stays unknown."""
+        near_m = min(max(self._sight.near_m, floor_from_m), max(self._sight.near_m, _MOST_CONSENT_M))
+        if near_m > self._near_m:
+            self._consent_s_m += near_m - self._near_m
+            self._near_m = near_m
+
     def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
         nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
         self._nearest.append(nearest)
@@ -100,7 +111,7 @@ class Sight:
         steady = sorted(self._nearest)[len(self._nearest) // 2]
         # What goes out of sight below the camera because the robot drives on is still there; what goes while
         # the robot stands has gone away.
-        blind_s_m = s_m + self._mount.forward_m + self._sight.near_m
+        blind_s_m = s_m + self._mount.forward_m + self._near_m
         if standing or self._held_s_m < s_m:
             self._held_s_m = math.inf
         elif steady > before + _CELL_M and before < blind_s_m:
@@ -124,7 +135,7 @@ class Sight:
         memory_ns = round(self._sight.memory_s * NS_PER_S)
         fresh = self._seen_ns >= captured_ns - memory_ns
         # Too near to be seen again: what was once seen free stays so, others' bodies are watched elsewhere.
-        near = self._cells <= s_m + self._mount.forward_m + self._sight.near_m + _CELL_M
+        near = self._cells <= s_m + self._mount.forward_m + self._near_m + _CELL_M
         known = fresh | (near & (self._seen_ns > _NEVER_NS)) | (self._cells <= self._consent_s_m)
         unknown = (~known[first:]).nonzero()[0]
         self.known_s_m = float(self._cells[first + unknown[0]]) - 0.5 * _CELL_M if len(unknown) else math.inf

@@ -128,13 +128,12 @@ class StandingLimits:
     def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:
         """(N,) where to stand before a body: so that it is still seen, and seen to leave; never nearer than
         stop_m, which a camera that looks down steeply would allow."""
-        sight = self._config.sight
         visible_m = visible_from_m(
-            bodies, placed.d_m[:, 0], known.edge_tan, sight.near_m, self._mount.height_m
+            bodies, placed.d_m[:, 0], known.edge_tan, known.near_m, self._mount.height_m
         )
         front_m = known.corridor.front_m - self._mount.forward_m
         stop_m = self._config.margins.stop_m
-        return np.clip(visible_m - front_m, stop_m, max(sight.near_m, stop_m))
+        return np.clip(visible_m - front_m, stop_m, max(known.near_m, stop_m))
 
     def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:
         """A young obstacle may be confirmed first while an emergency stop fits even if it came at V_o."""

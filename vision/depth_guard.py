@@ -33,16 +33,16 @@ def free_space(
     known. unmeasured_m: floor nearer than this depth cannot be measured (vision/near_floor.py), and no data
     there is no hole; 0.0: all can. Without a known mounting, space is known up to the nearest surface only.
     """
-    bands, blind_m = level_bands(grid), 0.0
+    bands, blind_m, floor_from_m = level_bands(grid), 0.0, 0.0
     nearest = _nearest_m(grid, obstacle, bands)
     if math.isfinite(grid.pitch_rad):
-        known, blind_m = _known_m(grid, bands, max_depth_m, unmeasured_m)
+        known, blind_m, floor_from_m = _known_m(grid, bands, max_depth_m, unmeasured_m)
         # What stands there hides what is behind it.
         known = np.where(np.isfinite(nearest), nearest, known)
     else:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     known = np.minimum(known, max_depth_m)
-    return FreeSpace(bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m)
+    return FreeSpace(bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, floor_from_m)
 
 
 def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: LevelBands) -> FloatArray:
@@ -79,15 +79,16 @@ def _nearest_fanned_m(
 
 def _known_m(
     grid: DepthGrid, bands: LevelBands, max_depth_m: float, unmeasured_m: float
-) -> tuple[FloatArray, float]:
-    """(B,) how far the floor, or something on it, was seen without a hole; and FreeSpace.blind_m."""
+) -> tuple[FloatArray, float, float]:
+    """(B,) how far the floor, or something on it, was seen without a hole; and FreeSpace.blind_m and
+    floor_from_m."""
     cos_pitch, sin_pitch = math.cos(grid.pitch_rad), math.sin(grid.pitch_rad)
     y = grid.y.astype(float)
     drop = y * cos_pitch + sin_pitch
     below = drop > grid.camera_height_m / (1.5 * max_depth_m)
     rows = np.flatnonzero(below)[::-1]  # from the bottom of the image outwards
     if len(rows) == 0:
-        return np.zeros(len(bands)), 0.0
+        return np.zeros(len(bands)), 0.0, 0.0
     floor_depth = grid.camera_height_m / drop[rows]
     floor_forward = floor_depth * (cos_pitch - y[rows] * sin_pitch)
     limit_m = (FLOOR_EXCESS * floor_depth).astype(np.float32)
@@ -114,4 +115,4 @@ def _known_m(
     known = np.minimum(reach[first], max_depth_m)
     nowhere = (first == 0) | (blank > 0) & (~shown.any(axis=0) | (shown.argmax(axis=0) >= first))
     blind_m = float(floor_forward[blank - 1]) if blank else 0.0
-    return np.where(nowhere, 0.0, known).astype(float), blind_m
+    return np.where(nowhere, 0.0, known).astype(float), blind_m, float(floor_forward[0])

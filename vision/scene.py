@@ -50,7 +50,8 @@ class FreeSpace:
     obstacle surface (inf: none seen); known_m (N,) how far the space was really seen, so that
     whatever lies beyond is unknown and therefore not free. half_width_tan: half a band's width.
     blind_m: floor in the view nearer than this forward distance was too near to be measured, and is no part
-    of what is known; 0.0: all of it can be measured.
+    of what is known; 0.0: all of it can be measured. floor_from_m: nearer than this forward distance the
+    floor is below the view, however far known_m reaches; 0.0: not known.
     """
 
     bearing_tan: FloatArray
@@ -58,6 +59,7 @@ class FreeSpace:
     nearest_m: FloatArray
     known_m: FloatArray
     blind_m: float = 0.0
+    floor_from_m: float = 0.0
 
 
 class CameraCondition(Enum):

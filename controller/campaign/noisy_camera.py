@@ -77,6 +77,8 @@ class NoisyCamera:
         self._random = np.random.default_rng((seed, 0xCA))
         self._glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
         self._scanned = stage.in_height & ~self._glass
+        # What hangs above the robot is no obstacle.
+        self._listed = ~self._glass & (stage.world.z_m[:, 0] < stage.robot.body.height_m)
         self._to_optical = camera_in_body(mount_of(stage.robot)).rotation.T
         low_m, high_m = stage.world.z_m.T
         self._height_m, self._middle_m = high_m - low_m, 0.5 * (low_m + high_m) - mount.height_m
@@ -125,7 +127,7 @@ class NoisyCamera:
         noise = self._noise
         missed = self._random.random(len(self._ids)).tolist()
         hits = np.where(view.forward_m >= self._least_m, view.forward_m, np.inf)
-        rows = ((hits.min(axis=1) < np.inf) & ~self._glass[view.bodies]).nonzero()[0]
+        rows = ((hits.min(axis=1) < np.inf) & self._listed[view.bodies]).nonzero()[0]
         z = hits.take(rows, 0)
         shown = z < np.inf
         x = z * self.eye.bearing_tan
@@ -233,7 +235,8 @@ class NoisyCamera:
         known = np.minimum(np.minimum(np.minimum(view.free_m, hidden), eye.range_m), nearest)
         blind = nearest < self._least_m
         nearest, known = np.where(blind, np.inf, nearest), np.where(blind, 0.0, known)
-        return FreeSpace(eye.bearing_tan, eye.half_width_tan, nearest, known)
+        floor_from_m = eye.floor_from_m
+        return FreeSpace(eye.bearing_tan, eye.half_width_tan, nearest, known, floor_from_m=floor_from_m)
 
 
 def mount_of(robot: Robot) -> CameraMount:

@@ -30,7 +30,8 @@ class PlanarView:
 
 
 class PlanarEye:
-    """The pinhole of a camera, its height and pitch. bearing_tan (B,): right over forward of each band."""
+    """The pinhole of a camera, its height and pitch. bearing_tan (B,): right over forward of each band.
+    floor_from_m: how far ahead the floor comes into view; 0.0: it never does."""
 
     def __init__(self, world: PlanarWorld, camera: SimulatedCameraConfig, mount: Mount) -> None:
         self._world, self._mount = world, mount
@@ -43,6 +44,7 @@ class PlanarEye:
         down = math.atan((camera.height - 0.5 - camera.cy) / camera.fy) + mount.pitch_rad
         up = math.atan((camera.cy + 0.5) / camera.fy) - mount.pitch_rad
         self._down_tan, self._up_tan = math.tan(down), math.tan(up)
+        self.floor_from_m = mount.height_m / self._down_tan if self._down_tan > 0.0 else 0.0
         z_m = world.z_m
         self._hides = (z_m[:, 0] < mount.height_m) & (z_m[:, 1] > mount.height_m)
         # The outlines of all bodies and, at the end, of the building; each closed by its first corner.

@@ -140,6 +140,12 @@ def test_what_the_robot_can_drive_over_or_under_is_no_surface() -> None:
         assert np.isinf(scenes(stage(body), 1, QUIET)[0].free_space.nearest_m).all()
 
 
+@pytest.mark.parametrize(("under_m", "listed"), [(0.79, True), (0.81, False)])
+def test_what_hangs_above_the_robot_is_no_obstacle(under_m: float, listed: bool) -> None:
+    hangs = crate(5.0).model_copy(update={"z_m": under_m})
+    assert any(one.obstacles for one in scenes(stage(hangs), 5, QUIET)) == listed
+
+
 def test_of_what_is_nearer_than_the_least_depth_nothing_is_measured() -> None:
     """A crate of 0.6 m before a camera that sits 0.45 m ahead of the robot's middle."""
     for gap_m, seen in ((CAMERA.depth_min_m + 0.02, True), (CAMERA.depth_min_m - 0.02, False)):

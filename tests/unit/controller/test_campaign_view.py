@@ -91,3 +91,15 @@ def test_the_free_way_ends_at_what_hides_it_and_at_the_wall() -> None:
     assert view.free_m[ahead] == pytest.approx(4.5)
     wall = ~np.isfinite(distances(view)) & (np.abs(eye.bearing_tan) < 0.45)
     assert view.free_m[wall] == pytest.approx(60.0, abs=4.0)
+
+
+@pytest.mark.parametrize(("height_m", "pitch_deg"), [(0.6, 4.0), (1.1, 15.0)])
+def test_the_floor_comes_into_view_where_the_lower_edge_of_the_image_meets_it(
+    height_m: float, pitch_deg: float
+) -> None:
+    eye, _ = look(crate(5.0), mount=Mount(forward_m=0.0, height_m=height_m, pitch_deg=pitch_deg))
+    camera = SimulatedCameraConfig()
+    down_rad = math.atan((camera.height - 0.5 - camera.cy) / camera.fy) + math.radians(pitch_deg)
+    assert eye.floor_from_m == pytest.approx(height_m / math.tan(down_rad))
+    upwards, _ = look(crate(5.0), mount=Mount(forward_m=0.0, height_m=height_m, pitch_deg=-40.0))
+    assert upwards.floor_from_m == 0.0

@@ -186,3 +186,28 @@ def test_floor_too_near_to_be_measured_was_not_seen_by_seeing_beyond_it() -> Non
         watch.look(beyond, s_m=float(s_m))
     # Seen from farther away, it stays known.
     assert watch.look(beyond, s_m=8.0).known_s_m > 15.0
+
+
+def test_what_is_below_the_view_of_a_high_camera_is_free_by_consent_at_the_start_only() -> None:
+    """1.9 m ahead of it the floor comes into view, and not 1.3 m."""
+    high, blind = replace(free(), floor_from_m=1.9), replace(free(known_m=0.0), floor_from_m=1.9)
+    assert Watch().look(replace(blind, floor_from_m=1.0)).known_s_m == pytest.approx(0.4 + 1.3 + 0.2, abs=0.2)
+    watch = Watch()
+    assert watch.look(blind, times=5).known_s_m == pytest.approx(0.4 + 1.9 + 0.2, abs=0.2)
+    watch.look(high)
+    # Seen free once, it stays so while it is too near to be seen again; what never was does not.
+    assert watch.look(blind, s_m=1.0, times=60).known_s_m == pytest.approx(1.0 + 0.4 + 1.9 + 0.2, abs=0.2)
+    assert Watch().look(blind, s_m=3.0).known_s_m < 3.1
+
+
+def test_no_camera_is_so_high_that_much_of_the_way_is_free_unseen() -> None:
+    assert Watch().look(replace(free(known_m=0.0), floor_from_m=6.0)).known_s_m < 0.4 + 2.5 + 0.5
+
+
+def test_a_surface_that_sinks_below_the_view_of_a_high_camera_is_still_there() -> None:
+    for floor_from_m, held in ((0.0, False), (1.9, True)):
+        watch = Watch()
+        near = replace(free(1.6, 1.6), floor_from_m=floor_from_m)  # farther than 1.3 m
+        assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(3.0, abs=0.1)
+        after = watch.look(replace(free(), floor_from_m=floor_from_m), s_m=1.3, times=5)
+        assert (after.surface_s_m < 4.0) == held

@@ -266,3 +266,19 @@ def test_the_whole_view_is_scanned_at_848_pixels_too() -> None:
     assert space.bearing_tan[0] - space.half_width_tan <= -edge + 0.01
     assert space.bearing_tan[-1] + space.half_width_tan >= edge - 0.01
     np.testing.assert_allclose(space.nearest_m, 3.0, atol=0.1)
+
+
+@pytest.mark.parametrize(("height_m", "pitch_deg"), [(0.6, 4.0), (1.1, 15.0), (0.3, 0.0)])
+def test_where_the_floor_comes_into_view_is_told(height_m: float, pitch_deg: float) -> None:
+    """By the middle of the lowest row of cells, somewhat above the image's edge."""
+    mount = CameraMount(0.0, 0.0, height_m, math.radians(pitch_deg))
+    down_rad = math.atan((VGA.height - 0.5 - VGA.cy) / VGA.fy) + mount.pitch_rad
+    edge_m = height_m / math.tan(down_rad)
+    assert edge_m < space_of(frame_of(floor(), mount), mount).floor_from_m < 1.05 * edge_m
+
+
+def test_where_no_floor_is_in_view_or_the_mounting_is_not_known_none_comes() -> None:
+    up = CameraMount(0.0, 0.0, 0.6, math.radians(-40.0))
+    assert space_of(frame_of(floor()), up).floor_from_m == 0.0
+    unknown = Perception(PerceptionConfig(), None, ROBOT_HEIGHT_M, clearance_m=0.05)
+    assert unknown.perceive(frame_of(floor()), None, None).scene.free_space.floor_from_m == 0.0

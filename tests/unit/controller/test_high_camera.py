@@ -1,0 +1,67 @@
+"""A camera that is high above the robot's nose: low things sink below its view far ahead of the robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from config.decision import DecisionConfig
+from config.robot import Body, Mount, Robot
+from controller.campaign.judge import judge
+from controller.campaign.noise_mission import drive_noise
+from controller.campaign.policies import build_policy
+from controller.campaign.stage import Stage
+from controller.campaign.task import yardstick
+from controller.knowledge import Knowledge
+from controller.path import OnPath
+from hal.types import PlanarPose
+from sim.families import generate
+from tests.support.campaign import CONFIG
+from tests.support.deciding import MOUNT, PATH, obstacle
+from tests.support.scenes import free_space, scene
+
+FRAME_NS = 100_000_000
+HERE, START = PlanarPose(0.0, 0.0, 0.0), OnPath(0.0, 0.0, 0.0)
+LONG = Robot(
+    body=Body(width_m=1.0, length_m=1.8, rear_m=0.7, height_m=1.2),
+    limits=CONFIG.robot.limits,
+    camera_mount=Mount(forward_m=1.0, height_m=1.1, pitch_deg=15.0),
+)
+
+
+def after_a_pallet(floor_from_m: float) -> Knowledge:
+    """What is known when a pallet 1.55 m ahead of the camera is seen no longer, by a robot that drives."""
+    known = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    space = replace(free_space(), floor_from_m=floor_from_m)
+    pallet = obstacle(2.0, 0.1, size_m=(0.5, 0.1))
+    for number, seen in enumerate([(pallet,), ()]):
+        known.update(scene(number * FRAME_NS, number, seen, space), HERE, START, 1.0, number * FRAME_NS)
+    return known
+
+
+@pytest.mark.parametrize(("floor_from_m", "near_m"), [(0.0, 1.3), (1.2, 1.3), (1.9, 1.9)])
+def test_what_sinks_below_the_view_is_kept_however_far_ahead_the_view_begins(
+    floor_from_m: float, near_m: float
+) -> None:
+    known = after_a_pallet(floor_from_m)
+    assert known.near_m == near_m
+    assert known.remembered.tolist() == ([True] if floor_from_m > 1.6 else [])
+
+
+def test_where_the_view_begins_is_known_on_the_next_path_too() -> None:
+    on = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    on.go_on_from(after_a_pallet(1.9))
+    assert on.near_m == 1.9
+
+
+@pytest.mark.parametrize("seed", [6100000, 6100001, 6100003])
+def test_a_long_robot_with_a_high_camera_does_not_drive_over_a_pallet(seed: int) -> None:
+    """It crept up to the pallet until that was below its view, forgot it, and drove over it."""
+    config = CONFIG.model_copy(update={"robot": LONG})
+    stage = Stage(generate("low_pallet", seed), LONG)
+    log = drive_noise(stage, config, build_policy("ours", config, stage))
+    row = judge(stage, log, "ours", "noise", yardstick(stage, config))
+    assert row.contacts == 0
+    assert not row.reached
+    assert log.s_m[-1] > 3.0
