@@ -35,7 +35,8 @@ class Bodies:
     ids (N,). xy_m (N, 2) centre. velocity_mps (N, 2) over ground, 0 for what stands; measured_mps (N, 2) as
     perception says, whether it stands or moves. surprise_mps (N, 2) by how much the newest measurement
     differs from velocity_mps. covariance (N, 2, 2) of the velocity. half_view_m, half_across_m (N,) half
-    sizes along and across view_rad (N,), the direction it was seen in. top_m (N,) height. moving (N,).
+    sizes along and across view_rad (N,), the direction it was seen in. top_m, bottom_m (N,) over the
+    floor. moving (N,).
     age_s, unseen_s (N,) since they were seen first and last, at captured_ns. tracked_s (N,) since they were
     seen first under this number: for so long velocities were measured.
     """
@@ -51,6 +52,7 @@ class Bodies:
     half_across_m: FloatArray
     view_rad: FloatArray
     top_m: FloatArray
+    bottom_m: FloatArray
     moving: NDArray[np.bool_]
     age_s: FloatArray
     unseen_s: FloatArray
@@ -96,6 +98,7 @@ _NOBODY = Bodies(
     half_across_m=np.zeros(0),
     view_rad=np.zeros(0),
     top_m=np.zeros(0),
+    bottom_m=np.zeros(0),
     moving=np.zeros(0, np.bool_),
     age_s=np.zeros(0),
     unseen_s=np.zeros(0),
@@ -148,6 +151,7 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
         half_across_m=extent[:, 0] / 2.0,
         view_rad=np.full(len(moving), pose.heading_rad),
         top_m=position[:, 2] + extent[:, 1] / 2.0,
+        bottom_m=position[:, 2] - extent[:, 1] / 2.0,
         moving=moving,
         age_s=seen_s[:, 0],
         unseen_s=seen_s[:, 1],

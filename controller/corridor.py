@@ -23,7 +23,7 @@ class Corridor:
 
     def __init__(self, path: Path, body: Body) -> None:
         self.path = path
-        self.front_m, self.rear_m = body.front_m, body.rear_m
+        self.front_m, self.rear_m, self.height_m = body.front_m, body.rear_m, body.height_m
         overhang_m = max(body.front_m, body.rear_m)
         self._s = np.arange(-overhang_m, path.length_m + overhang_m + _STEP_M, _STEP_M)
         # A bend is felt from where the front enters it until the tail has left it.

@@ -8,6 +8,7 @@ can be relied on: the field fault. controller/appraise.py makes speed limits of 
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import replace
 
@@ -50,7 +51,7 @@ class Knowledge:
     surfaces: P points (P, 2) that depth saw, and how far it saw in each of B bands (controller/surfaces.py).
     corridor: what the robot sweeps along the path; sight: what was seen of that. edge_tan: how far the camera
     looks to either side, as the tangent of the angle. near_m: nearer than this ahead of it the floor is below
-    its view.
+    its view; up_tan: so much a metre rises the upper edge of that.
 
     age_s: since the newest scene was captured; since_s: since the one that bodies are of, which was taken in
     while the camera could be trusted; inf: none yet. health: of the camera in the newest scene. fault: why
@@ -80,7 +81,7 @@ class Knowledge:
         self._boxes = no_bodies(0)
         self._steady = SteadyVelocities()
         self._memory = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
-        self.edge_tan, self.near_m = 0.5, config.sight.near_m
+        self.edge_tan, self.near_m, self.up_tan = 0.5, config.sight.near_m, math.inf
         # Of the last scenes: when they were captured, and floor points (K, 2) where something was.
         self._places: deque[tuple[int, FloatArray]] = deque()
         self._captured_ns: int | None = None
@@ -102,7 +103,8 @@ class Knowledge:
         self._seen, self._boxed = before._seen, before._boxed
         self._steady, self._memory, self._places = before._steady, before._memory, before._places
         self._poses, self.surfaces = before._poses, before.surfaces
-        self.health, self.edge_tan, self.near_m = before.health, before.edge_tan, before.near_m
+        self.health, self.edge_tan = before.health, before.edge_tan
+        self.near_m, self.up_tan = before.near_m, before.up_tan
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
 
     @property
@@ -171,6 +173,7 @@ class Knowledge:
                 float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
             )
         self.near_m = self._memory.near_m = max(self._config.sight.near_m, scene.free_space.floor_from_m)
+        self.up_tan = self._memory.up_tan = scene.free_space.up_tan
         self.surfaces = surfaces = surfaces_of(scene.free_space, pose, self._mount, self._noise)
         boxes = self._steady.update(self._recognise(seen.select(boxed)))
         boxes = self._memory.leaving(boxes, pose, self.edge_tan)

@@ -1,4 +1,4 @@
-"""Bodies that have left the camera's view but are still there: under the robot's nose and beside the view.
+"""Bodies that have left the camera's view but are still there: under the robot's nose, beside or above it.
 
 A body of the last scene that is missing in this one is kept while its place is outside the view:
 
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from controller.bodies import Bodies, no_bodies
 from controller.limits import LEAVES_ASLANT
+from controller.view_edges import UNCERTAIN_M, highest_seen_m, lowest_seen_m
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.judgement import IMPLAUSIBLE
@@ -38,8 +39,6 @@ _SAME_PLACE_M = 0.25
 # What was seen for less than this is not believed once it is gone.
 SETTLED_S = 0.5
 _MOVING_KEPT_S, _MAY_COME_KEPT_S = 2.0, 6.0
-# The height of what is seen only in part is known no better.
-_UNCERTAIN_M = 0.1
 _EDGE_M, _EDGE_MPS = 0.3, 0.15
 # So far from the middle of the view stays whoever has not been seen to come in.
 _MIDDLE_M = 0.1
@@ -61,11 +60,11 @@ _APART_SIGMAS = 2.0
 
 class OutOfView:
     """Call leaving, then update, once a scene. near_m: nearer than this ahead of the camera the floor is not
-    seen; to be set before, where the scene tells. max_obstacle_speed_mps: a velocity that was measured as
-    much greater is a mistake."""
+    seen; up_tan: so much a metre rises the upper edge of its view. Both to be set before, where the scene
+    tells. max_obstacle_speed_mps: a velocity that was measured as much greater is a mistake."""
 
     def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
-        self._mount, self.near_m = mount, near_m
+        self._mount, self.near_m, self.up_tan = mount, near_m, math.inf
         self._mistaken_mps = IMPLAUSIBLE * max_obstacle_speed_mps
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
@@ -171,12 +170,12 @@ class OutOfView:
         offset = bodies.xy_m - (pose.x_m, pose.y_m)
         ahead, left = offset @ forward - self._mount.forward_m, offset @ leftward - self._mount.left_m
         near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
-        tall = bodies.top_m >= self._lowest_seen_m(near) + _UNCERTAIN_M
+        within = ~self._beyond_edges(bodies, near)
         side = np.where(left < 0.0, -1.0, 1.0)
         inner = side * left - bodies.half_across_m
         xy, velocity = bodies.xy_m.copy(), bodies.velocity_mps.copy()
         covariance, unseen_s = bodies.covariance.copy(), bodies.unseen_s.copy()
-        for k in np.flatnonzero(bodies.moving & tall & (near > 0.0)).tolist():
+        for k in np.flatnonzero(bodies.moving & within & (near > 0.0)).tolist():
             from_tan = float(min(inner[k] / near[k], inner[k] / far[k]))
             outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
             late_m = outside_m - inner[k]
@@ -192,23 +191,27 @@ class OutOfView:
             unseen_s[k] = 0.0
         return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
 
-    def _lowest_seen_m(self, ahead_m: FloatArray) -> FloatArray:
-        """(N,) height of the lower edge of the view at ahead_m (N,)."""
-        return self._mount.height_m * (1.0 - ahead_m / self.near_m)
+    def _beyond_edges(self, bodies: Bodies, near_face_m: FloatArray) -> BoolArray:
+        """(N,) below the view or above it, where they begin near_face_m (N,) ahead of the camera."""
+        height_m = self._mount.height_m
+        lowest_m = lowest_seen_m(near_face_m, height_m, self.near_m) + UNCERTAIN_M
+        highest_m = highest_seen_m(near_face_m, height_m, self.up_tan) - UNCERTAIN_M
+        below = (near_face_m < self.near_m) & (bodies.top_m < lowest_m)
+        beyond: BoolArray = below | (bodies.bottom_m > highest_m)
+        return beyond
 
     def _hidden(self, bodies: Bodies, pose: PlanarPose, edge_tan: float) -> BoolArray:
-        """(N,) beside the view or below it, and not yet behind the camera by more than a robot's length."""
+        """(N,) beside, below or above the view, and not behind the camera by more than a robot's length."""
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         dx, dy = bodies.xy_m[:, 0] - pose.x_m, bodies.xy_m[:, 1] - pose.y_m
         ahead = dx * cos + dy * sin - self._mount.forward_m
         left = dy * cos - dx * sin - self._mount.left_m
         near_face = ahead - bodies.half_view_m
-        below = (near_face < self.near_m) & (bodies.top_m < self._lowest_seen_m(near_face) + _UNCERTAIN_M)
         # At the edge of the view it may be outside by what is not known of it: of who goes, more and more.
         late_m = np.where(bodies.moving, _EDGE_MPS * bodies.unseen_s, 0.0)
         edge_m = edge_tan * np.maximum(ahead, 0.0) - _EDGE_M - late_m
         beside = np.abs(left) > edge_m
-        hidden: BoolArray = (below | beside) & (ahead > -2.0)
+        hidden: BoolArray = (self._beyond_edges(bodies, near_face) | beside) & (ahead > -2.0)
         return hidden
 
 
@@ -289,13 +292,3 @@ def _missing(ids: NDArray[np.int64], among: NDArray[np.int64]) -> BoolArray:
     """(N,) which are not among the others; for a few, a table is faster than sorting."""
     missing: BoolArray = (ids[:, None] != among).all(axis=1)
     return missing
-
-
-def visible_from_m(
-    bodies: Bodies, side_m: FloatArray, edge_tan: float, near_m: float, height_m: float
-) -> FloatArray:
-    """(N,) how far ahead of the camera a body has to be so that it is seen: its middle within the edges of
-    the view, its upper part above the lower one. side_m (N,): its middle beside the camera's axis."""
-    lowest = np.clip(1.0 - (bodies.top_m - _UNCERTAIN_M) / height_m, 0.0, 1.0)
-    visible: FloatArray = np.maximum(np.abs(side_m) / max(edge_tan, 0.1), near_m * lowest)
-    return visible

@@ -17,6 +17,7 @@ from controller.blind_corners import BlindCorners
 from controller.bodies import Bodies
 from controller.corridor import Corridor
 from controller.surfaces import Surfaces, bands_at
+from controller.view_edges import above_from_m
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -48,7 +49,7 @@ class Sight:
         self._lanes = self._lanes_of(self._cells)
         self._seen_ns = np.full(len(self._cells), _NEVER_NS, np.int64)
         # Under the nose and beside it nothing can be seen: what the robot stands before is free by consent.
-        self._near_m = self._sight.near_m
+        self._near_m, self._above_m = self._sight.near_m, 0.0
         self._consent_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = math.inf
@@ -68,7 +69,7 @@ class Sight:
     ) -> None:
         """Take in one scene. surfaces: those of free. pose, s_m: of the robot when it was captured. standing:
         it was at rest then."""
-        self._take_near(free.floor_from_m)
+        self._take_edges(free)
         bands, forward, points = surfaces.bands, surfaces.forward_m, surfaces.points_m
         surface_s, surface_d = self._corridor.path.project_points(
             points, s_m, s_m + self._sight.range_m + 2.0
@@ -96,22 +97,24 @@ class Sight:
         in_corridor[bands] = inside
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
-    def _take_near(self, floor_from_m: float) -> None:
+    def _take_edges(self, free: FreeSpace) -> None:
         """What is below the view of a camera that is higher than usual cannot be seen before the start
         either; a stretch that is too long for consent stays unknown."""
-        near_m = min(max(self._sight.near_m, floor_from_m), max(self._sight.near_m, _MOST_CONSENT_M))
+        most_m = max(self._sight.near_m, _MOST_CONSENT_M)
+        near_m = min(max(self._sight.near_m, free.floor_from_m), most_m)
         if near_m > self._near_m:
             self._consent_s_m += near_m - self._near_m
             self._near_m = near_m
+        self._above_m = above_from_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
 
     def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
         nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
         self._nearest.append(nearest)
         before = self.surface_s_m
         steady = sorted(self._nearest)[len(self._nearest) // 2]
-        # What goes out of sight below the camera because the robot drives on is still there; what goes while
-        # the robot stands has gone away.
-        blind_s_m = s_m + self._mount.forward_m + self._near_m
+        # What goes out of sight below or above the view because the robot drives on is still there; what goes
+        # while the robot stands has gone away.
+        blind_s_m = s_m + self._mount.forward_m + max(self._near_m, self._above_m)
         if standing or self._held_s_m < s_m:
             self._held_s_m = math.inf
         elif steady > before + _CELL_M and before < blind_s_m:

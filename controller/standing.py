@@ -14,8 +14,8 @@ from controller.bodies import Bodies
 from controller.corridor import Corridor, Placed, place
 from controller.knowledge import Knowledge
 from controller.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
-from controller.memory import visible_from_m
 from controller.outline import outline_of
+from controller.view_edges import visible_from_m
 from hal.types import CameraMount, FloatArray
 
 _INSIDE_BODY_M = 0.05
@@ -129,7 +129,7 @@ class StandingLimits:
         """(N,) where to stand before a body: so that it is still seen, and seen to leave; never nearer than
         stop_m, which a camera that looks down steeply would allow."""
         visible_m = visible_from_m(
-            bodies, placed.d_m[:, 0], known.edge_tan, known.near_m, self._mount.height_m
+            bodies, placed.d_m[:, 0], known.edge_tan, known.near_m, self._mount.height_m, known.up_tan
         )
         front_m = known.corridor.front_m - self._mount.forward_m
         stop_m = self._config.margins.stop_m

@@ -22,6 +22,7 @@ _HOLE_ROWS = 2
 # Band and distance in one whole number: 80 bands, and up to 64 m in steps of 4 micrometres.
 _BAND_SHIFT = 24
 _UNITS_PER_M = 2.0**18
+_UPRIGHT_RAD = 1.5
 
 
 def free_space(
@@ -42,7 +43,17 @@ def free_space(
     else:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     known = np.minimum(known, max_depth_m)
-    return FreeSpace(bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, floor_from_m)
+    return FreeSpace(
+        bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, floor_from_m, _up_tan(grid)
+    )
+
+
+def _up_tan(grid: DepthGrid) -> float:
+    """FreeSpace.up_tan, of the uppermost row of cells."""
+    if not math.isfinite(grid.pitch_rad):
+        return math.inf
+    up_rad = math.atan(-float(grid.y[0])) - grid.pitch_rad
+    return math.tan(min(up_rad, _UPRIGHT_RAD))
 
 
 def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: LevelBands) -> FloatArray:

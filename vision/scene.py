@@ -5,6 +5,7 @@ Positions and velocities are in the camera optical frame (x right, y down, z for
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -51,7 +52,8 @@ class FreeSpace:
     whatever lies beyond is unknown and therefore not free. half_width_tan: half a band's width.
     blind_m: floor in the view nearer than this forward distance was too near to be measured, and is no part
     of what is known; 0.0: all of it can be measured. floor_from_m: nearer than this forward distance the
-    floor is below the view, however far known_m reaches; 0.0: not known.
+    floor is below the view, however far known_m reaches; 0.0: not known. up_tan: by so much a metre of
+    forward distance the upper edge of the view rises from the camera's height; inf: not known.
     """
 
     bearing_tan: FloatArray
@@ -60,6 +62,7 @@ class FreeSpace:
     known_m: FloatArray
     blind_m: float = 0.0
     floor_from_m: float = 0.0
+    up_tan: float = math.inf
 
 
 class CameraCondition(Enum):

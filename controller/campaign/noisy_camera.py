@@ -73,7 +73,7 @@ class NoisyCamera:
         self._ego_motion = EgoMotion(unmoved, self._period_s, "none", math.nan, math.nan, math.nan)
         mount = stage.robot.camera_mount
         self._mount = mount
-        self.eye = PlanarEye(stage.world, camera, mount)
+        self.eye = PlanarEye(stage.world, camera, mount, stage.robot.body.height_m)
         self._random = np.random.default_rng((seed, 0xCA))
         self._glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
         self._scanned = stage.in_height & ~self._glass
@@ -235,8 +235,14 @@ class NoisyCamera:
         known = np.minimum(np.minimum(np.minimum(view.free_m, hidden), eye.range_m), nearest)
         blind = nearest < self._least_m
         nearest, known = np.where(blind, np.inf, nearest), np.where(blind, 0.0, known)
-        floor_from_m = eye.floor_from_m
-        return FreeSpace(eye.bearing_tan, eye.half_width_tan, nearest, known, floor_from_m=floor_from_m)
+        return FreeSpace(
+            eye.bearing_tan,
+            eye.half_width_tan,
+            nearest,
+            known,
+            floor_from_m=eye.floor_from_m,
+            up_tan=eye.up_tan,
+        )
 
 
 def mount_of(robot: Robot) -> CameraMount:

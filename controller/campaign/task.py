@@ -54,7 +54,9 @@ def yardstick(stage: Stage, config: AppConfig) -> Yardstick:
         + 1.0 / config.runner.control_rate_hz
         + config.decision.chassis_delay_s
     )
-    return Yardstick(best, PlanarEye(stage.world, config.camera, config.robot.camera_mount), reaction_s)
+    robot = config.robot
+    eye = PlanarEye(stage.world, config.camera, robot.camera_mount, robot.body.height_m)
+    return Yardstick(best, eye, reaction_s)
 
 
 def _run(task: Task, stage: Stage, policy: str, by: Yardstick) -> Row:

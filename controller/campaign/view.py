@@ -31,9 +31,16 @@ class PlanarView:
 
 class PlanarEye:
     """The pinhole of a camera, its height and pitch. bearing_tan (B,): right over forward of each band.
-    floor_from_m: how far ahead the floor comes into view; 0.0: it never does."""
+    floor_from_m: how far ahead the floor comes into view; 0.0: it never does. up_tan: as in FreeSpace."""
 
-    def __init__(self, world: PlanarWorld, camera: SimulatedCameraConfig, mount: Mount) -> None:
+    def __init__(
+        self,
+        world: PlanarWorld,
+        camera: SimulatedCameraConfig,
+        mount: Mount,
+        hangs_m: float = math.inf,
+    ) -> None:
+        """hangs_m: what begins so high hangs, and hides nothing of the floor behind it."""
         self._world, self._mount = world, mount
         self.range_m = camera.depth_max_m
         left, right = (-0.5 - camera.cx) / camera.fx, (camera.width - 0.5 - camera.cx) / camera.fx
@@ -43,10 +50,10 @@ class PlanarEye:
         self._edge_tan = max(-float(edges[0]), float(edges[-1]))
         down = math.atan((camera.height - 0.5 - camera.cy) / camera.fy) + mount.pitch_rad
         up = math.atan((camera.cy + 0.5) / camera.fy) - mount.pitch_rad
-        self._down_tan, self._up_tan = math.tan(down), math.tan(up)
+        self._down_tan, self.up_tan = math.tan(down), math.tan(up)
         self.floor_from_m = mount.height_m / self._down_tan if self._down_tan > 0.0 else 0.0
         z_m = world.z_m
-        self._hides = (z_m[:, 0] < mount.height_m) & (z_m[:, 1] > mount.height_m)
+        self._hides = (z_m[:, 0] < min(mount.height_m, hangs_m)) & (z_m[:, 1] > mount.height_m)
         # The outlines of all bodies and, at the end, of the building; each closed by its first corner.
         outlines, room = world.look(0.0)[0], world.room_polygon()
         corners = max(outlines.shape[1], 4)
@@ -111,6 +118,6 @@ class PlanarEye:
         """Whether any of its height is between the upper and the lower edge of the image."""
         z_m, eye_m = self._world.z_m.take(bodies, 0), self._mount.height_m
         above = z_m[:, 1:] > eye_m - hits * self._down_tan
-        below = z_m[:, :1] < eye_m + hits * self._up_tan
+        below = z_m[:, :1] < eye_m + hits * self.up_tan
         seen: NDArray[np.bool_] = above & below & (hits < self.range_m)
         return seen

@@ -101,5 +101,7 @@ def test_the_floor_comes_into_view_where_the_lower_edge_of_the_image_meets_it(
     camera = SimulatedCameraConfig()
     down_rad = math.atan((camera.height - 0.5 - camera.cy) / camera.fy) + math.radians(pitch_deg)
     assert eye.floor_from_m == pytest.approx(height_m / math.tan(down_rad))
+    up_rad = math.atan((camera.cy + 0.5) / camera.fy) - math.radians(pitch_deg)
+    assert eye.up_tan == pytest.approx(math.tan(up_rad))
     upwards, _ = look(crate(5.0), mount=Mount(forward_m=0.0, height_m=height_m, pitch_deg=-40.0))
     assert upwards.floor_from_m == 0.0

@@ -211,3 +211,13 @@ def test_a_surface_that_sinks_below_the_view_of_a_high_camera_is_still_there() -
         assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(3.0, abs=0.1)
         after = watch.look(replace(free(), floor_from_m=floor_from_m), s_m=1.3, times=5)
         assert (after.surface_s_m < 4.0) == held
+
+
+def test_a_surface_that_rises_above_the_view_of_a_low_camera_is_still_there() -> None:
+    """The robot is 0.8 m high, its camera 0.6 m: 2 m ahead the view ends below the robot's height."""
+    for up_tan, held in ((math.inf, False), (0.1, True)):
+        watch = Watch()
+        near = replace(free(1.6, 1.6), up_tan=up_tan)
+        assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(3.0, abs=0.1)
+        after = watch.look(replace(free(), up_tan=up_tan), s_m=1.3, times=5)
+        assert (after.surface_s_m < 4.0) == held

@@ -282,3 +282,13 @@ def test_where_no_floor_is_in_view_or_the_mounting_is_not_known_none_comes() -> 
     assert space_of(frame_of(floor()), up).floor_from_m == 0.0
     unknown = Perception(PerceptionConfig(), None, ROBOT_HEIGHT_M, clearance_m=0.05)
     assert unknown.perceive(frame_of(floor()), None, None).scene.free_space.floor_from_m == 0.0
+
+
+@pytest.mark.parametrize("pitch_deg", [-5.0, 4.0, 30.0])
+def test_how_the_upper_edge_of_the_view_rises_is_told(pitch_deg: float) -> None:
+    mount = CameraMount(0.0, 0.0, 0.6, math.radians(pitch_deg))
+    up_rad = math.atan((VGA.cy + 0.5) / VGA.fy) - mount.pitch_rad
+    found = space_of(frame_of(floor(), mount), mount).up_tan
+    assert math.tan(up_rad - 0.03) < found < math.tan(up_rad)
+    unknown = Perception(PerceptionConfig(), None, ROBOT_HEIGHT_M, clearance_m=0.05)
+    assert math.isinf(unknown.perceive(frame_of(floor()), None, None).scene.free_space.up_tan)

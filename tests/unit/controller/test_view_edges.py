@@ -1,9 +1,12 @@
-"""A camera that is high above the robot's nose: low things sink below its view far ahead of the robot."""
+"""A camera high above the robot's nose, below whose view low things sink far ahead of the robot, and one that
+is lower than the robot, above whose view rises what hangs."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from config.decision import DecisionConfig
@@ -15,7 +18,7 @@ from controller.campaign.stage import Stage
 from controller.campaign.task import yardstick
 from controller.knowledge import Knowledge
 from controller.path import OnPath
-from hal.types import PlanarPose
+from hal.types import CameraMount, PlanarPose
 from sim.families import generate
 from tests.support.campaign import CONFIG
 from tests.support.deciding import MOUNT, PATH, obstacle
@@ -65,3 +68,52 @@ def test_a_long_robot_with_a_high_camera_does_not_drive_over_a_pallet(seed: int)
     assert row.contacts == 0
     assert not row.reached
     assert log.s_m[-1] > 3.0
+
+
+LOW = Robot(limits=CONFIG.robot.limits, camera_mount=Mount(height_m=0.25, pitch_deg=0.0))
+
+
+def after_a_beam(up_tan: float, bottom_m: float = 0.65, ahead_m: float = 0.9) -> Knowledge:
+    """What is known when a beam as wide as somebody is seen no longer, by a robot that drives."""
+    known = Knowledge(PATH, Robot(), CameraMount(0.45, 0.0, 0.25, 0.0), DecisionConfig(), 0.0)
+    space = replace(free_space(), up_tan=up_tan)
+    beam = obstacle(0.45 + ahead_m, 0.0, size_m=(0.5, 0.2))
+    beam = replace(beam, position_m=np.array([0.0, 0.25 - bottom_m - 0.1, ahead_m]))
+    for number, seen in enumerate([(beam,), ()]):
+        known.update(scene(number * FRAME_NS, number, seen, space), HERE, START, 1.0, number * FRAME_NS)
+    return known
+
+
+@pytest.mark.parametrize(
+    ("up_tan", "bottom_m", "ahead_m", "kept"),
+    [
+        (0.39, 0.65, 0.9, True),  # the view ends at 0.56 m, where its front is
+        (0.39, 0.65, 1.5, False),  # at 0.8 m
+        (0.39, 0.40, 0.9, False),
+        (math.inf, 0.65, 0.9, False),  # nobody knows of an upper edge
+    ],
+)
+def test_what_rises_above_the_view_is_kept(
+    up_tan: float, bottom_m: float, ahead_m: float, kept: bool
+) -> None:
+    known = after_a_beam(up_tan, bottom_m, ahead_m)
+    assert known.up_tan == up_tan
+    assert known.remembered.tolist() == ([True] if kept else [])
+
+
+@pytest.mark.parametrize("seed", [6100000, 6100002])
+def test_a_low_camera_does_not_forget_a_beam_that_the_robot_does_not_pass_under(seed: int) -> None:
+    config = CONFIG.model_copy(update={"robot": LOW})
+    stage = Stage(generate("hanging_beam", seed), LOW)
+    log = drive_noise(stage, config, build_policy("ours", config, stage))
+    row = judge(stage, log, "ours", "noise", yardstick(stage, config))
+    assert row.contacts == 0
+    assert not row.reached
+    assert log.s_m[-1] > 3.0
+
+
+def test_a_camera_at_the_height_of_what_hangs_above_the_robot_sees_the_floor_under_it() -> None:
+    high = Robot(limits=CONFIG.robot.limits, camera_mount=Mount(forward_m=0.1, height_m=1.4, pitch_deg=22.0))
+    config = CONFIG.model_copy(update={"robot": high})
+    stage = Stage(generate("hanging_beam", 6100001), high)
+    assert drive_noise(stage, config, build_policy("ours", config, stage)).reached_s is not None
