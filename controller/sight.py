@@ -25,7 +25,9 @@ from vision.scene import FreeSpace
 _CELL_M = 0.2
 _NEVER_NS = -(2**62)
 _LANES = 5
-_MOST_CONSENT_M = 2.5
+MOST_CONSENT_M = 2.5
+# Farther away hardly anything rises above the view: what flickers there was nothing.
+_MOST_ABOVE_M = 3.0
 # One frame's outlier must not brake; three frames of five are a tenth of a second.
 _FRAMES = 5
 
@@ -49,7 +51,7 @@ class Sight:
         self._lanes = self._lanes_of(self._cells)
         self._seen_ns = np.full(len(self._cells), _NEVER_NS, np.int64)
         # Under the nose and beside it nothing can be seen: what the robot stands before is free by consent.
-        self._near_m, self._above_m = self._sight.near_m, 0.0
+        self._near_m = self._floor_from_m = self._lost_m = self._sight.near_m
         self._consent_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = math.inf
@@ -99,13 +101,14 @@ class Sight:
 
     def _take_edges(self, free: FreeSpace) -> None:
         """What is below the view of a camera that is higher than usual cannot be seen before the start
-        either; a stretch that is too long for consent stays unknown."""
-        most_m = max(self._sight.near_m, _MOST_CONSENT_M)
-        near_m = min(max(self._sight.near_m, free.floor_from_m), most_m)
+        either: by consent it is free, but for a stretch that is too long for that."""
+        self._floor_from_m = max(self._sight.near_m, free.floor_from_m)
+        near_m = min(self._floor_from_m, max(self._sight.near_m, MOST_CONSENT_M))
         if near_m > self._near_m:
             self._consent_s_m += near_m - self._near_m
             self._near_m = near_m
-        self._above_m = above_from_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
+        above_m = above_from_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
+        self._lost_m = max(self._floor_from_m, min(above_m, _MOST_ABOVE_M))
 
     def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
         nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
@@ -114,7 +117,7 @@ class Sight:
         steady = sorted(self._nearest)[len(self._nearest) // 2]
         # What goes out of sight below or above the view because the robot drives on is still there; what goes
         # while the robot stands has gone away.
-        blind_s_m = s_m + self._mount.forward_m + max(self._near_m, self._above_m)
+        blind_s_m = s_m + self._mount.forward_m + self._lost_m
         if standing or self._held_s_m < s_m:
             self._held_s_m = math.inf
         elif steady > before + _CELL_M and before < blind_s_m:
@@ -168,8 +171,11 @@ class Sight:
         px, py = self._lanes[:, first:last]
         forward, band = bands_at(free, pose, self._mount, px, py)
         within = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
-        # What is too near to be measured was not seen, however far the scan goes beyond it.
+        # What is too near to be measured, or below the view of a high camera, was not seen, however far the
+        # scan goes beyond it.
         least_m = free.blind_m + 0.5 * _CELL_M if free.blind_m > 0.0 else 0.0
+        if self._floor_from_m > self._sight.near_m:
+            least_m = max(least_m, self._floor_from_m)
         in_view = (forward > least_m) & (band == within)
         # The far edge of a cell, so that a cell is not known for the sake of its beginning.
         far_edge = forward + 0.5 * _CELL_M

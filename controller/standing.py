@@ -21,6 +21,8 @@ from hal.types import CameraMount, FloatArray
 _INSIDE_BODY_M = 0.05
 # What stands so near beside the way may come to graze it when only a part of it is in view.
 _BESIDE_M = 0.5
+# What hangs and rises above the view is stood off so far at most.
+_MOST_OFF_M = 3.0
 _NOW = np.zeros(1)
 
 
@@ -133,7 +135,9 @@ class StandingLimits:
         )
         front_m = known.corridor.front_m - self._mount.forward_m
         stop_m = self._config.margins.stop_m
-        return np.clip(visible_m - front_m, stop_m, max(known.near_m, stop_m))
+        hangs = bodies.bottom_m > self._mount.height_m
+        most_m = np.maximum(max(known.near_m, stop_m), np.where(hangs, _MOST_OFF_M, 0.0))
+        return np.clip(visible_m - front_m, stop_m, most_m)
 
     def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:
         """A young obstacle may be confirmed first while an emergency stop fits even if it came at V_o."""

@@ -11,13 +11,13 @@ from hal.types import FloatArray
 
 # The height of what is seen only in part is known no better.
 UNCERTAIN_M = 0.1
-_LEAST_TAN = 0.1
+_LEAST_TAN, _LEAST_M = 0.1, 1e-3
 
 
 def lowest_seen_m(ahead_m: FloatArray, height_m: float, near_m: float) -> FloatArray:
     """(N,) height of the lower edge of the view at ahead_m (N,) of a camera at height_m that sees the floor
     from near_m on."""
-    return height_m * (1.0 - ahead_m / near_m)
+    return height_m * (1.0 - ahead_m / max(near_m, _LEAST_M))
 
 
 def highest_seen_m(ahead_m: FloatArray, height_m: float, up_tan: float) -> FloatArray:

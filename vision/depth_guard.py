@@ -15,14 +15,14 @@ from hal.types import FloatArray
 from vision.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.level_bands import LevelBands, level_bands
 from vision.near_floor import FLOOR_EXCESS
-from vision.scene import FreeSpace
+from vision.scene import NEVER_M, FreeSpace
 
 _SUPPORT = 3  # this many cells of a band must agree before they are a surface
 _HOLE_ROWS = 2
 # Band and distance in one whole number: 80 bands, and up to 64 m in steps of 4 micrometres.
 _BAND_SHIFT = 24
 _UNITS_PER_M = 2.0**18
-_UPRIGHT_RAD = 1.5
+_LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5
 
 
 def free_space(
@@ -34,18 +34,26 @@ def free_space(
     known. unmeasured_m: floor nearer than this depth cannot be measured (vision/near_floor.py), and no data
     there is no hole; 0.0: all can. Without a known mounting, space is known up to the nearest surface only.
     """
-    bands, blind_m, floor_from_m = level_bands(grid), 0.0, 0.0
+    bands, blind_m = level_bands(grid), 0.0
     nearest = _nearest_m(grid, obstacle, bands)
     if math.isfinite(grid.pitch_rad):
-        known, blind_m, floor_from_m = _known_m(grid, bands, max_depth_m, unmeasured_m)
+        known, blind_m = _known_m(grid, bands, max_depth_m, unmeasured_m)
         # What stands there hides what is behind it.
         known = np.where(np.isfinite(nearest), nearest, known)
     else:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     known = np.minimum(known, max_depth_m)
-    return FreeSpace(
-        bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, floor_from_m, _up_tan(grid)
-    )
+    edges = _floor_from_m(grid), _up_tan(grid)
+    return FreeSpace(bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, *edges)
+
+
+def _floor_from_m(grid: DepthGrid) -> float:
+    """FreeSpace.floor_from_m, of the lowest row of cells."""
+    if not math.isfinite(grid.pitch_rad):
+        return 0.0
+    down_rad = math.atan(float(grid.y[-1])) + grid.pitch_rad
+    nearest_m = grid.camera_height_m / math.tan(min(max(down_rad, _LEVEL_RAD), _UPRIGHT_RAD))
+    return min(nearest_m, NEVER_M)
 
 
 def _up_tan(grid: DepthGrid) -> float:
@@ -90,16 +98,15 @@ def _nearest_fanned_m(
 
 def _known_m(
     grid: DepthGrid, bands: LevelBands, max_depth_m: float, unmeasured_m: float
-) -> tuple[FloatArray, float, float]:
-    """(B,) how far the floor, or something on it, was seen without a hole; and FreeSpace.blind_m and
-    floor_from_m."""
+) -> tuple[FloatArray, float]:
+    """(B,) how far the floor, or something on it, was seen without a hole; and FreeSpace.blind_m."""
     cos_pitch, sin_pitch = math.cos(grid.pitch_rad), math.sin(grid.pitch_rad)
     y = grid.y.astype(float)
     drop = y * cos_pitch + sin_pitch
     below = drop > grid.camera_height_m / (1.5 * max_depth_m)
     rows = np.flatnonzero(below)[::-1]  # from the bottom of the image outwards
     if len(rows) == 0:
-        return np.zeros(len(bands)), 0.0, 0.0
+        return np.zeros(len(bands)), 0.0
     floor_depth = grid.camera_height_m / drop[rows]
     floor_forward = floor_depth * (cos_pitch - y[rows] * sin_pitch)
     limit_m = (FLOOR_EXCESS * floor_depth).astype(np.float32)
@@ -126,4 +133,4 @@ def _known_m(
     known = np.minimum(reach[first], max_depth_m)
     nowhere = (first == 0) | (blank > 0) & (~shown.any(axis=0) | (shown.argmax(axis=0) >= first))
     blind_m = float(floor_forward[blank - 1]) if blank else 0.0
-    return np.where(nowhere, 0.0, known).astype(float), blind_m, float(floor_forward[0])
+    return np.where(nowhere, 0.0, known).astype(float), blind_m

@@ -22,7 +22,8 @@ LOW_BESIDE = 0.6  # of the height of a body in the image: a trolley is, a child 
 _STANDING = 0.5  # of the share that would not have stayed
 LOW = 0.5  # of the height of that in the image; somebody behind somebody else is taller
 _DIP_M = 0.15  # between two heads; a shoulder is lower still
-_HEAD_M, _HEAD_WIDTH_M = 0.15, 0.30  # of a head, so much from its top down; a load or a mast is wider
+# Of a head, so much from its top down: a load is wider, a post narrower and has no shoulders.
+_HEAD_M, _LEAST_HEAD_M, _HEAD_WIDTH_M, _SHOULDERS_M = 0.15, 0.13, 0.30, 0.36
 _LEAST_APART_M, _MOST_APART_M = 0.35, 0.8  # two heads; who walks farther apart leaves a valley
 _HARDLY = 0.2  # of the image between two groups of cells
 _MIN_CELLS = 24
@@ -121,15 +122,19 @@ def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] 
     if not _LEAST_APART_M <= (other - one) * cell_m <= _MOST_APART_M:
         return None
     for head in (one, other):
-        if _head_width(height_m, head) * cell_m > _HEAD_WIDTH_M + cell_m:
+        width_m = _width_below(height_m, head, _HEAD_M) * cell_m
+        shoulders_m = _width_below(height_m, head, _SHOULDERS_M) * cell_m
+        if not _LEAST_HEAD_M - cell_m <= width_m <= _HEAD_WIDTH_M + cell_m:
+            return None
+        if shoulders_m < width_m + _LEAST_HEAD_M:
             return None
     second = _fewer(column > valley)
     return second if np.count_nonzero(second) >= _MIN_CELLS else None
 
 
-def _head_width(height_m: FloatArray, head: int) -> int:
-    """How many columns around head are nearly as high."""
-    high = height_m >= height_m[head] - _HEAD_M
+def _width_below(height_m: FloatArray, head: int, drop_m: float) -> int:
+    """How many columns around head are at most drop_m lower."""
+    high = height_m >= height_m[head] - drop_m
     right = len(high) if high[head:].all() else head + int(high[head:].argmin())
     left = 0 if high[: head + 1].all() else head + 1 - int(high[head::-1].argmin())
     return right - left

@@ -119,7 +119,7 @@ class Tracker:
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
         owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)
-        arrivals = np.bincount(labels[changes.arrived], minlength=len(tracks) + 1)[1:]
+        arrivals = np.bincount(whole[changes.arrived], minlength=len(tracks) + 1)[1:]
         if detection.dt_s > 0 and len(tracks):
             self._measure_velocities(detection, owner, velocities, arrivals, measured.cells)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)

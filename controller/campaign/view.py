@@ -12,6 +12,7 @@ from config.camera import SimulatedCameraConfig
 from config.robot import Mount
 from hal.types import FloatArray, PlanarPose
 from sim.planar import PlanarWorld
+from vision.scene import NEVER_M
 
 BANDS = 80
 _NEAR_M = 0.1
@@ -31,7 +32,7 @@ class PlanarView:
 
 class PlanarEye:
     """The pinhole of a camera, its height and pitch. bearing_tan (B,): right over forward of each band.
-    floor_from_m: how far ahead the floor comes into view; 0.0: it never does. up_tan: as in FreeSpace."""
+    floor_from_m, up_tan: as in FreeSpace."""
 
     def __init__(
         self,
@@ -51,7 +52,8 @@ class PlanarEye:
         down = math.atan((camera.height - 0.5 - camera.cy) / camera.fy) + mount.pitch_rad
         up = math.atan((camera.cy + 0.5) / camera.fy) - mount.pitch_rad
         self._down_tan, self.up_tan = math.tan(down), math.tan(up)
-        self.floor_from_m = mount.height_m / self._down_tan if self._down_tan > 0.0 else 0.0
+        sees_floor = self._down_tan > mount.height_m / NEVER_M
+        self.floor_from_m = mount.height_m / self._down_tan if sees_floor else NEVER_M
         z_m = world.z_m
         self._hides = (z_m[:, 0] < min(mount.height_m, hangs_m)) & (z_m[:, 1] > mount.height_m)
         # The outlines of all bodies and, at the end, of the building; each closed by its first corner.

@@ -11,6 +11,7 @@ from config.scenario import BodySpec, Pallet, Pole
 from controller.campaign.view import PlanarEye, PlanarView
 from hal.types import PlanarPose
 from tests.support.campaign import crate, stage
+from vision.scene import NEVER_M
 
 LEVEL = Mount(forward_m=0.0, left_m=0.0, height_m=0.6, pitch_deg=0.0)
 ORIGIN = PlanarPose(0.0, 0.0, 0.0)
@@ -104,4 +105,4 @@ def test_the_floor_comes_into_view_where_the_lower_edge_of_the_image_meets_it(
     up_rad = math.atan((camera.cy + 0.5) / camera.fy) - math.radians(pitch_deg)
     assert eye.up_tan == pytest.approx(math.tan(up_rad))
     upwards, _ = look(crate(5.0), mount=Mount(forward_m=0.0, height_m=height_m, pitch_deg=-40.0))
-    assert upwards.floor_from_m == 0.0
+    assert upwards.floor_from_m == NEVER_M

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -215,3 +216,29 @@ def test_a_cell_that_comes_to_hold_another_place_keeps_nothing_of_the_old_one() 
     new = GroundMemory(Robot(), MOUNT, DecisionConfig())
     differing = [name for name, field in kept.items() if field[at] != vars(new)[name][at]]
     assert (len(kept), differing) == (8, [])
+
+
+@pytest.mark.parametrize(("floor_from_m", "kept"), [(0.0, False), (2.0, True)])
+def test_what_sinks_below_the_view_of_a_high_camera_is_not_seen_to_be_gone(
+    floor_from_m: float, kept: bool
+) -> None:
+    """A pallet that was seen 2.1 m ahead of the camera, and no more from 1.95 m on."""
+    walk = Walkabout()
+    for x_m in (0.0, 0.1, 0.2):
+        walk.at(x_m)
+        walk.look(replace(scan(2.3 - x_m, ahead_only=0.2), floor_from_m=floor_from_m), times=3)
+    assert walk.blocked(2.77, 0.0)
+    walk.at(0.37)
+    walk.drive(0.8, replace(scan(), floor_from_m=floor_from_m))
+    assert walk.blocked(2.77, 0.0) == kept
+    assert walk.free(2.77, 0.0) == (not kept)
+
+
+def test_the_disc_of_consent_reaches_to_where_the_floor_comes_into_view_but_not_far() -> None:
+    for floor_from_m, reach_m in ((0.0, 1.3), (1.9, 1.9), (6.0, 2.5)):
+        walk = Walkabout()
+        walk.look(replace(scan(known_m=0.0), floor_from_m=floor_from_m), standing=True)
+        walk.memory.renew_consent(walk.now_ns)
+        assert walk.memory.consent_m == pytest.approx(0.45 + reach_m + 0.3)
+        assert walk.free(0.45 + reach_m, 0.0)
+        assert not walk.free(0.45 + reach_m + 0.6, 0.0)

@@ -201,11 +201,18 @@ def test_what_is_below_the_view_of_a_high_camera_is_free_by_consent_at_the_start
 
 
 def test_no_camera_is_so_high_that_much_of_the_way_is_free_unseen() -> None:
-    assert Watch().look(replace(free(known_m=0.0), floor_from_m=6.0)).known_s_m < 0.4 + 2.5 + 0.5
+    """Though the scan reaches far beyond what is below the view."""
+    assert Watch().look(replace(free(), floor_from_m=6.0)).known_s_m < 0.4 + 2.5 + 0.5
+    assert Watch().look(replace(free(), floor_from_m=1.2)).known_s_m > 9.0
+    watch = Watch()
+    for s_m in np.arange(0.0, 8.0, 0.1):
+        watch.look(replace(free(), floor_from_m=2.2), s_m=float(s_m))
+    # What was seen from farther away is known.
+    assert watch.look(replace(free(), floor_from_m=2.2), s_m=8.0).known_s_m > 15.0
 
 
 def test_a_surface_that_sinks_below_the_view_of_a_high_camera_is_still_there() -> None:
-    for floor_from_m, held in ((0.0, False), (1.9, True)):
+    for floor_from_m, held in ((0.0, False), (1.9, True), (5.0, True)):
         watch = Watch()
         near = replace(free(1.6, 1.6), floor_from_m=floor_from_m)  # farther than 1.3 m
         assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(3.0, abs=0.1)
@@ -221,3 +228,11 @@ def test_a_surface_that_rises_above_the_view_of_a_low_camera_is_still_there() ->
         assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(3.0, abs=0.1)
         after = watch.look(replace(free(), up_tan=up_tan), s_m=1.3, times=5)
         assert (after.surface_s_m < 4.0) == held
+
+
+def test_what_flickers_far_away_is_not_held_for_the_sake_of_the_upper_edge() -> None:
+    watch = Watch()
+    assert watch.look(replace(free(5.0, 5.0), up_tan=-0.1), times=5).surface_s_m == pytest.approx(
+        5.4, abs=0.1
+    )
+    assert math.isinf(watch.look(replace(free(), up_tan=-0.1), times=5).surface_s_m)

@@ -18,8 +18,10 @@ from controller.campaign.stage import Stage
 from controller.campaign.task import yardstick
 from controller.knowledge import Knowledge
 from controller.path import OnPath
+from controller.view_edges import lowest_seen_m, visible_from_m
 from hal.types import CameraMount, PlanarPose
 from sim.families import generate
+from tests.support.bodies import box
 from tests.support.campaign import CONFIG
 from tests.support.deciding import MOUNT, PATH, obstacle
 from tests.support.scenes import free_space, scene
@@ -117,3 +119,19 @@ def test_a_camera_at_the_height_of_what_hangs_above_the_robot_sees_the_floor_und
     config = CONFIG.model_copy(update={"robot": high})
     stage = Stage(generate("hanging_beam", 6100001), high)
     assert drive_noise(stage, config, build_policy("ours", config, stage)).reached_s is not None
+
+
+@pytest.mark.parametrize(("up_tan", "off_m"), [(math.inf, 0.0), (0.39, 1.28), (0.2, 2.5), (0.05, 3.0)])
+def test_what_hangs_is_stood_off_so_far_that_its_going_is_seen(up_tan: float, off_m: float) -> None:
+    """Its underside at 0.65 m has to be 0.1 m below the upper edge of a camera at 0.25 m; 3 m at most."""
+    beam = box(8.0, 0.0, top_m=0.85, bottom_m=0.65)
+    found = visible_from_m(beam, np.zeros(1), 0.5, 1.3, 0.25, up_tan)[0]
+    assert min(found, 3.0) == pytest.approx(off_m, abs=0.01)
+
+
+def test_no_view_ends_where_the_robot_is() -> None:
+    """A near_m of 0: all that is not high enough to be in view is below it, and nothing divides by zero."""
+    with np.errstate(all="raise"):
+        found = lowest_seen_m(np.array([0.0, 1.0]), 0.6, 0.0)
+    assert found[0] == 0.6
+    assert found[1] < 0.0

@@ -15,7 +15,7 @@ from hal.geometry import camera_in_floor
 from hal.types import CameraMount, Intrinsics, PlanarPose, RgbdFrame
 from tests.support.painted import MOUNT, VGA, Quad, box, drive, floor, paint, plain, record, vector, wall
 from vision.perception import Perception
-from vision.scene import FreeSpace, Scene
+from vision.scene import NEVER_M, FreeSpace, Scene
 
 HERE = PlanarPose(0.0, 0.0, 0.0)
 CENTRE = slice(220, 420)  # image columns that are tampered with
@@ -277,9 +277,12 @@ def test_where_the_floor_comes_into_view_is_told(height_m: float, pitch_deg: flo
     assert edge_m < space_of(frame_of(floor(), mount), mount).floor_from_m < 1.05 * edge_m
 
 
-def test_where_no_floor_is_in_view_or_the_mounting_is_not_known_none_comes() -> None:
+def test_where_no_floor_is_in_view_it_never_comes_and_without_a_mounting_nobody_knows() -> None:
     up = CameraMount(0.0, 0.0, 0.6, math.radians(-40.0))
-    assert space_of(frame_of(floor()), up).floor_from_m == 0.0
+    assert space_of(frame_of(floor()), up).floor_from_m == NEVER_M
+    # Beyond the depth mask, too: the lower edge looks down by 3.5 degrees.
+    hardly = CameraMount(0.0, 0.0, 1.2, math.radians(3.5) - math.atan((VGA.height - 2.5 - VGA.cy) / VGA.fy))
+    assert 19.0 < space_of(frame_of(floor()), hardly).floor_from_m < 21.0
     unknown = Perception(PerceptionConfig(), None, ROBOT_HEIGHT_M, clearance_m=0.05)
     assert unknown.perceive(frame_of(floor()), None, None).scene.free_space.floor_from_m == 0.0
 

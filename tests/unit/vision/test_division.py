@@ -185,3 +185,13 @@ def test_an_arm_raised_is_no_second_head() -> None:
     for hand in (plate(3.0, (0.6, 0.7), (-0.6, -0.4)), plate(3.0, (0.55, 0.7), (-0.8, -0.4))):
         depth_m = nearest(body, head, arms, hand)
         assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+
+
+@pytest.mark.parametrize("post_m", [0.04, 0.10, 0.15])
+@pytest.mark.parametrize("tall_m", [0.45, 0.7])
+def test_two_posts_on_a_cart_are_no_heads(post_m: float, tall_m: float) -> None:
+    """As wide as a head, some of them, but without shoulders."""
+    cart = plate(3.0, (-0.5, 0.5), (0.0, 0.9))
+    posts = [plate(3.0, (x_m - post_m / 2, x_m + post_m / 2), (-tall_m, 0.0)) for x_m in (-0.3, 0.3)]
+    depth_m = nearest(cart, *posts)
+    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
