@@ -56,9 +56,9 @@ class FreeSpace:
     whatever lies beyond is unknown and therefore not free. half_width_tan: half a band's width.
     blind_m: floor in the view nearer than this forward distance was too near to be measured, and is no part
     of what is known; 0.0: all of it can be measured. floor_from_m: nearer than this forward distance the
-    floor is below the view, however far known_m reaches; 0.0: not known,
-    NEVER_M: no floor comes into view. up_tan: by so much a metre of
-    forward distance the upper edge of the view rises from the camera's height; inf: not known.
+    floor is below the view, however far known_m reaches; 0.0: not known, NEVER_M: it never comes into view.
+    up_tan: by so much a metre of forward distance the upper edge of the view rises from the camera's height;
+    inf: not known.
     """
 
     bearing_tan: FloatArray
