@@ -17,7 +17,7 @@ from controller.blind_corners import BlindCorners
 from controller.bodies import Bodies
 from controller.corridor import Corridor
 from controller.surfaces import Surfaces, bands_at
-from controller.view_edges import above_from_m
+from controller.view_edges import LEAST_TAN, above_from_m
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -26,7 +26,7 @@ _CELL_M = 0.2
 _NEVER_NS = -(2**62)
 _LANES = 5
 MOST_CONSENT_M = 2.5
-# Farther away hardly anything rises above the view: what flickers there was nothing.
+# Where the view hardly rises, what flickers farther away than this was nothing.
 _MOST_ABOVE_M = 3.0
 # One frame's outlier must not brake; three frames of five are a tenth of a second.
 _FRAMES = 5
@@ -108,7 +108,9 @@ class Sight:
             self._consent_s_m += near_m - self._near_m
             self._near_m = near_m
         above_m = above_from_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
-        self._lost_m = max(self._floor_from_m, min(above_m, _MOST_ABOVE_M))
+        if free.up_tan < LEAST_TAN:  # the view hardly rises, and nobody knows where a thing leaves it
+            above_m = min(above_m, _MOST_ABOVE_M)
+        self._lost_m = max(self._floor_from_m, above_m)
 
     def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
         nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
@@ -171,10 +173,10 @@ class Sight:
         px, py = self._lanes[:, first:last]
         forward, band = bands_at(free, pose, self._mount, px, py)
         within = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
-        # What is too near to be measured, or below the view of a high camera, was not seen, however far the
-        # scan goes beyond it.
+        # What is too near to be measured was not seen, however far the scan goes beyond it. Nor was what is
+        # below the view, where that is more than could be consented to.
         least_m = free.blind_m + 0.5 * _CELL_M if free.blind_m > 0.0 else 0.0
-        if self._floor_from_m > self._sight.near_m:
+        if self._floor_from_m > self._near_m:
             least_m = max(least_m, self._floor_from_m)
         in_view = (forward > least_m) & (band == within)
         # The far edge of a cell, so that a cell is not known for the sake of its beginning.

@@ -11,7 +11,7 @@ from hal.types import FloatArray
 
 # The height of what is seen only in part is known no better.
 UNCERTAIN_M = 0.1
-_LEAST_TAN, _LEAST_M = 0.1, 1e-3
+LEAST_TAN, _LEAST_M = 0.1, 1e-3
 
 
 def lowest_seen_m(ahead_m: FloatArray, height_m: float, near_m: float) -> FloatArray:
@@ -30,7 +30,7 @@ def highest_seen_m(ahead_m: FloatArray, height_m: float, up_tan: float) -> Float
 def above_from_m(top_m: float, height_m: float, up_tan: float) -> float:
     """Nearer than this, something that is no higher than top_m may be above the view."""
     rise_m = top_m - height_m
-    return max(rise_m, 0.0) / max(up_tan, _LEAST_TAN)
+    return max(rise_m, 0.0) / max(up_tan, LEAST_TAN)
 
 
 def visible_from_m(
@@ -40,7 +40,7 @@ def visible_from_m(
     the view, its upper part above the lower one and its lower part below the upper one. side_m (N,): its
     middle beside the camera's axis."""
     lowest = np.clip(1.0 - (bodies.top_m - UNCERTAIN_M) / height_m, 0.0, 1.0)
-    visible = np.maximum(np.abs(side_m) / max(edge_tan, _LEAST_TAN), near_m * lowest)
+    visible = np.maximum(np.abs(side_m) / max(edge_tan, LEAST_TAN), near_m * lowest)
     rise_m = np.maximum(bodies.bottom_m + UNCERTAIN_M - height_m, 0.0)
-    result: FloatArray = np.maximum(visible, rise_m / max(up_tan, _LEAST_TAN))
+    result: FloatArray = np.maximum(visible, rise_m / max(up_tan, LEAST_TAN))
     return result

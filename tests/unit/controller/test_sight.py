@@ -203,12 +203,13 @@ def test_what_is_below_the_view_of_a_high_camera_is_free_by_consent_at_the_start
 def test_no_camera_is_so_high_that_much_of_the_way_is_free_unseen() -> None:
     """Though the scan reaches far beyond what is below the view."""
     assert Watch().look(replace(free(), floor_from_m=6.0)).known_s_m < 0.4 + 2.5 + 0.5
-    assert Watch().look(replace(free(), floor_from_m=1.2)).known_s_m > 9.0
+    for near_m in (1.2, 1.4, 2.4):
+        assert Watch().look(replace(free(), floor_from_m=near_m)).known_s_m > 9.0
     watch = Watch()
     for s_m in np.arange(0.0, 8.0, 0.1):
-        watch.look(replace(free(), floor_from_m=2.2), s_m=float(s_m))
-    # What was seen from farther away is known.
-    assert watch.look(replace(free(), floor_from_m=2.2), s_m=8.0).known_s_m > 15.0
+        watch.look(replace(free(), floor_from_m=2.7), s_m=float(s_m))
+    # What was seen from farther away a moment ago is known.
+    assert watch.look(replace(free(), floor_from_m=2.7), s_m=8.0).known_s_m > 15.0
 
 
 def test_a_surface_that_sinks_below_the_view_of_a_high_camera_is_still_there() -> None:
@@ -221,13 +222,23 @@ def test_a_surface_that_sinks_below_the_view_of_a_high_camera_is_still_there() -
 
 
 def test_a_surface_that_rises_above_the_view_of_a_low_camera_is_still_there() -> None:
-    """The robot is 0.8 m high, its camera 0.6 m: 2 m ahead the view ends below the robot's height."""
-    for up_tan, held in ((math.inf, False), (0.1, True)):
+    """The robot is 2.2 m high, its camera 0.6 m: 4 m ahead the view ends at its height, and 3 m at most
+    where it does not rise at all."""
+    for up_tan, ahead_m, held in (
+        (math.inf, 1.6, False),
+        (0.4, 3.8, True),
+        (0.4, 4.3, False),
+        (0.0, 2.9, True),
+        (0.0, 3.3, False),
+    ):
+        tall = BODY.model_copy(update={"height_m": 2.2})
         watch = Watch()
-        near = replace(free(1.6, 1.6), up_tan=up_tan)
-        assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(3.0, abs=0.1)
-        after = watch.look(replace(free(), up_tan=up_tan), s_m=1.3, times=5)
-        assert (after.surface_s_m < 4.0) == held
+        watch.sight = Sight(Corridor(line_path(), tall), MOUNT, DecisionConfig(), 0.0)
+        near = replace(free(ahead_m, ahead_m), up_tan=up_tan)
+        lost_s_m = 1.0 + 0.4 + ahead_m
+        assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(lost_s_m, abs=0.1)
+        after = watch.look(replace(free(), up_tan=up_tan), s_m=1.05, times=5)
+        assert (after.surface_s_m < 6.0) == held
 
 
 def test_what_flickers_far_away_is_not_held_for_the_sake_of_the_upper_edge() -> None:
