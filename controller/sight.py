@@ -17,7 +17,7 @@ from controller.blind_corners import BlindCorners
 from controller.bodies import Bodies
 from controller.corridor import Corridor
 from controller.surfaces import Surfaces, bands_at
-from controller.view_edges import LEAST_TAN, above_from_m
+from controller.view_edges import LEAST_TAN, above_from_m, consented_m
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -25,7 +25,6 @@ from vision.scene import FreeSpace
 _CELL_M = 0.2
 _NEVER_NS = -(2**62)
 _LANES = 5
-MOST_CONSENT_M = 2.5
 # Where the view hardly rises, what flickers farther away than this was nothing.
 _MOST_ABOVE_M = 3.0
 # One frame's outlier must not brake; three frames of five are a tenth of a second.
@@ -103,7 +102,7 @@ class Sight:
         """What is below the view of a camera that is higher than usual cannot be seen before the start
         either: by consent it is free, but for a stretch that is too long for that."""
         self._floor_from_m = max(self._sight.near_m, free.floor_from_m)
-        near_m = min(self._floor_from_m, max(self._sight.near_m, MOST_CONSENT_M))
+        near_m = consented_m(self._sight.near_m, free.floor_from_m)
         if near_m > self._near_m:
             self._consent_s_m += near_m - self._near_m
             self._near_m = near_m

@@ -12,6 +12,13 @@ from hal.types import FloatArray
 # The height of what is seen only in part is known no better.
 UNCERTAIN_M = 0.1
 LEAST_TAN, _LEAST_M = 0.1, 1e-3
+_MOST_CONSENT_M = 2.5
+
+
+def consented_m(near_m: float, floor_from_m: float) -> float:
+    """How far ahead of the camera the floor is free by the consent of whoever starts the robot: near_m, or to
+    where it comes into view, from floor_from_m on, unless that is too far to be consented to."""
+    return max(near_m, min(floor_from_m, _MOST_CONSENT_M))
 
 
 def lowest_seen_m(ahead_m: FloatArray, height_m: float, near_m: float) -> FloatArray:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.robot import Robot
 from controller.bodies import Bodies
-from controller.sight import MOST_CONSENT_M
 from controller.surfaces import bands_at, floor_points, surfaces_of
+from controller.view_edges import consented_m
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -58,7 +58,8 @@ class GroundMemory:
     def __init__(self, robot: Robot, mount: CameraMount, config: DecisionConfig) -> None:
         self._body, self._mount = robot.body, mount
         self._least_near_m = self._near_m = config.sight.near_m
-        self.consent_m = self._consented_m()
+        self._reach_m = mount.forward_m + 3.0 * CELL_M
+        self.consent_m = self._reach_m + self._near_m
         self._key = np.full((_SIZE, _SIZE, 2), np.iinfo(np.int32).min, np.int32)
         self._free_ns = np.zeros((_SIZE, _SIZE), np.int64)
         self._free_at_m = np.full((_SIZE, _SIZE), _NEVER_M)
@@ -82,10 +83,6 @@ class GroundMemory:
         self._travelled_m = 0.0
         self._stood = True
         self._pose: PlanarPose | None = None
-
-    def _consented_m(self) -> float:
-        most_m = max(self._least_near_m, MOST_CONSENT_M)
-        return self._mount.forward_m + min(self._near_m, most_m) + 3.0 * CELL_M
 
     def move(self, pose: PlanarPose, now_ns: int) -> None:
         """The robot is at pose now: what its body covers is free, and the way that it made counts."""
@@ -116,7 +113,7 @@ class GroundMemory:
         if not len(free.bearing_tan):
             return
         self._near_m = max(self._least_near_m, free.floor_from_m)
-        self.consent_m = self._consented_m()
+        self.consent_m = self._reach_m + consented_m(self._least_near_m, free.floor_from_m)
         if self._stood and not standing:
             # What was still there when the robot set off does not go away by that.
             there = self._stands & (self._marked_ns >= captured_ns - IN_VIEW_NS)

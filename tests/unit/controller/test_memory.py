@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 from controller.bodies import Bodies, no_bodies
 from controller.memory import OutOfView
-from controller.view_edges import visible_from_m
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
 from vision.scene import FreeSpace
@@ -130,14 +128,6 @@ def test_what_moves_out_of_view_goes_on_for_two_seconds() -> None:
     remembered = [recall.see(None, 4.4) for _ in range(25)]
     assert remembered[0] == [1]
     assert remembered[-1] == []
-
-
-def test_where_a_body_can_be_seen_from() -> None:
-    bodies = box(5.0, 0.6, top_m=1.7).joined(box(5.0, 0.0, top_m=0.15)).joined(box(5.0, 0.0, top_m=0.7))
-    bodies = bodies.joined(box(5.0, 0.0, top_m=1.2, bottom_m=0.8))
-    seen_from = visible_from_m(bodies, np.array([0.6, 0.0, 0.0, 0.0]), 0.5, NEAR_M, 0.6, 0.3)
-    assert seen_from.tolist() == pytest.approx([1.2, NEAR_M * (1 - 0.05 / 0.6), 0.0, (0.8 + 0.1 - 0.6) / 0.3])
-    assert visible_from_m(bodies, np.zeros(4), 0.5, NEAR_M, 0.6, math.inf)[3] == 0.0
 
 
 def test_who_left_the_view_on_its_way_into_the_path_is_remembered_for_longer() -> None:

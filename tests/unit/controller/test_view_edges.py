@@ -11,7 +11,8 @@ import pytest
 
 from config.decision import DecisionConfig
 from config.robot import Body, Mount, Robot
-from controller.campaign.judge import judge
+from controller.campaign.drive import DriveLog
+from controller.campaign.judge import Row, judge
 from controller.campaign.noise_mission import drive_noise
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
@@ -33,6 +34,19 @@ LONG = Robot(
     limits=CONFIG.robot.limits,
     camera_mount=Mount(forward_m=1.0, height_m=1.1, pitch_deg=15.0),
 )
+
+
+def driven(robot: Robot, family: str, seed: int) -> tuple[Row, DriveLog]:
+    """A mission with the noise model, and what became of it."""
+    config = CONFIG.model_copy(update={"robot": robot})
+    stage = Stage(generate(family, seed), robot)
+    log = drive_noise(stage, config, build_policy("ours", config, stage))
+    return judge(stage, log, "ours", "noise", yardstick(stage, config)), log
+
+
+def stops_before_it(robot: Robot, family: str, seed: int) -> bool:
+    row, log = driven(robot, family, seed)
+    return row.contacts == 0 and not row.reached and log.s_m[-1] > 3.0
 
 
 def after_a_pallet(floor_from_m: float) -> Knowledge:
@@ -63,13 +77,7 @@ def test_where_the_view_begins_is_known_on_the_next_path_too() -> None:
 @pytest.mark.parametrize("seed", [6100000, 6100001, 6100003])
 def test_a_long_robot_with_a_high_camera_does_not_drive_over_a_pallet(seed: int) -> None:
     """It crept up to the pallet until that was below its view, forgot it, and drove over it."""
-    config = CONFIG.model_copy(update={"robot": LONG})
-    stage = Stage(generate("low_pallet", seed), LONG)
-    log = drive_noise(stage, config, build_policy("ours", config, stage))
-    row = judge(stage, log, "ours", "noise", yardstick(stage, config))
-    assert row.contacts == 0
-    assert not row.reached
-    assert log.s_m[-1] > 3.0
+    assert stops_before_it(LONG, "low_pallet", seed)
 
 
 LOW = Robot(limits=CONFIG.robot.limits, camera_mount=Mount(height_m=0.25, pitch_deg=0.0))
@@ -105,20 +113,12 @@ def test_what_rises_above_the_view_is_kept(
 
 @pytest.mark.parametrize("seed", [6100000, 6100002])
 def test_a_low_camera_does_not_forget_a_beam_that_the_robot_does_not_pass_under(seed: int) -> None:
-    config = CONFIG.model_copy(update={"robot": LOW})
-    stage = Stage(generate("hanging_beam", seed), LOW)
-    log = drive_noise(stage, config, build_policy("ours", config, stage))
-    row = judge(stage, log, "ours", "noise", yardstick(stage, config))
-    assert row.contacts == 0
-    assert not row.reached
-    assert log.s_m[-1] > 3.0
+    assert stops_before_it(LOW, "hanging_beam", seed)
 
 
 def test_a_camera_at_the_height_of_what_hangs_above_the_robot_sees_the_floor_under_it() -> None:
     high = Robot(limits=CONFIG.robot.limits, camera_mount=Mount(forward_m=0.1, height_m=1.4, pitch_deg=22.0))
-    config = CONFIG.model_copy(update={"robot": high})
-    stage = Stage(generate("hanging_beam", 6100001), high)
-    assert drive_noise(stage, config, build_policy("ours", config, stage)).reached_s is not None
+    assert driven(high, "hanging_beam", 6100001)[1].reached_s is not None
 
 
 @pytest.mark.parametrize(("up_tan", "off_m"), [(math.inf, 0.0), (0.39, 1.28), (0.2, 2.5), (0.05, 3.0)])
@@ -135,3 +135,11 @@ def test_no_view_ends_where_the_robot_is() -> None:
         found = lowest_seen_m(np.array([0.0, 1.0]), 0.6, 0.0)
     assert found[0] == 0.6
     assert found[1] < 0.0
+
+
+def test_where_a_body_can_be_seen_from() -> None:
+    bodies = box(5.0, 0.6, top_m=1.7).joined(box(5.0, 0.0, top_m=0.15)).joined(box(5.0, 0.0, top_m=0.7))
+    bodies = bodies.joined(box(5.0, 0.0, top_m=1.2, bottom_m=0.8))
+    seen_from = visible_from_m(bodies, np.array([0.6, 0.0, 0.0, 0.0]), 0.5, 1.3, 0.6, 0.3)
+    assert seen_from.tolist() == pytest.approx([1.2, 1.3 * (1 - 0.05 / 0.6), 0.0, (0.8 + 0.1 - 0.6) / 0.3])
+    assert visible_from_m(bodies, np.zeros(4), 0.5, 1.3, 0.6, math.inf)[3] == 0.0
