@@ -23,12 +23,14 @@ _AVOIDING_S = 15.0
 def at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reaction_s: float) -> bool:
     """Whether the robot moved, and a driver who knows the whole motion of what it has once seen moving (or
     standing, if it never moves) avoids it: with the same field of view, reaction_s and limits, by braking
-    hard, by braking comfortably, by going on, or by speeding up."""
+    hard, by braking comfortably, by going on, or by speeding up. Where the mission's faults take the robot's
+    eyes, or have it see everything later, they do the same to that driver."""
     if contact.v_mps <= AT_FAULT_MPS:
         return False
     seen = _first_seen(contact, stage, log, eye)
     if seen is None:
         return False
+    reaction_s += stage.case.faults.late_by(log.times_s[seen])
     limits = stage.robot.limits
     soft = (limits.max_accel_mps2, limits.max_jerk_mps3)
     hard = (limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
@@ -51,6 +53,9 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -
     for k in range(0, len(log.times_s), _SIGHT_STEPS):
         if log.times_s[k] >= contact.t_s:
             break
+        if stage.case.faults.blinds(log.times_s[k]):
+            before = None
+            continue
         polygons, velocity = stage.world.look(log.times_s[k])
         if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
             first = before = None

@@ -80,6 +80,23 @@ def test_a_contact_with_what_was_seen_coming_is_at_fault() -> None:
     assert row.contacts_at_fault == 1
 
 
+@pytest.mark.parametrize(
+    ("faults", "at_fault"),
+    [
+        (Faults(silent=Window(0.0, 2.0)), 1),
+        (Faults(silent=Window(0.0, 4.5)), 0),
+        (Faults(frozen=Window(0.0, 4.5)), 0),
+        (Faults(late=Window(0.0, 9.0), late_by_s=0.2), 1),
+        (Faults(late=Window(0.0, 9.0), late_by_s=6.5), 0),
+    ],
+)
+def test_the_driver_has_no_better_eyes_than_the_robot(faults: Faults, at_fault: int) -> None:
+    """It is in view all the time and touched after 5 s; what is seen only then is seen too late."""
+    made = stage(mover(9.0, 2.0, 3.0, -1.0, 0.9), length_m=9.0, faults=faults)
+    row = judged(made, cruise(0.6, 9.0))
+    assert (row.contacts, row.contacts_at_fault) == (1, at_fault)
+
+
 @pytest.mark.parametrize(("gain_mps2", "at_fault"), [(0.0, 1), (0.3, 0)])
 def test_the_driver_takes_over_the_robot_as_it_is(gain_mps2: float, at_fault: int) -> None:
     """First seen at the same place and speed; but one is just becoming faster, and brakes later for that."""
