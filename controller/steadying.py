@@ -2,7 +2,8 @@
 
 The newest velocity of something far away is mostly noise, and whatever is foreseen from it would change with
 every frame. So each axis has a filter of its own: it follows at once what is measured well and averages what
-is not. What the newest measurement says beyond that is kept as surprise, for the worst case.
+is not. What the newest measurement says beyond that, and that it goes on, is kept as surprise, for the worst
+case.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from hal.types import FloatArray
 _CHANGES_MPS = 0.3
 # Errors of velocities are alike for as long as perception measures them over.
 _ALIKE_S = 0.25
+# By this many standard deviations any measurement differs: nobody has turned for that. Who has is still at
+# it: before anything is done about it, the velocity has changed once more by what the average lags behind by.
+_NOISE_SIGMAS, _GOES_ON = 0.5, 2.0
 
 
 class SteadyVelocities:
@@ -50,7 +54,7 @@ class SteadyVelocities:
         self._ids, self._velocity, self._variance = seen.ids[moving], velocity[moving], variance[moving]
         if not len(now):
             return seen
-        # One standard deviation is what any measurement differs by: nobody has turned for that.
         differs = measured - velocity
-        surprise = np.sign(differs) * np.maximum(np.abs(differs) - np.sqrt(spread), 0.0)
+        beyond_noise = np.maximum(np.abs(differs) - _NOISE_SIGMAS * np.sqrt(spread), 0.0)
+        surprise = _GOES_ON * np.sign(differs) * beyond_noise
         return replace(seen, velocity_mps=velocity, surprise_mps=surprise)

@@ -13,6 +13,7 @@ from controller.path import OnPath
 from controller.situation import Situation
 from hal.types import PlanarPose
 from tests.support.deciding import AGE_NS, PATH, STEP_NS, Bench, obstacle
+from tests.support.scenes import free_space
 from vision.scene import CameraCondition, CameraHealth, Obstacle
 
 
@@ -121,6 +122,30 @@ def test_a_blind_camera_teaches_nothing() -> None:
     assert decision.emergency
     seen = bench.step(bench.scene(obstacle(5.0, 0.0, vx_mps=-1.0)), 0.5)
     assert seen.target_speed_mps < 0.5
+
+
+def test_who_comes_so_near_that_depth_fails_is_not_driven_into() -> None:
+    """The floor before the robot was free a second ago; then nothing is seen there any more, and nobody
+    says that the camera cannot be trusted."""
+    bench = Bench()
+    assert bench.settle(v_mps=0.0).target_speed_mps == 1.5
+    for _ in range(60):
+        decision = bench.step(bench.scene(free=free_space(known_m=0.0)), 0.0)
+    assert decision.target_speed_mps == 0.0
+    assert decision.reason.rule == "unseen"
+    assert "right before the camera nothing is seen" in decision.reason.sentence
+    assert decision.stuck_since_ns is not None
+    assert bench.settle(v_mps=0.0).target_speed_mps == 1.5
+
+
+@pytest.mark.parametrize("somebody_walks", [False, True])
+def test_who_goes_blind_beside_somebody_brakes_hard(somebody_walks: bool) -> None:
+    bench = Bench()
+    people = [obstacle(6.0, 2.0, vx_mps=1.0)] if somebody_walks else []
+    bench.settle(*people)
+    decision = bench.settle(*people, free=free_space(known_m=0.0))
+    assert decision.target_speed_mps == 0.0
+    assert decision.emergency == somebody_walks
 
 
 def test_who_sees_nothing_for_long_brakes_hard_though_nobody_was_there() -> None:

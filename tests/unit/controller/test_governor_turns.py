@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from config.robot import Robot
 from controller.governor.request import Twist
 from tests.support.closed_loop import PERIOD_S, Thing, stands, walks
 from tests.support.governed import GovernedDrive, after, rules, sentence_at_the_end
+from vision.scene import Scene
 
 LIMITS = Robot().limits
 
@@ -75,3 +77,16 @@ def test_a_person_who_comes_near_stops_a_turn() -> None:
     stood = next(one for one in steps if one.governed.decision.reason.rule == "turn" and one.t_s > 1.0)
     assert stood.clearance_m > 1.0
     assert after(steps, stood.t_s + 0.6)[0].governed.w_radps == 0.0
+
+
+def test_nobody_turns_into_who_stands_too_near_to_be_measured() -> None:
+    def covered(scene: Scene, t: float) -> Scene:
+        free = scene.free_space
+        nothing = replace(free, nearest_m=free.nearest_m * math.inf, known_m=0.0 * free.known_m)
+        return scene if t < 4.0 else replace(scene, free_space=nothing)
+
+    steps = GovernedDrive(lambda _: Twist(0.0, 0.1), alter=covered).run(7.0)
+    assert max(one.governed.w_radps for one in steps) == pytest.approx(0.1)
+    assert steps[-1].governed.w_radps == 0.0
+    assert rules(steps)[-1] == "turn"
+    assert "right before the camera nothing is seen" in sentence_at_the_end(steps)

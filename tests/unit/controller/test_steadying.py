@@ -42,17 +42,28 @@ def test_what_is_measured_well_is_followed_at_once() -> None:
     for frame in range(20, 24):
         found = steady.update(seen(frame, -1.0, 0.5, 0.03))
     assert found.velocity_mps[0, 1] > 0.35
-    # What is not followed yet is told, but for what any measurement differs by.
+    # What is not followed yet is told, but for what any measurement differs by; and that it goes on.
     left_mps = 0.5 - found.velocity_mps[0, 1]
     assert left_mps > 0.03
-    assert found.surprise_mps[0, 1] == pytest.approx(left_mps - 0.03)
+    assert found.surprise_mps[0, 1] == pytest.approx(2.0 * (left_mps - 0.5 * 0.03))
+
+
+def test_what_gathers_speed_is_reckoned_to_go_on_doing_so() -> None:
+    """It sets off at 1.3 m/s^2, measured 0.15 s late: faster than measured, though not faster than it is."""
+    steady = SteadyVelocities()
+    for frame in range(1, 21):
+        late_mps = max(frame / 30.0 - 0.15, 0.0) * 1.3
+        found = steady.update(seen(frame, 0.0, late_mps, 0.1))
+    now_mps = 20 / 30.0 * 1.3
+    assert found.velocity_mps[0, 1] < 0.8 * now_mps
+    assert late_mps + 0.05 < found.velocity_mps[0, 1] + found.surprise_mps[0, 1] < now_mps
 
 
 def test_noise_is_no_surprise() -> None:
     steady = SteadyVelocities()
     for frame in range(1, 60):
         steady.update(seen(frame, -1.0, 0.0, 0.1))
-    assert steady.update(seen(60, -1.0, 0.08, 0.1)).surprise_mps[0, 1] == 0.0
+    assert steady.update(seen(60, -1.0, 0.04, 0.1)).surprise_mps[0, 1] == 0.0
     assert steady.update(seen(61, -1.0, -0.5, 0.1)).surprise_mps[0, 1] < -0.3
 
 
