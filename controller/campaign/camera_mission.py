@@ -42,7 +42,6 @@ from controller.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.shape import SpeedShaper
 from controller.tally import SetpointTally
 from hal.api import Chassis
-from hal.cameras.tum_writer import TumWriter
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import ChassisMode, PlanarPose, RgbdFrame
 from sim.camera import SimulatedCamera
@@ -64,7 +63,6 @@ class SpoiledCamera:
     def __init__(self, camera: SimulatedCamera, faults: Faults, glass_ids: tuple[int, ...]) -> None:
         self._camera, self._faults, self._glass_ids = camera, faults, glass_ids
         self._last: RgbdFrame | None = None
-        self.writer: TumWriter | None = None
 
     @property
     def next_capture_ns(self) -> int:
@@ -83,8 +81,6 @@ class SpoiledCamera:
         elif self._glass_ids:
             frame = self._blinded(frame)
         self._last = frame
-        if self.writer is not None:
-            self.writer.write(frame)
         return frame
 
     def _blinded(self, frame: RgbdFrame) -> RgbdFrame:
@@ -146,8 +142,6 @@ def _drive(
         devices.enter_context(chassis)
         devices.enter_context(true_camera)
         recorder = RunRecorder(devices.enter_context(open_recorder(options, surroundings(config))), path)
-        if keep is not None:
-            camera.writer = devices.enter_context(TumWriter(keep / "recording", mount_of(config)))
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         watch = _Watch(stage, simulation, log)
         for moment in run_lockstep(
@@ -192,7 +186,9 @@ def recording_in(folder: FilePath, stage: Stage) -> RecordingOptions:
         (folder / "scenario.yaml").write_text(scenario_yaml(stage), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another --report") from error
-    return RecordingOptions(folder / "observations.jsonl", folder / "video.mp4", timed=False)
+    return RecordingOptions(
+        folder / "observations.jsonl", folder / "video.mp4", folder / "recording", timed=False
+    )
 
 
 def _glass_ids(stage: Stage) -> tuple[int, ...]:

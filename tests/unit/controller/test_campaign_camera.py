@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from config.loader import CONFIG_DIR
 from config.scenario import load_scenario
-from controller.campaign.camera_mission import recording_in
+from controller.campaign.camera_mission import drive_camera, recording_in
 from controller.errors import UserError
-from tests.support.campaign import crate, stage
+from controller.replay import ReplayOptions, run_replay
+from sim.faults import Faults, Window
+from tests.support.campaign import CONFIG, crate, mover, stage
 
 
 def test_a_recording_has_the_world_beside_it_as_a_scenario_that_can_be_run(tmp_path: Path) -> None:
@@ -23,3 +28,23 @@ def test_a_folder_for_recordings_that_cannot_be_made_is_told(tmp_path: Path) -> 
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"file/mission: cannot be written \(Not a directory\); choose"):
         recording_in(tmp_path / "file" / "mission", stage())
+
+
+def movers(observations: Path) -> dict[float, list[list[float]]]:
+    """By the time of the frame, where in the image something moves."""
+    rows: list[dict[str, Any]] = [json.loads(line) for line in observations.read_text().splitlines()]
+    return {row["stamp"]: [one["bbox"] for one in row["obstacles"] if one["moving"]] for row in rows}
+
+
+def test_what_was_seen_in_a_mission_is_seen_in_its_recording(tmp_path: Path) -> None:
+    """Two seconds of it, of which the camera was silent for a third of one."""
+    faults = Faults(silent=Window(0.6, 0.9))
+    made = stage(mover(5.0, 1.5, 5.0, -3.0, 1.0), crate(7.0, 2.0), duration_s=2.0, faults=faults)
+    drive_camera(made, CONFIG, "ours", tmp_path)
+    again = tmp_path / "again.jsonl"
+    run_replay(ReplayOptions(tmp_path / "recording", "file", CONFIG_DIR / "replay.yaml", again, quiet=True))
+    then, now = movers(tmp_path / "observations.jsonl"), movers(again)
+    assert then.keys() == now.keys()
+    assert sum(len(boxes) for boxes in then.values()) > 10
+    for stamp, boxes in then.items():
+        assert now[stamp] == [pytest.approx(box, abs=1.0) for box in boxes]
