@@ -13,6 +13,7 @@ from vision.tracks import Tracks
 
 _MIN_CELLS = 12
 _SIGMA_M = 0.2
+_CAME_CELLS, _CAME_SHARE = 24, 0.5  # of what is above the robot: so much of it has come
 
 
 def begin(
@@ -20,18 +21,21 @@ def begin(
     detection: Detection,
     parts: IntGrid,
     measured: Regions,
+    came: NDArray[np.intp],
     winner: NDArray[np.int32],
     body_height_m: float,
     max_speed_mps: float,
 ) -> NDArray[np.int32]:
     """winner (P,), track index + 1 of each part or 0, with new tracks: large parts nobody claims, if they
-    reach down to the robot or may. parts (h, w), measured: of them."""
+    reach down to the robot or may, or have just come: an arm that swings into the view ahead of its body.
+    parts (h, w), measured, came (P,): of them, cells where free space was seen."""
     grid = detection.grid
     large = (winner == 0) & (measured.cells >= _MIN_CELLS)
     overhead = large.copy()
     if large.any():
         overhead &= ~reaching_down(grid, parts, len(winner), body_height_m)
-        large &= ~overhead | regions.hidden_below(grid, parts, measured)
+        reaches_in = (came >= _CAME_CELLS) & (came >= _CAME_SHARE * measured.cells)
+        large &= ~overhead | reaches_in | regions.hidden_below(grid, parts, measured)
     born = np.flatnonzero(large)
     if len(born) == 0:
         return winner

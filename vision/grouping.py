@@ -79,11 +79,11 @@ def expected_in(
     part, track = np.nonzero(inside & (main[1:] >= 0))
     if len(part) == 0:
         return result
-    result[part, track] = _parted(grid, parts, part, main[track + 1])
+    result[part, track] = something_nearer_between(grid, parts, part, main[track + 1])
     return result
 
 
-def _parted(
+def something_nearer_between(
     grid: DepthGrid, parts: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     """(K,) whether something nearer stands between the middles of parts one[k] and other[k] in the image."""

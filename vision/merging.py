@@ -24,13 +24,15 @@ from vision.boxes import (
 )
 from vision.depth_grid import BoolGrid, DepthGrid
 from vision.division import LOW_BESIDE, NEARER_INVERSE, SINGLE_WIDTH_M, split
+from vision.grouping import something_nearer_between
 from vision.regions import IntGrid, Regions
 
 BoolArray = NDArray[np.bool_]
 
 _CLOSE_M, _CLOSE_OVERLAPPING_M, _TOUCHING_M, _PIECES_M = 0.25, 0.40, 0.1, 0.8
 _PARTED_M, _SAME_DEPTH_M = 1.0, 0.4  # of pieces one above the other: what parts them hides no more
-_OVER = 0.5  # of the narrower one's width: so much of it is above or below the other
+_HIDDEN_M, _HALVES_MPS = 1.3, 0.6  # of a vehicle's halves: what parts them hides no more
+_OVER = 0.5  # of the narrower one's width: so much of it is above or below the other; of height, beside it
 _SMALL_SHARE = 0.5
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
 _EXACTLY_MPS, _MUCH_MPS = 0.25, 0.4
@@ -80,7 +82,10 @@ def merges(
         return []
     pairs = _paired(regions, velocity_mps, sigma_mps, small, large)
     one = _beside(pairs) | _carried(pairs) | _seen_through(pairs) | _pushed(pairs)
-    pieces = (_pieces(pairs, regions, velocity_mps) | _above(pairs, regions)) & ~one
+    halves = _halves(pairs, regions, velocity_mps) & ~one
+    if halves.any():
+        halves &= something_nearer_between(grid, regions, small, large)
+    pieces = (_pieces(pairs, regions, velocity_mps) | _above(pairs, regions) | halves) & ~one
     if pieces.any():
         one |= pieces & ~_seen_between(grid, regions, small, large)
     small, large = small[one], large[one]
@@ -160,9 +165,37 @@ def _pushed(pairs: _Pairs) -> BoolArray:
 def _pieces(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
     """(K,) pieces of something wider than anybody that go exactly alike; one if nothing is seen between them:
     of the plain sides of a vehicle a depth camera sees only the edges."""
-    goes = np.square(velocity_mps[pairs.large]).sum(axis=1) > _GOES_MPS**2
-    wide = np.maximum(regions.extent_m[pairs.small, 0], regions.extent_m[pairs.large, 0]) > SINGLE_WIDTH_M
-    result: BoolArray = pairs.exactly_alike & goes & wide & (pairs.gap_m <= _PIECES_M)
+    goes = _go(velocity_mps, pairs.large)
+    result: BoolArray = pairs.exactly_alike & goes & _wide(pairs, regions) & (pairs.gap_m <= _PIECES_M)
+    return result
+
+
+def _halves(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
+    """(K,) of something wider than anybody, side by side at one depth, with velocities that do not
+    contradict; one if something nearer, and nothing farther, is seen between them: a vehicle behind a pillar.
+    """
+    small_px, large_px = pairs.small_px, pairs.large_px
+    shared_px = np.minimum(small_px[:, 3], large_px[:, 3]) - np.maximum(small_px[:, 1], large_px[:, 1])
+    lower_px = np.minimum(small_px[:, 3] - small_px[:, 1], large_px[:, 3] - large_px[:, 1])
+    differ_mps = np.sqrt(np.square(velocity_mps[pairs.small] - velocity_mps[pairs.large]).sum(axis=1))
+    away_m = np.abs(regions.position_m[pairs.small, 2] - regions.position_m[pairs.large, 2])
+    alike = pairs.perhaps_alike & (differ_mps <= _HALVES_MPS)
+    close = (shared_px >= _OVER * lower_px) & (away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _HIDDEN_M)
+    go = _go(velocity_mps, pairs.small) & _go(velocity_mps, pairs.large)
+    result: BoolArray = alike & close & go & _wide(pairs, regions)
+    return result
+
+
+def _go(velocity_mps: FloatArray, tracks: NDArray[np.intp]) -> BoolArray:
+    """(K,) whether tracks (K,) go faster than what goes like whatever stands."""
+    result: BoolArray = np.square(velocity_mps[tracks]).sum(axis=1) > _GOES_MPS**2
+    return result
+
+
+def _wide(pairs: _Pairs, regions: Regions) -> BoolArray:
+    """(K,) whether one of them is wider than anybody."""
+    widest_m = np.maximum(regions.extent_m[pairs.small, 0], regions.extent_m[pairs.large, 0])
+    result: BoolArray = widest_m > SINGLE_WIDTH_M
     return result
 
 

@@ -173,7 +173,9 @@ class Tracker:
         alive = mover | tracks.has_moved
         winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, alive, expected)
         speed_mps = self._config.motion.max_speed_mps
-        winner = births.begin(tracks, detection, parts, measured, winner, self._body_height_m, speed_mps)
+        winner = births.begin(
+            tracks, detection, parts, measured, came, winner, self._body_height_m, speed_mps
+        )
         return masks.divide(parts, predicted, ballot, winner)
 
     def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes) -> IntGrid:

@@ -1,12 +1,14 @@
-"""Whose lower part is behind something nearer: reported once it moves, and not before."""
+"""Who is seen above the robot only, the rest hidden or beside the view: reported once it moves."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from hal.types import FloatArray
-from tests.support.painted import QVGA, box, drive, record, vector
+from hal.types import FloatArray, PlanarPose
+from tests.support.painted import QVGA, Quad, box, drive, record, vector
 from tests.support.painted_room import SIDEWAYS, TOWARDS, look, room
 from tests.unit.vision.test_regions import SHAPE, flat, grid_of
 from vision.regions import hidden_below, measure
@@ -88,3 +90,32 @@ def test_a_strip_is_nobody() -> None:
     depth[12:] = 2.0
     grid = grid_of(depth)
     assert hidden_below(grid, labels, measure(grid, labels, 1)).tolist() == [False]
+
+
+ARM_M = vector(0.2, 0.4, 0.22)
+
+
+def above_the_robot(
+    arm: list[Quad], frames: int, way: Callable[[float], PlanarPose] | None = None
+) -> list[list[Obstacle]]:
+    """What is listed nearer than 2.5 m, in each frame."""
+    looks = look(record(room() + arm, way or drive(), frames, QVGA), True)
+    return [[one for one in seen.scene.obstacles if one.position_m[2] < 2.5] for seen in looks]
+
+
+def test_an_arm_that_comes_into_the_view_is_somebody() -> None:
+    """0.9 m above the floor, whereas the robot is 0.8 m high; the rest of them is still beside the view."""
+    listed = above_the_robot(box(vector(1.6, 1.2, 0.9), ARM_M, 10, vector(0.0, -0.9, 0.0)), 20)
+    assert not any(listed[:6])
+    entered = next(k for k, seen in enumerate(listed) if seen)
+    assert entered <= 14
+    assert all(one.moving for seen in listed for one in seen)
+    assert all(len(seen) == 1 for seen in listed[entered:])
+
+
+def test_what_hangs_above_the_robot_is_not_listed_however_it_comes_into_the_view() -> None:
+    """Nor where the robot turns towards it, or drives up to it."""
+    hanging = box(vector(1.6, 1.1, 0.9), ARM_M, 10)
+    assert not any(above_the_robot(hanging, 20))
+    assert not any(above_the_robot(hanging, 20, drive(0.0, 0.5)))
+    assert not any(above_the_robot(box(vector(2.2, 0.2, 0.9), ARM_M, 10), 20, drive(1.0)))

@@ -151,6 +151,27 @@ def test_pieces_of_something_wide_with_nothing_seen_between_them_are_one() -> No
     assert merged(REAR, WHEEL, behind_m=0.0, velocity=[(0.29, 0.0, 0.0)] * 2) == []
 
 
+LOAD = Body(-0.8, width=1.0, height=1.2, cells=900)
+CAB = Body(1.1, z=4.2, width=0.8, height=1.5, cells=800)  # 1.0 m from the load
+NEARLY = [(0.8, 0.0, 0.0), (0.8, 0.0, 0.45)]
+
+
+def test_halves_of_a_vehicle_on_both_sides_of_a_pillar_are_one() -> None:
+    """First seen so, nothing but the pillar between them, and their velocities hardly known yet."""
+    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=2.0) == [(1, 0)]
+    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=4.1) == []  # no pillar: their own depth
+    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=0.0) == []
+    assert merged(LOAD, CAB, velocity=NEARLY, behind_m=6.0) == []  # two vehicles
+    assert merged(replace(LOAD, x=-0.7, width=0.8), CAB, velocity=NEARLY, behind_m=2.0) == []  # two people
+    assert merged(LOAD, replace(CAB, x=1.35), velocity=NEARLY, behind_m=2.0) == [(1, 0)]
+    assert merged(LOAD, replace(CAB, x=1.45), velocity=NEARLY, behind_m=2.0) == []  # 1.35 m
+    assert merged(LOAD, replace(CAB, z=4.45), velocity=NEARLY, behind_m=2.0) == []
+    assert merged(LOAD, replace(CAB, y=1.0), velocity=NEARLY, behind_m=2.0) == []  # hardly beside it
+    faster = [(0.8, 0.0, 0.0), (0.8, 0.0, 0.65)]
+    assert merged(LOAD, CAB, velocity=faster, sigma=0.2, behind_m=2.0) == []
+    assert merged(LOAD, CAB, velocity=[(0.8, 0.0, 0.0), (0.25, 0.0, 0.0)], sigma=0.2, behind_m=2.0) == []
+
+
 LEGS = Body(0.0, y=0.6, z=4.0, height=0.6, cells=200)
 HEAD = Body(0.05, y=-0.55, z=4.1, width=0.2, height=0.25, cells=40)  # 0.72 m above the legs
 
