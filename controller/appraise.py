@@ -33,9 +33,9 @@ from controller.crossing import comes_in
 from controller.debounce import Debounced
 from controller.decision import Reason
 from controller.knowledge import Knowledge
+from controller.lens_cover import COVERED
 from controller.limits import UNSEEN_SIGMAS, Gap, Limit, Motion, allowed, stop_before
 from controller.moving import MovingLimits
-from controller.sight import BLIND
 from controller.standing import StandingLimits
 from controller.worst_case import WorstCase
 from hal.types import CameraMount
@@ -121,9 +121,9 @@ class Appraiser:
             found.append(
                 stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", "stands")
             )
-        if sight.blind:
+        if known.lens.covered:
             urgent = bool(known.bodies.moving.any())
-            found.append(Limit(0.0, Reason("unseen", f"{BLIND}: stop", distance_m=0.0), urgent=urgent))
+            found.append(Limit(0.0, Reason("unseen", f"{COVERED}: stop", distance_m=0.0), urgent=urgent))
         if sight.known_s_m < known.corridor.path.length_m + known.corridor.front_m:
             gap = Gap(sight.known_s_m - front_m)
             limit = stop_before(gap, motion, self._comfort, margins.least_m, -math.inf, "unseen", "")

@@ -20,6 +20,7 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.corridor import Corridor
+from controller.lens_cover import LensCover
 from controller.limits import STANDING_MPS
 from controller.localise import PoseHistory
 from controller.memory import SETTLED_S, OutOfView
@@ -49,9 +50,10 @@ class Knowledge:
     bodies: N boxes to reckon with, those in view before those out of sight; remembered (N,) says which these
     are, and controller/bodies.py what arrays tell of them. unboxed: M more in view, as surfaces only.
     surfaces: P points (P, 2) that depth saw, and how far it saw in each of B bands (controller/surfaces.py).
-    corridor: what the robot sweeps along the path; sight: what was seen of that. edge_tan: how far the camera
-    looks to either side, as the tangent of the angle. near_m: nearer than this ahead of it the floor is below
-    its view; up_tan: so much a metre rises the upper edge of that.
+    corridor: what the robot sweeps along the path; sight: what was seen of that; lens: whether somebody
+    stands too near to be seen. edge_tan: how far the camera looks to either side, as the tangent of the
+    angle. near_m: nearer than this ahead of it the floor is below its view; up_tan: so much a metre rises the
+    upper edge of that.
 
     age_s: since the newest scene was captured; since_s: since the one that bodies are of, which was taken in
     while the camera could be trusted; inf: none yet. health: of the camera in the newest scene. fault: why
@@ -69,6 +71,7 @@ class Knowledge:
     ) -> None:
         self.corridor = Corridor(path, robot.body)
         self.sight = Sight(self.corridor, mount, config, start_s_m)
+        self.lens = LensCover()
         self.bodies = self._seen = no_bodies(0)
         self.surfaces = NO_SURFACES
         self.health = _GOOD
@@ -102,7 +105,7 @@ class Knowledge:
         self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._boxed = before._seen, before._boxed
         self._steady, self._memory, self._places = before._steady, before._memory, before._places
-        self._poses, self.surfaces = before._poses, before.surfaces
+        self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
         self.health, self.edge_tan = before.health, before.edge_tan
         self.near_m, self.up_tan = before.near_m, before.up_tan
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
@@ -181,6 +184,8 @@ class Knowledge:
         remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, scene.free_space)
         self.bodies = boxes.joined(remembered)
         self._boxes, self._seen, self._boxed = boxes, seen, boxed
+        half_width_m = float(self.corridor.half_width(np.array([s_m]))[0])
+        self.lens.look(scene.free_space, half_width_m, self._mount.left_m)
         self.sight.look(scene.free_space, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
         self._places.append((scene.captured_ns, np.concatenate((surfaces.points_m, seen.xy_m))))
         self.health = scene.health

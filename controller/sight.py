@@ -22,15 +22,11 @@ from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
-BLIND = "right before the camera nothing is seen, neither floor nor what stands on it"
-
 _CELL_M = 0.2
 _NEVER_NS = -(2**62)
 _LANES = 5
 # Where the view hardly rises, what flickers farther away than this was nothing.
 _MOST_ABOVE_M = 3.0
-# Nearer to the lens than this, depth is hardly measured; and nobody hides less of the way there.
-_LENS_M, _HIDES_M = 0.3, 0.1
 # One frame's outlier must not brake; three frames of five are a tenth of a second.
 _FRAMES = 5
 
@@ -38,10 +34,8 @@ _FRAMES = 5
 class Sight:
     """Remembers along one path what was seen of it; look() once a scene.
 
-    blind: towards a part of the way right ahead nothing is seen at all, neither floor nor a surface:
-    something may stand nearer to the lens than depth is measured. surface_s_m: where the nearest
-    unexplained surface stands in the corridor (path coordinate of its nearest point, inf: none), steady
-    against single frames.
+    surface_s_m: where the nearest unexplained surface stands in the corridor (path coordinate of its nearest
+    point, inf: none), steady against single frames.
     known_s_m: the corridor was seen free up to here. corners: where somebody could step out from behind
     something.
     """
@@ -59,9 +53,7 @@ class Sight:
         self._near_m = self._floor_from_m = self._lost_m = self._sight.near_m
         self._consent_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
-        self._hides: deque[bool] = deque(maxlen=_FRAMES)
         self._held_s_m = math.inf
-        self.blind = False
         self.surface_s_m = math.inf
         self.known_s_m = self._consent_s_m
         self.corners = BlindCorners(config.sight)
@@ -79,7 +71,6 @@ class Sight:
         """Take in one scene. surfaces: those of free. pose, s_m: of the robot when it was captured. standing:
         it was at rest then."""
         self._take_edges(free)
-        self._note_blindness(free, s_m)
         bands, forward, points = surfaces.bands, surfaces.forward_m, surfaces.points_m
         surface_s, surface_d = self._corridor.path.project_points(
             points, s_m, s_m + self._sight.range_m + 2.0
@@ -106,15 +97,6 @@ class Sight:
         in_corridor = np.zeros(len(free.bearing_tan), np.bool_)
         in_corridor[bands] = inside
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
-
-    def _note_blindness(self, free: FreeSpace, s_m: float) -> None:
-        """What was seen free earlier says nothing of who has come since, right before the lens."""
-        half_m = float(self._corridor.half_width(np.array([s_m]))[0])
-        ahead = np.abs(free.bearing_tan * _LENS_M - self._mount.left_m) <= half_m
-        blank = ahead & ~(free.known_m > 0.0) & ~np.isfinite(free.nearest_m)
-        hidden_m = 2.0 * free.half_width_tan * _LENS_M * np.count_nonzero(blank)
-        self._hides.append(not len(blank) or bool(hidden_m >= _HIDES_M))
-        self.blind = 2 * sum(self._hides) > len(self._hides)
 
     def _take_edges(self, free: FreeSpace) -> None:
         """What is below the view of a camera that is higher than usual cannot be seen before the start

@@ -20,8 +20,8 @@ from hal.types import FloatArray
 _CHANGES_MPS = 0.3
 # Errors of velocities are alike for as long as perception measures them over.
 _ALIKE_S = 0.25
-# By this many standard deviations any measurement differs: nobody has turned for that. Who has is still at
-# it: before anything is done about it, the velocity has changed once more by what the average lags behind by.
+# Who has begun to change its velocity is still at it: before anything is done about it, it has changed once
+# more by what the average lags behind by. So little is taken for noise that who sets off is noticed at once.
 _NOISE_SIGMAS, _GOES_ON = 0.5, 2.0
 
 

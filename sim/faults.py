@@ -37,9 +37,13 @@ class Faults:
         """Seconds by which the scene of a frame exposed at t_s comes later."""
         return self.late_by_s if self.late is not None and self.late.holds(t_s) else 0.0
 
-    def blinds(self, t_s: float) -> bool:
-        """Whether no picture is taken at t_s that shows anything new."""
-        return any(one is not None and one.holds(t_s) for one in (self.silent, self.frozen))
+    def blind_since(self, t_s: float, after_s: float = 0.0) -> float | None:
+        """Since when no picture has been taken that shows anything new; None: at t_s, or for after_s before,
+        there are such pictures."""
+        for window in (self.silent, self.frozen):
+            if window is not None and window.start_s <= t_s < window.end_s + after_s:
+                return window.start_s
+        return None
 
     def strikes(self, t_s: float, after_s: float) -> bool:
         """Whether something that must lead to a stop holds at t_s, or did within after_s before it."""

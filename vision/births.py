@@ -13,7 +13,8 @@ from vision.tracks import Tracks
 
 _MIN_CELLS = 12
 _SIGMA_M = 0.2
-_CAME_CELLS, _CAME_SHARE = 24, 0.5  # of what is above the robot: so much of it has come
+# Of what is above the robot, at the side of the image: so much has come, and it hangs no higher than people.
+_CAME_CELLS, _CAME_SHARE, _PERSON_M = 24, 0.5, 2.0
 
 
 def begin(
@@ -27,15 +28,19 @@ def begin(
     max_speed_mps: float,
 ) -> NDArray[np.int32]:
     """winner (P,), track index + 1 of each part or 0, with new tracks: large parts nobody claims, if they
-    reach down to the robot or may, or have just come: an arm that swings into the view ahead of its body.
-    parts (h, w), measured, came (P,): of them, cells where free space was seen."""
+    reach down to the robot or may, or are an arm that swings into the view ahead of its body.
+
+    parts (h, w), measured, came (P,): of them, cells where free space was seen.
+    """
     grid = detection.grid
     large = (winner == 0) & (measured.cells >= _MIN_CELLS)
     overhead = large.copy()
     if large.any():
         overhead &= ~reaching_down(grid, parts, len(winner), body_height_m)
-        reaches_in = (came >= _CAME_CELLS) & (came >= _CAME_SHARE * measured.cells)
-        large &= ~overhead | reaches_in | regions.hidden_below(grid, parts, measured)
+        swings_in = overhead & ~measured.wide & (came >= _CAME_CELLS) & (came >= _CAME_SHARE * measured.cells)
+        if swings_in.any():
+            swings_in &= reaching_down(grid, parts, len(winner), _PERSON_M)
+        large &= ~overhead | swings_in | regions.hidden_below(grid, parts, measured)
     born = np.flatnonzero(large)
     if len(born) == 0:
         return winner

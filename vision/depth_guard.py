@@ -19,6 +19,7 @@ from vision.scene import NEVER_M, FreeSpace
 
 _SUPPORT = 3  # this many cells of a band must agree before they are a surface
 _HOLE_ROWS = 2
+_BLANK_SHARE = 0.1
 # Band and distance in one whole number: 80 bands, and up to 64 m in steps of 4 micrometres.
 _BAND_SHIFT = 24
 _UNITS_PER_M = 2.0**18
@@ -43,8 +44,21 @@ def free_space(
     else:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     known = np.minimum(known, max_depth_m)
-    edges = _floor_from_m(grid), _up_tan(grid)
-    return FreeSpace(bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, *edges)
+    edges, blank = (_floor_from_m(grid), _up_tan(grid)), _blank(grid, bands, known, nearest)
+    return FreeSpace(bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, *edges, blank)
+
+
+def _blank(
+    grid: DepthGrid, bands: LevelBands, known_m: FloatArray, nearest_m: FloatArray
+) -> NDArray[np.bool_]:
+    """FreeSpace.blank: what is right before the lens fills its bands from below to above. A hole in the floor
+    does not."""
+    blank = (known_m <= 0.0) & np.isinf(nearest_m)
+    if blank.any():
+        rows = len(grid.y)
+        measured = bands.count(grid.valid | grid.beyond, rows).sum(axis=0, dtype=np.int64)
+        blank &= measured <= _BLANK_SHARE * rows * bands.width
+    return blank
 
 
 def _floor_from_m(grid: DepthGrid) -> float:

@@ -31,7 +31,11 @@ BoolArray = NDArray[np.bool_]
 
 _CLOSE_M, _CLOSE_OVERLAPPING_M, _TOUCHING_M, _PIECES_M = 0.25, 0.40, 0.1, 0.8
 _PARTED_M, _SAME_DEPTH_M = 1.0, 0.4  # of pieces one above the other: what parts them hides no more
-_HIDDEN_M, _HALVES_MPS = 1.3, 0.6  # of a vehicle's halves: what parts them hides no more
+_HIDDEN_M = 1.3  # of a vehicle's halves: what parts them hides no more
+_HALVES_MPS, _HALVES_SHARE = (
+    0.6,
+    0.6,
+)  # and by so much, or so much of the slower one's, their velocities differ
 _OVER = 0.5  # of the narrower one's width: so much of it is above or below the other; of height, beside it
 _SMALL_SHARE = 0.5
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
@@ -165,7 +169,7 @@ def _pushed(pairs: _Pairs) -> BoolArray:
 def _pieces(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
     """(K,) pieces of something wider than anybody that go exactly alike; one if nothing is seen between them:
     of the plain sides of a vehicle a depth camera sees only the edges."""
-    goes = _go(velocity_mps, pairs.large)
+    goes = np.square(velocity_mps[pairs.large]).sum(axis=1) > _GOES_MPS**2
     result: BoolArray = pairs.exactly_alike & goes & _wide(pairs, regions) & (pairs.gap_m <= _PIECES_M)
     return result
 
@@ -178,17 +182,12 @@ def _halves(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolAr
     shared_px = np.minimum(small_px[:, 3], large_px[:, 3]) - np.maximum(small_px[:, 1], large_px[:, 1])
     lower_px = np.minimum(small_px[:, 3] - small_px[:, 1], large_px[:, 3] - large_px[:, 1])
     differ_mps = np.sqrt(np.square(velocity_mps[pairs.small] - velocity_mps[pairs.large]).sum(axis=1))
+    speed_mps = np.sqrt(np.square(velocity_mps).sum(axis=1))
+    slower_mps = np.minimum(speed_mps[pairs.small], speed_mps[pairs.large])
+    alike = pairs.perhaps_alike & (differ_mps <= np.minimum(_HALVES_MPS, _HALVES_SHARE * slower_mps))
     away_m = np.abs(regions.position_m[pairs.small, 2] - regions.position_m[pairs.large, 2])
-    alike = pairs.perhaps_alike & (differ_mps <= _HALVES_MPS)
     close = (shared_px >= _OVER * lower_px) & (away_m <= _SAME_DEPTH_M) & (pairs.gap_m <= _HIDDEN_M)
-    go = _go(velocity_mps, pairs.small) & _go(velocity_mps, pairs.large)
-    result: BoolArray = alike & close & go & _wide(pairs, regions)
-    return result
-
-
-def _go(velocity_mps: FloatArray, tracks: NDArray[np.intp]) -> BoolArray:
-    """(K,) whether tracks (K,) go faster than what goes like whatever stands."""
-    result: BoolArray = np.square(velocity_mps[tracks]).sum(axis=1) > _GOES_MPS**2
+    result: BoolArray = alike & close & (slower_mps > _GOES_MPS) & _wide(pairs, regions)
     return result
 
 

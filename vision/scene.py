@@ -58,7 +58,8 @@ class FreeSpace:
     of what is known; 0.0: all of it can be measured. floor_from_m: nearer than this forward distance the
     floor is below the view, however far known_m reaches; 0.0: not known, NEVER_M: it never comes into view.
     up_tan: by so much a metre of forward distance the upper edge of the view rises from the camera's height;
-    inf: not known.
+    inf: not known. blank (N,): bands in which hardly anything was measured at all, near or far; None: not
+    told.
     """
 
     bearing_tan: FloatArray
@@ -68,6 +69,7 @@ class FreeSpace:
     blind_m: float = 0.0
     floor_from_m: float = 0.0
     up_tan: float = math.inf
+    blank: NDArray[np.bool_] | None = None
 
 
 class CameraCondition(Enum):

@@ -51,7 +51,9 @@ class Tracks:
         self.guessed = np.empty(
             0, np.bool_
         )  # a mover that ends in what stands around it where a guess has it
-        self.overhead = np.empty(0, np.bool_)  # seen only above the robot; something nearer hides the rest
+        self.overhead = np.empty(
+            0, np.bool_
+        )  # seen only above the robot; the rest is hidden, or beside the view
         # The verdict (vision/judgement.py): the score it rests on, now, ever, how surely (0..1), and whether
         # its fragments are sure that it stands.
         self.evidence = np.empty(0)

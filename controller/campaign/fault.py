@@ -18,22 +18,30 @@ AT_FAULT_MPS = 0.02
 _SIGHT_STEPS = 5
 _SEEN_MOVING_MPS = 0.1
 _AVOIDING_S = 15.0
+# Nobody drives on for longer without a new picture.
+_PATIENCE_S = 0.6
 
 
 def at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reaction_s: float) -> bool:
     """Whether the robot moved, and a driver who knows the whole motion of what it has once seen moving (or
     standing, if it never moves) avoids it: with the same field of view, reaction_s and limits, by braking
     hard, by braking comfortably, by going on, or by speeding up. Where the mission's faults take the robot's
-    eyes, or have it see everything later, they do the same to that driver."""
+    eyes, or have it see everything later, they do the same to that driver, who brakes hard once that lasts.
+    """
     if contact.v_mps <= AT_FAULT_MPS:
         return False
+    limits = stage.robot.limits
+    soft = (limits.max_accel_mps2, limits.max_jerk_mps3)
+    hard = (limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
+    blind_s = stage.case.faults.blind_since(contact.t_s, reaction_s)
+    if blind_s is not None:
+        start, waits_s = int(np.searchsorted(log.times_s, blind_s)), _PATIENCE_S + reaction_s
+        if not _touches(contact.body, stage, log, start, waits_s, 0.0, *hard):
+            return True
     seen = _first_seen(contact, stage, log, eye)
     if seen is None:
         return False
     reaction_s += stage.case.faults.late_by(log.times_s[seen])
-    limits = stage.robot.limits
-    soft = (limits.max_accel_mps2, limits.max_jerk_mps3)
-    hard = (limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
     choices = ((0.0, *hard), (0.0, *soft), (log.v_mps[seen], *soft), (limits.max_speed_mps, *soft))
     return not all(
         _touches(contact.body, stage, log, seen, reaction_s, target, accel, jerk)
@@ -53,12 +61,12 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -
     for k in range(0, len(log.times_s), _SIGHT_STEPS):
         if log.times_s[k] >= contact.t_s:
             break
-        if stage.case.faults.blinds(log.times_s[k]):
-            before = None
-            continue
         polygons, velocity = stage.world.look(log.times_s[k])
         if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
             first = before = None
+            continue
+        if stage.case.faults.blind_since(log.times_s[k]) is not None:
+            before = None
             continue
         if first is None:
             seen = _in_view(body, polygons, PlanarPose(*log.poses[k]), eye)

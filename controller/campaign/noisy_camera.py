@@ -242,6 +242,7 @@ class NoisyCamera:
             known,
             floor_from_m=eye.floor_from_m,
             up_tan=eye.up_tan,
+            blank=blind,
         )
 
 

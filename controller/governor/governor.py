@@ -23,11 +23,11 @@ from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
 from controller.governor.surroundings import near_limits, turn_objection
 from controller.knowledge import Knowledge
+from controller.lens_cover import COVERED
 from controller.limits import Limit, Motion
 from controller.localise import PoseHistory
 from controller.path import OnPath, Path
 from controller.shape import SpeedShaper
-from controller.sight import BLIND
 from controller.situation import Situation
 from hal.types import CameraMount, PlanarPose
 from vision.scene import CameraCondition, Scene
@@ -227,8 +227,8 @@ class SpeedGovernor:
             speed_mps = min(speed_mps, decision.target_speed_mps)
             if speed_mps <= 0.0:
                 objection = decision.reason.sentence
-        elif self._known.sight.blind:
-            objection = f"{BLIND}: stop"
+        elif self._known.lens.covered:
+            objection = f"{COVERED}: stop"
         else:
             objection = turn_objection(
                 self._ground, self._known.bodies, pose, self._robot, self._decision,

@@ -8,7 +8,7 @@ import pytest
 
 from config.app import AppConfig
 from config.camera import SimulatedCameraConfig
-from config.scenario import Go, MotionPlan, Wait
+from config.scenario import Go, MotionPlan, RobotBody, Wait
 from controller.campaign.drive import DriveLog
 from controller.campaign.judge import Row, false_stops, flaps, judge
 from controller.campaign.oracle import OracleTime
@@ -80,21 +80,47 @@ def test_a_contact_with_what_was_seen_coming_is_at_fault() -> None:
     assert row.contacts_at_fault == 1
 
 
+def sets_off(x_m: float, y_m: float, at_s: float, speed_mps: float) -> RobotBody:
+    """Stands in view, and drives across the way later."""
+    steps = (
+        Wait(kind="wait", duration_s=at_s),
+        Go(kind="go", x_m=x_m, y_m=-4.0, speed_mps=speed_mps),
+    )
+    who = mover(x_m, y_m, x_m, -4.0, speed_mps)
+    return who.model_copy(update={"motion": MotionPlan(accel_mps2=20.0, steps=steps)})
+
+
 @pytest.mark.parametrize(
     ("faults", "at_fault"),
     [
-        (Faults(silent=Window(0.0, 2.0)), 1),
-        (Faults(silent=Window(0.0, 4.5)), 0),
-        (Faults(frozen=Window(0.0, 4.5)), 0),
-        (Faults(late=Window(0.0, 9.0), late_by_s=0.2), 1),
-        (Faults(late=Window(0.0, 9.0), late_by_s=6.5), 0),
+        (Faults(), 1),
+        (Faults(silent=Window(2.95, 9.0)), 0),
+        (Faults(frozen=Window(2.95, 9.0)), 0),
+        (Faults(late=Window(0.0, 9.0), late_by_s=0.5), 0),
+        # Two looks it takes, and these are none: one at 3.1 s, the next one after the gap.
+        (Faults(silent=Window(3.15, 3.55)), 0),
+        # Nobody drives on for two seconds without a picture.
+        (Faults(silent=Window(0.5, 9.0)), 1),
+        (Faults(frozen=Window(0.5, 4.0)), 1),
     ],
 )
 def test_the_driver_has_no_better_eyes_than_the_robot(faults: Faults, at_fault: int) -> None:
-    """It is in view all the time and touched after 5 s; what is seen only then is seen too late."""
-    made = stage(mover(9.0, 2.0, 3.0, -1.0, 0.9), length_m=9.0, faults=faults)
-    row = judged(made, cruise(0.6, 9.0))
+    """Who sets off after 3 s touches the robot's side 0.7 s later."""
+    row = judged(stage(sets_off(3.6, 1.6, 3.0, 1.0), length_m=9.0, faults=faults), cruise(0.6, 9.0))
     assert (row.contacts, row.contacts_at_fault) == (1, at_fault)
+
+
+@pytest.mark.parametrize("faults", [Faults(), Faults(silent=Window(1.3, 4.35))])
+def test_who_stood_while_nothing_was_seen_is_not_known_to_go_on(faults: Faults) -> None:
+    steps = (
+        Go(kind="go", x_m=4.5, y_m=1.5, speed_mps=1.5),
+        Wait(kind="wait", duration_s=3.0),
+        Go(kind="go", x_m=4.5, y_m=-3.0, speed_mps=0.8),
+    )
+    who = mover(4.5, 3.5, 4.5, -3.0, 1.5)
+    who = who.model_copy(update={"motion": MotionPlan(accel_mps2=20.0, steps=steps)})
+    row = judged(stage(who, length_m=9.0, faults=faults), cruise(0.9, 8.0))
+    assert (row.contacts, row.contacts_at_fault) == (1, 0)
 
 
 @pytest.mark.parametrize(("gain_mps2", "at_fault"), [(0.0, 1), (0.3, 0)])

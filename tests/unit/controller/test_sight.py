@@ -188,43 +188,6 @@ def test_floor_too_near_to_be_measured_was_not_seen_by_seeing_beyond_it() -> Non
     assert watch.look(beyond, s_m=8.0).known_s_m > 15.0
 
 
-def blank(middle_tan: float, half_tan: float) -> FreeSpace:
-    """Nothing is seen in some of the bands: whoever is there is too near for depth."""
-    return free(known_m=np.where(np.abs(BEARING - middle_tan) <= half_tan, 0.0, 10.0))
-
-
-@pytest.mark.parametrize(
-    ("seen", "is_blind"),
-    [
-        (free(), False),
-        (free(nearest_m=0.4, known_m=0.4), False),
-        (blank(0.0, 1.0), True),
-        # 0.3 m from the lens, so much as hides 0.1 m of the way.
-        (blank(0.0, 0.205), True),
-        (blank(0.6, 0.405), True),
-        (blank(0.0, 0.105), False),
-        (FreeSpace(np.zeros(0), 0.01, np.zeros(0), np.zeros(0)), True),
-    ],
-)
-def test_somebody_right_before_the_lens_is_noticed_by_what_is_not_seen(
-    seen: FreeSpace, is_blind: bool
-) -> None:
-    """However free the floor was that was seen there before."""
-    watch = Watch()
-    assert not watch.look(free(), times=5).blind
-    # One frame does not brake, and three do.
-    assert not watch.look(seen, times=2).blind
-    assert watch.look(seen).blind == is_blind
-    assert not watch.look(free(), times=3).blind
-
-
-def test_what_is_not_seen_beside_the_way_hides_nobody_on_it() -> None:
-    """A camera that looks 80 degrees to either side, with nothing seen beyond 60 degrees."""
-    wide = np.linspace(-5.6, 5.6, 281)
-    seen = FreeSpace(wide, 0.02, np.full(281, math.inf), np.where(np.abs(wide) > 1.7, 0.0, 10.0))
-    assert not Watch().look(seen, times=5).blind
-
-
 def test_what_is_below_the_view_of_a_high_camera_is_free_by_consent_at_the_start_only() -> None:
     """1.9 m ahead of it the floor comes into view, and not 1.3 m."""
     high, blind = replace(free(), floor_from_m=1.9), replace(free(known_m=0.0), floor_from_m=1.9)

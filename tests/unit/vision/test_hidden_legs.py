@@ -119,3 +119,19 @@ def test_what_hangs_above_the_robot_is_not_listed_however_it_comes_into_the_view
     assert not any(above_the_robot(hanging, 20))
     assert not any(above_the_robot(hanging, 20, drive(0.0, 0.5)))
     assert not any(above_the_robot(box(vector(2.2, 0.2, 0.9), ARM_M, 10), 20, drive(1.0)))
+
+
+@pytest.mark.parametrize(
+    ("front_m", "velocity_mps"),
+    [
+        (vector(1.6, 0.3, 0.9), 0.5 * SIDEWAYS),  # in the middle of the view: a load on its way
+        (vector(3.0, 0.3, 1.3), TOWARDS),
+        (vector(4.5, 2.75, 2.02), SIDEWAYS),  # from the side, higher than people
+    ],
+)
+def test_what_moves_above_the_robot_and_belongs_to_nobody_is_not_listed(
+    front_m: FloatArray, velocity_mps: FloatArray
+) -> None:
+    load = box(front_m, vector(0.3, 0.6, 0.25), 10, velocity_mps)
+    looks = look(record(room() + load, drive(), 40, QVGA), True)
+    assert [one for seen in looks for one in seen.scene.obstacles if one.position_m[2] < 5.5] == []

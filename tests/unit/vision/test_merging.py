@@ -167,7 +167,9 @@ def test_halves_of_a_vehicle_on_both_sides_of_a_pillar_are_one() -> None:
     assert merged(LOAD, replace(CAB, x=1.45), velocity=NEARLY, behind_m=2.0) == []  # 1.35 m
     assert merged(LOAD, replace(CAB, z=4.45), velocity=NEARLY, behind_m=2.0) == []
     assert merged(LOAD, replace(CAB, y=1.0), velocity=NEARLY, behind_m=2.0) == []  # hardly beside it
-    faster = [(0.8, 0.0, 0.0), (0.8, 0.0, 0.65)]
+    towards = [(0.4, 0.0, 0.0), (0.3, 0.0, -0.3)]  # 0.32 m/s, of somebody who goes 0.42
+    assert merged(LOAD, CAB, velocity=towards, sigma=0.2, behind_m=2.0) == []
+    faster = [(1.2, 0.0, 0.0), (1.2, 0.0, 0.65)]
     assert merged(LOAD, CAB, velocity=faster, sigma=0.2, behind_m=2.0) == []
     assert merged(LOAD, CAB, velocity=[(0.8, 0.0, 0.0), (0.25, 0.0, 0.0)], sigma=0.2, behind_m=2.0) == []
 
