@@ -35,9 +35,9 @@ def at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reac
     hard = (limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
     blind_s = stage.case.faults.blind_since(contact.t_s, reaction_s)
     if blind_s is not None:
-        start, waits_s = int(np.searchsorted(log.times_s, blind_s)), _PATIENCE_S + reaction_s
-        if not _touches(contact.body, stage, log, start, waits_s, 0.0, *hard):
-            return True
+        last, waits_s = int(np.searchsorted(log.times_s, blind_s)), _PATIENCE_S + reaction_s
+        if not _touches(contact.body, stage, log, last, waits_s, 0.0, *hard):
+            return True  # It drove on blind.
     seen = _first_seen(contact, stage, log, eye)
     if seen is None:
         return False
