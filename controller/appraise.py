@@ -91,11 +91,12 @@ class Appraiser:
             watched, placed, course, enters, s_m, motion, base_mps, now_s
         )
         found += in_the_way
-        # Who is out of sight on a way towards the robot's may be nearer than where it is reckoned.
-        unsure_mps = UNSEEN_SIGMAS * course.sigma_left_mps
-        inwards = -np.sign(placed.d_m[:, 0]) * course.left_mps > unsure_mps
-        nearer = comes_in(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
-        enters |= self._remembered & inwards & nearer
+        if self._remembered.any():
+            # Who is out of sight on a way towards the robot's may be nearer than where it is reckoned.
+            unsure_mps = UNSEEN_SIGMAS * course.sigma_left_mps
+            inwards = -np.sign(placed.d_m[:, 0]) * course.left_mps > unsure_mps
+            nearer = comes_in(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
+            enters |= self._remembered & inwards & nearer
         worst = self._worst_case.limit(
             watched, placed, course, enters, s_m, motion, known.since_s, chosen_mps
         )

@@ -71,10 +71,10 @@ class BlindCorners:
             # Nearer than this, too little of the face is in view to be sure.
             corner.sightings -= 1 if corner.s_m - front_s_m > _SURE_M else 0
         close = stands & (beside > 0.0) & (beside <= self._beside_m) & (s_m - front_s_m < _LOOK_AHEAD_M)
-        for left in (False, True):
-            side = (d_m > 0.0) == left
-            near = (side & close).nonzero()[0]
-            for end in self._ends(near if left else near[::-1], bands, forward_m, s_m, d_m, band_tan):
+        near = close.nonzero()[0]
+        on_left = d_m[near] > 0.0
+        for left, rows in ((False, near[~on_left][::-1]), (True, near[on_left])):
+            for end in self._ends(rows, bands, forward_m, s_m, d_m, band_tan):
                 self._note(float(s_m[end]), left, float(beside[end]))
         self._corners = [one for one in self._corners if one.sightings > 0 and one.s_m > front_s_m - _SAME_M]
 
@@ -98,7 +98,7 @@ class BlindCorners:
         """The far ends of long faces among rows, which come from the edge of the view inwards."""
         if not len(rows):
             return []
-        along, aside, number = np.diff(s_m[rows]), np.diff(d_m[rows]), np.diff(bands[rows])
+        along, aside, number = (one[rows[1:]] - one[rows[:-1]] for one in (s_m, d_m, bands))
         # So much of a face that runs along the way lies between two bands.
         step_m = forward_m**2 * band_tan / np.maximum(np.abs(d_m), 0.1)
         flat_m = _SLACK * step_m[rows[:-1]] + _STEP_ASIDE_M

@@ -64,8 +64,10 @@ class Bodies:
     def select(self, chosen: NDArray[np.bool_]) -> Bodies:
         """Only the chosen ones."""
         rows = chosen.nonzero()[0]
-        if len(rows) == len(self):
+        if len(rows) == len(chosen):
             return self
+        if not len(rows):
+            return no_bodies(self.captured_ns)
         # For a few rows, take() is ten times as fast as an index.
         return Bodies(self.captured_ns, *[array.take(rows, 0) for array in _arrays_of(self)])
 
@@ -73,6 +75,8 @@ class Bodies:
         """These and, behind them, others; the time is that of these."""
         if not len(other):
             return self
+        if not len(self):
+            return Bodies(self.captured_ns, *_arrays_of(other))
         pairs = zip(_arrays_of(self), _arrays_of(other), strict=True)
         return Bodies(self.captured_ns, *[np.concatenate(pair) for pair in pairs])
 
@@ -137,21 +141,22 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     covariance = floor @ spread @ floor.T
     moving = np.array([one.moving for one in scene.obstacles], np.bool_)
     velocity = speed @ floor.T
-    half_view = np.maximum(extent[:, 2], depth_m) / 2.0
+    half_across, half_height, half_seen = (extent / 2.0).T
+    half_view = np.maximum(half_seen, depth_m / 2.0)
     forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
     return Bodies(
         captured_ns=scene.captured_ns,
         ids=np.array([one.id for one in scene.obstacles], np.int64),
-        xy_m=position[:, :2] + (half_view - extent[:, 2] / 2.0)[:, None] * forward,
+        xy_m=position[:, :2] + (half_view - half_seen)[:, None] * forward,
         velocity_mps=np.where(moving[:, None], velocity, 0.0),
         measured_mps=velocity,
-        surprise_mps=np.zeros_like(velocity),
+        surprise_mps=np.zeros(velocity.shape),
         covariance=covariance,
         half_view_m=half_view,
-        half_across_m=extent[:, 0] / 2.0,
+        half_across_m=half_across,
         view_rad=np.full(len(moving), pose.heading_rad),
-        top_m=position[:, 2] + extent[:, 1] / 2.0,
-        bottom_m=position[:, 2] - extent[:, 1] / 2.0,
+        top_m=position[:, 2] + half_height,
+        bottom_m=position[:, 2] - half_height,
         moving=moving,
         age_s=seen_s[:, 0],
         unseen_s=seen_s[:, 1],
@@ -161,10 +166,10 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
 
 def _check(obstacles: tuple[Obstacle, ...], measured: FloatArray, seen_s: FloatArray) -> None:
     """Written so that NaN fails every comparison."""
-    reasonable = ((measured >= _LEAST) & (measured <= _MOST)).all(axis=1) & (seen_s >= 0.0).all(axis=1)
-    if reasonable.all():
+    possible, known = (measured >= _LEAST) & (measured <= _MOST), seen_s >= 0.0
+    if possible.all() and known.all():
         return
-    k = int(reasonable.argmin())
+    k = int((possible.all(axis=1) & known.all(axis=1)).argmin())
     position, extent, velocity = (measured[k, part] for part in (_POSITION, _EXTENT, _VELOCITY))
     raise SceneError(
         f"obstacle {obstacles[k].id} is impossible: position {_list(position)} m, "

@@ -118,13 +118,14 @@ class OutOfView:
         something that is still seen.
         """
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
-        gone = _missing(before.ids, seen.ids)
-        before = _as_measured(before, self._mistaken_mps)
-        gone &= before.moving | ((before.age_s >= SETTLED_S) & (not standing))
-        if not len(self._since_s) and not gone.any():
+        gone = before.select(_missing(before.ids, seen.ids))
+        if len(gone):
+            gone = _as_measured(gone, self._mistaken_mps)
+            gone = gone.select(gone.moving | ((gone.age_s >= SETTLED_S) & (not standing)))
+        if not len(self._since_s) and not len(gone):
             return no_bodies(seen.captured_ns)
-        since = np.concatenate((self._since_s, np.zeros(int(gone.sum())))) + dt_s
-        bodies = self._bodies.joined(before.select(gone))
+        since = np.concatenate((self._since_s, np.zeros(len(gone)))) + dt_s
+        bodies = self._bodies.joined(gone)
         bodies = replace(
             bodies,
             captured_ns=seen.captured_ns,
@@ -133,13 +134,15 @@ class OutOfView:
         )
         part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
         kept = self._hidden(bodies, pose, edge_tan) & _missing(bodies.ids, seen.ids)
-        if bodies.moving.any():
+        some_move = bodies.moving.any()
+        if some_move:
             part_of &= _alike(bodies, seen) | ~bodies.moving[:, None]
             kept &= ~bodies.moving | (
                 since <= np.where(_may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
             )
         kept &= ~part_of.any(axis=1)
-        kept &= ~_rests(bodies, kept)
+        if some_move:
+            kept &= ~_rests(bodies, kept)
         self._since_s = since[kept]
         self._bodies = self._kept_out(bodies.select(kept), pose, free)
         return self._bodies
@@ -147,6 +150,8 @@ class OutOfView:
     def _gone_on(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:
         """(N, 2) where they are dt_s later if they go on as they did. Nobody has passed ahead of the robot
         unseen: who comes is still on the side where it was."""
+        if not bodies.moving.any():
+            return bodies.xy_m
         way = bodies.velocity_mps * dt_s
         forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
         leftward = np.array([-forward[1], forward[0]])
@@ -245,7 +250,7 @@ def _may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:
 def _clearly_comes(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     """(N,) who was measured, beyond what noise explains, on a way towards the robot's axis."""
     leftward = np.array([-math.sin(pose.heading_rad), math.cos(pose.heading_rad)])
-    side = np.sign((bodies.xy_m - (pose.x_m, pose.y_m)) @ leftward)
+    side = np.sign((bodies.xy_m - np.array([pose.x_m, pose.y_m])) @ leftward)
     inwards_mps = -side * (bodies.measured_mps @ leftward)
     sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
     return np.asarray(inwards_mps > np.maximum(_CLEAR_SIGMAS * sigma_mps, _CLEAR_MPS))

@@ -87,7 +87,8 @@ class Sight:
             half_width,
             2.0 * free.half_width_tan,
             s_m + self._corridor.front_m,
-            np.logical_not(belongs[:, explained_by.moving].any(axis=1)),
+            # As matrices of yes and no: whether a point belongs to any who moves.
+            ~(belongs @ explained_by.moving),
         )
         way = inside.nonzero()[0]
         way_s = surface_s[way]
@@ -148,16 +149,11 @@ class Sight:
         self.known_s_m = float(self._cells[first + unknown[0]]) - 0.5 * _CELL_M if len(unknown) else math.inf
 
     def _lanes_of(self, cells: FloatArray) -> FloatArray:
-        """(2, C, L) points across the swept width at each cell: they depend on the path alone."""
+        """(2, L, C) points across the swept width at each cell: they depend on the path alone."""
         x, y, heading = self._corridor.path.poses(cells)
         half = self._corridor.half_width(cells)
-        lanes = np.linspace(-1.0, 1.0, _LANES)
-        return np.stack(
-            (
-                x[:, None] - np.sin(heading)[:, None] * half[:, None] * lanes,
-                y[:, None] + np.cos(heading)[:, None] * half[:, None] * lanes,
-            )
-        )
+        lanes = np.linspace(-1.0, 1.0, _LANES)[:, None]
+        return np.stack((x - np.sin(heading) * half * lanes, y + np.cos(heading) * half * lanes))
 
     def _lanes_seen(
         self,
@@ -169,7 +165,7 @@ class Sight:
     ) -> FloatArray:
         """(C,) share of the width of the cells first..last that was seen as free, or lies behind a surface in
         the corridor: that surface limits the speed itself."""
-        px, py = self._lanes[:, first:last]
+        px, py = self._lanes[:, :, first:last]
         forward, band = bands_at(free, pose, self._mount, px, py)
         within = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
         # What is too near to be measured was not seen, however far the scan goes beyond it. Nor was what is
@@ -182,5 +178,5 @@ class Sight:
         far_edge = forward + 0.5 * _CELL_M
         surface_m = np.where(surface_in_corridor, free.nearest_m, np.inf)
         seen = in_view & ((far_edge <= free.known_m[within]) | (far_edge >= surface_m[within]))
-        share: FloatArray = seen.sum(axis=1) / _LANES
+        share: FloatArray = seen.sum(axis=0) / _LANES
         return share

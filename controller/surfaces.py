@@ -45,11 +45,12 @@ def surfaces_of(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount, noise: DepthNoise = TYPICAL_DEPTH_NOISE
 ) -> Surfaces:
     """What was seen of free by a camera that a body at pose carried. noise: of its depth."""
-    bands = (np.isfinite(free.nearest_m) & np.isfinite(free.bearing_tan)).nonzero()[0]
+    shows = np.isfinite(free.nearest_m)
+    bands = (shows & np.isfinite(free.bearing_tan)).nonzero()[0]
     forward = free.nearest_m[bands]
     ahead = forward + mount.forward_m
     left = mount.left_m - forward * free.bearing_tan[bands]
-    seen_m = np.where(np.isfinite(free.nearest_m), free.nearest_m, np.nan_to_num(free.known_m))
+    seen_m = np.where(shows, free.nearest_m, np.fmax(free.known_m, 0.0))
     points = floor_points(pose, ahead, left)
     return Surfaces(seen_m, bands, forward, forward * free.half_width_tan, points, noise)
 

@@ -75,6 +75,10 @@ def test_selected_bodies_keep_their_order_and_joined_ones_follow() -> None:
     some = bodies.select(np.array([True, False, True]))
     assert some.ids.tolist() == [1, 3]
     assert some.joined(bodies.select(np.array([False, True, False]))).ids.tolist() == [1, 3, 2]
+    nobody = replace(bodies, captured_ns=7).select(np.zeros(3, np.bool_))
+    assert (len(nobody), nobody.captured_ns) == (0, 7)
+    assert nobody.joined(some).ids.tolist() == [1, 3]
+    assert nobody.joined(some).captured_ns == 7
     assert len(no_bodies(3)) == 0
     assert len(bodies_of(scene(), POSE, MOUNT, 0.5)) == 0
 
