@@ -77,25 +77,23 @@ def reach(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stops:
-    """R emergency stops at K times: distance_m, speed_mps (R, K)."""
+    """R emergency stops at K times: distance_m (R, K), moves (R, K) whether the robot does not stand yet."""
 
     distance_m: FloatArray
-    speed_mps: FloatArray
+    moves: NDArray[np.bool_]
 
 
 def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
     """Sampled at times_s (K,)."""
-    count = len(ramps.duration_s)
-    distance, speed, _ = ramps.state(np.broadcast_to(times_s, (count, len(times_s))))
-    return Stops(distance, speed)
+    distance, speed, _ = ramps.state(times_s[None, :])
+    return Stops(distance, speed > _STANDING_MPS)
 
 
 def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
     """(R,) for each stop of a robot at s_m: the least distance by which it stays short of everything while it
     still moves; negative where something could be touched, inf where nothing is in the way."""
     at = (s_m + stopping.distance_m)[:, None, :]
-    moves = (stopping.speed_mps > _STANDING_MPS)[:, None, :]
-    matters = reached.inside & (at < reached.hi_m) & moves
+    matters = reached.inside & (at < reached.hi_m) & stopping.moves[:, None, :]
     least: FloatArray = np.where(matters, reached.lo_m - at, np.inf).min(axis=(1, 2), initial=np.inf)
     return least
 
@@ -103,8 +101,7 @@ def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
 def stands_in_time(stopping: Stops, reached: Reach) -> NDArray[np.bool_]:
     """(R,) which stops are over before anything could be in the way at all, however near it is."""
     first = int(reached.inside.any(axis=0).argmax())
-    stands: NDArray[np.bool_] = stopping.speed_mps[:, max(first - 1, 0)] <= _STANDING_MPS
-    return stands
+    return ~stopping.moves[:, max(first - 1, 0)]
 
 
 def gets_through(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:

@@ -138,12 +138,11 @@ def choices(
 
     leave_s: how long after the obstacle has left, enter_s: how long before it enters, the robot may come.
     """
-    n = len(speeds_mps)
     times = np.array([conflict.in_s, max(conflict.in_s - enter_s, 0.0), conflict.out_s + leave_s])
     leaves = math.isfinite(conflict.out_s)
     if not leaves:
         times[2] = times[0]
-    at_in, at_first, at_out = ramps.distance(np.broadcast_to(times, (n, 3))).T + s_m
+    at_in, at_first, at_out = ramps.distance(times[None, :]).T + s_m
     room = np.minimum(conflict.lo_in_m - at_in, conflict.lo_out_m - at_out) - margin_m
     yield_mps = _greatest_with_room(room, speeds_mps) if leaves else 0.0
     passes = at_first > conflict.hi_in_m

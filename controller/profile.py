@@ -36,19 +36,21 @@ class SpeedRamps:
         jerk_mps3: float,
         latency_s: float = 0.0,
     ) -> None:
-        v, a = np.empty(targets_mps.shape), np.empty(targets_mps.shape)
-        v[:], a[:] = v_mps, a_mps2
+        # Columns (N, 1): what is asked for are tables of N ramps at K times.
+        target = targets_mps[:, None]
+        v, a = np.empty(target.shape), np.empty(target.shape)
+        v[:, 0], a[:, 0] = v_mps, a_mps2
         # Up or down, judged by the speed that remains when a has been let go of.
-        sign = np.where(targets_mps >= v + a * np.abs(a) / (2.0 * jerk_mps3), 1.0, -1.0)
+        sign = np.where(target >= v + a * np.abs(a) / (2.0 * jerk_mps3), 1.0, -1.0)
         start = sign * a
         bound = np.maximum(np.where(sign > 0.0, accel_mps2, decel_mps2), start)
-        wanted = sign * (targets_mps - v)
+        wanted = sign * (target - v)
         peak = np.minimum(np.sqrt(np.maximum(jerk_mps3 * wanted + start * start / 2.0, 0.0)), bound)
         self._t1 = np.maximum(peak - start, 0.0) / jerk_mps3
         self._t3 = peak / jerk_mps3
         in_ramps = (2.0 * peak * peak - start * start) / (2.0 * jerk_mps3)
         self._t2 = np.where(peak > 0.0, np.maximum(wanted - in_ramps, 0.0) / np.maximum(peak, 1e-12), 0.0)
-        self._v, self._a, self._target = v, a, targets_mps
+        self._v, self._a, self._target = v, a, target
         self._jerk, self._peak = sign * jerk_mps3, sign * peak
         self._v1 = v + a * self._t1 + self._jerk * self._t1**2 / 2.0
         self._v2 = self._v1 + self._peak * self._t2
@@ -58,47 +60,50 @@ class SpeedRamps:
     def duration_s(self) -> FloatArray:
         """(N,) until the target speed is reached, latency included."""
         duration: FloatArray = self._latency_s + self._t1 + self._t2 + self._t3
-        return duration
+        return duration[:, 0]
 
     def state(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Distance m, speed m/s and acceleration m/s^2 after t_s; t_s and all results (N, K)."""
+        """Distance m, speed m/s and acceleration m/s^2 after t_s: (N, K), or (1, K) for the same times of
+        all ramps; all results are (N, K)."""
         phases = self._split(t_s)
         _, x1, x2, x3, _ = phases
-        v, a, j, peak = self._v[:, None], self._a[:, None], self._jerk[:, None], self._peak[:, None]
-        speed = v + a * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0
+        a, j, peak = self._a, self._jerk, self._peak
+        speed = self._v + a * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0
         acceleration = np.where(x2 + x3 > 0.0, peak - j * x3, a + j * x1)
         return self._distance(*phases), np.maximum(speed, 0.0), acceleration
 
     def distance(self, t_s: FloatArray) -> FloatArray:
-        """Distance m after t_s (N, K)."""
+        """(N, K) distance m after t_s: (N, K) or (1, K)."""
         return self._distance(*self._split(t_s))
 
     def _distance(
         self, held: FloatArray, x1: FloatArray, x2: FloatArray, x3: FloatArray, x4: FloatArray
     ) -> FloatArray:
-        v, a, j, peak = self._v[:, None], self._a[:, None], self._jerk[:, None], self._peak[:, None]
+        j, peak = self._jerk, self._peak
         distance: FloatArray = (
-            v * (held + x1)
-            + a * x1**2 / 2.0
+            self._v * (held + x1)
+            + self._a * x1**2 / 2.0
             + j * x1**3 / 6.0
-            + self._v1[:, None] * x2
+            + self._v1 * x2
             + peak * x2**2 / 2.0
-            + self._v2[:, None] * x3
+            + self._v2 * x3
             + peak * x3**2 / 2.0
             - j * x3**3 / 6.0
-            + self._target[:, None] * x4
+            + self._target * x4
         )
         return distance
 
     def _split(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """How long each phase has lasted at t_s: latency, jerk, constant, jerk back, done."""
-        t1, t2, t3 = self._t1[:, None], self._t2[:, None], self._t3[:, None]
+        t1, t2, t3 = self._t1, self._t2, self._t3
         held = np.minimum(t_s, self._latency_s)
         rest = t_s - held
         x1 = np.minimum(rest, t1)
-        x2 = np.minimum(np.maximum(rest - t1, 0.0), t2)
-        x3 = np.minimum(np.maximum(rest - t1 - t2, 0.0), t3)
-        return held, x1, x2, x3, np.maximum(rest - t1 - t2 - t3, 0.0)
+        after = rest - t1
+        x2 = np.minimum(np.maximum(after, 0.0), t2)
+        after = after - t2
+        x3 = np.minimum(np.maximum(after, 0.0), t3)
+        return held, x1, x2, x3, np.maximum(after - t3, 0.0)
 
 
 def comfortable(limits: Limits, motion: Motion, targets_mps: FloatArray) -> SpeedRamps:

@@ -51,6 +51,14 @@ def test_is_the_law_of_ruckig(v: float, a: float, target: float, t: float) -> No
         assert accelerating[0, 0] == pytest.approx(acceleration[0], abs=1e-5)
 
 
+def test_the_same_times_do_for_all_ramps() -> None:
+    some, times = ramps(0.8, 0.1, [0.0, 0.4, 1.2]), np.linspace(0.0, 6.0, 7)
+    once, each = some.state(times[None, :]), some.state(np.tile(times, (3, 1)))
+    for alone, spelt_out in zip(once, each, strict=True):
+        assert alone.tolist() == spelt_out.tolist()
+    assert some.distance(times[None, :]).tolist() == each[0].tolist()
+
+
 def test_goes_on_at_the_target_speed() -> None:
     distance, speed, acceleration = ramps(1.0, 0.0, [1.0, 0.0]).state(np.full((2, 1), 20.0))
     assert distance[0, 0] == pytest.approx(20.0)
