@@ -82,8 +82,9 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
     """
     ahead_m = bodies.velocity_mps[:, None, :] * times_s[:, None]
     points = (bodies.xy_m[:, None, :] + ahead_m).reshape(-1, 2)
-    located = corridor.path.locate_points(points, near_s_m - _BEHIND_M, near_s_m + reach_m)
-    s, d, heading = (values.reshape(len(bodies), len(times_s)) for values in located)
+    s, d, heading = corridor.path.locate_points(points, near_s_m - _BEHIND_M, near_s_m + reach_m)
+    shape = len(bodies), len(times_s)
+    s, d, heading = s.reshape(shape), d.reshape(shape), heading.reshape(shape)
     if corridor.straight:
         heading = heading[:, :1]
     turned = bodies.view_rad[:, None] - heading

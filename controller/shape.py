@@ -129,8 +129,10 @@ class SpeedShaper:
             gentle_jerk = self._v + let_go_mps <= self._limits.max_speed_mps + _TINY
         else:
             gentle_jerk = self._v >= let_go_mps and self._a >= -self._comfort.decel_mps2
-        jerk = self._comfort.jerk_mps3 if gentle_jerk else self._active.jerk_mps3
-        self._active = BrakeLimits(self._comfort.decel_mps2, jerk)
+        if gentle_jerk:
+            self._active = self._comfort
+        else:
+            self._active = BrakeLimits(self._comfort.decel_mps2, self._active.jerk_mps3)
 
     def _track_end(self, distance_to_end_m: float) -> None:
         """The distance still to be commanded: own integral, slowly corrected by the odometry's."""
