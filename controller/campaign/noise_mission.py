@@ -24,7 +24,7 @@ from controller.shape import SpeedShaper
 from controller.situation import Situation
 from controller.tally import SetpointTally
 from hal.clocks import NS_PER_S
-from hal.types import FloatArray, Setpoint
+from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import CameraCondition, CameraHealth, Scene
 
 # A robot that still stands so long after everything else has come to rest will stand for ever.
@@ -79,8 +79,8 @@ class _Eyes:
         """Whether the next frame is exposed at this control step."""
         return self._frame / self._fps <= t_s + 1e-9
 
-    def look(self, t_s: float, stage: Stage, s_m: float, d_m: float, known_s_m: float) -> None:
-        """One frame."""
+    def look(self, t_s: float, true_pose: PlanarPose, known_pose: PlanarPose) -> None:
+        """One frame from true_pose, where the robot believes to be at known_pose."""
         faults = self._faults
         self._frame += 1
         if faults.silent is not None and faults.silent.holds(t_s):
@@ -89,7 +89,7 @@ class _Eyes:
             scene = self._frozen(self._last, t_s)
         else:
             self._same = 0
-            scene = self._camera.look(t_s, self._frame, stage.pose(s_m, d_m), stage.pose(known_s_m, d_m))
+            scene = self._camera.look(t_s, self._frame, true_pose, known_pose)
         self._last = scene
         self._on_way.append((t_s + self._latency_s + faults.late_by(t_s), scene))
 
@@ -140,10 +140,9 @@ class _NoiseDrive:
         """All control steps until the drive is over."""
         for k, off_m in enumerate(self._off_m):
             t_s = k * self._dt_s
-            decision = self._decide(t_s, off_m)
-            self._log.add(
-                t_s, self._stage.pose(self._base.s_m, off_m), self._base.s_m, self._base.v_mps, decision
-            )
+            pose = self._stage.pose(self._base.s_m, off_m)
+            decision = self._decide(t_s, pose, off_m)
+            self._log.add(t_s, pose, self._base.s_m, self._base.v_mps, decision)
             self._move(t_s, decision)
             if self._is_over(t_s):
                 break
@@ -154,15 +153,17 @@ class _NoiseDrive:
         """How far it believes to have come."""
         return self._base.s_m * self._odometry
 
-    def _decide(self, t_s: float, off_m: float) -> Decision:
+    def _decide(self, t_s: float, pose: PlanarPose, off_m: float) -> Decision:
+        """For the robot that truly is at pose, and believes to be elsewhere along the path."""
         known_s_m = self._known_s_m
+        known_pose = self._stage.pose(known_s_m, off_m)
         if self._eyes.due(t_s):
-            self._eyes.look(t_s, self._stage, self._base.s_m, off_m, known_s_m)
+            self._eyes.look(t_s, pose, known_pose)
         return self._policy.step(
             Situation(
                 self._eyes.arrived(t_s),
                 self._stage.path,
-                self._stage.pose(known_s_m, off_m),
+                known_pose,
                 OnPath(known_s_m, off_m, 0.0),
                 max(self._shaper.v_mps, self._base.v_mps),
                 self._shaper.a_mps2,

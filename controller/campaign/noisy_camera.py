@@ -30,6 +30,8 @@ from vision.scene import CameraCondition, CameraHealth, EgoMotion, FreeSpace, Ob
 
 _GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)
 _BOX_PX = (0.0, 0.0, 1.0, 1.0)
+# How well it is known that nothing goes up or down.
+_UP_MPS = 0.1
 # What was in view in the frame before was so within this many of its periods.
 _SEEN_FRAMES = 1.5
 
@@ -68,6 +70,11 @@ class NoisyCamera:
         self, stage: Stage, camera: SimulatedCameraConfig, seed: int, noise: NoiseModel | None = None
     ) -> None:
         self._stage, self._noise = stage, noise or NoiseModel()
+        # Of velocities along the view, to its side and upwards: so much, and so much more a metre away.
+        self._sigma_mps = np.array([self._noise.radial_velocity_mps, self._noise.side_velocity_mps, _UP_MPS])
+        self._sigma_per_m = np.array(
+            [self._noise.radial_velocity_per_m, self._noise.side_velocity_per_m, 0.0]
+        )
         self._period_s, self._least_m = 1.0 / camera.fps, camera.depth_min_m
         unmoved = Pose(np.eye(3), np.zeros(3))
         self._ego_motion = EgoMotion(unmoved, self._period_s, "none", math.nan, math.nan, math.nan)
@@ -81,7 +88,7 @@ class NoisyCamera:
         self._listed = ~self._glass & (stage.world.z_m[:, 0] < stage.robot.body.height_m)
         self._to_optical = camera_in_body(mount_of(stage.robot)).rotation.T
         low_m, high_m = stage.world.z_m.T
-        self._height_m, self._middle_m = high_m - low_m, 0.5 * (low_m + high_m) - mount.height_m
+        self._middle_m = 0.5 * (low_m + high_m) - mount.height_m
         n = len(stage.world)
         self._ids = np.zeros(n, np.int64)
         self._next_id = 1
@@ -90,7 +97,8 @@ class NoisyCamera:
         self._velocity = np.zeros((n, 2))
         self._evidence_s, self._moving = np.zeros(n), np.zeros(n, np.bool_)
         self._wander = np.zeros((n, 4))
-        self._centre, self._extent = np.zeros((n, 2)), np.zeros((n, 2))
+        self._centre, self._extent = np.zeros((n, 2)), np.zeros((n, 3))
+        self._extent[:, 1] = high_m - low_m
         self._started = False
 
     def look(self, t_s: float, sequence: int, true_pose: PlanarPose, known_pose: PlanarPose) -> Scene:
@@ -141,7 +149,7 @@ class NoisyCamera:
             if missed[body] < max(noise.missed_share, share):
                 continue
             self._see(body, right[k], forward[k], t_s, pose)
-            self._extent[body] = high_x[k] - low_x[k], high_z[k] - low_z[k]
+            self._extent[body, ::2] = high_x[k] - low_x[k], high_z[k] - low_z[k]
         gone = self._seen_s < t_s - noise.forget_s
         self._sightings[gone] = 0
         self._moving[gone] = False
@@ -186,38 +194,40 @@ class NoisyCamera:
         in_camera[:, 0] = ahead + sigma_m * wander[:, 0]
         in_camera[:, 1] = left - self._mount.left_m + noise.side_sigma_m * wander[:, 1]
         in_camera[:, 2] = self._middle_m[rows]
-        age_s = t_s - self._first_s[rows]
-        young = noise.first_velocity_mps * np.exp(-age_s / noise.first_velocity_fades_s)
-        radial = noise.radial_velocity_mps + noise.radial_velocity_per_m * ahead
-        side = noise.side_velocity_mps + noise.side_velocity_per_m * ahead
+        sigma = self._sigma_mps + self._sigma_per_m * ahead[:, None]
         vx, vy = self._velocity.take(rows, 0).T
         velocity = np.zeros((len(rows), 3))
-        velocity[:, 0] = vx * cos + vy * sin + radial * wander[:, 2]
-        velocity[:, 1] = vy * cos - vx * sin + side * wander[:, 3]
-        sigma = np.empty((len(rows), 3))
-        sigma[:, 0], sigma[:, 1], sigma[:, 2] = radial + young, side + young, 0.1 + young
+        velocity[:, 0], velocity[:, 1] = vx * cos + vy * sin, vy * cos - vx * sin
+        velocity[:, :2] += sigma[:, :2] * wander[:, 2:]
+        age_s = t_s - self._first_s[rows]
+        sigma += (noise.first_velocity_mps * np.exp(-age_s / noise.first_velocity_fades_s))[:, None]
         turn = self._to_optical
-        position, velocity = in_camera @ turn.T, velocity @ turn.T
-        covariance = (turn * (sigma * sigma)[:, None, :]) @ turn.T
-        extent = np.empty((len(rows), 3))
-        extent[:, 0::2], extent[:, 1] = self._extent.take(rows, 0), self._height_m[rows]
-        unseen_s = (t_s - self._seen_s[rows]).tolist()
-        ids, moving = self._ids[rows].tolist(), self._moving[rows].tolist()
+        columns = zip(
+            self._ids[rows].tolist(),
+            in_camera @ turn.T,
+            self._extent.take(rows, 0),
+            velocity @ turn.T,
+            (turn * (sigma * sigma)[:, None, :]) @ turn.T,
+            self._moving[rows].tolist(),
+            age_s.tolist(),
+            (t_s - self._seen_s[rows]).tolist(),
+            strict=True,
+        )
         return tuple(
             Obstacle(
-                id=ids[k],
+                id=number,
                 bbox_px=_BOX_PX,
-                position_m=position[k],
-                extent_m=extent[k],
-                velocity_mps=velocity[k],
-                velocity_cov=covariance[k],
-                moving=moving[k],
-                score=0.9 if moving[k] else 0.5,
+                position_m=position,
+                extent_m=extent,
+                velocity_mps=speed,
+                velocity_cov=covariance,
+                moving=moves,
+                score=0.9 if moves else 0.5,
                 fragments=8,
                 age_s=age,
-                unseen_s=unseen_s[k],
+                unseen_s=unseen,
             )
-            for k, age in enumerate(age_s.tolist())
+            for number, position, extent, speed, covariance, moves, age, unseen in columns
         )
 
     def _free_space(self, view: PlanarView) -> FreeSpace:

@@ -56,62 +56,59 @@ class PlanarEye:
         self.floor_from_m = mount.height_m / self._down_tan if sees_floor else NEVER_M
         z_m = world.z_m
         self._hides = (z_m[:, 0] < min(mount.height_m, hangs_m)) & (z_m[:, 1] > mount.height_m)
-        # The outlines of all bodies and, at the end, of the building; each closed by its first corner.
+        # (2, K + 1, N + 1): the outlines of all bodies and, at the end, of the building, by corners; each is
+        # closed by its first one.
         outlines, room = world.look(0.0)[0], world.room_polygon()
-        corners = max(outlines.shape[1], 4)
-        self._outlines = np.empty((len(world) + 1, corners + 1, 2))
-        self._outlines[-1, :4], self._outlines[-1, 4:-1], self._outlines[-1, -1] = room, room[-1], room[0]
+        corners = max(outlines.shape[1], len(room))
+        self._outlines = np.empty((2, corners + 1, len(world) + 1))
+        self._outlines[:, :-1, -1] = room[np.minimum(np.arange(corners), len(room) - 1)].T
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> PlanarView:
         """polygons (N, K, 2) of all bodies now; pose of the robot."""
-        self._outlines[:-1, :-1], self._outlines[:-1, -1] = polygons, polygons[:, 0]
-        forward, right = self._in_camera(self._outlines, pose)
+        outlines = self._outlines
+        outlines[:, :-1, :-1] = polygons.T
+        outlines[:, -1] = outlines[:, 0]
+        forward, right = self._in_camera(outlines[0], outlines[1], pose)
         reach = self._edge_tan * forward
-        near = (forward.max(axis=1) > _NEAR_M) & (forward.min(axis=1) < self.range_m)
-        inside = ((right - reach).min(axis=1) < 0.0) & ((right + reach).max(axis=1) > 0.0)
-        near &= inside
+        near = (forward.max(axis=0) > _NEAR_M) & (forward.min(axis=0) < self.range_m)
+        near &= ((right - reach).min(axis=0) < 0.0) & ((right + reach).max(axis=0) > 0.0)
         near[-1] = True  # the building, which is not a body
         chosen = near.nonzero()[0]
-        forward, right = forward.take(chosen, 0), right.take(chosen, 0)
+        forward, right = forward.take(chosen, 1), right.take(chosen, 1)
         hits = self._hits(forward, right)
         bodies, room, hits = chosen[:-1], hits[-1], hits[:-1]
         unmet = np.isinf(hits.min(axis=1)).nonzero()[0]
         if len(unmet):
-            hits[unmet] = self._thin_ones(forward[unmet], right[unmet])
+            hits[unmet] = self._thin_ones(forward[:, unmet], right[:, unmet])
         hiding = hits.take(self._hides[bodies].nonzero()[0], 0)
         free = np.minimum(hiding.min(axis=0, initial=np.inf), room)
         np.putmask(hits, (hits > free + _TOUCHING_M) | ~self._in_frame(bodies, hits), np.inf)
         return PlanarView(bodies, hits, free)
 
-    def _in_camera(self, polygons: FloatArray, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
-        """Forward and right (N, K) of the camera, on the level."""
+    def _in_camera(self, x_m: FloatArray, y_m: FloatArray, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
+        """Forward and right (...) of the camera, on the level, of points x_m (...), y_m (...)."""
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        dx, dy = polygons[..., 0] - pose.x_m, polygons[..., 1] - pose.y_m
+        dx, dy = x_m - pose.x_m, y_m - pose.y_m
         return dx * cos + dy * sin - self._mount.forward_m, self._mount.left_m + dx * sin - dy * cos
 
     def _hits(self, forward: FloatArray, right: FloatArray) -> FloatArray:
-        """(M, B) forward distance at which each ray first meets an edge of each polygon (M, K + 1)."""
-        count, corners, bands = *forward.shape, len(self.bearing_tan)
+        """(M, B) forward distance at which each ray first meets an edge of each polygon (K + 1, M)."""
+        # All pairs of a ray and an edge at once: to pick the few that meet would take longer.
         off = right[:, :, None] - self.bearing_tan * forward[:, :, None]
-        # Of all the pairs of a ray and an edge only a few meet: the rest is never divided.
-        met = (off[:, :-1] * off[:, 1:] <= 0.0).ravel().nonzero()[0]
-        edge = met // bands
-        body = edge // (corners - 1)
-        corner = edge + body  # each polygon has one corner more than it has edges
-        here, there = off.take(met + body * bands), off.take(met + (body + 1) * bands)
+        here, there = off[:-1], off[1:]
         drop = here - there
         share = here / np.where(np.abs(drop) < 1e-12, np.inf, drop)
-        start = forward.take(corner)
-        z = start + share * (forward.take(corner + 1) - start)
-        nearest = np.full(count * bands, np.inf)
-        np.minimum.at(nearest, met - (edge - body) * bands, np.where(z > _NEAR_M, z, np.inf))
-        return nearest.reshape(count, bands)
+        start = forward[:-1, :, None]
+        z = start + share * (forward[1:, :, None] - start)
+        met = (here * there <= 0.0) & (z > _NEAR_M)
+        nearest: FloatArray = np.where(met, z, np.inf).min(axis=0)
+        return nearest
 
     def _thin_ones(self, forward: FloatArray, right: FloatArray) -> FloatArray:
         """(M, B) for bodies that no ray has met: a pole may stand between two, and is seen all the same."""
-        ahead = forward.min(axis=1)
+        ahead = forward.min(axis=0)
         tangent = right / np.maximum(forward, _NEAR_M)
-        low, high = tangent.min(axis=1) - self.half_width_tan, tangent.max(axis=1) + self.half_width_tan
+        low, high = tangent.min(axis=0) - self.half_width_tan, tangent.max(axis=0) + self.half_width_tan
         thin = (ahead > _NEAR_M) & (high - low <= 4.0 * self.half_width_tan)
         between = (self.bearing_tan > low[:, None]) & (self.bearing_tan < high[:, None])
         return np.where(thin[:, None] & between, ahead[:, None], np.inf)
