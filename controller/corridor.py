@@ -80,11 +80,9 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
 
     The path is looked at from a little behind near_s_m to reach_m ahead of it.
     """
-    ahead_m = bodies.velocity_mps[:, None, :] * times_s[:, None]
-    points = (bodies.xy_m[:, None, :] + ahead_m).reshape(-1, 2)
-    s, d, heading = corridor.path.locate_points(points, near_s_m - _BEHIND_M, near_s_m + reach_m)
-    shape = len(bodies), len(times_s)
-    s, d, heading = s.reshape(shape), d.reshape(shape), heading.reshape(shape)
+    x = bodies.xy_m[:, :1] + bodies.velocity_mps[:, :1] * times_s
+    y = bodies.xy_m[:, 1:] + bodies.velocity_mps[:, 1:] * times_s
+    s, d, heading = corridor.path.locate(x, y, near_s_m - _BEHIND_M, near_s_m + reach_m)
     if corridor.straight:
         heading = heading[:, :1]
     turned = bodies.view_rad[:, None] - heading

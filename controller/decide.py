@@ -79,11 +79,11 @@ class DecisionMaker:
             reason = Reason("camera", f"{known.fault}: stop")
             return Decision(self._action(0.0, v_mps), 0.0, reason)
         motion = Motion(v_mps, at.a_mps2, self._latency_s)
-        way = self._path_limits(path, on_path, motion)
+        on_way = self._path_limit(path, on_path, motion)
         limits = self._camera_limits(known)
-        base_mps = min(limit.speed_mps for limit in (*way, *limits))
+        base_mps = min(limit.speed_mps for limit in (on_way, *limits))
         limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
-        return self._conclude(way, limits, motion, now_ns)
+        return self._conclude(on_way, limits, motion, now_ns)
 
     def _input_fault(self, at: Situation) -> str:
         pose, on_path, v_mps, now_ns = at.pose, at.on_path, at.v_mps, at.now_ns
@@ -118,31 +118,27 @@ class DecisionMaker:
             self._known = self.knowledge(path, on_path.s_m)
         return self._known
 
-    def _path_limits(self, path: Path, on_path: OnPath, motion: Motion) -> list[Limit]:
-        """Robot, section, bend and end of the path."""
+    def _path_limit(self, path: Path, on_path: OnPath, motion: Motion) -> Limit:
+        """The least that robot, section, bend and end of the path allow."""
         left_m = path.length_m - on_path.s_m
         ahead_s = on_path.s_m + motion.v_mps * motion.latency_s
         # Who accelerates brakes only once that has ended; but no section is left before it has been left.
         steady_s = ahead_s + braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
         section = min(path.speed_limit(ahead_s), path.speed_limit(steady_s))
-        rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
-        sentence = f"{left_m:.1f} m to go: {allowed(section)}"
         end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
+        if section <= end:
+            rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
+            return Limit(section, Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
         required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
-        return [
-            Limit(section, Reason(rule, sentence)),
-            Limit(
-                end,
-                Reason(
-                    "target",
-                    f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
-                    distance_m=left_m,
-                    closing_mps=0.0,
-                    required_m=required,
-                    margin_m=left_m - required,
-                ),
-            ),
-        ]
+        reason = Reason(
+            "target",
+            f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
+            distance_m=left_m,
+            closing_mps=0.0,
+            required_m=required,
+            margin_m=left_m - required,
+        )
+        return Limit(end, reason)
 
     def _camera_limits(self, known: Knowledge) -> list[Limit]:
         sight, limits = self._config.sight, self._robot.limits
@@ -169,10 +165,9 @@ class DecisionMaker:
         )
         return Limit(speed, Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed(speed)}"))
 
-    def _conclude(self, way: list[Limit], limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
+    def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
         top_mps = self._robot.limits.max_speed_mps
         watched = min(limits, key=lambda limit: limit.speed_mps)
-        on_way = min(way, key=lambda limit: limit.speed_mps)
         raw_mps = self._start_or_creep(watched, motion)
         if raw_mps < watched.speed_mps:
             sentence = f"{watched.reason.sentence}: too little to go for"

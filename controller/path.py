@@ -151,12 +151,12 @@ class Path:
         self, points_m: FloatArray, from_s_m: float = -math.inf, to_s_m: float = math.inf
     ) -> tuple[FloatArray, FloatArray]:
         """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m."""
-        return self.locate_points(points_m, from_s_m, to_s_m)[:2]
+        return self.locate(points_m[:, 0], points_m[:, 1], from_s_m, to_s_m)[:2]
 
-    def locate_points(
-        self, points_m: FloatArray, from_s_m: float, to_s_m: float
+    def locate(
+        self, x_m: FloatArray, y_m: FloatArray, from_s_m: float, to_s_m: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The same with the path's heading_rad (N,) there (not wrapped).
+        """The same of points x_m, y_m, with the path's heading_rad there (not wrapped), each of one shape.
 
         From the nearest of samples 0.25 m apart, on the circle that the path is there: exact but for the
         steps of a blend, and those take a second round.
@@ -165,41 +165,41 @@ class Path:
         high = min(max(to_s_m, low + _SAMPLE_M), self.length_m + EXTENSION_M)
         piece = max(bisect_right(self._starts, low) - 1, 0)
         if self._curvature[piece] == 0.0 and self._straight_to[piece] >= bisect_right(self._starts, high) - 1:
-            return self._project_on_line(piece, points_m, low, high)
+            return self._locate_on_line(piece, x_m, y_m, low, high)
         first = math.ceil((low + EXTENSION_M) / _SAMPLE_M)
         last = max(int((high + EXTENSION_M) / _SAMPLE_M), first) + 1
-        dx = points_m[:, :1] - self._sample_x[first:last]
-        dy = points_m[:, 1:2] - self._sample_y[first:last]
-        s = (first + np.argmin(dx * dx + dy * dy, axis=1)) * _SAMPLE_M - EXTENSION_M
+        dx = x_m[..., None] - self._sample_x[first:last]
+        dy = y_m[..., None] - self._sample_y[first:last]
+        s = (first + (dx * dx + dy * dy).argmin(axis=-1)) * _SAMPLE_M - EXTENSION_M
         for _ in range(_ROUNDS):
-            ahead, left, bend, _ = self._seen_from(s, points_m)
+            ahead, left, bend, _ = self._seen_from(s, x_m, y_m)
             inward = np.maximum(1.0 - bend * left, _INNERMOST)
             curved = np.where(np.abs(bend) < _STRAIGHT_1PM, _STRAIGHT_1PM, bend)
             s = np.minimum(np.maximum(s + np.arctan2(curved * ahead, inward) / curved, low), high)
-        ahead, left, _, heading = self._seen_from(s, points_m)
+        ahead, left, _, heading = self._seen_from(s, x_m, y_m)
         return s, np.copysign(np.hypot(ahead, left), left), heading
 
-    def _project_on_line(
-        self, piece: int, points_m: FloatArray, low: float, high: float
+    def _locate_on_line(
+        self, number: int, x_m: FloatArray, y_m: FloatArray, low: float, high: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        heading = self._heading.item(piece)
-        cos, sin = math.cos(heading), math.sin(heading)
-        dx, dy = points_m[:, 0] - self._x.item(piece), points_m[:, 1] - self._y.item(piece)
-        along = dx * cos + dy * sin + self._starts[piece]
+        piece = self._pieces[number]
+        cos, sin = math.cos(piece.heading_rad), math.sin(piece.heading_rad)
+        dx, dy = x_m - piece.x_m, y_m - piece.y_m
+        along = dx * cos + dy * sin + piece.s_m
         left = dy * cos - dx * sin
         s = np.minimum(np.maximum(along, low), high)
-        headings = np.empty(len(s))
-        headings.fill(heading)
+        headings = np.empty(s.shape)
+        headings.fill(piece.heading_rad)
         return s, np.copysign(np.hypot(along - s, left), left), headings
 
     def _seen_from(
-        self, s_m: FloatArray, points_m: FloatArray
+        self, s_m: FloatArray, x_m: FloatArray, y_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Each point ahead and to the left of the path's pose at its s_m; the curvature and heading there."""
         k = self._piece_at(s_m)
         x, y, heading = self._poses_on(k, s_m)
         cos, sin = np.cos(heading), np.sin(heading)
-        dx, dy = points_m[:, 0] - x, points_m[:, 1] - y
+        dx, dy = x_m - x, y_m - y
         return dx * cos + dy * sin, dy * cos - dx * sin, self._curvature[k], heading
 
     def speed_limit(self, s_m: float) -> float:
