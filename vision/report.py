@@ -18,11 +18,10 @@ _WAY_SIGMA_M = 0.06
 _STATIC_SCORE = 0.5
 _LAST_CELLS = 12  # less of a sliver is no sight of anybody
 _OVERHEAD_CELLS = 24  # half of a head, 6 m away
-# For so long, with so much of its box in that of a mover so many times as large, and so far before or behind
-# it, a new mover may be a piece of that one: a wheel under a cart, a trolley's front, a torso.
+# For so long a mover of less than half of a body, in the image at something larger that is at most so far
+# before or behind it, may be a piece of that: a wheel under a cart, a leg of somebody close to a wall.
 _PIECE_S = 0.3
-_PIECE_SHARE = 0.3
-_PIECE_OF_CELLS = 2
+_PIECE_M2 = 0.5
 _PIECE_M = 1.5
 
 
@@ -47,7 +46,7 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
         expected_px[rest, :2] = np.minimum(expected_px[rest, :2], bbox[rest, :2])
         expected_px[rest, 2:] = np.maximum(expected_px[rest, 2:], bbox[rest, 2:])
         bbox = np.where(whole[:, None], expected_px, bbox)
-    told = tracks.moving & ~_pieces(tracks, listed, bbox, local[:, 2], detection.captured_ns)
+    told = tracks.moving & ~_pieces(tracks, listed, bbox, local[:, 2], detection.camera.fx)
     result = []
     for t in np.flatnonzero(listed).tolist():
         moving = bool(told[t])
@@ -71,17 +70,18 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
 
 
 def _pieces(
-    tracks: Tracks, listed: NDArray[np.bool_], bbox_px: FloatArray, depth_m: FloatArray, now_ns: int
+    tracks: Tracks, listed: NDArray[np.bool_], bbox_px: FloatArray, depth_m: FloatArray, focal_px: float
 ) -> NDArray[np.bool_]:
-    """(T,) movers so new that they may be a piece of a larger one, which is told of already."""
-    movers = tracks.moving & listed
-    new = np.flatnonzero(movers & (now_ns - tracks.born_ns < _PIECE_S * 1e9))
+    """(T,) movers so small and so new that they may be a piece of something larger, whether that is known to
+    move or not."""
     result = np.zeros(len(tracks), np.bool_)
-    if len(new) and np.count_nonzero(movers) > 1:
-        larger = movers & (tracks.cells >= _PIECE_OF_CELLS * tracks.cells[new, None])
-        larger[np.arange(len(new)), new] = False
+    area_px = (bbox_px[:, 2:] - bbox_px[:, :2]).prod(axis=1)
+    small = area_px * np.square(depth_m / focal_px) < _PIECE_M2
+    new = np.flatnonzero(tracks.moving & listed & small & (tracks.moving_s < _PIECE_S))
+    if len(new):
+        larger = listed & (area_px > area_px[new, None])
         larger &= np.abs(depth_m - depth_m[new, None]) <= _PIECE_M
-        larger &= overlaps(bbox_px[new, None], bbox_px) >= _PIECE_SHARE
+        larger &= overlaps(bbox_px[new, None], bbox_px) > 0.0
         result[new] = larger.any(axis=1)
     return result
 

@@ -240,6 +240,7 @@ class Tracker:
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
         tracks.unproven_s = np.where(verdict.proven, 0.0, tracks.unproven_s + detection.dt_s)
+        tracks.moving_s = np.where(verdict.moving, tracks.moving_s + detection.dt_s, 0.0)
         tracks.has_moved |= verdict.moving
         tracks.confidence, tracks.stands = verdict.confidence, verdict.stands
         tracks.calm_s = np.where(tracks.evidence > 0.0, 0.0, tracks.calm_s + detection.dt_s)

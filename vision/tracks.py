@@ -62,6 +62,7 @@ class Tracks:
         self.confidence = np.empty(0)
         self.stands = np.empty(0, np.bool_)
         self.calm_s = np.empty(0)  # since there was evidence; inf: there never was
+        self.moving_s = np.empty(0)  # for how long the verdict has been that it moves
         self.unproven_s = np.empty(0)  # since a frame proved that it moves, or since its birth
         # For how long nearly all ends denied that it stands, less how long they did not.
         self.unrest_s = np.empty(0)

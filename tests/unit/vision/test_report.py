@@ -183,18 +183,15 @@ def test_what_is_seen_above_the_robot_only_is_listed_when_much_of_it_moves(
     assert len(report.obstacles(made, now())) == listed
 
 
-def mover_and_newcomer(
+def large_and_new(
     box_px: tuple[float, float, float, float] = (130.0, 150.0, 150.0, 170.0),
     depth_m: float = 4.5,
-    cells: int = 20,
-    age_s: float = 0.2,
+    moving_s: float = 0.29,
 ) -> Tracks:
-    """A mover of 200 cells, seen for long, and a second one."""
+    """Something that stands, seen for long, and something small that has begun to move: 0.09 m2."""
     made = tracks(BEFORE_ME, (0.2, -0.1, depth_m))
-    made.moving[:] = True
-    made.born_ns[:] = NOW_NS - np.array([round(2e9), round(age_s * 1e9)])
+    made.moving[1], made.moving_s[1] = True, moving_s
     made.bbox_px[:] = (100.0, 50.0, 140.0, 180.0), box_px
-    made.cells[:] = 200, cells
     return made
 
 
@@ -202,35 +199,39 @@ def told_moving(made: Tracks) -> list[bool]:
     return [one.moving for one in report.obstacles(made, now())]
 
 
-def test_a_new_mover_at_a_larger_one_may_be_a_piece_of_it_and_is_listed_without_a_verdict() -> None:
-    old, new = report.obstacles(mover_and_newcomer(), now())
-    assert (old.moving, new.moving, new.score) == (True, False, 0.5)
+def test_a_small_new_mover_at_something_larger_may_be_a_piece_of_it_and_is_listed_without_a_verdict() -> None:
+    made = large_and_new()
+    made.state[1, 3:] = [0.5, 0.0, 0.0]
+    large, new = report.obstacles(made, now())
+    assert (large.moving, new.moving, new.score) == (False, False, 0.5)
+    np.testing.assert_allclose(new.velocity_mps, [0.5, 0.0, 0.0])  # what is known of it is told all the same
+    made.moving[0], made.moving_s[0] = True, 2.0
+    assert told_moving(made) == [True, False]
 
 
 @pytest.mark.parametrize(
     "apart",
     [
-        {"age_s": 0.31},
-        {"box_px": (135.0, 150.0, 155.0, 170.0)},  # a quarter of it
+        {"moving_s": 0.31},
+        {"box_px": (141.0, 150.0, 161.0, 170.0)},
         {"depth_m": 5.6},
         {"depth_m": 2.4},
-        {"cells": 101},
+        {"box_px": (130.0, 120.0, 165.0, 185.0)},  # 2275 px at 4.5 m with 300 px: 0.51 m2
     ],
-    ids=["seen for longer", "beside", "behind", "before", "no smaller"],
+    ids=["for longer", "beside", "behind", "before", "half of a body"],
 )
-def test_a_new_mover_apart_from_a_larger_one_is_told_at_once(apart: dict[str, Any]) -> None:
-    assert told_moving(mover_and_newcomer(**apart)) == [True, True]
+def test_a_mover_that_is_no_piece_of_something_larger_is_told_at_once(apart: dict[str, Any]) -> None:
+    assert told_moving(large_and_new(**apart)) == [False, True]
 
 
-def test_a_new_mover_at_something_large_that_stands_or_is_not_listed_is_told_at_once() -> None:
-    stands, unlisted = mover_and_newcomer(), mover_and_newcomer()
-    stands.moving[0] = False
-    unlisted.sightings[0] = 2
-    assert told_moving(stands) == [False, True]
-    assert told_moving(unlisted) == [True]
+def test_a_small_new_mover_at_something_that_is_not_listed_is_told_at_once() -> None:
+    made = large_and_new()
+    made.sightings[0] = 2
+    assert told_moving(made) == [True]
 
 
-def test_of_two_new_movers_the_larger_one_is_told() -> None:
-    made = mover_and_newcomer()
-    made.born_ns[0] = made.born_ns[1]
+def test_of_two_small_new_movers_the_larger_one_is_told() -> None:
+    made = large_and_new()
+    made.moving[0], made.moving_s[0] = True, 0.1
+    made.bbox_px[0] = (125.0, 150.0, 150.0, 190.0)
     assert told_moving(made) == [True, False]
