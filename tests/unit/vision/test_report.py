@@ -188,9 +188,9 @@ def large_and_new(
     depth_m: float = 4.5,
     moving_s: float = 0.29,
 ) -> Tracks:
-    """Something that stands, seen for long, and something small that has begun to move: 0.09 m2."""
+    """Something that has moved for long, and something small that has begun to: 0.09 m2."""
     made = tracks(BEFORE_ME, (0.2, -0.1, depth_m))
-    made.moving[1], made.moving_s[1] = True, moving_s
+    made.moving[:], made.moving_s[:] = True, (2.0, moving_s)
     made.bbox_px[:] = (100.0, 50.0, 140.0, 180.0), box_px
     return made
 
@@ -199,14 +199,19 @@ def told_moving(made: Tracks) -> list[bool]:
     return [one.moving for one in report.obstacles(made, now())]
 
 
-def test_a_small_new_mover_at_something_larger_may_be_a_piece_of_it_and_is_listed_without_a_verdict() -> None:
+def test_a_small_new_mover_at_a_larger_one_may_be_a_piece_of_it_and_is_listed_without_a_verdict() -> None:
     made = large_and_new()
     made.state[1, 3:] = [0.5, 0.0, 0.0]
     large, new = report.obstacles(made, now())
-    assert (large.moving, new.moving, new.score) == (False, False, 0.5)
+    assert (large.moving, new.moving, new.score) == (True, False, 0.5)
     np.testing.assert_allclose(new.velocity_mps, [0.5, 0.0, 0.0])  # what is known of it is told all the same
-    made.moving[0], made.moving_s[0] = True, 2.0
-    assert told_moving(made) == [True, False]
+
+
+@pytest.mark.parametrize("guessed", [False, True])
+def test_at_what_stands_it_may_be_a_piece_where_only_a_guess_parts_the_two(guessed: bool) -> None:
+    made = large_and_new()
+    made.moving[0], made.guessed[1] = False, guessed
+    assert told_moving(made) == [False, not guessed]
 
 
 @pytest.mark.parametrize(
@@ -221,7 +226,7 @@ def test_a_small_new_mover_at_something_larger_may_be_a_piece_of_it_and_is_liste
     ids=["for longer", "beside", "behind", "before", "half of a body"],
 )
 def test_a_mover_that_is_no_piece_of_something_larger_is_told_at_once(apart: dict[str, Any]) -> None:
-    assert told_moving(large_and_new(**apart)) == [False, True]
+    assert told_moving(large_and_new(**apart)) == [True, True]
 
 
 def test_a_small_new_mover_at_something_that_is_not_listed_is_told_at_once() -> None:
@@ -232,6 +237,6 @@ def test_a_small_new_mover_at_something_that_is_not_listed_is_told_at_once() -> 
 
 def test_of_two_small_new_movers_the_larger_one_is_told() -> None:
     made = large_and_new()
-    made.moving[0], made.moving_s[0] = True, 0.1
+    made.moving_s[0] = 0.1
     made.bbox_px[0] = (125.0, 150.0, 150.0, 190.0)
     assert told_moving(made) == [True, False]

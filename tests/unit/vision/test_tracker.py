@@ -287,15 +287,3 @@ def test_a_line_beside_a_body_is_none_of_its_outline() -> None:
     alone = plate(FRONT_M, (-0.5, 0.0), (-0.9, 0.9))
     assert owner_of(164.0, FRONT_M, alone)[0] == -1
     assert owner_of(150.0, FRONT_M, alone)[0] >= 0
-
-
-def first_told(board_m: float) -> int:
-    """The frame in which something low that comes along in front of a board is told to move first."""
-    board = plate(board_m, (-1.2, 1.2), (-0.6, 1.0))
-    frames = [nearest(plate(4.0, (-1.0 + way_m(k), -0.6 + way_m(k)), (0.4, 1.0)), board) for k in range(40)]
-    return next(k for k, percept in enumerate(track(frames)) if moving(percept))
-
-
-def test_what_is_small_and_close_to_something_larger_has_to_move_for_0_3_s_before_it_is_told() -> None:
-    later_s = (first_told(board_m=4.9) - first_told(board_m=5.9)) * FRAME_S
-    assert 0.2 < later_s <= 0.3
