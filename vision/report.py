@@ -18,12 +18,14 @@ _WAY_SIGMA_M = 0.06
 _STATIC_SCORE = 0.5
 _LAST_CELLS = 12  # less of a sliver is no sight of anybody
 _OVERHEAD_CELLS = 24  # half of a head, 6 m away
-# For so long a mover of less than half of a body may be a piece of something larger, at most so far before or
-# behind it, that it overlaps in the image: of a mover, as a wheel under a cart is, or, where it ends in what
-# stands by guess, of somebody close to a wall, as a leg is.
+# For so long a new mover may be a piece of something else, at most so far before or behind it: of a mover so
+# many times as large that covers so much of it, as a wheel of a cart is; or, if it is less than half of a
+# body and ends in what stands by guess, of somebody close to that, as a leg is.
 _PIECE_S = 0.3
-_PIECE_M2 = 0.5
 _PIECE_M = 1.5
+_PIECE_OF = 2.0
+_PIECE_SHARE = 0.3
+_PIECE_M2 = 0.5
 
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
@@ -73,16 +75,17 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
 def _pieces(
     tracks: Tracks, listed: NDArray[np.bool_], bbox_px: FloatArray, depth_m: FloatArray, focal_px: float
 ) -> NDArray[np.bool_]:
-    """(T,) movers so small and so new that they may be a piece of something larger."""
+    """(T,) movers so new that they may be a piece of something larger."""
     result = np.zeros(len(tracks), np.bool_)
-    area_px = (bbox_px[:, 2:] - bbox_px[:, :2]).prod(axis=1)
-    small = area_px * np.square(depth_m / focal_px) < _PIECE_M2
-    new = np.flatnonzero(tracks.moving & listed & small & (tracks.moving_s < _PIECE_S))
+    new = np.flatnonzero(tracks.moving & listed & (tracks.moving_s < _PIECE_S))
     if len(new):
-        larger = listed & (tracks.moving | tracks.guessed[new, None]) & (area_px > area_px[new, None])
-        larger &= np.abs(depth_m - depth_m[new, None]) <= _PIECE_M
-        larger &= overlaps(bbox_px[new, None], bbox_px) > 0.0
-        result[new] = larger.any(axis=1)
+        area_px = (bbox_px[:, 2:] - bbox_px[:, :2]).prod(axis=1)
+        small = area_px * np.square(depth_m / focal_px) < _PIECE_M2
+        covered, own_px = overlaps(bbox_px[new, None], bbox_px), area_px[new, None]
+        piece = tracks.moving & (area_px >= _PIECE_OF * own_px) & (covered >= _PIECE_SHARE)
+        piece |= (small & tracks.guessed)[new, None] & (area_px > own_px) & (covered > 0.0)
+        piece &= listed & (np.abs(depth_m - depth_m[new, None]) <= _PIECE_M)
+        result[new] = piece.any(axis=1)
     return result
 
 

@@ -188,7 +188,7 @@ def large_and_new(
     depth_m: float = 4.5,
     moving_s: float = 0.29,
 ) -> Tracks:
-    """Something that has moved for long, and something small that has begun to: 0.09 m2."""
+    """Something that has moved for long, and something small that has begun to, half covered: 0.09 m2."""
     made = tracks(BEFORE_ME, (0.2, -0.1, depth_m))
     made.moving[:], made.moving_s[:] = True, (2.0, moving_s)
     made.bbox_px[:] = (100.0, 50.0, 140.0, 180.0), box_px
@@ -199,7 +199,7 @@ def told_moving(made: Tracks) -> list[bool]:
     return [one.moving for one in report.obstacles(made, now())]
 
 
-def test_a_small_new_mover_at_a_larger_one_may_be_a_piece_of_it_and_is_listed_without_a_verdict() -> None:
+def test_a_new_mover_at_a_larger_one_may_be_a_piece_of_it_and_is_listed_without_a_verdict() -> None:
     made = large_and_new()
     made.state[1, 3:] = [0.5, 0.0, 0.0]
     large, new = report.obstacles(made, now())
@@ -207,11 +207,31 @@ def test_a_small_new_mover_at_a_larger_one_may_be_a_piece_of_it_and_is_listed_wi
     np.testing.assert_allclose(new.velocity_mps, [0.5, 0.0, 0.0])  # what is known of it is told all the same
 
 
-@pytest.mark.parametrize("guessed", [False, True])
-def test_at_what_stands_it_may_be_a_piece_where_only_a_guess_parts_the_two(guessed: bool) -> None:
-    made = large_and_new()
-    made.moving[0], made.guessed[1] = False, guessed
-    assert told_moving(made) == [False, not guessed]
+@pytest.mark.parametrize(
+    "apart",
+    [
+        {"moving_s": 0.31},
+        {"box_px": (135.0, 150.0, 155.0, 170.0)},  # a quarter of it
+        {"depth_m": 5.6},
+        {"depth_m": 2.4},
+        {"box_px": (110.0, 80.0, 140.0, 170.0)},  # 2700 of 5200 px
+    ],
+    ids=["for longer", "beside", "behind", "before", "more than half as large"],
+)
+def test_a_new_mover_that_is_no_piece_of_a_larger_one_is_told_at_once(apart: dict[str, Any]) -> None:
+    assert told_moving(large_and_new(**apart)) == [True, True]
+
+
+def beside_what_stands(**new: Any) -> Tracks:
+    """As large_and_new, but that the large one stands, and where the new one ends in it is a guess."""
+    made = large_and_new(**new)
+    made.moving[0], made.guessed[1] = False, True
+    return made
+
+
+@pytest.mark.parametrize("box_px", [(130.0, 150.0, 150.0, 170.0), (139.0, 150.0, 159.0, 170.0)])
+def test_what_only_a_guess_parts_from_what_stands_may_be_a_piece_of_somebody(box_px: Any) -> None:
+    assert told_moving(beside_what_stands(box_px=box_px)) == [False, False]
 
 
 @pytest.mark.parametrize(
@@ -220,23 +240,27 @@ def test_at_what_stands_it_may_be_a_piece_where_only_a_guess_parts_the_two(guess
         {"moving_s": 0.31},
         {"box_px": (141.0, 150.0, 161.0, 170.0)},
         {"depth_m": 5.6},
-        {"depth_m": 2.4},
-        {"box_px": (130.0, 120.0, 165.0, 185.0)},  # 2275 px at 4.5 m with 300 px: 0.51 m2
+        {"box_px": (110.0, 100.0, 140.0, 176.0)},  # 2280 px at 4.5 m with 300 px: 0.51 m2
     ],
-    ids=["for longer", "beside", "behind", "before", "half of a body"],
+    ids=["for longer", "beside", "behind", "half of a body"],
 )
-def test_a_mover_that_is_no_piece_of_something_larger_is_told_at_once(apart: dict[str, Any]) -> None:
-    assert told_moving(large_and_new(**apart)) == [True, True]
+def test_who_is_no_piece_beside_what_stands_is_told_at_once(apart: dict[str, Any]) -> None:
+    assert told_moving(beside_what_stands(**apart)) == [False, True]
 
 
-def test_a_small_new_mover_at_something_that_is_not_listed_is_told_at_once() -> None:
+def test_who_ends_at_edges_in_depth_beside_what_stands_is_told_at_once() -> None:
+    made = beside_what_stands()
+    made.guessed[1] = False
+    assert told_moving(made) == [False, True]
+
+
+def test_a_new_mover_at_something_that_is_not_listed_is_told_at_once() -> None:
     made = large_and_new()
     made.sightings[0] = 2
     assert told_moving(made) == [True]
 
 
-def test_of_two_small_new_movers_the_larger_one_is_told() -> None:
+def test_of_two_new_movers_the_larger_one_is_told() -> None:
     made = large_and_new()
     made.moving_s[0] = 0.1
-    made.bbox_px[0] = (125.0, 150.0, 150.0, 190.0)
     assert told_moving(made) == [True, False]
