@@ -38,6 +38,7 @@ _HALVES_MPS, _HALVES_SHARE = (
 )  # and by so much, or so much of the slower one's, their velocities differ
 _OVER = 0.5  # of the narrower one's width: so much of it is above or below the other; of height, beside it
 _SMALL_SHARE = 0.5
+_TINY_SHARE = 0.1  # a dog beside its owner is more
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
 _EXACTLY_MPS, _MUCH_MPS = 0.25, 0.4
 _KNOWN_SIGMA_MPS = 0.35  # a velocity known less well surely goes like nothing
@@ -86,6 +87,7 @@ def merges(
         return []
     pairs = _paired(regions, velocity_mps, sigma_mps, small, large)
     one = _beside(pairs) | _carried(pairs) | _seen_through(pairs) | _pushed(pairs)
+    one |= _tiny(pairs, regions.cells, velocity_mps)
     halves = _halves(pairs, regions, velocity_mps) & ~one
     if halves.any():
         halves &= something_nearer_between(grid, regions, small, large)
@@ -164,6 +166,14 @@ def _pushed(pairs: _Pairs) -> BoolArray:
     """(K,) what is low beside somebody, touches him and surely goes much as he does: a trolley."""
     rows, rows_beside = (px[:, 3] - px[:, 1] for px in (pairs.small_px, pairs.large_px))
     return pairs.much_alike & (rows <= LOW_BESIDE * rows_beside) & (pairs.gap_m <= _TOUCHING_M)
+
+
+def _tiny(pairs: _Pairs, cells: NDArray[np.intp], velocity_mps: FloatArray) -> BoolArray:
+    """(K,) what is tiny beside something close and surely goes exactly as that does: a wheel of a cart."""
+    goes = np.square(velocity_mps[pairs.large]).sum(axis=1) > _GOES_MPS**2
+    tiny = cells[pairs.small] <= _TINY_SHARE * cells[pairs.large]
+    result: BoolArray = tiny & goes & pairs.exactly_alike & (pairs.gap_m <= _PIECES_M)
+    return result
 
 
 def _pieces(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
