@@ -98,11 +98,8 @@ def speed_for_distance(
     """
     towards_mps = max(closing_mps, 0.0)
     free_m = distance_m - margin_m
-    # Who stands and is not about to go needs what comes nearer during the latency.
-    least_m = towards_mps * latency_s
-    if a_mps2 != 0.0:
-        least_m = required_distance(0.0, a_mps2, towards_mps, latency_s, limits)
-    if free_m <= least_m:
+    # Even who stands needs what comes nearer during the latency.
+    if free_m <= towards_mps * latency_s:
         return 0.0
     if abs(a_mps2) > limits.decel_mps2:
         return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, limits)

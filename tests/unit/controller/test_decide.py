@@ -105,6 +105,7 @@ def test_the_target_is_reported_when_it_is_near() -> None:
     assert decision.reason.rule == "target"
     assert decision.action is Action.KEEP
     assert decision.reason.distance_m == pytest.approx(1.5)
+    assert decision.reason.closing_mps == 0.0
     # A comfort stop from 0.9 m/s: v^2 / 0.6 + 0.25 v.
     assert decision.reason.required_m == pytest.approx(1.575)
     assert decision.reason.margin_m == pytest.approx(-0.075)
