@@ -138,7 +138,7 @@ def test_a_slow_section_is_a_reason() -> None:
 
 @pytest.mark.parametrize(
     ("x_m", "v_mps", "a_mps2", "action"),
-    [(29.6, 0.3, 0.0, Action.INCREASE), (29.985, 0.04, -0.17, Action.KEEP), (29.985, 0.0, 0.0, Action.KEEP)],
+    [(29.6, 0.3, 0.0, Action.INCREASE), (29.6, 0.3, -0.1, Action.KEEP), (29.985, 0.04, -0.17, Action.KEEP), (29.985, 0.0, 0.0, Action.KEEP)],
 )
 def test_closing_in_on_the_target_is_no_wish_to_go_faster(
     x_m: float, v_mps: float, a_mps2: float, action: Action
@@ -148,3 +148,24 @@ def test_closing_in_on_the_target_is_no_wish_to_go_faster(
     decision = bench.step(bench.scene(x_m=x_m), v_mps, a_mps2, x_m=x_m)
     assert decision.reason.rule == "target"
     assert decision.action is action
+
+
+@pytest.mark.parametrize(
+    ("x_m", "a_mps2", "section_mps"),
+    [
+        (8.7, 0.0, 0.83),  # 0.22 m on by the latency, then 1.08 m: 0.665 m/s for 0.33 / 0.3 + 0.5 s
+        (8.7, 0.3, 0.64),  # until it no longer accelerates it comes 0.525 m farther
+        (11.7, 0.3, 0.5),  # by then it will have left the section, but it is not left before that
+        (12.1, 0.3, 1.5),
+    ],
+)
+def test_a_section_is_entered_slowly_also_by_who_accelerates(
+    x_m: float, a_mps2: float, section_mps: float
+) -> None:
+    """0.5 m/s from 10 m to 12 m."""
+    slow = LineSpec(kind="line", length_m=2.0, max_speed_mps=0.5)
+    before, after = LineSpec(kind="line", length_m=10.0), LineSpec(kind="line", length_m=18.0)
+    path = Path(PathSpec(segments=(before, slow, after)), Robot())
+    bench = Bench()
+    decision = bench.step(bench.scene(x_m=x_m), 1.0, a_mps2, x_m=x_m, path=path)
+    assert decision.target_speed_mps == pytest.approx(section_mps, abs=0.02)
