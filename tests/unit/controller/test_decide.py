@@ -138,7 +138,12 @@ def test_a_slow_section_is_a_reason() -> None:
 
 @pytest.mark.parametrize(
     ("x_m", "v_mps", "a_mps2", "action"),
-    [(29.6, 0.3, 0.0, Action.INCREASE), (29.6, 0.3, -0.1, Action.KEEP), (29.985, 0.04, -0.17, Action.KEEP), (29.985, 0.0, 0.0, Action.KEEP)],
+    [
+        (29.6, 0.3, 0.0, Action.INCREASE),
+        (29.6, 0.3, -0.1, Action.KEEP),
+        (29.985, 0.04, -0.17, Action.KEEP),
+        (29.985, 0.0, 0.0, Action.KEEP),
+    ],
 )
 def test_closing_in_on_the_target_is_no_wish_to_go_faster(
     x_m: float, v_mps: float, a_mps2: float, action: Action
