@@ -62,7 +62,7 @@ SegmentSpec = Annotated[LineSpec | ArcSpec, Field(discriminator="kind")]
 
 
 class PathSpec(Section):
-    """The whole path. controller.path.Path measures along it."""
+    """The whole path. controller.path.path.Path measures along it."""
 
     start: StartSpec = StartSpec()
     segments: Annotated[tuple[SegmentSpec, ...], Field(strict=False)]

@@ -26,12 +26,12 @@ from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import Scenario, load_scenario
 from controller.control import ControlLoop
-from controller.decide import DecisionMaker
+from controller.decision.decide import DecisionMaker
 from controller.follow import PathFollower
 from controller.localise import Localiser
-from controller.path import Path, PathError
+from controller.path.path import Path, PathError
 from controller.perceive import Perceiver
-from controller.recorder import Surroundings
+from controller.record.recorder import Surroundings
 from controller.shape import SpeedShaper
 from hal.api import Chassis, Clock, DatagramLink, FrameSource, OdometrySource
 from hal.cameras.bag_file import is_bag
@@ -46,7 +46,7 @@ from hal.cameras.tum_replay import TumReplay
 from hal.errors import BadRecording
 from hal.links.datagrams import UdpSocket, UnixSocket
 from hal.types import CameraMount, PlanarPose
-from sim.camera import SimulatedCamera
+from sim.rendering.camera import SimulatedCamera
 from sim.simulation import Emulator, Referee, Simulation
 from sim.world import World
 from vision.perception import Perception

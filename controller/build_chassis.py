@@ -31,11 +31,11 @@ from hal.links.pseudo_terminal import PseudoTerminal
 from hal.links.scripted import ScriptedCanLink, ScriptedSerialLink, can_pair, serial_pair
 from hal.links.serial_port import SerialPortLink
 from hal.types import PlanarPose
-from sim.agilex_emulator import AgilexEmulator
-from sim.kobuki_emulator import KobukiEmulator
+from sim.emulators.agilex import AgilexEmulator
+from sim.emulators.kobuki import KobukiEmulator
+from sim.emulators.roboclaw import RoboclawEmulator
+from sim.emulators.roboteq import RoboteqEmulator
 from sim.plant import TrackedPlant
-from sim.roboclaw_emulator import RoboclawEmulator
-from sim.roboteq_emulator import RoboteqEmulator
 from sim.simulation import Emulator
 
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from controller.decision import Decision
+from controller.decision.decision import Decision
 from controller.outlet import Outlet, Words, write
 
 BAR = 24

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from controller.decision import Decision
+from controller.decision.decision import Decision
+from controller.decision.situation import Situation
 from controller.ending import Ending, Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
-from controller.path import OnPath, Path
+from controller.path.path import OnPath, Path
 from controller.shape import SpeedShaper
-from controller.situation import Situation
 from hal.api import Chassis
 from hal.types import ChassisMode, ChassisState, FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 from config.robot import Limits
-from controller.path import OnPath, Path
+from controller.path.path import OnPath, Path
 
 _BANDWIDTH_1PM = 2.0
 # The loop must stay well below what a base with a lag of some 0.2 s can follow.

@@ -7,7 +7,6 @@ from contextlib import ExitStack
 from pathlib import Path as FilePath
 
 from config.app import AppConfig, LockstepRunner, load_app
-from controller.blind_bends import blind_bend_warning
 from controller.build import (
     build_control,
     build_path,
@@ -21,14 +20,15 @@ from controller.console import Console
 from controller.ending import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
-from controller.observations import STANDARD_OUTPUT
+from controller.path.blind_bends import blind_bend_warning
 from controller.possible_world import require_possible_world
-from controller.realtime_mission import drive_realtime
-from controller.recorder import RecordingOptions, RunRecorder, open_recorder
+from controller.realtime.mission import drive_realtime
+from controller.realtime.service import stop_on_signals
+from controller.record.observations import STANDARD_OUTPUT
+from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
+from controller.record.tally import SetpointTally, TimingTally
 from controller.result import MissionOptions, MissionResult
-from controller.service import stop_on_signals
 from controller.summary import report, summary_rows
-from controller.tally import SetpointTally, TimingTally
 from hal.clocks import SimulatedClock
 
 

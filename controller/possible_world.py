@@ -10,7 +10,7 @@ from config.app import AppConfig
 from config.loader import ConfigError
 from config.scenario import Room
 from controller.build import build_path, build_world, path_spec
-from controller.path import Path
+from controller.path.path import Path
 from sim.contact import BUILDING, nearest_body
 
 _LOOKED_AT_EVERY_M = 0.1

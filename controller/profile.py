@@ -12,7 +12,7 @@ import numpy as np
 
 from config.robot import Limits
 from controller.braking import BrakeLimits
-from controller.limits import Motion
+from controller.decision.limits import Motion
 from hal.types import FloatArray
 
 _STANDING_MPS = 1e-9

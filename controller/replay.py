@@ -23,15 +23,15 @@ from controller.build import (
     straight_ahead,
 )
 from controller.console import Console
-from controller.decide import DecisionMaker
-from controller.decision import Decision
+from controller.decision.decide import DecisionMaker
+from controller.decision.decision import Decision
+from controller.decision.situation import Situation
 from controller.errors import UserError
-from controller.observations import STANDARD_OUTPUT
-from controller.path import OnPath, Path
+from controller.path.path import OnPath, Path
 from controller.perceive import Look
-from controller.recorder import RecordingOptions, open_recorder, require_two_files
-from controller.situation import Situation
-from controller.tally import TimingTally
+from controller.record.observations import STANDARD_OUTPUT
+from controller.record.recorder import RecordingOptions, open_recorder, require_two_files
+from controller.record.tally import TimingTally
 from hal.cameras.bag_topics import WantedTopics
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream

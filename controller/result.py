@@ -8,8 +8,15 @@ from pathlib import Path as FilePath
 
 from controller.control import ControlLoop, ControlStep
 from controller.ending import Outcome
-from controller.realtime import Punctuality
-from controller.tally import Complaints, FrameTally, SetpointTally, ShaperFaults, Standstill, TimingTally
+from controller.realtime.runner import Punctuality
+from controller.record.tally import (
+    Complaints,
+    FrameTally,
+    SetpointTally,
+    ShaperFaults,
+    Standstill,
+    TimingTally,
+)
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 

@@ -10,9 +10,9 @@ from config.app import AppConfig
 from controller.console import STUCK_S, Console
 from controller.control import ControlStep
 from controller.ending import Outcome
-from controller.realtime import Punctuality
+from controller.realtime.runner import Punctuality
+from controller.record.tally import SetpointTally, mean_speed_mps
 from controller.result import MissionResult
-from controller.tally import SetpointTally, mean_speed_mps
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 

@@ -25,10 +25,10 @@ from config.scenario import (
     Wall,
 )
 from hal.types import FloatArray
-from sim.bodies import rectangle, regular_polygon
+from sim.models.bodies import rectangle, regular_polygon
+from sim.models.person import person_footprint
+from sim.models.vehicle import SENSOR_HEIGHT_M
 from sim.motion import MotionState
-from sim.person import person_footprint
-from sim.vehicle import SENSOR_HEIGHT_M
 from sim.world import trajectory_of
 
 _POLE_SIDES = 8

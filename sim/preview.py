@@ -18,9 +18,9 @@ from config.scenario import load_scenario
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.geometry import advance_pose
 from hal.types import CameraMount, ColourImage, PlanarPose, RgbdFrame
-from sim.camera import SimulatedCamera
 from sim.contact import robot_footprint
-from sim.render import Picture
+from sim.rendering.camera import SimulatedCamera
+from sim.rendering.render import Picture
 from sim.world import World
 
 _FAR_M = 10.0

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from config.scenario import BodySpec, Scenario
 from hal.geometry import body_in_floor
 from hal.types import FloatArray, PlanarPose
-from sim.bodies import BodyModel, build_body
-from sim.building import build_room
-from sim.mesh import Faces, join, normals
+from sim.models.bodies import BodyModel, build_body
+from sim.models.building import build_room
+from sim.models.mesh import Faces, join, normals
 from sim.motion import MotionState, Trajectory
 
 BUILDING_ID = 0

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import Intrinsics, Pose
-from vision.depth_grid import DepthGrid
-from vision.health import worsened
+from vision.camera.health import worsened
+from vision.depth.depth_grid import DepthGrid
+from vision.motion.velocities import PointMotion
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
-from vision.velocities import PointMotion
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,27 +10,27 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
-from vision import optical_flow
-from vision.attention import Attention, Wanted
-from vision.depth_grid import DepthGrid, make_grid
-from vision.depth_mask import surface_depth
+from vision.camera.floor import FloorFinder, on_floor
+from vision.camera.gyro import GyroMemory
+from vision.camera.health import Continuity, HealthMonitor
+from vision.camera.lens import project, rays, vector_from_rotation
+from vision.camera.mount_check import MountCheck
+from vision.depth.depth_grid import DepthGrid, make_grid
+from vision.depth.depth_mask import surface_depth
 from vision.detection import Detection, camera_health, no_motion
-from vision.edges import GreyImage
-from vision.ego_motion import CameraEstimate, estimate
-from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
-from vision.floor import FloorFinder, on_floor
-from vision.fragments import FragmentStore
-from vision.gyro import GyroMemory
-from vision.health import Continuity, HealthMonitor
-from vision.lens import project, rays, vector_from_rotation
-from vision.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
-from vision.mount_check import MountCheck
-from vision.optical_flow import Pyramid, pyramid
+from vision.ego_motion.camera_motion import CameraEstimate, estimate
+from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
+from vision.ego_motion.rolling_shutter import ReadOut
+from vision.fragments import optical_flow
+from vision.fragments.attention import Attention, Wanted
+from vision.fragments.edges import GreyImage
+from vision.fragments.optical_flow import Pyramid, pyramid
+from vision.fragments.renewal import Renewal
+from vision.fragments.store import FragmentStore
+from vision.motion.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
+from vision.motion.velocities import PointMotion
 from vision.percept import Percept
-from vision.renewal import Renewal
-from vision.rolling_shutter import ReadOut
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
-from vision.velocities import PointMotion
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
 _AGREEMENT = 0.45

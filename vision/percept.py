@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vision.attention import Wanted
+from vision.fragments.attention import Wanted
 from vision.scene import Fragments, Scene
 
 

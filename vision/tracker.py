@@ -13,35 +13,24 @@ from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import PlanarPose
-from vision import (
-    births,
-    carving,
-    division,
-    grounding,
-    grouping,
-    kalman,
-    limbs,
-    masks,
-    merging,
-    obstacles,
-    regions,
-    report,
-    sightings,
-)
-from vision.adoption import adopt
-from vision.arrivals import Changes, FreeMemory
-from vision.attention import wanted
-from vision.depth_grid import BoolGrid
-from vision.depth_guard import free_space
+from vision.bodies import births, carving, division, grounding, grouping, masks, merging, report, sightings
+from vision.bodies.adoption import adopt
+from vision.bodies.arrivals import Changes, FreeMemory
+from vision.bodies.judgement import judge
+from vision.bodies.tracks import Tracks
+from vision.depth import regions
+from vision.depth.depth_grid import BoolGrid
+from vision.depth.depth_guard import free_space
+from vision.depth.near_floor import NearFloor
+from vision.depth.regions import IntGrid, Regions
 from vision.detection import Detection
-from vision.judgement import judge
-from vision.motion_evidence import evidence_of
-from vision.near_floor import NearFloor
-from vision.obstacles import FragmentVelocities
+from vision.fragments.attention import wanted
+from vision.motion import least_squares, limbs
+from vision.motion.least_squares import FragmentVelocities
+from vision.motion.motion_evidence import evidence_of
+from vision.numerics import kalman
 from vision.percept import Percept
-from vision.regions import IntGrid, Regions
 from vision.scene import CameraCondition, FreeSpace, Scene
-from vision.tracks import Tracks
 
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: 0.28 m/s in the first second
 _FORGET_S = 0.5
@@ -81,7 +70,7 @@ class Tracker:
         self._last_ns = max(detection.captured_ns, before_ns)
         owner = self._owners(detection.ids)
         standing = regions.standing(detection.grid, self._clearance_m)
-        velocities = obstacles.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
+        velocities = least_squares.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
         if detection.health.condition is not CameraCondition.UNTRUSTWORTHY or detection.restarted:
             owner = self._follow(detection, standing, owner, velocities, elapsed_s)
         unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
@@ -211,7 +200,7 @@ class Tracker:
         rotation = detection.pose.rotation
         index = tracks.index_of(owner)
         tracks.fragments = np.bincount(index[index >= 0], minlength=len(tracks)).astype(np.intp)
-        body = obstacles.body_velocities(
+        body = least_squares.body_velocities(
             detection.motion,
             velocities.per_end,
             np.repeat(index, 2),

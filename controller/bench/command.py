@@ -40,8 +40,8 @@ from controller.build import (
 from controller.build_chassis import build_base
 from controller.errors import UserError
 from hal.clocks import SimulatedClock
-from sim.camera import SimulatedCamera
-from sim.render import Renderer
+from sim.rendering.camera import SimulatedCamera
+from sim.rendering.render import Renderer
 from sim.simulation import Emulator
 from sim.world import World
 from vision.perception import Perception

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -188,8 +189,11 @@ def _time(
 
 
 def _module_of(function: str) -> str:
-    """vision.renewal of vision.renewal.Renewal.find."""
-    return ".".join(function.split(".")[:2])
+    """vision.fragments.renewal of vision.fragments.renewal.Renewal.find."""
+    name = function
+    while name not in sys.modules:
+        name = name.rpartition(".")[0]
+    return name
 
 
 def _slowest_first(figures: dict[str, Durations]) -> dict[str, Durations]:

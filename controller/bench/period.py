@@ -26,7 +26,7 @@ from config.chassis import CanLinkConfig
 from config.loader import CONFIG_DIR
 from controller.console import Console
 from controller.errors import UserError
-from controller.realtime_mission import drive_realtime
+from controller.realtime.mission import drive_realtime
 from controller.result import MissionOptions
 from hal.api import Clock
 from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from controller.path import Path
+from controller.path.path import Path
 from hal.api import FrameSource
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream

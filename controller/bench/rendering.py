@@ -10,8 +10,8 @@ import numpy as np
 from controller.bench.figures import Durations
 from controller.bench.reel import Tick
 from hal.clocks import NS_PER_S
-from sim.camera import SimulatedCamera
-from sim.render import Renderer
+from sim.rendering.camera import SimulatedCamera
+from sim.rendering.render import Renderer
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,15 +37,15 @@ from controller.errors import UserError
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.lockstep import run_lockstep
-from controller.path import Path
-from controller.recorder import RecordingOptions, RunRecorder, open_recorder
+from controller.path.path import Path
+from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
+from controller.record.tally import SetpointTally
 from controller.shape import SpeedShaper
-from controller.tally import SetpointTally
 from hal.api import Chassis
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import ChassisMode, PlanarPose, RgbdFrame
-from sim.camera import SimulatedCamera
 from sim.faults import Faults
+from sim.rendering.camera import SimulatedCamera
 from sim.simulation import Simulation
 
 _STANDING_MPS = 1e-3

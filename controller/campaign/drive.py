@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from controller.decision import Action, Decision
-from controller.tally import SetpointTally
+from controller.decision.decision import Action, Decision
+from controller.record.tally import SetpointTally
 from hal.types import FloatArray, PlanarPose
 
 

@@ -13,7 +13,7 @@ from controller.campaign.fault import at_fault
 from controller.campaign.oracle import OracleTime
 from controller.campaign.stage import Stage
 from controller.campaign.view import PlanarEye
-from controller.decision import Action
+from controller.decision.decision import Action
 from hal.types import FloatArray
 
 FLAP_REVERSALS, FLAP_S = 3, 2.0

@@ -18,11 +18,11 @@ from controller.campaign.drive import DriveLog
 from controller.campaign.noisy_camera import NoisyCamera
 from controller.campaign.stage import Stage
 from controller.control import ARRIVED_M, Decides
-from controller.decision import Decision
-from controller.path import OnPath
+from controller.decision.decision import Decision
+from controller.decision.situation import Situation
+from controller.path.path import OnPath
+from controller.record.tally import SetpointTally
 from controller.shape import SpeedShaper
-from controller.situation import Situation
-from controller.tally import SetpointTally
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import CameraCondition, CameraHealth, Scene
@@ -94,7 +94,7 @@ class _Eyes:
         self._on_way.append((t_s + self._latency_s + faults.late_by(t_s), scene))
 
     def _frozen(self, last: Scene, t_s: float) -> Scene:
-        """The same picture with a new stamp, as vision/health.py sees it."""
+        """The same picture with a new stamp, as vision/camera/health.py sees it."""
         self._same += 1
         health = last.health
         if self._same >= _FROZEN_FRAMES:

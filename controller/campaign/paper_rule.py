@@ -10,11 +10,11 @@ import numpy as np
 
 from config.robot import Robot
 from controller import braking
-from controller.bodies import Bodies, bodies_of
 from controller.campaign.rivals import decision, free_speed
-from controller.corridor import Corridor, course_of, place
-from controller.decision import Decision
-from controller.situation import Situation
+from controller.decision.bodies import Bodies, bodies_of
+from controller.decision.corridor import Corridor, course_of, place
+from controller.decision.decision import Decision
+from controller.decision.situation import Situation
 from hal.types import CameraMount
 from vision.scene import Scene
 

@@ -11,7 +11,7 @@ from controller.campaign.protective_field import ProtectiveField
 from controller.campaign.stage import Stage
 from controller.campaign.zone_monitor import ZoneMonitor
 from controller.control import Decides
-from controller.decide import DecisionMaker
+from controller.decision.decide import DecisionMaker
 
 OURS, PAPER, ZONES, FIELD = "ours", "paper", "zones", "field"
 

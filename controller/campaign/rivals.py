@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from config.robot import Limits
 from controller import braking
-from controller.decision import Action, Decision, Reason
-from controller.path import OnPath, Path
+from controller.decision.decision import Action, Decision, Reason
+from controller.path.path import OnPath, Path
 
 _DEAD_BAND_MPS = 0.03
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from config.app import AppConfig, LockstepRunner
 from config.robot import Body, Robot
 from controller import braking
-from controller.path import Path
+from controller.path.path import Path
 from hal.types import FloatArray, PlanarPose
 from sim.families import Case
 from sim.planar import PlanarWorld, overlap

@@ -22,7 +22,7 @@ from config.robot import Robot
 from controller import braking
 from controller.campaign.drive import DriveLog
 from controller.campaign.stage import Stage
-from controller.decision import Action
+from controller.decision.decision import Action
 from controller.errors import UserError
 from hal.types import FloatArray
 

@@ -16,8 +16,8 @@ from config.robot import Robot
 from controller.campaign.planar_scan import PlanarScanner
 from controller.campaign.rivals import decision, free_speed
 from controller.campaign.stage import Stage
-from controller.decision import Decision
-from controller.situation import Situation
+from controller.decision.decision import Decision
+from controller.decision.situation import Situation
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray
 

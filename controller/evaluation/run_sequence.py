@@ -28,7 +28,7 @@ from controller.evaluation.totals import PixelCounts
 from controller.evaluation.truth import TruthTeller
 from controller.evaluation.types import Answer, DetectedObject, FrameDetections, FrameTruth
 from hal.types import ColourImage, RgbdFrame
-from sim.camera import intrinsics_of
+from sim.rendering.camera import intrinsics_of
 from vision.scene import Fragments
 
 FAILURES_PER_SEQUENCE = 2

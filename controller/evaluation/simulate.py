@@ -11,7 +11,7 @@ from controller.evaluation.truth import TrueImages, TruthTeller
 from controller.evaluation.types import FrameTruth
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import Pose, RgbdFrame
-from sim.camera import SimulatedCamera
+from sim.rendering.camera import SimulatedCamera
 from sim.world import BodyState, World
 
 

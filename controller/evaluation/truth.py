@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from controller.evaluation.types import NO_BOX, FrameTruth, TrueObject
 from hal.types import FloatArray, Intrinsics, Pose
-from sim.render import Picture
-from sim.truth import BodyTruth, GroundTruth
+from sim.rendering.render import Picture
+from sim.rendering.truth import BodyTruth, GroundTruth
 from sim.world import BodyState, World
 
 _MIN_TURN_RADPS = 0.05

@@ -9,12 +9,12 @@ from enum import Enum
 from config.path import ArcSpec, LineSpec, PathSpec, StartSpec
 from config.robot import Robot
 from controller import braking
-from controller.decision import Reason
+from controller.decision.decision import Reason
 from controller.governor.request import Twist
-from controller.path import Path
+from controller.path.path import Path
 from hal.types import PlanarPose
 
-# As controller/path.py: the rest of the yaw rate is kept.
+# As controller/path/path.py: the rest of the yaw rate is kept.
 _YAW_RATE_FOR_THE_BEND = 0.8
 # Slower than this is no motion: encoders and noise of a planner's own arithmetic.
 STANDING_MPS = 0.005
@@ -64,7 +64,7 @@ def tightest_m(robot: Robot) -> float:
 
 
 def _least_radius_by_yaw_m(robot: Robot) -> float:
-    # controller/path.py refuses a bend that cannot be driven at 0.1 m/s.
+    # controller/path/path.py refuses a bend that cannot be driven at 0.1 m/s.
     return 0.1 / (_YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps)
 
 

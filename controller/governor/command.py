@@ -15,14 +15,21 @@ from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
 from controller.mission import with_overrides
-from controller.observations import STANDARD_OUTPUT
 from controller.possible_world import require_possible_world
-from controller.realtime import Punctuality
-from controller.realtime_rig import realtime_rig
+from controller.realtime.rig import realtime_rig
+from controller.realtime.runner import Punctuality
+from controller.realtime.service import ServiceManager
+from controller.record.observations import STANDARD_OUTPUT
+from controller.record.tally import (
+    Complaints,
+    FrameTally,
+    SetpointTally,
+    ShaperFaults,
+    Standstill,
+    TimingTally,
+)
 from controller.result import MissionOptions
-from controller.service import ServiceManager
 from controller.summary import contact_text, limits_text, punctuality_text
-from controller.tally import Complaints, FrameTally, SetpointTally, ShaperFaults, Standstill, TimingTally
 from hal.clocks import NS_PER_S
 from sim.simulation import Simulation
 

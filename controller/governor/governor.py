@@ -1,8 +1,9 @@
 """Another planner's (v, w) in, the greatest safe part of it out: both scaled alike, so the arc is kept.
 
-The decision is the mission's (controller/decide.py) with the arc as the path ahead; the floor that is too
-near for the camera to see along a path that begins only now is remembered (controller/governor/ground.py);
-the speed goes through the same shaper. A turn in place is driven where the circle that it sweeps is free.
+The decision is the mission's (controller/decision/decide.py) with the arc as the path ahead; the floor that
+is too near for the camera to see along a path that begins only now is remembered
+(controller/governor/ground.py); the speed goes through the same shaper. A turn in place is driven where the
+circle that it sweeps is free.
 """
 
 from __future__ import annotations
@@ -15,20 +16,20 @@ from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
-from controller.bodies import SceneError, bodies_of
-from controller.decide import DecisionMaker
-from controller.decision import Action, Decision, Reason
+from controller.decision.bodies import SceneError, bodies_of
+from controller.decision.decide import DecisionMaker
+from controller.decision.decision import Action, Decision, Reason
+from controller.decision.knowledge import Knowledge
+from controller.decision.lens_cover import COVERED
+from controller.decision.limits import Limit, Motion
+from controller.decision.situation import Situation
 from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand, why_stop
 from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
 from controller.governor.surroundings import near_limits, turn_objection
-from controller.knowledge import Knowledge
-from controller.lens_cover import COVERED
-from controller.limits import Limit, Motion
 from controller.localise import PoseHistory
-from controller.path import OnPath, Path
+from controller.path.path import OnPath, Path
 from controller.shape import SpeedShaper
-from controller.situation import Situation
 from hal.types import CameraMount, PlanarPose
 from vision.scene import CameraCondition, Scene
 
@@ -38,7 +39,7 @@ _OFF_RAD = 0.02
 _ALONG_M = 0.25
 # So far ahead of the robot's standing place the remembered floor answers instead of the camera.
 _NEAR_EXTRA_M = 0.3
-# As many scenes as controller/sight.py compares before it believes a surface.
+# As many scenes as controller/decision/sight.py compares before it believes a surface.
 _SCENES = 5
 _STANDING_MPS = 0.01
 _SAME_MPS = 1e-3

@@ -1,8 +1,9 @@
 """The floor around the robot as the camera saw it on the way here: what its view no longer covers.
 
-A path that is known beforehand is looked at long before the robot is there (controller/sight.py). A planner's
-arc begins under the camera's nose, turns into floor beside the view, or sweeps all around the robot: what is
-known of that floor was seen earlier, from elsewhere. Kept in square cells that move along with the robot.
+A path that is known beforehand is looked at long before the robot is there (controller/decision/sight.py). A
+planner's arc begins under the camera's nose, turns into floor beside the view, or sweeps all around the
+robot: what is known of that floor was seen earlier, from elsewhere. Kept in square cells that move along with
+the robot.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from config.robot import Robot
-from controller.bodies import Bodies
-from controller.surfaces import bands_at, floor_points, surfaces_of
-from controller.view_edges import consented_m
+from controller.decision.bodies import Bodies
+from controller.decision.surfaces import bands_at, floor_points, surfaces_of
+from controller.decision.view_edges import consented_m
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -38,7 +39,7 @@ _THROUGH_M = 0.1
 # Two sightings make a surface; being seen through takes it back three times as slowly as that.
 _HIT, _MOST_HITS, _BLOCKED_HITS = 2, 6, 3
 # What moved may have gone on, unseen, soon after; so has what leaves the view of a robot that stands, which
-# it can only do by moving (as controller/memory.py keeps both).
+# it can only do by moving (as controller/decision/memory.py keeps both).
 _PASSING_NS = 2 * NS_PER_S
 _FOR_EVER_NS = 2**62
 _BESIDE = 2

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from config.governor import GovernorConfig
-from controller.decision import Decision
+from controller.decision.decision import Decision
 from controller.governor.request import MessageError, Request, Twist, answer, parse_request
 from hal.api import DatagramLink
 from hal.clocks import NS_PER_MS, NS_PER_S

@@ -7,12 +7,12 @@ from typing import Protocol
 import numpy as np
 
 from controller.control import ControlStep
-from controller.decision import Decision
+from controller.decision.decision import Decision
 from controller.ending import Ending, Outcome
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import Asked
 from controller.localise import Localiser
-from controller.recorder import path_ahead
+from controller.record.recorder import path_ahead
 from hal.api import Chassis
 from hal.types import ChassisMode, ChassisState, FloatArray, Setpoint
 from vision.scene import Scene

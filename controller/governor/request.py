@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import NoReturn
 
-from controller.decision import Decision
+from controller.decision.decision import Decision
 
 MOST_BYTES = 512
 # Nothing that drives on a floor is faster: such numbers are mistakes, not wishes.

@@ -9,13 +9,13 @@ import numpy as np
 from config.decision import DecisionConfig
 from config.robot import Robot
 from controller import braking
-from controller.bodies import Bodies
-from controller.corridor import Corridor
-from controller.decision import Reason
+from controller.decision.bodies import Bodies
+from controller.decision.corridor import Corridor
+from controller.decision.decision import Reason
+from controller.decision.limits import Gap, Limit, Motion, allowed, stop_before
 from controller.governor.arcs import corner_m
 from controller.governor.ground import CELL_M, IN_VIEW_NS, GroundMemory
-from controller.limits import Gap, Limit, Motion, allowed, stop_before
-from controller.path import Path
+from controller.path.path import Path
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray, PlanarPose
 

@@ -7,7 +7,7 @@ import math
 import cv2
 import numpy as np
 
-from controller.decision import Action, Decision
+from controller.decision.decision import Action, Decision
 from controller.video import draw, text
 from controller.video.moment import VideoMoment
 from controller.video.style import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from config.robot import Body
-from controller.decision import Decision
+from controller.decision.decision import Decision
 from hal.types import CameraMount, FloatArray, RgbdFrame
 from vision.scene import Fragments, Scene
 

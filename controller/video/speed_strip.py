@@ -7,7 +7,7 @@ from collections import deque
 
 import numpy as np
 
-from controller.decision import Action
+from controller.decision.decision import Action
 from controller.video import draw, text
 from controller.video.moment import VideoMoment
 from controller.video.style import (

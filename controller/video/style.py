@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.decision import Action
+from controller.decision.decision import Action
 from vision.scene import CameraCondition
 
 Image = NDArray[np.uint8]

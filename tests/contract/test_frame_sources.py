@@ -27,7 +27,7 @@ from hal.cameras.tum_replay import TumReplay
 from hal.clocks import SimulatedClock
 from hal.errors import DeviceRefused, EndOfStream, FrameTimeout
 from hal.types import CameraMount, Intrinsics, PlanarPose, RgbdFrame
-from sim.camera import SimulatedCamera
+from sim.rendering.camera import SimulatedCamera
 from sim.world import World
 from tests.support.bags import small_bag
 from tests.support.fake_realsense import FakeRealsense, framesets

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from controller.decide import DecisionMaker
-from controller.path import OnPath, Path
+from controller.decision.decide import DecisionMaker
+from controller.decision.situation import Situation
+from controller.path.path import OnPath, Path
 from controller.shape import SpeedShaper
-from controller.situation import Situation
 from hal.types import CameraMount, PlanarPose
 from tests.support.scenes import STILL, free_space
 from vision.scene import CameraCondition, CameraHealth, Obstacle, Scene

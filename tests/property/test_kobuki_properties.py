@@ -9,7 +9,7 @@ from hal.chassis import kobuki_packets
 from hal.chassis.kobuki import KobukiChassis
 from hal.links.scripted import ScriptedSerialLink
 from hal.types import Setpoint
-from sim.kobuki_emulator import KobukiEmulator
+from sim.emulators.kobuki import KobukiEmulator
 from sim.plant import TrackedPlant
 from tests.support.chassis_rig import (
     KOBUKI_PLANT,

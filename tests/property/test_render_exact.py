@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from hal.geometry import camera_in_floor
 from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose, Pose
-from sim.mesh import Faces, axis_rotation, box, join, normals, prism
-from sim.raster import Rasteriser
+from sim.models.mesh import Faces, axis_rotation, box, join, normals, prism
+from sim.rendering.raster import Rasteriser
 from sim.world import Geometry
 
 K = Intrinsics(80, 60, 75.0, 71.0, 38.7, 29.2)

@@ -12,8 +12,8 @@ from hal.chassis.roboclaw import RoboclawChassis
 from hal.chassis.roboclaw_port import RoboclawPort
 from hal.links.scripted import ScriptedSerialLink
 from hal.types import Setpoint
+from sim.emulators.roboclaw import RoboclawEmulator
 from sim.plant import TrackedPlant
-from sim.roboclaw_emulator import RoboclawEmulator
 from tests.support.chassis_rig import (
     COUNTS_PER_M,
     MS,

@@ -9,8 +9,8 @@ from hal.chassis import roboteq_lines as lines
 from hal.chassis.roboteq import RoboteqChassis
 from hal.links.scripted import ScriptedSerialLink
 from hal.types import Setpoint
+from sim.emulators.roboteq import RoboteqEmulator
 from sim.plant import TrackedPlant
-from sim.roboteq_emulator import RoboteqEmulator
 from tests.support.chassis_rig import (
     COUNTS_PER_M,
     MS,

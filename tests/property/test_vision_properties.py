@@ -10,14 +10,14 @@ from config.perception import FragmentSettings, MotionSettings, PerceptionConfig
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
 from tests.support.grids import grid_of, plane
 from tests.support.point_motion import static_miss
-from vision import kalman
-from vision.floor import FloorFinder
-from vision.judgement import judge
-from vision.lens import project, rays, rotation_from_vector, vector_from_rotation
-from vision.motion_evidence import MotionEvidence
+from vision.bodies.judgement import judge
+from vision.camera.floor import FloorFinder
+from vision.camera.lens import project, rays, rotation_from_vector, vector_from_rotation
+from vision.motion.motion_evidence import MotionEvidence
+from vision.motion.velocities import PointMotion, normal_equations
+from vision.numerics import kalman
 from vision.perception import Perception
 from vision.scene import Scene
-from vision.velocities import PointMotion, normal_equations
 
 SMALL = PerceptionConfig(grid_step_px=2, fragments=FragmentSettings(min_length_px=16, tile_px=20))
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from config.path import ArcSpec, LineSpec, PathSpec
 from config.robot import Robot
-from controller.bodies import Bodies
-from controller.path import Path
+from controller.decision.bodies import Bodies
+from controller.path.path import Path
 
 
 def line_path(length_m: float = 20.0) -> Path:

@@ -11,8 +11,8 @@ from config.robot import Robot
 from config.scenario import BodySpec, Crate, Go, MotionPlan, RobotBody, Room, Scenario
 from controller.campaign.drive import DriveLog
 from controller.campaign.stage import Stage
-from controller.decision import Action, Decision, Reason
-from controller.tally import SetpointTally
+from controller.decision.decision import Action, Decision, Reason
+from controller.record.tally import SetpointTally
 from sim.families import Case
 from sim.faults import NO_FAULTS, Faults
 

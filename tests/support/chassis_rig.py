@@ -30,11 +30,11 @@ from hal.chassis.roboteq import RoboteqChassis
 from hal.links.can_bus import CanBusLink
 from hal.links.scripted import can_pair, serial_pair
 from hal.types import ChassisMode, ChassisState, Setpoint
-from sim.agilex_emulator import AgilexEmulator
-from sim.kobuki_emulator import KobukiEmulator
+from sim.emulators.agilex import AgilexEmulator
+from sim.emulators.kobuki import KobukiEmulator
+from sim.emulators.roboclaw import RoboclawEmulator
+from sim.emulators.roboteq import RoboteqEmulator
 from sim.plant import TrackedPlant
-from sim.roboclaw_emulator import RoboclawEmulator
-from sim.roboteq_emulator import RoboteqEmulator
 from tests.support.wires import PluggedCan, PluggedSerial, SettledPort, SettledTerminal
 
 MS = 1_000_000

@@ -12,11 +12,11 @@ import numpy as np
 from config.decision import DecisionConfig
 from config.path import ArcSpec, LineSpec, PathSpec
 from config.robot import Robot
-from controller.decide import Action, Decision, DecisionMaker
+from controller.decision.decide import Action, Decision, DecisionMaker
+from controller.decision.situation import Situation
 from controller.follow import PathFollower
-from controller.path import Path
+from controller.path.path import Path
 from controller.shape import SpeedShaper
-from controller.situation import Situation
 from hal.clocks import NS_PER_S
 from hal.geometry import advance_pose, camera_in_floor
 from hal.types import CameraMount, FloatArray, PlanarPose, Pose

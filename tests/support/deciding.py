@@ -9,9 +9,9 @@ import numpy as np
 from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from controller.decide import Decision, DecisionMaker
-from controller.path import OnPath, Path
-from controller.situation import Situation
+from controller.decision.decide import Decision, DecisionMaker
+from controller.decision.situation import Situation
+from controller.path.path import OnPath, Path
 from hal.geometry import camera_in_floor
 from hal.types import CameraMount, PlanarPose
 from tests.support.scenes import GOOD, STILL, free_space

@@ -10,12 +10,12 @@ from config.perception import PerceptionConfig
 from hal.types import FloatArray, Pose
 from tests.support.grids import CAMERA, grid_of
 from tests.support.scenes import GOOD
-from vision.depth_grid import DepthGrid
+from vision.depth.depth_grid import DepthGrid
 from vision.detection import Detection
+from vision.motion.velocities import PointMotion
 from vision.percept import Percept
 from vision.scene import EgoMotion
 from vision.tracker import Tracker
-from vision.velocities import PointMotion
 
 FRAME_NS = 33_333_333
 START_NS = 1_000_000_000

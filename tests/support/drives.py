@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from controller.control import ControlStep
-from controller.decision import Action, Decision, Reason
+from controller.decision.decision import Action, Decision, Reason
 from controller.ending import Outcome
 from controller.perceive import Look
 from hal.types import RgbdFrame, Setpoint

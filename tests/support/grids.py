@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray, Intrinsics
-from vision.depth_grid import BoolGrid, DepthGrid
+from vision.depth.depth_grid import BoolGrid, DepthGrid
 
 STEP_PX = 4
 OFFSET_PX = 1.5

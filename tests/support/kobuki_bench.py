@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hal.chassis.kobuki import KobukiChassis
-from sim.kobuki_emulator import KobukiEmulator
+from sim.emulators.kobuki import KobukiEmulator
 from tests.support.chassis_rig import KOBUKI_PLANT, kobuki_config
 from tests.support.serial_bench import SerialBench
 

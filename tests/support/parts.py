@@ -1,4 +1,4 @@
-"""Parts and surfaces as vision/regions.py measures them, without a grid."""
+"""Parts and surfaces as vision/depth/regions.py measures them, without a grid."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.support.grids import CAMERA
-from vision.regions import Regions
+from vision.depth.regions import Regions
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hal.chassis.roboteq import RoboteqChassis
-from sim.roboteq_emulator import RoboteqEmulator
+from sim.emulators.roboteq import RoboteqEmulator
 from tests.support.chassis_rig import COUNTS_PER_M, PLANT, roboteq_config
 from tests.support.serial_bench import SerialBench
 

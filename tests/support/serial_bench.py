@@ -10,7 +10,7 @@ from config.chassis import PlantConfig
 from hal.api import Chassis, SerialLink
 from hal.links.scripted import ScriptedSerialLink, serial_pair
 from hal.types import ChassisMode, ChassisState, Setpoint
-from sim.emulator import SerialEmulator
+from sim.emulators.base import SerialEmulator
 from sim.plant import TrackedPlant
 from tests.support.chassis_rig import MS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from config.robot import Body
-from controller.decision import Action, Decision, Reason
+from controller.decision.decision import Action, Decision, Reason
 from controller.video.moment import VideoMoment
 from hal.geometry import camera_in_body
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame

@@ -34,7 +34,7 @@ NO_DEVICES = {
 
 
 def test_only_build_names_concrete_devices() -> None:
-    inner = re.compile(r"^\s*from ((?:hal\.(?:cameras|chassis|links)|sim)\.\w+) import", re.MULTILINE)
+    inner = re.compile(r"^\s*from ((?:hal\.(?:cameras|chassis|links)|sim)(?:\.\w+)+) import", re.MULTILINE)
     naming = {
         str(path.relative_to(ROOT / "controller"))
         for path in (ROOT / "controller").rglob("*.py")

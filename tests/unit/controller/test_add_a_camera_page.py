@@ -22,7 +22,7 @@ from config.loader import CONFIG_DIR
 from config.scenario import load_scenario
 from hal.clocks import MonotonicClock
 from hal.types import CameraMount, PlanarPose
-from sim.camera import SimulatedCamera
+from sim.rendering.camera import SimulatedCamera
 from sim.world import World
 from tests.support.pages import PROGRAM, ROOT, Page, changed, complaints_of_ruff, python_in
 

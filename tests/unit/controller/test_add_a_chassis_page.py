@@ -126,15 +126,15 @@ STEPS = {
     ),
     "config/hil-*.yaml": lambda kind: f"kind: {kind}" in read(f"config/hil-{kind}.yaml"),
     "build_chassis.py": lambda kind: KINDS[kind].__name__ in read("controller/build_chassis.py"),
-    "emulator": lambda kind: (ROOT / "sim" / f"{kind}_emulator.py").is_file(),
-    "emulator by its bytes": lambda kind: (ROOT / f"tests/unit/sim/test_{kind}_emulator.py").is_file(),
+    "emulator": lambda kind: (ROOT / "sim/emulators" / f"{kind}.py").is_file(),
+    "emulator by its bytes": lambda kind: (ROOT / f"tests/unit/sim/emulators/test_{kind}.py").is_file(),
     "driver by its bytes": lambda kind: (ROOT / f"tests/unit/hal/test_{kind}_chassis.py").is_file(),
     "rig": lambda kind: f"def {kind}_rig(" in read("tests/support/chassis_rig.py"),
     "contract": lambda kind: sum(name.startswith(f"{kind}-") for name in EMULATED) >= 2,
     "property": lambda kind: (
         f"def test_{kind}_driver_survives_any_" in read(f"tests/property/test_{kind}_properties.py")
     ),
-    "own time-out": lambda kind: f'"{kind}": ' in read("tests/unit/controller/test_faults.py"),
+    "own time-out": lambda kind: f'"{kind}": ' in read("tests/unit/controller/faults/test_faults.py"),
     "guard": lambda kind: f'"{kind}": {kind}_rig' in read("tests/unit/controller/test_guard.py"),
     "mission and faults": lambda kind: kind in EVERY_BASE,
     "README": lambda kind: kind.lower() in read("README.md").lower(),

@@ -5,7 +5,7 @@ from typing import TextIO
 import pytest
 
 from controller.console import Console
-from controller.decision import Action, Decision, Reason
+from controller.decision.decision import Action, Decision, Reason
 
 
 def decided(rule: str, number: int | None = None) -> Decision:

@@ -8,11 +8,11 @@ from config.decision import DecisionConfig
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from controller.control import ControlLoop, ControlStep
-from controller.decide import DecisionMaker
+from controller.decision.decide import DecisionMaker
 from controller.ending import Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
-from controller.path import Path
+from controller.path.path import Path
 from controller.shape import SpeedShaper
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis

@@ -7,7 +7,7 @@ import pytest
 
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
-from controller.path import Path
+from controller.path.path import Path
 from tests.support.closed_loop import (
     Log,
     Mission,

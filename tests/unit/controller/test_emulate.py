@@ -18,11 +18,11 @@ from config.loader import CONFIG_DIR
 from controller.emulate import EmulateOptions, _linked, can_link, run_in_real_time, with_wire
 from controller.errors import UserError
 from controller.faults.trials import KINDS
-from controller.service import StopRequest
+from controller.realtime.service import StopRequest
 from hal.chassis.agilex_messages import ControlModeCommand, MotionCommand, encode
 from hal.clocks import SimulatedClock
 from hal.links.scripted import can_pair
-from sim.agilex_emulator import AgilexEmulator
+from sim.emulators.agilex import AgilexEmulator
 from sim.plant import TrackedPlant
 from tests.support.chassis_rig import MS, PLANT
 

@@ -9,7 +9,7 @@ import pytest
 from config.path import ArcSpec, LineSpec, PathSpec
 from config.robot import Robot
 from controller.follow import PathFollower
-from controller.path import OnPath, Path
+from controller.path.path import OnPath, Path
 from hal.geometry import advance_pose
 from hal.types import PlanarPose
 

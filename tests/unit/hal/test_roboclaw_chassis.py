@@ -10,7 +10,7 @@ import pytest
 from hal.chassis import roboclaw_packets as packets
 from hal.chassis.roboclaw import RoboclawChassis
 from hal.types import ChassisMode
-from sim.roboclaw_emulator import RoboclawEmulator
+from sim.emulators.roboclaw import RoboclawEmulator
 from tests.support.chassis_rig import COUNTS_PER_M, PLANT, roboclaw_config
 from tests.support.serial_bench import SerialBench, every, first_known, reason_for_giving_up
 

@@ -14,8 +14,8 @@ from tests.support.painted import MOUNT, QVGA, Take, box, drive, floor, record, 
 from vision import detector
 from vision.detection import Detection
 from vision.detector import Detector
-from vision.ego_motion import CameraEstimate, estimate
-from vision.motion_prior import MotionPrior
+from vision.ego_motion.camera_motion import CameraEstimate, estimate
+from vision.ego_motion.motion_prior import MotionPrior
 from vision.scene import CameraCondition
 
 SMALL = PerceptionConfig(grid_step_px=2, fragments=FragmentSettings(min_length_px=16, tile_px=20))

@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.support.grids import grid_of, nearest, plate
 from tests.support.parts import Body, regions
-from vision.grouping import ExpectedBodies, attach, detach, expected_in
+from vision.bodies.grouping import ExpectedBodies, attach, detach, expected_in
 
 NOWHERE = np.zeros((2, 1), np.bool_)  # no track is expected in either part
 

@@ -12,10 +12,10 @@ from hal.types import FloatArray, Pose
 from tests.support.detections import AT_ORIGIN, FRAME_NS, detection, no_ends, track
 from tests.support.grids import CAMERA, grid_of, nearest, no_depth, plate, wall
 from vision.detection import no_motion
+from vision.motion.velocities import PointMotion
 from vision.percept import Percept
 from vision.scene import Obstacle
 from vision.tracker import Tracker
-from vision.velocities import PointMotion
 
 FRAME_S = FRAME_NS * 1e-9
 SPEED_MPS = 0.8

@@ -11,7 +11,7 @@ from hal.types import FloatArray
 from tests.support.detections import detection, track
 from tests.support.grids import grid_of, nearest, plate, wall
 from tests.unit.vision.test_tracker import moving, walker, way_m
-from vision import masks
+from vision.bodies import masks
 from vision.tracker import Tracker
 
 _BACK = wall(8.0)

@@ -1,0 +1,170 @@
+"""Obstacles and depth -> speed limits with their reasons, for one control step.
+
+controller/decision/decide.py calls Appraiser.limits and takes the least of these limits and its own (path,
+range, camera). The advisers, in the order in which they are called:
+
+1. Depth (controller/decision/sight.py): a blind corner, the nearest surface that no obstacle explains, and
+the end of
+   the floor that was seen to be free.
+2. standing.StandingLimits: bodies that stand in the swept corridor.
+3. moving.MovingLimits: bodies that cross, come or drive ahead (conflicts: controller/decision/crossing.py).
+4. worst_case.WorstCase: what the watched bodies could do at worst (geometry:
+controller/decision/contingency.py).
+
+Words for the bodies that controller/decision/knowledge.py knows:
+
+* watched: those that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone.
+* enters: watched bodies that are in the swept corridor or are likely to come into it (crossing.comes_in),
+  debounced.
+* remembered: those out of the camera's view, kept by controller/decision/memory.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from config.decision import DecisionConfig
+from config.robot import Limits
+from controller import braking
+from controller.decision.blind_corners import BlindCorner
+from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.corridor import course_of, place
+from controller.decision.crossing import comes_in
+from controller.decision.debounce import Debounced
+from controller.decision.decision import Reason
+from controller.decision.knowledge import Knowledge
+from controller.decision.lens_cover import COVERED
+from controller.decision.limits import UNSEEN_SIGMAS, Gap, Limit, Motion, allowed, stop_before
+from controller.decision.moving import MovingLimits
+from controller.decision.standing import StandingLimits
+from controller.decision.worst_case import WorstCase
+from hal.types import CameraMount
+
+_COARSE_S = 0.5
+_SAME_SURFACE_M = 0.8
+# So long somebody must head for the way until he counts as coming in, and head elsewhere until he does not;
+# meanwhile the worst case is what is reckoned with.
+_SETTLES_S = 0.3
+
+
+class Appraiser:
+    """Asks, in this order: depth, what stands, what moves, and what the moving ones could do at worst."""
+
+    def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount) -> None:
+        self._config, self._comfort = config, braking.comfort(limits)
+        self._worst_case = WorstCase(config, limits)
+        fine = self._worst_case.times_s
+        coarse = np.arange(fine[-1] + _COARSE_S, config.prediction.horizon_s + _COARSE_S, _COARSE_S)
+        self._times_s = np.concatenate((fine, coarse))
+        self._inside: set[int] = set()
+        self._standing = StandingLimits(config, limits, mount, self._inside)
+        self._moving = MovingLimits(config, limits, self._times_s, self._inside)
+        self._enters = Debounced(_SETTLES_S)
+        self._of: Bodies | None = None
+        self._watched = no_bodies(0)
+        self._remembered = np.zeros(0, np.bool_)
+
+    def limits(
+        self, known: Knowledge, s_m: float, motion: Motion, base_mps: float, now_s: float
+    ) -> list[Limit]:
+        """Every limit that obstacles and depth put on the speed of a robot at s_m; base_mps: what path
+        and camera allow."""
+        if known.bodies is not self._of:
+            self._take_in(known)
+        found = self._depth(known, s_m, motion)
+        found += self._standing.limits(known, s_m, motion)
+        watched = self._watched
+        if not len(watched):
+            self._moving.nobody()
+            return found
+        placed = place(
+            watched, known.corridor, known.since_s + self._times_s, s_m, self._config.sight.range_m + 2.0
+        )
+        course = course_of(watched, placed.heading_rad[:, 0])
+        sigma_left = course.sigma_left_mps * self._config.prediction.sigmas
+        comes = comes_in(placed, self._times_s, sigma_left)
+        # Who is in the way is; and of who is out of sight nothing is measured that could be noise.
+        at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
+        enters = self._enters.update(watched.ids, comes, at_once, now_s)
+        base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
+        in_the_way, chosen_mps = self._moving.limits(
+            watched, placed, course, enters, s_m, motion, base_mps, now_s
+        )
+        found += in_the_way
+        if self._remembered.any():
+            # Who is out of sight on a way towards the robot's may be nearer than where it is reckoned.
+            unsure_mps = UNSEEN_SIGMAS * course.sigma_left_mps
+            inwards = -np.sign(placed.d_m[:, 0]) * course.left_mps > unsure_mps
+            nearer = comes_in(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
+            enters |= self._remembered & inwards & nearer
+        worst = self._worst_case.limit(
+            watched, placed, course, enters, s_m, motion, known.since_s, chosen_mps
+        )
+        if worst is not None:
+            found.append(worst)
+        return found
+
+    def _take_in(self, known: Knowledge) -> None:
+        """Once a scene: whose future has to be looked at, and who is gone."""
+        self._of = bodies = known.bodies
+        watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
+        self._watched = bodies.select(watched)
+        self._remembered = known.remembered[watched]
+        self._inside.intersection_update(bodies.ids.tolist())
+
+    def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
+        """The nearest unexplained surface, and the end of the floor that was seen to be free."""
+        margins, sight = self._config.margins, known.sight
+        front_m = s_m + known.corridor.front_m
+        found = self._corner(sight.corners.nearest(front_m), front_m, motion)
+        if math.isfinite(sight.surface_s_m):
+            gap = Gap(sight.surface_s_m - front_m, obstacle_id=_owner(known, sight.surface_s_m, s_m))
+            found.append(
+                stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", "stands")
+            )
+        if known.lens.covered:
+            urgent = bool(known.bodies.moving.any())
+            found.append(Limit(0.0, Reason("unseen", f"{COVERED}: stop", distance_m=0.0), urgent=urgent))
+        if sight.known_s_m < known.corridor.path.length_m + known.corridor.front_m:
+            gap = Gap(sight.known_s_m - front_m)
+            limit = stop_before(gap, motion, self._comfort, margins.least_m, -math.inf, "unseen", "")
+            sentence = (
+                f"the floor is not seen to be free beyond {max(gap.distance_m, 0.0):.1f} m: "
+                f"{allowed(limit.speed_mps)}"
+            )
+            reason = Reason(
+                "unseen",
+                sentence,
+                distance_m=gap.distance_m,
+                required_m=limit.reason.required_m,
+                margin_m=limit.reason.margin_m,
+            )
+            found.append(Limit(limit.speed_mps, reason))
+        return found
+
+    def _corner(self, corner: BlindCorner | None, front_m: float, motion: Motion) -> list[Limit]:
+        """Past a blind corner, slow enough that whoever steps out has a chance."""
+        if corner is None:
+            return []
+        ahead_m = corner.s_m - front_m
+        slow_mps = self._config.sight.blind_corner_mps
+        rolls_m = motion.v_mps * motion.latency_s
+        rolls_m += braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
+        speed = braking.speed_before_section(ahead_m - rolls_m, slow_mps, self._comfort)
+        sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
+        return [Limit(speed, Reason("corner", sentence + allowed(speed), distance_m=ahead_m))]
+
+
+def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:
+    """The obstacle whose surface this is, if one is tracked there that is no box."""
+    unboxed = known.unboxed
+    if not len(unboxed):
+        return None
+    placed = place(unboxed, known.corridor, np.zeros(1), s_m, surface_s_m - s_m + 2.0)
+    near_s = placed.s_m[:, 0] - placed.half_s_m[:, 0]
+    far_s = placed.s_m[:, 0] + placed.half_s_m[:, 0]
+    off = np.maximum(np.maximum(near_s - surface_s_m, surface_s_m - far_s), 0.0)
+    best = int(off.argmin())
+    return int(unboxed.ids[best]) if off[best] < _SAME_SURFACE_M else None

@@ -1,0 +1,241 @@
+"""Scene, path and state -> Decision: how fast to go now, and why.
+
+Each control step collects the limits that anything puts on the speed (controller/decision/appraise.py for
+obstacles and depth, here for path, range, camera and faults) and takes the least. Faster again comes later
+than slower (controller/decision/release.py); whatever cannot be relied on leads to a jerk-limited stop.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from config.decision import DecisionConfig
+from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
+from config.robot import Limits, Robot
+from controller import braking
+from controller.decision.appraise import Appraiser
+from controller.decision.decision import Action, Decision, Reason
+from controller.decision.knowledge import Knowledge
+from controller.decision.limits import BLOCKING_RULES, STANDING_MPS, Limit, Motion, allowed, starts_at_mps
+from controller.decision.release import ReleaseGate
+from controller.decision.situation import Situation
+from controller.path.path import OnPath, Path
+from hal.clocks import NS_PER_S
+from hal.types import CameraMount
+from vision.scene import CameraCondition
+
+__all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
+
+_BACKWARDS_MPS = -0.05
+_OVER_COMFORT_MPS = 0.05
+# The target point is closed in on by the shaper; the limit that is reported for it must not do so earlier.
+_END_SLACK_M = 0.02
+_AT_END_M = 0.02
+
+
+class DecisionMaker:
+    """One decision a control step. Keeps what hysteresis and memory need; calls no clock. noise: of depth."""
+
+    def __init__(
+        self,
+        config: DecisionConfig,
+        robot: Robot,
+        mount: CameraMount,
+        period_s: float,
+        noise: DepthNoise = TYPICAL_DEPTH_NOISE,
+    ) -> None:
+        self._config, self._robot, self._mount, self._noise = config, robot, mount, noise
+        self._comfort = braking.comfort(robot.limits)
+        self._range_brake = braking.emergency(robot.limits) if config.emergency_caps_range else self._comfort
+        self._latency_s = period_s + config.chassis_delay_s
+        self._path: Path | None = None
+        self._known: Knowledge | None = None
+        self._appraiser = Appraiser(config, robot.limits, mount)
+        self._gate = ReleaseGate(config.release)
+        self._now_ns: int | None = None
+        self._emergency = False
+        self._stuck_since_ns: int | None = None
+        self._last: Limit | None = None
+
+    def take_path(self, path: Path, known: Knowledge) -> None:
+        """Go on along another path, of which this is known already; what hysteresis needs is kept."""
+        self._path, self._known = path, known
+
+    def knowledge(self, path: Path, start_s_m: float) -> Knowledge:
+        """Of a path of which nothing is known yet, for a robot that stands at start_s_m on it."""
+        return Knowledge(path, self._robot, self._mount, self._config, start_s_m, self._noise)
+
+    def step(self, at: Situation) -> Decision:
+        """The decision for at.now_ns."""
+        fault = self._input_fault(at)
+        if fault:
+            return self._halt(fault, at.v_mps, at.now_ns)
+        path, on_path, v_mps, now_ns = at.path, at.on_path, max(at.v_mps, 0.0), at.now_ns
+        known = self._knowledge(path, on_path)
+        known.update(at.scene, at.pose, on_path, v_mps, now_ns)
+        if not known.has_seen:
+            # Nothing was decided yet: the first scene that shows a free way lets the robot go at once.
+            reason = Reason("camera", f"{known.fault}: stop")
+            return Decision(self._action(0.0, v_mps), 0.0, reason)
+        motion = Motion(v_mps, at.a_mps2, self._latency_s)
+        on_way = self._path_limit(path, on_path, motion)
+        limits = self._camera_limits(known)
+        base_mps = min(limit.speed_mps for limit in (on_way, *limits))
+        limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
+        return self._conclude(on_way, limits, motion, now_ns)
+
+    def _input_fault(self, at: Situation) -> str:
+        pose, on_path, v_mps, now_ns = at.pose, at.on_path, at.v_mps, at.now_ns
+        before, self._now_ns = self._now_ns, now_ns
+        if before is not None and now_ns < before:
+            return f"time went back by {(before - now_ns) / NS_PER_S:.3f} s"
+        if not math.isfinite(pose.x_m + pose.y_m + pose.heading_rad):
+            return "where the robot is is not known"
+        if not math.isfinite(on_path.s_m + on_path.d_m + on_path.heading_rad):
+            return "where the robot is on its path is not known"
+        if not (math.isfinite(v_mps) and math.isfinite(at.a_mps2)):
+            return "how fast the robot is is not known"
+        if v_mps < _BACKWARDS_MPS:
+            return f"the robot moves backwards at {-v_mps:.2f} m/s"
+        if abs(on_path.d_m) > self._config.off_path_m:
+            return f"the robot is {abs(on_path.d_m):.2f} m beside its path"
+        return ""
+
+    def _halt(self, fault: str, v_mps: float, now_ns: int) -> Decision:
+        """A stop without looking at anything: the inputs cannot be relied on."""
+        v = v_mps if math.isfinite(v_mps) else 0.0
+        self._gate.step(0.0, v, 0.0, now_ns)
+        self._stuck_since_ns = None
+        reason = Reason("fault", f"{fault}: stop")
+        self._last = Limit(0.0, reason)
+        action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
+        return Decision(action, 0.0, reason, self._emergency)
+
+    def _knowledge(self, path: Path, on_path: OnPath) -> Knowledge:
+        if self._known is None or path is not self._path:
+            self._path = path
+            self._known = self.knowledge(path, on_path.s_m)
+        return self._known
+
+    def _path_limit(self, path: Path, on_path: OnPath, motion: Motion) -> Limit:
+        """The least that robot, section, bend and end of the path allow."""
+        left_m = path.length_m - on_path.s_m
+        ahead_s = on_path.s_m + motion.v_mps * motion.latency_s
+        # Who accelerates brakes only once that has ended; but no section is left before it has been left.
+        steady_s = ahead_s + braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
+        section = min(path.speed_limit(ahead_s), path.speed_limit(steady_s))
+        end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
+        if section <= end:
+            rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
+            return Limit(section, Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
+        required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
+        reason = Reason(
+            "target",
+            f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
+            distance_m=left_m,
+            closing_mps=0.0,
+            required_m=required,
+            margin_m=left_m - required,
+        )
+        return Limit(end, reason)
+
+    def _camera_limits(self, known: Knowledge) -> list[Limit]:
+        sight, limits = self._config.sight, self._robot.limits
+        if known.fault:
+            # Blind among people who were moving a moment ago, or for so long that somebody may have come
+            # since: comfort would be at their cost.
+            urgent = bool(known.bodies.moving.any()) or known.since_s > sight.blind_s
+            return [Limit(0.0, Reason("camera", f"{known.fault}: stop"), urgent=urgent)]
+        found = [self._range_limit(known, limits)]
+        if known.health.condition is CameraCondition.DEGRADED:
+            sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"
+            found.append(Limit(sight.degraded_mps, Reason("camera", sentence)))
+        return found
+
+    def _range_limit(self, known: Knowledge, limits: Limits) -> Limit:
+        """What may come from beyond the range at V_omax must still find the robot standing."""
+        sees_m = self._config.sight.range_m + self._mount.forward_m - self._robot.body.front_m
+        speed = braking.speed_for_distance(
+            sees_m,
+            self._range_brake,
+            latency_s=self._latency_s + known.age_s,
+            closing_mps=limits.max_obstacle_speed_mps,
+            margin_m=self._config.margins.least_m,
+        )
+        return Limit(speed, Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed(speed)}"))
+
+    def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
+        top_mps = self._robot.limits.max_speed_mps
+        watched = min(limits, key=lambda limit: limit.speed_mps)
+        raw_mps = self._start_or_creep(watched, motion)
+        if raw_mps < watched.speed_mps:
+            sentence = f"{watched.reason.sentence}: too little to go for"
+            watched = replace(watched, reason=replace(watched.reason, sentence=sentence))
+        let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
+        if raw_mps < min(top_mps, on_way.speed_mps):
+            self._last = watched
+        gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
+        target_mps = min(gated_mps, on_way.speed_mps)
+        reason = self._reason(watched, on_way, raw_mps, gated_mps)
+        self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
+        self._note_stuck(target_mps, motion, reason, now_ns)
+        action = self._action(target_mps, motion.v_mps)
+        closing = motion.a_mps2 < 0.0 or reason.distance_m <= _AT_END_M
+        if action is Action.INCREASE and reason.rule == "target" and closing:
+            # The shaper is closing in on the end: what the slack leaves over is no wish to go faster.
+            action = Action.KEEP
+        return Decision(action, target_mps, reason, self._emergency, self._stuck_since_ns)
+
+    def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
+        """No creeping up to what blocks the way, and no start for a way that is hardly free."""
+        if limit.reason.rule not in BLOCKING_RULES:
+            return limit.speed_mps
+        release = self._config.release
+        least = release.creep_mps
+        if motion.v_mps <= STANDING_MPS:
+            least = starts_at_mps(release, self._comfort)
+            if limit.reason.rule == "worst case":
+                # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
+                least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
+        return limit.speed_mps if limit.speed_mps >= least else 0.0
+
+    def _reason(self, watched: Limit, on_way: Limit, raw_mps: float, gated_mps: float) -> Reason:
+        if on_way.speed_mps <= gated_mps:
+            return on_way.reason
+        if gated_mps >= raw_mps or self._last is None:
+            return watched.reason
+        held = self._last.reason
+        return Reason(
+            "release",
+            f"not yet faster after: {held.sentence}",
+            held.obstacle_id,
+            watched.reason.distance_m,
+            watched.reason.closing_mps,
+            watched.reason.required_m,
+            watched.reason.margin_m,
+        )
+
+    def _brakes_hard(self, limits: list[Limit], allowed_mps: float, motion: Motion) -> bool:
+        """From the moment when comfort would be too late until the speed is what is allowed now: not what is
+        held back for a while."""
+        if motion.v_mps <= STANDING_MPS:
+            return False
+        urgent = any(limit.urgent for limit in limits)
+        return urgent or (self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS)
+
+    def _note_stuck(self, target_mps: float, motion: Motion, reason: Reason, now_ns: int) -> None:
+        blocked = reason.rule in BLOCKING_RULES or reason.rule == "release"
+        if motion.v_mps > STANDING_MPS or target_mps > 0.0 or not blocked:
+            self._stuck_since_ns = None
+        elif self._stuck_since_ns is None:
+            self._stuck_since_ns = now_ns
+
+    def _action(self, target_mps: float, v_mps: float) -> Action:
+        band = self._config.release.dead_band_mps
+        if target_mps > v_mps + band:
+            return Action.INCREASE
+        stopping = target_mps == 0.0 and v_mps > STANDING_MPS
+        if target_mps < v_mps - band or stopping:
+            return Action.DECREASE
+        return Action.KEEP

@@ -1,0 +1,206 @@
+"""Speed limits for bodies that cross, come towards the robot or drive ahead of it.
+
+controller/decision/crossing.py finds the conflicts and the speeds that solve each one. This file compares
+letting the body pass with stopping before it (or following it), settles all conflicts on one speed, and keeps
+each choice from step to step: hysteresis, so that noise does not change it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.decision import DecisionConfig
+from config.robot import Limits
+from controller import braking
+from controller.decision.bodies import Bodies
+from controller.decision.corridor import Course, Placed
+from controller.decision.crossing import Choice, Conflict, choices, find_conflicts
+from controller.decision.decision import Reason
+from controller.decision.limits import ALONGSIDE_M, STANDING_MPS, Gap, Limit, Motion, allowed, stop_before
+from controller.profile import SpeedRamps, comfortable
+from hal.types import FloatArray
+
+_SPEEDS = 31
+_DRIVES_AHEAD_MPS = 0.1
+# Slower than this, arriving as it leaves is no better than waiting at the line.
+_WORTH_ARRIVING_MPS = 0.3
+# Nor is slowing down for who leaves later than this: most change their velocity before, and a stop remains.
+_FORESEEN_S = 4.0
+_AVERAGE = 0.2
+# Who is beside the robot, or will be so soon, is waited for before a start.
+_PASSES_S = 2.0
+# A choice that was made is kept unless this much time would be lost or gained.
+_STICKY_S = 0.5
+
+
+class MovingLimits:
+    """Keeps what hysteresis needs. times_s (K,): from now, where bodies are placed; inside: see
+    controller/decision/standing.py."""
+
+    def __init__(self, config: DecisionConfig, limits: Limits, times_s: FloatArray, inside: set[int]) -> None:
+        self._config, self._limits, self._times_s = config, limits, times_s
+        self._comfort = braking.comfort(limits)
+        self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
+        self._inside = inside
+        self._goes_first: set[int] = set()
+        self._leaves_s: dict[int, float] = {}
+
+    def nobody(self) -> None:
+        """Nothing moves: nothing to remember."""
+        self._goes_first.clear()
+        self._leaves_s.clear()
+
+    def limits(
+        self,
+        bodies: Bodies,
+        placed: Placed,
+        course: Course,
+        enters: NDArray[np.bool_],
+        s_m: float,
+        motion: Motion,
+        base_mps: float,
+        now_s: float,
+    ) -> tuple[list[Limit], float]:
+        """For the robot at s_m whose speed is otherwise base_mps; and the speed that remains.
+
+        enters (N,): who is or is likely to come within the swept width.
+        """
+        ahead = placed.s_m[:, 0] + placed.half_s_m[:, 0] > s_m
+        # Nobody starts while somebody is about to walk into his side, or on the way along it with hardly a
+        # hand's breadth between; who drives is past before that.
+        standing = motion.v_mps <= STANDING_MPS
+        behind_m = math.inf if standing else ALONGSIDE_M
+        if standing:
+            passes = placed.lo_m[:, 0] - s_m <= np.maximum(-course.along_mps, 0.0) * _PASSES_S
+            enters = enters | (passes & (placed.clear_m[:, 0] <= self._config.margins.lateral_m))
+        rows = (bodies.moving & ahead & enters).nonzero()[0]
+        if not len(rows):
+            self.nobody()
+            return [], base_mps
+        conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, course, rows, now_s)
+        if not conflicts:
+            return [], base_mps
+        ramps = comfortable(self._limits, motion, self._speeds)
+        offers = []
+        for one in conflicts:
+            along_mps = float(course.along_mps[one.row])
+            leader_mps = along_mps - float(course.sigma_along_mps[one.row])
+            stays = self._when_it_stays(one, bodies, placed, s_m, motion, along_mps, leader_mps)
+            offers.append((one, *self._offer(one, int(bodies.ids[one.row]), ramps, s_m, stays)))
+        return self._settle(offers, bodies, base_mps)
+
+    def _conflicts(
+        self,
+        bodies: Bodies,
+        placed: Placed,
+        s_m: float,
+        from_s_m: float,
+        course: Course,
+        rows: NDArray[np.intp],
+        now_s: float,
+    ) -> list[Conflict]:
+        margins = self._config.margins
+        grazes = np.array([number in self._inside for number in bodies.ids.tolist()])
+        beside_m = margins.lateral_m + margins.graze_m * grazes
+        sigma_mps = course.sigma_left_mps * self._config.prediction.sigmas
+        found = [
+            one
+            for one in find_conflicts(placed, self._times_s, sigma_mps, beside_m, rows)
+            if one.hi_in_m > s_m and one.lo_in_m > from_s_m
+        ]
+        numbers = {int(bodies.ids[one.row]) for one in found}
+        self._inside |= numbers
+        self._goes_first &= numbers
+        found = [self._steadied(one, int(bodies.ids[one.row]), now_s) for one in found]
+        self._leaves_s = {number: when for number, when in self._leaves_s.items() if number in numbers}
+        return found
+
+    def _steadied(self, conflict: Conflict, number: int, now_s: float) -> Conflict:
+        """With the time of leaving averaged over some frames: it is an extrapolation of a noisy speed."""
+        if math.isinf(conflict.out_s):
+            self._leaves_s.pop(number, None)
+            return conflict
+        leaves_s = now_s + conflict.out_s
+        before_s = self._leaves_s.get(number, leaves_s)
+        self._leaves_s[number] = before_s + _AVERAGE * (leaves_s - before_s)
+        return replace(conflict, out_s=max(self._leaves_s[number] - now_s, conflict.in_s))
+
+    def _when_it_stays(
+        self,
+        conflict: Conflict,
+        bodies: Bodies,
+        placed: Placed,
+        s_m: float,
+        motion: Motion,
+        along_mps: float,
+        leader_mps: float,
+    ) -> Limit:
+        """Stop before it, or follow it: the limit by an obstacle that does not leave the corridor."""
+        margins = self._config.margins
+        runs_m = 0.0
+        rule, what = "oncoming", f"comes at {-along_mps:.1f} m/s"
+        if along_mps > _DRIVES_AHEAD_MPS:
+            runs_m = max(leader_mps, 0.0) ** 2 / (2.0 * self._config.prediction.leader_decel_mps2)
+            rule, what = "leader", f"drives ahead at {along_mps:.1f} m/s"
+        elif along_mps > -_DRIVES_AHEAD_MPS:
+            rule, what = "crossing", "is on the path"
+        gap = Gap(
+            float(placed.lo_m[conflict.row, 0]) - s_m,
+            closing_mps=-along_mps,
+            runs_m=runs_m,
+            obstacle_id=int(bodies.ids[conflict.row]),
+        )
+        return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, rule, what)
+
+    def _offer(
+        self, conflict: Conflict, number: int, ramps: SpeedRamps, s_m: float, stays: Limit
+    ) -> tuple[Choice, Limit]:
+        margins = self._config.margins
+        first = number in self._goes_first
+        enter_s = margins.crossing_s * (0.5 if first else 1.0) + (0.0 if first else _STICKY_S)
+        choice = choices(conflict, ramps, self._speeds, s_m, margins.least_m, margins.crossing_s, enter_s)
+        if conflict.in_s <= 0.0 or conflict.hi_in_m <= s_m:
+            choice = Choice(choice.yield_mps, math.inf)
+        worth_mps = _WORTH_ARRIVING_MPS if conflict.out_s <= _FORESEEN_S else math.inf
+        if choice.yield_mps < min(stays.speed_mps, worth_mps):
+            return Choice(stays.speed_mps, choice.first_mps), stays
+        sentence = (
+            f"obstacle {number} crosses {max(conflict.lo_in_m - s_m, 0.0):.1f} m ahead until "
+            f"{conflict.out_s:.1f} s from now: {allowed(choice.yield_mps)}"
+        )
+        reason = Reason(
+            "crossing",
+            sentence,
+            number,
+            conflict.lo_in_m - s_m,
+            stays.reason.closing_mps,
+            stays.reason.required_m,
+            stays.reason.margin_m,
+        )
+        return choice, Limit(choice.yield_mps, reason)
+
+    def _settle(
+        self, offers: list[tuple[Conflict, Choice, Limit]], bodies: Bodies, base_mps: float
+    ) -> tuple[list[Limit], float]:
+        """The greatest speed up to base_mps that every conflict admits, before it or behind it."""
+        speed, found = base_mps, []
+        waiting = list(offers)
+        while waiting:
+            blocked = [one for one in waiting if one[1].yield_mps < speed < one[1].first_mps]
+            if not blocked:
+                break
+            worst = min(blocked, key=lambda one: one[1].yield_mps)
+            speed = worst[1].yield_mps
+            found.append(worst[2])
+            waiting.remove(worst)
+        for conflict, choice, _ in offers:
+            number = int(bodies.ids[conflict.row])
+            if choice.yield_mps < speed and speed >= choice.first_mps:
+                self._goes_first.add(number)
+            else:
+                self._goes_first.discard(number)
+        return found, speed

@@ -1,0 +1,188 @@
+"""The worst case as a speed limit: how fast may the robot go and still stand before a body could touch it?
+
+controller/decision/contingency.py has the geometry: what each body could reach, and how much room a stop
+leaves. This file decides by how much each body may change its velocity, tries emergency stops from many
+speeds, and makes a Limit of the greatest speed that suffices. controller/decision/appraise.py calls it last,
+after the other advisers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.decision import DecisionConfig
+from config.robot import Limits
+from controller import braking
+from controller.decision.bodies import Bodies
+from controller.decision.contingency import Reach, Stops, gets_through, reach, room, stands_in_time, stops
+from controller.decision.corridor import Course, Placed
+from controller.decision.decision import Reason
+from controller.decision.limits import ALONGSIDE_M, LEAVES_ASLANT, UNSEEN_SIGMAS, Limit, Motion, allowed
+from controller.profile import SpeedRamps, comfortable
+from hal.types import FloatArray
+
+# Fine where stops from low speeds end, coarser for the long ones.
+_STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
+_SPEEDS = 31
+# Before a stop begins: beside what the configuration says no control period takes as long as this; and the
+# least that is looked at.
+_PERIOD_S, _LEAST_WAIT_S = 0.5, 1.0
+# So much sooner than it would have to, the robot slows comfortably for the worst case.
+_FORESIGHT_S = 0.1
+_GOES_MPS = 0.1
+# Who has been seen for so long and comes towards the robot has seen it too.
+_SEES_S = 1.0
+_SOFT_MPS = 0.1
+
+
+class WorstCase:
+    """times_s (K,): from now, the times that are looked at; they cover any emergency stop."""
+
+    def __init__(self, config: DecisionConfig, limits: Limits) -> None:
+        self._config, self._limits = config, limits
+        waits_s = max(config.chassis_delay_s + config.prediction.confirm_s + _PERIOD_S, _LEAST_WAIT_S)
+        stop = braking.stop(limits.max_speed_mps, 0.0, braking.emergency(limits))
+        longest_s = stop.time_s + waits_s
+        self.times_s: FloatArray = np.concatenate(
+            (
+                np.arange(0.0, _FINE_S, _STEP_S),
+                np.arange(_FINE_S, longest_s + _COARSE_STEP_S, _COARSE_STEP_S),
+            )
+        )
+        self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
+        self._latency_s = math.nan
+        self._foreseen = self._confirming = self._at_once = self._stops(self._speeds, 0.0, 0.0)
+
+    def limit(
+        self,
+        bodies: Bodies,
+        placed: Placed,
+        course: Course,
+        enters: NDArray[np.bool_],
+        s_m: float,
+        motion: Motion,
+        since_s: float,
+        chosen_mps: float,
+    ) -> Limit | None:
+        """The greatest speed from which the robot at s_m could still stand in time; None: no need to slow.
+
+        placed: the bodies, since_s after their scene; its first times are times_s. enters (N,): whose motion
+        as it was measured leads into the way. chosen_mps: what is driven if nothing happens; where that gets
+        through whatever they do, the robot need not be able to stop. A robot that slows down to chosen_mps
+        anyway may still have to do so harder than it would: the limit is urgent then.
+        """
+        unsure_m = UNSEEN_SIGMAS * course.sigma_along_mps * bodies.unseen_s
+        rows = placed.lo_m[:, 0] + unsure_m > s_m - ALONGSIDE_M
+        if not rows.any():
+            return None
+        bodies, placed = bodies.select(rows), placed.select(rows, len(self.times_s))
+        reached = self._reach(bodies, placed, course.select(rows), since_s)
+        self._prepare(motion.latency_s)
+        if reached.lo_m[:, -1].min() > s_m + self._furthest_m:
+            return None
+        young = bodies.age_s < self._config.prediction.confirm_s
+        speed = self._speed(reached, young, enters[rows], s_m)
+        if speed >= min(chosen_mps, self._limits.max_speed_mps) and speed >= motion.v_mps:
+            return None
+        go = comfortable(self._limits, motion, np.array([chosen_mps]))
+        if gets_through(go, s_m, self.times_s, reached):
+            return None
+        urgent = False
+        if motion.v_mps > speed:
+            now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
+            urgent = bool(room(now, s_m, reached)[0] < 0.0)
+            if not urgent and motion.v_mps <= speed + _SOFT_MPS:
+                # Foresight may wait a moment; braking for every breath of noise would only delay going on.
+                speed = motion.v_mps
+        row = int(np.argmin(placed.lo_m[:, 0]))
+        number = int(bodies.ids[row])
+        gap_m = float(placed.lo_m[row, 0]) - s_m
+        sentence = (
+            f"obstacle {number}, {max(gap_m, 0.0):.1f} m ahead, could step into the way: {allowed(speed)}"
+        )
+        return Limit(speed, Reason("worst case", sentence, number, gap_m), urgent)
+
+    def _speed(
+        self, reached: Reach, young: NDArray[np.bool_], enters: NDArray[np.bool_], s_m: float
+    ) -> float:
+        """inf: no need to slow.
+
+        For confirmed ones with foresight, but not below what suffices right beside them. What is hardly seen
+        yet may be confirmed first while there is time for that. Who keeps clear is passed at beside_mps.
+        """
+        speed = self._greatest(self._foreseen, reached.select(~young), s_m)
+        if math.isfinite(speed):
+            soon = self._speeds[stands_in_time(self._at_once, reached)]
+            speed = max(speed, float(soon.max(initial=0.0)))
+        if young.any():
+            speed = min(speed, self._greatest(self._confirming, reached.select(young), s_m))
+        beside_mps = self._config.prediction.beside_mps
+        if speed >= beside_mps:
+            return speed
+        return max(speed, min(self._greatest(self._foreseen, reached.select(enters), s_m), beside_mps))
+
+    def _greatest(self, stopping: Stops, reached: Reach, s_m: float) -> float:
+        """The greatest speed whose stop stays short of everything; inf: all of them do."""
+        fails = (room(stopping, s_m, reached) < 0.0).nonzero()[0]
+        return float(self._speeds[max(int(fails[0]) - 1, 0)]) if len(fails) else math.inf
+
+    def _prepare(self, latency_s: float) -> None:
+        if latency_s == self._latency_s:
+            return
+        self._latency_s = latency_s
+        confirm_s = self._config.prediction.confirm_s
+        self._foreseen = self._stops(self._speeds, 0.0, latency_s + _FORESIGHT_S)
+        self._confirming = self._stops(self._speeds, 0.0, latency_s + confirm_s)
+        self._at_once = self._stops(self._speeds, 0.0, latency_s)
+        # Which of the two waits longer is the configuration's choice.
+        self._furthest_m = float(max(self._foreseen.distance_m.max(), self._confirming.distance_m.max()))
+
+    def _reach(self, bodies: Bodies, placed: Placed, course: Course, since_s: float) -> Reach:
+        prediction = self._config.prediction
+        sigmas = prediction.sigmas
+        # Who goes the robot's way does not see it coming and is beside it for long; who comes towards it sees
+        # it after a while and keeps its lane; all others may have become faster or turned since they left the
+        # view.
+        aslant_mps = np.maximum(np.abs(course.left_mps), _GOES_MPS)
+        outwards = course.left_mps * placed.d_m[:, 0] > 0.0
+        unaware = course.along_mps > np.where(outwards, LEAVES_ASLANT, 1.0) * aslant_mps
+        comes = course.along_mps < -aslant_mps
+        leaves = outwards & ~unaware & (placed.clear_m[:, 0] > 0.0)
+        sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
+        sideways = np.where(comes & (bodies.age_s >= _SEES_S), prediction.oncoming_mps2, sideways)
+        # Turning in, one also becomes slower along the path.
+        beside = placed.clear_m[:, 0] > 0.0
+        along = np.where(unaware & beside, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
+        unsure_s = np.where(leaves, 0.0, UNSEEN_SIGMAS * bodies.unseen_s)
+        return reach(
+            placed,
+            self.times_s,
+            since_s + np.where(comes | leaves, 0.0, bodies.unseen_s),
+            spread_mps=(
+                np.maximum(sigmas * course.sigma_along_mps, np.abs(course.surprise_along_mps)),
+                np.maximum(sigmas * course.sigma_left_mps, np.abs(course.surprise_left_mps)),
+            ),
+            speed_mps=np.hypot(course.along_mps, course.left_mps),
+            manoeuvre_mps2=(
+                np.where(bodies.moving, along, 0.0),
+                np.where(bodies.moving, sideways, 0.0),
+            ),
+            most_mps=self._limits.max_obstacle_speed_mps,
+            margin_m=self._config.margins.least_m,
+            unsure_m=(unsure_s * course.sigma_along_mps, unsure_s * course.sigma_left_mps),
+        )
+
+    def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:
+        ramps = SpeedRamps(
+            speeds,
+            a_mps2,
+            np.zeros(len(speeds)),
+            accel_mps2=self._limits.max_accel_mps2,
+            decel_mps2=self._limits.emergency_decel_mps2,
+            jerk_mps3=self._limits.emergency_jerk_mps3,
+            latency_s=latency_s,
+        )
+        return stops(ramps, self.times_s)

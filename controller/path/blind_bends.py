@@ -1,0 +1,194 @@
+"""Bends that the camera cannot see round: told before the drive, or the robot would wait there for ever.
+
+Nothing here is a formula of its own. controller/decision/sight.py, which decides in the drive how far the
+floor is known, is led along each bend of the path with all that this camera could see of an empty hall, and
+where a robot that stands would not be let go again, the bend is named.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from config.app import AppConfig
+from config.decision import DecisionConfig
+from config.path import ArcSpec, LineSpec, PathSpec
+from config.robot import Robot
+from controller import braking
+from controller.build import build_path, mount_of, path_spec
+from controller.decision.bodies import no_bodies
+from controller.decision.corridor import Corridor
+from controller.decision.limits import starts_at_mps
+from controller.decision.sight import Sight
+from controller.decision.surfaces import NO_SURFACES
+from controller.path.path import Path
+from hal.clocks import NS_PER_S
+from hal.types import CameraMount, FloatArray
+from vision.scene import FreeSpace
+
+_STEP_M = 0.1
+# So far before a bend the thought begins: what is free by consent has been left behind at its beginning.
+_RUN_IN_M = 3.0
+# Floor is known in cells of 0.2 m, and no drive is as straight, no scan as complete as in thought.
+_SPARE_M = 0.2
+_BANDS = 80
+_WIDEST_BEND_M = 20.0
+_TO_THE_CM = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class CameraView:
+    """Tangents of the bearing of the image's edges to the left and to the right of its axis, both positive,
+    and how far the floor is seen."""
+
+    left_tan: float
+    right_tan: float
+    range_m: float
+
+    @property
+    def degrees(self) -> float:
+        """From edge to edge."""
+        return math.degrees(math.atan(self.left_tan) + math.atan(self.right_tan))
+
+
+@dataclass(frozen=True, slots=True)
+class BlindBend:
+    """stand_s_m: where along the path the robot would stand. segment: which one of the path's it could not
+    see round, radius_m wide. enough_m: the radius from which on it could, None if none is."""
+
+    stand_s_m: float
+    segment: int
+    radius_m: float
+    enough_m: float | None
+
+
+def view_of(config: AppConfig) -> CameraView | None:
+    """What the camera of this configuration sees at most; None: only its recording knows."""
+    tangents = config.camera.edge_tangents
+    if tangents is None:
+        return None
+    level = math.cos(config.robot.camera_mount.pitch_rad)
+    range_m = min(config.decision.sight.range_m, config.perception.max_depth_m)
+    return CameraView(tangents[0] / level, tangents[1] / level, range_m)
+
+
+def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
+    """One line about the first bend of the path that the camera cannot see round: what, where, why and what
+    to do. None where there is none, or where nobody knows how wide the camera looks.
+
+    Raises ConfigError, PathError.
+    """
+    view = view_of(config)
+    if view is None:
+        return None
+    where, spec = path_spec(config, config_path)
+    path = build_path(config, config_path)
+    bend = first_blind_bend(spec, path, config.robot, mount_of(config), view, config.decision)
+    if bend is None:
+        return None
+    wider = "" if bend.enough_m is None else f"widen it to a radius of {bend.enough_m:.1f} m or more, or "
+    return (
+        f"{where}: path.segments.{bend.segment}: the camera sees {int(view.degrees)} degrees and not round "
+        f"this bend of {bend.radius_m:g} m radius: {bend.stand_s_m:.1f} m along the path the robot may wait "
+        f"for ever for floor that it cannot see; {wider}take a camera that sees wider"
+    )
+
+
+def first_blind_bend(
+    spec: PathSpec, path: Path, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
+) -> BlindBend | None:
+    """The first bend of path, which is spec's, in which a robot that has come to stand would not go on."""
+    ends = np.cumsum([segment.length_m for segment in spec.segments])
+    arcs = [k for k, segment in enumerate(spec.segments) if isinstance(segment, ArcSpec)]
+    for begin_m, end_m in _around(ends, arcs, path.length_m):
+        found = _stands_at(path, robot, mount, view, decision, begin_m, end_m)
+        if found is None:
+            continue
+        stand_s_m, unseen_s_m = found
+        # What is hidden may lie behind the bend: the bend is the last one that begins before it.
+        segment = max((k for k in arcs if ends[k] - spec.segments[k].length_m <= unseen_s_m), default=arcs[0])
+        bend = spec.segments[segment]
+        assert isinstance(bend, ArcSpec)
+        enough_m = _enough_m(bend, robot, mount, view, decision)
+        return BlindBend(stand_s_m, segment, bend.radius_m, enough_m)
+    return None
+
+
+def _around(ends: FloatArray, arcs: list[int], length_m: float) -> Iterator[tuple[float, float]]:
+    """From where to where along the path bends are ahead; those that follow each other closely are one."""
+    begin_m = end_m = -math.inf
+    for k in arcs:
+        starts_m = float(ends[k - 1]) if k > 0 else 0.0
+        if starts_m - _RUN_IN_M > end_m:
+            if end_m > begin_m:
+                yield begin_m, end_m
+            begin_m = max(starts_m - _RUN_IN_M, 0.0)
+        end_m = min(float(ends[k]), length_m)
+    if end_m > begin_m:
+        yield begin_m, end_m
+
+
+def _stands_at(
+    path: Path,
+    robot: Robot,
+    mount: CameraMount,
+    view: CameraView,
+    decision: DecisionConfig,
+    begin_m: float,
+    end_m: float,
+) -> tuple[float, float] | None:
+    """Where between begin_m and end_m it would stand for ever, and up to where the floor is known then."""
+    corridor = Corridor(path, robot.body)
+    sight = Sight(corridor, mount, decision, begin_m)
+    half_width = 0.5 * (view.left_tan + view.right_tan) / _BANDS
+    free = FreeSpace(
+        half_width * (2.0 * np.arange(_BANDS, dtype=np.float64) + 1.0) - view.left_tan,
+        half_width,
+        np.full(_BANDS, math.inf),
+        np.full(_BANDS, view.range_m),
+    )
+    go_mps = starts_at_mps(decision.release, braking.comfort(robot.limits))
+    # So slowly that of what has left the view only the floor right ahead is still known: as after a stop.
+    step_ns = round((decision.sight.memory_s + 1.0) * NS_PER_S)
+    for k, s_m in enumerate(np.arange(begin_m, end_m, _STEP_M).tolist()):
+        sight.look(free, NO_SURFACES, path.pose(s_m), s_m, k * step_ns, no_bodies(0), True)
+        if sight.known_s_m >= path.length_m + corridor.front_m:
+            continue
+        allowed_mps = braking.speed_for_distance(
+            sight.known_s_m - (s_m + corridor.front_m) - _SPARE_M,
+            braking.comfort(robot.limits),
+            latency_s=decision.chassis_delay_s,
+            margin_m=decision.margins.least_m,
+        )
+        if allowed_mps < go_mps:
+            return s_m, sight.known_s_m
+    return None
+
+
+def _enough_m(
+    bend: ArcSpec, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
+) -> float | None:
+    """The least radius that this camera sees round in a half turn, to 5 cm upwards; None above 20 m."""
+    low_m, high_m = bend.radius_m, _WIDEST_BEND_M
+    if low_m >= high_m or _half_turn_blind(high_m, robot, mount, view, decision):
+        return None
+    while high_m - low_m > _TO_THE_CM:
+        middle_m = 0.5 * (low_m + high_m)
+        if _half_turn_blind(middle_m, robot, mount, view, decision):
+            low_m = middle_m
+        else:
+            high_m = middle_m
+    return math.ceil(high_m * 10.0) / 10.0
+
+
+def _half_turn_blind(
+    radius_m: float, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
+) -> bool:
+    line = LineSpec(kind="line", length_m=_RUN_IN_M)
+    turn = ArcSpec(kind="arc", radius_m=radius_m, angle_deg=180.0)
+    path = Path(PathSpec(segments=(line, turn, line)), robot)
+    return _stands_at(path, robot, mount, view, decision, 0.0, path.length_m - _RUN_IN_M) is not None

@@ -1,0 +1,51 @@
+"""A drive along a path in real time."""
+
+from __future__ import annotations
+
+from config.app import AppConfig, RealtimeRunner
+from config.chassis import AgilexChassisConfig, AnyChassisConfig, CanLinkConfig
+from controller.build import build_control
+from controller.console import Console
+from controller.ending import Outcome
+from controller.realtime.rig import realtime_rig
+from controller.record.tally import SetpointTally, TimingTally
+from controller.result import MissionOptions, MissionResult
+from controller.summary import report
+from hal.errors import DeviceRefused
+from hal.types import ChassisMode
+
+
+def drive_realtime(
+    config: AppConfig, runner: RealtimeRunner, options: MissionOptions, console: Console
+) -> MissionResult:
+    """Drive on the machine's clock. Raises ConfigError, HalError, UserError, and nothing has moved then."""
+    with realtime_rig(config, runner, options) as rig:
+        loop = build_control(config, options.config_path, rig.chassis)
+        result = MissionResult(
+            loop,
+            SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz),
+            TimingTally(),
+            simulation=rig.simulation,
+            punctuality=rig.punctuality,
+        )
+        was_armed = False
+        with rig.under_way(loop, console, lambda service: service.ready("driving")) as moments:
+            for moment in moments:
+                result.take(moment.control)
+                was_armed = was_armed or moment.control.chassis.mode is ChassisMode.ARMED
+                for message in moment.arrived:
+                    result.timing.add(message.timing_ms)
+                    result.frames.add(message.scene.sequence)
+                report(console, result, moment.control)
+    if loop.ending.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
+        raise DeviceRefused(f"{describe_base(config.chassis)}: {loop.ending.stop_reason}; nothing has moved")
+    return result
+
+
+def describe_base(chassis: AnyChassisConfig) -> str:
+    """What was tried: the kind of base, and the link as configured."""
+    link = chassis.link
+    kind = f"{chassis.kind} {chassis.model}" if isinstance(chassis, AgilexChassisConfig) else chassis.kind
+    if isinstance(link, CanLinkConfig):
+        return f"{kind} on CAN {link.interface} {link.channel!r}"
+    return f"{kind} on serial port {link.url} at {link.baud} baud"

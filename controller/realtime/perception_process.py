@@ -1,0 +1,160 @@
+"""The perception process of the real-time runner: camera, detect, track, and what is recorded of it."""
+
+from __future__ import annotations
+
+import math
+import socket
+import time
+from contextlib import suppress
+from pathlib import Path as FilePath
+
+from config.app import AppConfig, RealtimeRunner
+from controller.build import build_path, build_perceiver, mount_of, open_camera, surroundings
+from controller.control import ControlStep
+from controller.errors import UserError
+from controller.localise import PoseHistory
+from controller.realtime.channel import Channel, PeerGone
+from controller.realtime.runner import Farewell, SceneMessage, StepMessage
+from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
+from hal.clocks import NS_PER_S, MonotonicClock
+from hal.errors import EndOfStream, FrameTimeout, HalError
+from hal.geometry import advance_pose, body_in_floor, camera_in_floor, planar
+from hal.types import CameraMount, PlanarPose, Pose
+
+# Odometry is asked for between two control steps: carried on with its last twist for at most this long.
+REACH_S = 0.25
+
+
+class RemoteBody:
+    """The robot's motion as the control process tells it (hal.api.OdometrySource). start: where on the path's
+    floor it begins."""
+
+    def __init__(self, channel: Channel, mount: CameraMount, start: PlanarPose) -> None:
+        self._channel = channel
+        self._mount = mount
+        self._start = body_in_floor(start)
+        self._from_odometry: Pose | None = None
+        self._true = PoseHistory(reach_s=0.0)
+        self._newest_true = start
+        self._fused = PoseHistory(reach_s=0.0)
+        self._odometry = PoseHistory(reach_s=0.0)
+        self._newest: ControlStep | None = None
+        self._unread: list[ControlStep] = []
+
+    def listen(self) -> None:
+        """Take in every control step that has arrived. Raises PeerGone."""
+        while (message := self._channel.receive()) is not None:
+            assert isinstance(message, StepMessage), f"control sent {type(message).__name__}"
+            step = self._newest = message.control
+            self._unread.append(step)
+            self._fused.append(step.now_ns, step.pose)
+            self._odometry.append(step.now_ns, step.chassis.pose)
+            true_pose = message.true_pose or self._by_odometry(step.chassis.pose)
+            if true_pose is not None:
+                self._newest_true = true_pose
+                self._true.append(step.now_ns, true_pose)
+
+    def take_steps(self) -> list[ControlStep]:
+        """The control steps that have arrived since the last call."""
+        self.listen()
+        steps, self._unread = self._unread, []
+        return steps
+
+    def body_pose(self, stamp_ns: int) -> PlanarPose | None:
+        """The body in the path's frame."""
+        self.listen()
+        known = self._fused.at(stamp_ns)
+        if known is None and self._newest is not None:
+            return self._carried_on(self._newest.pose, stamp_ns)
+        return known
+
+    def true_pose(self, stamp_ns: int) -> PlanarPose | None:
+        """The body on the path's floor, for a simulated camera to see from: where its world has it, or, with
+        a base outside of this program, where that reports to be. Never where the robot believes to be: its
+        belief follows what the camera sees."""
+        self.listen()
+        known = self._true.at(stamp_ns)
+        if known is None and self._newest is not None:
+            return self._carried_on(self._newest_true, stamp_ns)
+        return known
+
+    def camera_pose(self, stamp_ns: int) -> Pose | None:
+        """The camera by the chassis' dead reckoning."""
+        self.listen()
+        known = self._odometry.at(stamp_ns)
+        if known is None and self._newest is not None:
+            known = self._carried_on(self._newest.chassis.pose, stamp_ns)
+        return None if known is None else camera_in_floor(known, self._mount)
+
+    def _by_odometry(self, odometry: PlanarPose) -> PlanarPose | None:
+        """On the path's floor; the first odometry is that of its start. None while the base knows of none."""
+        if not math.isfinite(odometry.x_m + odometry.y_m + odometry.heading_rad):
+            return None
+        if self._from_odometry is None:
+            self._from_odometry = self._start @ body_in_floor(odometry).inverse()
+        return planar(self._from_odometry @ body_in_floor(odometry))
+
+    def _carried_on(self, pose: PlanarPose, stamp_ns: int) -> PlanarPose | None:
+        """pose of the newest step, moved on to stamp_ns with its twist; None if that is too far."""
+        assert self._newest is not None
+        ahead_ns = stamp_ns - self._newest.now_ns
+        state = self._newest.chassis
+        twist_known = state.v_mps == state.v_mps and state.w_radps == state.w_radps
+        if not 0 <= ahead_ns <= REACH_S * NS_PER_S or not twist_known:
+            return None
+        return advance_pose(pose, state.v_mps, state.w_radps, ahead_ns / NS_PER_S)
+
+
+def perceive_forever(
+    config: AppConfig, config_path: FilePath, end: socket.socket, start_ns: int, recording: RecordingOptions
+) -> None:
+    """Entry point of the process. start_ns: time zero of a simulated world.
+
+    Ends when the camera ends or the control process has gone.
+    """
+    channel = Channel(end)
+    try:
+        _look_until_the_end(config, config_path, channel, start_ns, recording)
+    except PeerGone:
+        return
+    except EndOfStream:
+        _say_farewell(channel, "the camera's stream has ended")
+    except HalError as error:
+        _say_farewell(channel, f"camera: {error}")
+    except UserError as error:
+        # A recording that cannot be begun or gone on with: why the robot stops is told there.
+        _say_farewell(channel, str(error))
+
+
+def _look_until_the_end(
+    config: AppConfig, config_path: FilePath, channel: Channel, start_ns: int, recording: RecordingOptions
+) -> None:
+    assert isinstance(config.runner, RealtimeRunner)
+    timeout_s = config.runner.frame_timeout_s
+    path = build_path(config, config_path)
+    body = RemoteBody(channel, mount_of(config), path.start)
+    with (
+        open_camera(config, config_path, MonotonicClock(), body.true_pose, start_ns) as camera,
+        open_recorder(recording, surroundings(config)) as recorder,
+    ):
+        perceiver = build_perceiver(config, body, body.body_pose, time.perf_counter_ns)
+        run_recorder = RunRecorder(recorder, path)
+        try:
+            while True:
+                # Without a frame the scene ages and the robot stops; the camera may come back.
+                with suppress(FrameTimeout):
+                    look = perceiver.look(camera.read(timeout_s))
+                    channel.send(SceneMessage(look.scene, look.timing_ms))
+                    run_recorder.saw(look)
+                for step in body.take_steps():
+                    run_recorder.decided(step)
+        except (PeerGone, EndOfStream):
+            run_recorder.finish()
+            raise
+
+
+def _say_farewell(channel: Channel, reason: str) -> None:
+    try:
+        channel.send(Farewell(reason))
+    except PeerGone:
+        return

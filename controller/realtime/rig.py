@@ -1,0 +1,163 @@
+"""What every drive in real time has around its loop: base, world, perception process, service manager."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Protocol
+
+from config.app import AppConfig, RealtimeRunner
+from controller.build import build_path, build_simulation, require_camera
+from controller.build_chassis import build_base
+from controller.console import Console
+from controller.control import Drive
+from controller.ending import Ending, Outcome
+from controller.realtime.channel import Channel, channel_sockets
+from controller.realtime.perception_process import perceive_forever
+from controller.realtime.punctual import PunctualChassis
+from controller.realtime.runner import PerceptionLink, Punctuality, RealtimeMoment, run_realtime
+from controller.realtime.scheduling import become_realtime
+from controller.realtime.service import ServiceManager, stop_on_signals
+from controller.record.recorder import RecordingOptions, require_writable
+from controller.result import MissionOptions
+from controller.workers import held
+from hal.clocks import NS_PER_S, MonotonicClock
+from hal.errors import DeviceRefused
+from sim.simulation import Simulation
+
+# The perception process needs a moment to import and open the camera; a simulated world starts after that.
+HEAD_START_S = 3.0
+GOODBYE_S = 5.0
+
+
+class EndingDrive(Drive, Protocol):
+    """A loop that says why it ends."""
+
+    @property
+    def ending(self) -> Ending: ...
+
+
+@dataclass(frozen=True, slots=True)
+class RealtimeRig:
+    """chassis: open, and its commands leave at their moments. simulation: the world of a simulated camera,
+    None with a real one."""
+
+    config: AppConfig
+    runner: RealtimeRunner
+    options: MissionOptions
+    clock: MonotonicClock
+    start_ns: int
+    chassis: PunctualChassis
+    simulation: Simulation | None
+    punctuality: Punctuality
+
+    @contextmanager
+    def under_way(
+        self, loop: EndingDrive, console: Console, on_ready: Callable[[ServiceManager], None]
+    ) -> Iterator[Iterator[RealtimeMoment]]:
+        """The moments of a drive of this loop, until it has finished; perception ends with the block.
+
+        on_ready is called once, when the first scene has come.
+        """
+        service = ServiceManager(os.environ, os.getpid())
+        recording = _recording(self.options)
+        with (
+            perception_beside(self.config, self.options.config_path, self.start_ns, recording) as link,
+            stop_on_signals() as stop,
+            console.beside_a_drive(),
+        ):
+            # Last, so that the processes and threads started before keep ordinary scheduling.
+            for refused in become_realtime(self.runner.priority):
+                console.event(f"not permitted, running without: {refused}")
+            moments = run_realtime(
+                self.runner, self.clock, self.simulation, link, loop, service, stop, self.punctuality
+            )
+            try:
+                yield _told(moments, loop.ending, link, service, on_ready)
+            except BaseException:
+                # To end the perception process takes seconds; the base must not go on meanwhile.
+                self.chassis.stop(self.clock.now_ns())
+                raise
+
+
+def _told(
+    moments: Iterator[RealtimeMoment],
+    ending: Ending,
+    link: PerceptionLink,
+    service: ServiceManager,
+    on_ready: Callable[[ServiceManager], None],
+) -> Iterator[RealtimeMoment]:
+    """Tells the service manager when the drive is ready, and when it is about to end.
+
+    Raises DeviceRefused at the end where perception could not even begin: without a scene nothing moves.
+    """
+    told_ready = told_stopping = False
+    for moment in moments:
+        if link.newest is not None and not told_ready:
+            told_ready = True
+            on_ready(service)
+        if ending.stop_reason is not None and not told_stopping:
+            told_stopping = True
+            service.stopping(ending.stop_reason)
+        yield moment
+    if link.refused_reason is not None and ending.outcome is Outcome.BROKEN_OFF:
+        raise DeviceRefused(f"{link.refused_reason}; nothing has moved")
+
+
+@contextmanager
+def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOptions) -> Iterator[RealtimeRig]:
+    """The base, opened, and the simulated world if it is one. Raises ConfigError, HalError, UserError."""
+    require_camera(config, options.config_path)
+    require_writable(_recording(options))
+    clock = MonotonicClock()
+    start_ns = clock.now_ns() + round(HEAD_START_S * NS_PER_S)
+    start = build_path(config, options.config_path).start
+    chassis, emulator = build_base(config, start, clock.now_ns())
+    simulation = None
+    if emulator is not None:
+        simulation = build_simulation(config, options.config_path, emulator, start_ns)
+    with ExitStack() as devices:
+        if simulation is not None:
+            devices.enter_context(simulation)
+        period_ns = round(NS_PER_S / runner.control_rate_hz)
+        punctual = devices.enter_context(PunctualChassis(chassis, clock, period_ns))
+        yield RealtimeRig(config, runner, options, clock, start_ns, punctual, simulation, Punctuality())
+
+
+def _recording(options: MissionOptions) -> RecordingOptions:
+    return RecordingOptions(options.observations, options.video, options.record)
+
+
+@contextmanager
+def perception_beside(
+    config: AppConfig, config_path: Path, start_ns: int, recording: RecordingOptions
+) -> Iterator[PerceptionLink]:
+    """The perception process; when the block ends, its channel is closed, and it with that. start_ns: time
+    zero of a simulated world."""
+    here, there = channel_sockets()
+    process: BaseProcess = multiprocessing.get_context("spawn").Process(
+        target=perceive_forever,
+        args=(config, config_path, there, start_ns, recording),
+        name="perception",
+        daemon=True,
+    )
+    # A terminal that goes would end the camera before the robot has come to rest.
+    with held(signal.SIGINT, signal.SIGHUP):
+        process.start()
+    # Ours must be the only open copy of the other end, or its death would not show.
+    there.close()
+    channel = Channel(here)
+    try:
+        yield PerceptionLink(channel)
+    finally:
+        channel.close()
+        process.join(GOODBYE_S)
+        if process.is_alive():
+            process.kill()
+            process.join()

@@ -1,0 +1,1 @@
+"""A world -> what an RGB-D camera in it reports, and the truth of it."""

@@ -1,0 +1,114 @@
+"""Soft shadows on the floor under whatever stands on it: without them everything seems to float."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.scenario import Light
+from hal.types import FloatArray, Intrinsics, Pose
+from sim.rendering.raster import Drawn, LabelImage, texture_frames
+from sim.rendering.spans import convert
+from sim.world import BUILDING_ID, BodyState, Geometry
+
+_MARGIN_M = 0.6  # a large lamp lights the floor this far under an edge, and misses it this far beside
+_DARKEST = 0.6  # share of the light that is lost right below
+_HIGH_M = 0.5  # what hangs higher casts no shadow that could be told from the rest
+_FAR_M = 12.0
+_SIDE_PX = 64
+_RIM = 0.3  # share of the shadow's picture that lies outside the footprint, at each side
+
+
+class ShadowCaster:
+    """Darkens the floor in a picture (H, W, 4) before its edges are smoothed."""
+
+    def __init__(self, intrinsics: Intrinsics, light: Light) -> None:
+        self._intrinsics = intrinsics
+        azimuth = math.radians(light.azimuth_deg)
+        # Away from the light.
+        self._drift = -0.06 * np.array([math.cos(azimuth), math.sin(azimuth)])
+        self._blot = _soft_blot()
+        self._still: dict[int, FloatArray] = {}
+
+    def cast(
+        self,
+        colour: NDArray[np.uint8],
+        labels: LabelImage,
+        drawn: Drawn,
+        geometry: Geometry,
+        bodies: tuple[BodyState, ...],
+        camera: Pose,
+    ) -> None:
+        """Multiply the shadows of bodies into colour, where labels show the floor."""
+        near = self._near(bodies, camera)
+        if not near:
+            return
+        corners = np.array([self._patch_of(state) for state in near])
+        corners = (corners - camera.translation_m) @ camera.rotation
+        k = self._intrinsics
+        bounds = convert(corners, k).bounds
+        to_ray = np.array([[1 / k.fx, 0, -k.cx / k.fx], [0, 1 / k.fy, -k.cy / k.fy], [0, 0, 1]])
+        to_blot = np.diag([_SIDE_PX, _SIDE_PX, 1.0]) @ np.linalg.inv(texture_frames(corners)) @ to_ray
+        on_floor = _floor_faces(drawn, geometry)
+        for (u0, v0, u1, v1), matrix in zip(bounds.tolist(), to_blot, strict=True):
+            if u1 <= u0:
+                continue
+            floor = on_floor[labels[v0:v1, u0:u1]]
+            matrix[:, 2] += matrix[:, 0] * u0 + matrix[:, 1] * v0
+            shade = cv2.warpPerspective(
+                self._blot, matrix, (u1 - u0, v1 - v0), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+                borderMode=cv2.BORDER_CONSTANT, borderValue=(255, 255, 255, 255),
+            )  # fmt: skip
+            lit = colour[v0:v1, u0:u1]
+            cv2.copyTo(cv2.multiply(lit, shade, scale=1.0 / 255.0), floor, lit)
+
+    def _near(self, bodies: tuple[BodyState, ...], camera: Pose) -> list[BodyState]:
+        """Those whose shadow may be seen."""
+        low = [state for state in bodies if state.z_m[0] < _HIGH_M]
+        places = np.array([(state.pose.x_m, state.pose.y_m) for state in low]).reshape(-1, 2)
+        reaches = np.array([state.reach_m for state in low]) + _MARGIN_M
+        ahead = (places - camera.translation_m[:2]) @ camera.rotation[:2, 2]
+        return [low[k] for k in np.flatnonzero((ahead > -reaches) & (ahead < _FAR_M + reaches)).tolist()]
+
+    def _patch_of(self, state: BodyState) -> FloatArray:
+        """As _patch; what never moves is asked once."""
+        if state.moves:
+            return self._patch(state)
+        patch = self._still.get(state.id)
+        if patch is None:
+            patch = self._still[state.id] = self._patch(state)
+        return patch
+
+    def _patch(self, state: BodyState) -> FloatArray:
+        """The shadow's rectangle (4, 3) on the floor, clockwise from above as the first corner says."""
+        c, s = math.cos(state.pose.heading_rad), math.sin(state.pose.heading_rad)
+        turn = np.array([[c, -s], [s, c]])
+        outline = (state.footprint_m - np.array([state.pose.x_m, state.pose.y_m])) @ turn
+        low, high = outline.min(axis=0), outline.max(axis=0)
+        # The blurred rim is _MARGIN_M wide at each side, whatever the size of the body.
+        grow = np.minimum(_MARGIN_M, _RIM / (1.0 - 2.0 * _RIM) * (high - low))
+        low, high = low - grow, high + grow
+        corners = np.array([[low[0], high[1]], [high[0], high[1]], [high[0], low[1]], [low[0], low[1]]])
+        placed = corners @ turn.T + np.array([state.pose.x_m, state.pose.y_m]) + self._drift
+        return np.column_stack([placed, np.zeros(4)])
+
+
+def _floor_faces(drawn: Drawn, geometry: Geometry) -> NDArray[np.uint8]:
+    """For each label: 255 if it is the floor or a marking on it."""
+    face = drawn.face
+    floor = (geometry.body[face] == BUILDING_ID) & (geometry.normals[face, 2] > 0.99)
+    return np.concatenate([[False], floor]).astype(np.uint8) * np.uint8(255)
+
+
+def _soft_blot() -> NDArray[np.uint8]:
+    """How much light is left (H, W, 4): dark in the middle, all of it at the border."""
+    dark = np.zeros((_SIDE_PX, _SIDE_PX), np.float32)
+    rim = round(_RIM * _SIDE_PX)
+    dark[rim:-rim, rim:-rim] = 1.0
+    soft = np.asarray(cv2.GaussianBlur(dark, (0, 0), 0.5 * rim, borderType=cv2.BORDER_CONSTANT))
+    soft = np.maximum(soft - soft[0].max(), 0.0)
+    left = 255.0 * (1.0 - _DARKEST * soft / soft.max())
+    return np.repeat(np.rint(left).astype(np.uint8)[:, :, None], 4, axis=2)

@@ -1,0 +1,106 @@
+"""Exact ground truth of a picture: who is where in it, how fast, and where each pixel goes next."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray, Intrinsics, Pose
+from sim.rendering.raster import Rasteriser, texture_frames
+from sim.rendering.render import Picture
+from sim.rendering.spans import NEAR_M
+from sim.world import BodyState, Geometry, World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyTruth:
+    """A body in the image. Camera axes: optical frame (x right, y down, z forward).
+
+    bbox_px: (u0, v0, u1, v1) around its visible pixels, u1 and v1 exclusive. visible_px of them;
+    visible_ratio: of those that it would have in this image if nothing stood before it. position_m (3,):
+    mean of its visible surface points; velocity_mps (3,): over ground.
+    """
+
+    state: BodyState
+    bbox_px: tuple[int, int, int, int]
+    visible_px: int
+    visible_ratio: float
+    position_m: FloatArray
+    velocity_mps: FloatArray
+
+
+class GroundTruth:
+    """Answers questions about pictures of one world through one camera. For evaluation, not for speed."""
+
+    def __init__(self, world: World, intrinsics: Intrinsics) -> None:
+        self._world = world
+        self._intrinsics = intrinsics
+        self._alone = Rasteriser(intrinsics)
+
+    def bodies(self, picture: Picture, only: Collection[int] | None = None) -> tuple[BodyTruth, ...]:
+        """Every body with at least one visible pixel, in the order of their ids.
+
+        only: look at the bodies with these ids alone, which takes a fraction of the time.
+        """
+        mask = picture.instance_mask()
+        points = self._points(picture)
+        found = []
+        for state in self._world.bodies(picture.t_s):
+            if only is not None and state.id not in only:
+                continue
+            v, u = np.nonzero(mask == state.id)
+            if len(u) == 0:
+                continue
+            velocity = np.array([state.velocity_mps[0], state.velocity_mps[1], 0.0])
+            surface = points[v, u]
+            found.append(
+                BodyTruth(
+                    state=state,
+                    bbox_px=(int(u.min()), int(v.min()), int(u.max()) + 1, int(v.max()) + 1),
+                    visible_px=len(u),
+                    visible_ratio=len(u) / self._pixels_alone(picture, state.id),
+                    position_m=surface.mean(axis=0),
+                    velocity_mps=velocity @ picture.camera.rotation,
+                )
+            )
+        return tuple(found)
+
+    def flow(self, picture: Picture, t_s: float, camera: Pose) -> NDArray[np.float32]:
+        """Where the surface point of each pixel is in another exposure: (H, W, 2) float32, (du, dv).
+
+        Robot, bodies and limbs move; what covers the point then is not asked. NaN where there is no
+        surface or the point is behind the other camera.
+        """
+        k = self._intrinsics
+        project = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
+        corners = self._world.geometry(t_s).corners_m[picture.drawn.face]
+        corners = (corners - camera.translation_m) @ camera.rotation
+        homographies = project @ texture_frames(corners) @ picture.drawn.to_plane
+        flow = np.full((k.height, k.width, 2), np.nan, np.float32)
+        for number, (u0, v0, u1, v1) in enumerate(picture.drawn.bounds.tolist()):
+            v, u = np.nonzero(picture.labels[v0:v1, u0:u1] == number + 1)
+            here = np.stack([u + u0, v + v0, np.ones(len(u))])
+            there = homographies[number] @ here
+            # The plane's own inverse depth divides out: what is left of the scale is z then over z now.
+            ratio = np.where(there[2] / (picture.drawn.to_plane[number, 2] @ here) > NEAR_M, there[2], np.nan)
+            flow[v + v0, u + u0] = (there[:2] / ratio - here[:2]).T
+        return flow
+
+    def _points(self, picture: Picture) -> FloatArray:
+        """Surface points (H, W, 3) in the optical frame."""
+        k = self._intrinsics
+        z = picture.depth_m()
+        v, u = np.mgrid[0 : k.height, 0 : k.width]
+        return np.stack([(u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z], axis=2)
+
+    def _pixels_alone(self, picture: Picture, body_id: int) -> int:
+        every = picture.geometry
+        own = every.body == body_id
+        only = Geometry(
+            every.corners_m[own], every.normals[own], every.windows[own], every.texture[own], every.body[own]
+        )
+        self._alone.draw(only, picture.camera)
+        return int(np.count_nonzero(self._alone.labels))

@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import vision
+from config.perception import PerceptionConfig
+from controller.bench.figures import Stopwatches
+from controller.bench.opencv_calls import recorded_calls
+from controller.bench.perception import (
+    FrameTime,
+    SideBySide,
+    measure_perception,
+    run_side_by_side,
+    run_watched,
+)
+from controller.bench.reel import Reel, recorded_reel
+from controller.bench.stages import modules_of
+from hal.cameras.tum_replay import TumReplay
+from vision.perception import Perception
+
+DESK = Path(__file__).parents[3] / "recordings" / "desk_rpy"
+MODULES = modules_of(vision)
+
+
+@pytest.fixture(scope="module")
+def reel() -> Reel:
+    whole = recorded_reel(TumReplay(DESK), None)
+    return Reel(whole.frames[:3], whole.odometry[:3], whole.mount)
+
+
+def make() -> Perception:
+    return Perception(PerceptionConfig(), None, 0.8, 0.05)
+
+
+class Ticks:
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self) -> None:
+        self.count += 1
+
+
+def steady_clock(step_ns: int) -> Iterator[int]:
+    """Every interval between two readings is step_ns."""
+    return itertools.count(0, step_ns)
+
+
+def test_functions_that_a_frame_does_not_call_take_no_time_in_it() -> None:
+    side = SideBySide()
+    side.add(FrameTime(5, 1, 10), {"Canny": 2})
+    side.add(FrameTime(6, 2, 11), {"Canny": 3, "LUT": 4})
+    side.add(FrameTime(7, 3, 12), {"LUT": 1})
+    assert side.total_ns == [6, 8, 10]
+    assert side.elapsed_ns == [10, 11, 12]
+    assert side.bare_ns == [2, 7, 1]
+    assert dict(side.opencv_ns) == {"Canny": [2, 3, 0], "LUT": [0, 4, 1]}
+
+
+def test_side_by_side_times_perception_and_its_calls(reel: Reel) -> None:
+    expected: list[int] = []
+    perception = make()
+    for frame in reel.frames:
+        with recorded_calls(MODULES) as calls:
+            perception.perceive(frame, None, None)
+        expected.append(1000 * len(calls))
+    assert expected[1] > 0
+    side, ticks = SideBySide(), Ticks()
+    stopwatches = Stopwatches(steady_clock(1000).__next__, steady_clock(7).__next__)
+    run_side_by_side(reel, make, MODULES, stopwatches, side, ticks)
+    assert side.detect_ns == side.track_ns == [1000, 1000]
+    assert side.elapsed_ns == [7, 7]
+    assert side.bare_ns == expected[1:]
+    assert side.first_ns == [2000]
+    assert ticks.count == 3
+
+
+def test_a_watched_pass_sees_the_stages(reel: Reel) -> None:
+    frames = run_watched(reel, make, MODULES, time.perf_counter_ns, Ticks())
+    assert len(frames) == 2
+    for spent in frames:
+        assert spent["vision.perception.Perception.perceive"].calls == 1
+        assert spent["vision.fragments.edges.find_edges"].opencv_ns > 0
+
+
+def test_figures_of_a_reel(reel: Reel) -> None:
+    ticks = Ticks()
+    stopwatches = Stopwatches(time.process_time_ns, time.perf_counter_ns)
+    figures = measure_perception(reel, make, 2, stopwatches, ticks)
+    assert ticks.count == 2 * 2 * 3
+    assert figures.total.count == figures.bare.count == 4
+    assert figures.first.count == 2
+    assert figures.ratio_of_medians == pytest.approx(figures.total.median_ms / figures.bare.median_ms)
+    assert {"vision.fragments.edges", "vision.tracker"} <= set(figures.modules)
+    assert "vision.fragments.edges.find_edges" in figures.functions
+    assert set(figures.as_json()) == {
+        "total", "elapsed", "detect", "track", "bare_opencv", "first_frame", "ratio_of_medians",
+        "median_ratio", "opencv_functions", "modules", "functions",
+    }  # fmt: skip

@@ -1,0 +1,105 @@
+"""The far end of a rack close beside the way, from what depth shows of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from config.decision import SightConfig
+from controller.decision.blind_corners import BlindCorners
+
+BANDS = 80
+EDGE_TAN = 0.687
+CAMERA_M, FRONT_M, HALF_WIDTH_M = 0.45, 0.51, 0.39
+BEARING = np.linspace(-EDGE_TAN, EDGE_TAN, 2 * BANDS + 1)[1::2]
+
+
+class Aisle:
+    """A rack from x = 0 to end_m, its face beside_m beside the swept width, on the left (1) or right (-1);
+    behind it the room goes on for 9 m, or another rack stands in line gap_m behind."""
+
+    def __init__(
+        self, end_m: float, beside_m: float, side: int, start_m: float = 0.0, gap_m: float = 9.0
+    ) -> None:
+        self.corners = BlindCorners(SightConfig())
+        self.start_m, self.end_m, self.side = start_m, end_m, side
+        self.face_m, self.next_m = HALF_WIDTH_M + beside_m, end_m + gap_m
+
+    def look(self, s_m: float, times: int = 1, stands: bool = True) -> None:
+        """From s_m along a straight path."""
+        right = -self.side * self.face_m
+        with np.errstate(divide="ignore"):
+            hit = right / BEARING
+        at = hit + s_m + CAMERA_M
+        forward = np.where((hit > 0.0) & (at < self.end_m) & (at > self.start_m), hit, 9.0)
+        # Who looks past the end into the gap sees the next rack's end, or its face.
+        behind = (hit > 0.0) & (at >= self.end_m)
+        to_next = np.maximum(hit, self.next_m - s_m - CAMERA_M)
+        forward = np.where(behind & (to_next < 9.0), to_next, forward)
+        for _ in range(times):
+            self.corners.look(
+                np.arange(BANDS),
+                forward,
+                s_m + CAMERA_M + forward,
+                -BEARING * forward,
+                np.full(BANDS, HALF_WIDTH_M),
+                2.0 * EDGE_TAN / BANDS,
+                s_m + FRONT_M,
+                np.full(BANDS, stands),
+            )
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_end_of_a_rack_is_a_blind_corner(side: int) -> None:
+    aisle = Aisle(5.0, 0.6, side)
+    aisle.look(1.0, times=2)
+    assert aisle.corners.nearest(1.51) is None
+    aisle.look(1.0)
+    corner = aisle.corners.nearest(1.51)
+    assert corner is not None
+    assert corner.s_m == pytest.approx(5.0, abs=0.5)
+    assert corner.beside_m == pytest.approx(0.6, abs=0.05)
+
+
+def test_it_is_remembered_until_it_is_passed() -> None:
+    aisle = Aisle(5.0, 0.6, 1)
+    for s_m in np.arange(1.0, 4.2, 0.05):
+        aisle.look(float(s_m))
+    assert aisle.corners.nearest(4.2 + FRONT_M) is not None
+    aisle.look(5.2)
+    assert aisle.corners.nearest(5.2 + FRONT_M) is None
+
+
+def test_a_rack_further_away_leaves_time_enough() -> None:
+    aisle = Aisle(5.0, 1.2, 1)
+    aisle.look(1.0, times=5)
+    assert aisle.corners.nearest(1.51) is None
+
+
+def test_a_crate_is_no_corner() -> None:
+    aisle = Aisle(4.4, 0.3, 1, start_m=3.8)
+    aisle.look(1.0, times=5)
+    assert aisle.corners.nearest(1.51) is None
+
+
+@pytest.mark.parametrize(("gap_m", "corner"), [(0.3, False), (0.7, False), (1.5, True)])
+def test_what_is_between_two_goods_in_a_rack_is_no_passage(gap_m: float, corner: bool) -> None:
+    aisle = Aisle(5.0, 0.4, 1, gap_m=gap_m)
+    for s_m in np.arange(0.5, 2.5, 0.05):
+        aisle.look(float(s_m))
+    assert (aisle.corners.nearest(2.5 + FRONT_M) is not None) == corner
+
+
+def test_people_one_behind_the_other_are_no_face() -> None:
+    aisle = Aisle(5.0, 0.6, 1)
+    aisle.look(1.0, times=5, stands=False)
+    assert aisle.corners.nearest(1.51) is None
+
+
+def test_what_was_noise_is_forgotten() -> None:
+    aisle = Aisle(5.5, 0.6, 1)
+    aisle.look(0.5, times=4)
+    assert aisle.corners.nearest(1.01) is not None
+    aisle.end_m = 0.0
+    aisle.look(0.5, times=9)
+    assert aisle.corners.nearest(1.01) is None

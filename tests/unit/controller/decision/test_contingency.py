@@ -1,0 +1,143 @@
+"""What a moving body could block in the worst case, and whether the robot stands by then."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from config.robot import Body
+from controller.decision.bodies import Bodies
+from controller.decision.contingency import Reach, gets_through, reach, room, stands_in_time, stops
+from controller.decision.corridor import Corridor, place
+from controller.profile import SpeedRamps
+from hal.types import FloatArray
+from tests.support.bodies import box, line_path
+
+TIMES = np.arange(0.0, 4.01, 0.1)
+CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
+
+
+def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, since_s: float = 0.0) -> Reach:
+    placed = place(body, CORRIDOR, TIMES + since_s, 0.0, 12.0)
+    speed = np.linalg.norm(body.velocity_mps, axis=1)
+    return reach(
+        placed,
+        TIMES,
+        np.full(len(body), since_s),
+        (np.full(len(body), sigma_mps), np.full(len(body), sigma_mps)),
+        speed,
+        (np.full(len(body), manoeuvre_mps2), np.full(len(body), manoeuvre_mps2)),
+        most_mps=1.5,
+        margin_m=0.2,
+    )
+
+
+def stop_from(v_mps: float, latency_s: float = 0.0) -> SpeedRamps:
+    return SpeedRamps(
+        np.array([v_mps]),
+        0.0,
+        np.zeros(1),
+        accel_mps2=0.3,
+        decel_mps2=0.7,
+        jerk_mps3=2.0,
+        latency_s=latency_s,
+    )
+
+
+def room_for(v_mps: float, body: Reach, latency_s: float = 0.0) -> float:
+    return float(room(stops(stop_from(v_mps, latency_s), TIMES), 0.0, body)[0])
+
+
+def test_a_crosser_may_stop_dead_in_the_way() -> None:
+    """Nominally it is inside from 1.35 s to 2.65 s; from then on it may still be there."""
+    worst = reached(box(5.0, 2.0, 0.0, -1.0))
+    assert not worst.inside[0, 13]
+    assert worst.inside[0, 14:].all()
+    assert worst.lo_m[0, -1] == pytest.approx(5.0 - 0.2 - 0.5 - 0.2)
+
+
+def test_it_may_manoeuvre_into_the_way() -> None:
+    """1 m beside the corridor: half of 0.5 m/s2 reaches it after 2 s."""
+    worst = reached(box(5.0, 0.65 + 1.0, 0.01, 0.0), manoeuvre_mps2=0.5)
+    assert not worst.inside[0, 19]
+    assert worst.inside[0, 21]
+    # It may also have come nearer by as much.
+    assert worst.lo_m[0, 21] == pytest.approx(4.1 - 0.25 * 2.1**2 + 0.01 * 2.1, abs=0.01)
+
+
+def test_it_does_not_become_faster_than_obstacles_are() -> None:
+    slow = reached(box(5.0, 3.0, 0.0, 0.01), manoeuvre_mps2=5.0)
+    # 1.51 m/s at the most: 2.35 m take it 1.56 s; without the bound they would take 0.97 s.
+    assert not slow.inside[0, 15]
+    assert slow.inside[0, 16]
+
+
+def test_how_well_its_place_was_known_counts_from_the_first_moment() -> None:
+    body = box(5.0, 1.65, 0.01, 0.0)
+    placed, none = place(body, CORRIDOR, TIMES, 0.0, 12.0), np.zeros(1)
+
+    def unsure(along_m: float, across_m: float) -> Reach:
+        at = (np.array([along_m]), np.array([across_m]))
+        return reach(placed, TIMES, none, (none, none), none, (none, none), 1.5, 0.2, unsure_m=at)
+
+    assert not unsure(0.0, 0.9).inside.any()
+    assert unsure(0.0, 1.1).inside.all()
+    assert unsure(0.5, 1.1).lo_m[0, 0] == pytest.approx(unsure(0.0, 1.1).lo_m[0, 0] - 0.5)
+    assert unsure(0.5, 1.1).hi_m[0, -1] == pytest.approx(unsure(0.0, 1.1).hi_m[0, -1] + 0.5)
+
+
+def test_the_age_of_the_scene_counts() -> None:
+    fresh = reached(box(5.0, 1.65, 0.01, 0.0), sigma_mps=0.5)
+    old = reached(box(5.0, 1.65, 0.01, 0.0), sigma_mps=0.5, since_s=1.0)
+    assert int(fresh.inside[0].argmax()) - int(old.inside[0].argmax()) == 10
+
+
+def test_room_is_what_the_stop_leaves() -> None:
+    """An emergency stop from 1 m/s takes 1 / 1.4 + 0.175 m; the way is blocked at 4.1 m."""
+    standing = reached(box(5.0, 0.0))
+    assert room_for(1.0, standing) == pytest.approx(4.1 - (1 / 1.4 + 0.175), abs=0.01)
+    assert room_for(1.0, standing, latency_s=0.5) == pytest.approx(4.1 - (1 / 1.4 + 0.675), abs=0.01)
+
+
+def test_an_oncoming_one_takes_room_while_the_robot_brakes_only() -> None:
+    """Once the robot stands, being reached is all that can be promised."""
+    oncoming = reached(box(5.0, 0.0, -1.0, 0.0))
+    assert room_for(1.0, oncoming) > 0.0
+    assert room_for(1.5, oncoming) < room_for(1.0, oncoming)
+    assert room_for(0.0, oncoming) == np.inf
+    near = reached(box(2.5, 0.0, -1.0, 0.0))
+    assert room_for(1.0, near) < 0.0
+
+
+def test_what_is_never_in_the_way_takes_no_room() -> None:
+    assert room_for(1.5, reached(box(5.0, 2.0, -1.0, 0.0))) == np.inf
+
+
+def go(v_mps: float, target_mps: float) -> SpeedRamps:
+    return SpeedRamps(v_mps, 0.0, np.array([target_mps]), accel_mps2=0.3, decel_mps2=0.3, jerk_mps3=0.6)
+
+
+def test_getting_through_before_it_comes() -> None:
+    crosser = reached(box(2.0, 4.0, 0.0, -1.0))
+    assert gets_through(go(1.5, 1.5), 0.0, TIMES, crosser)
+    assert not gets_through(go(0.5, 0.5), 0.0, TIMES, crosser)
+
+
+def test_what_may_happen_along_and_across_is_told_apart() -> None:
+    """0.5 m/s more along the path brings nobody into it, 0.5 m/s across it does."""
+    body = box(5.0, 0.65 + 0.9, 0.01, 0.0)
+    placed = place(body, CORRIDOR, TIMES, 0.0, 12.0)
+    none, half = np.zeros(1), np.full(1, 0.5)
+
+    def worst(spread: tuple[FloatArray, FloatArray]) -> Reach:
+        return reach(placed, TIMES, none, spread, none, (none, none), most_mps=1.5, margin_m=0.2)
+
+    assert not worst((half, none)).inside.any()
+    assert worst((none, half)).inside.any()
+
+
+def test_a_stop_that_is_over_in_time_needs_no_room() -> None:
+    """It could be in the way after 2 s at the earliest, right before the robot's nose."""
+    near = reached(box(0.9, 0.65 + 1.0, 0.01, 0.0), manoeuvre_mps2=0.5)
+    assert stands_in_time(stops(stop_from(1.0), TIMES), near)[0]
+    assert not stands_in_time(stops(stop_from(1.5), TIMES), near)[0]

@@ -1,0 +1,75 @@
+"""What the decision knows of the way ahead: who is a newcomer, and who only has a new number."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from config.app import ReplayConfig
+from config.decision import DecisionConfig
+from config.perception import DepthNoise, PerceptionConfig
+from config.robot import Robot
+from controller.build import build_replay_decision
+from controller.decision.knowledge import Knowledge
+from controller.path.path import OnPath
+from hal.types import PlanarPose
+from tests.support.deciding import MOUNT, PATH, Bench, obstacle
+from vision.scene import Obstacle
+
+START = OnPath(0.0, 0.0, 0.0)
+
+
+def after(*frames: tuple[Obstacle, ...]) -> Knowledge:
+    """What is known after these were seen, one after the other, by a robot that drives."""
+    bench = Bench()
+    known = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    for shown in frames:
+        bench.now_ns += 33_000_000
+        known.update(bench.scene(*shown), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
+    return known
+
+
+CRATE = [(obstacle(4.0, 0.0),)] * 10
+
+
+def age_s(y_m: float, seen_s: float) -> float:
+    """For how long something was seen, by what is known, that shows where there was a crate before."""
+    bodies = after(*CRATE, (obstacle(4.0, y_m, age_s=seen_s, number=6),)).bodies
+    assert bodies.tracked_s.item() == pytest.approx(seen_s)
+    return float(bodies.age_s.item())
+
+
+def test_what_stands_where_something_stood_is_no_newcomer() -> None:
+    assert age_s(0.1, 0.03) == 0.5
+    assert age_s(1.0, 0.03) == pytest.approx(0.03)
+    assert age_s(0.1, 2.0) == 2.0
+
+
+def test_a_strip_is_no_body_unless_it_moves() -> None:
+    """2 cm of a rack, or of somebody's leg: where it stands is what depth sees of it."""
+    strip = obstacle(4.0, 0.1, age_s=0.6, number=6, size_m=(0.02, 0.3))
+    known = after(*[(strip,)] * 3)
+    assert not len(known.bodies)
+    assert known.unboxed.ids.tolist() == [6]
+    assert after((replace(strip, moving=True),)).bodies.ids.tolist() == [6]
+    assert after((obstacle(4.0, 0.1, number=6, size_m=(0.04, 0.3)),)).bodies.ids.tolist() == [6]
+
+
+def test_of_what_leaves_the_view_the_last_strip_is_not_all_that_is_remembered() -> None:
+    """A crate at the edge of the view, of which less and less is in it."""
+    crate = obstacle(2.0, 0.9)
+    known = after((crate,), (replace(crate, extent_m=np.array([0.02, 1.7, 0.2])),))
+    assert known.bodies.ids.tolist() == [5]
+    assert known.remembered.tolist() == [True]
+    assert known.bodies.half_across_m.tolist() == [0.25]
+
+
+def test_depth_is_as_noisy_as_the_configuration_says() -> None:
+    noise = DepthNoise(quadratic_per_m=0.002)
+    config = ReplayConfig(perception=PerceptionConfig(depth_noise=noise))
+    known = build_replay_decision(config, MOUNT).knowledge(PATH, 0.0)
+    bench = Bench()
+    known.update(bench.scene(), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
+    assert known.surfaces.noise == noise

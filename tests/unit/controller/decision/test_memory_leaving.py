@@ -1,0 +1,271 @@
+"""Who leaves the view without a verdict, and who comes into it where somebody else was expected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from config.decision import DecisionConfig
+from config.robot import Limits, Robot
+from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.knowledge import Knowledge
+from controller.decision.memory import OutOfView
+from controller.path.path import OnPath
+from hal.types import CameraMount, PlanarPose
+from tests.support.bodies import box
+from tests.support.deciding import MOUNT, PATH, obstacle
+from tests.support.scenes import GOOD, STILL, free_space
+from vision.scene import FreeSpace, Scene
+
+NEAR_M, EDGE = 1.3, 0.5
+HERE = PlanarPose(0.0, 0.0, 0.0)
+FRAME_NS = 100_000_000
+NOTHING_SEEN = FreeSpace(np.zeros(1), EDGE, np.full(1, np.inf), np.zeros(1))
+# On the left edge of the view, 4 m ahead of the camera.
+AT_EDGE = box(4.4, 2.1, sigma_mps=0.1)
+
+
+def memory(max_obstacle_speed_mps: float = 1.5) -> OutOfView:
+    return OutOfView(CameraMount(0.4, 0.0, 0.60, 0.0), NEAR_M, max_obstacle_speed_mps)
+
+
+def measured(bodies: Bodies, left_mps: float, unseen_s: float = 0.0) -> Bodies:
+    """Standing by the verdict, whatever was measured."""
+    return replace(bodies, measured_mps=np.array([[0.05, left_mps]]), unseen_s=np.array([unseen_s]))
+
+
+def expected(bodies: Bodies, left_mps: float = 0.0) -> Bodies:
+    """No longer seen: what perception says of it now is no measurement."""
+    return measured(bodies, left_mps, unseen_s=0.1)
+
+
+def after(*scenes: Bodies) -> Bodies:
+    """The bodies of the last of some scenes."""
+    view = memory()
+    return [view.leaving(scene, HERE, EDGE) for scene in scenes][-1]
+
+
+def test_who_is_clearly_coming_when_it_leaves_the_view_moves() -> None:
+    """A verdict takes some frames, of which there are no more."""
+    found = after(measured(AT_EDGE, -0.4), expected(AT_EDGE), expected(AT_EDGE))
+    assert found.moving.tolist() == [True]
+    assert found.velocity_mps[0].tolist() == [0.05, -0.4]
+
+
+def test_on_the_right_as_on_the_left() -> None:
+    mirrored = replace(AT_EDGE, xy_m=AT_EDGE.xy_m * (1, -1))
+    assert after(measured(mirrored, 0.4), expected(mirrored)).moving.tolist() == [True]
+
+
+def narrow(bodies: Bodies) -> Bodies:
+    """What is still in view of somebody at its edge."""
+    return replace(bodies, half_across_m=np.array([0.03]))
+
+
+def test_nobody_was_never_wider_than_the_end_of_a_rack() -> None:
+    coming = measured(narrow(AT_EDGE), -0.4)
+    assert after(coming, expected(narrow(AT_EDGE))).moving.tolist() == [False]
+    assert after(AT_EDGE, coming, expected(narrow(AT_EDGE))).moving.tolist() == [True]
+
+
+AHEAD, YOUNG = box(4.4, 0.5), box(4.4, 2.1, sigma_mps=0.1, age_s=0.4)
+KNOWN = replace(AT_EDGE, tracked_s=np.array([0.4]))
+EXACT = replace(AT_EDGE, covariance=np.zeros((1, 2, 2)))
+
+
+@pytest.mark.parametrize(
+    "scenes",
+    [
+        pytest.param((measured(AT_EDGE, -0.32), expected(AT_EDGE)), id="noise may be as much"),
+        pytest.param((measured(EXACT, -0.19), expected(EXACT)), id="hardly moves"),
+        pytest.param((measured(AT_EDGE, 0.4), expected(AT_EDGE)), id="walks away"),
+        pytest.param((measured(AT_EDGE, -0.4),), id="is still seen"),
+        pytest.param((measured(AHEAD, -0.4), expected(AHEAD)), id="only missed in the middle of the view"),
+        pytest.param((measured(YOUNG, -0.4), expected(YOUNG)), id="was hardly seen"),
+        pytest.param((measured(KNOWN, -0.4), expected(KNOWN)), id="only its place was seen for long"),
+        pytest.param((measured(AT_EDGE, 0.0), expected(AT_EDGE, -0.4)), id="what is not seen proves nothing"),
+        pytest.param(
+            (measured(AT_EDGE, -0.4), measured(AT_EDGE, 0.0), expected(AT_EDGE)),
+            id="stood when it was seen last",
+        ),
+    ],
+)
+def test_all_others_stay_what_perception_says(scenes: tuple[Bodies, ...]) -> None:
+    found = after(*scenes)
+    assert found.moving.tolist() == [False]
+    assert found.velocity_mps[0].tolist() == [0.0, 0.0]
+
+
+def test_who_moves_keeps_its_averaged_velocity() -> None:
+    walker = replace(box(4.4, 2.1, 0.0, -0.5), measured_mps=np.array([[0.0, -0.9]]), unseen_s=np.array([0.1]))
+    second = replace(AT_EDGE, ids=np.array([2]))
+    found = after(walker.joined(measured(second, -0.4)), walker.joined(expected(second)))
+    assert found.velocity_mps.tolist() == [[0.0, -0.5], [0.05, -0.4]]
+
+
+def kept_beside(newcomer: Bodies, remembered: Bodies) -> list[int]:
+    """The ids of who is still reckoned with, after a newcomer came into view where it was expected."""
+    view = memory()
+    view.update(remembered, no_bodies(FRAME_NS), HERE, EDGE, True, NOTHING_SEEN)
+    newcomer = replace(newcomer, captured_ns=2 * FRAME_NS)
+    kept = view.update(no_bodies(FRAME_NS), newcomer, HERE, EDGE, True, NOTHING_SEEN)
+    return [int(one) for one in kept.ids]
+
+
+EXPECTED = box(2.5, 1.2, 0.0, -0.5, sigma_mps=0.1)
+
+
+def test_who_comes_into_view_as_expected_is_the_one_that_was_expected() -> None:
+    assert kept_beside(box(2.5, 1.1, 0.0, -0.7, number=2, age_s=0.6), EXPECTED) == []
+
+
+@pytest.mark.parametrize(
+    "newcomer",
+    [
+        pytest.param(box(2.5, 1.1, 0.0, -1.0, number=2, age_s=0.6), id="goes twice as fast"),
+        pytest.param(box(2.5, 1.1, 0.4, -0.5, number=2, age_s=0.6), id="goes elsewhere"),
+        pytest.param(box(2.5, 1.1, number=2), id="stands"),
+        pytest.param(box(2.5, 1.1, 0.0, -0.5, number=2, age_s=0.5), id="too young to tell"),
+        pytest.param(
+            replace(box(2.5, 1.1, 0.0, -0.5, number=2), tracked_s=np.array([0.4])),
+            id="only its place was seen for long",
+        ),
+    ],
+)
+def test_somebody_else_in_its_place_does_not_make_it_forgotten(newcomer: Bodies) -> None:
+    """Two walk one behind the other: when one of them is seen again, the other is still there."""
+    assert kept_beside(newcomer, EXPECTED) == [1]
+
+
+def test_what_stands_is_part_of_whatever_is_seen_in_its_place() -> None:
+    assert kept_beside(box(2.5, 1.1, 0.0, -1.0, number=2), box(2.5, 1.2)) == []
+
+
+@pytest.mark.parametrize(
+    ("left_mps", "age_s", "kept_s"), [(0.6, 0.9, 2.0), (0.4, 0.9, 60.0), (0.6, 1.1, 60.0)]
+)
+def test_who_was_certainly_going_is_not_thought_to_stand_where_it_is_not_seen(
+    left_mps: float, age_s: float, kept_s: float
+) -> None:
+    """Before the nose, below the view: what stands there is waited for. 6 sigmas of velocity are no noise, 4
+    may be; and after a second the verdict knows better."""
+    view, pallet = memory(), box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=age_s)
+    before, kept = measured(pallet, left_mps), []
+    for number in range(1, round(kept_s * 10) + 3):
+        seen = replace(no_bodies(0), captured_ns=number * FRAME_NS)
+        kept.append(len(view.update(before, seen, HERE, EDGE, number > 1, NOTHING_SEEN)))
+        before = seen
+    assert kept[: round(kept_s * 10) - 1] == [1] * (round(kept_s * 10) - 1)
+    assert kept[-1] == (0 if kept_s == 2.0 else 1)
+
+
+def out_of_view_after(seconds: float, left_mps: float, sigma_mps: float, fastest_mps: float = 1.5) -> Bodies:
+    """Of what was measured so below the view, standing by the verdict; fastest_mps: the greatest speed of any
+    obstacle."""
+    view, pallet = memory(fastest_mps), box(1.6, 0.1, top_m=0.1, sigma_mps=sigma_mps, age_s=0.9)
+    before = measured(pallet, left_mps)
+    for number in range(1, round(seconds * 10) + 1):
+        seen = replace(no_bodies(0), captured_ns=number * FRAME_NS)
+        found = view.update(before, seen, HERE, EDGE, number > 1, NOTHING_SEEN)
+        before = seen
+    return found
+
+
+def test_who_was_certainly_going_goes_on_as_it_was_measured() -> None:
+    found = out_of_view_after(0.5, left_mps=0.6, sigma_mps=0.1)
+    assert found.velocity_mps[0].tolist() == [0.05, 0.6]
+    assert found.xy_m[0].tolist() == pytest.approx([1.6 + 0.025, 0.1 + 0.3])
+
+
+@pytest.mark.parametrize(
+    ("left_mps", "age_s", "kept"), [(0.6, 0.6, True), (0.4, 0.6, False), (0.6, 0.4, False), (0.6, 1.1, False)]
+)
+def test_who_was_certainly_going_goes_on_though_the_robot_stands(
+    left_mps: float, age_s: float, kept: bool
+) -> None:
+    """What stands and vanishes then has gone by itself; who was going is somewhere."""
+    pallet = measured(box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=age_s), left_mps)
+    seen = replace(no_bodies(0), captured_ns=FRAME_NS)
+    found = memory().update(pallet, seen, HERE, EDGE, True, NOTHING_SEEN)
+    assert found.moving.tolist() == [True] * kept
+
+
+@pytest.mark.parametrize(("fastest_mps", "left_mps"), [(1.5, 2.4), (1.0, 1.6), (2.5, 4.0)])
+def test_however_certainly_nobody_goes_as_fast_as_a_mistake(fastest_mps: float, left_mps: float) -> None:
+    """Which is 1.6 times as fast as any obstacle."""
+    for measured_mps, goes in ((left_mps - 0.1, True), (left_mps + 0.1, False)):
+        found = out_of_view_after(0.5, measured_mps, sigma_mps=0.1, fastest_mps=fastest_mps)
+        assert found.moving.tolist() == [goes]
+
+
+@pytest.mark.parametrize(("fastest_mps", "goes"), [(1.5, True), (1.0, False)])
+def test_how_fast_any_obstacle_is_the_robots_limits_say(fastest_mps: float, goes: bool) -> None:
+    """Of a pallet that sinks below the view while it is measured at 2 m/s, standing by the verdict."""
+    robot = Robot(limits=Limits(max_obstacle_speed_mps=fastest_mps))
+    known = Knowledge(PATH, robot, MOUNT, DecisionConfig(), 0.0)
+    sinking = replace(
+        obstacle(1.6, 0.1, size_m=(0.5, 0.1), age_s=0.9), velocity_mps=np.array([-2.0, 0.0, 0.0])
+    )
+    for number, seen in enumerate([(sinking,), ()]):
+        scene = Scene(number * FRAME_NS, number, seen, free_space(), STILL, GOOD, HERE)
+        known.update(scene, HERE, OnPath(0.0, 0.0, 0.0), 1.0, number * FRAME_NS)
+    assert known.remembered.tolist() == [True]
+    assert known.bodies.moving.tolist() == [goes]
+
+
+def test_what_stood_where_something_stood_is_not_believed_before_it_was_measured_for_as_long() -> None:
+    pallet = measured(box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=0.6), 0.6)
+    renumbered = replace(pallet, tracked_s=np.array([0.4]))
+    for before, goes in ((pallet, True), (renumbered, False)):
+        seen = replace(no_bodies(0), captured_ns=FRAME_NS)
+        found = memory().update(before, seen, HERE, EDGE, False, NOTHING_SEEN)
+        assert found.moving.tolist() == [goes]
+
+
+def test_however_certainly_hardly_any_speed_is_no_going() -> None:
+    assert out_of_view_after(0.5, left_mps=0.18, sigma_mps=0.02).moving.tolist() == [False]
+    assert out_of_view_after(0.5, left_mps=0.22, sigma_mps=0.02).moving.tolist() == [True]
+
+
+WALKER = box(2.0, 1.5, 0.0, 1.0, sigma_mps=0.1)
+
+
+def strip(
+    y_m: float = 1.3,
+    vy_mps: float = 0.01,
+    half_across_m: float = 0.02,
+    sigma_mps: float = 1.5,
+    age_s: float = 0.07,
+) -> Bodies:
+    """Of which two frames told that it moves, though not where to."""
+    return box(2.0, y_m, 0.0, vy_mps, number=2, half_across_m=half_across_m, sigma_mps=sigma_mps, age_s=age_s)
+
+
+def left_behind(*bodies: Bodies) -> list[int]:
+    """The ids of who is reckoned with once all of them are out of view."""
+    view, before = memory(), bodies[0]
+    for one in bodies[1:]:
+        before = before.joined(one)
+    kept = view.update(before, no_bodies(FRAME_NS), HERE, EDGE, False, NOTHING_SEEN)
+    return [int(one) for one in kept.ids]
+
+
+def test_the_last_strip_of_a_walker_to_be_in_view_goes_with_him() -> None:
+    assert left_behind(WALKER, strip()) == [1]
+
+
+@pytest.mark.parametrize(
+    "bodies",
+    [
+        pytest.param((WALKER, strip(half_across_m=0.15)), id="as wide as somebody"),
+        pytest.param((WALKER, strip(age_s=0.6)), id="seen for long enough"),
+        pytest.param((WALKER, strip(vy_mps=-1.0, sigma_mps=0.2)), id="goes elsewhere"),
+        pytest.param((WALKER, strip(y_m=0.7)), id="not beside him"),
+        pytest.param((box(2.0, 1.5), strip()), id="beside what stands"),
+        pytest.param((box(2.0, 0.2, 0.0, 1.0), strip(y_m=0.8)), id="beside who is in view, and has gone"),
+    ],
+)
+def test_no_other_strip_does(bodies: tuple[Bodies, ...]) -> None:
+    assert 2 in left_behind(*bodies)

@@ -1,0 +1,172 @@
+"""Slower at once, faster later, with a fake clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from config.decision import Release
+from controller.decision.release import ReleaseGate
+
+STEP_NS = 20_000_000
+STEP_S = 0.02
+
+
+class Gate:
+    """Steps a gate with the speed following the target by 0.3 m/s2."""
+
+    def __init__(self, v: float = 1.0, config: Release | None = None) -> None:
+        self.gate = ReleaseGate(config or Release())
+        self.now_ns = 0
+        self.v = v
+        self.target = self.step(v) if v > 0.0 else 0.0
+
+    def step(self, raw: float) -> float:
+        self.target = self.gate.step(raw, self.v, self.v, self.now_ns)
+        self.now_ns += STEP_NS
+        self.v += min(max(self.target - self.v, -0.3 * STEP_S), 0.3 * STEP_S)
+        return self.target
+
+    def hold(self, raw: float, seconds: float) -> float:
+        for _ in range(round(seconds / STEP_S)):
+            self.step(raw)
+        return self.target
+
+
+def test_the_first_way_is_free_at_once() -> None:
+    assert Gate(v=0.0).step(1.5) == 1.5
+
+
+def test_a_falling_target_is_passed_on_at_once() -> None:
+    gate = Gate(1.0)
+    assert gate.step(0.4) == 0.4
+    assert gate.step(0.0) == 0.0
+
+
+def test_a_rising_target_waits_for_a_free_way() -> None:
+    """From standstill the decrease is long ago: only delay_s counts."""
+    gate = Gate(0.0)
+    gate.step(1.0)
+    gate.step(0.0)
+    gate.v = 0.0
+    assert gate.hold(0.0, 3.0) == 0.0
+    assert gate.hold(0.2, 0.28) == 0.0
+    assert gate.hold(0.2, 0.06) == 0.2
+
+
+def test_what_is_far_above_the_speed_is_waited_for_less_long() -> None:
+    gate = Gate(0.0)
+    gate.step(1.0)
+    gate.hold(0.0, 3.0)
+    gate.v = 0.0
+    assert gate.hold(0.6, 0.1) == 0.0
+    assert gate.hold(0.6, 0.06) == 0.6
+
+
+def test_far_above_the_speed_counts_the_least_of_that_time() -> None:
+    """A single frame that is not free: no more than it showed, until far_delay_s after it."""
+    gate = Gate(0.0)
+    gate.step(1.0)
+    gate.hold(0.0, 3.0)
+    gate.v = 0.0
+    gate.hold(1.5, 0.06)
+    gate.step(0.2)
+    assert gate.hold(1.5, 0.1) == 0.0
+    assert gate.hold(1.5, 0.06) == 1.5
+
+
+def test_a_break_in_the_free_way_starts_the_delay_anew() -> None:
+    gate = Gate(0.0)
+    gate.step(0.0)
+    gate.hold(1.0, 0.2)
+    gate.step(0.0)
+    assert gate.hold(1.0, 0.2) == 0.0
+
+
+def test_no_increase_sooner_than_hold_after_a_decrease_began() -> None:
+    gate = Gate(1.0)
+    gate.step(0.3)
+    began = gate.now_ns
+    while gate.step(1.5) <= gate.v + 1e-9:
+        assert gate.now_ns - began < 3e9
+    assert (gate.now_ns - began) / 1e9 == pytest.approx(2.0, abs=0.05)
+
+
+def test_while_it_waits_it_does_not_go_on_braking() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.3, 0.4)
+    slow = gate.v
+    gate.hold(1.5, 0.4)
+    assert gate.v >= slow - 0.3 * 0.35
+    gate.hold(1.5, 0.6)
+    assert gate.v >= slow - 0.3 * 0.35
+
+
+def test_noise_cannot_turn_it_round_three_times_in_two_seconds() -> None:
+    random = np.random.default_rng(3)
+    gate = Gate(1.0)
+    turns: list[float] = []
+    last = 0
+    for k in range(6000):
+        v = gate.v
+        target = gate.step(float(random.uniform(0.2, 1.5)))
+        sign = 1 if target > v + 0.03 else -1 if target < v - 0.03 else 0
+        if sign and last and sign != last:
+            turns.append(k * STEP_S)
+        last = sign or last
+    assert all(sum(t <= u < t + 2.0 for u in turns) < 3 for t in turns)
+
+
+def test_a_rising_target_is_followed_without_steps_once_released() -> None:
+    gate = Gate(0.0)
+    targets = [gate.step(0.2 + 0.004 * k) for k in range(100)]
+    assert targets == pytest.approx([0.2 + 0.004 * k for k in range(100)])
+
+
+def test_stepping_down_further_does_not_begin_the_hold_anew() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.8, 1.0)
+    gate.hold(0.5, 0.9)
+    began = gate.now_ns
+    while gate.step(1.5) <= gate.v + 1e-9:
+        assert gate.now_ns - began < 3e9
+    assert (gate.now_ns - began) / 1e9 < 0.5
+
+
+def test_it_rises_to_the_least_of_the_last_moments() -> None:
+    gate = Gate(0.0)
+    gate.step(1.0)
+    gate.hold(0.0, 3.0)
+    gate.v = 0.0
+    for k in range(40):
+        target = gate.step(1.4 if k % 2 else 0.7)
+    assert target == 0.7
+
+
+def test_a_hair_is_no_reason_to_go_faster() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.5, 4.0)
+    assert gate.hold(0.58, 1.0) <= 0.5 + 1e-9
+    assert gate.hold(0.65, 1.0) == 0.65
+
+
+def test_nor_where_the_path_hardly_allows_more() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.5, 4.0)
+    for _ in range(60):
+        target = gate.gate.step(1.5, 0.5, 0.5, gate.now_ns, most_mps=0.55)
+        gate.now_ns += STEP_NS
+    assert target == 0.5
+
+
+def test_a_stop_from_a_crawl_is_a_turn_too() -> None:
+    gate = Gate(1.0)
+    gate.hold(0.0, 4.0)
+    gate.hold(0.5, 0.4)
+    gate.v = 0.02
+    gate.step(0.0)
+    began = gate.now_ns
+    gate.v = 0.0
+    while gate.step(0.5) <= 0.0:
+        assert gate.now_ns - began < 3e9
+    assert (gate.now_ns - began) / 1e9 > 1.9

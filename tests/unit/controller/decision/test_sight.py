@@ -1,0 +1,249 @@
+"""Depth in the corridor: surfaces nobody tracks, floor that was seen free, and what sinks out of view."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from config.decision import DecisionConfig, SightConfig
+from config.robot import Body
+from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.corridor import Corridor
+from controller.decision.sight import Sight
+from controller.decision.surfaces import NO_SURFACES, surfaces_of
+from hal.types import CameraMount, FloatArray, PlanarPose
+from tests.support.bodies import arc_path, box, line_path
+from vision.scene import FreeSpace
+
+BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)
+MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
+FRAME_NS = 33_000_000
+BANDS = 61
+BEARING = np.linspace(-0.6, 0.6, BANDS)
+
+
+def free(nearest_m: FloatArray | float = math.inf, known_m: FloatArray | float = 10.0) -> FreeSpace:
+    return FreeSpace(
+        BEARING, 0.01, np.full(BANDS, nearest_m) * np.ones(BANDS), np.full(BANDS, known_m) * np.ones(BANDS)
+    )
+
+
+class Watch:
+    """A sight of a straight path of 20 m, looked at once a frame from wherever the robot is."""
+
+    def __init__(self, config: DecisionConfig | None = None) -> None:
+        self.sight = Sight(Corridor(line_path(), BODY), MOUNT, config or DecisionConfig(), 0.0)
+        self.frame = 0
+
+    def look(
+        self,
+        seen: FreeSpace,
+        s_m: float = 0.0,
+        times: int = 1,
+        explained: Bodies | None = None,
+        standing: bool = False,
+    ) -> Sight:
+        for _ in range(times):
+            self.frame += 1
+            pose = PlanarPose(s_m, 0.0, 0.0)
+            self.sight.look(
+                seen,
+                surfaces_of(seen, pose, MOUNT),
+                pose,
+                s_m,
+                self.frame * FRAME_NS,
+                explained or no_bodies(0),
+                standing,
+            )
+        return self.sight
+
+
+def test_a_plain_wall_stands_in_the_corridor() -> None:
+    """Seen 5 m ahead of a camera 0.4 m ahead of the turning centre."""
+    sight = Watch().look(free(nearest_m=5.0), times=5)
+    assert sight.surface_s_m == pytest.approx(5.4)
+
+
+def test_a_surface_beside_the_corridor_does_not_count() -> None:
+    """Corridor 0.4 m and margin 0.15 m to either side: at 3 m that is a bearing of 0.183."""
+    beside = np.where(np.abs(BEARING) > 0.21, 3.0, math.inf)
+    assert Watch().look(free(beside), times=5).surface_s_m == math.inf
+    inside = np.where(np.abs(BEARING) > 0.17, 3.0, math.inf)
+    assert Watch().look(free(inside), times=5).surface_s_m == pytest.approx(3.4)
+
+
+def test_one_frame_does_not_brake_and_three_do() -> None:
+    watch = Watch()
+    watch.look(free(), times=5)
+    assert watch.look(free(nearest_m=2.0)).surface_s_m == math.inf
+    assert watch.look(free(nearest_m=2.0)).surface_s_m == math.inf
+    assert watch.look(free(nearest_m=2.0)).surface_s_m == pytest.approx(2.4)
+
+
+def test_what_a_tracked_obstacle_explains_is_not_counted_twice() -> None:
+    person = np.where(np.abs(BEARING) < 0.1, 4.0, math.inf)
+    assert Watch().look(free(person), times=5, explained=box(4.6, 0.0)).surface_s_m == math.inf
+    assert Watch().look(free(person), times=5, explained=box(6.5, 0.0)).surface_s_m == pytest.approx(4.4)
+
+
+@pytest.mark.parametrize(("vx_mps", "corner"), [(0.0, True), (-1.0, False)])
+def test_only_what_stands_hides_whoever_steps_out_behind_it(vx_mps: float, corner: bool) -> None:
+    """A face from 1.8 to 3.8 m ahead, 0.4 m beside the swept width: a rack, or people in a row."""
+    with np.errstate(divide="ignore"):
+        at = -0.8 / BEARING
+    face = np.where((at > 1.4) & (at < 3.4), at, math.inf)
+    row = box(2.8, 0.9, vx_mps, half_view_m=1.0, half_across_m=0.2)
+    sight = Watch().look(free(nearest_m=face), times=5, explained=row)
+    assert (sight.corners.nearest(0.5) is not None) == corner
+
+
+def test_a_surface_that_sinks_below_the_view_while_driving_is_still_there() -> None:
+    watch = Watch()
+    watch.look(free(nearest_m=1.2), s_m=3.0, times=5)
+    assert watch.look(free(), s_m=3.2, times=5).surface_s_m == pytest.approx(4.6)
+    # It is forgotten once it has been passed.
+    assert watch.look(free(), s_m=4.7, times=5).surface_s_m == math.inf
+
+
+def test_a_surface_that_goes_while_the_robot_stands_has_gone() -> None:
+    watch = Watch()
+    watch.look(free(nearest_m=1.2), s_m=3.0, times=5, standing=True)
+    assert watch.look(free(), s_m=3.0, times=5, standing=True).surface_s_m == math.inf
+
+
+def test_floor_is_known_as_far_as_it_was_seen() -> None:
+    sight = Watch().look(free(known_m=6.0))
+    # 6.4 m ahead of the turning centre; cells of 0.2 m count when all of them was seen.
+    assert sight.known_s_m == pytest.approx(6.4, abs=0.21)
+    assert sight.known_s_m <= 6.4 + 1e-9
+
+
+def test_glass_ahead_leaves_only_what_the_robot_stands_before() -> None:
+    sight = Watch().look(free(known_m=0.0), times=5)
+    assert sight.known_s_m <= MOUNT.forward_m + 1.3 + 0.4
+
+
+def test_floor_stays_known_for_a_while_when_depth_drops_out() -> None:
+    watch = Watch()
+    watch.look(free(known_m=8.0))
+    assert watch.look(free(known_m=2.0), times=20).known_s_m > 8.0
+    assert watch.look(free(known_m=2.0), times=20).known_s_m < 2.5
+
+
+def test_memory_of_floor_can_be_switched_off() -> None:
+    watch = Watch(DecisionConfig(sight=SightConfig(memory_s=0.0)))
+    watch.look(free(known_m=8.0))
+    assert watch.look(free(known_m=4.0)).known_s_m <= 4.4
+
+
+def test_a_narrow_gap_in_depth_does_not_make_the_floor_unknown() -> None:
+    """A fifth of the width unseen is tolerated (known_share 0.6), half of it is not."""
+    thin = np.where(np.abs(BEARING) < 0.015, 0.0, 10.0)
+    assert Watch().look(free(known_m=thin)).known_s_m > 9.0
+    half = np.where(BEARING < 0.03, 0.0, 10.0)
+    assert Watch().look(free(known_m=half)).known_s_m < 3.0
+
+
+def test_behind_a_surface_in_the_corridor_the_surface_itself_is_the_limit() -> None:
+    leader = np.where(np.abs(BEARING) < 0.2, 4.0, math.inf)
+    known = np.where(np.abs(BEARING) < 0.2, 4.0, 10.0)
+    assert Watch().look(free(leader, known)).known_s_m > 9.0
+
+
+def test_behind_a_corner_beside_the_path_the_floor_is_unknown() -> None:
+    """A left turn of 8 m radius; 3 m ahead a shelf stands on its inner side, outside the corridor."""
+    path = arc_path(8.0, 70.0)
+    sight = Sight(Corridor(path, BODY), MOUNT, DecisionConfig(), 0.0)
+    shelf = np.where(BEARING < -0.5, 3.0, math.inf)
+    blocked = np.where(BEARING < -0.5, 3.0, 10.0)
+    seen = free(shelf, blocked)
+    sight.look(seen, surfaces_of(seen, path.start, MOUNT), path.start, 0.0, FRAME_NS, no_bodies(0), False)
+    hidden = sight.known_s_m
+    sight = Sight(Corridor(path, BODY), MOUNT, DecisionConfig(), 0.0)
+    sight.look(free(), NO_SURFACES, path.start, 0.0, FRAME_NS, no_bodies(0), False)
+    assert hidden < sight.known_s_m - 0.3
+
+
+def test_unknown_numbers_are_not_free() -> None:
+    sight = Watch().look(free(math.nan, math.nan), times=5)
+    assert sight.known_s_m < 2.2
+
+
+def test_no_bands_at_all_are_not_free() -> None:
+    empty = FreeSpace(np.zeros(0), 0.01, np.zeros(0), np.zeros(0))
+    assert Watch().look(empty, times=5).known_s_m < 2.2
+
+
+def test_floor_too_near_to_be_measured_was_not_seen_by_seeing_beyond_it() -> None:
+    """Nor does it become so once the robot stands before it: what was a hole from afar is not free now."""
+    beyond = replace(free(), blind_m=0.6)
+    assert Watch().look(beyond, s_m=8.0, times=5).known_s_m < 8.0 + 0.4 + 0.6
+    watch = Watch()
+    for s_m in np.arange(0.0, 8.0, 0.1):
+        watch.look(beyond, s_m=float(s_m))
+    # Seen from farther away, it stays known.
+    assert watch.look(beyond, s_m=8.0).known_s_m > 15.0
+
+
+def test_what_is_below_the_view_of_a_high_camera_is_free_by_consent_at_the_start_only() -> None:
+    """1.9 m ahead of it the floor comes into view, and not 1.3 m."""
+    high, blind = replace(free(), floor_from_m=1.9), replace(free(known_m=0.0), floor_from_m=1.9)
+    assert Watch().look(replace(blind, floor_from_m=1.0)).known_s_m == pytest.approx(0.4 + 1.3 + 0.2, abs=0.2)
+    watch = Watch()
+    assert watch.look(blind, times=5).known_s_m == pytest.approx(0.4 + 1.9 + 0.2, abs=0.2)
+    watch.look(high)
+    # Seen free once, it stays so while it is too near to be seen again; what never was does not.
+    assert watch.look(blind, s_m=1.0, times=60).known_s_m == pytest.approx(1.0 + 0.4 + 1.9 + 0.2, abs=0.2)
+    assert Watch().look(blind, s_m=3.0).known_s_m < 3.1
+
+
+def test_no_camera_is_so_high_that_much_of_the_way_is_free_unseen() -> None:
+    """Though the scan reaches far beyond what is below the view."""
+    assert Watch().look(replace(free(), floor_from_m=6.0)).known_s_m < 0.4 + 2.5 + 0.5
+    for near_m in (1.2, 1.4, 2.4):
+        assert Watch().look(replace(free(), floor_from_m=near_m)).known_s_m > 9.0
+    watch = Watch()
+    for s_m in np.arange(0.0, 8.0, 0.1):
+        watch.look(replace(free(), floor_from_m=2.7), s_m=float(s_m))
+    # What was seen from farther away a moment ago is known.
+    assert watch.look(replace(free(), floor_from_m=2.7), s_m=8.0).known_s_m > 15.0
+
+
+def test_a_surface_that_sinks_below_the_view_of_a_high_camera_is_still_there() -> None:
+    for floor_from_m, held in ((0.0, False), (1.9, True), (5.0, True)):
+        watch = Watch()
+        near = replace(free(1.6, 1.6), floor_from_m=floor_from_m)  # farther than 1.3 m
+        assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(3.0, abs=0.1)
+        after = watch.look(replace(free(), floor_from_m=floor_from_m), s_m=1.3, times=5)
+        assert (after.surface_s_m < 4.0) == held
+
+
+def test_a_surface_that_rises_above_the_view_of_a_low_camera_is_still_there() -> None:
+    """The robot is 2.2 m high, its camera 0.6 m: 4 m ahead the view ends at its height, and 3 m at most
+    where it does not rise at all."""
+    for up_tan, ahead_m, held in (
+        (math.inf, 1.6, False),
+        (0.4, 3.8, True),
+        (0.4, 4.3, False),
+        (0.0, 2.9, True),
+        (0.0, 3.3, False),
+    ):
+        tall = BODY.model_copy(update={"height_m": 2.2})
+        watch = Watch()
+        watch.sight = Sight(Corridor(line_path(), tall), MOUNT, DecisionConfig(), 0.0)
+        near = replace(free(ahead_m, ahead_m), up_tan=up_tan)
+        lost_s_m = 1.0 + 0.4 + ahead_m
+        assert watch.look(near, s_m=1.0, times=5).surface_s_m == pytest.approx(lost_s_m, abs=0.1)
+        after = watch.look(replace(free(), up_tan=up_tan), s_m=1.05, times=5)
+        assert (after.surface_s_m < 6.0) == held
+
+
+def test_what_flickers_far_away_is_not_held_for_the_sake_of_the_upper_edge() -> None:
+    watch = Watch()
+    assert watch.look(replace(free(5.0, 5.0), up_tan=-0.1), times=5).surface_s_m == pytest.approx(
+        5.4, abs=0.1
+    )
+    assert math.isinf(watch.look(replace(free(), up_tan=-0.1), times=5).surface_s_m)

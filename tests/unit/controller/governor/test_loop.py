@@ -1,0 +1,131 @@
+"""The governor's control loop with a fake clock and a base that obeys at once."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import pytest
+
+from config.decision import DecisionConfig
+from config.governor import GovernorConfig
+from config.robot import Robot
+from controller.control import ControlStep
+from controller.decision.decision import Decision
+from controller.ending import ARM_TIMEOUT_S, Outcome
+from controller.governor.governor import SpeedGovernor
+from controller.governor.inbox import Asked
+from controller.governor.loop import GovernorLoop
+from controller.governor.request import Twist
+from controller.localise import Localiser
+from hal.types import CameraMount, ChassisMode
+from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
+from tests.support.scenes import ORIGIN, free_space, scene
+
+PERIOD_NS = round(PERIOD_S * 1e9)
+ROBOT = Robot()
+MOUNT = CameraMount(0.45, 0.0, 0.6, 0.07)
+GO = Asked(Twist(0.6, 0.1))
+
+
+class Planner:
+    """controller.governor.loop.Commands: asks by the time, notes what it is told."""
+
+    def __init__(self, asks: Callable[[float], Asked]) -> None:
+        self._asks = asks
+        self.told: list[tuple[float, float, str, str]] = []
+
+    def poll(self, now_ns: int) -> Asked:
+        return self._asks(now_ns / 1e9)
+
+    def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None:
+        self.told.append((v_mps, w_radps, decision.reason.rule, chassis))
+
+
+class Rig:
+    def __init__(self, asks: Callable[[float], Asked] = lambda _: GO, arms_after: int = 3) -> None:
+        self.chassis, self.planner = ObedientChassis(arms_after), Planner(asks)
+        governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)
+        self.loop = GovernorLoop(governor, self.planner, Localiser(ORIGIN, MOUNT), self.chassis)
+        self.steps: list[ControlStep] = []
+
+    def run(self, seconds: float) -> list[ControlStep]:
+        """With a fresh scene of a free way at every step."""
+        for _ in range(round(50 * seconds)):
+            if self.loop.finished:
+                break
+            k = len(self.steps)
+            seen = scene(k * PERIOD_NS, k, space=free_space(), pose=self.loop.localiser.pose)
+            self.steps.append(self.loop.step(seen, k * PERIOD_NS))
+        return self.steps
+
+
+def test_nothing_moves_before_the_base_is_armed_and_then_it_does_as_asked() -> None:
+    rig = Rig(arms_after=40)
+    steps = rig.run(5.0)
+    assert rig.chassis.armed_at_ns == [0]
+    assert all(one.setpoint.v_mps == 0.0 for one in steps[:41])
+    assert "the chassis is not armed (arming)" in steps[20].decision.reason.sentence
+    assert steps[-1].setpoint.v_mps == pytest.approx(0.6)
+    assert steps[-1].setpoint.w_radps == pytest.approx(0.1)
+    assert steps[-1].progress_m == pytest.approx(
+        sum(0.02 * one.setpoint.v_mps for one in steps[:-1]), abs=0.02
+    )
+
+
+def test_the_planner_is_told_what_really_went_out() -> None:
+    rig = Rig()
+    steps = rig.run(3.0)
+    sent = [(one.setpoint.v_mps, one.setpoint.w_radps) for one in steps]
+    assert [(v, w) for v, w, _, _ in rig.planner.told] == sent
+    assert rig.planner.told[-1][2:] == ("requested", "armed")
+
+
+def test_silence_is_a_jerk_limited_stop_and_no_end() -> None:
+    rig = Rig(lambda t: Asked(None, "no command for 251 ms") if 3.0 <= t < 6.0 else GO)
+    steps = rig.run(9.0)
+    assert not rig.loop.finished
+    assert steps[150].decision.reason.sentence == "no command for 251 ms: stop"
+    assert steps[299].setpoint.v_mps == 0.0
+    assert steps[-1].setpoint.v_mps == pytest.approx(0.6)
+    assert rig.chassis.armed_at_ns == [0]
+    jerks = [abs(b.setpoint.a_mps2 - a.setpoint.a_mps2) / 0.02 for a, b in itertools.pairwise(steps)]
+    assert max(jerks) <= ROBOT.limits.max_jerk_mps3 + 1e-6
+
+
+def test_a_latched_base_ends_it_and_no_command_leads_out() -> None:
+    rig = Rig()
+    rig.run(3.0)
+    rig.chassis.fault = ChassisMode.ESTOP
+    rig.run(1.0)
+    assert (rig.loop.ending.outcome, rig.loop.ending.stop_reason) == (Outcome.CHASSIS_FAULT, "e-stop pressed")
+    assert (len(rig.chassis.stopped_at_ns), len(rig.chassis.armed_at_ns)) == (1, 1)
+
+
+def test_a_base_that_never_arms_is_given_up() -> None:
+    rig = Rig(arms_after=10**9)
+    steps = rig.run(ARM_TIMEOUT_S + 1.0)
+    assert rig.loop.ending.outcome is Outcome.NOT_ARMED
+    assert steps[-1].now_ns == pytest.approx((ARM_TIMEOUT_S + 0.02) * 1e9, abs=3e7)
+
+
+@pytest.mark.parametrize("asked", [GO, Asked(Twist(0.0, 0.5))])
+def test_a_requested_stop_comes_to_rest_whatever_is_asked_and_ends(asked: Asked) -> None:
+    rig = Rig(lambda _: asked)
+    rig.run(3.0)
+    rig.loop.request_stop("SIGTERM received")
+    rig.loop.request_stop("later", Outcome.BROKEN_OFF)
+    steps = rig.run(20.0)
+    assert (rig.loop.ending.outcome, rig.loop.ending.stop_reason) == (Outcome.STOPPED, "SIGTERM received")
+    last = steps[-1].setpoint
+    assert (last.v_mps, last.a_mps2, last.w_radps) == (0.0, 0.0, 0.0)
+    assert steps[-1].decision.reason.sentence == "SIGTERM received: stop"
+
+
+def test_the_way_ahead_is_the_arc_for_pictures() -> None:
+    steps = Rig().run(3.0)
+    ahead = steps[-1].ahead_m
+    assert ahead is not None
+    # Six metres round: curvature 1/6 to the left.
+    assert (ahead[:, 0] ** 2 + (ahead[:, 1] - 6.0) ** 2) ** 0.5 == pytest.approx(6.0, abs=1e-6)
+    assert ahead[0] == pytest.approx([0.0, 0.0], abs=1e-9)

@@ -1,0 +1,124 @@
+import dataclasses
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from config.app import load_app
+from config.loader import CONFIG_DIR
+from controller.realtime.channel import Channel, PeerGone, channel_sockets
+from controller.realtime.perception_process import RemoteBody, perceive_forever
+from controller.realtime.runner import Farewell, StepMessage
+from controller.record.recorder import RecordingOptions
+from hal.types import CameraMount, PlanarPose
+from tests.support.drives import control_step
+from tests.support.scenes import chassis_state
+
+MS = 1_000_000
+MOUNT = CameraMount(0.45, 0.0, 0.6, 0.0)
+START = PlanarPose(2.0, 3.0, math.pi / 2)
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[RemoteBody, Channel]]:
+    here, there = channel_sockets()
+    with here, there:
+        yield RemoteBody(Channel(here), MOUNT, START), Channel(there)
+
+
+def step_at(now_ms: int, x_m: float, v_mps: float, true_pose: PlanarPose | None = None) -> StepMessage:
+    """The robot at x_m on the path as it believes, 10 m further by its odometry."""
+    state = chassis_state(now_ms * MS, v_mps=v_mps, pose=PlanarPose(x_m + 10.0, 0.0, 0.0))
+    step = control_step(now_ms * MS, None)
+    return StepMessage(dataclasses.replace(step, pose=PlanarPose(x_m, 0.0, 0.0), chassis=state), true_pose)
+
+
+def test_before_the_first_step_nothing_is_known(ends: tuple[RemoteBody, Channel]) -> None:
+    body, _ = ends
+    assert body.body_pose(0) is None
+    assert body.camera_pose(0) is None
+
+
+def test_between_two_steps_the_pose_is_interpolated(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, 1.0))
+    control.send(step_at(20, 1.02, 1.0))
+    pose = body.body_pose(10 * MS)
+    assert pose is not None
+    assert pose.x_m == pytest.approx(1.01)
+
+
+def test_after_the_newest_step_it_is_carried_on_with_the_twist(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, 1.5))
+    pose = body.body_pose(100 * MS)
+    assert pose is not None
+    assert pose.x_m == pytest.approx(1.15)
+    camera = body.camera_pose(100 * MS)
+    assert camera is not None
+    assert camera.translation_m == pytest.approx([11.0 + 0.15 + 0.45, 0.0, 0.6])
+
+
+def test_a_simulated_camera_sees_from_where_the_world_has_the_robot(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    assert body.true_pose(0) is None
+    control.send(step_at(0, 1.0, 1.5, PlanarPose(7.0, 8.0, 0.0)))
+    control.send(step_at(20, 1.02, 1.5, PlanarPose(7.0, 8.2, 0.0)))
+    between, after = body.true_pose(10 * MS), body.true_pose(120 * MS)
+    assert between is not None
+    assert (between.x_m, between.y_m) == pytest.approx((7.0, 8.1))
+    assert after is not None
+    assert (after.x_m, after.y_m) == pytest.approx((7.15, 8.2))
+
+
+def test_or_from_where_a_base_outside_of_this_program_reports_to_be(
+    ends: tuple[RemoteBody, Channel],
+) -> None:
+    """By its odometry, which begins anywhere, from where the path begins; not from where it is believed."""
+    body, control = ends
+    control.send(step_at(0, math.nan, 1.0))
+    control.send(step_at(10, 1.0, 1.0))
+    control.send(step_at(20, 1.5, 1.0))
+    pose = body.true_pose(20 * MS)
+    assert pose is not None
+    assert (pose.x_m, pose.y_m, pose.heading_rad) == pytest.approx((2.0, 3.5, math.pi / 2))
+
+
+def test_but_not_for_ever(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, 1.5))
+    assert body.body_pose(251 * MS) is None
+    assert body.camera_pose(251 * MS) is None
+
+
+def test_a_twist_that_is_not_known_is_not_taken_as_standing(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, math.nan))
+    assert body.body_pose(10 * MS) is None
+
+
+def test_every_step_is_handed_on_once(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.send(step_at(0, 1.0, 1.0))
+    control.send(step_at(20, 1.0, 1.0))
+    assert [step.now_ns // MS for step in body.take_steps()] == [0, 20]
+    assert body.take_steps() == []
+
+
+def test_a_control_process_that_is_gone_is_noticed(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    control.close()
+    with pytest.raises(PeerGone):
+        body.listen()
+
+
+def test_a_recording_that_cannot_be_written_is_told_to_the_control_process(tmp_path: Path) -> None:
+    config_path = CONFIG_DIR / "sim-realtime.yaml"
+    here, there = channel_sockets()
+    with here, there:
+        recording = RecordingOptions(observations=tmp_path / "none" / "out.jsonl")
+        perceive_forever(load_app(config_path), config_path, there, 0, recording)
+        told = Channel(here).receive()
+    assert isinstance(told, Farewell)
+    assert "observations cannot be written there" in told.reason

@@ -1,0 +1,78 @@
+import json
+from pathlib import Path as FilePath
+
+import cv2
+import numpy as np
+import pytest
+
+from config.path import ArcSpec, LineSpec, PathSpec
+from config.robot import Body, Robot
+from controller.path.path import Path
+from controller.record.observations import ObservationFile
+from controller.record.recorder import (
+    Recorder,
+    RecordingOptions,
+    RunRecorder,
+    Surroundings,
+    open_recorder,
+    path_ahead,
+)
+from hal.types import CameraMount, PlanarPose
+from tests.support.drives import PlainEyes, TickingCamera, control_step
+
+AROUND = Surroundings(CameraMount(0.45, 0.0, 0.6, 0.07), Body(), 0.54, 30.0, 1.5, 10.0)
+STRAIGHT = Path(PathSpec(segments=(LineSpec(kind="line", length_m=20.0),)), Robot())
+
+
+def written(path: FilePath) -> list[dict[str, object]]:
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def test_a_frame_is_written_with_the_first_decision_that_knew_it(tmp_path: FilePath) -> None:
+    camera, eyes = TickingCamera(33_000_000), PlainEyes()
+    with ObservationFile(tmp_path / "o.jsonl") as observations:
+        recorder = RunRecorder(Recorder(observations, None, None, AROUND, timed=False), STRAIGHT)
+        recorder.saw(eyes.look(camera.read(0.0)))
+        recorder.decided(control_step(20_000_000, None))
+        recorder.saw(eyes.look(camera.read(0.0)))
+        recorder.decided(control_step(40_000_000, 0))
+        recorder.decided(control_step(60_000_000, 0))
+        recorder.saw(eyes.look(camera.read(0.0)))
+        recorder.finish()
+    lines = written(tmp_path / "o.jsonl")
+    assert [line["frame"] for line in lines] == [0, 1, 2]
+    assert [line["decision"] is not None for line in lines] == [True, False, False]
+
+
+def test_durations_are_written_only_where_time_is_real(tmp_path: FilePath) -> None:
+    for timed in (True, False):
+        options = RecordingOptions(tmp_path / f"{timed}.jsonl", timed=timed)
+        with open_recorder(options, AROUND) as recorder:
+            recorder.record(PlainEyes().look(TickingCamera(1).read(0.0)), None)
+    assert written(tmp_path / "True.jsonl")[0]["timing_ms"] == {"detect": 1.0, "track": 0.5}
+    assert written(tmp_path / "False.jsonl")[0]["timing_ms"] == {}
+
+
+def test_a_video_gets_one_picture_a_look(tmp_path: FilePath) -> None:
+    camera = TickingCamera(33_000_000)
+    with open_recorder(RecordingOptions(video=tmp_path / "v.mp4"), AROUND) as recorder:
+        for _ in range(3):
+            recorder.record(PlainEyes().look(camera.read(0.0)), None, 0.5, 0.5)
+    video = cv2.VideoCapture(str(tmp_path / "v.mp4"))
+    assert int(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 3
+    video.release()
+
+
+def test_the_path_ahead_is_told_in_the_body_frame() -> None:
+    points = path_ahead(STRAIGHT, 5.0, PlanarPose(5.0, 0.2, 0.0))
+    assert points[0] == pytest.approx([0.0, -0.2])
+    assert points[-1] == pytest.approx([12.0, -0.2])
+    near_end = path_ahead(STRAIGHT, 19.0, PlanarPose(19.0, 0.0, 0.0))
+    assert near_end[-1] == pytest.approx([1.0, 0.0])
+
+
+def test_a_bend_ahead_bends_to_its_side() -> None:
+    bend = Path(PathSpec(segments=(ArcSpec(kind="arc", radius_m=5.0, angle_deg=90.0),)), Robot())
+    points = path_ahead(bend, 0.0, PlanarPose(0.0, 0.0, 0.0))
+    assert points[-1] == pytest.approx([5.0, 5.0], abs=1e-6)
+    assert np.all(np.diff(points[:, 1]) >= 0.0)

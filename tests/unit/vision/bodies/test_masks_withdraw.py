@@ -1,0 +1,65 @@
+"""Movers that went behind what stands, at about its depth, keep none of its cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.support.grids import labelled
+from tests.unit.vision.bodies.test_masks import MOVES, PART, block, vote
+from vision.bodies import masks
+
+HALF = block((10, 30), (10, 30))  # of PART; the other half is a crate's, which stands
+OVERDUE = np.array([False, True])
+
+
+@pytest.mark.parametrize(("stayed_columns", "hidden"), [(14, True), (13, False)])
+def test_a_mover_that_must_have_gone_on_loses_what_was_there_before(
+    stayed_columns: int, hidden: bool
+) -> None:
+    """Seven tenths of what speaks for it."""
+    expected = (PART > 0) & ~HALF, HALF
+    before, stayed = vote(*expected, mover=(False, True)), block((10, 30), (10, 10 + stayed_columns))
+    left, lost = masks.withdraw(before, PART, labelled(*expected), stayed, OVERDUE, MOVES)
+    np.testing.assert_array_equal(left.present, [[True, not hidden]])
+    np.testing.assert_array_equal(lost, [False, hidden])
+    labels = masks.divide(PART, labelled(*expected), left, left.winner)
+    assert (labels[HALF] == (1 if hidden else 2)).all()
+
+
+@pytest.mark.parametrize(
+    ("mover", "overdue"), [((True, True), (False, True)), ((False, True), (False, False))]
+)
+def test_it_keeps_what_nothing_that_stands_claims_and_where_it_may_be_still(
+    mover: tuple[bool, bool], overdue: tuple[bool, bool]
+) -> None:
+    expected = (PART > 0) & ~HALF, HALF
+    before = vote(*expected, mover=mover)
+    left, lost = masks.withdraw(
+        before, PART, labelled(*expected), PART > 0, np.array(overdue), np.array(mover)
+    )
+    assert left is before
+    assert not lost.any()
+
+
+def test_who_is_in_sight_somewhere_else_is_not_hidden() -> None:
+    parts = labelled(block((10, 30), (10, 50)), block((35, 45), (10, 20)))
+    expected = (parts == 1) & ~HALF, HALF | (parts == 2)
+    before = vote(*expected, mover=(False, True), parts=parts)
+    left, lost = masks.withdraw(before, parts, labelled(*expected), parts > 0, OVERDUE, MOVES)
+    np.testing.assert_array_equal(left.present, [[True, False], [False, True]])
+    assert not lost.any()
+
+
+def test_a_mover_ends_where_a_guess_has_it_if_what_stands_claims_all_of_its_parts() -> None:
+    expected = (PART > 0) & ~HALF, HALF
+    both = vote(*expected, mover=(False, True))
+    np.testing.assert_array_equal(masks.guessed(both, MOVES), [False, True])
+    np.testing.assert_array_equal(masks.guessed(both, np.array([True, True])), [False, False])
+    # Some of it is seen by itself.
+    parts = labelled(block((10, 30), (10, 50)), block((35, 45), (10, 20)))
+    seen = vote((parts == 1) & ~HALF, HALF | (parts == 2), mover=(False, True), parts=parts)
+    np.testing.assert_array_equal(masks.guessed(seen, MOVES), [False, False])
+    # Who claims nothing ends nowhere.
+    alone = vote(PART > 0, np.zeros_like(HALF), mover=(False, True))
+    np.testing.assert_array_equal(masks.guessed(alone, MOVES), [False, False])

@@ -1,0 +1,80 @@
+"""Surfaces into the filters of their tracks: what is left to see of a mover, and where."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from config.perception import DepthNoise
+from tests.support.detections import detection
+from tests.support.grids import grid_of, labelled, nearest, plate
+from vision.bodies import sightings
+from vision.bodies.tracks import Tracks
+from vision.depth import regions
+
+
+def seen_of(left_m: float, right_m: float, moving: bool = True) -> Tracks:
+    """A body 0.6 m wide that was seen whole 3 m away; now only what is between left_m and right_m."""
+    tracks = Tracks()
+    tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 1.0, 0)
+    tracks.moving[:] = moving
+    for frame, (low, high) in enumerate(((-0.3, 0.3), (left_m, right_m))):
+        depth_m = plate(3.0, (low, high), (-0.6, 0.6))
+        grid, labels = grid_of(depth_m), labelled(depth_m > 0.0)
+        measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
+        sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
+    return tracks
+
+
+@pytest.mark.parametrize(("right_m", "sliver"), [(-0.2, True), (0.0, False)])
+def test_a_mover_of_which_less_than_two_fifths_are_left_to_see_is_a_sliver(
+    right_m: float, sliver: bool
+) -> None:
+    tracks = seen_of(-0.3, right_m)
+    assert tracks.sliver.tolist() == [sliver]
+    whole_m = tracks.box_m[0, 2] - tracks.box_m[0, 0]
+    assert (abs(whole_m - 0.6) < 0.1) == sliver  # a sliver says nothing of how wide its body is
+
+
+def test_what_stands_is_no_sliver() -> None:
+    assert not seen_of(-0.3, -0.2, moving=False).sliver.any()
+
+
+def test_who_leaves_the_image_is_no_sliver() -> None:
+    """Its rest is where it is seen to be, and the others are outside."""
+    assert not seen_of(-1.6, -1.5).sliver.any()
+
+
+def reaching_in(moving: bool) -> float:
+    """Velocity across, as filtered, of a body 3 m away whose right side comes into the view at 1.2 m/s."""
+    tracks = Tracks()
+    tracks.start(np.array([[-1.4, 0.0, 3.0]]), 0.2, 1.5, 1.0, 0)
+    tracks.moving[:] = moving
+    for frame in range(12):
+        tracks.predict(1.0 / 30.0, 0.12, None)
+        depth_m = plate(3.0, (-2.0, -1.2 + 0.04 * frame), (-0.6, 0.6))
+        grid, labels = grid_of(depth_m), labelled(depth_m > 0.0)
+        measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
+        sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
+    return float(tracks.state[0, 3])
+
+
+def test_a_surface_that_is_cut_tells_roughly_of_the_velocity_of_what_is_known_to_move() -> None:
+    assert 0.3 < reaching_in(moving=True) < 1.2  # its middle goes half as fast as its rim
+    assert reaching_in(moving=False) == 0.0  # of what stands a new rim is no motion
+
+
+@pytest.mark.parametrize(("board_m", "whole"), [(9.0, True), (1.5, False)])
+def test_a_surface_that_something_nearer_reaches_over_tells_nothing_of_its_motion_by_itself(
+    board_m: float, whole: bool
+) -> None:
+    """Somebody who passes before a crate hides more and more of it: its middle goes, but it stands."""
+    tracks = Tracks()
+    tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 0.0, 0)
+    for frame in range(6):
+        crate, board = plate(3.0, (-0.3, 0.3), (-0.3, 0.3)), plate(board_m, (0.12, 1.0), (-1.0, 1.0))
+        depth_m = nearest(crate, board)
+        grid, labels = grid_of(depth_m), labelled(depth_m == 3.0)
+        measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
+        sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
+    assert (tracks.clean_s[0] > 0.1) == whole

@@ -1,0 +1,73 @@
+"""Bands of the view in which nothing was measured: somebody right before the lens, and what is not that."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hal.types import CameraMount
+from tests.support.painted import VGA, floor, wall
+from tests.unit.vision.depth.test_depth_guard import CENTRE, frame_of, inside, outside, space_of, with_depth
+from vision.scene import FreeSpace
+
+DOWN = CameraMount(0.0, 0.0, 0.9, math.radians(25.0))
+HORIZON = round(VGA.cy)
+
+
+def seen_without(
+    columns: slice, rows: slice, share: float = 1.0, mount: CameraMount | None = None
+) -> tuple[FreeSpace, NDArray[np.bool_]]:
+    """The scan of a floor and a wall of which a share of some pixels has no depth; and its blank bands."""
+    frame = frame_of(floor() + wall()) if mount is None else frame_of(floor() + wall(), mount)
+    depth = frame.depth.copy()
+    lost = np.zeros(depth.shape, np.bool_)
+    lost[rows, columns] = np.random.default_rng(1).random(lost[rows, columns].shape) < share
+    depth[lost] = 0
+    frame = with_depth(frame, depth)
+    space = space_of(frame) if mount is None else space_of(frame, mount)
+    assert space.blank is not None
+    return space, space.blank
+
+
+def test_what_is_right_before_the_lens_leaves_its_bands_blank() -> None:
+    space, blank = seen_without(CENTRE, slice(None))
+    assert blank[inside(space)].all()
+    assert not blank[outside(space)].any()
+    assert seen_without(slice(None), slice(None))[1].all()
+    # Speckles on it are no data.
+    speckled, blank = seen_without(CENTRE, slice(None), share=0.999)
+    assert blank[inside(speckled)].all()
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        slice(0, 0),
+        slice(HORIZON, None),  # a mat or a puddle as far as the wall
+        slice(VGA.height - 80, None),
+        slice(0, VGA.height - 60),  # a glass front
+    ],
+)
+def test_a_hole_in_the_floor_or_behind_it_is_not_blank(rows: slice) -> None:
+    assert not seen_without(CENTRE, rows)[1].any()
+
+
+def test_a_camera_that_looks_down_tells_it_in_its_fanned_bands() -> None:
+    middle = slice(240, 400)
+    space, blank = seen_without(middle, slice(None), mount=DOWN)
+    assert blank[np.abs(space.bearing_tan) < 0.05].all()
+    assert not blank[np.abs(space.bearing_tan) > 0.3].any()
+    assert not seen_without(middle, slice(VGA.height - 80, None), mount=DOWN)[1].any()
+
+
+def test_what_is_measured_beyond_the_depth_mask_is_data() -> None:
+    frame = frame_of(floor())
+    depth = frame.depth.copy()
+    depth[:, CENTRE] = 30000
+    space = space_of(replace(frame, depth=depth))
+    assert space.blank is not None
+    assert not space.blank.any()

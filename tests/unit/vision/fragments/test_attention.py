@@ -1,0 +1,241 @@
+"""A closer look at bodies of which too few fragments tell: whose turn it is, and what counts as theirs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from config.perception import FragmentSettings, PerceptionConfig
+from hal.types import FloatArray, RgbdFrame
+from tests.support.detections import START_NS, detection
+from tests.support.grids import grid_of, no_depth
+from tests.support.painted import MOUNT, QVGA, Quad, box, drive, plain, record, vector
+from tests.support.painted_room import SMALL, room
+from vision import detector
+from vision.bodies.tracks import Tracks
+from vision.ego_motion.camera_motion import CameraEstimate, estimate
+from vision.ego_motion.reprojection import Anchors
+from vision.fragments.attention import Attention, Wanted, wanted
+from vision.fragments.candidates import NewFragments
+from vision.perception import Perception
+
+CONFIG = PerceptionConfig()
+NO_ENDS = np.empty((0, 2, 2), np.float32)
+BODY_M = vector(0.3, 0.5, 0.9)  # 76 px by 137 px at 4 m
+FRONT_M = 4.0
+FRAME_S = 1.0 / 30.0
+NOBODY = Wanted(np.empty(0, np.int64), np.empty((0, 4)), np.empty(0), np.empty(0), np.empty(0, np.bool_))
+
+
+def one_body(depth_m: float = FRONT_M, number: int = 7, urgent: bool = True) -> Wanted:
+    """A box in the image around what stands 4 m ahead on the floor."""
+    return Wanted(
+        np.array([number]),
+        np.array([[281.0, 178.0, 358.0, 316.0]]),
+        np.array([depth_m]),
+        np.array([0.5]),
+        np.array([urgent]),
+    )
+
+
+@pytest.fixture(scope="module")
+def frame() -> RgbdFrame:
+    return record(room() + box(vector(FRONT_M, 0.0, 0.0), BODY_M, 10), drive(), 1).frames[0]
+
+
+def grey_of(frame: RgbdFrame) -> NDArray[np.uint8]:
+    return np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), np.uint8)
+
+
+def look(frame: RgbdFrame, body: Wanted, attention: Attention | None = None, after_s: float = 0.0) -> int:
+    """How many fragments are found after_s later."""
+    later = replace(frame, captured_ns=frame.captured_ns + round(after_s * 1e9))
+    return len((attention or awake(frame)).find(later, grey_of(frame), NO_ENDS, body).ends_px)
+
+
+def awake(frame: RgbdFrame, config: PerceptionConfig = CONFIG) -> Attention:
+    """One that began a second before this frame, when there was nobody."""
+    attention, earlier = Attention(config), replace(frame, captured_ns=frame.captured_ns - 10**9)
+    attention.find(earlier, grey_of(frame), NO_ENDS, NOBODY)
+    return attention
+
+
+def find(frame: RgbdFrame) -> NewFragments:
+    return awake(frame).find(frame, grey_of(frame), NO_ENDS, one_body())
+
+
+def test_a_body_gets_fragments_of_its_own(frame: RgbdFrame) -> None:
+    found = find(frame)
+    assert 2 <= len(found.ends_px) <= 4
+    np.testing.assert_allclose(found.near_m, one_body().depth_m[0], atol=0.2)
+    lengths = np.linalg.norm(found.ends_px[:, 0] - found.ends_px[:, 1], axis=1)
+    assert (lengths >= 8.0).all()
+
+
+def test_what_is_at_another_depth_is_not_its_own(frame: RgbdFrame) -> None:
+    assert look(frame, one_body(depth_m=1.5)) == 0
+
+
+def test_where_there_is_a_fragment_already_there_is_no_second_one(frame: RgbdFrame) -> None:
+    present = find(frame).ends_px
+    assert len(present)
+    more = awake(frame).find(frame, grey_of(frame), present, one_body()).ends_px
+    gap = np.abs(more.reshape(-1, 1, 2) - present.reshape(1, -1, 2)).max(axis=2)
+    assert (gap > 0.0).all()
+
+
+def test_an_end_beside_what_has_no_depth_is_nobodys_witness(frame: RgbdFrame) -> None:
+    depth = frame.depth.copy()
+    depth[:, ::2] = 0  # three columns of five in every neighbourhood are left, at most
+    assert look(replace(frame, depth=depth), one_body()) == 0
+
+
+def test_an_end_between_two_surfaces_is_nobodys_witness(frame: RgbdFrame) -> None:
+    found = find(frame)
+    assert (found.far_m - found.near_m <= 0.25).all()
+    # All of it is an outline, as far as depth tells.
+    depth = frame.depth.copy()
+    depth[:, ::3] = 9000
+    assert look(replace(frame, depth=depth), one_body()) == 0
+
+
+def test_a_plain_body_without_edges_gets_none() -> None:
+    bare = [replace(one, texture=plain()) for one in room()]
+    assert look(record(bare, drive(), 1).frames[0], one_body()) == 0
+
+
+def test_where_edges_have_no_corners_nobody_is_a_witness() -> None:
+    """Along level stripes an end is held by noise alone; chequers in the same place are as good as any."""
+    row, column = np.indices((9, 5))
+    for bright, found in ((row % 2 == 0, False), ((row + column) % 2 == 0, True)):
+        seen = record([*room(), upright(bright)], drive(), 1).frames[0]
+        assert (look(seen, one_body()) > 0) == found
+
+
+def upright(bright: NDArray[np.bool_]) -> Quad:
+    """A plate of bright and dark cells of 10 cm where the body stands."""
+    texture = np.kron(np.where(bright, 180, 70), np.ones((32, 32))).astype(np.uint8)
+    return replace(box(vector(FRONT_M, 0.0, 0.0), BODY_M, 10)[0], texture=texture)
+
+
+def test_no_more_than_there_is_room_for(frame: RgbdFrame) -> None:
+    taken = np.zeros((20, 2, 2), np.float32)
+    for spare, most in ((0, 0), (1, 1), (9, 4)):
+        settings = FragmentSettings(max_fragments=20, closer_fragments=spare)
+        attention = awake(frame, PerceptionConfig(fragments=settings))
+        found = attention.find(frame, grey_of(frame), taken, one_body()).ends_px
+        assert len(found) <= most
+        assert (len(found) > 0) == (most > 0)
+
+
+@pytest.mark.parametrize(("urgent", "pause_s"), [(True, 0.1), (False, 0.5)])
+def test_everybody_is_looked_at_only_now_and_then(frame: RgbdFrame, urgent: bool, pause_s: float) -> None:
+    attention, body = awake(frame), one_body(urgent=urgent)
+    assert look(frame, body, attention) > 0
+    assert look(frame, body, attention, pause_s - FRAME_S) == 0
+    assert look(frame, body, attention, pause_s) > 0
+
+
+@pytest.mark.parametrize(("urgent", "pause_s"), [(True, 0.1), (False, 0.5)])
+def test_at_the_very_beginning_everybody_waits_as_long(
+    frame: RgbdFrame, urgent: bool, pause_s: float
+) -> None:
+    attention, body = Attention(CONFIG), one_body(urgent=urgent)
+    assert look(frame, body, attention) == 0
+    assert look(frame, body, attention, pause_s - FRAME_S) == 0
+    assert look(frame, body, attention, pause_s) > 0
+
+
+def test_the_urgent_one_comes_first_then_who_has_waited_for_longest(frame: RgbdFrame) -> None:
+    """Only one of them stands where something is to be found: it is seen when its turn comes."""
+    here, away = one_body(number=7), one_body(number=9, depth_m=1.5)
+
+    def both(first: Wanted, second: Wanted, urgent: tuple[bool, bool]) -> Wanted:
+        parts = zip(*((one.ids, one.box_px, one.depth_m, one.gate_m) for one in (first, second)), strict=True)
+        ids, box_px, depth_m, gate_m = (np.concatenate(part) for part in parts)
+        return Wanted(ids, box_px, depth_m, gate_m, np.array(urgent))
+
+    assert look(frame, both(away, here, (False, True))) > 0
+    assert look(frame, both(away, here, (True, False))) == 0
+    attention, equal = awake(frame), both(away, here, (True, True))
+    assert look(frame, equal, attention) == 0
+    assert look(frame, equal, attention, FRAME_S) > 0
+    assert look(frame, equal, attention, 2.0 * FRAME_S) == 0  # neither has waited for long
+
+
+def tracks(places: list[tuple[float, float, float]]) -> Tracks:
+    made = Tracks()
+    made.start(np.array(places), 0.2, 1.5, 0.0, START_NS)
+    made.seen_ns[:], made.cells[:], made.sightings[:] = START_NS, 99, 99
+    made.bbox_px[:] = np.arange(len(places))[:, None]
+    return made
+
+
+def asked_for(made: Tracks) -> Wanted:
+    return wanted(made, detection(grid_of(no_depth())), CONFIG)
+
+
+@pytest.mark.parametrize(
+    ("moving", "fragments", "more"),
+    [(False, 3, True), (False, 4, False), (True, 1, True), (True, 2, False)],
+)
+def test_more_is_wanted_of_whom_too_few_tell(moving: bool, fragments: int, more: bool) -> None:
+    made = tracks([(0.0, 0.0, 4.0)])
+    made.moving[0], made.fragments[0] = moving, fragments
+    assert len(asked_for(made).ids) == more
+
+
+def test_only_of_what_is_seen_large_enough_and_near() -> None:
+    made = tracks([(0.0, 0.0, 4.0), (0.0, 0.0, 4.0), (0.0, 0.0, 4.0), (5.0, 0.0, 8.0)])
+    made.seen_ns[1] -= 33_000_000
+    made.cells[2] = 11
+    assert asked_for(made).ids.tolist() == [1]
+
+
+def test_new_ones_and_suspects_are_urgent() -> None:
+    made = tracks([(0.0, 0.0, 4.0)] * 3)
+    made.sightings[1], made.evidence[2] = 5, 0.1
+    assert asked_for(made).urgent.tolist() == [False, True, True]
+
+
+def test_the_gate_grows_with_depth_and_with_the_bodys_own() -> None:
+    made = tracks([(0.0, 0.0, 2.0), (0.0, 0.0, 6.0), (0.0, 0.0, 2.0), (0.0, 0.0, 2.0)])
+    made.extent_m[2, 2], made.extent_m[3, 2] = 0.6, 5.0
+    gate_m: FloatArray = asked_for(made).gate_m
+    sigma_m = [0.005 + 0.0075 * depth * depth for depth in (2.0, 6.0)]
+    np.testing.assert_allclose(
+        gate_m, [0.3 + 2 * sigma_m[0], 0.3 + 2 * sigma_m[1], 0.6 + 2 * sigma_m[0], 0.8 + 2 * sigma_m[0]]
+    )
+
+
+def crowded_view() -> list[Quad]:
+    """So much texture that the fragments do not suffice for what is small."""
+    return room() + box(vector(3.5, 0.4, 0.0), vector(0.4, 0.7, 1.2), 10)
+
+
+def witnesses(config: PerceptionConfig, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
+    """For each frame: how many ends are witnesses of a body, and how many of these find the camera."""
+    eyes = Perception(config, MOUNT, body_height_m=0.8, clearance_m=0.05)
+    found: list[tuple[int, int]] = []
+
+    def noted(anchors: Anchors, *rest: Any) -> CameraEstimate:
+        witness = eyes._detector._store.witness.repeat(2)
+        found.append((int(witness.sum()), int((anchors.usable & witness).sum())))
+        return estimate(anchors, *rest)
+
+    monkeypatch.setattr(detector, "estimate", noted)
+    for frame in record(crowded_view(), drive(0.5), 16, QVGA).frames:
+        eyes.perceive(frame, None, None)
+    return found
+
+
+def test_the_cameras_motion_does_not_rest_on_witnesses(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = SMALL.fragments.model_copy(update={"max_fragments": 16})
+    found = witnesses(SMALL.model_copy(update={"fragments": few}), monkeypatch)
+    assert max(present for present, _ in found) >= 4
+    assert max(asked for _, asked in found) == 0

@@ -1,0 +1,110 @@
+"""Where fragments are looked for, and that in time it is everywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from config.perception import FragmentSettings, PerceptionConfig
+from hal.types import RgbdFrame
+from tests.support.painted import VGA
+from vision.fragments.renewal import PART_PX, Renewal
+
+
+def picture() -> tuple[RgbdFrame, NDArray[np.uint8]]:
+    """Black and white cells of 48 px, all 3 m away."""
+    cells = np.random.default_rng(5).integers(0, 2, (10, 14), np.uint8) * np.uint8(180) + np.uint8(30)
+    grey = np.repeat(np.repeat(cells, 48, axis=0), 48, axis=1)[:480, :640]
+    colour = np.repeat(grey[:, :, None], 3, axis=2)
+    depth = np.full(grey.shape, 3000, np.uint16)
+    return RgbdFrame(colour, depth, 0.001, 0, 0.0, 0, VGA), grey
+
+
+def present(count: int) -> NDArray[np.float32]:
+    """So many fragments in the upper left corner."""
+    ends = np.zeros((count, 2, 2), np.float32)
+    ends[:, :, 0] = np.arange(2 * count).reshape(count, 2) % 30
+    return ends
+
+
+def parts_of(ends_px: NDArray[np.float32]) -> set[tuple[int, int]]:
+    """Row and column of the parts that the middles of segments fall into."""
+    middle = ends_px.mean(axis=1)[:, ::-1] // np.array(PART_PX)
+    return {(int(row), int(column)) for row, column in middle.tolist()}
+
+
+def test_at_first_it_looks_everywhere() -> None:
+    frame, grey = picture()
+    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=400))
+    new = Renewal(config).find(frame, grey, present(0), 0)
+    assert parts_of(new.ends_px) == {(row, column) for row in range(2) for column in range(4)}
+
+
+@pytest.mark.parametrize(("missing", "parts"), [(15, 1), (40, 2)])
+def test_then_in_one_part_after_the_other_and_in_a_whole_band_where_many_are_missing(
+    missing: int, parts: int
+) -> None:
+    frame, grey = picture()
+    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=160))
+    renewal, seen = Renewal(config), set[tuple[int, int]]()
+    for visit in range(8 // parts):
+        new = renewal.find(frame, grey, present(160 - missing), 0)
+        assert len(new.ends_px) <= missing
+        there = {(row, column) for row, column in parts_of(new.ends_px) if (row, column) not in seen}
+        assert {column for _, column in there} <= {visit * parts // 2, visit * parts // 2 + 1}
+        assert len(there) >= parts
+        seen |= there
+    assert seen >= {(row, column) for row in range(2) for column in range(4)}
+
+
+def test_no_more_than_there_is_room_for() -> None:
+    frame, grey = picture()
+    config = PerceptionConfig(fragments=FragmentSettings(max_fragments=30))
+    assert len(Renewal(config).find(frame, grey, present(0), 0).ends_px) == 30
+    assert len(Renewal(config).find(frame, grey, present(30), 0).ends_px) == 0
+
+
+@pytest.mark.parametrize(("missing", "searched"), [(9, False), (10, True)])
+def test_while_few_are_missing_it_does_not_look(missing: int, searched: bool) -> None:
+    """One in sixteen of 160 is ten."""
+    frame, grey = picture()
+    renewal = Renewal(PerceptionConfig(fragments=FragmentSettings(max_fragments=160)))
+    new = renewal.find(frame, grey, present(160 - missing), 0)
+    assert (len(new.ends_px) > 0) == searched
+    assert new.near_m.shape == new.far_m.shape == (len(new.ends_px), 2)
+    assert new.pixel_cov.shape == (len(new.ends_px), 2, 3)
+    # A frame without a search is no visit: the next search begins at the first part.
+    first = Renewal(PerceptionConfig(fragments=FragmentSettings(max_fragments=160)))
+    if not searched:
+        after = renewal.find(frame, grey, present(140), 0)
+        np.testing.assert_array_equal(after.ends_px, first.find(frame, grey, present(140), 0).ends_px)
+
+
+def slope() -> tuple[RgbdFrame, NDArray[np.uint8]]:
+    """An edge that falls by one pixel in 48, a little smoothed: every twelve pixels a stair, a quarter as
+    high as the edge is strong."""
+    v, u = np.mgrid[0:480, 0:640]
+    below = np.clip(v - 240 - u / 48.0, -0.5, 0.5)
+    grey = (120 + 30 * np.rint(4.0 * below)).astype(np.uint8)
+    colour = np.repeat(grey[:, :, None], 3, axis=2)
+    return RgbdFrame(colour, np.full(grey.shape, 3000, np.uint16), 0.001, 0, 0.0, 0, VGA), grey
+
+
+def sigmas_px(frame: RgbdFrame, grey: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """(2N, 2) smaller and larger standard deviation of the new ends."""
+    xx, xy, yy = Renewal(PerceptionConfig()).find(frame, grey, present(0), 0).pixel_cov.reshape(-1, 3).T
+    matrices = np.array([[xx, xy], [xy, yy]], float).transpose(2, 0, 1)
+    assert len(matrices) >= 8
+    return np.sqrt(np.linalg.eigvalsh(matrices))
+
+
+def test_the_stairs_of_an_edge_hold_no_end_along_it() -> None:
+    across, along = sigmas_px(*slope()).T
+    assert across.max() < 0.2
+    assert np.median(along) > 1.0
+
+
+def test_a_corner_holds_its_end_both_ways() -> None:
+    _, wider = sigmas_px(*picture()).T
+    assert np.median(wider) < 0.2

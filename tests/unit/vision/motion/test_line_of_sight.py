@@ -1,0 +1,52 @@
+"""Velocities in sigmas, along the line of sight and across, against values computed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vision.motion.line_of_sight import split
+
+UP = np.array([0.0, -1.0, 0.0])
+
+
+def test_split_by_hand() -> None:
+    """Along x, y, z: 0.3, 0.4, 0.5 m/s with variances 0.0091, 0.0391, 0.2491 and 0.0009 added to each."""
+    velocity = np.array([[0.3, 0.4, 0.5]])
+    doubt = np.diag([0.0091, 0.0391, 0.2491])[None]
+    # 0.09 / 0.01 + 0.16 / 0.04 + 0.25 / 0.25
+    ahead = split(velocity, doubt, np.array([[0.0, 0.0, 1.0]]), None)
+    assert ahead.total[0] == pytest.approx(14.0)
+    assert ahead.along[0] == pytest.approx(1.0)
+    assert ahead.across[0] == pytest.approx(13.0)
+    aside = split(velocity, doubt, np.array([[1.0, 0.0, 0.0]]), None)
+    assert aside.along[0] == pytest.approx(9.0)
+    assert aside.across[0] == pytest.approx(5.0)
+
+
+def test_of_what_goes_across_the_level_part_by_hand() -> None:
+    """Along z, level or obliquely downwards, that is x. Straight down nothing is."""
+    velocity, doubt = np.array([[0.3, 0.4, 0.5]]), np.diag([0.0091, 0.0391, 0.2491])[None]
+    for sight in ([0.0, 0.0, 1.0], [0.0, 0.6, 0.8]):
+        assert split(velocity, doubt, np.array([sight]), UP).level[0] == pytest.approx(9.0)
+    assert split(velocity, doubt, np.array([[1.0, 0.0, 0.0]]), UP).level[0] == pytest.approx(1.0)
+    assert split(velocity, doubt, np.array([[0.0, 1.0, 0.0]]), UP).level[0] == 0.0
+    ahead = split(velocity, doubt, np.array([[0.0, 0.0, 1.0]]), None)
+    assert ahead.level[0] == ahead.across[0]  # without a floor nothing is level
+
+
+def test_many_velocities_are_split_at_once_as_one_by_one() -> None:
+    """Two of each of two tracks: the parts along their lines of sight, with variance, and what is left."""
+    velocity = np.array([[[0.3, 0.4, 0.5], [0.0, 0.0, 1.0]], [[-0.1, 0.2, 0.0], [1.0, 2.0, 2.0]]])
+    doubt = np.array([[0.04 * np.eye(3), 0.09 * np.eye(3)], [0.01 * np.eye(3), 0.25 * np.eye(3)]])
+    sight = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    together = split(velocity, doubt, sight, UP)
+    np.testing.assert_allclose(together.value, [[0.5, 0.0], [0.0, 1.0]])
+    np.testing.assert_allclose(together.variance, [[0.04, 0.09], [0.01, 0.25]])
+    np.testing.assert_allclose(together.rest[1], [[-0.1, 0.2, 0.0], [0.0, 2.0, 2.0]])
+    for k in range(2):
+        alone = split(velocity[k], doubt[k], sight, UP)
+        np.testing.assert_allclose(together[k].along, alone.along)
+        np.testing.assert_allclose(together[k].across, alone.across)
+        np.testing.assert_allclose(together[k].total, alone.total)
+        np.testing.assert_allclose(together[k].level, alone.level)

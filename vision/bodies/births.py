@@ -1,0 +1,62 @@
+"""New tracks, for parts of the view that no track claims. Terms: vision/__init__.py."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision.bodies.tracks import Tracks
+from vision.depth import regions
+from vision.depth.depth_grid import DepthGrid
+from vision.depth.regions import IntGrid, Regions
+from vision.detection import Detection
+
+_MIN_CELLS = 12
+_SIGMA_M = 0.2
+# Of what is above the robot, at the side of the image: so much has come, and it hangs no higher than people.
+_CAME_CELLS, _CAME_SHARE, _PERSON_M = 24, 0.5, 2.0
+
+
+def begin(
+    tracks: Tracks,
+    detection: Detection,
+    parts: IntGrid,
+    measured: Regions,
+    came: NDArray[np.intp],
+    winner: NDArray[np.int32],
+    body_height_m: float,
+    max_speed_mps: float,
+) -> NDArray[np.int32]:
+    """winner (P,), track index + 1 of each part or 0, with new tracks: large parts nobody claims, if they
+    reach down to the robot or may, or are an arm that swings into the view ahead of its body.
+
+    parts (h, w), measured, came (P,): of them, cells where free space was seen.
+    """
+    grid = detection.grid
+    large = (winner == 0) & (measured.cells >= _MIN_CELLS)
+    overhead = large.copy()
+    if large.any():
+        overhead &= ~reaching_down(grid, parts, len(winner), body_height_m)
+        swings_in = overhead & ~measured.wide & (came >= _CAME_CELLS) & (came >= _CAME_SHARE * measured.cells)
+        if swings_in.any():
+            swings_in &= reaching_down(grid, parts, len(winner), _PERSON_M)
+        large &= ~overhead | swings_in | regions.hidden_below(grid, parts, measured)
+    born = np.flatnonzero(large)
+    if len(born) == 0:
+        return winner
+    result = winner.copy()
+    result[born] = np.arange(1, len(born) + 1) + len(tracks)
+    position_m = detection.pose.apply(measured.position_m[born])
+    tracks.start(position_m, _SIGMA_M, max_speed_mps, 0.0, detection.captured_ns)
+    tracks.overhead[-len(born) :] = overhead[born]
+    return result
+
+
+def reaching_down(grid: DepthGrid, labels: IntGrid, count: int, body_height_m: float) -> NDArray[np.bool_]:
+    """(count,) parts 1..count of labels (h, w) seen below body_height_m; all where heights are not known."""
+    if grid.height_m is None:
+        return np.ones(count, np.bool_)
+    low = np.flatnonzero((labels > 0) & (grid.height_m < body_height_m))
+    cells = np.bincount(labels.ravel().take(low), minlength=count + 1)[1:]
+    result: NDArray[np.bool_] = cells >= _MIN_CELLS // 2
+    return result

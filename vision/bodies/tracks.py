@@ -1,0 +1,206 @@
+"""The obstacles that are followed: struct of arrays over T tracks, in the fixed frame of the detector."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray
+from vision.numerics import kalman
+
+_TRAIL_S = 0.3
+_GOING_SHARE = 0.4
+_UNPROVEN_S = 0.05
+_GONE_SHARE = 0.6  # of its width
+
+
+class Tracks:
+    """Parallel arrays, one entry for each of T tracks; what each of them means is said where it is made."""
+
+    def __init__(self) -> None:
+        self.ids = np.empty(0, np.int64)  # growing
+        # Position and velocity (T, 6); as a second opinion the same from the centres of the visible surface
+        # alone, without the fragments.
+        self.state = np.empty((0, 6))
+        self.covariance = np.empty((0, 6, 6))
+        self.surface_state = np.empty((0, 6))
+        self.surface_covariance = np.empty((0, 6, 6))
+        self.trailing_m = np.empty((0, 3))  # where the centre was of late, averaged
+        # When it was seen first and last, and in how many frames.
+        self.born_ns = np.empty(0, np.int64)
+        self.seen_ns = np.empty(0, np.int64)
+        self.sightings = np.empty(0, np.intp)
+        # What was seen of it last: its box in the image, its size in the camera's axes, cells of the grid (0:
+        # it went behind something since), fragments on it.
+        self.bbox_px = np.empty((0, 4))
+        self.extent_m = np.empty((0, 3))
+        self.cells = np.empty(0, np.intp)
+        self.fragments = np.empty(0, np.intp)
+        # Edges of the last box that showed all of it, at its depth, from its centre.
+        self.box_m = np.empty((0, 4))
+        self.area_m2 = np.empty(0)  # averaged, up to a common factor
+        self.growth_mps = np.empty(
+            0
+        )  # how fast its centre may wander because it shows more or less of itself
+        self.clean_s = np.empty(
+            0
+        )  # for how long its surface's centre has told of the velocity without a break
+        self.sliver = np.empty(0, np.bool_)  # a mover of which hardly anything was left to see
+        self.guessed = np.empty(
+            0, np.bool_
+        )  # a mover that ends in what stands around it where a guess has it
+        self.overhead = np.empty(
+            0, np.bool_
+        )  # seen only above the robot; the rest is hidden, or beside the view
+        # The verdict (vision/bodies/judgement.py): the score it rests on, now, ever, how surely (0..1), and
+        # whether its fragments are sure that it stands.
+        self.evidence = np.empty(0)
+        self.moving = np.empty(0, np.bool_)
+        self.has_moved = np.empty(0, np.bool_)
+        self.confidence = np.empty(0)
+        self.stands = np.empty(0, np.bool_)
+        self.calm_s = np.empty(0)  # since there was evidence; inf: there never was
+        self.moving_s = np.empty(0)  # for how long the verdict has been that it moves
+        self.unproven_s = np.empty(0)  # since a frame proved that it moves, or since its birth
+        # For how long nearly all ends denied that it stands, less how long they did not.
+        self.unrest_s = np.empty(0)
+        self._fields = tuple(vars(self))
+        self._next_id = 1
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def mover(self) -> NDArray[np.bool_]:
+        """(T,) who moves, or is suspected of it."""
+        return self.moving | (self.evidence > 0.0)
+
+    @property
+    def speed_mps(self) -> FloatArray:
+        """(T,) as filtered."""
+        result: FloatArray = np.sqrt(np.square(self.state[:, 3:]).sum(axis=1))
+        return result
+
+    @property
+    def velocity_sigma_mps(self) -> FloatArray:
+        """(T,) of the filtered velocities, over all directions."""
+        result: FloatArray = np.sqrt(self.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
+        return result
+
+    def clear(self) -> None:
+        """Forget all tracks; ids go on."""
+        self.keep(np.zeros(len(self), np.bool_))
+
+    def keep(self, chosen: NDArray[np.bool_]) -> None:
+        """Drop all but the chosen tracks."""
+        if chosen.all():
+            return
+        for name in self._fields:
+            setattr(self, name, getattr(self, name)[chosen])
+
+    def index_of(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
+        """(N,) index of each track id, -1 where there is none (any more)."""
+        if len(self) == 0:
+            return np.full(len(ids), -1, np.intp)
+        place = np.minimum(self.ids.searchsorted(ids), len(self) - 1)
+        return np.where(self.ids[place] == ids, place, -1)
+
+    def start(
+        self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
+    ) -> None:
+        """Begin tracks at positions (K, 3) with unknown velocity: bounded by max_speed_mps, not zero."""
+        count = len(position_m)
+        given: dict[str, object] = {
+            "ids": np.arange(self._next_id, self._next_id + count),
+            "born_ns": now_ns,
+            "seen_ns": now_ns,
+            "evidence": evidence,
+            "trailing_m": position_m,
+            "calm_s": np.inf,
+        }
+        given["state"] = given["surface_state"] = np.concatenate((position_m, np.zeros((count, 3))), axis=1)
+        spread = np.diag([sigma_m**2] * 3 + [max_speed_mps**2] * 3)
+        given["covariance"] = given["surface_covariance"] = spread
+        self._next_id += count
+        for name in self._fields:
+            old = getattr(self, name)
+            new = np.zeros((count, *old.shape[1:]), old.dtype)
+            if name in given:
+                new[...] = given[name]
+            setattr(self, name, np.concatenate((old, new)))
+
+    def twin(self, track: int, evidence: float, now_ns: int) -> None:
+        """Begin a track with the velocity of another one that it was taken for a part of. It has to prove
+        its motion itself: it may be what the mover passes by."""
+        self.start(self.state[track : track + 1, :3], 0.3, 1.0, evidence, now_ns)
+        self.state[-1, 3:] = self.state[track, 3:]
+
+    def predict(self, dt_s: float, accel_density: float, up: FloatArray | None) -> None:
+        """Move every track on. up (3,): along the floor's normal nothing keeps going; None: not known."""
+        if len(self) and dt_s > 0:
+            # Both filters at once: the calls cost more than what they compute.
+            states = np.concatenate((self.state, self.surface_state))
+            covariances = np.concatenate((self.covariance, self.surface_covariance))
+            states, covariances = kalman.predict(states, covariances, dt_s, accel_density, up)
+            count = len(self)
+            self.state, self.surface_state = states[:count], states[count:]
+            self.covariance, self.surface_covariance = covariances[:count], covariances[count:]
+
+    def follow_trails(self, dt_s: float) -> NDArray[np.bool_]:
+        """Take in where the centres are, dt_s on; (T,) whether they really go about as fast as the velocities
+        say. Once a frame."""
+        self.trailing_m += -math.expm1(-dt_s / _TRAIL_S) * (self.state[:, :3] - self.trailing_m)
+        velocity, behind_s = self.state[:, 3:], dt_s / math.expm1(dt_s / _TRAIL_S)
+        way = ((self.state[:, :3] - self.trailing_m) * velocity).sum(axis=1) / behind_s
+        result: NDArray[np.bool_] = way > _GOING_SHARE * np.square(velocity).sum(axis=1)
+        return result
+
+    def sight(self, camera_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(T, 3) unit vectors from a camera at camera_m (3,) to the centres, and (T,) their distances."""
+        away_m = self.state[:, :3] - camera_m
+        distance_m = np.sqrt(np.square(away_m).sum(axis=1))
+        return away_m / np.maximum(distance_m, 0.1)[:, None], distance_m
+
+    def overdue(self, elapsed_s: float, sight: FloatArray, resolves_m: FloatArray) -> NDArray[np.bool_]:
+        """(T,) movers of which nothing has proved just now that they go on, and which by their velocity are
+        clearly no longer where they were elapsed_s ago: across the line of sight by most of their width, or
+        along it by what depth can tell apart there, resolves_m (T,). sight (T, 3): unit vectors."""
+        if elapsed_s <= 0.0:
+            return np.zeros(len(self), np.bool_)
+        way_m = elapsed_s * self.state[:, 3:]
+        along_m = (way_m * sight).sum(axis=1)
+        across_m = np.sqrt(np.maximum(np.square(way_m).sum(axis=1) - np.square(along_m), 0.0))
+        gone = across_m >= _GONE_SHARE * self.extent_m[:, ::2].max(axis=1)
+        gone |= np.abs(along_m) >= np.maximum(resolves_m, _GONE_SHARE * self.extent_m[:, 2])
+        result: NDArray[np.bool_] = self.moving & (self.unproven_s >= _UNPROVEN_S) & gone
+        return result
+
+    def hide(self, chosen: NDArray[np.bool_]) -> None:
+        """Tracks of which nothing is to be seen any more, behind what stands there."""
+        self.sliver |= chosen
+        self.cells[chosen] = 0
+
+    def locate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
+        """The centres of tracks index (K,) were seen at position_m (K, 3) with covariance noise (K, 3, 3)."""
+        if len(index) == 0:
+            return
+        states = np.concatenate((self.state[index], self.surface_state[index]))
+        covariances = np.concatenate((self.covariance[index], self.surface_covariance[index]))
+        measured, doubt = np.concatenate((position_m, position_m)), np.concatenate((noise, noise))
+        states, covariances = kalman.update(states, covariances, measured, doubt, 0)
+        count = len(index)
+        self.state[index], self.surface_state[index] = states[:count], states[count:]
+        self.covariance[index], self.surface_covariance[index] = covariances[:count], covariances[count:]
+
+    def relocate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
+        """As locate, where the centre says nothing of the velocity."""
+        if len(index) == 0:
+            return
+        self.state[index], self.covariance[index] = kalman.place(
+            self.state[index], self.covariance[index], position_m, noise
+        )
+        self.surface_state[index], self.surface_covariance[index] = kalman.place(
+            self.surface_state[index], self.surface_covariance[index], position_m, noise
+        )

@@ -1,0 +1,145 @@
+"""How far a frame can be trusted: fail closed, with a plain sentence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from config.perception import PerceptionConfig
+from hal.types import RgbdFrame
+from vision.depth.depth_grid import DepthGrid
+from vision.fragments.edges import GreyImage
+from vision.scene import CameraCondition, CameraHealth
+
+_STEP = 16
+_BLACK_LEVEL = 12
+_WHITE_LEVEL = 243
+_BAD_SHARE = 0.9
+_MIN_DEPTH_SHARE = 0.02
+_POOR_DEPTH_SHARE = 0.25
+_FROZEN_FRAMES = 2
+_STEPPED_FRAMES = 3  # so many in a row from before, in order, and it is time itself that has gone back
+
+
+class Continuity(Enum):
+    """How a frame follows the one before."""
+
+    FIRST = "first"
+    NEXT = "next"
+    REPEATED = "repeated"
+    BACKWARD = "backward"
+    STEPPED = "stepped"
+    GAP = "gap"
+
+
+@dataclass(frozen=True, slots=True)
+class FrameCheck:
+    """usable_colour, usable_depth: whether the images say anything. health: what the scene reports."""
+
+    usable_colour: bool
+    usable_depth: bool
+    continuity: Continuity
+    health: CameraHealth
+
+
+class HealthMonitor:
+    """Looks at each frame once. Keeps the time and the image of the frame before."""
+
+    def __init__(self, config: PerceptionConfig) -> None:
+        self._config = config
+        self._last_ns: int | None = None
+        self._last_grey: GreyImage | None = None
+        self._same = 0
+        self._earlier_ns: int | None = None
+        self._earlier_frames = 0
+
+    def check(self, frame: RgbdFrame, grey: GreyImage, grid: DepthGrid) -> FrameCheck:
+        """The worst finding decides the condition; each finding has its sentence."""
+        sample = grey[_STEP // 2 :: _STEP, _STEP // 2 :: _STEP]
+        continuity, gap_s = self._continuity(frame)
+        problems: list[tuple[CameraCondition, str]] = []
+        bad, poor = CameraCondition.UNTRUSTWORTHY, CameraCondition.DEGRADED
+        if continuity is Continuity.BACKWARD:
+            problems.append((bad, f"frame is {-gap_s:.3f} s older than the one before"))
+        elif continuity is Continuity.STEPPED:
+            problems.append((bad, f"time has gone back by {-gap_s:.3f} s: everything begins anew"))
+        elif continuity is Continuity.REPEATED:
+            problems.append((bad, "frame has the time of the one before: it is a repetition"))
+        elif continuity is Continuity.GAP:
+            problems.append((poor, f"{gap_s:.2f} s without a frame: motion cannot be compared across it"))
+        # Colour alone: a sensor's noise never repeats, whatever depth does beside it.
+        repeated = self._repeats(grey, sample)
+        self._same = self._same + 1 if repeated else 0
+        if self._same >= _FROZEN_FRAMES:
+            problems.append((bad, f"image has not changed by a single grey level for {self._same} frames"))
+        dark = float(np.count_nonzero(sample <= _BLACK_LEVEL)) / sample.size
+        bright = float(np.count_nonzero(sample >= _WHITE_LEVEL)) / sample.size
+        usable_colour = max(dark, bright) < _BAD_SHARE
+        if dark >= _BAD_SHARE:
+            problems.append((bad, f"{dark:.0%} of the colour image is black: is the lens covered?"))
+        elif bright >= _BAD_SHARE:
+            problems.append((bad, f"{bright:.0%} of the colour image is saturated"))
+        # What is beyond the depth mask was measured, too, but tells of nothing that could be touched.
+        near_share = float(np.count_nonzero(grid.valid)) / grid.valid.size
+        share = near_share + float(np.count_nonzero(grid.beyond)) / grid.beyond.size
+        usable_depth = near_share >= _MIN_DEPTH_SHARE
+        if not usable_depth:
+            within = f"data nearer than {grid.range_m:.3g} m"
+            problems.append((bad, f"only {near_share:.1%} of the depth image holds {within}"))
+        elif share < _POOR_DEPTH_SHARE:
+            problems.append((poor, f"only {share:.0%} of the depth image holds data"))
+        if continuity is not Continuity.BACKWARD:
+            self._last_ns = frame.captured_ns
+            self._last_grey = grey
+        if repeated and continuity is Continuity.NEXT:
+            continuity = Continuity.REPEATED
+        return FrameCheck(usable_colour, usable_depth, continuity, _verdict(problems, share))
+
+    def _repeats(self, grey: GreyImage, sample: GreyImage) -> bool:
+        """Whether this is the image of the frame before. Hardly any gets past the first comparison."""
+        before = self._last_grey
+        if before is None or before.shape != grey.shape:
+            return False
+        if (before[_STEP // 2 :: _STEP, _STEP // 2 :: _STEP] != sample).any():
+            return False
+        return bool((before == grey).all())
+
+    def _continuity(self, frame: RgbdFrame) -> tuple[Continuity, float]:
+        if self._last_ns is None:
+            return Continuity.FIRST, 0.0
+        gap_s = (frame.captured_ns - self._last_ns) * 1e-9
+        if gap_s < 0:
+            return self._backward(frame.captured_ns), gap_s
+        self._earlier_ns = None
+        if gap_s == 0:
+            return Continuity.REPEATED, 0.0
+        return (Continuity.GAP if gap_s > self._config.max_gap_s else Continuity.NEXT), gap_s
+
+    def _backward(self, captured_ns: int) -> Continuity:
+        """A frame from before the last one: late, or one of several that follow each other from there on."""
+        earlier_ns, self._earlier_ns = self._earlier_ns, captured_ns
+        follows = earlier_ns is not None and 0 < captured_ns - earlier_ns <= self._config.max_gap_s * 1e9
+        self._earlier_frames = self._earlier_frames + 1 if follows else 1
+        if self._earlier_frames < _STEPPED_FRAMES:
+            return Continuity.BACKWARD
+        self._earlier_ns = None
+        return Continuity.STEPPED
+
+
+def worsened(health: CameraHealth, condition: CameraCondition, reason: str) -> CameraHealth:
+    """health with one more finding; the worse condition stands."""
+    present = [] if health.condition is CameraCondition.GOOD else [(health.condition, health.reason)]
+    return _verdict([*present, (condition, reason)], health.valid_depth_ratio)
+
+
+def _verdict(problems: list[tuple[CameraCondition, str]], share: float) -> CameraHealth:
+    conditions = [condition for condition, _ in problems]
+    if CameraCondition.UNTRUSTWORTHY in conditions:
+        condition = CameraCondition.UNTRUSTWORTHY
+    elif conditions:
+        condition = CameraCondition.DEGRADED
+    else:
+        condition = CameraCondition.GOOD
+    return CameraHealth(condition, "; ".join(reason for _, reason in problems), share)

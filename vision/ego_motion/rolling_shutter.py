@@ -1,0 +1,94 @@
+"""Rolling shutter: the rows of an image are read one after another, so a camera that shakes bends the image.
+
+The colour sensor of a D435i has a rolling shutter; such sensors take some 10 to 30 ms from their first row to
+their last. The robot's tracks shake the camera by a quarter of a radian per second and more. That stretches
+and shrinks the image by pixels, and the length ratio (vision/motion/velocities.py) would take this for speed.
+
+The sweep is how far the camera turned about x and y while one image was read.
+vision/ego_motion/camera_motion.py estimates it for each image, and straight_rays corrects pixels by it. How
+far the camera can have turned follows from the rate of turn and the read-out time of the image. No recording
+states the read-out time, so ReadOut learns it. For a global shutter ReadOut learns 0, and nothing is
+corrected.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hal.types import FloatArray, Intrinsics
+from vision.camera.lens import RealArray, rays, row_delays
+from vision.ego_motion.camera_motion import CameraEstimate
+from vision.ego_motion.motion_prior import SweepPrior
+
+_UNKNOWN_S = 0.015  # one sigma of the read-out before anything is seen
+_MOST_S = 0.035  # frames follow each other in that time
+_MEMORY = 0.98  # a frame: of what is known; what was learned from a bad start fades
+_OTHER_BENDS_RAD = 0.7e-3  # one sigma, by whatever else bends an image
+_LEAST_RAD = 1e-9  # nothing, but no division by zero
+_RATE_MEMORY = 0.9  # a frame: of the fastest turn, since vibration comes and goes between frames
+
+
+def straight_rays(pixels: RealArray, camera: Intrinsics, sweep_rad: FloatArray) -> FloatArray:
+    """(N, 3) points at z = 1 m behind pixels (N, 2), as if all rows had been read with the middle one.
+
+    sweep_rad (2,): how far the camera turned about x and y while the image was read.
+    """
+    result = rays(pixels, camera)
+    x, y = result[:, 0].copy(), result[:, 1].copy()
+    about_x, about_y = np.multiply.outer(sweep_rad, row_delays(pixels[:, 1], camera))
+    # The derivatives of a small rotation, as in vision/ego_motion/camera_motion.py.
+    result[:, 0] -= about_x * x * y - about_y * (1.0 + x * x)
+    result[:, 1] -= about_x * (1.0 + y * y) - about_y * x * y
+    return result
+
+
+class ReadOut:
+    """How long the rows of an image take, learned from how it bends while the camera pitches.
+
+    Least squares of the bend over the rate of turn at that image, from a prior of 0 +- 15 ms. Only pitch
+    teaches: vibration goes to and fro, while a steady turn bends all images alike, which nothing shows.
+    """
+
+    def __init__(self, vibration_radps: float) -> None:
+        """vibration_radps: as fast as the camera may turn before it has been seen to."""
+        self._rates_radps = np.full(2, vibration_radps)
+        self._information = 0.0
+        self._told = 0.0
+        self._bend: tuple[float, float, float, float] | None = None
+
+    @property
+    def seconds(self) -> float:
+        """From the first row to the last: what is certain to one sigma, 0 for a global shutter."""
+        information = self._information + 1.0 / _UNKNOWN_S**2
+        return min(max(self._told / information - 1.0 / math.sqrt(information), 0.0), _MOST_S)
+
+    def sweep(self) -> SweepPrior:
+        """How far the camera turns about x and y while the next image is read."""
+        information = self._information + 1.0 / _UNKNOWN_S**2
+        most_s = min(max(self._told / information, 0.0) + 1.0 / math.sqrt(information), _MOST_S)
+        return SweepPrior(
+            _LEAST_RAD + self.seconds * self._rates_radps, _LEAST_RAD + most_s * self._rates_radps
+        )
+
+    def learn(self, found: CameraEstimate, turn_rad: FloatArray, dt_s: float) -> None:
+        """After an image.
+
+        turn_rad (3,): the camera's turn since the frame before, dt_s ago. The rate at an image is known one
+        frame later, when its turns before and after it are.
+        """
+        if self._bend is not None:
+            bend_rad, variance, before_rad, before_s = self._bend
+            rate = (before_rad + float(turn_rad[0])) / (before_s + dt_s)
+            weight = 1.0 / (variance + _OTHER_BENDS_RAD**2)
+            self._told = _MEMORY * self._told + weight * bend_rad * rate
+            self._information = _MEMORY * self._information + weight * rate * rate
+        self._bend = None
+        if found.visual:
+            self._bend = float(found.bend_rad[0]), float(found.bend_variance[0]), float(turn_rad[0]), dt_s
+        self._rates_radps = np.maximum(_RATE_MEMORY * self._rates_radps, np.abs(turn_rad[:2]) / dt_s)
+
+    def lose(self) -> None:
+        """The next image does not follow the last one."""
+        self._bend = None

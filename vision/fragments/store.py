@@ -1,0 +1,170 @@
+"""The featured fragments as they live: kept from frame to frame, dropped when lost, renewed when thin.
+
+Struct of arrays over N fragments with two ends each. A history of the last frames gives every fragment
+an anchor: where its ends were and how deep, up to a window of time ago.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.types import FloatArray, Intrinsics, Pose
+from vision.ego_motion.rolling_shutter import straight_rays
+
+HISTORY = 24
+_FEWEST_PLACES = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnchorEnds:
+    """Where the 2N ends of the fragments were some frames ago, both ends of one next to each other.
+
+    direction, origin (3, 2N): a point of depth d lay at d * direction + origin in the fixed frame.
+    depth_m, far_m, looks (2N,) as in the store. lag_frames, lag_s (N,): how long ago.
+    """
+
+    direction: FloatArray
+    origin: FloatArray
+    depth_m: FloatArray
+    far_m: FloatArray
+    looks: FloatArray
+    lag_frames: NDArray[np.intp]
+    lag_s: FloatArray
+
+
+class FragmentStore:
+    """Holds the fragments and their history. Changed only by the detector.
+
+    near_m, far_m (N, 2): depth measured in this frame. depth_m (N, 2): of the near surface, averaged over
+    looks (N, 2) frames as for a static point. witness (N,): found on a body whose motion is in question; they
+    do not tell of the camera's.
+
+    The history is a ring of frames. Each fragment keeps its place in it for life, so that neither losing
+    nor finding fragments moves what is remembered of the others.
+    """
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything but the next id: an id is never used twice."""
+        self._next_id = getattr(self, "_next_id", 0)
+        self.ids = np.empty(0, np.int64)
+        self.ends_px = np.empty((0, 2, 2), np.float32)
+        self.near_m = np.empty((0, 2), np.float32)
+        self.far_m = np.empty((0, 2), np.float32)
+        self.depth_m = np.empty((0, 2), np.float32)
+        self.looks = np.empty((0, 2), np.float32)
+        self.age_frames = np.empty(0, np.intp)
+        self.pixel_cov = np.empty((0, 2, 3), np.float32)
+        self.witness = np.empty(0, np.bool_)
+        # Direction (3), depth, far depth and looks of both ends: by frame and place.
+        self._history = np.empty((6, HISTORY, _FEWEST_PLACES, 2))
+        self._place = np.empty(0, np.intp)
+        self._stamps_ns = np.zeros(HISTORY, np.int64)
+        self._origins = np.zeros((3, HISTORY))
+        self._comparable = 0
+        self._head = -1
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def keep(self, chosen: NDArray[np.bool_]) -> None:
+        """Drop all but the chosen fragments."""
+        if chosen.all():
+            return
+        kept = np.flatnonzero(chosen)  # a choice by index is several times as fast
+        self.ids = self.ids.take(kept)
+        self.ends_px = self.ends_px.take(kept, axis=0)
+        self.near_m = self.near_m.take(kept, axis=0)
+        self.far_m = self.far_m.take(kept, axis=0)
+        self.depth_m = self.depth_m.take(kept, axis=0)
+        self.looks = self.looks.take(kept, axis=0)
+        self.age_frames = self.age_frames.take(kept)
+        self.pixel_cov = self.pixel_cov.take(kept, axis=0)
+        self.witness = self.witness.take(kept)
+        self._place = self._place.take(kept)
+
+    def add(
+        self,
+        ends_px: NDArray[np.float32],
+        near_m: NDArray[np.float32],
+        far_m: NDArray[np.float32],
+        pixel_cov: NDArray[np.float32],
+        witness: bool = False,
+    ) -> None:
+        """New fragments, seen for the first time in the frame that is committed next."""
+        count = len(ends_px)
+        if count == 0:
+            return
+        self.ids = np.concatenate((self.ids, np.arange(self._next_id, self._next_id + count)))
+        self._next_id += count
+        self.ends_px = np.concatenate((self.ends_px, ends_px))
+        self.near_m = np.concatenate((self.near_m, near_m))
+        self.far_m = np.concatenate((self.far_m, far_m))
+        self.depth_m = np.concatenate((self.depth_m, near_m))
+        self.looks = np.concatenate((self.looks, np.ones((count, 2), np.float32)))
+        self.age_frames = np.concatenate((self.age_frames, np.zeros(count, np.intp)))
+        self.pixel_cov = np.concatenate((self.pixel_cov, pixel_cov))
+        self.witness = np.concatenate((self.witness, np.full(count, witness)))
+        self._place = np.concatenate((self._place, self._free_places(count)))
+
+    def _free_places(self, count: int) -> NDArray[np.intp]:
+        """Places in the history that no fragment has; it grows where they do not suffice."""
+        free = np.ones(self._history.shape[2], np.bool_)
+        free[self._place] = False
+        places = np.flatnonzero(free)
+        missing = count - len(places)
+        if missing > 0:
+            more = max(missing, len(free))
+            room = np.empty((6, HISTORY, more, 2))
+            self._history = np.concatenate((self._history, room), axis=2)
+            places = np.concatenate((places, np.arange(len(free), len(free) + more)))
+        return places[:count]
+
+    def commit(self, stamp_ns: int, pose: Pose, camera: Intrinsics, sweep_rad: FloatArray) -> None:
+        """Write the present ends into the history, with the camera of this frame; sweep_rad as in
+        straight_rays."""
+        self._head = (self._head + 1) % HISTORY
+        self._comparable = min(self._comparable + 1, HISTORY)
+        frame, place = self._history[:, self._head], self._place
+        direction = pose.rotation @ straight_rays(self.ends_px.reshape(-1, 2), camera, sweep_rad).T
+        ends = np.empty((6, len(place), 2))
+        ends[:3] = direction.reshape(3, -1, 2)
+        ends[3], ends[4], ends[5] = self.depth_m, self.far_m, self.looks
+        frame[:, place] = ends
+        self._stamps_ns[self._head] = stamp_ns
+        self._origins[:, self._head] = pose.translation_m
+        self.age_frames += 1
+
+    def break_history(self) -> None:
+        """The camera's way to the frame that is committed next is not known: do not look back beyond it."""
+        self._comparable = 0
+
+    def anchors(self, now_ns: int, window_s: float) -> AnchorEnds:
+        """The oldest sight of each fragment that is no older than window_s; at least the last one.
+
+        Call between tracking and commit: the history then ends with the frame before.
+        """
+        back = np.arange(1, self._comparable + 1)
+        slots = (self._head - back + 1) % HISTORY
+        ages_s: FloatArray = np.multiply(now_ns - self._stamps_ns[slots], 1e-9, dtype=np.float64)
+        reach = max(1, int(np.count_nonzero(ages_s <= window_s)))
+        lag = np.minimum(np.maximum(self.age_frames, 1), reach)
+        return self._sight(slots.take(lag - 1), lag, ages_s.take(lag - 1))
+
+    def before(self, now_ns: int) -> AnchorEnds:
+        """The last sight of each fragment: in the frame before."""
+        slot = np.full(len(self), self._head)
+        lag_s = (now_ns - int(self._stamps_ns[self._head])) * 1e-9
+        return self._sight(slot, np.ones(len(self), np.intp), np.full(len(self), lag_s))
+
+    def _sight(self, slot: NDArray[np.intp], lag: NDArray[np.intp], lag_s: FloatArray) -> AnchorEnds:
+        """What the history holds of each fragment in its frame slot (N,)."""
+        rows = self._history.reshape(6, -1, 2).take(slot * self._history.shape[2] + self._place, axis=1)
+        rows = rows.reshape(6, -1)
+        origin = self._origins.take(slot.repeat(2), axis=1)
+        return AnchorEnds(rows[:3], origin, rows[3], rows[4], rows[5], lag, lag_s)

@@ -1,0 +1,1 @@
+"""How fragments and bodies move over ground, and what that proves."""

@@ -1,0 +1,1 @@
+"""Small arrays: filters, medians, inverses."""
