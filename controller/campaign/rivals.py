@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from config.robot import Limits
 from controller import braking
-from controller.decision.decision import Action, Decision, Reason
+from controller.decision.decision import Action, Decision, Reason, RivalRule
 from controller.path.path import OnPath, Path
 
 _DEAD_BAND_MPS = 0.03
 
 
-def decision(rule: str, sentence: str, target_mps: float, v_mps: float, *, hard: bool = False) -> Decision:
+def decision(
+    rule: RivalRule, sentence: str, target_mps: float, v_mps: float, *, hard: bool = False
+) -> Decision:
     """The target with the action that follows from it. hard: braking beyond comfort is allowed for it."""
     if target_mps > v_mps + _DEAD_BAND_MPS:
         action = Action.INCREASE

@@ -15,7 +15,7 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Limits, Robot
 from controller import braking
 from controller.decision.appraise import Appraiser
-from controller.decision.decision import Action, Decision, Reason
+from controller.decision.decision import Action, Decision, Reason, Rule
 from controller.decision.knowledge import Knowledge
 from controller.decision.limits import BLOCKING_RULES, STANDING_MPS, Limit, Motion, allowed, starts_at_mps
 from controller.decision.release import ReleaseGate
@@ -127,7 +127,7 @@ class DecisionMaker:
         section = min(path.speed_limit(ahead_s), path.speed_limit(steady_s))
         end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
         if section <= end:
-            rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
+            rule: Rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
             return Limit(section, Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
         required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
         reason = Reason(

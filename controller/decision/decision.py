@@ -5,6 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Literal
+
+# What limits the speed; docs/design.md ("Observations") says what each of them means.
+Rule = Literal[
+    "free", "section", "target",
+    "static", "depth",
+    "leader", "oncoming", "crossing",
+    "worst case",
+    "corner", "unseen", "range",
+    "release",
+    "camera", "fault",
+    "robot", "requested", "turn", "refused", "no command",
+]  # fmt: skip
+# Of the policies that a campaign compares ours with.
+RivalRule = Literal["paper", "field", "zones"]
 
 
 class Action(Enum):
@@ -26,7 +41,7 @@ class Reason:
     it has no meaning.
     """
 
-    rule: str
+    rule: Rule | RivalRule
     sentence: str
     obstacle_id: int | None = None
     distance_m: float = math.nan

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from config.decision import Release
 from controller import braking
 from controller.braking import BrakeLimits
-from controller.decision.decision import Reason
+from controller.decision.decision import Reason, Rule
 
 # So far the front may be past the near side of something that still counts as ahead.
 ALONGSIDE_M = 0.1
@@ -19,7 +19,9 @@ LEAVES_ASLANT = 2.0
 UNSEEN_SIGMAS = 2.0
 
 # Rules of a Reason that mean: something stands or moves in the way.
-BLOCKING_RULES = frozenset({"static", "oncoming", "leader", "crossing", "depth", "unseen", "worst case"})
+BLOCKING_RULES: frozenset[Rule] = frozenset(
+    {"static", "oncoming", "leader", "crossing", "depth", "unseen", "worst case"}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def stop_before(
     comfort: BrakeLimits,
     margin_m: float,
     least_m: float,
-    rule: str,
+    rule: Rule,
     what: str,
 ) -> Limit:
     """Stand margin_m before it, comfortably; urgent when comfort would leave less than least_m."""

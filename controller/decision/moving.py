@@ -19,7 +19,7 @@ from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Course, Placed
 from controller.decision.crossing import Choice, Conflict, choices, find_conflicts
-from controller.decision.decision import Reason
+from controller.decision.decision import Reason, Rule
 from controller.decision.limits import ALONGSIDE_M, STANDING_MPS, Gap, Limit, Motion, allowed, stop_before
 from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
@@ -142,6 +142,7 @@ class MovingLimits:
         """Stop before it, or follow it: the limit by an obstacle that does not leave the corridor."""
         margins = self._config.margins
         runs_m = 0.0
+        rule: Rule
         rule, what = "oncoming", f"comes at {-along_mps:.1f} m/s"
         if along_mps > _DRIVES_AHEAD_MPS:
             runs_m = max(leader_mps, 0.0) ** 2 / (2.0 * self._config.prediction.leader_decel_mps2)

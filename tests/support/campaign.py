@@ -80,7 +80,7 @@ def log_of(speeds_mps: list[float], period_s: float = PERIOD_S, s_m: float = 0.0
     """A drive along x with these speeds, one a control step."""
     log = DriveLog(SetpointTally(CONFIG.robot.limits, period_s))
     for k, v_mps in enumerate(speeds_mps):
-        decision = Decision(Action.KEEP, v_mps, Reason("made", ""))
+        decision = Decision(Action.KEEP, v_mps, Reason("free", ""))
         log.times_s.append(k * period_s)
         log.poses.append((s_m, 0.0, 0.0))
         log.s_m.append(s_m)

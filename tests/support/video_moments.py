@@ -141,7 +141,7 @@ def decision(
     sentence = "the way is free for 8.0 m"
     if obstacle_id is not None:
         sentence = f"obstacle {obstacle_id} comes to 2.4 m ahead on the path: gap for 0.62 m/s"
-    return Decision(action, target_mps, Reason("test", sentence, obstacle_id))
+    return Decision(action, target_mps, Reason("free", sentence, obstacle_id))
 
 
 def straight_path(length_m: float = 12.0) -> FloatArray:

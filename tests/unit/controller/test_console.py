@@ -5,10 +5,10 @@ from typing import TextIO
 import pytest
 
 from controller.console import Console
-from controller.decision.decision import Action, Decision, Reason
+from controller.decision.decision import Action, Decision, Reason, Rule
 
 
-def decided(rule: str, number: int | None = None) -> Decision:
+def decided(rule: Rule, number: int | None = None) -> Decision:
     return Decision(Action.DECREASE, 0.5, Reason(rule, f"because of {rule} {number}", obstacle_id=number))
 
 
@@ -30,14 +30,14 @@ def test_flickering_between_reasons_is_not_told(capsys: pytest.CaptureFixture[st
 def test_a_robot_that_does_not_get_on_says_why_ever_more_rarely(capsys: pytest.CaptureFixture[str]) -> None:
     console = Console(quiet=False)
     for step in range(50 * 45):
-        console.standing(100.0 + step * 0.02, step * 0.02, decided("standing", 3))
+        console.standing(100.0 + step * 0.02, step * 0.02, decided("static", 3))
     console.standing(146.0, 0.0, decided("free"))
-    console.standing(160.0, 12.0, decided("standing", 4))
+    console.standing(160.0, 12.0, decided("static", 4))
     assert capsys.readouterr().out.splitlines() == [
-        " 110.00 s  standing for 10 s, since 100.00 s: because of standing 3",
-        " 120.00 s  standing for 20 s, since 100.00 s: because of standing 3",
-        " 140.00 s  standing for 40 s, since 100.00 s: because of standing 3",
-        " 160.00 s  standing for 12 s, since 148.00 s: because of standing 4",
+        " 110.00 s  standing for 10 s, since 100.00 s: because of static 3",
+        " 120.00 s  standing for 20 s, since 100.00 s: because of static 3",
+        " 140.00 s  standing for 40 s, since 100.00 s: because of static 3",
+        " 160.00 s  standing for 12 s, since 148.00 s: because of static 4",
     ]
 
 

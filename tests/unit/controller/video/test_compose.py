@@ -137,7 +137,7 @@ def test_the_header_shows_the_cameras_health(condition: CameraCondition) -> None
 
 
 def header_with(sentence: str) -> Image:
-    decision = dataclasses.replace(build.decision(), reason=Reason("test", sentence))
+    decision = dataclasses.replace(build.decision(), reason=Reason("free", sentence))
     return HEADER.of(Composer().compose(build.moment(decided=decision))).copy()
 
 
