@@ -26,7 +26,7 @@ from controller.realtime.mission import drive_realtime
 from controller.realtime.service import stop_on_signals
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
-from controller.record.tally import SetpointTally, TimingTally
+from controller.record.tally import SetpointTally
 from controller.result import MissionOptions, MissionResult
 from controller.summary import report, summary_rows
 from hal.clocks import SimulatedClock
@@ -97,12 +97,8 @@ def drive_lockstep(
         recorder = devices.enter_context(open_recorder(recording, surroundings(config)))
         stop = devices.enter_context(stop_on_signals())
         loop = build_control(config, options.config_path, chassis)
-        result = MissionResult(
-            loop,
-            SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz),
-            TimingTally(),
-            simulation=simulation,
-        )
+        setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
+        result = MissionResult(loop=loop, setpoints=setpoints, simulation=simulation)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
         run_recorder = RunRecorder(recorder, path)
         began_s = time.perf_counter()

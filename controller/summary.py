@@ -12,8 +12,7 @@ from controller.control import ControlStep
 from controller.ending import Outcome
 from controller.realtime.runner import Punctuality
 from controller.record.tally import SetpointTally, mean_speed_mps
-from controller.result import MissionResult
-from hal.clocks import NS_PER_S
+from controller.result import DriveResult, MissionResult
 from sim.simulation import Simulation
 
 
@@ -29,7 +28,7 @@ def report(console: Console, result: MissionResult, step: ControlStep) -> None:
         step.progress_m / length_m,
         f"{step.progress_m:5.1f}/{length_m:.1f} m  {step.setpoint.v_mps:4.2f} m/s  {does}",
     )
-    seconds = (step.now_ns - result.started_ns) / NS_PER_S
+    seconds = result.seconds(step)
     if stops is None:
         console.decision(seconds, step.decision, step.setpoint.v_mps)
         console.standing(seconds, result.standstill.lasted_s(step.now_ns), step.decision)
@@ -45,16 +44,7 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
         stood_s = result.standstill.lasted_s(result.last.now_ns)
         if stood_s >= STUCK_S:
             rows.append(("standing", f"for the last {stood_s:.1f} s: {result.last.decision.reason.sentence}"))
-    if result.simulation is not None:
-        rows.append(("contacts", contact_text(result.simulation)))
-    rows.append(("limits", limits_text(config, result.setpoints)))
-    if result.shaper_faults.count:
-        rows.append(("shaper", result.shaper_faults.line()))
-    if result.complaints.told:
-        rows.append(("base", result.complaints.line()))
-    rows.append(("perception", result.timing.line()))
-    if result.frames.line():
-        rows.append(("frames", result.frames.line()))
+    rows.extend(drive_rows(config, result))
     if math.isfinite(result.wall_s):
         ratio = result.duration_s / result.wall_s
         rows.append(
@@ -63,12 +53,28 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
                 f"{result.duration_s:.1f} s simulated in {result.wall_s:.1f} s: {ratio:.2f} x real time",
             )
         )
-    if result.punctuality is not None and result.punctuality.late_ns:
-        rows.append(("control", punctuality_text(result.punctuality)))
     return rows
 
 
-def punctuality_text(punctuality: Punctuality) -> str:
+def drive_rows(config: AppConfig, result: DriveResult) -> list[tuple[str, str]]:
+    """What the summary of every drive has, as (subject, text)."""
+    rows = []
+    if result.simulation is not None:
+        rows.append(("contacts", _contact_text(result.simulation)))
+    rows.append(("limits", _limits_text(config, result.setpoints)))
+    if result.shaper_faults.count:
+        rows.append(("shaper", result.shaper_faults.line()))
+    if result.complaints.told:
+        rows.append(("base", result.complaints.line()))
+    rows.append(("perception", result.timing.line()))
+    if result.frames.line():
+        rows.append(("frames", result.frames.line()))
+    if result.punctuality is not None and result.punctuality.late_ns:
+        rows.append(("control", _punctuality_text(result.punctuality)))
+    return rows
+
+
+def _punctuality_text(punctuality: Punctuality) -> str:
     """How late the control steps began."""
     late_ms = np.array(punctuality.late_ns) / 1e6
     return (
@@ -112,7 +118,7 @@ def length_text(length_m: float, sign: str = "") -> str:
     return f"{length_m:{sign}.2f} m"
 
 
-def contact_text(simulation: Simulation) -> str:
+def _contact_text(simulation: Simulation) -> str:
     """What was touched, and what was passed nearest."""
     referee = simulation.referee
     count = len(referee.contacts)
@@ -122,7 +128,7 @@ def contact_text(simulation: Simulation) -> str:
     return text
 
 
-def limits_text(config: AppConfig, tally: SetpointTally) -> str:
+def _limits_text(config: AppConfig, tally: SetpointTally) -> str:
     """Whether what was sent kept the limits."""
     limits = config.robot.limits
     kept = "kept" if tally.violations == 0 else f"broken {tally.violations} times"

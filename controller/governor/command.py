@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
@@ -17,53 +17,24 @@ from controller.governor.loop import GovernorLoop
 from controller.mission import with_overrides
 from controller.possible_world import require_possible_world
 from controller.realtime.rig import realtime_rig
-from controller.realtime.runner import Punctuality
 from controller.realtime.service import ServiceManager
 from controller.record.observations import STANDARD_OUTPUT
-from controller.record.tally import (
-    Complaints,
-    FrameTally,
-    SetpointTally,
-    ShaperFaults,
-    Standstill,
-    TimingTally,
-)
-from controller.result import MissionOptions
-from controller.summary import contact_text, limits_text, punctuality_text
-from hal.clocks import NS_PER_S
-from sim.simulation import Simulation
+from controller.record.tally import SetpointTally
+from controller.result import DriveResult, MissionOptions
+from controller.summary import drive_rows
 
 
-@dataclass
-class Governing:
-    """What the summary is made of."""
+@dataclass(kw_only=True)
+class Governing(DriveResult):
+    """Of a drive that another planner leads."""
 
     loop: GovernorLoop
     inbox: Inbox
-    setpoints: SetpointTally
-    timing: TimingTally
-    simulation: Simulation | None
-    punctuality: Punctuality
-    first: ControlStep | None = None
-    last: ControlStep | None = None
-    standstill: Standstill = field(default_factory=Standstill)
-    shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
-    complaints: Complaints = field(default_factory=Complaints)
-    frames: FrameTally = field(default_factory=FrameTally)
 
     @property
     def succeeded(self) -> bool:
         """Ended as asked, nothing touched, limits kept."""
-        contacts = [] if self.simulation is None else self.simulation.referee.contacts
-        return self.loop.ending.outcome is Outcome.STOPPED and not contacts and self.setpoints.violations == 0
-
-    def take(self, step: ControlStep) -> None:
-        """Account for one control step."""
-        self.first = self.first or step
-        self.last = step
-        self.setpoints.add(step.chassis.sent, step.chassis.mode)
-        self.standstill.add(step.setpoint)
-        self.shaper_faults.add(step.fault)
+        return self.loop.ending.outcome is Outcome.STOPPED and self.clean
 
 
 def run_governor(options: MissionOptions) -> int:
@@ -93,7 +64,13 @@ def _govern(
         inbox = build_inbox(link, governor, console.event)
         loop = build_governor_loop(config, options.config_path, rig.chassis, inbox)
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
-        governing = Governing(loop, inbox, setpoints, TimingTally(), rig.simulation, rig.punctuality)
+        governing = Governing(
+            loop=loop,
+            inbox=inbox,
+            setpoints=setpoints,
+            simulation=rig.simulation,
+            punctuality=rig.punctuality,
+        )
 
         def ready(service: ServiceManager) -> None:
             console.event(f"ready: commands are heard on {_where(governor.input)}")
@@ -103,8 +80,7 @@ def _govern(
             for moment in moments:
                 governing.take(moment.control)
                 for message in moment.arrived:
-                    governing.timing.add(message.timing_ms)
-                    governing.frames.add(message.scene.sequence)
+                    governing.take_message(message)
                 _report(console, governing, moment.control)
     return governing
 
@@ -114,8 +90,7 @@ def _where(config: InputConfig) -> str:
 
 
 def _report(console: Console, governing: Governing, step: ControlStep) -> None:
-    assert governing.first is not None
-    seconds = (step.now_ns - governing.first.now_ns) / NS_PER_S
+    seconds = governing.seconds(step)
     console.progress(0.0, f"{step.setpoint.v_mps:4.2f} m/s  {step.decision.reason.sentence}")
     console.decision(seconds, step.decision, step.setpoint.v_mps)
     console.standing(seconds, governing.standstill.lasted_s(step.now_ns), step.decision)
@@ -124,28 +99,16 @@ def _report(console: Console, governing: Governing, step: ControlStep) -> None:
 
 def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, str]]:
     rows = [("governor", _drive_text(governing)), ("commands", _commands_text(governing.inbox))]
-    if governing.simulation is not None:
-        rows.append(("contacts", contact_text(governing.simulation)))
-    rows.append(("limits", limits_text(config, governing.setpoints)))
-    if governing.shaper_faults.count:
-        rows.append(("shaper", governing.shaper_faults.line()))
-    if governing.complaints.told:
-        rows.append(("base", governing.complaints.line()))
-    rows.append(("perception", governing.timing.line()))
-    if governing.frames.line():
-        rows.append(("frames", governing.frames.line()))
-    if governing.punctuality.late_ns:
-        rows.append(("control", punctuality_text(governing.punctuality)))
-    return rows
+    return rows + drive_rows(config, governing)
 
 
 def _drive_text(governing: Governing) -> str:
-    first, last, loop = governing.first, governing.last, governing.loop
+    last, loop = governing.last, governing.loop
     ended = "ended" if loop.ending.outcome is None else loop.ending.outcome.value
-    if first is None or last is None:
+    if last is None:
         return ended
-    seconds = (last.now_ns - first.now_ns) / NS_PER_S
-    return f"{ended} ({loop.ending.stop_reason}); {last.progress_m:.2f} m in {seconds:.1f} s"
+    driven = f"{last.progress_m:.2f} m in {governing.duration_s:.1f} s"
+    return f"{ended} ({loop.ending.stop_reason}); {driven}"
 
 
 def _commands_text(inbox: Inbox) -> str:

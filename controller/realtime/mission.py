@@ -8,7 +8,7 @@ from controller.build import build_control
 from controller.console import Console
 from controller.ending import Outcome
 from controller.realtime.rig import realtime_rig
-from controller.record.tally import SetpointTally, TimingTally
+from controller.record.tally import SetpointTally
 from controller.result import MissionOptions, MissionResult
 from controller.summary import report
 from hal.errors import DeviceRefused
@@ -22,9 +22,8 @@ def drive_realtime(
     with realtime_rig(config, runner, options) as rig:
         loop = build_control(config, options.config_path, rig.chassis)
         result = MissionResult(
-            loop,
-            SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz),
-            TimingTally(),
+            loop=loop,
+            setpoints=SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz),
             simulation=rig.simulation,
             punctuality=rig.punctuality,
         )
@@ -34,8 +33,7 @@ def drive_realtime(
                 result.take(moment.control)
                 was_armed = was_armed or moment.control.chassis.mode is ChassisMode.ARMED
                 for message in moment.arrived:
-                    result.timing.add(message.timing_ms)
-                    result.frames.add(message.scene.sequence)
+                    result.take_message(message)
                 report(console, result, moment.control)
     if loop.ending.outcome in (Outcome.NOT_ARMED, Outcome.CHASSIS_FAULT) and not was_armed:
         raise DeviceRefused(f"{describe_base(config.chassis)}: {loop.ending.stop_reason}; nothing has moved")

@@ -6,7 +6,7 @@ from config.app import load_app
 from config.loader import CONFIG_DIR
 from controller.build import build_control
 from controller.console import Console
-from controller.record.tally import SetpointTally, TimingTally
+from controller.record.tally import SetpointTally
 from controller.result import MissionResult
 from controller.shape import SpeedShaper
 from controller.summary import length_text, report, summary_rows
@@ -28,7 +28,7 @@ def drive(seconds: float, sees: bool, chassis: ObedientChassis | None = None) ->
     """The first seconds of the simulated mission, with a free way in sight or nothing at all."""
     config = load_app(CONFIG_PATH)
     loop = build_control(config, CONFIG_PATH, chassis or ObedientChassis())
-    result = MissionResult(loop, SetpointTally(config.robot.limits, PERIOD_S), TimingTally())
+    result = MissionResult(loop=loop, setpoints=SetpointTally(config.robot.limits, PERIOD_S))
     console = Console(quiet=False)
     for index in range(round(seconds / PERIOD_S)):
         now_ns = round(index * PERIOD_S * 1e9)
