@@ -74,7 +74,9 @@ def wanted(tracks: Tracks, detection: Detection, config: PerceptionConfig) -> Wa
     gate_m = _GATE_M + _GATE_SIGMAS * depth_sigma_m(depth_m, config.depth_noise)
     gate_m += 0.5 * np.minimum(tracks.extent_m[chosen, 2], _DEEPEST_M)
     urgent = (tracks.evidence[chosen] > 0.0) | (tracks.sightings[chosen] < _URGENT_SIGHTINGS)
-    return Wanted(tracks.ids[chosen], tracks.bbox_px[chosen], depth_m, gate_m, urgent)
+    return Wanted(
+        ids=tracks.ids[chosen], box_px=tracks.bbox_px[chosen], depth_m=depth_m, gate_m=gate_m, urgent=urgent
+    )
 
 
 class Attention:

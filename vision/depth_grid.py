@@ -115,25 +115,39 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     if mount is None:
         nan = float("nan")
         return DepthGrid(
-            step, offset, depth_m, inverse, valid, beyond, x, y, depth_m, None, None, nan, nan, None, range_m
+            step_px=step,
+            offset_px=offset,
+            depth_m=depth_m,
+            inverse_depth=inverse,
+            valid=valid,
+            beyond=beyond,
+            x=x,
+            y=y,
+            forward_m=depth_m,
+            height_m=None,
+            height_sigma_m=None,
+            camera_height_m=nan,
+            pitch_rad=nan,
+            up=None,
+            range_m=range_m,
         )
     sigma_m = np.float32(CELL_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
     return DepthGrid(
-        step,
-        offset,
-        depth_m,
-        inverse,
-        valid,
-        beyond,
-        x,
-        y,
-        depth_m * view.ahead,
-        np.float32(mount.height_m) - depth_m * view.drop,
-        sigma_m * np.abs(view.drop),
-        mount.height_m,
-        mount.pitch_rad,
-        np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
-        range_m,
+        step_px=step,
+        offset_px=offset,
+        depth_m=depth_m,
+        inverse_depth=inverse,
+        valid=valid,
+        beyond=beyond,
+        x=x,
+        y=y,
+        forward_m=depth_m * view.ahead,
+        height_m=np.float32(mount.height_m) - depth_m * view.drop,
+        height_sigma_m=sigma_m * np.abs(view.drop),
+        camera_height_m=mount.height_m,
+        pitch_rad=mount.pitch_rad,
+        up=np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
+        range_m=range_m,
     )
 
 

@@ -44,8 +44,16 @@ def free_space(
     else:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     known = np.minimum(known, max_depth_m)
-    edges, blank = (_floor_from_m(grid), _up_tan(grid)), _blank(grid, bands, known, nearest)
-    return FreeSpace(bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, *edges, blank)
+    return FreeSpace(
+        bearing_tan=bands.bearing_tan,
+        half_width_tan=bands.half_width_tan,
+        nearest_m=nearest,
+        known_m=known,
+        blind_m=blind_m,
+        floor_from_m=_floor_from_m(grid),
+        up_tan=_up_tan(grid),
+        blank=_blank(grid, bands, known, nearest),
+    )
 
 
 def _blank(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,16 @@ from vision.depth_grid import DepthGrid
 from vision.health import worsened
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
 from vision.velocities import PointMotion
+
+# Of a frame that was not compared with the one before.
+MOTION_NOT_KNOWN = EgoMotion(
+    motion=Pose(np.eye(3), np.zeros(3)),
+    dt_s=0.0,
+    source="none",
+    inlier_ratio=math.nan,
+    sigma_translation_m=math.inf,
+    sigma_rotation_rad=math.inf,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,15 +79,15 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> Camera
 def no_motion(count: int) -> PointMotion:
     """Evidence of count ends of which nothing is known."""
     return PointMotion(
-        np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
-        np.zeros((count, 2)),
-        np.zeros(count),
-        np.zeros((count, 2)),
-        np.ones((count, 3)) * np.array([1.0, 0.0, 1.0]),
-        np.zeros((count, 2)),
-        np.full(count, np.nan),
-        np.ones(count),
-        np.zeros(count),
-        np.zeros(count),
-        np.zeros(count, np.bool_),
+        static_m=np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
+        ray=np.zeros((count, 2)),
+        lag_s=np.zeros(count),
+        miss_m=np.zeros((count, 2)),
+        covariance=np.ones((count, 3)) * np.array([1.0, 0.0, 1.0]),
+        depth_effect=np.zeros((count, 2)),
+        depth_step_m=np.full(count, np.nan),
+        depth_step_sigma_m=np.ones(count),
+        depth_lag_s=np.zeros(count),
+        static_chi2=np.zeros(count),
+        usable=np.zeros(count, np.bool_),
     )

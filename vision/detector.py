@@ -14,7 +14,7 @@ from vision import optical_flow
 from vision.attention import Attention, Wanted
 from vision.depth_grid import DepthGrid, make_grid
 from vision.depth_mask import surface_depth
-from vision.detection import Detection, camera_health, no_motion
+from vision.detection import MOTION_NOT_KNOWN, Detection, camera_health, no_motion
 from vision.edges import GreyImage
 from vision.ego_motion import CameraEstimate, estimate
 from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
@@ -149,8 +149,9 @@ class Detector:
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
         known = ego.source in ("visual", "odometry") and not blurred
+        reckoned = prior.source != "none"
         detection = self._detection(
-            frame, grid, dt_s, motion, ego, health, False, known, prior.source != "none"
+            frame, grid, health, motion, ego, dt_s=dt_s, motion_known=known, reckoned=reckoned
         )
         self._renew(frame, grey)
         if previous is not None:
@@ -197,50 +198,48 @@ class Detector:
         self._store.clear()
         self._read_out.lose()
         self._motion, self._motion_dt_s = _IDENTITY, 0.0
-        ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
         self._renew(frame, grey)
         motion = no_motion(2 * len(self._store))
-        detection = self._detection(frame, grid, 0.0, motion, ego, health, True)
+        detection = self._detection(frame, grid, health, motion, restarted=True)
         self._commit(frame, pyramid(grey, self._config.fragments), odometry, _NO_SWEEP)
         return detection
 
     def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
         """Nothing can be followed through this frame; the fragments wait for the next good one."""
         self._read_out.lose()
-        ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
-        motion = no_motion(2 * len(self._store))
-        return self._detection(frame, grid, 0.0, motion, ego, health, False)
+        return self._detection(frame, grid, health, no_motion(2 * len(self._store)))
 
     def _detection(
         self,
         frame: RgbdFrame,
         grid: DepthGrid,
-        dt_s: float,
-        motion: PointMotion,
-        ego: EgoMotion,
         health: CameraHealth,
-        restarted: bool,
+        motion: PointMotion,
+        ego: EgoMotion = MOTION_NOT_KNOWN,
+        *,
+        dt_s: float = 0.0,
+        restarted: bool = False,
         motion_known: bool = False,
         reckoned: bool = False,
     ) -> Detection:
         store, self._told = self._store, health
         return Detection(
-            frame.captured_ns,
-            frame.sequence,
-            dt_s,
-            frame.intrinsics,
-            grid,
-            store.ids,
-            store.ends_px,
-            store.near_m,
-            store.age_frames.copy(),
-            motion,
-            self._pose,
-            ego,
-            health,
-            restarted,
-            motion_known,
-            reckoned,
+            captured_ns=frame.captured_ns,
+            sequence=frame.sequence,
+            dt_s=dt_s,
+            camera=frame.intrinsics,
+            grid=grid,
+            ids=store.ids,
+            ends_px=store.ends_px,
+            near_m=store.near_m,
+            age_frames=store.age_frames.copy(),
+            motion=motion,
+            pose=self._pose,
+            ego_motion=ego,
+            health=health,
+            restarted=restarted,
+            motion_known=motion_known,
+            reckoned=reckoned,
         )
 
     def _prior(self, frame: RgbdFrame, odometry: Pose | None, dt_s: float) -> MotionPrior:
@@ -275,12 +274,12 @@ class Detector:
 def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:
     variance = result.covariance.diagonal()
     return EgoMotion(
-        step,
-        dt_s,
-        "visual" if result.visual else "disputed" if result.disputed else prior.source,
-        result.inlier_ratio,
-        float(np.sqrt(variance[3:].sum())),
-        float(np.sqrt(variance[:3].sum())),
+        motion=step,
+        dt_s=dt_s,
+        source="visual" if result.visual else "disputed" if result.disputed else prior.source,
+        inlier_ratio=result.inlier_ratio,
+        sigma_translation_m=float(np.sqrt(variance[3:].sum())),
+        sigma_rotation_rad=float(np.sqrt(variance[:3].sum())),
     )
 
 

@@ -116,14 +116,29 @@ def estimate(
         return _unseen(start, sigma, ratio)
     spread = np.asarray(covariance, np.float64)
     return CameraEstimate(
-        found.pose, found.sweep_rad, bend_rad, bend_variance, spread, ratio, not disputed, disputed
+        pose=found.pose,
+        sweep_rad=found.sweep_rad,
+        bend_rad=bend_rad,
+        bend_variance=bend_variance,
+        covariance=spread,
+        inlier_ratio=ratio,
+        visual=not disputed,
+        disputed=disputed,
     )
 
 
 def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:
     """Only the prior speaks."""
     nothing, unknown = np.zeros(2), np.full(2, np.inf)
-    return CameraEstimate(start, nothing, nothing, unknown, np.diag(np.square(sigma)), inlier_ratio, False)
+    return CameraEstimate(
+        pose=start,
+        sweep_rad=nothing,
+        bend_rad=nothing,
+        bend_variance=unknown,
+        covariance=np.diag(np.square(sigma)),
+        inlier_ratio=inlier_ratio,
+        visual=False,
+    )
 
 
 def _bend(found: _Solution) -> tuple[FloatArray, FloatArray]:
@@ -195,7 +210,13 @@ def _solve(view: View, start: Pose, sigma: FloatArray) -> _Solution:
         normal[:8, 8] + prior * assumed * _OF_MOTION,
     )
     return _Solution(
-        _moved(pose, gone[:6]), sweep_rad + gone[6:], information, inliers, free, free_side, -assumed[6:]
+        pose=_moved(pose, gone[:6]),
+        sweep_rad=sweep_rad + gone[6:],
+        information=information,
+        inliers=inliers,
+        free=free,
+        free_side=free_side,
+        free_from_rad=-assumed[6:],
     )
 
 

@@ -63,7 +63,13 @@ def appraise(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
     far_m = np.where(known, anchor.far_m, UNSEEN_M)
     single = depth_sigma_m(near_m, noise)
     sigma_m = np.where(known, single * _averaged(anchor.looks), _UNSEEN_SIGMA_M)
-    return AnchorDepths(near_m, sigma_m, far_m, known, far_m - near_m > 0.1 + _MIXED_SIGMAS * single)
+    return AnchorDepths(
+        near_m=near_m,
+        sigma_m=sigma_m,
+        far_m=far_m,
+        known=known,
+        mixed=far_m - near_m > 0.1 + _MIXED_SIGMAS * single,
+    )
 
 
 def static_points(
@@ -81,11 +87,11 @@ def static_points(
     distant = depths.mixed & (depths.far_m > distant_m)
     between_m = np.where(distant, depths.far_m - depths.near_m, 0.0)
     return Anchors(
-        (anchor.direction * depths.near_m + anchor.origin).T,
-        anchor.direction.T,
-        np.maximum(depths.sigma_m, between_m),
-        pixel_cov.reshape(-1, 3).astype(float),
-        ~((depths.mixed & ~distant) | moving.repeat(2)),
+        points_m=(anchor.direction * depths.near_m + anchor.origin).T,
+        range_m=anchor.direction.T,
+        depth_sigma_m=np.maximum(depths.sigma_m, between_m),
+        pixel_cov=pixel_cov.reshape(-1, 3).astype(float),
+        usable=~((depths.mixed & ~distant) | moving.repeat(2)),
     )
 
 

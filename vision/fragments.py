@@ -167,4 +167,12 @@ class FragmentStore:
         rows = self._history.reshape(6, -1, 2).take(slot * self._history.shape[2] + self._place, axis=1)
         rows = rows.reshape(6, -1)
         origin = self._origins.take(slot.repeat(2), axis=1)
-        return AnchorEnds(rows[:3], origin, rows[3], rows[4], rows[5], lag, lag_s)
+        return AnchorEnds(
+            direction=rows[:3],
+            origin=origin,
+            depth_m=rows[3],
+            far_m=rows[4],
+            looks=rows[5],
+            lag_frames=lag,
+            lag_s=lag_s,
+        )

@@ -132,23 +132,25 @@ def judge(
     new_evidence = np.minimum(np.maximum(evidence + change, 0.0), _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
     confidence = 1.0 - np.exp(-read.filtered.total / _SURE_SQUARED_SIGMAS)
-    return Verdict(new_evidence, new_moving, confidence, stands, rising)
+    return Verdict(
+        evidence=new_evidence, moving=new_moving, confidence=confidence, stands=stands, proven=rising
+    )
 
 
 def _read(seen: MotionEvidence, settings: MotionSettings) -> _Reading:
     threshold = settings.sigmas**2
     filtered, own, surface, apart = _split_all(seen)
     return _Reading(
-        threshold,
-        np.sqrt(np.square(seen.velocity).sum(axis=1)),
-        settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m,
-        np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0),
-        (filtered.across > threshold) & (own.across > 0.5 * threshold),
-        (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells),
-        filtered,
-        own,
-        surface,
-        apart,
+        threshold=threshold,
+        speed_mps=np.sqrt(np.square(seen.velocity).sum(axis=1)),
+        least_mps=settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m,
+        agreeing=np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0),
+        shown_across=(filtered.across > threshold) & (own.across > 0.5 * threshold),
+        arrived=(seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells),
+        filtered=filtered,
+        own=own,
+        surface=surface,
+        apart=apart,
     )
 
 

@@ -109,7 +109,9 @@ def body_velocities(
     excess = (member * bounded).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
     covariance = covariance * np.maximum(1.0, excess)[:, None, None]
     unexplained = member @ (motion.static_chi2 > _MOVED_CHI2) / np.maximum(ends, 1)
-    return BodyVelocities(velocity, covariance, ends, agree, unexplained)
+    return BodyVelocities(
+        velocity_mps=velocity, covariance=covariance, ends=ends, agreement=agree, unexplained=unexplained
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +131,7 @@ def _parties(chosen: NDArray[np.intp], owner: NDArray[np.intp], ends: NDArray[np
     """ends (G,): how many of the ends chosen (M,) each body has; owner (2N,): of all ends."""
     many = np.flatnonzero(ends >= _SPREAD_ENDS)
     middle = (np.cumsum(ends) - ends + ends // 2)[many]
-    return _Parties(len(ends), chosen, owner[chosen], many, middle)
+    return _Parties(bodies=len(ends), chosen=chosen, owner=owner[chosen], many=many, middle=middle)
 
 
 def _spread(chi2: FloatArray, parties: _Parties) -> FloatArray:

@@ -57,14 +57,14 @@ class Regions:
 def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> Regions:
     """regions, where chosen (R,) those of others."""
     return Regions(
-        np.where(chosen, others.cells, regions.cells),
-        np.where(chosen, others.rows, regions.rows),
-        np.where(chosen[:, None], others.bbox_px, regions.bbox_px),
-        np.where(chosen[:, None], others.position_m, regions.position_m),
-        np.where(chosen[:, None], others.extent_m, regions.extent_m),
-        np.where(chosen, others.wide, regions.wide),
-        np.where(chosen, others.tall, regions.tall),
-        np.where(chosen, others.overlapped, regions.overlapped),
+        cells=np.where(chosen, others.cells, regions.cells),
+        rows=np.where(chosen, others.rows, regions.rows),
+        bbox_px=np.where(chosen[:, None], others.bbox_px, regions.bbox_px),
+        position_m=np.where(chosen[:, None], others.position_m, regions.position_m),
+        extent_m=np.where(chosen[:, None], others.extent_m, regions.extent_m),
+        wide=np.where(chosen, others.wide, regions.wide),
+        tall=np.where(chosen, others.tall, regions.tall),
+        overlapped=np.where(chosen, others.overlapped, regions.overlapped),
     )
 
 
@@ -136,7 +136,16 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     # Box, centre and size of each, in this order.
     table, reach = np.zeros((10, count)), np.zeros(count, np.intp)
     wide, tall, nothing = np.zeros((3, count), np.bool_)
-    result = Regions(cells, reach, table[:4].T, table[4:7].T, table[7:].T, wide, tall, nothing)
+    result = Regions(
+        cells=cells,
+        rows=reach,
+        bbox_px=table[:4].T,
+        position_m=table[4:7].T,
+        extent_m=table[7:].T,
+        wide=wide,
+        tall=tall,
+        overlapped=nothing,
+    )
     if len(flat) == 0:
         return result
     present = np.flatnonzero(cells)

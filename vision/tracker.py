@@ -255,13 +255,13 @@ class Tracker:
     ) -> Percept:
         tracks = self._tracks
         scene = Scene(
-            detection.captured_ns,
-            detection.sequence,
-            report.obstacles(tracks, detection),
-            self._free_space(detection, standing),
-            detection.ego_motion,
-            detection.health,
-            robot_pose,
+            captured_ns=detection.captured_ns,
+            sequence=detection.sequence,
+            obstacles=report.obstacles(tracks, detection),
+            free_space=self._free_space(detection, standing),
+            ego_motion=detection.ego_motion,
+            health=detection.health,
+            robot_pose=robot_pose,
         )
         index = tracks.index_of(owner)
         moving = np.concatenate((tracks.moving, [False]))[index]
