@@ -74,14 +74,14 @@ def carve(
     if not chosen.any():
         return labels
     looked_at = chosen.take(labels)
-    evidence = arrived & looked_at
-    evidence |= _around_moving_fragments(detection, velocities, suspicious, looked_at, config)
-    if not evidence.any():
+    shown = arrived & looked_at
+    shown |= _around_moving_fragments(detection, velocities, suspicious, looked_at, config)
+    if not shown.any():
         return labels
     chosen[1:] = searched
     inside = chosen.take(labels) if overgrown.any() else looked_at
-    labels = _cut_back(tracks, detection, labels, overgrown, evidence, config)
-    seeds = evidence & inside
+    labels = _cut_back(tracks, detection, labels, overgrown, shown, config)
+    seeds = shown & inside
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
     if np.count_nonzero(grown) < _MIN_CELLS:
@@ -105,14 +105,14 @@ def _cut_back(
     detection: Detection,
     labels: IntGrid,
     overgrown: NDArray[np.bool_],
-    evidence: BoolGrid,
+    shown: BoolGrid,
     config: PerceptionConfig,
 ) -> IntGrid:
     """labels (h, w) where movers that have grown larger than any body, over furniture they walk along, keep
-    only what evidence (h, w) is of. The rest of each begins as a track that stands."""
+    only what is shown (h, w) to move. The rest of each begins as a track that stands."""
     for track in np.flatnonzero(overgrown).tolist():
         own = labels == track + 1
-        widened = np.asarray(cv2.dilate((evidence & own).view(np.uint8), _BLOCK), np.uint8)
+        widened = np.asarray(cv2.dilate((shown & own).view(np.uint8), _BLOCK), np.uint8)
         kept = widened.view(np.bool_) & own
         rest = own & ~kept
         if min(np.count_nonzero(kept), np.count_nonzero(rest)) < _MIN_CELLS:

@@ -1,4 +1,4 @@
-"""What detect yields and track reads: fragments with the evidence of their motion, and what it is worth."""
+"""What detect yields and track reads: fragments, the residuals of their ends, and what these are worth."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ MOTION_NOT_KNOWN = EgoMotion(
 class Detection:
     """What one frame yields before anything is called an obstacle.
 
-    N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: evidence of the 2N
-    ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
+    N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: residuals of the
+    2N ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
     the fixed frame has begun anew, what was tracked before cannot be compared. motion_known: the camera's
     own motion is known well enough to call anything else moving. reckoned: odometry says it, too.
     """
@@ -77,7 +77,7 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> Camera
 
 
 def no_motion(count: int) -> PointMotion:
-    """Evidence of count ends of which nothing is known."""
+    """Residuals of count ends of which nothing is known."""
     return PointMotion(
         static_m=np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
         ray=np.zeros((count, 2)),

@@ -1,4 +1,4 @@
-"""detect: an RGB-D frame and the odometry of its time -> tracked fragments, ego-motion, motion evidence."""
+"""detect: an RGB-D frame and the odometry of its time -> tracked fragments, their residuals, ego-motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vision.depth_mask import surface_depth
 from vision.detection import MOTION_NOT_KNOWN, Detection, camera_health, no_motion
 from vision.edges import GreyImage
 from vision.ego_motion import CameraEstimate, estimate
-from vision.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
+from vision.evidence import appraise, average_depth, observed_variance_scale, residuals, static_points
 from vision.floor import FloorFinder, on_floor
 from vision.fragments import FragmentStore
 from vision.gyro import GyroMemory
@@ -135,10 +135,11 @@ class Detector:
         static = static_points(anchor, depths, store.pixel_cov, moving | store.witness, config.max_depth_m)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
         result = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), camera)
-        motion = gather(store, anchor, depths, result, camera, config.depth_noise, self._variance_scale)
+        scale = self._variance_scale
+        motion = residuals(store, anchor, depths, result, camera, config.depth_noise, scale)
         if result.visual:
             self._variance_scale = observed_variance_scale(
-                motion, store.age_frames, moving | store.witness, self._variance_scale
+                motion, store.age_frames, moving | store.witness, scale
             )
         average_depth(store, store.before(frame.captured_ns), result.pose, config.depth_noise)
         step = self._pose.inverse() @ result.pose

@@ -1,11 +1,10 @@
 """Residual of every fragment end (end point of a fragment) against the prediction that it is static.
 
 The prediction: where the end would be now if it had stayed at its anchor, by the camera's own motion. The
-residual (innovation): how far from there it is seen, with its covariance and chi-square (PointMotion). In
-this file, vision/detection.py and vision/velocities.py "evidence" means these residuals; in
-vision/judgement.py it is something else, a score of each track. The ends that are not known to move also give
-the points that the camera's motion is found by (static_points) and the scale of the noise
-(observed_variance_scale).
+residual (innovation): how far from there it is seen, with its covariance and chi-square (PointMotion). The
+ends that are not known to move also give the points that the camera's motion is found by (static_points) and
+the scale of the noise (observed_variance_scale). The evidence of tracks, which rests on these residuals among
+other things, is in vision/motion_evidence.py.
 """
 
 from __future__ import annotations
@@ -95,7 +94,7 @@ def static_points(
     )
 
 
-def gather(
+def residuals(
     store: FragmentStore,
     anchor: AnchorEnds,
     depths: AnchorDepths,
@@ -104,7 +103,7 @@ def gather(
     noise: DepthNoise,
     variance_scale: float,
 ) -> PointMotion:
-    """The evidence of the 2N ends in store, from their anchors and the camera's pose now.
+    """Of the 2N ends in store, from their anchors and the camera's pose now.
 
     variance_scale: how much larger the variance of static ends has been found than it was assumed.
     """

@@ -16,10 +16,10 @@ Kinds of proof in one frame (threshold: settings.sigmas squared; ends: end point
 All kinds need a known motion of the camera and, except for much arrival, more than the least speed. Bodies
 too fast or too wide to be true prove nothing.
 
-Hysteresis: evidence is a score from 0 to 1.5. A frame with proof raises it by dt / 0.06 s (0.07 s without
-odometry) or more, by 0.5 at most. Without proof it falls by dt / 0.30 s, by dt / 2 s while the motion seems
-to go on, and by dt / 0.12 s where fragments, or of a mover the filter, prove that it stands still, or where
-nothing tells a mover from what stands around it. A track becomes moving at 1.0 and static again at 0.
+Hysteresis: evidence is a track's score from 0 to 1.5. A frame with proof raises it by dt / 0.06 s (0.07 s
+without odometry) or more, by 0.5 at most. Without proof it falls by dt / 0.30 s, by dt / 2 s while the motion
+seems to go on, and by dt / 0.12 s where fragments, or of a mover the filter, prove that it stands still, or
+where nothing tells a mover from what stands around it. A track becomes moving at 1.0 and static again at 0.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What one frame says of whether the tracks move: what vision/judgement.py decides by."""
+"""What one frame says of whether the tracks move: vision/judgement.py adds it up and decides."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth_mask import UNSEEN_M
 from vision.ego_motion import CameraEstimate
-from vision.evidence import appraise, gather
+from vision.evidence import appraise, residuals
 from vision.fragments import FragmentStore
 from vision.velocities import PointMotion
 
@@ -46,7 +46,7 @@ def seen(
             store.ends_px, store.near_m, store.far_m = pixels, near, far
             anchor = store.anchors(stamp_ns, 0.25)
             now = replace(STILL, pose=pose)
-            motion = gather(store, anchor, appraise(anchor, NOISE), now, CAMERA, NOISE, 1.0)
+            motion = residuals(store, anchor, appraise(anchor, NOISE), now, CAMERA, NOISE, 1.0)
         store.commit(stamp_ns, pose, CAMERA, np.zeros(2))
     assert motion is not None
     return motion
