@@ -28,28 +28,28 @@ from vision.edges import GreyImage, find_edges
 from vision.segments import find_segments, longest_first
 from vision.tracks import Tracks
 
-_FEW_FRAGMENTS = 4
+_FEW_FRAGMENTS = 4  # eight ends are what a verdict along the line of sight takes (vision/judgement.py)
 _ENOUGH_OF_A_MOVER = 2  # to follow it, its surface helps
-_MIN_CELLS = 12
-_REACH_M = 9.0
+_MIN_CELLS = 12  # what a track begins with (vision/births.py): less is a sliver
+_REACH_M = 9.0  # short of the depth mask's 10 m by about the noise of depth there
 _URGENT_SIGHTINGS = 45  # who is new in view, or under suspicion, is looked at more often
 # Beside no whole number of frames at 30, 15 or 10 Hz, or the rounding of a stamp would decide.
 _URGENT_NS = 95_000_000
-_IDLE_NS = 495_000_000
-_MARGIN_PX = 6
-_MIN_SIDE_PX = 16
+_IDLE_NS = 495_000_000  # who is known well is looked at twice a second
+_MARGIN_PX = 6  # around its box: an edge is at the rim of a body, and corners are looked for beside it
+_MIN_SIDE_PX = 16  # the least length of a segment here
 _MIN_LENGTH = 0.5  # of the length of other fragments
-_MIN_END_DISTANCE_PX = 8.0
+_MIN_END_DISTANCE_PX = 8.0  # half of the least length of a segment here: ends were moved to corners
 _LEAST_HELD = 600.0  # on a short edge without corners both ends slide alike; noise alone makes 220
 # Not what vision/renewal.py has adapted to there, mostly more: velocities were no better known by it.
 _CONTRAST = 60.0
-_CANDIDATES = 48
-_AT_ONCE = 4
-_GATE_M = 0.3
-_GATE_SIGMAS = 2.0
-_DEEPEST_M = 1.0
+_CANDIDATES = 48  # the longest ones, which bounds the time that one look takes
+_AT_ONCE = 4  # from none to enough in one look, and no body takes all free places
+_GATE_M = 0.3  # about a body's depth, and
+_GATE_SIGMAS = 2.0  # 95 % of what is there, by the noise of depth
+_DEEPEST_M = 1.0  # of its measured depth no more counts: the rest of something deeper is noise, or a wall
 _ONE_SURFACE = 0.5  # of the gate
-_HOLES = 0.2
+_HOLES = 0.2  # of the 25 samples around an end: from a quarter on another surface may be there
 
 
 @dataclass(frozen=True, slots=True, eq=False)

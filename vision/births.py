@@ -11,8 +11,9 @@ from vision.detection import Detection
 from vision.regions import IntGrid, Regions
 from vision.tracks import Tracks
 
+# About 0.1 x 0.1 m 4 m away, as sim.yaml's camera sees it: what is smaller comes and goes with noise.
 _MIN_CELLS = 12
-_SIGMA_M = 0.2
+_SIGMA_M = 0.2  # one sigma of a first sight: the middle of what is seen, from the middle of the body
 # Of what is above the robot, at the side of the image: so much has come, and it hangs no higher than people.
 _CAME_CELLS, _CAME_SHARE, _PERSON_M = 24, 0.5, 2.0
 

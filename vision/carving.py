@@ -25,20 +25,20 @@ from vision.obstacles import FragmentVelocities
 from vision.regions import IntGrid, Regions
 from vision.tracks import Tracks
 
-SUSPECT_EVIDENCE = 0.3
-_COMPACT_M = 1.6
-_BODY_M = 0.85
+SUSPECT_EVIDENCE = 0.3  # gone in 0.09 s where nothing speaks for motion, in 0.6 s where hints do
+_COMPACT_M = 1.6  # wider or deeper than any one body with what it carries: it may hide one
+_BODY_M = 0.85  # nobody is wider (SINGLE_WIDTH_M of vision/division.py)
 _CALM_S = 0.9  # for so long, what has come to rest is where free space was seen
-_MIN_CELLS = 12
-_AROUND_M = 0.2
-_MIN_FRAGMENTS = 2
+_MIN_CELLS = 12  # what a track begins with (vision/births.py)
+_AROUND_M = 0.2  # cells so close to a moving fragment are of its body; a body is about twice as wide
+_MIN_FRAGMENTS = 2  # one alone may be an end that slides
 # One alone, on somebody who walks along a wall: seen for so long, level, and surely so fast.
 _LONE_S = 0.25
-_LONE_MPS, _LONE_SIGMAS = 0.4, 4.0
-_LEVEL = 0.3
+_LONE_MPS, _LONE_SIGMAS = 0.4, 4.0  # a slow walk, as surely as a verdict asks for
+_LEVEL = 0.3  # of its speed may go up or down: an end that slides along an upright edge does
 _BLOCK = np.ones((3, 3), np.uint8)
-_AGREE_M = 0.3
-_AGREE_PER_M2 = 0.015
+_AGREE_M = 0.3  # about a body's depth, and
+_AGREE_PER_M2 = 0.015  # two sigmas of depth by the default noise
 
 
 def carve(

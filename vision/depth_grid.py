@@ -17,11 +17,12 @@ from vision.depth_mask import depth_sigma_m, measurable_m
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
 
-CELL_NOISE = (
-    0.4  # noise of a cell over noise of a pixel: of neighbouring pixels, so less than the count tells
-)
-_FARTHEST = np.uint16(65535)
-_NEAREST_M = 0.1
+# Noise of a cell's height over what one pixel's depth would make: of a median of many pixels, but neighbours,
+# so not as little as their count tells. An estimate; standing() in vision/regions.py has a margin beside it.
+# From one look to another it has been measured, and is more: _CELL_NOISE_OVER_TIME in vision/arrivals.py.
+CELL_HEIGHT_NOISE = 0.4
+_FARTHEST = np.uint16(65535)  # raw depth of what is not valid: sorts behind all that is
+_NEAREST_M = 0.1  # nearer, a point projects anywhere
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
 
 
@@ -131,7 +132,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
             up=None,
             range_m=range_m,
         )
-    sigma_m = np.float32(CELL_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
+    sigma_m = np.float32(CELL_HEIGHT_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
     return DepthGrid(
         step_px=step,
         offset_px=offset,

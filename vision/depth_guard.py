@@ -18,12 +18,12 @@ from vision.near_floor import FLOOR_EXCESS
 from vision.scene import NEVER_M, FreeSpace
 
 _SUPPORT = 3  # this many cells of a band must agree before they are a surface
-_HOLE_ROWS = 2
-_BLANK_SHARE = 0.1
+_HOLE_ROWS = 2  # one row is lost to noise now and then
+_BLANK_SHARE = 0.1  # of a band's cells: stray ones are measured even where something covers the lens
 # Band and distance in one whole number: 80 bands, and up to 64 m in steps of 4 micrometres.
 _BAND_SHIFT = 24
 _UNITS_PER_M = 2.0**18
-_LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5
+_LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5  # as level and as steep as a ray may be to have a tangent worth telling
 
 
 def free_space(

@@ -30,13 +30,13 @@ from vision.motion_prior import MotionPrior, SweepPrior
 from vision.order import median
 from vision.reprojection import Anchors, View, linearise, view_of
 
-_ITERATIONS = 6
+_ITERATIONS = 6  # at most: two that anneal, the others until it has converged
 _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
 _ANNEAL = (32.0, 4.0)  # robust scale of the first iterations, falling to 1
-_MIN_POINTS = 8
-_MIN_INLIER_RATIO = 0.25
-_MIN_BACKGROUND_RATIO = 0.10
-_UNANIMOUS_RATIO = 0.9
+_MIN_POINTS = 8  # two equations each: twice as many as unknowns
+_MIN_INLIER_RATIO = 0.25  # where fewer agree, something else than the ground may have been followed
+_MIN_BACKGROUND_RATIO = 0.10  # the same where the prior binds: what agrees with it may be a small rest
+_UNANIMOUS_RATIO = 0.9  # somebody large leaves more than a tenth of the ground in view
 _LOOSE_SHARE = np.array([5.0] * 6 + [1.0] * 2)  # of the prior's sigma
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, where it decides

@@ -27,20 +27,21 @@ from vision.velocities import PointMotion, chi2_2d
 
 # Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
 _UNSEEN_SIGMA_M = 10.0
-_SETTLED_FRAMES = 3
-_LEAST_ENDS = 16
+_SETTLED_FRAMES = 3  # younger ends are hardly farther from their anchors than the noise
+_LEAST_ENDS = 16  # a third of fewer tells no scale
 _CHI2_THIRD = 0.811  # a third of static ends, 2 degrees of freedom, lies below
-_SCALE_GAIN = 0.15
+_SCALE_GAIN = 0.15  # of what is new in each frame: half of it in four, as the floor or the light changes
+# Sigmas of 0.55 to 2.8 times the assumed ones: beyond that it is something else than noise.
 _LEAST_SCALE = 0.3
 _MOST_SCALE = 8.0
 _STEPS_SHARE = 0.5  # flow errors of successive frames cancel in part
-_MOST_LOOKS = 6.0
+_MOST_LOOKS = 6.0  # a running mean over so many; what they share does not average out, see below
 _SETTLED_LATE_FRAMES = 4.0  # between the plain mean of the first looks and the running one: 2.5 to 5
-_COMMON_NOISE = 0.5
-_MIXED_SIGMAS = 3.0
+_COMMON_NOISE = 0.5  # of depth: what neighbouring frames share, and no mean takes off
+_MIXED_SIGMAS = 3.0  # of depth, and 0.1 m: less is one surface
 _STATIC_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom, lie below
-_MIXED_ALONG_PX = 3.0
-_MIXED_ACROSS_PX = 0.3
+_MIXED_ALONG_PX = 3.0  # how far an end slides along a fragment at least, where two surfaces cross
+_MIXED_ACROSS_PX = 0.3  # across it: twice what a clear end is known to
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.rolling_shutter import straight_rays
 
-HISTORY = 24
-_FEWEST_PLACES = 64
+HISTORY = 24  # frames: the window of 0.25 s at 90 frames a second
+_FEWEST_PLACES = 64  # to begin with; it grows by doubling
 
 
 @dataclass(frozen=True, slots=True, eq=False)

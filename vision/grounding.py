@@ -14,9 +14,9 @@ from vision.depth_grid import DepthGrid
 from vision.order import median
 from vision.regions import IntGrid, Regions, exchanged, measure
 
-_SAME_M = 0.3
-_SAME_PER_M2 = 0.015
-_HOVERS_M = 0.2
+_SAME_M = 0.3  # about a body's depth, and
+_SAME_PER_M2 = 0.015  # two sigmas of depth by the default noise
+_HOVERS_M = 0.2  # what reaches no farther down is the rim of what was found already
 _LOWEST = 4  # one in so many of its rows, the lowest: what reaches down does so at their depth
 
 

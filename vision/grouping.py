@@ -33,10 +33,10 @@ from vision.division import NEARER_INVERSE
 from vision.regions import Regions
 
 _APART_M = 0.40  # parts further from the main one are of something else
-_CLOSE_M = 0.25
-_SAME_DEPTH_M = 0.30
-_SMALL_SHARE = 0.5
-_MOSTLY = 0.7
+_CLOSE_M = 0.25  # a hand's length of depth is lost at a shoe or under an arm
+_SAME_DEPTH_M = 0.30  # about a body's depth, beside the noise
+_SMALL_SHARE = 0.5  # of the larger part: what is more is a body of its own
+_MOSTLY = 0.7  # of its cells were the track's before: then it stays, as a load does
 
 
 @dataclass(frozen=True, slots=True, eq=False)

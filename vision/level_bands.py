@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.depth_grid import BoolGrid, DepthGrid
 
-BANDS = 80
+BANDS = 80  # across 60 degrees: 8 cm wide 6 m ahead
 _FAN_BANDS = 1.5  # columns will do where no cell is farther than so many bands from where it belongs
-_PITCH_RAD = math.radians(0.1)
+_PITCH_RAD = math.radians(0.1)  # in such steps: less moves no cell into another band
 _LEAST_AHEAD = 0.05  # metres along the floor per metre of depth; less is straight down, or behind
 
 

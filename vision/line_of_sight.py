@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.symmetric import inverse
 
-_FLOOR_SIGMA_MPS = 0.03
-_CONTRADICTION_SIGMAS = 2.5
-_CONFIRMING_SIGMAS = 2.5
+_FLOOR_SIGMA_MPS = 0.03  # what no filter knows: the camera's own motion is off by some cm/s
+_CONTRADICTION_SIGMAS = 2.5  # 99 % of velocities that are the same differ by less
+_CONFIRMING_SIGMAS = 2.5  # as clearly as what contradicts
 _LEAST_LEVEL = 1e-6  # straight up or down nothing is level
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # of the axes, in turn
 _IDENTITY = np.eye(3)

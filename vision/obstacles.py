@@ -19,17 +19,17 @@ from vision.velocities import (
     solve_velocity,
 )
 
-_ROBUST_CHI2 = 9.0
+_ROBUST_CHI2 = 9.0  # 99 % of ends that go with the body, 2 degrees of freedom; others lose their weight
 _MEDIAN_CHI2 = 1.386  # of 2 degrees of freedom
 _SPREAD_ENDS = 6  # fewer of them do not show how widely they scatter
 _MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom
 _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
 _INDEPENDENT_DEPTHS = 10.0  # depth noise is shared by neighbours: a body never has more looks than these
-_STATIC_END_CHI2 = 6.0
+_STATIC_END_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
 _LONG_S = 0.26  # about the window of time in which motion is measured
-_NEAR_M = 0.5
-_VELOCITY_GATE_MPS = 0.5
+_NEAR_M = 0.5  # fragments of one body are no farther apart: it is a chain of neighbours that makes a group
+_VELOCITY_GATE_MPS = 0.5  # limbs of a walker differ by about as much, beside two sigmas
 
 
 @dataclass(frozen=True, slots=True, eq=False)

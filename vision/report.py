@@ -12,10 +12,10 @@ from vision.obstacles import FragmentVelocities
 from vision.scene import Fragments, Obstacle
 from vision.tracks import Tracks
 
-MIN_SIGHTINGS = 3
+MIN_SIGHTINGS = 3  # frames: a speckle lasts for one or two
 _LISTED_UNSEEN_S = 0.15  # a track is remembered for longer, but no longer shown as seen
-_WAY_SIGMA_M = 0.06
-_STATIC_SCORE = 0.5
+_WAY_SIGMA_M = 0.06  # one sigma of where a mover went that is not seen
+_STATIC_SCORE = 0.5  # nothing is estimated of what stands: neither sure nor unsure
 _LAST_CELLS = 12  # less of a sliver is no sight of anybody
 _OVERHEAD_CELLS = 24  # half of a head, 6 m away
 # For so long a new mover may be a piece of something else, at most so far before or behind it: of a mover so

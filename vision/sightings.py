@@ -26,17 +26,17 @@ from vision.grouping import ExpectedBodies
 from vision.regions import Regions
 from vision.tracks import Tracks
 
-MIN_CELLS = 6
-_CENTRE_SIGMA_M = 0.015
+MIN_CELLS = 6  # as many as a part has (_SPECKLE_CELLS of vision/regions.py)
+_CENTRE_SIGMA_M = 0.015  # of the centre of the smallest thing: a cell is as wide 2.3 m away
 _CENTRE_SHARE = 0.0125  # of its size, across the line of sight: cells at the rim come and go
-_CENTRE_DEPTH_SHARE = 0.04
+_CENTRE_DEPTH_SHARE = 0.04  # of its size along the line of sight, where what is seen of it changes more
 _SHIFT_SHARE = 0.35  # of its size: the middle of what is seen of a body, from where it is while all is seen
 _CUT_SIGMA_M = 1.0  # in height, of what reaches beyond the image above or below
 _CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it does not average out
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
 _AREA_MEMORY_S = 0.32  # a tenth of what is new each frame at 30 a second
 _SLIVER = 0.4  # of its usual surface
-_JUMP_M = 0.3
+_JUMP_M = 0.3  # beside two sigmas of depth: nobody is so far from where he was expected
 
 
 def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
