@@ -54,10 +54,8 @@ class Changes:
 class FreeMemory:
     """Remembers what was seen through during the last moments."""
 
-    def __init__(self, noise: DepthNoise, range_m: float) -> None:
-        """range_m: where depth ends; what was measured beyond was seen through up to there, no farther."""
+    def __init__(self, noise: DepthNoise) -> None:
         self._noise = noise
-        self._range_inverse = np.float32(1.0 / range_m)
         self._memories: list[_Memory] = []
 
     def clear(self) -> None:
@@ -98,7 +96,8 @@ class FreeMemory:
             return
         nearest = np.full(grid.inverse_depth.shape, _UNKNOWN)
         cv2.copyTo(grid.inverse_depth, grid.valid.view(np.uint8), nearest)
-        nearest[grid.beyond] = max(self._range_inverse, np.float32(1.0 / grid.range_m))
+        # What was measured beyond was seen through up to where depth ends, no farther.
+        nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
         cv2.dilate(nearest, _BLOCK, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest))
         horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))

@@ -58,7 +58,7 @@ class Tracker:
         self._body_height_m = body_height_m
         self._clearance_m = clearance_m
         self._tracks = Tracks()
-        self._free = FreeMemory(config.depth_noise, config.max_depth_m)
+        self._free = FreeMemory(config.depth_noise)
         self._near_floor = NearFloor(config.min_depth_m)
         self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
