@@ -69,7 +69,7 @@ def wanted(tracks: Tracks, detection: Detection, config: PerceptionConfig) -> Wa
     away = (tracks.state[:, :3] - detection.pose.translation_m) @ detection.pose.rotation
     few = tracks.fragments < np.where(tracks.moving, _ENOUGH_OF_A_MOVER, _FEW_FRAGMENTS)
     seen = (tracks.seen_ns == detection.captured_ns) & (tracks.cells >= _MIN_CELLS)
-    chosen = np.flatnonzero(few & seen & (np.square(away).sum(axis=1) <= _REACH_M**2))
+    chosen = (few & seen & (np.square(away).sum(axis=1) <= _REACH_M**2)).nonzero()[0]
     depth_m = np.maximum(away[chosen, 2], 0.0)
     gate_m = _GATE_M + _GATE_SIGMAS * depth_sigma_m(depth_m, config.depth_noise)
     gate_m += 0.5 * np.minimum(tracks.extent_m[chosen, 2], _DEEPEST_M)
@@ -107,7 +107,7 @@ class Attention:
         longest_px = longest_first(segments_px)[:_CANDIDATES]
         ends, tensor = held_ends(grey, longest_px, ends_px, _MIN_END_DISTANCE_PX, _LEAST_HELD)
         surface = depth_along(ends, frame, self._config)
-        picked = np.flatnonzero(self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]))
+        picked = self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]).nonzero()[0]
         return new_fragments(picked[: min(room, _AT_ONCE)], ends, tensor, surface, settings)
 
     def _on_it(self, surface: SurfaceDepth, depth_m: float, gate_m: float) -> NDArray[np.bool_]:

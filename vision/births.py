@@ -42,7 +42,7 @@ def begin(
         if swings_in.any():
             swings_in &= reaching_down(grid, parts, len(winner), _PERSON_M)
         large &= ~overhead | swings_in | regions.hidden_below(grid, parts, measured)
-    born = np.flatnonzero(large)
+    born = large.nonzero()[0]
     if len(born) == 0:
         return winner
     result = winner.copy()

@@ -58,7 +58,7 @@ def carve(
     if len(tracks) == 0:
         return labels
     grid = detection.grid
-    suspicious = np.flatnonzero(obstacles.moving_candidates(detection.motion, detection.age_frames))
+    suspicious = obstacles.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not arrived.any():
         return labels
     mover = tracks.mover
@@ -88,7 +88,7 @@ def carve(
         return labels
     count, parts = regions.components(grid, grown)
     cells = np.bincount(parts.ravel(), minlength=count + 1)
-    keep = np.flatnonzero(cells[1:] >= _MIN_CELLS) + 1
+    keep = (cells[1:] >= _MIN_CELLS).nonzero()[0] + 1
     if len(keep) == 0:
         return labels
     number = np.zeros(count + 1, np.int32)
@@ -110,7 +110,7 @@ def _cut_back(
 ) -> IntGrid:
     """labels (h, w) where movers that have grown larger than any body, over furniture they walk along, keep
     only what is shown (h, w) to move. The rest of each begins as a track that stands."""
-    for track in np.flatnonzero(overgrown).tolist():
+    for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
         widened = np.asarray(cv2.dilate((shown & own).view(np.uint8), _BLOCK), np.uint8)
         kept = widened.view(np.bool_) & own

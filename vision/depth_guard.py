@@ -126,7 +126,7 @@ def _known_m(
     y = grid.y.astype(float)
     drop = y * cos_pitch + sin_pitch
     below = drop > grid.camera_height_m / (1.5 * max_depth_m)
-    rows = np.flatnonzero(below)[::-1]  # from the bottom of the image outwards
+    rows = below.nonzero()[0][::-1]  # from the bottom of the image outwards
     if len(rows) == 0:
         return np.zeros(len(bands)), 0.0
     floor_depth = grid.camera_height_m / drop[rows]
@@ -153,6 +153,8 @@ def _known_m(
     # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known. Nor is it where a
     # hole comes before any floor.
     known = np.minimum(reach[first], max_depth_m)
-    nowhere = (first == 0) | (blank > 0) & (~shown.any(axis=0) | (shown.argmax(axis=0) >= first))
-    blind_m = float(floor_forward[blank - 1]) if blank else 0.0
+    nowhere, blind_m = first == 0, 0.0
+    if blank:
+        nowhere |= ~shown.any(axis=0) | (shown.argmax(axis=0) >= first)
+        blind_m = float(floor_forward[blank - 1])
     return np.where(nowhere, 0.0, known).astype(float), blind_m

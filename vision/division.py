@@ -42,7 +42,7 @@ def split(
     either. Nor is what is low beside it, a trolley before who pushes it, unless it stands: more of it has
     stayed (h, w) where it was than if it had gone way_m with the track.
     """
-    cells = np.flatnonzero(labels.ravel() == track + 1)
+    cells = (labels.ravel() == track + 1).nonzero()[0]
     if len(cells) < 2 * _MIN_CELLS:
         return None
     points = grid.points(cells)[::2].T.astype(float)
@@ -116,7 +116,7 @@ def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] 
     if deepest_m < _DIP_M + cell_m:
         return None
     # In the middle of what is about as low.
-    low = np.flatnonzero(dip_m >= deepest_m - cell_m)
+    low = (dip_m >= deepest_m - cell_m).nonzero()[0]
     valley = int(low[len(low) // 2])
     one, other = int(height_m[:valley].argmax()), valley + int(height_m[valley:].argmax())
     if not _LEAST_APART_M <= (other - one) * cell_m <= _MOST_APART_M:

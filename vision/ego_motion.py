@@ -80,7 +80,7 @@ def estimate(
     before: the camera of the frame before, in the fixed frame.
     """
     start, sigma = before @ prior.motion, np.concatenate((prior.sigma, sweep.sigma_rad))
-    use = np.flatnonzero(anchors.usable)
+    use = anchors.usable.nonzero()[0]
     if len(use) < _MIN_POINTS:
         return _unseen(start, sigma, float("nan"))
     view = view_of(anchors, pixels, use, camera)

@@ -209,7 +209,7 @@ def _pixel_covariance(
     """
     steps = np.maximum(1.0, _STEPS_SHARE * anchor.lag_frames).repeat(2)
     result: FloatArray = store.pixel_cov.reshape(-1, 3).T * steps
-    ends = np.flatnonzero(mixed)
+    ends = mixed.nonzero()[0]
     both = store.ends_px[ends // 2].astype(float)
     du, dv = (both[:, 1] - both[:, 0]).T
     squared = np.maximum(du * du + dv * dv, 1e-12)

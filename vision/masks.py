@@ -90,7 +90,7 @@ def predict(
     agrees = inside & (measured > 0) & (np.abs(measured - expected) <= gate)
     if not number.all():
         agrees &= number.take(before.owner) > 0
-    chosen = np.flatnonzero(agrees)
+    chosen = agrees.nonzero()[0]
     _write_nearest(
         result.ravel(), cell.take(chosen), number.take(before.owner.take(chosen)), expected.take(chosen)
     )
@@ -109,7 +109,7 @@ def _write_nearest(
     held[cell] = inverse_depth
     # What is written last stays. Most cells are wanted once; only what is nearer than the last has to be
     # written again, the nearest last.
-    nearer = np.flatnonzero(inverse_depth > held.take(cell))
+    nearer = (inverse_depth > held.take(cell)).nonzero()[0]
     nearer = nearer[np.argsort(inverse_depth.take(nearer), kind="stable")]
     into[cell.take(nearer)] = value.take(nearer)
 

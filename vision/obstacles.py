@@ -85,7 +85,7 @@ def body_velocities(
     """
     use = motion.usable & (owner >= 0)
     member = np.zeros((bodies, len(owner)))
-    chosen = np.flatnonzero(use)
+    chosen = use.nonzero()[0]
     member[owner[chosen], chosen] = 1.0
     ends = member.sum(axis=1).astype(np.intp)
     share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))
@@ -129,7 +129,7 @@ class _Parties:
 
 def _parties(chosen: NDArray[np.intp], owner: NDArray[np.intp], ends: NDArray[np.intp]) -> _Parties:
     """ends (G,): how many of the ends chosen (M,) each body has; owner (2N,): of all ends."""
-    many = np.flatnonzero(ends >= _SPREAD_ENDS)
+    many = (ends >= _SPREAD_ENDS).nonzero()[0]
     middle = (np.cumsum(ends) - ends + ends // 2)[many]
     return _Parties(bodies=len(ends), chosen=chosen, owner=owner[chosen], many=many, middle=middle)
 

@@ -148,7 +148,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     )
     if len(flat) == 0:
         return result
-    present = np.flatnonzero(cells)
+    present = cells.nonzero()[0]
     starts, number = starts[present], cells[present]
     rows = flat // np.int32(width)
     columns = flat - rows * np.int32(width)
@@ -232,7 +232,7 @@ def _hidden_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.in
     """(count,) cells at the left or right rim of each part beside which something else stands nearer, or
     another part goes on at the same depth."""
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    rims = np.flatnonzero(flat[1:] != flat[:-1])
+    rims = (flat[1:] != flat[:-1]).nonzero()[0]
     rims = rims[(rims + 1) % labels.shape[1] > 0]  # not from the end of a row to the next one
     left, right = flat.take(rims), flat.take(rims + 1)
     step = inverse.take(rims + 1) - inverse.take(rims)
@@ -249,9 +249,9 @@ def _overlapped_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[n
     comes after that gap is the neighbour.
     """
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    owned = np.flatnonzero(flat > 0)
+    owned = (flat > 0).nonzero()[0]
     label = flat.take(owned)
-    rims = np.flatnonzero(label[1:] != label[:-1])
+    rims = (label[1:] != label[:-1]).nonzero()[0]
     first, second = owned.take(rims), owned.take(rims + 1)
     apart = second - first
     near = (apart <= _GAP_CELLS + 1) & (second % labels.shape[1] >= apart)  # not from one row to the next
@@ -266,7 +266,7 @@ def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[
     further down is not known. A beam ends before what is farther away. A head is as tall as _HEAD_M."""
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
     width = labels.shape[1]
-    rims = np.flatnonzero((flat[:-width] > 0) & (flat[:-width] != flat[width:]))
+    rims = ((flat[:-width] > 0) & (flat[:-width] != flat[width:])).nonzero()[0]
     below = np.zeros(len(rims), inverse.dtype)
     for step in range(1, _GAP_CELLS + 1):
         below = np.maximum(below, inverse.take(np.minimum(rims + step * width, len(flat) - 1)))

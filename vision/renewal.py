@@ -122,7 +122,7 @@ class Renewal:
         # Where nothing is measured at all, it is mostly far away: good to know the camera's turn by.
         beyond = ~(near == near).any(axis=1)
         beyond &= np.cumsum(beyond) <= room[1]
-        whole = np.flatnonzero(on_one_surface(near, config) | beyond)
+        whole = (on_one_surface(near, config) | beyond).nonzero()[0]
         tile = _tiles(snapped[whole], settings.tile_px, counts.shape[1])
         picked = whole[_rank_within(tile) < missing[tile]][: max(0, room[0])]
         return new_fragments(picked, snapped, tensor, surface, settings)

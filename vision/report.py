@@ -51,7 +51,7 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
         bbox = np.where(whole[:, None], expected_px, bbox)
     told = tracks.moving & ~_pieces(tracks, listed, bbox, local[:, 2], detection.camera.fx)
     result = []
-    for t in np.flatnonzero(listed).tolist():
+    for t in listed.nonzero()[0].tolist():
         moving = bool(told[t])
         u0, v0, u1, v1 = bbox[t].tolist()
         result.append(
@@ -77,7 +77,7 @@ def _pieces(
 ) -> NDArray[np.bool_]:
     """(T,) movers so new that they may be a piece of something larger."""
     result = np.zeros(len(tracks), np.bool_)
-    new = np.flatnonzero(tracks.moving & listed & (tracks.moving_s < _PIECE_S))
+    new = (tracks.moving & listed & (tracks.moving_s < _PIECE_S)).nonzero()[0]
     if len(new):
         area_px = (bbox_px[:, 2:] - bbox_px[:, :2]).prod(axis=1)
         small = area_px * np.square(depth_m / focal_px) < _PIECE_M2

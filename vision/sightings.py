@@ -43,7 +43,7 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     """Update tracks with the surfaces measured, entry k for track k; without cells they stay as predicted."""
     visible = measured.cells >= MIN_CELLS
     tracks.clean_s[~visible] = 0.0
-    seen = np.flatnonzero(visible)
+    seen = visible.nonzero()[0]
     if len(seen) == 0:
         return
     position = detection.pose.apply(measured.position_m[seen])
@@ -61,7 +61,7 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     rough = ~smooth & ~sliver & steady & tracks.moving[seen]
     cut = ~smooth & ~sliver & ~rough
     tracks.sliver[seen] = sliver & ~_at_border(measured.bbox_px[seen], detection)
-    located, doubt = np.flatnonzero(smooth | rough), covariance
+    located, doubt = (smooth | rough).nonzero()[0], covariance
     if rough.any():
         shift_m = np.where(rough, _SHIFT_SHARE * measured.extent_m[seen, :2].max(axis=1), 0.0)
         doubt = covariance + np.square(shift_m)[:, None, None] * np.eye(3)

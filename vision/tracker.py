@@ -171,7 +171,7 @@ class Tracker:
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
         alive = mover | tracks.has_moved
-        winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, alive, expected)
+        winner = grouping.attach((winner == 0).nonzero()[0], measured, winner, alive, expected)
         speed_mps = self._config.motion.max_speed_mps
         winner = births.begin(
             tracks, detection, parts, measured, came, winner, self._body_height_m, speed_mps
@@ -190,7 +190,7 @@ class Tracker:
         way_m = tracks.speed_mps * changes.stayed_s
         labels, gone = merging.join(grid, labels, pairs, changes.stayed, way_m)
         tracks.seen_ns[gone] = detection.captured_ns - _LONG_AGO_NS
-        for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
+        for track in (tracks.moving & (measured.cells > 0)).nonzero()[0].tolist():
             second = division.split(grid, labels, track, changes.stayed, float(way_m[track]))
             if second is not None:
                 tracks.twin(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)

@@ -93,8 +93,9 @@ class Tracks:
         """Drop all but the chosen tracks."""
         if chosen.all():
             return
+        kept = chosen.nonzero()[0]  # a choice by index is several times as fast
         for name in self._fields:
-            setattr(self, name, getattr(self, name)[chosen])
+            setattr(self, name, getattr(self, name).take(kept, axis=0))
 
     def index_of(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
         """(N,) index of each track id, -1 where there is none (any more)."""
