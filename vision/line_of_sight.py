@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.symmetric import inverse
 
-_FLOOR_SIGMA_MPS = 0.03  # what no filter knows: the camera's own motion is off by some cm/s
+_FLOOR_SIGMA_MPS = 0.03  # allowed for: an error of the camera's own motion, which no filter knows of
 _CONTRADICTION_SIGMAS = 2.5  # 99 % of velocities that are the same differ by less
 _CONFIRMING_SIGMAS = 2.5  # as clearly as what contradicts
 _LEAST_LEVEL = 1e-6  # straight up or down nothing is level

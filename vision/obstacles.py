@@ -29,7 +29,7 @@ _STATIC_END_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
 _LONG_S = 0.26  # about the window of time in which motion is measured
 _NEAR_M = 0.5  # fragments of one body are no farther apart: it is a chain of neighbours that makes a group
-_VELOCITY_GATE_MPS = 0.5  # limbs of a walker differ by about as much, beside two sigmas
+_VELOCITY_GATE_MPS = 0.5  # allowed for limbs, which go unlike their body, beside two sigmas
 
 
 @dataclass(frozen=True, slots=True, eq=False)

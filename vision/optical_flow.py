@@ -13,7 +13,7 @@ from vision.edges import GreyImage
 from vision.order import median
 
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)  # px: far below an end's own sigma
-_MIN_EIGENVALUE = 1e-5  # hardly any is refused by it: straight edges are held by the expectation
+_MIN_EIGENVALUE = 1e-5  # low: straight edges are to pass, and are held by the expectation
 # Eigenvalues are at hand; the other error that could be asked for would be worked out pixel by pixel.
 _FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 _EXPECTATION_PX = 2.0  # one sigma of where an end is expected, once what all have in common is taken off

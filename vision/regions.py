@@ -20,7 +20,7 @@ IntGrid = NDArray[np.int32]
 # 1/m: 0.15 m at 5 m, below which it is noise; a body's depth at 3 m, above which a slope is no excuse.
 _LEAST_JUMP = 0.006
 _MOST_JUMP = 0.03
-_SPECKLE_CELLS = 6  # fewer are wrong matches of a stereo camera more often than things
+_SPECKLE_CELLS = 6  # fewer are taken for wrong matches of a stereo camera
 _UNIFORM = 3.46  # a uniform spread is this many standard deviations long
 _FOOT_M, _FOOT_PER_METRE = 0.12, 0.015  # taken for floor: standing()'s clearance and margins
 _OCCLUDED_SHARE = 0.15  # of its rows: at fewer rims it is noise that is nearer

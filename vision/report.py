@@ -12,7 +12,7 @@ from vision.obstacles import FragmentVelocities
 from vision.scene import Fragments, Obstacle
 from vision.tracks import Tracks
 
-MIN_SIGHTINGS = 3  # frames: a speckle lasts for one or two
+MIN_SIGHTINGS = 3  # frames: what lasts for one or two is taken for a speckle
 _LISTED_UNSEEN_S = 0.15  # a track is remembered for longer, but no longer shown as seen
 _WAY_SIGMA_M = 0.06  # one sigma of where a mover went that is not seen
 _STATIC_SCORE = 0.5  # nothing is estimated of what stands: neither sure nor unsure

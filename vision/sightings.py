@@ -36,7 +36,7 @@ _CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
 _AREA_MEMORY_S = 0.32  # a tenth of what is new each frame at 30 a second
 _SLIVER = 0.4  # of its usual surface
-_JUMP_M = 0.3  # beside two sigmas of depth: nobody is so far from where he was expected
+_JUMP_M = 0.3  # and two sigmas of depth: a centre farther from where it was expected has jumped
 
 
 def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:

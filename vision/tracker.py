@@ -45,7 +45,7 @@ from vision.tracks import Tracks
 
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: 0.28 m/s in the first second
 _FORGET_S = 0.5  # who goes behind a post is out again by then; for longer the decision remembers
-_FORGET_YOUNG_S = 0.15  # some frames: what was hardly seen is a speckle more often than a body
+_FORGET_YOUNG_S = 0.15  # some frames: what was hardly seen is taken for a speckle
 _LONG_AGO_NS = 10**9  # as seen last, of what is to be forgotten now: more than the former
 _IDENTITY = np.eye(3)
 
