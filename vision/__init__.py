@@ -12,8 +12,13 @@ vision/detector.py turns a frame into a Detection, vision/tracker.py turns that 
 * body: a physical thing, a person or a vehicle for example. Depth may merge two bodies or split one.
 * track: what is kept of one body from frame to frame: id, filter, verdict (vision/bodies/tracks.py). Comments
   on slip and vibration, however, mean the crawler tracks that the robot drives on.
-* mover: a track that moves by the verdict, or has at least some evidence of it; suspect: a track that was cut
+* mover: a track that moves by the verdict, or has some evidence of it; suspect: a track that was cut
   out of another one and has yet to prove that it moves.
 * surface: the cells of one track in one frame, the visible side of its body.
+* residual of an end: by how much it is not seen where it would be if it were static
+  (vision/motion/evidence.py).
+* evidence of a track: what speaks for its motion, from the residuals of its fragments, from arrivals and from
+  its surface: in one frame (MotionEvidence), and added up over frames to a score
+  (vision/bodies/judgement.py).
 * region: what a labelled set of cells (a part or a surface) measures: box, centre, extent, whether it is cut.
 """

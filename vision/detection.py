@@ -1,7 +1,8 @@
-"""What detect yields and track reads: fragments with the evidence of their motion, and what it is worth."""
+"""What detect yields and track reads: fragments, the residuals of their ends, and what these are worth."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,13 +14,23 @@ from vision.depth.depth_grid import DepthGrid
 from vision.motion.velocities import PointMotion
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
+# Of a frame that was not compared with the one before.
+MOTION_NOT_KNOWN = EgoMotion(
+    motion=Pose(np.eye(3), np.zeros(3)),
+    dt_s=0.0,
+    source="none",
+    inlier_ratio=math.nan,
+    sigma_translation_m=math.inf,
+    sigma_rotation_rad=math.inf,
+)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection:
     """What one frame yields before anything is called an obstacle.
 
-    N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: evidence of the 2N
-    ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
+    N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: residuals of the
+    2N ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
     the fixed frame has begun anew, what was tracked before cannot be compared. motion_known: the camera's
     own motion is known well enough to call anything else moving. reckoned: odometry says it, too.
     """
@@ -66,17 +77,17 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> Camera
 
 
 def no_motion(count: int) -> PointMotion:
-    """Evidence of count ends of which nothing is known."""
+    """Residuals of count ends of which nothing is known."""
     return PointMotion(
-        np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
-        np.zeros((count, 2)),
-        np.zeros(count),
-        np.zeros((count, 2)),
-        np.ones((count, 3)) * np.array([1.0, 0.0, 1.0]),
-        np.zeros((count, 2)),
-        np.full(count, np.nan),
-        np.ones(count),
-        np.zeros(count),
-        np.zeros(count),
-        np.zeros(count, np.bool_),
+        static_m=np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
+        ray=np.zeros((count, 2)),
+        lag_s=np.zeros(count),
+        miss_m=np.zeros((count, 2)),
+        covariance=np.ones((count, 3)) * np.array([1.0, 0.0, 1.0]),
+        depth_effect=np.zeros((count, 2)),
+        depth_step_m=np.full(count, np.nan),
+        depth_step_sigma_m=np.ones(count),
+        depth_lag_s=np.zeros(count),
+        static_chi2=np.zeros(count),
+        usable=np.zeros(count, np.bool_),
     )

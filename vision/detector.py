@@ -1,4 +1,4 @@
-"""detect: an RGB-D frame and the odometry of its time -> tracked fragments, ego-motion, motion evidence."""
+"""detect: an RGB-D frame and the odometry of its time -> tracked fragments, their residuals, ego-motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vision.camera.lens import project, rays, vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
-from vision.detection import Detection, camera_health, no_motion
+from vision.detection import MOTION_NOT_KNOWN, Detection, camera_health, no_motion
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
 from vision.ego_motion.rolling_shutter import ReadOut
@@ -27,7 +27,7 @@ from vision.fragments.edges import GreyImage
 from vision.fragments.optical_flow import Pyramid, pyramid
 from vision.fragments.renewal import Renewal
 from vision.fragments.store import FragmentStore
-from vision.motion.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
+from vision.motion.evidence import appraise, average_depth, observed_variance_scale, residuals, static_points
 from vision.motion.velocities import PointMotion
 from vision.percept import Percept
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
@@ -135,10 +135,11 @@ class Detector:
         static = static_points(anchor, depths, store.pixel_cov, moving | store.witness, config.max_depth_m)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
         result = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), camera)
-        motion = gather(store, anchor, depths, result, camera, config.depth_noise, self._variance_scale)
+        scale = self._variance_scale
+        motion = residuals(store, anchor, depths, result, camera, config.depth_noise, scale)
         if result.visual:
             self._variance_scale = observed_variance_scale(
-                motion, store.age_frames, moving | store.witness, self._variance_scale
+                motion, store.age_frames, moving | store.witness, scale
             )
         average_depth(store, store.before(frame.captured_ns), result.pose, config.depth_noise)
         step = self._pose.inverse() @ result.pose
@@ -149,8 +150,9 @@ class Detector:
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
         known = ego.source in ("visual", "odometry") and not blurred
+        reckoned = prior.source != "none"
         detection = self._detection(
-            frame, grid, dt_s, motion, ego, health, False, known, prior.source != "none"
+            frame, grid, health, motion, ego, dt_s=dt_s, motion_known=known, reckoned=reckoned
         )
         self._renew(frame, grey)
         if previous is not None:
@@ -197,50 +199,48 @@ class Detector:
         self._store.clear()
         self._read_out.lose()
         self._motion, self._motion_dt_s = _IDENTITY, 0.0
-        ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
         self._renew(frame, grey)
         motion = no_motion(2 * len(self._store))
-        detection = self._detection(frame, grid, 0.0, motion, ego, health, True)
+        detection = self._detection(frame, grid, health, motion, restarted=True)
         self._commit(frame, pyramid(grey, self._config.fragments), odometry, _NO_SWEEP)
         return detection
 
     def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
         """Nothing can be followed through this frame; the fragments wait for the next good one."""
         self._read_out.lose()
-        ego = EgoMotion(_IDENTITY, 0.0, "none", float("nan"), float("inf"), float("inf"))
-        motion = no_motion(2 * len(self._store))
-        return self._detection(frame, grid, 0.0, motion, ego, health, False)
+        return self._detection(frame, grid, health, no_motion(2 * len(self._store)))
 
     def _detection(
         self,
         frame: RgbdFrame,
         grid: DepthGrid,
-        dt_s: float,
-        motion: PointMotion,
-        ego: EgoMotion,
         health: CameraHealth,
-        restarted: bool,
+        motion: PointMotion,
+        ego: EgoMotion = MOTION_NOT_KNOWN,
+        *,
+        dt_s: float = 0.0,
+        restarted: bool = False,
         motion_known: bool = False,
         reckoned: bool = False,
     ) -> Detection:
         store, self._told = self._store, health
         return Detection(
-            frame.captured_ns,
-            frame.sequence,
-            dt_s,
-            frame.intrinsics,
-            grid,
-            store.ids,
-            store.ends_px,
-            store.near_m,
-            store.age_frames.copy(),
-            motion,
-            self._pose,
-            ego,
-            health,
-            restarted,
-            motion_known,
-            reckoned,
+            captured_ns=frame.captured_ns,
+            sequence=frame.sequence,
+            dt_s=dt_s,
+            camera=frame.intrinsics,
+            grid=grid,
+            ids=store.ids,
+            ends_px=store.ends_px,
+            near_m=store.near_m,
+            age_frames=store.age_frames.copy(),
+            motion=motion,
+            pose=self._pose,
+            ego_motion=ego,
+            health=health,
+            restarted=restarted,
+            motion_known=motion_known,
+            reckoned=reckoned,
         )
 
     def _prior(self, frame: RgbdFrame, odometry: Pose | None, dt_s: float) -> MotionPrior:
@@ -275,12 +275,12 @@ class Detector:
 def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:
     variance = result.covariance.diagonal()
     return EgoMotion(
-        step,
-        dt_s,
-        "visual" if result.visual else "disputed" if result.disputed else prior.source,
-        result.inlier_ratio,
-        float(np.sqrt(variance[3:].sum())),
-        float(np.sqrt(variance[:3].sum())),
+        motion=step,
+        dt_s=dt_s,
+        source="visual" if result.visual else "disputed" if result.disputed else prior.source,
+        inlier_ratio=result.inlier_ratio,
+        sigma_translation_m=float(np.sqrt(variance[3:].sum())),
+        sigma_rotation_rad=float(np.sqrt(variance[:3].sum())),
     )
 
 

@@ -25,12 +25,12 @@ class Perception:
         self._before: Percept | None = None
 
     def detect(self, frame: RgbdFrame, odometry: Pose | None) -> Detection:
-        """RGB-D frame to fragments with motion evidence. odometry: the camera (optical frame) in the
+        """RGB-D frame to fragments with their residuals. odometry: the camera (optical frame) in the
         odometry frame at frame.captured_ns by dead reckoning, None where not known."""
         return self._detector.step(frame, odometry, self._before)
 
     def track(self, detection: Detection, robot_pose: PlanarPose | None) -> Percept:
-        """Motion evidence to the scene. robot_pose is handed on to it."""
+        """Fragments and depth to the scene. robot_pose is handed on to it."""
         percept = self._tracker.step(detection, robot_pose)
         self._before = percept
         return percept

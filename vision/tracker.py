@@ -33,9 +33,9 @@ from vision.percept import Percept
 from vision.scene import CameraCondition, FreeSpace, Scene
 
 _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: 0.28 m/s in the first second
-_FORGET_S = 0.5
-_FORGET_YOUNG_S = 0.15
-_LONG_AGO_NS = 10**9
+_FORGET_S = 0.5  # who goes behind a post is out again by then; for longer the decision remembers
+_FORGET_YOUNG_S = 0.15  # some frames: what was hardly seen is taken for a speckle
+_LONG_AGO_NS = 10**9  # as seen last, of what is to be forgotten now: more than the former
 _IDENTITY = np.eye(3)
 
 
@@ -47,7 +47,7 @@ class Tracker:
         self._body_height_m = body_height_m
         self._clearance_m = clearance_m
         self._tracks = Tracks()
-        self._free = FreeMemory(config.depth_noise, config.max_depth_m)
+        self._free = FreeMemory(config.depth_noise)
         self._near_floor = NearFloor(config.min_depth_m)
         self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
@@ -160,7 +160,7 @@ class Tracker:
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
         alive = mover | tracks.has_moved
-        winner = grouping.attach(np.flatnonzero(winner == 0), measured, winner, alive, expected)
+        winner = grouping.attach((winner == 0).nonzero()[0], measured, winner, alive, expected)
         speed_mps = self._config.motion.max_speed_mps
         winner = births.begin(
             tracks, detection, parts, measured, came, winner, self._body_height_m, speed_mps
@@ -179,7 +179,7 @@ class Tracker:
         way_m = tracks.speed_mps * changes.stayed_s
         labels, gone = merging.join(grid, labels, pairs, changes.stayed, way_m)
         tracks.seen_ns[gone] = detection.captured_ns - _LONG_AGO_NS
-        for track in np.flatnonzero(tracks.moving & (measured.cells > 0)).tolist():
+        for track in (tracks.moving & (measured.cells > 0)).nonzero()[0].tolist():
             second = division.split(grid, labels, track, changes.stayed, float(way_m[track]))
             if second is not None:
                 tracks.twin(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
@@ -244,13 +244,13 @@ class Tracker:
     ) -> Percept:
         tracks = self._tracks
         scene = Scene(
-            detection.captured_ns,
-            detection.sequence,
-            report.obstacles(tracks, detection),
-            self._free_space(detection, standing),
-            detection.ego_motion,
-            detection.health,
-            robot_pose,
+            captured_ns=detection.captured_ns,
+            sequence=detection.sequence,
+            obstacles=report.obstacles(tracks, detection),
+            free_space=self._free_space(detection, standing),
+            ego_motion=detection.ego_motion,
+            health=detection.health,
+            robot_pose=robot_pose,
         )
         index = tracks.index_of(owner)
         moving = np.concatenate((tracks.moving, [False]))[index]

@@ -21,9 +21,9 @@ from vision.motion.least_squares import long_static
 _ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85, 0.5, 0.5])
 _ABOVE_PX = np.array([0.0, 0.0, 0.0, 8.0, 8.0, 8.0, 0.0, 0.0])
 _BESIDE_PX = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -8.0, 8.0])
-_ON_IT = 6
-_LEAST_GATE_M = 0.3
-_SAME_DEPTH_M = 0.05
+_ON_IT = 6  # places that are on the fragment: one of these at least has to agree, not only one beside it
+_LEAST_GATE_M = 0.3  # about a body's depth: an outline may be as far back as its side
+_SAME_DEPTH_M = 0.05  # closer than this, beside the noise, is at the same depth: no surface is even
 _NEARER = 0.1  # per metre, against the depth by which a fragment is off
 
 

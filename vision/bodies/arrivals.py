@@ -19,14 +19,18 @@ from config.perception import DepthNoise
 from hal.types import FloatArray, Pose
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 
+# Every second view at 30 frames a second: a look back takes whichever is close to it.
 _KEEP_EVERY_S = 0.06
+# Who walks has left his own width behind in the longer one; the shorter one forgets sooner what the camera's
+# own motion was off by.
 _LOOK_BACK_S = (0.2, 0.6)
-_MARGIN_M = 0.10
-_SIGMAS = 3.5
-# Of a cell over that of a pixel: a median over 25 cells of four samples each, of noise that neighbours share.
-_CELL_NOISE = 0.55
+_MARGIN_M = 0.10  # beside the noise: what the camera's motion may be off by over the longer look back
+_SIGMAS = 3.5  # of what is compared, two in ten thousand cells by chance; neighbours have to agree, too
+# Noise of a cell between two looks over that of a pixel, measured over time: a median over 25 cells of four
+# samples each, whose noise neighbours share. Within one look, over the floor, it is CELL_HEIGHT_NOISE.
+_CELL_NOISE_OVER_TIME = 0.55
 _NEIGHBOURS = 5  # of a cell and its eight neighbours, this many must have arrived
-_UNKNOWN = np.float32(1e3)
+_UNKNOWN = np.float32(1e3)  # 1/m, of what was not measured: nothing is nearer, so that nothing has come there
 _BLOCK = np.ones((3, 3), np.uint8)
 
 
@@ -50,10 +54,8 @@ class Changes:
 class FreeMemory:
     """Remembers what was seen through during the last moments."""
 
-    def __init__(self, noise: DepthNoise, range_m: float) -> None:
-        """range_m: where depth ends; what was measured beyond was seen through up to there, no farther."""
+    def __init__(self, noise: DepthNoise) -> None:
         self._noise = noise
-        self._range_inverse = np.float32(1.0 / range_m)
         self._memories: list[_Memory] = []
 
     def clear(self) -> None:
@@ -84,7 +86,7 @@ class FreeMemory:
 
     def resolves_m(self, distance_m: FloatArray) -> FloatArray:
         """(N,) how much nearer or farther a surface at distance_m (N,) has to be to be told from another."""
-        noise_1pm = _SIGMAS * math.sqrt(2.0) * _CELL_NOISE * self._noise.quadratic_per_m
+        noise_1pm = _SIGMAS * math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
         result: FloatArray = _MARGIN_M + noise_1pm * np.square(distance_m)
         return result
 
@@ -94,7 +96,8 @@ class FreeMemory:
             return
         nearest = np.full(grid.inverse_depth.shape, _UNKNOWN)
         cv2.copyTo(grid.inverse_depth, grid.valid.view(np.uint8), nearest)
-        nearest[grid.beyond] = max(self._range_inverse, np.float32(1.0 / grid.range_m))
+        # What was measured beyond was seen through up to where depth ends, no farther.
+        nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
         cv2.dilate(nearest, _BLOCK, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest))
         horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))
@@ -119,6 +122,6 @@ class FreeMemory:
         there += relative.translation_m.astype(np.float32)[:, None]
         cell, inside, inverse = grid.project(there)
         seen = memory.nearest_inverse.ravel().take(cell)
-        sigma = np.float32(np.sqrt(2.0) * _CELL_NOISE * self._noise.quadratic_per_m)
+        sigma = np.float32(np.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m)
         margin = np.float32(_MARGIN_M) * inverse * inverse + np.float32(_SIGMAS) * sigma
         return inverse - seen, inside, margin

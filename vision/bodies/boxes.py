@@ -19,8 +19,8 @@ LOAD_M = 0.8  # by so much farther back a load may begin than what carries it
 THROUGH_M = 1.5  # by so much farther back a vehicle may be seen through itself
 LEAST_SAMPLES = 3  # of the cells between two: something is there
 _ALONG = np.linspace(0.0, 1.0, 24)[:, None]  # from one to another
-_MOSTLY = 0.7
-_TOUCHING_PX = 16.0
+_MOSTLY = 0.7  # of its width: a load juts out beyond its carrier by no more
+_TOUCHING_PX = 16.0  # four cells: the rims between two depths are of neither
 
 
 @dataclass(frozen=True, slots=True, eq=False)

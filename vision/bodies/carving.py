@@ -26,20 +26,20 @@ from vision.detection import Detection
 from vision.motion import least_squares
 from vision.motion.least_squares import FragmentVelocities
 
-SUSPECT_EVIDENCE = 0.3
-_COMPACT_M = 1.6
-_BODY_M = 0.85
+SUSPECT_EVIDENCE = 0.3  # gone in 0.09 s where nothing speaks for motion, in 0.6 s where hints do
+_COMPACT_M = 1.6  # wider or deeper than any one body with what it carries: it may hide one
+_BODY_M = 0.85  # nobody is wider (SINGLE_WIDTH_M of vision/bodies/division.py)
 _CALM_S = 0.9  # for so long, what has come to rest is where free space was seen
-_MIN_CELLS = 12
-_AROUND_M = 0.2
-_MIN_FRAGMENTS = 2
+_MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py)
+_AROUND_M = 0.2  # cells so close to a moving fragment are of its body; a body is about twice as wide
+_MIN_FRAGMENTS = 2  # one alone may be an end that slides
 # One alone, on somebody who walks along a wall: seen for so long, level, and surely so fast.
 _LONE_S = 0.25
-_LONE_MPS, _LONE_SIGMAS = 0.4, 4.0
-_LEVEL = 0.3
+_LONE_MPS, _LONE_SIGMAS = 0.4, 4.0  # a slow walk, as surely as a verdict asks for
+_LEVEL = 0.3  # of its speed may go up or down: an end that slides along an upright edge does
 _BLOCK = np.ones((3, 3), np.uint8)
-_AGREE_M = 0.3
-_AGREE_PER_M2 = 0.015
+_AGREE_M = 0.3  # about a body's depth, and
+_AGREE_PER_M2 = 0.015  # two sigmas of depth by the default noise
 
 
 def carve(
@@ -59,7 +59,7 @@ def carve(
     if len(tracks) == 0:
         return labels
     grid = detection.grid
-    suspicious = np.flatnonzero(least_squares.moving_candidates(detection.motion, detection.age_frames))
+    suspicious = least_squares.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not arrived.any():
         return labels
     mover = tracks.mover
@@ -75,21 +75,21 @@ def carve(
     if not chosen.any():
         return labels
     looked_at = chosen.take(labels)
-    evidence = arrived & looked_at
-    evidence |= _around_moving_fragments(detection, velocities, suspicious, looked_at, config)
-    if not evidence.any():
+    shown = arrived & looked_at
+    shown |= _around_moving_fragments(detection, velocities, suspicious, looked_at, config)
+    if not shown.any():
         return labels
     chosen[1:] = searched
     inside = chosen.take(labels) if overgrown.any() else looked_at
-    labels = _cut_back(tracks, detection, labels, overgrown, evidence, config)
-    seeds = evidence & inside
+    labels = _cut_back(tracks, detection, labels, overgrown, shown, config)
+    seeds = shown & inside
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
     if np.count_nonzero(grown) < _MIN_CELLS:
         return labels
     count, parts = regions.components(grid, grown)
     cells = np.bincount(parts.ravel(), minlength=count + 1)
-    keep = np.flatnonzero(cells[1:] >= _MIN_CELLS) + 1
+    keep = (cells[1:] >= _MIN_CELLS).nonzero()[0] + 1
     if len(keep) == 0:
         return labels
     number = np.zeros(count + 1, np.int32)
@@ -106,14 +106,14 @@ def _cut_back(
     detection: Detection,
     labels: IntGrid,
     overgrown: NDArray[np.bool_],
-    evidence: BoolGrid,
+    shown: BoolGrid,
     config: PerceptionConfig,
 ) -> IntGrid:
     """labels (h, w) where movers that have grown larger than any body, over furniture they walk along, keep
-    only what evidence (h, w) is of. The rest of each begins as a track that stands."""
-    for track in np.flatnonzero(overgrown).tolist():
+    only what is shown (h, w) to move. The rest of each begins as a track that stands."""
+    for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
-        widened = np.asarray(cv2.dilate((evidence & own).view(np.uint8), _BLOCK), np.uint8)
+        widened = np.asarray(cv2.dilate((shown & own).view(np.uint8), _BLOCK), np.uint8)
         kept = widened.view(np.bool_) & own
         rest = own & ~kept
         if min(np.count_nonzero(kept), np.count_nonzero(rest)) < _MIN_CELLS:

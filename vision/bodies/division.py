@@ -15,8 +15,8 @@ from vision.numerics.order import median, quantile, quantiles
 
 SINGLE_WIDTH_M = 0.85  # nobody is wider
 NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
-_PAIR_DISTANCE_M = 0.5
-_VALLEY = 0.35
+_PAIR_DISTANCE_M = 0.5  # shoulder to shoulder, middle to middle: bodies cannot be closer side by side
+_VALLEY = 0.35  # of the lower hill: so little is left between two bodies; arms touch
 WITHIN = 0.9  # of a group of cells: it is seen through another one
 LOW_BESIDE = 0.6  # of the height of a body in the image: a trolley is, a child beside an adult is not
 _STANDING = 0.5  # of the share that would not have stayed
@@ -26,8 +26,8 @@ _DIP_M = 0.15  # between two heads; a shoulder is lower still
 _HEAD_M, _LEAST_HEAD_M, _HEAD_WIDTH_M, _SHOULDERS_M = 0.15, 0.13, 0.30, 0.36
 _LEAST_APART_M, _MOST_APART_M = 0.35, 0.8  # two heads; who walks farther apart leaves a valley
 _HARDLY = 0.2  # of the image between two groups of cells
-_MIN_CELLS = 24
-_BINS = 12
+_MIN_CELLS = 24  # of either of two: twice what a track begins with, for each half is to be judged by itself
+_BINS = 12  # along the line: a tenth of a metre each where two people walk side by side
 
 
 def split(
@@ -42,7 +42,7 @@ def split(
     either. Nor is what is low beside it, a trolley before who pushes it, unless it stands: more of it has
     stayed (h, w) where it was than if it had gone way_m with the track.
     """
-    cells = np.flatnonzero(labels.ravel() == track + 1)
+    cells = (labels.ravel() == track + 1).nonzero()[0]
     if len(cells) < 2 * _MIN_CELLS:
         return None
     points = grid.points(cells)[::2].T.astype(float)
@@ -116,7 +116,7 @@ def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] 
     if deepest_m < _DIP_M + cell_m:
         return None
     # In the middle of what is about as low.
-    low = np.flatnonzero(dip_m >= deepest_m - cell_m)
+    low = (dip_m >= deepest_m - cell_m).nonzero()[0]
     valley = int(low[len(low) // 2])
     one, other = int(height_m[:valley].argmax()), valley + int(height_m[valley:].argmax())
     if not _LEAST_APART_M <= (other - one) * cell_m <= _MOST_APART_M:

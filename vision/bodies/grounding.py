@@ -14,9 +14,9 @@ from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import IntGrid, Regions, exchanged, measure
 from vision.numerics.order import median
 
-_SAME_M = 0.3
-_SAME_PER_M2 = 0.015
-_HOVERS_M = 0.2
+_SAME_M = 0.3  # about a body's depth, and
+_SAME_PER_M2 = 0.015  # two sigmas of depth by the default noise
+_HOVERS_M = 0.2  # what reaches no farther down is the rim of what was found already
 _LOWEST = 4  # one in so many of its rows, the lowest: what reaches down does so at their depth
 
 
@@ -34,7 +34,7 @@ def ground(
         return labels, measured
     standing = np.concatenate(([False], ~mover))
     result, grown = labels, np.zeros(len(mover), np.bool_)
-    for track in np.flatnonzero(chosen & (measured.cells > 0)).tolist():
+    for track in (chosen & (measured.cells > 0)).nonzero()[0].tolist():
         below = _below(grid, labels, track, standing)
         if below is not None:
             result = labels.copy() if result is labels else result
@@ -49,10 +49,12 @@ def _below(
     grid: DepthGrid, labels: IntGrid, track: int, standing: NDArray[np.bool_]
 ) -> NDArray[np.intp] | None:
     """Flat cells below those labelled track + 1 that belong to it, column by column; None: there are none."""
-    rows, columns = np.nonzero(labels == track + 1)
-    top, left, right = int(rows.min()), int(columns.min()), int(columns.max()) + 1
-    lowest = rows >= rows.max() - (np.ptp(rows) + 1) // _LOWEST
-    depth_m = float(median(grid.depth_m[rows[lowest], columns[lowest]]))
+    cells = np.flatnonzero(labels == track + 1)
+    rows = cells // labels.shape[1]
+    columns = cells - rows * labels.shape[1]
+    top, bottom, left, right = int(rows[0]), int(rows[-1]), int(columns.min()), int(columns.max()) + 1
+    lowest = cells[rows >= bottom - (bottom - top + 1) // _LOWEST]
+    depth_m = float(median(grid.depth_m.ravel().take(lowest)))
     # In each of its columns the lowest row of its own, which is written last.
     foot = np.full(right - left, len(labels), np.intp)
     foot[columns - left] = rows
@@ -67,7 +69,7 @@ def _below(
         return None
     row, column = np.nonzero(taken)
     # It may stand with one foot, and has no more feet than it shows.
-    if (grid.y[int(row.max()) + top] - grid.y[int(rows.max())]) * depth_m < _HOVERS_M:
+    if (grid.y[int(row.max()) + top] - grid.y[bottom]) * depth_m < _HOVERS_M:
         return None
     flat: NDArray[np.intp] = (row + top) * labels.shape[1] + column + left
     return flat

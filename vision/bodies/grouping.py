@@ -33,10 +33,10 @@ from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
 
 _APART_M = 0.40  # parts further from the main one are of something else
-_CLOSE_M = 0.25
-_SAME_DEPTH_M = 0.30
-_SMALL_SHARE = 0.5
-_MOSTLY = 0.7
+_CLOSE_M = 0.25  # a hand's length of depth is lost at a shoe or under an arm
+_SAME_DEPTH_M = 0.30  # about a body's depth, beside the noise
+_SMALL_SHARE = 0.5  # of the larger part: what is more is a body of its own
+_MOSTLY = 0.7  # of its cells were the track's before: then it stays, as a load does
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +102,7 @@ def detach(
     votes (P,): how many cells spoke for the winner. expected (P, T): parts that stay with it all the same, as
     those do that stand on the main one in the image, or are seen through it, and were its own before.
     """
-    owned = np.flatnonzero(winner > 0)
+    owned = (winner > 0).nonzero()[0]
     if len(owned) == 0:
         return winner
     order = owned[np.lexsort((-votes[owned], winner[owned]))]
@@ -132,7 +132,7 @@ def attach(
 ) -> NDArray[np.int32]:
     """winner (P,) with new parts (indices) given to the track that they are small beside and close to, or to
     the one that is expected there (P, T). alive (T,): the tracks that may get them, which move or moved."""
-    of_mover = np.flatnonzero((winner > 0) & np.concatenate(([False], alive))[winner])
+    of_mover = ((winner > 0) & np.concatenate(([False], alive))[winner]).nonzero()[0]
     if len(of_mover) == 0 or len(new_parts) == 0:
         return winner
     box = boxes(parts)

@@ -16,10 +16,10 @@ Kinds of proof in one frame (threshold: settings.sigmas squared; ends: end point
 All kinds need a known motion of the camera and, except for much arrival, more than the least speed. Bodies
 too fast or too wide to be true prove nothing.
 
-Hysteresis: evidence is a score from 0 to 1.5. A frame with proof raises it by dt / 0.06 s (0.07 s without
-odometry) or more, by 0.5 at most. Without proof it falls by dt / 0.30 s, by dt / 2 s while the motion seems
-to go on, and by dt / 0.12 s where fragments, or of a mover the filter, prove that it stands still, or where
-nothing tells a mover from what stands around it. A track becomes moving at 1.0 and static again at 0.
+Hysteresis: evidence is a track's score from 0 to 1.5. A frame with proof raises it by dt / 0.06 s (0.07 s
+without odometry) or more, by 0.5 at most. Without proof it falls by dt / 0.30 s, by dt / 2 s while the motion
+seems to go on, and by dt / 0.12 s where fragments, or of a mover the filter, prove that it stands still, or
+where nothing tells a mover from what stands around it. A track becomes moving at 1.0 and static again at 0.
 """
 
 from __future__ import annotations
@@ -34,30 +34,31 @@ from hal.types import FloatArray
 from vision.motion.line_of_sight import Split, second_opinion, split
 from vision.motion.motion_evidence import MotionEvidence
 
+# Two frames at 30 a second: with three of them the first detection came 0.07 s later.
 _RISE_S = 0.06
 # Without odometry an error of the camera's motion stays for some frames: one more of them is asked for.
 _RISE_ALONE_S = 0.07
 _FASTEST = 2.5  # times, with overwhelming proof
 _MOST_A_FRAME = 0.5  # no single frame proves motion, however long ago the one before was
-_FALL_S = 0.30
+_FALL_S = 0.30  # without proof: in some frames there is none of what moves
 _HOLD_S = 2.0  # without new proof
-_HOLDING_SQUARED_SIGMAS = 4.0
+_HOLDING_SQUARED_SIGMAS = 4.0  # two sigmas: it still seems to go
 _STOP_S = 0.12  # with proof of standing still
-_MAX_EVIDENCE = 1.5
-_ENDS_ACROSS = 4
-_ENDS_ALONG = 8
+_MAX_EVIDENCE = 1.5  # half as much again as a verdict takes: no mover is held for much longer
+_ENDS_ACROSS = 4  # two fragments: across, where an end is seen tells by itself
+_ENDS_ALONG = 8  # four fragments: along, only how far ends are apart tells, and that slides
 _LEVEL_SHARE = 0.5  # of the threshold: with less than that, what goes up or down needs as many ends as along
-_MIN_AGREEMENT = 0.18
+_MIN_AGREEMENT = 0.18  # of the ends: bodies whose limbs disagree still speak
 _UNREST_SHARE = 0.5  # of the threshold
-_LASTING_UNREST_S = 0.4
-_LIKELY_SHARE = 0.25
-_OWN_PROOF = 3.0
+_LASTING_UNREST_S = 0.4  # longer than a limb swings one way
+_LIKELY_SHARE = 0.25  # of the threshold: two of four sigmas; a slow machine on legs stays at two and a half
+_OWN_PROOF = 3.0  # squared sigmas of this frame alone: the filter does not speak of the past only
 _SHARED_PROOF = 0.55  # of the threshold, where fragments and surface say the same
-_SPEED_PER_METRE = 0.02
-_ARRIVED_CELLS = 8
-_ARRIVED_SHARE = 0.05
-_MUCH_CELLS = 20
-_MUCH_SHARE = 0.2
+_SPEED_PER_METRE = 0.02  # of distance: by so much more the least speed is, as all errors grow with it
+_ARRIVED_CELLS = 8  # fewer come and go with noise at a rim
+_ARRIVED_SHARE = 0.05  # of the surface: who walks arrives with one side of himself
+_MUCH_CELLS = 20  # about a forearm 4 m away
+_MUCH_SHARE = 0.2  # of the surface: more than a rim that noise widens
 _STANDING_SHARE = 0.6  # of the least speed: what is slower stands
 _KNOWN_SPEED = 2.0  # of the least speed: with less doubt than this, a slow mover has stopped
 IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
@@ -66,9 +67,9 @@ _CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewh
 _CLEAR_WAY = 4.0  # times the noise of one pixel's depth: no noise that neighbours share feigns so long a way
 _CLEAN_LOOKS = 2.5  # three of them, where frames are few
 _EVEN_CELLS = 48  # fewer lie on two or three patches of depth noise, and go to and fro with these
-_COMPACT_M = 2.2
+_COMPACT_M = 2.2  # a tall person; larger things are seen in part only, and their middle wanders
 _WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
-_SURE_SQUARED_SIGMAS = 30.0
+_SURE_SQUARED_SIGMAS = 30.0  # five and a half sigmas: a confidence of 0.63, and 0.4 at the least proof
 _LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them is carved out
 
 
@@ -132,23 +133,25 @@ def judge(
     new_evidence = np.minimum(np.maximum(evidence + change, 0.0), _MAX_EVIDENCE)
     new_moving = np.where(moving, new_evidence > 0.0, new_evidence >= 1.0)
     confidence = 1.0 - np.exp(-read.filtered.total / _SURE_SQUARED_SIGMAS)
-    return Verdict(new_evidence, new_moving, confidence, stands, rising)
+    return Verdict(
+        evidence=new_evidence, moving=new_moving, confidence=confidence, stands=stands, proven=rising
+    )
 
 
 def _read(seen: MotionEvidence, settings: MotionSettings) -> _Reading:
     threshold = settings.sigmas**2
     filtered, own, surface, apart = _split_all(seen)
     return _Reading(
-        threshold,
-        np.sqrt(np.square(seen.velocity).sum(axis=1)),
-        settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m,
-        np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0),
-        (filtered.across > threshold) & (own.across > 0.5 * threshold),
-        (seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells),
-        filtered,
-        own,
-        surface,
-        apart,
+        threshold=threshold,
+        speed_mps=np.sqrt(np.square(seen.velocity).sum(axis=1)),
+        least_mps=settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m,
+        agreeing=np.where(seen.agreement >= _MIN_AGREEMENT, seen.agreement * seen.ends, 0.0),
+        shown_across=(filtered.across > threshold) & (own.across > 0.5 * threshold),
+        arrived=(seen.arrived >= _ARRIVED_CELLS) & (seen.arrived >= _ARRIVED_SHARE * seen.cells),
+        filtered=filtered,
+        own=own,
+        surface=surface,
+        apart=apart,
     )
 
 

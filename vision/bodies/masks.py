@@ -28,15 +28,15 @@ from hal.types import FloatArray, Pose
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.depth.regions import IntGrid, spread_labels
 
-_LEAST_VOTES = 4
-_SHARE_OF_PART = 0.15
-_SHARE_OF_TRACK = 0.30
-_CAME_CELLS = 20
-_CAME_SHARE = 0.3
+_LEAST_VOTES = 4  # cells: fewer are strays of a prediction that is off by a cell
+_SHARE_OF_PART = 0.15  # of all votes in it, or
+_SHARE_OF_TRACK = 0.30  # of all votes of the track, whichever is less: else they are strays, too
+_CAME_CELLS = 20  # as much as an arrival that proves by itself (vision/bodies/judgement.py), and
+_CAME_SHARE = 0.3  # of the part: who leaves furniture comes out of it side first
 _LEAVING_SHARE = 0.75  # of what stands: a larger part is the thing itself
-_STAYED_SHARE = 0.7
-_DEPTH_GATE_INVERSE = 0.03  # 1/m
-_DEPTH_GATE_M = 0.25
+_STAYED_SHARE = 0.7  # of its votes: the rest is where the rims of both lie
+_DEPTH_GATE_INVERSE = 0.03  # 1/m, as large as a jump in depth may be within one part, and
+_DEPTH_GATE_M = 0.25  # what may come nearer as a body turns or bends, beside its own velocity
 _NOBODY = np.zeros(1, np.int32)
 
 
@@ -90,7 +90,7 @@ def predict(
     agrees = inside & (measured > 0) & (np.abs(measured - expected) <= gate)
     if not number.all():
         agrees &= number.take(before.owner) > 0
-    chosen = np.flatnonzero(agrees)
+    chosen = agrees.nonzero()[0]
     _write_nearest(
         result.ravel(), cell.take(chosen), number.take(before.owner.take(chosen)), expected.take(chosen)
     )
@@ -109,7 +109,7 @@ def _write_nearest(
     held[cell] = inverse_depth
     # What is written last stays. Most cells are wanted once; only what is nearer than the last has to be
     # written again, the nearest last.
-    nearer = np.flatnonzero(inverse_depth > held.take(cell))
+    nearer = (inverse_depth > held.take(cell)).nonzero()[0]
     nearer = nearer[np.argsort(inverse_depth.take(nearer), kind="stable")]
     into[cell.take(nearer)] = value.take(nearer)
 

@@ -29,18 +29,18 @@ from vision.depth.regions import IntGrid, Regions
 
 BoolArray = NDArray[np.bool_]
 
+# Depth is lost beside a body for so far; more where one is seen before the other; noise parts what touches;
+# and the edges of a plain side, between which depth sees nothing, are so far apart.
 _CLOSE_M, _CLOSE_OVERLAPPING_M, _TOUCHING_M, _PIECES_M = 0.25, 0.40, 0.1, 0.8
 _PARTED_M, _SAME_DEPTH_M = 1.0, 0.4  # of pieces one above the other: what parts them hides no more
 _HIDDEN_M = 1.3  # of a vehicle's halves: what parts them hides no more
-_HALVES_MPS, _HALVES_SHARE = (
-    0.6,
-    0.6,
-)  # and by so much, or so much of the slower one's, their velocities differ
+# And by so much, or so much of the slower one's, their velocities differ.
+_HALVES_MPS, _HALVES_SHARE = 0.6, 0.6
 _OVER = 0.5  # of the narrower one's width: so much of it is above or below the other; of height, beside it
-_SMALL_SHARE = 0.5
+_SMALL_SHARE = 0.5  # of the larger one's cells: what is more is a body of its own
 _TINY_SHARE = 0.1  # a dog beside its owner is more
 _OVERLAP = 0.5  # of the smaller box: side by side people overlap less
-_EXACTLY_MPS, _MUCH_MPS = 0.25, 0.4
+_EXACTLY_MPS, _MUCH_MPS = 0.25, 0.4  # parts of one rigid thing may differ by this; its surfaces by this
 _KNOWN_SIGMA_MPS = 0.35  # a velocity known less well surely goes like nothing
 _ALIKE_SIGMAS = 2.0  # a shank that stands, or swings, on a body that goes
 _GOES_MPS = 0.3  # what goes more slowly goes like whatever stands

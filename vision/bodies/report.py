@@ -12,10 +12,10 @@ from vision.detection import Detection
 from vision.motion.least_squares import FragmentVelocities
 from vision.scene import Fragments, Obstacle
 
-MIN_SIGHTINGS = 3
+MIN_SIGHTINGS = 3  # frames: what lasts for one or two is taken for a speckle
 _LISTED_UNSEEN_S = 0.15  # a track is remembered for longer, but no longer shown as seen
-_WAY_SIGMA_M = 0.06
-_STATIC_SCORE = 0.5
+_WAY_SIGMA_M = 0.06  # one sigma of where a mover went that is not seen
+_STATIC_SCORE = 0.5  # nothing is estimated of what stands: neither sure nor unsure
 _LAST_CELLS = 12  # less of a sliver is no sight of anybody
 _OVERHEAD_CELLS = 24  # half of a head, 6 m away
 # For so long a new mover may be a piece of something else, at most so far before or behind it: of a mover so
@@ -51,7 +51,7 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
         bbox = np.where(whole[:, None], expected_px, bbox)
     told = tracks.moving & ~_pieces(tracks, listed, bbox, local[:, 2], detection.camera.fx)
     result = []
-    for t in np.flatnonzero(listed).tolist():
+    for t in listed.nonzero()[0].tolist():
         moving = bool(told[t])
         u0, v0, u1, v1 = bbox[t].tolist()
         result.append(
@@ -77,7 +77,7 @@ def _pieces(
 ) -> NDArray[np.bool_]:
     """(T,) movers so new that they may be a piece of something larger."""
     result = np.zeros(len(tracks), np.bool_)
-    new = np.flatnonzero(tracks.moving & listed & (tracks.moving_s < _PIECE_S))
+    new = (tracks.moving & listed & (tracks.moving_s < _PIECE_S)).nonzero()[0]
     if len(new):
         area_px = (bbox_px[:, 2:] - bbox_px[:, :2]).prod(axis=1)
         small = area_px * np.square(depth_m / focal_px) < _PIECE_M2

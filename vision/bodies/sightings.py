@@ -26,24 +26,24 @@ from vision.depth.depth_mask import depth_sigma_m
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
-MIN_CELLS = 6
-_CENTRE_SIGMA_M = 0.015
+MIN_CELLS = 6  # as many as a part has (_SPECKLE_CELLS of vision/depth/regions.py)
+_CENTRE_SIGMA_M = 0.015  # of the centre of the smallest thing: a cell is as wide 2.3 m away
 _CENTRE_SHARE = 0.0125  # of its size, across the line of sight: cells at the rim come and go
-_CENTRE_DEPTH_SHARE = 0.04
+_CENTRE_DEPTH_SHARE = 0.04  # of its size along the line of sight, where what is seen of it changes more
 _SHIFT_SHARE = 0.35  # of its size: the middle of what is seen of a body, from where it is while all is seen
 _CUT_SIGMA_M = 1.0  # in height, of what reaches beyond the image above or below
 _CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it does not average out
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
 _AREA_MEMORY_S = 0.32  # a tenth of what is new each frame at 30 a second
 _SLIVER = 0.4  # of its usual surface
-_JUMP_M = 0.3
+_JUMP_M = 0.3  # and two sigmas of depth: a centre farther from where it was expected has jumped
 
 
 def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
     """Update tracks with the surfaces measured, entry k for track k; without cells they stay as predicted."""
     visible = measured.cells >= MIN_CELLS
     tracks.clean_s[~visible] = 0.0
-    seen = np.flatnonzero(visible)
+    seen = visible.nonzero()[0]
     if len(seen) == 0:
         return
     position = detection.pose.apply(measured.position_m[seen])
@@ -61,7 +61,7 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
     rough = ~smooth & ~sliver & steady & tracks.moving[seen]
     cut = ~smooth & ~sliver & ~rough
     tracks.sliver[seen] = sliver & ~_at_border(measured.bbox_px[seen], detection)
-    located, doubt = np.flatnonzero(smooth | rough), covariance
+    located, doubt = (smooth | rough).nonzero()[0], covariance
     if rough.any():
         shift_m = np.where(rough, _SHIFT_SHARE * measured.extent_m[seen, :2].max(axis=1), 0.0)
         doubt = covariance + np.square(shift_m)[:, None, None] * np.eye(3)

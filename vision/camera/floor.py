@@ -16,21 +16,21 @@ from numpy.typing import NDArray
 
 from config.perception import DepthNoise
 from hal.types import FloatArray
-from vision.depth.depth_grid import CELL_NOISE, DepthGrid
+from vision.depth.depth_grid import CELL_HEIGHT_NOISE, DepthGrid
 from vision.depth.depth_mask import depth_sigma_m
 
 _EVERY = 3  # cells, in both directions
-_TRIES = 96
+_TRIES = 96  # where half of what is looked at is floor, one in eight hits it three times
 _LEAST_SHARE = 0.06  # of the cells looked at: less floor than this is no floor
 _BELOW_COSTS = 3.0  # cells seen under a plane speak against it more than cells on it speak for it
 _TOLERANCE = 0.012  # 1/m, four standard deviations of a cell
 _LEAST_UPRIGHT = 0.7  # cosine: a camera held more askew than 45 degrees is not expected
-_HELD_M = (0.15, 2.5)
-_REFINEMENTS = 3
-_KEEP_FRAMES = 5
+_HELD_M = (0.15, 2.5)  # as low as a small robot's camera, as high as over a head
+_REFINEMENTS = 3  # each from the cells on the plane before
+_KEEP_FRAMES = 5  # without it: by then the camera may have turned too far for the last one
 _SEARCH_EVERY = 5  # frames, while a floor is followed
 _SIGMA_M = 0.01  # of the plane itself
-_SIGMA_PER_METRE = 0.006
+_SIGMA_PER_METRE = 0.006  # and of its tilt: a third of a degree
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +89,7 @@ def on_floor(grid: DepthGrid, floor: Floor, noise: DepthNoise) -> DepthGrid:
     ahead = np.array([0.0, 0.0, 1.0]) - floor.up[2] * floor.up
     ahead /= np.sqrt(ahead @ ahead)
     forward = ahead[0] * grid.x[None, :] + (ahead[1] * grid.y + ahead[2])[:, None]
-    sigma_m = np.float32(CELL_NOISE) * depth_sigma_m(grid.depth_m, noise) * np.abs(rise)
+    sigma_m = np.float32(CELL_HEIGHT_NOISE) * depth_sigma_m(grid.depth_m, noise) * np.abs(rise)
     return replace(
         grid,
         forward_m=grid.depth_m * forward.astype(np.float32),

@@ -13,13 +13,13 @@ from vision.depth.depth_grid import DepthGrid
 from vision.fragments.edges import GreyImage
 from vision.scene import CameraCondition, CameraHealth
 
-_STEP = 16
-_BLACK_LEVEL = 12
-_WHITE_LEVEL = 243
-_BAD_SHARE = 0.9
-_MIN_DEPTH_SHARE = 0.02
-_POOR_DEPTH_SHARE = 0.25
-_FROZEN_FRAMES = 2
+_STEP = 16  # every so many pixels a sample: 1200 of 640x480 are enough for shares
+_BLACK_LEVEL = 12  # grey: black, with room for a sensor's noise
+_WHITE_LEVEL = 243  # grey: as far from white as that from black
+_BAD_SHARE = 0.9  # of the image: a lamp or a dark hall is less
+_MIN_DEPTH_SHARE = 0.02  # of the grid: what is left is stray cells
+_POOR_DEPTH_SHARE = 0.25  # of the grid: most of the view is dark, glass or too near
+_FROZEN_FRAMES = 2  # repetitions in a row; a single one is left out and not complained of
 _STEPPED_FRAMES = 3  # so many in a row from before, in order, and it is time itself that has gone back
 
 

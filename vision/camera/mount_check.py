@@ -14,8 +14,8 @@ from vision.scene import CameraCondition, CameraHealth
 
 # Looked at so often, and more rarely once it was found in its place so many times.
 _OFTEN_NS, _RARELY_NS = 500_000_000, 5_000_000_000
-_LOOKS = 5
-_MOST_WRONG = 2
+_LOOKS = 5  # one look may take a ramp or a table for the floor; so many in a row do not agree on one
+_MOST_WRONG = 2  # of these: the majority decides
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +29,10 @@ _PLAINLY_WRONG = _Bounds(math.radians(5.0), 0.2)
 # A pallet is lost in the floor, or the floor becomes a surface some metres ahead. One look tells to 0.3
 # degrees and 6 mm; slopes are as much, but not the same in all looks.
 _WRONG = _Bounds(math.radians(1.5), 0.05)
-_SAME = _Bounds(math.radians(0.5), 0.03)
+_SAME = _Bounds(math.radians(0.5), 0.03)  # what one look is right to, with room for the robot's vibration
 # Also where depth is in another unit, five times as much or as little.
 _HEIGHTS_M = (0.05, 8.0)
-_OTHER_UNIT = 1.8
+_OTHER_UNIT = 1.8  # times: no mounting is measured so wrongly
 _STILL_FLOOR = 0.5  # of the cells of the plane that was found
 
 

@@ -17,11 +17,13 @@ from vision.depth.depth_mask import depth_sigma_m, measurable_m
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
 
-CELL_NOISE = (
-    0.4  # noise of a cell over noise of a pixel: of neighbouring pixels, so less than the count tells
-)
-_FARTHEST = np.uint16(65535)
-_NEAREST_M = 0.1
+# Noise of a cell's height over what one pixel's depth would make: of a median of many pixels, but neighbours,
+# so not as little as their count tells. An estimate; standing() in vision/depth/regions.py has a margin
+# beside it. From one look to another it has been measured, and is more: _CELL_NOISE_OVER_TIME in
+# vision/bodies/arrivals.py.
+CELL_HEIGHT_NOISE = 0.4
+_FARTHEST = np.uint16(65535)  # raw depth of what is not valid: sorts behind all that is
+_NEAREST_M = 0.1  # nearer, a point projects anywhere
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
 
 
@@ -115,25 +117,39 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     if mount is None:
         nan = float("nan")
         return DepthGrid(
-            step, offset, depth_m, inverse, valid, beyond, x, y, depth_m, None, None, nan, nan, None, range_m
+            step_px=step,
+            offset_px=offset,
+            depth_m=depth_m,
+            inverse_depth=inverse,
+            valid=valid,
+            beyond=beyond,
+            x=x,
+            y=y,
+            forward_m=depth_m,
+            height_m=None,
+            height_sigma_m=None,
+            camera_height_m=nan,
+            pitch_rad=nan,
+            up=None,
+            range_m=range_m,
         )
-    sigma_m = np.float32(CELL_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
+    sigma_m = np.float32(CELL_HEIGHT_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
     return DepthGrid(
-        step,
-        offset,
-        depth_m,
-        inverse,
-        valid,
-        beyond,
-        x,
-        y,
-        depth_m * view.ahead,
-        np.float32(mount.height_m) - depth_m * view.drop,
-        sigma_m * np.abs(view.drop),
-        mount.height_m,
-        mount.pitch_rad,
-        np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
-        range_m,
+        step_px=step,
+        offset_px=offset,
+        depth_m=depth_m,
+        inverse_depth=inverse,
+        valid=valid,
+        beyond=beyond,
+        x=x,
+        y=y,
+        forward_m=depth_m * view.ahead,
+        height_m=np.float32(mount.height_m) - depth_m * view.drop,
+        height_sigma_m=sigma_m * np.abs(view.drop),
+        camera_height_m=mount.height_m,
+        pitch_rad=mount.pitch_rad,
+        up=np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
+        range_m=range_m,
     )
 
 

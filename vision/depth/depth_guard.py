@@ -18,12 +18,12 @@ from vision.depth.near_floor import FLOOR_EXCESS
 from vision.scene import NEVER_M, FreeSpace
 
 _SUPPORT = 3  # this many cells of a band must agree before they are a surface
-_HOLE_ROWS = 2
-_BLANK_SHARE = 0.1
+_HOLE_ROWS = 2  # one row is lost to noise now and then
+_BLANK_SHARE = 0.1  # of a band's cells: stray ones are measured even where something covers the lens
 # Band and distance in one whole number: 80 bands, and up to 64 m in steps of 4 micrometres.
 _BAND_SHIFT = 24
 _UNITS_PER_M = 2.0**18
-_LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5
+_LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5  # as level and as steep as a ray may be to have a tangent worth telling
 
 
 def free_space(
@@ -45,8 +45,16 @@ def free_space(
     else:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
     known = np.minimum(known, max_depth_m)
-    edges, blank = (_floor_from_m(grid), _up_tan(grid)), _blank(grid, bands, known, nearest)
-    return FreeSpace(bands.bearing_tan, bands.half_width_tan, nearest, known, blind_m, *edges, blank)
+    return FreeSpace(
+        bearing_tan=bands.bearing_tan,
+        half_width_tan=bands.half_width_tan,
+        nearest_m=nearest,
+        known_m=known,
+        blind_m=blind_m,
+        floor_from_m=_floor_from_m(grid),
+        up_tan=_up_tan(grid),
+        blank=_blank(grid, bands, known, nearest),
+    )
 
 
 def _blank(
@@ -119,7 +127,7 @@ def _known_m(
     y = grid.y.astype(float)
     drop = y * cos_pitch + sin_pitch
     below = drop > grid.camera_height_m / (1.5 * max_depth_m)
-    rows = np.flatnonzero(below)[::-1]  # from the bottom of the image outwards
+    rows = below.nonzero()[0][::-1]  # from the bottom of the image outwards
     if len(rows) == 0:
         return np.zeros(len(bands)), 0.0
     floor_depth = grid.camera_height_m / drop[rows]
@@ -146,6 +154,8 @@ def _known_m(
     # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known. Nor is it where a
     # hole comes before any floor.
     known = np.minimum(reach[first], max_depth_m)
-    nowhere = (first == 0) | (blank > 0) & (~shown.any(axis=0) | (shown.argmax(axis=0) >= first))
-    blind_m = float(floor_forward[blank - 1]) if blank else 0.0
+    nowhere, blind_m = first == 0, 0.0
+    if blank:
+        nowhere |= ~shown.any(axis=0) | (shown.argmax(axis=0) >= first)
+        blind_m = float(floor_forward[blank - 1])
     return np.where(nowhere, 0.0, known).astype(float), blind_m

@@ -19,9 +19,9 @@ from vision.camera.lens import RealArray
 
 Depths = TypeVar("Depths", NDArray[np.float32], NDArray[np.float64])
 
-_REACH_PX = np.array((-6, -3, 0, 3, 6))
+_REACH_PX = np.array((-6, -3, 0, 3, 6))  # 13 px across: beyond the rim of some pixels where depth is wrong
 _NEAR_RANK = 4  # the 5th nearest of 25 samples: a corner of a body still covers a fifth of them
-_MIN_SUPPORT = 4
+_MIN_SUPPORT = 4  # of 25 samples: fewer are stray ones
 _NO_DATA_M = np.float32(1e6)  # sorts behind everything that is valid
 _HOLES = 0.25  # of the surroundings: so much without depth may be another surface
 UNSEEN_M = 12.0  # how far that is taken to be

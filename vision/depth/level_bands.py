@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 
-BANDS = 80
+BANDS = 80  # across 60 degrees: 8 cm wide 6 m ahead
 _FAN_BANDS = 1.5  # columns will do where no cell is farther than so many bands from where it belongs
-_PITCH_RAD = math.radians(0.1)
+_PITCH_RAD = math.radians(0.1)  # in such steps: less moves no cell into another band
 _LEAST_AHEAD = 0.05  # metres along the floor per metre of depth; less is straight down, or behind
 
 
@@ -72,7 +72,7 @@ def _bands(
     middle: FloatArray = x0 + step * (width * np.arange(bands, dtype=np.float64) + 0.5 * (width - 1))
     half_width = 0.5 * width * step
     if pitch_rad is None:
-        return LevelBands(middle, half_width, width, None, None)
+        return LevelBands(bearing_tan=middle, half_width_tan=half_width, width=width, band=None, cells=None)
     cosine, sine = math.cos(pitch_rad), math.sin(pitch_rad)
     tilt = cosine - 0.5 * (y0 + y1) * sine
     middle /= tilt
@@ -81,7 +81,7 @@ def _bands(
     x = x0 + step * np.arange(columns)
     off = max(abs(x0), abs(float(x[-1]))) * float(np.abs(1.0 / ahead - 1.0 / tilt).max())
     if off <= _FAN_BANDS * 2.0 * half_width:
-        return LevelBands(middle, half_width, width, None, None)
+        return LevelBands(bearing_tan=middle, half_width_tan=half_width, width=width, band=None, cells=None)
     edge = middle[0] - half_width
     band = np.floor((x / ahead - edge) / (2.0 * half_width)).clip(0, bands - 1).astype(np.int32)
     # So close to each other that none is left out in the row that sees farthest ahead.
@@ -92,4 +92,4 @@ def _bands(
     cells = np.where(inside, column + columns * np.arange(rows)[:, None], rows * columns)
     for values in (band, cells):
         values.setflags(write=False)
-    return LevelBands(middle, half_width, width, band, cells)
+    return LevelBands(bearing_tan=middle, half_width_tan=half_width, width=width, band=band, cells=cells)

@@ -59,7 +59,7 @@ class NearFloor:
             self._frames += 1
             if self._frames >= _FRAMES:
                 self._shown, self._frames = self._shown // 2, self._frames // 2
-        often = np.flatnonzero(self._shown > _FRAMES_SHARE * self._frames)
+        often = (self._shown > _FRAMES_SHARE * self._frames).nonzero()[0]
         if len(often) == 0:
             return self._most_m
         return 0.0 if often[-1] == rows - 1 else min(_MARGIN * float(self._depth_m[often[-1]]), self._most_m)

@@ -17,16 +17,16 @@ from vision.numerics.order import median
 
 IntGrid = NDArray[np.int32]
 
-_LEAST_JUMP = 0.006  # 1/m
+# 1/m: 0.15 m at 5 m, below which it is noise; a body's depth at 3 m, above which a slope is no excuse.
+_LEAST_JUMP = 0.006
 _MOST_JUMP = 0.03
-_SPECKLE_CELLS = 6
+_SPECKLE_CELLS = 6  # fewer are taken for wrong matches of a stereo camera
 _UNIFORM = 3.46  # a uniform spread is this many standard deviations long
-_FOOT_M = 0.12
-_FOOT_PER_METRE = 0.015
-_OCCLUDED_SHARE = 0.15
-_GAP_CELLS = 3
-_HIDDEN_SHARE = 0.5
-_HEAD_M = 0.2
+_FOOT_M, _FOOT_PER_METRE = 0.12, 0.015  # taken for floor: standing()'s clearance and margins
+_OCCLUDED_SHARE = 0.15  # of its rows: at fewer rims it is noise that is nearer
+_GAP_CELLS = 3  # beside what is nearer a stereo camera measures nothing for some cells
+_HIDDEN_SHARE = 0.5  # of its width: else some of its lower end is seen, and ends there
+_HEAD_M = 0.2  # a head to the chin: less is a strip of something
 _RIM = 8  # one in so many columns of a part is its rim, on either side
 
 
@@ -57,14 +57,14 @@ class Regions:
 def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> Regions:
     """regions, where chosen (R,) those of others."""
     return Regions(
-        np.where(chosen, others.cells, regions.cells),
-        np.where(chosen, others.rows, regions.rows),
-        np.where(chosen[:, None], others.bbox_px, regions.bbox_px),
-        np.where(chosen[:, None], others.position_m, regions.position_m),
-        np.where(chosen[:, None], others.extent_m, regions.extent_m),
-        np.where(chosen, others.wide, regions.wide),
-        np.where(chosen, others.tall, regions.tall),
-        np.where(chosen, others.overlapped, regions.overlapped),
+        cells=np.where(chosen, others.cells, regions.cells),
+        rows=np.where(chosen, others.rows, regions.rows),
+        bbox_px=np.where(chosen[:, None], others.bbox_px, regions.bbox_px),
+        position_m=np.where(chosen[:, None], others.position_m, regions.position_m),
+        extent_m=np.where(chosen[:, None], others.extent_m, regions.extent_m),
+        wide=np.where(chosen, others.wide, regions.wide),
+        tall=np.where(chosen, others.tall, regions.tall),
+        overlapped=np.where(chosen, others.overlapped, regions.overlapped),
     )
 
 
@@ -136,10 +136,19 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     # Box, centre and size of each, in this order.
     table, reach = np.zeros((10, count)), np.zeros(count, np.intp)
     wide, tall, nothing = np.zeros((3, count), np.bool_)
-    result = Regions(cells, reach, table[:4].T, table[4:7].T, table[7:].T, wide, tall, nothing)
+    result = Regions(
+        cells=cells,
+        rows=reach,
+        bbox_px=table[:4].T,
+        position_m=table[4:7].T,
+        extent_m=table[7:].T,
+        wide=wide,
+        tall=tall,
+        overlapped=nothing,
+    )
     if len(flat) == 0:
         return result
-    present = np.flatnonzero(cells)
+    present = cells.nonzero()[0]
     starts, number = starts[present], cells[present]
     rows = flat // np.int32(width)
     columns = flat - rows * np.int32(width)
@@ -223,7 +232,7 @@ def _hidden_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.in
     """(count,) cells at the left or right rim of each part beside which something else stands nearer, or
     another part goes on at the same depth."""
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    rims = np.flatnonzero(flat[1:] != flat[:-1])
+    rims = (flat[1:] != flat[:-1]).nonzero()[0]
     rims = rims[(rims + 1) % labels.shape[1] > 0]  # not from the end of a row to the next one
     left, right = flat.take(rims), flat.take(rims + 1)
     step = inverse.take(rims + 1) - inverse.take(rims)
@@ -240,9 +249,9 @@ def _overlapped_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[n
     comes after that gap is the neighbour.
     """
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    owned = np.flatnonzero(flat > 0)
+    owned = (flat > 0).nonzero()[0]
     label = flat.take(owned)
-    rims = np.flatnonzero(label[1:] != label[:-1])
+    rims = (label[1:] != label[:-1]).nonzero()[0]
     first, second = owned.take(rims), owned.take(rims + 1)
     apart = second - first
     near = (apart <= _GAP_CELLS + 1) & (second % labels.shape[1] >= apart)  # not from one row to the next
@@ -257,7 +266,7 @@ def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[
     further down is not known. A beam ends before what is farther away. A head is as tall as _HEAD_M."""
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
     width = labels.shape[1]
-    rims = np.flatnonzero((flat[:-width] > 0) & (flat[:-width] != flat[width:]))
+    rims = ((flat[:-width] > 0) & (flat[:-width] != flat[width:])).nonzero()[0]
     below = np.zeros(len(rims), inverse.dtype)
     for step in range(1, _GAP_CELLS + 1):
         below = np.maximum(below, inverse.take(np.minimum(rims + step * width, len(flat) - 1)))

@@ -30,13 +30,13 @@ from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors, View, linearise, view_of
 from vision.numerics.order import median
 
-_ITERATIONS = 6
+_ITERATIONS = 6  # at most: two that anneal, the others until it has converged
 _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
 _ANNEAL = (32.0, 4.0)  # robust scale of the first iterations, falling to 1
-_MIN_POINTS = 8
-_MIN_INLIER_RATIO = 0.25
-_MIN_BACKGROUND_RATIO = 0.10
-_UNANIMOUS_RATIO = 0.9
+_MIN_POINTS = 8  # two equations each: twice as many as unknowns
+_MIN_INLIER_RATIO = 0.25  # where fewer agree, something else than the ground may have been followed
+_MIN_BACKGROUND_RATIO = 0.10  # the same where the prior binds: what agrees with it may be a small rest
+_UNANIMOUS_RATIO = 0.9  # somebody large leaves more than a tenth of the ground in view
 _LOOSE_SHARE = np.array([5.0] * 6 + [1.0] * 2)  # of the prior's sigma
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, where it decides
@@ -80,7 +80,7 @@ def estimate(
     before: the camera of the frame before, in the fixed frame.
     """
     start, sigma = before @ prior.motion, np.concatenate((prior.sigma, sweep.sigma_rad))
-    use = np.flatnonzero(anchors.usable)
+    use = anchors.usable.nonzero()[0]
     if len(use) < _MIN_POINTS:
         return _unseen(start, sigma, float("nan"))
     view = view_of(anchors, pixels, use, camera)
@@ -116,14 +116,29 @@ def estimate(
         return _unseen(start, sigma, ratio)
     spread = np.asarray(covariance, np.float64)
     return CameraEstimate(
-        found.pose, found.sweep_rad, bend_rad, bend_variance, spread, ratio, not disputed, disputed
+        pose=found.pose,
+        sweep_rad=found.sweep_rad,
+        bend_rad=bend_rad,
+        bend_variance=bend_variance,
+        covariance=spread,
+        inlier_ratio=ratio,
+        visual=not disputed,
+        disputed=disputed,
     )
 
 
 def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:
     """Only the prior speaks."""
     nothing, unknown = np.zeros(2), np.full(2, np.inf)
-    return CameraEstimate(start, nothing, nothing, unknown, np.diag(np.square(sigma)), inlier_ratio, False)
+    return CameraEstimate(
+        pose=start,
+        sweep_rad=nothing,
+        bend_rad=nothing,
+        bend_variance=unknown,
+        covariance=np.diag(np.square(sigma)),
+        inlier_ratio=inlier_ratio,
+        visual=False,
+    )
 
 
 def _bend(found: _Solution) -> tuple[FloatArray, FloatArray]:
@@ -195,7 +210,13 @@ def _solve(view: View, start: Pose, sigma: FloatArray) -> _Solution:
         normal[:8, 8] + prior * assumed * _OF_MOTION,
     )
     return _Solution(
-        _moved(pose, gone[:6]), sweep_rad + gone[6:], information, inliers, free, free_side, -assumed[6:]
+        pose=_moved(pose, gone[:6]),
+        sweep_rad=sweep_rad + gone[6:],
+        information=information,
+        inliers=inliers,
+        free=free,
+        free_side=free_side,
+        free_from_rad=-assumed[6:],
     )
 
 

@@ -63,7 +63,13 @@ def view_of(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera:
     whitening[0] = camera.fx / first
     whitening[1] = -camera.fx * low / (first * second)
     whitening[2] = camera.fy / second
-    return View(lines, seen, row_delays(v, camera), np.square(anchors.depth_sigma_m[use]), whitening)
+    return View(
+        lines=lines,
+        seen=seen,
+        delays=row_delays(v, camera),
+        depth_variance=np.square(anchors.depth_sigma_m[use]),
+        whitening=whitening,
+    )
 
 
 def linearise(view: View, pose: Pose, table: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:

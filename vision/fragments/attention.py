@@ -28,29 +28,29 @@ from vision.fragments.candidates import (
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
-_FEW_FRAGMENTS = 4
+_FEW_FRAGMENTS = 4  # eight ends are what a verdict along the line of sight takes (vision/bodies/judgement.py)
 _ENOUGH_OF_A_MOVER = 2  # to follow it, its surface helps
-_MIN_CELLS = 12
-_REACH_M = 9.0
+_MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py): less is a sliver
+_REACH_M = 9.0  # short of the depth mask's 10 m by about the noise of depth there
 _URGENT_SIGHTINGS = 45  # who is new in view, or under suspicion, is looked at more often
 # Beside no whole number of frames at 30, 15 or 10 Hz, or the rounding of a stamp would decide.
 _URGENT_NS = 95_000_000
-_IDLE_NS = 495_000_000
-_MARGIN_PX = 6
-_MIN_SIDE_PX = 16
+_IDLE_NS = 495_000_000  # who is known well is looked at twice a second
+_MARGIN_PX = 6  # around its box: an edge is at the rim of a body, and corners are looked for beside it
+_MIN_SIDE_PX = 16  # the least length of a segment here
 _MIN_LENGTH = 0.5  # of the length of other fragments
-_MIN_END_DISTANCE_PX = 8.0
+_MIN_END_DISTANCE_PX = 8.0  # half of the least length of a segment here: ends were moved to corners
 _LEAST_HELD = 600.0  # on a short edge without corners both ends slide alike; noise alone makes 220
 # Not what vision/fragments/renewal.py has adapted to there, mostly more: velocities were no better known by
 # it.
 _CONTRAST = 60.0
-_CANDIDATES = 48
-_AT_ONCE = 4
-_GATE_M = 0.3
-_GATE_SIGMAS = 2.0
-_DEEPEST_M = 1.0
+_CANDIDATES = 48  # the longest ones, which bounds the time that one look takes
+_AT_ONCE = 4  # from none to enough in one look, and no body takes all free places
+_GATE_M = 0.3  # about a body's depth, and
+_GATE_SIGMAS = 2.0  # 95 % of what is there, by the noise of depth
+_DEEPEST_M = 1.0  # of its measured depth no more counts: the rest of something deeper is noise, or a wall
 _ONE_SURFACE = 0.5  # of the gate
-_HOLES = 0.2
+_HOLES = 0.2  # of the 25 samples around an end: from a quarter on another surface may be there
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,12 +70,14 @@ def wanted(tracks: Tracks, detection: Detection, config: PerceptionConfig) -> Wa
     away = (tracks.state[:, :3] - detection.pose.translation_m) @ detection.pose.rotation
     few = tracks.fragments < np.where(tracks.moving, _ENOUGH_OF_A_MOVER, _FEW_FRAGMENTS)
     seen = (tracks.seen_ns == detection.captured_ns) & (tracks.cells >= _MIN_CELLS)
-    chosen = np.flatnonzero(few & seen & (np.square(away).sum(axis=1) <= _REACH_M**2))
+    chosen = (few & seen & (np.square(away).sum(axis=1) <= _REACH_M**2)).nonzero()[0]
     depth_m = np.maximum(away[chosen, 2], 0.0)
     gate_m = _GATE_M + _GATE_SIGMAS * depth_sigma_m(depth_m, config.depth_noise)
     gate_m += 0.5 * np.minimum(tracks.extent_m[chosen, 2], _DEEPEST_M)
     urgent = (tracks.evidence[chosen] > 0.0) | (tracks.sightings[chosen] < _URGENT_SIGHTINGS)
-    return Wanted(tracks.ids[chosen], tracks.bbox_px[chosen], depth_m, gate_m, urgent)
+    return Wanted(
+        ids=tracks.ids[chosen], box_px=tracks.bbox_px[chosen], depth_m=depth_m, gate_m=gate_m, urgent=urgent
+    )
 
 
 class Attention:
@@ -106,7 +108,7 @@ class Attention:
         longest_px = longest_first(segments_px)[:_CANDIDATES]
         ends, tensor = held_ends(grey, longest_px, ends_px, _MIN_END_DISTANCE_PX, _LEAST_HELD)
         surface = depth_along(ends, frame, self._config)
-        picked = np.flatnonzero(self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]))
+        picked = self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]).nonzero()[0]
         return new_fragments(picked[: min(room, _AT_ONCE)], ends, tensor, surface, settings)
 
     def _on_it(self, surface: SurfaceDepth, depth_m: float, gate_m: float) -> NDArray[np.bool_]:

@@ -13,9 +13,9 @@ from vision.depth.depth_mask import SurfaceDepth, depth_sigma_m, surface_depth
 from vision.fragments.edges import GreyImage
 from vision.fragments.segments import lengths_px, smaller_eigenvalue, snap_to_corners
 
-_TAKEN_PX = 6
+_TAKEN_PX = 6  # about half a search window: closer ends would follow the same pixels
 _NOISE_STRUCTURE = 220.0  # what image noise of 3 grey levels adds to both eigenvalues over 7x7 px
-_LEAST_STRUCTURE = 3.0
+_LEAST_STRUCTURE = 3.0  # of either eigenvalue: an end held so weakly is known to 3.5 px
 _STAIRS = 0.05  # of the larger eigenvalue, that the stairs of a coarsely sampled edge add to the smaller one
 _MATCH_SIGMA = 6.0  # grey levels by which two sights of the same patch differ
 _SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0], np.float32)  # where along a segment its depth is read

@@ -12,11 +12,11 @@ from config.perception import FragmentSettings
 from vision.fragments.edges import GreyImage
 from vision.numerics.order import median
 
-_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)
-_MIN_EIGENVALUE = 1e-5
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)  # px: far below an end's own sigma
+_MIN_EIGENVALUE = 1e-5  # low: straight edges are to pass, and are held by the expectation
 # Eigenvalues are at hand; the other error that could be asked for would be worked out pixel by pixel.
 _FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
-_EXPECTATION_PX = 2.0
+_EXPECTATION_PX = 2.0  # one sigma of where an end is expected, once what all have in common is taken off
 
 # An image, then itself at half the size, at a quarter, and so on.
 Pyramid = tuple[GreyImage, ...]

@@ -22,14 +22,14 @@ from vision.fragments.candidates import (
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
-PART_PX = (240, 160)
+PART_PX = (240, 160)  # rows, columns: as much as a frame has time for; eight of them are 640x480
 _BLOCKS = 2  # per part, one above the other: each has its own threshold of contrast
-_MARGIN_PX = 8
+_MARGIN_PX = 8  # around a part: a segment across its border is found from either side
 _MANY_MISSING = 8  # where more than one fragment in so many is missing, all parts of a band are searched
 _FEW_MISSING = 16  # where less than one in so many is, none: a search costs as much for one as for ten
-_MIN_END_DISTANCE_PX = 12.0
-_CANDIDATES_PER_TILE = 4
-_SHARE_WITHOUT_DEPTH = 0.15
+_MIN_END_DISTANCE_PX = 12.0  # a third of the least length: ends were moved to corners
+_CANDIDATES_PER_TILE = 4  # twice what a tile takes, for some have no depth or no corner
+_SHARE_WITHOUT_DEPTH = 0.15  # of all fragments: they tell of the camera's turn, of nothing else
 
 
 class Renewal:
@@ -122,7 +122,7 @@ class Renewal:
         # Where nothing is measured at all, it is mostly far away: good to know the camera's turn by.
         beyond = ~(near == near).any(axis=1)
         beyond &= np.cumsum(beyond) <= room[1]
-        whole = np.flatnonzero(on_one_surface(near, config) | beyond)
+        whole = (on_one_surface(near, config) | beyond).nonzero()[0]
         tile = _tiles(snapped[whole], settings.tile_px, counts.shape[1])
         picked = whole[_rank_within(tile) < missing[tile]][: max(0, room[0])]
         return new_fragments(picked, snapped, tensor, surface, settings)

@@ -17,8 +17,8 @@ from vision.fragments.edges import GreyImage
 
 FloatImage = NDArray[np.float32]
 
-_SNAP_PX = 4
-_WINDOW_PX = 3
+_SNAP_PX = 4  # how far an end may be moved: edges end somewhat before a corner
+_WINDOW_PX = 3  # on either side: 7x7, less than the 11x11 that is followed
 _MARGIN_PX = _SNAP_PX + _WINDOW_PX + 2
 _ONES = np.ones(2 * _WINDOW_PX + 1)
 # A segment of 32 px turns by somewhat more when an end moves by a pixel: finer says no more. Upright, level

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.ego_motion.rolling_shutter import straight_rays
 
-HISTORY = 24
-_FEWEST_PLACES = 64
+HISTORY = 24  # frames: the window of 0.25 s at 90 frames a second
+_FEWEST_PLACES = 64  # to begin with; it grows by doubling
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +76,7 @@ class FragmentStore:
         """Drop all but the chosen fragments."""
         if chosen.all():
             return
-        kept = np.flatnonzero(chosen)  # a choice by index is several times as fast
+        kept = chosen.nonzero()[0]  # a choice by index is several times as fast
         self.ids = self.ids.take(kept)
         self.ends_px = self.ends_px.take(kept, axis=0)
         self.near_m = self.near_m.take(kept, axis=0)
@@ -116,7 +116,7 @@ class FragmentStore:
         """Places in the history that no fragment has; it grows where they do not suffice."""
         free = np.ones(self._history.shape[2], np.bool_)
         free[self._place] = False
-        places = np.flatnonzero(free)
+        places = free.nonzero()[0]
         missing = count - len(places)
         if missing > 0:
             more = max(missing, len(free))
@@ -167,4 +167,12 @@ class FragmentStore:
         rows = self._history.reshape(6, -1, 2).take(slot * self._history.shape[2] + self._place, axis=1)
         rows = rows.reshape(6, -1)
         origin = self._origins.take(slot.repeat(2), axis=1)
-        return AnchorEnds(rows[:3], origin, rows[3], rows[4], rows[5], lag, lag_s)
+        return AnchorEnds(
+            direction=rows[:3],
+            origin=origin,
+            depth_m=rows[3],
+            far_m=rows[4],
+            looks=rows[5],
+            lag_frames=lag,
+            lag_s=lag_s,
+        )

@@ -1,11 +1,10 @@
 """Residual of every fragment end (end point of a fragment) against the prediction that it is static.
 
 The prediction: where the end would be now if it had stayed at its anchor, by the camera's own motion. The
-residual (innovation): how far from there it is seen, with its covariance and chi-square (PointMotion). In
-this file, vision/detection.py and vision/motion/velocities.py "evidence" means these residuals; in
-vision/bodies/judgement.py it is something else, a score of each track. The ends that are not known to move
-also give the points that the camera's motion is found by (static_points) and the scale of the noise
-(observed_variance_scale).
+residual (innovation): how far from there it is seen, with its covariance and chi-square (PointMotion). The
+ends that are not known to move also give the points that the camera's motion is found by (static_points) and
+the scale of the noise (observed_variance_scale). The evidence of tracks, which rests on these residuals among
+other things, is in vision/motion/motion_evidence.py.
 """
 
 from __future__ import annotations
@@ -28,20 +27,21 @@ from vision.numerics.order import quantile
 
 # Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
 _UNSEEN_SIGMA_M = 10.0
-_SETTLED_FRAMES = 3
-_LEAST_ENDS = 16
+_SETTLED_FRAMES = 3  # younger ends are hardly farther from their anchors than the noise
+_LEAST_ENDS = 16  # a third of fewer tells no scale
 _CHI2_THIRD = 0.811  # a third of static ends, 2 degrees of freedom, lies below
-_SCALE_GAIN = 0.15
+_SCALE_GAIN = 0.15  # of what is new in each frame: half of it in four, as the floor or the light changes
+# Sigmas of 0.55 to 2.8 times the assumed ones: beyond that it is something else than noise.
 _LEAST_SCALE = 0.3
 _MOST_SCALE = 8.0
 _STEPS_SHARE = 0.5  # flow errors of successive frames cancel in part
-_MOST_LOOKS = 6.0
+_MOST_LOOKS = 6.0  # a running mean over so many; what they share does not average out, see below
 _SETTLED_LATE_FRAMES = 4.0  # between the plain mean of the first looks and the running one: 2.5 to 5
-_COMMON_NOISE = 0.5
-_MIXED_SIGMAS = 3.0
+_COMMON_NOISE = 0.5  # of depth: what neighbouring frames share, and no mean takes off
+_MIXED_SIGMAS = 3.0  # of depth, and 0.1 m: less is one surface
 _STATIC_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom, lie below
-_MIXED_ALONG_PX = 3.0
-_MIXED_ACROSS_PX = 0.3
+_MIXED_ALONG_PX = 3.0  # how far an end slides along a fragment at least, where two surfaces cross
+_MIXED_ACROSS_PX = 0.3  # across it: twice what a clear end is known to
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +63,13 @@ def appraise(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
     far_m = np.where(known, anchor.far_m, UNSEEN_M)
     single = depth_sigma_m(near_m, noise)
     sigma_m = np.where(known, single * _averaged(anchor.looks), _UNSEEN_SIGMA_M)
-    return AnchorDepths(near_m, sigma_m, far_m, known, far_m - near_m > 0.1 + _MIXED_SIGMAS * single)
+    return AnchorDepths(
+        near_m=near_m,
+        sigma_m=sigma_m,
+        far_m=far_m,
+        known=known,
+        mixed=far_m - near_m > 0.1 + _MIXED_SIGMAS * single,
+    )
 
 
 def static_points(
@@ -81,15 +87,15 @@ def static_points(
     distant = depths.mixed & (depths.far_m > distant_m)
     between_m = np.where(distant, depths.far_m - depths.near_m, 0.0)
     return Anchors(
-        (anchor.direction * depths.near_m + anchor.origin).T,
-        anchor.direction.T,
-        np.maximum(depths.sigma_m, between_m),
-        pixel_cov.reshape(-1, 3).astype(float),
-        ~((depths.mixed & ~distant) | moving.repeat(2)),
+        points_m=(anchor.direction * depths.near_m + anchor.origin).T,
+        range_m=anchor.direction.T,
+        depth_sigma_m=np.maximum(depths.sigma_m, between_m),
+        pixel_cov=pixel_cov.reshape(-1, 3).astype(float),
+        usable=~((depths.mixed & ~distant) | moving.repeat(2)),
     )
 
 
-def gather(
+def residuals(
     store: FragmentStore,
     anchor: AnchorEnds,
     depths: AnchorDepths,
@@ -98,7 +104,7 @@ def gather(
     noise: DepthNoise,
     variance_scale: float,
 ) -> PointMotion:
-    """The evidence of the 2N ends in store, from their anchors and the camera's pose now.
+    """Of the 2N ends in store, from their anchors and the camera's pose now.
 
     variance_scale: how much larger the variance of static ends has been found than it was assumed.
     """
@@ -203,7 +209,7 @@ def _pixel_covariance(
     """
     steps = np.maximum(1.0, _STEPS_SHARE * anchor.lag_frames).repeat(2)
     result: FloatArray = store.pixel_cov.reshape(-1, 3).T * steps
-    ends = np.flatnonzero(mixed)
+    ends = mixed.nonzero()[0]
     both = store.ends_px[ends // 2].astype(float)
     du, dv = (both[:, 1] - both[:, 0]).T
     squared = np.maximum(du * du + dv * dv, 1e-12)

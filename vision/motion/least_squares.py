@@ -19,17 +19,17 @@ from vision.motion.velocities import (
     solve_velocity,
 )
 
-_ROBUST_CHI2 = 9.0
+_ROBUST_CHI2 = 9.0  # 99 % of ends that go with the body, 2 degrees of freedom; others lose their weight
 _MEDIAN_CHI2 = 1.386  # of 2 degrees of freedom
 _SPREAD_ENDS = 6  # fewer of them do not show how widely they scatter
 _MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom
 _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
 _INDEPENDENT_DEPTHS = 10.0  # depth noise is shared by neighbours: a body never has more looks than these
-_STATIC_END_CHI2 = 6.0
+_STATIC_END_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
 _LONG_S = 0.26  # about the window of time in which motion is measured
-_NEAR_M = 0.5
-_VELOCITY_GATE_MPS = 0.5
+_NEAR_M = 0.5  # fragments of one body are no farther apart: it is a chain of neighbours that makes a group
+_VELOCITY_GATE_MPS = 0.5  # allowed for limbs, which go unlike their body, beside two sigmas
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +85,7 @@ def body_velocities(
     """
     use = motion.usable & (owner >= 0)
     member = np.zeros((bodies, len(owner)))
-    chosen = np.flatnonzero(use)
+    chosen = use.nonzero()[0]
     member[owner[chosen], chosen] = 1.0
     ends = member.sum(axis=1).astype(np.intp)
     share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))
@@ -109,7 +109,9 @@ def body_velocities(
     excess = (member * bounded).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
     covariance = covariance * np.maximum(1.0, excess)[:, None, None]
     unexplained = member @ (motion.static_chi2 > _MOVED_CHI2) / np.maximum(ends, 1)
-    return BodyVelocities(velocity, covariance, ends, agree, unexplained)
+    return BodyVelocities(
+        velocity_mps=velocity, covariance=covariance, ends=ends, agreement=agree, unexplained=unexplained
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,9 +129,9 @@ class _Parties:
 
 def _parties(chosen: NDArray[np.intp], owner: NDArray[np.intp], ends: NDArray[np.intp]) -> _Parties:
     """ends (G,): how many of the ends chosen (M,) each body has; owner (2N,): of all ends."""
-    many = np.flatnonzero(ends >= _SPREAD_ENDS)
+    many = (ends >= _SPREAD_ENDS).nonzero()[0]
     middle = (np.cumsum(ends) - ends + ends // 2)[many]
-    return _Parties(len(ends), chosen, owner[chosen], many, middle)
+    return _Parties(bodies=len(ends), chosen=chosen, owner=owner[chosen], many=many, middle=middle)
 
 
 def _spread(chi2: FloatArray, parties: _Parties) -> FloatArray:

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.motion.least_squares import BodyVelocities
 
-_FEW_ENDS = 2
-_SOME_ENDS = 4
-_MANY_ENDS = 6
-_LEAST_AGREEMENT = 0.2
+_FEW_ENDS = 2  # of one fragment, if a fifth of all agrees with it
+_SOME_ENDS = 4  # of two: these speak, however many others there are
+_MANY_ENDS = 6  # of three: fewer that deny may all be on one sliding edge
+_LEAST_AGREEMENT = 0.2  # of the ends
 _RESTLESS = 0.7  # of the ends: so many must be where nothing that stands still would have them
 # Limbs swing about as fast as their body goes. For half a step it is the same ones that disagree: that is
 # no noise which averages out from frame to frame.

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.numerics.symmetric import inverse
 
-_FLOOR_SIGMA_MPS = 0.03
-_CONTRADICTION_SIGMAS = 2.5
-_CONFIRMING_SIGMAS = 2.5
+_FLOOR_SIGMA_MPS = 0.03  # allowed for: an error of the camera's own motion, which no filter knows of
+_CONTRADICTION_SIGMAS = 2.5  # 99 % of velocities that are the same differ by less
+_CONFIRMING_SIGMAS = 2.5  # as clearly as what contradicts
 _LEAST_LEVEL = 1e-6  # straight up or down nothing is level
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # of the axes, in turn
 _IDENTITY = np.eye(3)
@@ -41,13 +41,13 @@ class Split:
     def __getitem__(self, k: int) -> Split:
         """Of the first axis, entry k."""
         return Split(
-            self.value[k],
-            self.variance[k],
-            self.rest[k],
-            self.along[k],
-            self.across[k],
-            self.total[k],
-            self.level[k],
+            value=self.value[k],
+            variance=self.variance[k],
+            rest=self.rest[k],
+            along=self.along[k],
+            across=self.across[k],
+            total=self.total[k],
+            level=self.level[k],
         )
 
 
@@ -65,13 +65,17 @@ def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: F
     vector[1], doubt[1] = velocity, covariance + _FLOOR
     across, total = _squared_length(vector, doubt)
     if up is None:
-        return Split(value, variance, rest, along, across, total, across)
+        return Split(
+            value=value, variance=variance, rest=rest, along=along, across=across, total=total, level=across
+        )
     # Their cross product; that of NumPy takes ten times as long.
     aside = sight.take(_NEXT, axis=1) * up.take(_LAST) - sight.take(_LAST, axis=1) * up.take(_NEXT)
     aside /= np.maximum(np.sqrt(np.square(aside).sum(axis=1)), _LEAST_LEVEL)[:, None]
     sideways, sideways_variance = _component(velocity, covariance, aside)
     level = sideways * sideways / (sideways_variance + _FLOOR_SIGMA_MPS**2)
-    return Split(value, variance, rest, along, across, total, level)
+    return Split(
+        value=value, variance=variance, rest=rest, along=along, across=across, total=total, level=level
+    )
 
 
 def _component(

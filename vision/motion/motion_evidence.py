@@ -1,4 +1,4 @@
-"""What one frame says of whether the tracks move: what vision/bodies/judgement.py decides by."""
+"""What one frame says of whether the tracks move: vision/bodies/judgement.py adds it up and decides."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from vision.numerics.symmetric import inverse_entries, whole
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointMotion:
-    """Evidence of N tracked points, in the camera axes now. All NaN-free where usable.
+    """Residuals of N tracked points, in the camera axes now. All NaN-free where usable.
 
     static_m (N, 3): where it would be if static. ray (N, 2): x', y' now. lag_s (N,): T.
     miss_m (N, 2): x' Z - X, y' Z - Y: zero for a static point. covariance (N, 3): xx, xy, yy of miss_m

@@ -15,13 +15,12 @@ from vision.depth.depth_grid import BoolGrid
 NOISE = DepthNoise(floor_m=0.005, quadratic_per_m=0.0075)
 BACK = wall(6.0)
 BODY = plate(3.0, (-0.3, 0.3), (-0.5, 0.5))
-RANGE_M = 10.0
 MS = 1_000_000
 
 
 def memory(*views: tuple[int, FloatArray], pose: Pose = AT_ORIGIN) -> FreeMemory:
     """Has seen the views: (milliseconds, depth)."""
-    kept = FreeMemory(NOISE, RANGE_M)
+    kept = FreeMemory(NOISE)
     for stamp_ms, depth_m in views:
         kept.remember(grid_of(depth_m), pose, stamp_ms * MS)
     return kept
@@ -93,7 +92,7 @@ def test_a_wall_that_comes_into_range_has_not_arrived() -> None:
 
 def test_nor_has_one_that_comes_to_where_16_bits_end() -> None:
     """With units of 0.1 mm a wall 6.9 m away was cut off to 6.55 m, and was not seen through up to 10 m."""
-    ahead, kept = Pose(np.eye(3), np.array([0.0, 0.0, 0.6])), FreeMemory(NOISE, RANGE_M)
+    ahead, kept = Pose(np.eye(3), np.array([0.0, 0.0, 0.6])), FreeMemory(NOISE)
     kept.remember(grid_of(wall(6.9), most_m=6.55), AT_ORIGIN, 0)
     assert not arrived(kept, wall(6.3), pose=ahead).any()
 

@@ -1,4 +1,4 @@
-"""Motion evidence of ends whose way is known exactly: a camera that stands still, no images."""
+"""Residuals of ends whose way is known exactly: a camera that stands still, no images."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.camera.lens import project
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.fragments.store import FragmentStore
-from vision.motion.evidence import appraise, average_depth, gather, observed_variance_scale, static_points
+from vision.motion.evidence import appraise, average_depth, observed_variance_scale, residuals, static_points
 from vision.motion.velocities import PointMotion
 
 CAMERA = Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0)
@@ -27,7 +27,7 @@ ENDS_M = np.array([[-0.2, 0.1, 5.0], [0.3, 0.1, 5.0]])
 
 @dataclass
 class Way:
-    """One fragment, frame by frame. motions: the evidence of every frame but the first."""
+    """One fragment, frame by frame. motions: the residuals of every frame but the first."""
 
     store: FragmentStore
     motions: list[PointMotion]
@@ -48,7 +48,7 @@ def follow(ends_m: list[FloatArray], far_m: float | None = None, scale: float = 
         else:
             store.ends_px, store.near_m, store.far_m = pixels, near, far
             anchor = store.anchors(stamp_ns, WINDOW_S)
-            way.motions.append(gather(store, anchor, appraise(anchor, NOISE), HERE, CAMERA, NOISE, scale))
+            way.motions.append(residuals(store, anchor, appraise(anchor, NOISE), HERE, CAMERA, NOISE, scale))
             average_depth(store, store.before(stamp_ns), STILL, NOISE)
         store.commit(stamp_ns, STILL, CAMERA, np.zeros(2))
     return way
@@ -123,7 +123,7 @@ def test_missing_depth_is_a_distant_point_hardly_known_and_not_used() -> None:
     np.testing.assert_array_equal(depths.near_m, 12.0)
     np.testing.assert_array_equal(depths.sigma_m, 10.0)
     assert not depths.known.any()
-    motion = gather(store, anchor, depths, HERE, CAMERA, NOISE, 1.0)
+    motion = residuals(store, anchor, depths, HERE, CAMERA, NOISE, 1.0)
     assert not motion.usable.any()
     assert np.isnan(motion.depth_step_m).all()
     assert np.isfinite(motion.static_chi2).all()

@@ -12,7 +12,7 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth.depth_mask import UNSEEN_M
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.fragments.store import FragmentStore
-from vision.motion.evidence import appraise, gather
+from vision.motion.evidence import appraise, residuals
 from vision.motion.velocities import PointMotion
 
 CAMERA = Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0)
@@ -46,7 +46,7 @@ def seen(
             store.ends_px, store.near_m, store.far_m = pixels, near, far
             anchor = store.anchors(stamp_ns, 0.25)
             now = replace(STILL, pose=pose)
-            motion = gather(store, anchor, appraise(anchor, NOISE), now, CAMERA, NOISE, 1.0)
+            motion = residuals(store, anchor, appraise(anchor, NOISE), now, CAMERA, NOISE, 1.0)
         store.commit(stamp_ns, pose, CAMERA, np.zeros(2))
     assert motion is not None
     return motion

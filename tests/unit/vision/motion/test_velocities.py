@@ -17,7 +17,7 @@ from vision.motion.velocities import (
 )
 
 
-def evidence(static_m: FloatArray, ray: FloatArray, lag_s: float) -> PointMotion:
+def points(static_m: FloatArray, ray: FloatArray, lag_s: float) -> PointMotion:
     """Points whose pixel covariance is the unit matrix (1 m^2) and whose depth is exact."""
     count = len(static_m)
     return PointMotion(
@@ -40,7 +40,7 @@ def test_length_ratio_and_lateral_speed_follow_from_the_point_equations() -> Non
     static = np.array([[-0.3, 0.0, 4.0], [0.3, 0.0, 4.0]])
     # One second later, seen 60 px long instead of 45 (f = 300), and 20 px right of the centre.
     ray = np.array([[-30.0 + 20.0, 0.0], [30.0 + 20.0, 0.0]]) / 300.0
-    equations = normal_equations(evidence(static, ray, 1.0), np.ones(2))
+    equations = normal_equations(points(static, ray, 1.0), np.ones(2))
     information = equations.matrix.sum(axis=0)
     velocity = np.linalg.solve(information, equations.rhs.sum(axis=0))
     later_m = 4.0 * 45.0 / 60.0  # eqs. 6 and 8: Z' = Z L / L'
@@ -72,14 +72,14 @@ def test_chi2_by_numbers(
 
 
 def test_information_of_an_end_is_the_inverse_of_its_covariance() -> None:
-    base = evidence(np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, -0.2]]), 0.5)
+    base = points(np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, -0.2]]), 0.5)
     motion = replace(base, covariance=np.array([[1.0, 0.5, 1.0]]), depth_effect=np.array([[1.0, 0.5]]))
     # [[1, 0.5], [0.5, 1]] + [[1, 0.5], [0.5, 0.25]] = [[2, 1], [1, 1.25]], determinant 1.5.
     np.testing.assert_allclose(end_information(motion)[:, 0], np.array([1.25, -1.0, 2.0]) / 1.5)
 
 
 def test_normal_equations_of_one_point_by_hand() -> None:
-    motion = evidence(np.array([[1.0, 0.0, 4.0]]), np.array([[0.5, 0.0]]), 2.0)
+    motion = points(np.array([[1.0, 0.0, 4.0]]), np.array([[0.5, 0.0]]), 2.0)
     np.testing.assert_allclose(motion.miss_m, [[1.0, 0.0]])
     equations = normal_equations(motion, np.array([3.0]))
     # Rows (2, 0, -1) and (0, 2, 0), weighted with 3.
@@ -89,7 +89,7 @@ def test_normal_equations_of_one_point_by_hand() -> None:
 
 
 def test_correlated_pixels_are_weighted_by_the_inverse_of_their_covariance() -> None:
-    base = evidence(np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, -0.2]]), 0.5)
+    base = points(np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, -0.2]]), 0.5)
     covariance = np.array([[2.0, 1.0], [1.0, 3.0]])
     motion = PointMotion(
         base.static_m,
