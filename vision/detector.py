@@ -17,7 +17,7 @@ from vision.camera.lens import project, rays, vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
-from vision.detection import MOTION_NOT_KNOWN, Detection, camera_health, no_motion
+from vision.detection import LEAST_AGREEMENT, MOTION_NOT_KNOWN, Detection, camera_health, no_motion
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
 from vision.ego_motion.rolling_shutter import ReadOut
@@ -31,9 +31,6 @@ from vision.motion.evidence import appraise, average_depth, observed_variance_sc
 from vision.motion.velocities import PointMotion
 from vision.percept import Percept
 from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
-
-# Without odometry, at least this share of the fragments must fit one motion of the camera.
-_AGREEMENT = 0.45
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
 _NO_SWEEP = np.zeros(2)
@@ -145,7 +142,7 @@ class Detector:
         step = self._pose.inverse() @ result.pose
         self._read_out.learn(result, vector_from_rotation(step.rotation), dt_s)
         ego = _ego(step, dt_s, result, prior)
-        blurred = result.visual and prior.source == "none" and result.inlier_ratio < _AGREEMENT
+        blurred = result.visual and prior.source == "none" and result.inlier_ratio < LEAST_AGREEMENT
         health = camera_health(health, ego, blurred)
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0

@@ -227,6 +227,7 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         up=np.array([0.0, -1.0, 0.0]) if rng.random() < 0.5 else None,
         trusted=trusted,
         reckoned=bool(rng.random() < 0.5),
+        borne_out=float(rng.uniform(0.2, 1.0)),
     )
 
 

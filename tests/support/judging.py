@@ -59,6 +59,7 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         up=LEVEL_UP,
         trusted=True,
         reckoned=True,
+        borne_out=1.0,
     )
     return replace(plain, **changes)
 

@@ -17,9 +17,10 @@ All kinds need a known motion of the camera and, except for much arrival, more t
 too fast or too wide to be true prove nothing.
 
 Hysteresis: evidence is a track's score from 0 to 1.5. A frame with proof raises it by dt / 0.06 s (0.07 s
-without odometry) or more, by 0.5 at most. Without proof it falls by dt / 0.30 s, by dt / 2 s while the motion
-seems to go on, and by dt / 0.12 s where fragments, or of a mover the filter, prove that it stands still, or
-where nothing tells a mover from what stands around it. A track becomes moving at 1.0 and static again at 0.
+without odometry) or more, by 0.5 at most, and by less where the camera's own motion is in doubt. Without
+proof it falls by dt / 0.30 s, by dt / 2 s while the motion seems to go on, and by dt / 0.12 s where
+fragments, or of a mover the filter, prove that it stands still, or where nothing tells a mover from what
+stands around it. A track becomes moving at 1.0 and static again at 0.
 """
 
 from __future__ import annotations
@@ -234,9 +235,8 @@ def _rise(seen: MotionEvidence, read: _Reading, dt_s: float) -> FloatArray:
     by_filter = np.maximum(read.filtered.along, read.filtered.across)
     strength = np.minimum(by_filter, np.maximum(read.own.along, read.own.across)) / read.threshold
     pace = np.minimum(np.maximum(np.minimum(strength, read.agreeing / _ENDS_ACROSS), 1.0), _FASTEST)
-    result: FloatArray = np.minimum(
-        pace * dt_s / (_RISE_S if seen.reckoned else _RISE_ALONE_S), _MOST_A_FRAME
-    )
+    rise = np.minimum(pace * dt_s / (_RISE_S if seen.reckoned else _RISE_ALONE_S), _MOST_A_FRAME)
+    result: FloatArray = seen.borne_out * rise
     return result
 
 

@@ -12,9 +12,13 @@ from hal.types import FloatArray
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_mask import depth_sigma_m
-from vision.detection import Detection
+from vision.detection import LEAST_AGREEMENT, Detection
 from vision.motion.least_squares import BodyVelocities
 from vision.motion.limbs import believable, restless
+
+# Without odometry: so large a share of the fragments on one motion of the camera leaves no doubt about it.
+_AGREED = 0.65
+_LEAST_BORNE_OUT = 0.2  # two people before the camera are half of what it sees
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +36,7 @@ class MotionEvidence:
     goes (T,): its centre really goes about as fast as the velocity says. guessed (T,): where it ends in what
     stands around it is a guess. up (3,): the floor's normal, None
     where it is not known. trusted: the camera's motion is known. reckoned: odometry says it, too, not the
-    images alone.
+    images alone. borne_out: how well the fragments bear it out, from 0 to 1.
     """
 
     sight: FloatArray
@@ -59,6 +63,7 @@ class MotionEvidence:
     up: FloatArray | None
     trusted: bool
     reckoned: bool
+    borne_out: float
 
 
 def evidence_of(
@@ -99,4 +104,17 @@ def evidence_of(
         guessed=tracks.guessed,
         trusted=detection.motion_known,
         reckoned=detection.reckoned,
+        borne_out=borne_out(detection),
     )
+
+
+def borne_out(detection: Detection) -> float:
+    """How far this frame's proof can be believed, as far as the camera's own motion goes.
+
+    Where hardly more fragments agree on that than have to, and no odometry says it, too, it may be the motion
+    of something else, and then all that stands moves, for as long as the mistake lasts.
+    """
+    if detection.reckoned:
+        return 1.0
+    spare = (detection.ego_motion.inlier_ratio - LEAST_AGREEMENT) / (_AGREED - LEAST_AGREEMENT)
+    return min(spare, 1.0) if spare > _LEAST_BORNE_OUT else _LEAST_BORNE_OUT  # not where NaN

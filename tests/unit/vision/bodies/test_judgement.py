@@ -237,12 +237,14 @@ def test_many_ends_that_deny_for_long_bear_out_a_velocity_that_is_only_likely() 
 
 def test_tracks_are_judged_each_by_itself() -> None:
     all_of = [*EVIDENT.values(), one(ACROSS), by_fragments(ACROSS, 3)]
-    names = [name for name in MotionEvidence.__slots__ if name not in ("up", "trusted", "reckoned")]
+    of_all = ("up", "trusted", "reckoned", "borne_out")
+    names = [name for name in MotionEvidence.__slots__ if name not in of_all]
     together = MotionEvidence(
         **{name: np.concatenate([getattr(seen, name) for seen in all_of]) for name in names},
         up=LEVEL_UP,
         trusted=True,
         reckoned=True,
+        borne_out=1.0,
     )
     count = len(all_of)
     joint = judge(together, np.full(count, 0.6), np.ones(count, np.bool_), DT_S, SETTINGS)

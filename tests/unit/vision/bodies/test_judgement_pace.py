@@ -56,6 +56,13 @@ def test_at_thirty_hertz_two_frames_are_enough_with_odometry_and_three_are_neede
     assert frames == {True: 2, False: 3}
 
 
+def test_proof_counts_by_how_well_the_cameras_own_motion_is_borne_out() -> None:
+    seen = by_fragments(ACROSS, 40)
+    assert rise_s(replace(seen, borne_out=0.25)) == pytest.approx(4.0 * rise_s(seen))
+    assert verdict(seen).evidence[0] == 0.5
+    assert verdict(replace(seen, borne_out=0.25)).evidence[0] == 0.125
+
+
 def test_what_was_shown_is_not_forgotten_while_one_fragment_still_shows_it() -> None:
     half = 0.5
     waiting = judge(by_fragments(ACROSS, 2), np.full(1, half), np.zeros(1, np.bool_), 0.03, SETTINGS)
