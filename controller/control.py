@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from controller.decision.decision import Decision
+from controller.decision.limits import speed_to_decide_by
 from controller.decision.situation import Situation
 from controller.ending import Ending, Outcome
 from controller.follow import PathFollower
@@ -102,8 +103,10 @@ class ControlLoop:
         on_path = self.path.project(pose, self._progress_m)
         if math.isfinite(on_path.s_m):
             self._progress_m = on_path.s_m
+        measured_mps = math.nan if self._state is None else self._state.v_mps
+        speed_mps = speed_to_decide_by(self._shape.v_mps, measured_mps)
         decision = self._decide.step(
-            Situation(scene, self.path, pose, on_path, self._speed_mps(), self._shape.a_mps2, now_ns)
+            Situation(scene, self.path, pose, on_path, speed_mps, self._shape.a_mps2, now_ns)
         )
         setpoint, fault = self._setpoint(decision, on_path, now_ns)
         self._state = self._chassis.exchange(setpoint, now_ns)
@@ -123,11 +126,6 @@ class ControlLoop:
         if scene is not None and scene.captured_ns != self._scene_ns:
             self._scene_ns = scene.captured_ns
             self.localiser.add_ego_motion(scene.captured_ns, scene.ego_motion)
-
-    def _speed_mps(self) -> float:
-        """The greater of commanded and measured: rather brake for speed that is not there than miss some."""
-        measured = self._state.v_mps if self._state is not None else math.nan
-        return max(self._shape.v_mps, measured) if math.isfinite(measured) else self._shape.v_mps
 
     def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> tuple[Setpoint, str]:
         """What to send, and the shaper's fault."""

@@ -17,7 +17,15 @@ from controller import braking
 from controller.decision.appraise import Appraiser
 from controller.decision.decision import Action, Decision, Reason, Rule
 from controller.decision.knowledge import Knowledge
-from controller.decision.limits import BLOCKING_RULES, STANDING_MPS, Limit, Motion, allowed, starts_at_mps
+from controller.decision.limits import (
+    BACKWARDS_MPS,
+    BLOCKING_RULES,
+    STANDING_MPS,
+    Limit,
+    Motion,
+    allowed,
+    starts_at_mps,
+)
 from controller.decision.release import ReleaseGate
 from controller.decision.situation import Situation
 from controller.path.path import OnPath, Path
@@ -27,7 +35,6 @@ from vision.scene import CameraCondition
 
 __all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
 
-_BACKWARDS_MPS = -0.05
 _OVER_COMFORT_MPS = 0.05
 # The target point is closed in on by the shaper; the limit that is reported for it must not do so earlier.
 _END_SLACK_M = 0.02
@@ -96,7 +103,7 @@ class DecisionMaker:
             return "where the robot is on its path is not known"
         if not (math.isfinite(v_mps) and math.isfinite(at.a_mps2)):
             return "how fast the robot is is not known"
-        if v_mps < _BACKWARDS_MPS:
+        if v_mps < BACKWARDS_MPS:
             return f"the robot moves backwards at {-v_mps:.2f} m/s"
         if abs(on_path.d_m) > self._config.off_path_m:
             return f"the robot is {abs(on_path.d_m):.2f} m beside its path"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from config.decision import Release
@@ -12,6 +13,7 @@ from controller.decision.decision import Reason, Rule
 # So far the front may be past the near side of something that still counts as ahead.
 ALONGSIDE_M = 0.1
 STANDING_MPS = 0.01
+BACKWARDS_MPS = -0.05  # slower is noise of the odometry
 # Who moves away from the path at more than one in so much leaves it: that is not going the robot's way.
 LEAVES_ASLANT = 2.0
 # Where somebody out of sight is reckoned to be, no further look corrects: so many standard deviations of its
@@ -88,6 +90,15 @@ def stop_before(
     sentence = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: {allowed(speed)}"
     reason = Reason(rule, sentence, gap.obstacle_id, gap.distance_m, gap.closing_mps, required, spare)
     return Limit(speed, reason, urgent=motion.v_mps > 0.0 and spare < least_m - margin_m)
+
+
+def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:
+    """The greater of commanded and measured: rather brake for speed that is not there than miss some. Of a base
+    that goes backwards the decision has to know that. measured_mps: not finite
+    where it is not known."""
+    if not math.isfinite(measured_mps):
+        return commanded_mps
+    return measured_mps if measured_mps < BACKWARDS_MPS else max(commanded_mps, measured_mps)
 
 
 def starts_at_mps(release: Release, comfort: BrakeLimits) -> float:

@@ -21,7 +21,7 @@ from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
 from controller.decision.knowledge import Knowledge
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import Limit, Motion
+from controller.decision.limits import Limit, Motion, speed_to_decide_by
 from controller.decision.situation import Situation
 from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand, why_stop
 from controller.governor.ground import GroundMemory
@@ -168,7 +168,7 @@ class SpeedGovernor:
     def _decided(self, scene: Scene | None, pose: PlanarPose, measured_mps: float, now_ns: int) -> Decision:
         """The mission's decision along the present motion, before it is compared with what is asked."""
         turns = self._motion.kind is Kind.TURN
-        v_mps = 0.0 if turns else self._speed_mps(measured_mps)
+        v_mps = 0.0 if turns else speed_to_decide_by(self._shape.v_mps, measured_mps)
         a_mps2 = 0.0 if turns else self._shape.a_mps2
         path = self._arc(pose)
         if scene is not None and self._scenes and scene.captured_ns == self._scenes[-1].captured_ns:
@@ -284,10 +284,6 @@ class SpeedGovernor:
             action = Action.DECREASE
         stuck_ns = decision.stuck_since_ns if reason is decision.reason else None
         return Decision(action, target_mps, reason, emergency and v > _STANDING_MPS, stuck_ns)
-
-    def _speed_mps(self, measured_mps: float) -> float:
-        """The greater of commanded and measured, as in controller/control.py."""
-        return max(self._shape.v_mps, measured_mps) if math.isfinite(measured_mps) else self._shape.v_mps
 
     def _command(self, decision: Decision) -> Governed:
         shaped = self._shape.step(decision.target_speed_mps, emergency=decision.emergency)

@@ -17,6 +17,7 @@ from hal.chassis import arming
 from hal.chassis.arming import Arming, ArmingLimits, Evidence
 from hal.chassis.command import CommandLimits, is_zero, zero
 from hal.chassis.following import Following
+from hal.chassis.rolling_back import RollingBack
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import LinkLost
 from hal.geometry import advance_pose
@@ -73,6 +74,8 @@ class ChassisDriver(ABC):
         self._limits = limits
         self._arming = Arming()
         self._following = Following()
+        self._rolling_back = RollingBack()
+        self._may_go_back = True
         self._asked: Setpoint | None = None
         self._objection = ""
         self._link_error = ""
@@ -100,9 +103,12 @@ class ChassisDriver(ABC):
         self._objection = self._commands.objection(setpoint, now_ns)
         self._hear(now_ns)
         self._following.step(self._told.pose, now_ns)
+        self._rolling_back.step(self._told.pose, now_ns, expected=self._may_go_back)
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
         command = self._commands.fit(setpoint, now_ns) if self._arming.may_move else zero(now_ns)
         self._following.ordered(command)
+        # Not armed it may be pushed, or driven by somebody else.
+        self._may_go_back = command.v_mps < 0.0 or not self._arming.may_move
         return self._state(now_ns, self._say(command, now_ns))
 
     def arm(self, now_ns: int) -> None:
@@ -199,7 +205,10 @@ class ChassisDriver(ABC):
             feedback_ns=told.feedback_ns,
             status_ns=told.status_ns,
             disobeys=told.disobeys,
-            stop_cause=told.stop_cause or self._objection or self._following.sentence,
+            stop_cause=told.stop_cause
+            or self._objection
+            or self._following.sentence
+            or self._rolling_back.sentence,
             standing=told.standing,
             command_is_zero=is_zero(self._asked),
             silence=self._silence(),

@@ -39,3 +39,21 @@ def test_a_base_that_tells_of_no_motion_when_told_to_move_latches(
     rig.arm()
     rig.run(2.0, 0.3)
     assert rig.plant.twist[0] == pytest.approx(0.3, abs=rig.tolerance_mps)
+
+
+def test_a_base_that_rolls_back_latches(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a slope that its motors do not hold."""
+    rig.run(0.2)
+    rig.arm()
+    rig.run(1.0, 0.3)
+    rig.run(1.0, 0.0)
+    with monkeypatch.context() as slope:
+        rig.plant.command(-0.2, 0.0)
+        slope.setattr(rig.plant, "command", lambda v_mps, w_radps: None)
+        slope.setattr(rig.plant, "command_tracks", lambda left_mps, right_mps: None)
+        rig.run(2.5, 0.0)
+        assert rig.state.mode is ChassisMode.ESTOP
+        assert "rolls back" in rig.state.reason
+    rig.plant.command(0.0, 0.0)
+    rig.run(1.0, 0.5)
+    assert rig.stands(), "held again, and yet it needs consent"

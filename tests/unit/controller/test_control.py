@@ -153,3 +153,22 @@ def test_a_robot_that_knows_not_where_it_is_stops_and_the_loop_goes_on() -> None
     assert len(taken) == 140
     assert any("where the robot is is not known" in step.decision.reason.sentence for step in taken)
     assert all(math.isfinite(step.setpoint.v_mps + step.setpoint.w_radps) for step in taken)
+
+
+class RollingChassis(ObedientChassis):
+    """On a slope that it does not hold: from its hundredth exchange on it tells of going back."""
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        state = super().exchange(setpoint, now_ns)
+        return replace(state, v_mps=-0.2) if len(self.sent) > 100 else state
+
+
+def test_a_base_that_rolls_back_is_stopped_and_not_taken_for_one_that_goes_forward() -> None:
+    taken = drive(loop_on(RollingChassis()), 400)
+    before, after = taken[100], taken[101:]
+    assert before.setpoint.v_mps > 0.2
+    assert {(step.decision.reason.rule, step.decision.target_speed_mps) for step in after} == {("fault", 0.0)}
+    assert after[0].decision.reason.sentence == "the robot moves backwards at 0.20 m/s: stop"
+    speeds = [step.setpoint.v_mps for step in after]
+    assert speeds[-1] == 0.0
+    assert max(abs(later - sooner) for sooner, later in itertools.pairwise(speeds)) < 0.7 * PERIOD_S + 1e-6

@@ -1,0 +1,42 @@
+"""Does the base roll back though it is not told to? A slope is too much for it then, or a motor turns
+the wrong way; and behind the robot nobody looks."""
+
+from __future__ import annotations
+
+import math
+
+from hal.clocks import NS_PER_S
+from hal.types import PlanarPose
+
+# Over so long, twice in a row, at so much at least: tracks spring back when a stop ends, but by less.
+_GLANCE_NS = NS_PER_S // 2
+_LEAST_MPS = 0.05
+
+
+class RollingBack:
+    """sentence: "" until a base that is to stand or go forward has rolled back for a second."""
+
+    def __init__(self) -> None:
+        self.sentence = ""
+        self._pose: PlanarPose | None = None
+        self._since_ns, self._back_m, self._before = 0, 0.0, False
+
+    def step(self, pose: PlanarPose, now_ns: int, *, expected: bool) -> None:
+        """What the base tells of where it is. expected: it may go back, as it is told to or taken there."""
+        last, self._pose = self._pose, pose
+        if last is None or expected:
+            self.sentence = ""
+            self._since_ns, self._back_m, self._before = now_ns, 0.0, False
+            return
+        cos, sin = math.cos(last.heading_rad), math.sin(last.heading_rad)
+        self._back_m -= (pose.x_m - last.x_m) * cos + (pose.y_m - last.y_m) * sin
+        if now_ns - self._since_ns < _GLANCE_NS:
+            return
+        back_mps = self._back_m * NS_PER_S / (now_ns - self._since_ns)
+        rolls = back_mps >= _LEAST_MPS
+        if rolls and self._before:
+            self.sentence = (
+                f"the base rolls back at {back_mps:.2f} m/s: does it hold itself on this slope, "
+                "and do its motors turn the right way?"
+            )
+        self._since_ns, self._back_m, self._before = now_ns, 0.0, rolls
