@@ -93,9 +93,10 @@ def stop_before(
 
 
 def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:
-    """The greater of commanded and measured: rather brake for speed that is not there than miss some. Of a base
-    that goes backwards the decision has to know that. measured_mps: not finite
-    where it is not known."""
+    """The greater of commanded and measured: rather brake for speed that is not there than miss some.
+
+    Of a base that goes backwards the decision has to know that. measured_mps: not finite where not known.
+    """
     if not math.isfinite(measured_mps):
         return commanded_mps
     return measured_mps if measured_mps < BACKWARDS_MPS else max(commanded_mps, measured_mps)
