@@ -100,9 +100,10 @@ def envelope(config_path: Path) -> None:
     """
     from config.app import load_app
     from controller.envelope import describe_envelope
+    from controller.outlet import say
 
     for line in describe_envelope(load_app(config_path)):
-        click.echo(line)
+        say(line)
 
 
 @cli.command()
@@ -166,4 +167,6 @@ def _refuse(mistake: str) -> NoReturn:
 
 
 def _say(line: str) -> None:
-    click.echo(f"treadwatch: {' '.join(line.split())}", err=True)
+    from controller.outlet import say
+
+    say(f"treadwatch: {' '.join(line.split())}", to_stderr=True)

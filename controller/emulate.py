@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
-import click
 from pydantic import ValidationError
 
 from config.app import AppConfig, load_app
@@ -27,6 +26,7 @@ from config.chassis import (
 from config.loader import CONFIG_DIR, describe
 from controller.build_chassis import build_can_emulator, build_pseudo_terminal, build_serial_emulator
 from controller.errors import UserError
+from controller.outlet import say
 from controller.realtime.service import StopRequest, stop_on_signals
 from hal.api import Clock
 from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
@@ -75,7 +75,7 @@ def run_emulator(options: EmulateOptions, commands: TextIO | None) -> None:
         hearer = stack.enter_context(_Commands(commands))
         for line in run_in_real_time(emulator, clock, stop, hearer.read):
             if options.telling or not line.startswith("v "):
-                click.echo(line)
+                say(line)
 
 
 @contextmanager
@@ -86,7 +86,7 @@ def _emulator(config: AppConfig, options: EmulateOptions, now_ns: int) -> Iterat
     if isinstance(chassis.link, CanLinkConfig):
         link = can_link(chassis.link, options)
         with build_can_emulator(chassis, link, plant) as can_emulator:
-            click.echo(f"emulating {options.kind} on CAN {link.interface} {link.channel!r}", err=True)
+            say(f"emulating {options.kind} on CAN {link.interface} {link.channel!r}", to_stderr=True)
             yield can_emulator
         return
     if options.interface is not None or options.port is not None:
@@ -96,7 +96,7 @@ def _emulator(config: AppConfig, options: EmulateOptions, now_ns: int) -> Iterat
     terminal = build_pseudo_terminal()
     wanted = options.channel or chassis.link.url
     with build_serial_emulator(chassis, terminal, plant) as emulator, _linked(wanted, terminal.path):
-        click.echo(f"emulating {options.kind} on {wanted} -> {terminal.path}", err=True)
+        say(f"emulating {options.kind} on {wanted} -> {terminal.path}", to_stderr=True)
         yield emulator
 
 

@@ -39,6 +39,11 @@ def write(words: Words) -> None:
             write(Words(f"treadwatch: warning: {lost}", to_stderr=True))
 
 
+def say(line: str, *, to_stderr: bool = False) -> None:
+    """A whole line at once, for commands that measure: see write."""
+    write(Words(line, to_stderr))
+
+
 class Outlet:
     """Writes in a thread of its own while it is open: who stops reading (Ctrl-S, a pipe, a connection that
     hangs) does not hold up the control loop. What becomes too much is left out, and said to be."""

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path as FilePath
 
-import click
-
 from config.app import AppConfig, load_app, load_replay
 from config.camera import SimulatedCameraConfig
 from config.loader import CONFIG_DIR
@@ -39,6 +37,7 @@ from controller.build import (
 )
 from controller.build_chassis import build_base
 from controller.errors import UserError
+from controller.outlet import say
 from hal.clocks import SimulatedClock
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Renderer
@@ -74,7 +73,7 @@ def run_bench(frames: int, json_path: FilePath | None) -> None:
     with one_opencv_thread():
         report = measure_all(Plan(frames=frames))
     for line in report.lines():
-        click.echo(line)
+        say(line)
     if json_path is not None:
         try:
             json_path.write_text(report.to_text(), encoding="utf-8")
@@ -82,7 +81,7 @@ def run_bench(frames: int, json_path: FilePath | None) -> None:
             raise UserError(
                 f"{json_path}: cannot be written ({error.strerror}); choose another --json"
             ) from error
-        click.echo(f"every figure: {json_path}")
+        say(f"every figure: {json_path}")
 
 
 def measure_all(plan: Plan) -> BenchReport:

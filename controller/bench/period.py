@@ -17,7 +17,6 @@ from functools import partial
 from pathlib import Path as FilePath
 from typing import Self
 
-import click
 import numpy as np
 
 from config.app import AppConfig, RealtimeRunner, load_app
@@ -26,6 +25,7 @@ from config.chassis import CanLinkConfig
 from config.loader import CONFIG_DIR
 from controller.console import Console
 from controller.errors import UserError
+from controller.outlet import say
 from controller.realtime.mission import drive_realtime
 from controller.result import MissionOptions
 from hal.api import Clock
@@ -71,7 +71,7 @@ class PeriodFigures:
 
 def run_period_bench(seconds: float) -> None:
     """Measure with ordinary scheduling, then with SCHED_FIFO; print a table. Raises UserError, HalError."""
-    click.echo(
+    say(
         f"command period, 20 ms wanted, {seconds:g} s each; perception without a pause in another process\n"
         f"{'scheduling':26}{'commands':>9}{'median':>11}{'p99 off':>11}{'worst off':>11}{'within 1 ms':>13}"
         f"{'load':>6}{'stolen':>9}"
@@ -81,7 +81,7 @@ def run_period_bench(seconds: float) -> None:
         _print_row(name, partial(measure_period, priority, seconds))
     # This process has become what the second drive made of it.
     _print_row("SCHED_FIFO, empty loop", partial(measure_floor, clock, seconds))
-    click.echo(
+    say(
         "off: distance of one period from 20 ms. empty loop: nothing but waiting for the next 20 ms, so it\n"
         "shows what is the machine's. load: average of the minute. stolen: processor time that the host of\n"
         "a virtual machine gave to others meanwhile, of all cores."
@@ -91,7 +91,7 @@ def run_period_bench(seconds: float) -> None:
 def _print_row(name: str, measure: Callable[[], PeriodFigures]) -> None:
     before_s = stolen_s(_STAT)
     figures = measure()
-    click.echo(
+    say(
         f"{name:26}{figures.commands:9d}{figures.median_ms:8.3f} ms{figures.p99_off_ms:8.3f} ms"
         f"{figures.worst_off_ms:8.3f} ms{figures.within_1_ms:13.2%}{os.getloadavg()[0]:6.1f}"
         f"{stolen_s(_STAT) - before_s:7.2f} s"

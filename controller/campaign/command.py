@@ -22,6 +22,7 @@ from controller.campaign.summary import Summary, why_failed
 from controller.campaign.task import Mode, Task, failed, run_task, time_ratio
 from controller.errors import Interrupted, UserError
 from controller.evaluation import markdown
+from controller.outlet import say
 from sim.families import FAMILY_NAMES
 
 FAILING = "failing"
@@ -141,9 +142,9 @@ def _run_one(options: CampaignOptions, config: AppConfig, mission: Mission) -> i
     task = Task(mission.family, mission.seed, policies, options.mode, config, keep, keep_all=True)
     rows = run_task(task)
     for row in rows:
-        click.echo(line_of(row))
+        say(line_of(row))
     if keep is not None:
-        click.echo(f"recording     {keep}")
+        say(f"recording     {keep}")
     return int(any(failed(row) for row in rows))
 
 
@@ -175,11 +176,11 @@ def _say(summary: Summary, count: int, took_s: float, folder: Path) -> None:
     for name, one in summary.policies.items():
         median = markdown.fixed(math.nan if one.ratio_median is None else one.ratio_median, 2)
         p90 = markdown.fixed(math.nan if one.ratio_p90 is None else one.ratio_p90, 2)
-        click.echo(
+        say(
             f"{name:<8} {one.missions} missions, reached {one.reached}/{one.expected}, "
             f"contacts {one.contacts} ({one.contacts_at_fault} at fault), time x{median} (p90 x{p90}), "
             f"false stops {one.false_stops}, flaps {one.flaps}, outside limits {one.limit_violations}"
         )
     if count:
-        click.echo(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.1f} a second")
-    click.echo(f"report   {folder / 'report.md'}")
+        say(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.1f} a second")
+    say(f"report   {folder / 'report.md'}")

@@ -22,6 +22,7 @@ from controller.campaign.stop_and_go import StopAndGo
 from controller.campaign.task import Mode
 from controller.errors import UserError
 from controller.evaluation import markdown
+from controller.outlet import say
 from sim.families.step_in import step_in
 
 TO_STOP_S, HOLD, TO_RESUME_S, FALSE_STOPS = 0.6, 0.95, 0.6, 0.01
@@ -89,8 +90,8 @@ def run_stop_and_go(options: StopAndGoOptions) -> int:
     }
     _write(options, found)
     for target in TARGETS:
-        click.echo(f"{target.name:<36} {_line(target, list(found.values()))}")
-    click.echo(f"report   {options.report / 'report.md'}")
+        say(f"{target.name:<36} {_line(target, list(found.values()))}")
+    say(f"report   {options.report / 'report.md'}")
     return int(any(target.missed(one) for one in found.values() for target in TARGETS))
 
 

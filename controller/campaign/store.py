@@ -86,25 +86,36 @@ class MissionStore:
 
     def _check_settings(self) -> None:
         """Rows of two configurations would make one table."""
-        if self._settings_path.exists() and self._settings_path.read_text("utf-8") != self._settings:
+        if self._settings_path.exists() and _text_of(self._settings_path) != self._settings:
             raise UserError(
                 f"{self.path}: was driven with another --config (it is in {self._settings_path}); go on with "
                 "that one, or give another --report folder"
             )
 
     def _read(self) -> None:
-        lines = self.path.read_text(encoding="utf-8").splitlines()
+        text = _text_of(self.path)
+        lines, cut = text.splitlines(), not text.endswith("\n")
         for number, line in enumerate(lines, start=1):
             try:
                 row = row_of(json.loads(line))
             except (ValueError, TypeError, KeyError) as error:
-                if number == len(lines):
+                if cut and number == len(lines):
                     return
                 raise UserError(
                     f"{self.path}: line {number} is not a row of this program ({error}); "
                     "mend it or give another --report folder"
                 ) from error
             self.rows[key_of(row)] = row
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise UserError(
+            f"{path}: is no text in UTF-8 ({error.reason} at byte {error.start}); mend it or give another "
+            "--report folder"
+        ) from error
 
 
 def row_of(values: dict[str, object]) -> Row:

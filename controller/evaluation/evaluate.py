@@ -29,6 +29,7 @@ from controller.evaluation.run_sequence import SequenceRecord
 from controller.evaluation.sequences import Sequence, sequences
 from controller.evaluation.summary import Summary, as_json, summarise
 from controller.evaluation.targets import TARGETS
+from controller.outlet import say
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ def run_evaluation(options: EvaluationOptions) -> None:
         lines.extend(recording_lines(looked))
         _say_recordings(looked)
     write_texts(options.report, result, lines)
-    click.echo(f"report        {options.report / 'report.md'}")
+    say(f"report        {options.report / 'report.md'}")
 
 
 def choose(names: tuple[str, ...]) -> tuple[Sequence, ...]:
@@ -129,12 +130,12 @@ def _say_figures(summary: Summary) -> None:
             figures = methods[name].figures
             objects = figures.objects
             found = f"{objects.correct} of {objects.correct + objects.missed} found, {objects.wrong} wrong"
-            click.echo(f"{split:<13} {name}: {found}")
+            say(f"{split:<13} {name}: {found}")
             for target in TARGETS:
                 value = target.value(figures)
                 mark = "" if target.reached(value, alone) else "  missed"
                 bound = target.bound(alone)
-                click.echo(f"{'':13} {target.name:<32} {fixed(value):>7} {target.unit:<8} {bound}{mark}")
+                say(f"{'':13} {target.name:<32} {fixed(value):>7} {target.unit:<8} {bound}{mark}")
 
 
 def _say_recordings(records: ReadOnly[RecordingRecord]) -> None:
@@ -142,4 +143,4 @@ def _say_recordings(records: ReadOnly[RecordingRecord]) -> None:
         moving = f"{len(record.moving_objects)} of {record.objects} objects called moving"
         false = f", {fixed(record.false_per_minute, 2)} false a minute" if record.static else ""
         skipped = f", {record.skipped} skipped" if record.skipped else ""
-        click.echo(f"recording     {record.name}: {record.frames} frames{skipped}, {moving}{false}")
+        say(f"recording     {record.name}: {record.frames} frames{skipped}, {moving}{false}")

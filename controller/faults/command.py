@@ -8,12 +8,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import click
-
 from config.loader import CONFIG_DIR
 from controller.errors import UserError
 from controller.faults.kills import KILLS, KillResult, run_kill
 from controller.faults.trials import FAULTS, KINDS, TrialResult, run_trial
+from controller.outlet import say
 
 HEADING = "## Faults"
 
@@ -35,15 +34,15 @@ def run_faults(options: FaultsOptions) -> None:
     trials = []
     for kind in KINDS:
         for fault in FAULTS:
-            click.echo(f"{kind}: {fault.name}", err=True)
+            say(f"{kind}: {fault.name}", to_stderr=True)
             trials.append(run_trial(kind, fault))
     kills = []
     for name in KILLS if options.kind is not None else ():
         assert options.kind is not None
-        click.echo(f"{options.kind}, processes: {name}", err=True)
+        say(f"{options.kind}, processes: {name}", to_stderr=True)
         kills.append(run_kill(options.kind, CONFIG_DIR / f"hil-{options.kind}.yaml", name))
     section = describe(trials, kills, options.kind)
-    click.echo(section)
+    say(section)
     if options.into is not None:
         write_section(options.into, section)
 
@@ -100,3 +99,5 @@ def write_section(path: Path, section: str) -> None:
         path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise UserError(f"--into {path}: cannot be written ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise UserError(f"--into {path}: is no text in UTF-8 ({error.reason}); give another page") from error

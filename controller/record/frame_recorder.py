@@ -8,8 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import click
-
+from controller.outlet import say
 from hal.cameras.tum_writer import TumWriter
 from hal.errors import DeviceRefused
 from hal.types import Pose, RgbdFrame
@@ -44,14 +43,14 @@ class FrameRecorder:
         self._thread.shutdown(wait=True)
         if self.dropped:
             why = "they came faster than they could be written"
-            click.echo(f"treadwatch: {self._folder}: {self.dropped} frames were left out: {why}", err=True)
+            say(f"treadwatch: {self._folder}: {self.dropped} frames were left out: {why}", to_stderr=True)
         try:
             self._collect(0)
         except DeviceRefused as refused:
             if error is None:
                 raise
             if not isinstance(error, DeviceRefused):
-                click.echo(f"treadwatch: {refused}", err=True)
+                say(f"treadwatch: {refused}", to_stderr=True)
 
     def write(self, frame: RgbdFrame, odometry: Pose | None) -> None:
         """Take in one frame; one that is not later than the last says nothing new. Raises DeviceRefused where

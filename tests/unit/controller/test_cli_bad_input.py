@@ -293,3 +293,16 @@ def test_a_path_that_may_not_even_be_looked_at(tmp_path: Path, arguments: tuple[
     nowhere = str(tmp_path / ("x" * 300))
     message = refusal(*(str(argument).format(nowhere) for argument in arguments))
     assert "x" * 300 in message
+
+
+@pytest.mark.parametrize("arguments", [("envelope",), ("replay", DESK)], ids=["envelope", "replay"])
+def test_a_disk_that_is_full_behind_standard_output_is_one_line(arguments: tuple[str | Path, ...]) -> None:
+    command = [sys.executable, "-m", "controller", *map(str, arguments)]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False
+        )
+    assert done.returncode == 0
+    assert done.stderr.splitlines() == [
+        "treadwatch: warning: nothing more can be written to standard output (No space left on device)"
+    ]

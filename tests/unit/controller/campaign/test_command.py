@@ -154,6 +154,30 @@ def test_a_row_that_is_none_is_told_with_its_line(tmp_path: Path) -> None:
         MissionStore(tmp_path, "").begin(resume=True)
 
 
+@pytest.mark.parametrize("last", ["{}\n", "hello\n"])
+def test_a_last_row_that_is_whole_and_none_is_told_and_kept(tmp_path: Path, last: str) -> None:
+    (tmp_path / MISSIONS).write_text(last)
+    with pytest.raises(UserError, match="line 1 is not a row"):
+        MissionStore(tmp_path, "").begin(resume=True)
+    assert (tmp_path / MISSIONS).read_text() == last
+
+
+def test_a_last_row_that_was_cut_off_is_driven_again(tmp_path: Path) -> None:
+    (tmp_path / MISSIONS).write_text('{"family": "plain_w')
+    store = MissionStore(tmp_path, "")
+    store.begin(resume=True)
+    assert store.rows == {}
+
+
+@pytest.mark.parametrize("file", [MISSIONS, SETTINGS])
+def test_a_file_that_is_no_text_is_told_and_kept(tmp_path: Path, file: str) -> None:
+    (tmp_path / MISSIONS).write_text("")
+    (tmp_path / file).write_bytes(b"\xff\xfe\n")
+    with pytest.raises(UserError, match=f"{file}: is no text in UTF-8"):
+        MissionStore(tmp_path, "").begin(resume=True)
+    assert (tmp_path / file).read_bytes() == b"\xff\xfe\n"
+
+
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="choose a folder"):

@@ -28,6 +28,8 @@ def stops(decision: Decision, rule: str, word: str) -> bool:
 
 def test_no_scene_no_motion() -> None:
     assert stops(Bench().step(None), "camera", "no scene yet")
+    assert stops(Bench().step(None, 0.2), "camera", "no scene yet")
+    assert Bench().step(None, 0.0).action is Action.KEEP
 
 
 def test_a_stale_scene_stops() -> None:

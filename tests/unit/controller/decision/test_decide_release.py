@@ -128,6 +128,23 @@ def test_a_crate_is_not_started_for_at_what_would_do_beside_a_person() -> None:
     assert Bench(config=config).settle(near, v_mps=0.0).target_speed_mps == 0.0
 
 
+def test_nobody_is_started_beside_as_slowly_as_it_may_creep() -> None:
+    """Who could step into the way allows 0.25 m/s: too little to set off with, below beside_mps."""
+    near = obstacle(1.0, 0.7, vx_mps=0.5, vy_mps=-0.4, sigma_mps=0.05)
+    decision = Bench().settle(near, v_mps=0.0)
+    assert decision.reason.rule == "worst case"
+    assert "at most 0.25 m/s: too little to go for" in decision.reason.sentence
+    assert decision.target_speed_mps == 0.0
+
+
+def test_who_sets_off_however_slowly_is_not_stuck() -> None:
+    config = DecisionConfig.model_validate({"release": {"go_m": 0.05}})
+    decision = Bench(config=config).settle(obstacle(0.51 + 0.45 + 0.1 + 0.1, 0.0), v_mps=0.0)
+    assert decision.reason.rule == "static"
+    assert 0.1 < decision.target_speed_mps < 0.2
+    assert decision.stuck_since_ns is None
+
+
 def test_what_does_not_block_the_way_may_be_as_slow_as_it_likes() -> None:
     """A degraded camera's limit is no place to creep up to."""
     config = DecisionConfig.model_validate({"sight": {"degraded_mps": 0.05}})

@@ -61,3 +61,11 @@ def test_the_section_takes_the_place_of_the_old_one_and_of_nothing_else(tmp_path
     assert page.read_text() == expected
     with pytest.raises(UserError, match="cannot be written"):
         write_section(tmp_path, "## Faults\n")
+
+
+def test_a_page_that_is_no_text_is_told_and_left_alone(tmp_path: Path) -> None:
+    page = tmp_path / "results.md"
+    page.write_bytes(b"# Mine \xff\n")
+    with pytest.raises(UserError, match="no text in UTF-8"):
+        write_section(page, "## Faults\n")
+    assert page.read_bytes() == b"# Mine \xff\n"
