@@ -84,6 +84,9 @@ class RealtimeRig:
                 # To end the perception process takes seconds; the base must not go on meanwhile.
                 self.chassis.stop(self.clock.now_ns())
                 raise
+            finally:
+                # Nobody feeds the watchdog from now on, and perception and its files take seconds to end.
+                service.stopping(_why_over(loop.ending))
 
 
 def _told(
@@ -97,17 +100,22 @@ def _told(
 
     Raises DeviceRefused at the end where perception could not even begin: without a scene nothing moves.
     """
-    told_ready = told_stopping = False
+    told_ready = False
     for moment in moments:
         if link.newest is not None and not told_ready:
             told_ready = True
             on_ready(service)
-        if ending.stop_reason is not None and not told_stopping:
-            told_stopping = True
+        if ending.stop_reason is not None:
             service.stopping(ending.stop_reason)
         yield moment
     if link.refused_reason is not None and ending.outcome is Outcome.BROKEN_OFF:
         raise DeviceRefused(f"{link.refused_reason}; nothing has moved")
+
+
+def _why_over(ending: Ending) -> str:
+    if ending.stop_reason is not None:
+        return ending.stop_reason
+    return "ended by an error" if ending.outcome is None else ending.outcome.value
 
 
 @contextmanager

@@ -26,6 +26,7 @@ class ServiceManager:
         self._address = "\0" + address[1:] if address.startswith("@") else address
         self._interval_ns = _watchdog_interval_ns(environment, pid)
         self._next_ns = 0
+        self._told_stopping = False
         self.lost_notices = 0
 
     def ready(self, status: str) -> None:
@@ -33,8 +34,10 @@ class ServiceManager:
         self._send(f"READY=1\nSTATUS={status}")
 
     def stopping(self, status: str) -> None:
-        """The stop has begun."""
-        self._send(f"STOPPING=1\nSTATUS={status}")
+        """The stop has begun, or the drive is over; told once. From now on no watchdog waits to be fed."""
+        if not self._told_stopping:
+            self._told_stopping = True
+            self._send(f"STOPPING=1\nSTATUS={status}")
 
     def feed_watchdog(self, now_ns: int) -> None:
         """Call once per healthy control step; sends at half the interval that systemd allows."""
