@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence as ReadOnly
 from dataclasses import dataclass
@@ -68,13 +69,13 @@ def run_evaluation(options: EvaluationOptions) -> None:
         write_figures(options.report, summary, records)
         failures = write_failures(options.report, records)
         result.update(as_json(summary))
-        lines.extend(simulated_lines(summary, records, failures, _command(options)))
+        lines.extend(simulated_lines(summary, records, failures, command_of(options)))
         _say_figures(summary)
     if options.recordings:
         looked = [_recording(options, *one) for one in zip(options.recordings, names, strict=True)]
         write_recording_pictures(options.report, looked)
         result["recordings"] = recordings_json(looked)
-        lines.extend(recording_lines(looked))
+        lines.extend(recording_lines(looked, command_of(options)))
         _say_recordings(looked)
     write_texts(options.report, result, lines)
     say(f"report        {options.report / 'report.md'}")
@@ -112,12 +113,20 @@ def _hidden(options: EvaluationOptions) -> bool:
     return options.quiet or not sys.stderr.isatty()
 
 
-def _command(options: EvaluationOptions) -> str:
-    parts = ["treadwatch evaluate --sim"]
+def command_of(options: EvaluationOptions) -> str:
+    """What makes this report again."""
+    parts = ["treadwatch", "evaluate", *map(str, options.recordings)]
+    if options.recordings and options.odometry != "auto":
+        parts.extend(("--odometry", options.odometry))
+    if options.static:
+        parts.append("--static")
+    if options.simulated:
+        parts.append("--sim")
     if options.baselines != "some":
-        parts.append(f"--baselines {options.baselines}")
-    parts.extend(f"--only {name}" for name in options.only)
-    return " ".join(parts)
+        parts.extend(("--baselines", options.baselines))
+    for name in options.only:
+        parts.extend(("--only", name))
+    return shlex.join([*parts, "--report", str(options.report)])
 
 
 def _say_figures(summary: Summary) -> None:

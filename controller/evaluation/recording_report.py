@@ -52,8 +52,8 @@ def write_recording_pictures(folder: Path, records: Sequence[RecordingRecord]) -
             write_picture(folder / file, image)
 
 
-def recording_lines(records: Sequence[RecordingRecord]) -> list[str]:
-    """report.md about recordings."""
+def recording_lines(records: Sequence[RecordingRecord], command: str) -> list[str]:
+    """report.md about recordings. command: how to get it again."""
     rows = [
         (
             record.name,
@@ -74,7 +74,8 @@ def recording_lines(records: Sequence[RecordingRecord]) -> list[str]:
         "recording", "odometry", "frames", "skipped", "seconds", "objects", "called moving",
         "frames with a moving one", "false a minute", "ms a frame, median", "p99",
     )  # fmt: skip
-    lines = ["# Recordings", "", " ".join(_WHAT.split()), "", *table(head, rows)]
+    made = f"Made by `{command}`. {' '.join(_WHAT.split())}"
+    lines = ["# Recordings", "", made, "", *table(head, rows)]
     for record, file in zip(records, _files(records), strict=True):
         if record.pictures:
             lines += [f"{record.name}: the second frame, and frames with something called moving.", ""]

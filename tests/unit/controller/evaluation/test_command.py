@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from config.app import ReplayConfig
 from controller.cli import cli
 from controller.errors import UserError
-from controller.evaluation.evaluate import EvaluationOptions, choose, run_evaluation
+from controller.evaluation.evaluate import EvaluationOptions, choose, command_of, run_evaluation
 from controller.evaluation.recording_report import recording_lines, write_recording_pictures
 from controller.evaluation.recordings import distinct_names, evaluate_recording
 from controller.evaluation.sequences import sequences
@@ -73,7 +73,7 @@ def test_each_recording_has_a_picture_of_its_own(tmp_path: Path) -> None:
     write_recording_pictures(tmp_path, records)
     files = [f"recording-{stem}.png" for stem in ("a-b-none", "a-b-none-2", "c-none", "a-b-none-3")]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(files)
-    shown = [line for line in recording_lines(records) if line.startswith("![")]
+    shown = [line for line in recording_lines(records, "") if line.startswith("![")]
     assert shown == [f"![{record.name}]({file})" for record, file in zip(records, files, strict=True)]
 
 
@@ -82,6 +82,18 @@ def test_without_static_nothing_is_called_false() -> None:
     record = evaluate_recording(DESK, "none", False, ReplayConfig(), lambda: frames.append(None))
     assert math.isnan(record.false_per_minute)
     assert len(frames) == record.frames
+
+
+def test_a_report_says_what_makes_it_again() -> None:
+    recordings = (Path("/data/my walk"), Path("b"))
+    options = EvaluationOptions(recordings, False, Path("out"), odometry="none", static=True)
+    command = "treadwatch evaluate '/data/my walk' b --odometry none --static --report out"
+    assert command_of(options) == command
+    assert any(f"Made by `{command}`." in line for line in recording_lines([], command))
+    simulated = EvaluationOptions((), True, Path("out"), baselines="all", only=("bend-group",))
+    assert command_of(simulated) == (
+        "treadwatch evaluate --sim --baselines all --only bend-group --report out"
+    )
 
 
 def test_nothing_to_evaluate(tmp_path: Path) -> None:
