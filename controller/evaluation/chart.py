@@ -67,9 +67,9 @@ class Axis:
         return [(value, f"{value:g}") for value in round_ticks(self.low, self.high)]
 
 
-def round_ticks(low: float, high: float, about: int = 6) -> list[float]:
-    """Multiples of 1, 2 or 5 times a power of ten between low and high, about so many."""
-    raw = (high - low) / about
+def round_ticks(low: float, high: float) -> list[float]:
+    """Multiples of 1, 2 or 5 times a power of ten between low and high, about six of them."""
+    raw = (high - low) / 6
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw * (1.0 - 1e-9))
     first = math.ceil(low / step - 1e-9)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -75,9 +74,8 @@ def run_sequence(
     methods: tuple[str, ...],
     show_frames: tuple[int, ...],
     stopwatch_ns: Stopwatch,
-    on_frame: Callable[[], None] = lambda: None,
 ) -> SequenceRecord:
-    """show_frames: indices of frames to keep for pictures. on_frame is called after each frame."""
+    """show_frames: indices of frames to keep for pictures."""
     world = build_world(sequence)
     intrinsics = intrinsics_of(sequence.camera())
     teller = TruthTeller(world, intrinsics)
@@ -85,7 +83,6 @@ def run_sequence(
     recorder = _Recorder(sequence, methods, show_frames)
     for index, seen in enumerate(simulate(sequence, teller, world)):
         recorder.add(index, seen, contestants)
-        on_frame()
     return recorder.result()
 
 

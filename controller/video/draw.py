@@ -13,6 +13,7 @@ from controller.video.style import Colour, Image
 
 Points = NDArray[np.floating]
 _FRACTION_BITS = 4
+_HEAD_PX = 8.0  # of an arrow
 # Far outside every picture, and far inside int32 with the fraction bits.
 _FARTHEST_PX = 1e5
 
@@ -86,19 +87,17 @@ def box(corners: ArrayLike) -> NDArray[np.float64]:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
-def arrow(
-    image: Image, tail: Points, tip: Points, colour: Colour, thickness: int = 2, head_px: float = 8.0
-) -> None:
+def arrow(image: Image, tail: Points, tip: Points, colour: Colour) -> None:
     """From tail to tip with a filled head; nothing where they are less than a pixel apart."""
     along = tip - tail
     length_px = float(np.hypot(*along))
     if length_px < 1.0:
         return
     forward = along / length_px
-    head_px = min(head_px, length_px)
+    head_px = min(_HEAD_PX, length_px)
     neck = tip - forward * head_px
     side = np.array([-forward[1], forward[0]]) * head_px * 0.5
-    line(image, np.stack([tail, neck]), colour, thickness)
+    line(image, np.stack([tail, neck]), colour, thickness=2)
     area(image, np.stack([tip, neck + side, neck - side]), colour)
 
 

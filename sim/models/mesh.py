@@ -107,9 +107,8 @@ def prism(
     texture: str,
     taper: float = 1.0,
     cap: str | None = None,
-    lean_m: tuple[float, float] = (0.0, 0.0),
 ) -> Faces:
-    """An upright many-sided cylinder (elliptic; the top is taper times the bottom, shifted by lean_m).
+    """An upright many-sided cylinder (elliptic; the top is taper times the bottom).
 
     radii_m: half axes along x and y at the bottom. z_m: bottom and top. The texture goes once around.
     cap: texture of the top and the underside; None leaves both open. sides must be even with a cap.
@@ -117,7 +116,7 @@ def prism(
     angles = (np.arange(sides) + 0.5) * (2.0 * math.pi / sides)
     ring = np.stack([radii_m[0] * np.cos(angles), radii_m[1] * np.sin(angles)], axis=1)
     bottom = np.column_stack([ring, np.full(sides, z_m[0])])
-    top = np.column_stack([ring * taper + np.array(lean_m), np.full(sides, z_m[1])])
+    top = np.column_stack([ring * taper, np.full(sides, z_m[1])])
     after = np.roll(np.arange(sides), -1)
     corners = np.stack([top, top[after], bottom[after], bottom], axis=1)
     steps = np.arange(sides) / sides

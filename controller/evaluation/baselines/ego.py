@@ -15,6 +15,7 @@ _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.01)
 _BACK_PX = 1.0
 _MIN_POINTS = 8
 _SEED = 20200127
+_APART_PX = 7
 
 
 def seed_ransac() -> None:
@@ -22,14 +23,14 @@ def seed_ransac() -> None:
     cv2.setRNGSeed(_SEED)
 
 
-def corners(grey: Mask, count: int, taken: Points | None = None, distance_px: int = 7) -> Points:
+def corners(grey: Mask, count: int, taken: Points | None = None) -> Points:
     """(N, 2) good features to track; none near points that are taken already."""
     mask = None
     if taken is not None and len(taken):
         mask = np.full(grey.shape, 255, np.uint8)
         for u, v in np.rint(taken).astype(int):
-            cv2.circle(mask, (int(u), int(v)), distance_px, 0, -1)
-    found: object = cv2.goodFeaturesToTrack(grey, count, 0.01, distance_px, mask=mask)
+            cv2.circle(mask, (int(u), int(v)), _APART_PX, 0, -1)
+    found: object = cv2.goodFeaturesToTrack(grey, count, 0.01, _APART_PX, mask=mask)
     return np.empty((0, 2), np.float32) if found is None else np.asarray(found, np.float32).reshape(-1, 2)
 
 
