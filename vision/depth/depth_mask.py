@@ -14,15 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
+from hal.compiled import compiled, inlined
 from hal.types import DepthImage, FloatArray
 from vision.camera.lens import RealArray
 
 Depths = TypeVar("Depths", NDArray[np.float32], NDArray[np.float64])
 
-_REACH_PX = np.array((-6, -3, 0, 3, 6))  # 13 px across: beyond the rim of some pixels where depth is wrong
+# 5x5 samples over 13 px: beyond the rim of some pixels where depth is wrong.
+_REACH_PX, _EVERY_PX, _SAMPLES = 6, 3, 25
 _NEAR_RANK = 4  # the 5th nearest of 25 samples: a corner of a body still covers a fifth of them
 _MIN_SUPPORT = 4  # of 25 samples: fewer are stray ones
-_NO_DATA_M = np.float32(1e6)  # sorts behind everything that is valid
 _HOLES = 0.25  # of the surroundings: so much without depth may be another surface
 UNSEEN_M = 12.0  # how far that is taken to be
 _CUT_OFF = np.iinfo(np.uint16).max  # what is as far as this, or farther
@@ -65,48 +66,85 @@ def surface_depth(
 
     The far one may be beyond: the texture of a distant wall mixes with an outline as that of a near one does.
     """
-    sample_m = _samples(depth, pixels) * np.float32(scale_m)
-    sample_m[sample_m < min_m] = _NO_DATA_M
-    # One column per point: sums over the samples then run along the memory.
-    ordered = np.ascontiguousarray(np.sort(sample_m, axis=1).T)
-    within, measured = ordered <= measurable_m(max_m, scale_m), ordered < _NO_DATA_M
-    count = _count(within)
-    # With holes around, the same share of what is valid decides.
-    rank = np.minimum(_NEAR_RANK, count // 3)
-    anchor_m = ordered[rank, np.arange(len(rank))]
-    gate_m = (0.06 + 3.0 * depth_sigma_m(anchor_m.astype(float), noise)).astype(np.float32)
-    behind_m = ordered - anchor_m
-    is_near = (np.abs(behind_m) <= gate_m) & within
-    is_far = (behind_m > gate_m) & measured
-    near_count, far_count = _count(is_near), _count(is_far)
-    near_m = _sum(ordered, is_near) / np.maximum(near_count, 1)
-    far_m = _sum(ordered, is_far) / np.maximum(far_count, 1)
-    near_m[(count < _MIN_SUPPORT) | (near_count < 2)] = np.nan
-    far_m = np.where((far_count >= 2) & (near_m == near_m), far_m, near_m)
-    holes = 1.0 - _count(measured) / len(measured)
-    far_m = np.where((holes >= _HOLES) & (near_m == near_m), np.maximum(far_m, UNSEEN_M), far_m)
+    near_m, far_m, holes = _surfaces(
+        np.ascontiguousarray(depth),
+        np.ascontiguousarray(pixels, np.float64),
+        np.float32(scale_m),
+        np.float32(min_m),
+        np.float32(measurable_m(max_m, scale_m)),
+        noise.floor_m,
+        noise.quadratic_per_m,
+    )
     return SurfaceDepth(near_m, far_m, holes)
 
 
-def _samples(depth: DepthImage, pixels: RealArray) -> DepthImage:
-    """(N, 25) raw depth around pixels (N, 2); close to the border they lie to one side, within the image."""
+@inlined
+def _sorted_samples(
+    depth: DepthImage,
+    u: float,
+    v: float,
+    scale_m: np.float32,
+    min_m: np.float32,
+    into_m: NDArray[np.float32],
+) -> int:
+    """How many of the samples around a pixel are no holes; into_m (_SAMPLES,) begins with these, the nearest
+    first. Close to the border they lie to one side, within the image."""
     height, width = depth.shape
-    centre = np.rint(pixels).astype(np.intp)
-    reach = int(_REACH_PX[-1])
-    column = np.minimum(np.maximum(centre[:, 0], reach), width - 1 - reach)
-    row = np.minimum(np.maximum(centre[:, 1], reach), height - 1 - reach)
-    around = (_REACH_PX[:, None] * width + _REACH_PX).ravel()
-    samples: DepthImage = depth.ravel().take((row * width + column)[:, None] + around)
-    return samples
+    column = min(max(int(np.rint(u)), _REACH_PX), width - 1 - _REACH_PX)
+    row = min(max(int(np.rint(v)), _REACH_PX), height - 1 - _REACH_PX)
+    count = 0
+    for i in range(row - _REACH_PX, row + _REACH_PX + 1, _EVERY_PX):
+        for j in range(column - _REACH_PX, column + _REACH_PX + 1, _EVERY_PX):
+            sample_m = depth[i, j] * scale_m
+            if sample_m < min_m:
+                continue
+            place = count
+            while place > 0 and into_m[place - 1] > sample_m:
+                into_m[place] = into_m[place - 1]
+                place -= 1
+            into_m[place] = sample_m
+            count += 1
+    return count
 
 
-def _count(chosen: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """(N,) how many of the samples (25, N) are chosen."""
-    result: NDArray[np.uint8] = np.add.reduce(chosen.view(np.uint8), axis=0, dtype=np.uint8)
-    return result
-
-
-def _sum(depth_m: NDArray[np.float32], chosen: NDArray[np.bool_]) -> FloatArray:
-    """(N,) sum of the chosen ones of the samples (25, N)."""
-    result: FloatArray = np.add.reduce(depth_m * chosen, axis=0, dtype=np.float64)
-    return result
+@compiled("uint16[:, ::1], float64[:, ::1], float32, float32, float32, float64, float64")
+def _surfaces(
+    depth: DepthImage,
+    pixels: FloatArray,
+    scale_m: np.float32,
+    min_m: np.float32,
+    max_m: np.float32,
+    floor_m: float,
+    quadratic_per_m: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """near_m, far_m and holes, (N,) each. max_m: of the near surface."""
+    count = len(pixels)
+    near_m, far_m, holes = np.full(count, np.nan), np.full(count, np.nan), np.empty(count)
+    sample_m = np.empty(_SAMPLES, np.float32)
+    for k in range(count):
+        measured = _sorted_samples(depth, pixels[k, 0], pixels[k, 1], scale_m, min_m, sample_m)
+        holes[k] = 1.0 - measured / _SAMPLES
+        within = measured
+        while within > 0 and sample_m[within - 1] > max_m:
+            within -= 1
+        if within < _MIN_SUPPORT:
+            continue
+        # With holes around, the same share of what is valid decides.
+        anchor_m = sample_m[min(_NEAR_RANK, within // 3)]
+        gate_m = np.float32(0.06 + 3.0 * (floor_m + quadratic_per_m * anchor_m * anchor_m))
+        near_sum, near_count, far_sum, far_count = 0.0, 0, 0.0, 0
+        for j in range(measured):
+            behind_m = sample_m[j] - anchor_m
+            if behind_m > gate_m:
+                far_sum += sample_m[j]
+                far_count += 1
+            elif behind_m >= -gate_m and j < within:
+                near_sum += sample_m[j]
+                near_count += 1
+        if near_count < 2:
+            continue
+        near_m[k] = near_sum / near_count
+        far_m[k] = far_sum / far_count if far_count >= 2 else near_m[k]
+        if holes[k] >= _HOLES:
+            far_m[k] = max(far_m[k], UNSEEN_M)
+    return near_m, far_m, holes
