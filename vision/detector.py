@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
-from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
+from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.camera.floor import FloorFinder, on_floor
 from vision.camera.gyro import GyroMemory
 from vision.camera.health import Continuity, HealthMonitor
-from vision.camera.lens import project, rays, vector_from_rotation
+from vision.camera.lens import vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
@@ -27,10 +26,12 @@ from vision.fragments.edges import GreyImage
 from vision.fragments.optical_flow import Pyramid, pyramid
 from vision.fragments.renewal import Renewal
 from vision.fragments.store import FragmentStore
-from vision.motion.evidence import appraise, average_depth, observed_variance_scale, residuals, static_points
+from vision.motion.anchor_depths import appraise, average_depth, static_points
+from vision.motion.evidence import observed_variance_scale, residuals
+from vision.motion.expected import expected_px, known_motion
 from vision.motion.velocities import PointMotion
 from vision.percept import Percept
-from vision.scene import CameraCondition, CameraHealth, EgoMotion, Fragments
+from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
 _IDENTITY = Pose(np.eye(3), np.zeros(3))
 _NO_SWEEP = np.zeros(2)
@@ -101,8 +102,8 @@ class Detector:
     ) -> Detection:
         store, config, camera = self._store, self._config, frame.intrinsics
         prior = self._prior(frame, odometry, dt_s)
-        moving, velocity = _hint(store.ids, previous.fragments if previous else None)
-        guess = self._guess(prior.motion, velocity, dt_s, camera)
+        moving, velocity = known_motion(store.ids, previous.fragments if previous else None)
+        guess = expected_px(store, velocity, prior.motion, dt_s, camera)
         images = pyramid(grey, config.fragments)
         flow = optical_flow.track(
             self._images,
@@ -251,23 +252,6 @@ class Detector:
         turn_rad = self._gyro.turn_rad(self._last_ns, frame.captured_ns)
         return prior if turn_rad is None else with_gyro(prior, turn_rad, dt_s, settings)
 
-    def _guess(
-        self, motion: Pose, velocity: FloatArray, dt_s: float, camera: Intrinsics
-    ) -> NDArray[np.float32]:
-        """Where the ends are expected now: (2N, 2). velocity (N, 3) over ground in the camera before."""
-        store = self._store
-        pixels = store.ends_px.reshape(-1, 2)
-        if len(pixels) == 0:
-            return pixels
-        near_m = store.near_m.ravel().astype(float)
-        depth_m = np.where(np.isnan(near_m), 5.0, near_m)
-        points = rays(pixels, camera).T * depth_m - motion.translation_m[:, None]
-        if velocity.any():
-            points += np.repeat(velocity.T * dt_s, 2, axis=1)
-        moved = motion.rotation.T @ points
-        moved[2] = np.maximum(moved[2], 0.1)
-        return project(moved.T, camera).astype(np.float32)
-
 
 def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) -> EgoMotion:
     variance = result.covariance.diagonal()
@@ -279,17 +263,3 @@ def _ego(step: Pose, dt_s: float, result: CameraEstimate, prior: MotionPrior) ->
         sigma_translation_m=float(np.sqrt(variance[3:].sum())),
         sigma_rotation_rad=float(np.sqrt(variance[:3].sum())),
     )
-
-
-def _hint(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Which of the fragments ids tracking knew as moving, and how fast: (N,), (N, 3)."""
-    moving, velocity = np.zeros(len(ids), np.bool_), np.zeros((len(ids), 3))
-    if previous is None or len(previous.ids) == 0:
-        return moving, velocity
-    index = np.minimum(previous.ids.searchsorted(ids), len(previous.ids) - 1)
-    same = previous.ids[index] == ids
-    moving[same] = previous.moving[index[same]]
-    if moving.any():
-        measured = previous.velocity_mps[index[moving]]
-        velocity[moving] = np.where(measured == measured, measured, 0.0)
-    return moving, velocity

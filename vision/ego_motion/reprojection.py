@@ -1,19 +1,15 @@
-"""Reprojection error of anchored points, with its derivatives: what vision/ego_motion/camera_motion.py
-minimises.
-
-For a given pose of the camera: where points that were anchored some frames ago are predicted in the image,
-how far from there they are seen (the residual), and how that changes with each unknown: pose (6) and sweep
-(2, the camera's turn while the image was read). All in standard deviations.
-"""
+"""Anchored points, and how they are seen now: what vision/ego_motion/robust_fit.py fits the camera to."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.types import FloatArray, Intrinsics, Pose
+from hal.compiled import compiled
+from hal.types import FloatArray, Intrinsics
 from vision.camera.lens import row_delays
 
 
@@ -32,89 +28,64 @@ class Anchors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The N points that count, coordinate by coordinate: at this size a NumPy call costs more than what it
-    computes, so everything of one kind lies in one array. lines (3, 2N): points, then their derivatives
-    by depth. seen (2, N): on the plane z = 1; delays (N,) of their rows. whitening (3, N): turns an error
-    (a, b) on that plane into (w0 a, w1 a + w2 b), of unit variance."""
+    """The N points that count. lines (N, 2, 3): each point and its derivative by depth. seen (N, 3): where it
+    is on the plane z = 1, and when its row was read (row_delays). doubt (N, 4): w0, w1, w2, which turn an
+    error (a, b) on that plane into (w0 a, w1 a + w2 b), of unit variance; then the variance of its depth."""
 
     lines: FloatArray
     seen: FloatArray
-    delays: FloatArray
-    depth_variance: FloatArray
-    whitening: FloatArray
+    doubt: FloatArray
 
 
 def view_of(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: Intrinsics) -> View:
     """Of the points use (M,)."""
-    count = len(use)
-    lines = np.empty((3, 2 * count))
-    lines[:, :count] = anchors.points_m.T.take(use, axis=1)
-    lines[:, count:] = anchors.range_m.T.take(use, axis=1)
-    seen = np.empty((2, count))
-    u, v = pixels.T.take(use, axis=1)
-    seen[0] = (u - camera.cx) / camera.fx
-    seen[1] = (v - camera.cy) / camera.fy
-    # The inverse of Cholesky's factor.
-    xx, xy, yy = anchors.pixel_cov.T.take(use, axis=1)
-    first = np.sqrt(xx)
-    low = xy / first
-    second = np.sqrt(np.maximum(yy - low * low, 1e-6))
-    whitening = np.empty((3, count))
-    whitening[0] = camera.fx / first
-    whitening[1] = -camera.fx * low / (first * second)
-    whitening[2] = camera.fy / second
     return View(
-        lines=lines,
-        seen=seen,
-        delays=row_delays(v, camera),
-        depth_variance=np.square(anchors.depth_sigma_m[use]),
-        whitening=whitening,
+        *_view(
+            anchors.points_m,
+            anchors.range_m,
+            np.ascontiguousarray(anchors.depth_sigma_m),
+            anchors.pixel_cov,
+            pixels,
+            row_delays(pixels[:, 1], camera),
+            use,
+            camera.fx,
+            camera.fy,
+            camera.cx,
+            camera.cy,
+        )
     )
 
 
-def linearise(view: View, pose: Pose, table: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Fill table (10, 3, N). Returns which points lie in front of the camera and what the variance of their
-    depth takes off the square of an error along the derivative by depth: (N,), (N,).
-
-    Rows 0 to 5: derivative of the image by a small motion of the camera (rotation, translation); rows 6
-    and 7: by its sweep; row 8: seen minus predicted, without sweep; row 9: derivative by depth. First and
-    second layer: across and down the image, in sigmas. Third layer: the part along the derivative by depth,
-    times its length.
-    """
-    count = view.seen.shape[1]
-    turned = pose.rotation.T @ view.lines
-    x, y, z = turned[:, :count] - (pose.rotation.T @ pose.translation_m)[:, None]
-    direction = turned[:, count:]
-    in_front: NDArray[np.bool_] = z > 0.1
-    inverse = 1.0 / np.maximum(z, 0.1)
-    x *= inverse
-    y *= inverse
-    # The camera turns by w and goes by v: a point goes by -(w x p) - v in its frame.
-    across, down, along = table[:, 0], table[:, 1], table[:, 2]
-    np.multiply(x, y, out=across[0])
-    np.negative(across[0], out=down[1])
-    np.subtract(-1.0, x * x, out=across[1])
-    np.add(1.0, y * y, out=down[0])
-    across[2] = y
-    np.negative(x, out=down[2])
-    np.negative(inverse, out=across[3])
-    across[4] = 0.0
-    down[3] = 0.0
-    down[4] = across[3]
-    np.multiply(x, inverse, out=across[5])
-    np.multiply(y, inverse, out=down[5])
-    np.subtract(view.seen[0], x, out=across[8])
-    np.subtract(view.seen[1], y, out=down[8])
-    np.multiply(inverse, direction[0] - x * direction[2], out=across[9])
-    np.multiply(inverse, direction[1] - y * direction[2], out=down[9])
-    np.multiply(across[:2], view.delays, out=across[6:8])
-    np.multiply(down[:2], view.delays, out=down[6:8])
-    own, mixed, other = view.whitening
-    down *= other
-    down += across * mixed
-    across *= own
-    np.multiply(across, across[9], out=along)
-    along += down * down[9]
-    # Depth's share of the covariance, by Sherman and Morrison: only along the epipolar line.
-    shrink = view.depth_variance / (1.0 + view.depth_variance * along[9])
-    return in_front, shrink
+@compiled(
+    "float64[:, :], float64[:, :], float64[::1], float64[:, :], float64[:, :], float64[::1], int64[::1],"
+    " float64, float64, float64, float64"
+)
+def _view(
+    points_m: FloatArray,
+    range_m: FloatArray,
+    depth_sigma_m: FloatArray,
+    pixel_cov: FloatArray,
+    pixels: FloatArray,
+    delays: FloatArray,
+    use: NDArray[np.intp],
+    fx: float,
+    fy: float,
+    cx: float,
+    cy: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The fields of View."""
+    count = len(use)
+    lines, seen, doubt = np.empty((count, 2, 3)), np.empty((count, 3)), np.empty((count, 4))
+    for k in range(count):
+        one = use[k]
+        for i in range(3):
+            lines[k, 0, i], lines[k, 1, i] = points_m[one, i], range_m[one, i]
+        seen[k, 0], seen[k, 1] = (pixels[one, 0] - cx) / fx, (pixels[one, 1] - cy) / fy
+        seen[k, 2] = delays[one]
+        # The inverse of Cholesky's factor.
+        first = math.sqrt(pixel_cov[one, 0])
+        low = pixel_cov[one, 1] / first
+        second = math.sqrt(max(pixel_cov[one, 2] - low * low, 1e-6))
+        doubt[k, 0], doubt[k, 1], doubt[k, 2] = fx / first, -fx * low / (first * second), fy / second
+        doubt[k, 3] = depth_sigma_m[one] * depth_sigma_m[one]
+    return lines, seen, doubt

@@ -17,6 +17,7 @@ import math
 
 import numpy as np
 
+from hal.compiled import compiled
 from hal.types import FloatArray, Intrinsics
 from vision.camera.lens import RealArray, rays, row_delays
 from vision.ego_motion.camera_motion import CameraEstimate
@@ -35,12 +36,19 @@ def straight_rays(pixels: RealArray, camera: Intrinsics, sweep_rad: FloatArray) 
 
     sweep_rad (2,): how far the camera turned about x and y while the image was read.
     """
-    result = rays(pixels, camera)
-    x, y = result[:, 0].copy(), result[:, 1].copy()
-    about_x, about_y = np.multiply.outer(sweep_rad, row_delays(pixels[:, 1], camera))
-    # The derivatives of a small rotation, as in vision/ego_motion/camera_motion.py.
-    result[:, 0] -= about_x * x * y - about_y * (1.0 + x * x)
-    result[:, 1] -= about_x * (1.0 + y * y) - about_y * x * y
+    delays = row_delays(pixels[:, 1], camera)
+    return _straightened(rays(pixels, camera).T, delays, float(sweep_rad[0]), float(sweep_rad[1])).T
+
+
+@compiled("float64[:, ::1], float64[::1], float64, float64")
+def _straightened(plane: FloatArray, delays: FloatArray, sweep_x: float, sweep_y: float) -> FloatArray:
+    """plane and result (3, N). delays (N,): when each point was read."""
+    result = np.ones_like(plane)
+    for k in range(len(delays)):
+        x, y, about_x, about_y = plane[0, k], plane[1, k], sweep_x * delays[k], sweep_y * delays[k]
+        # The derivatives of a small rotation, as in vision/ego_motion/robust_fit.py.
+        result[0, k] = x - (about_x * x * y - about_y * (1.0 + x * x))
+        result[1, k] = y - (about_x * (1.0 + y * y) - about_y * x * y)
     return result
 
 

@@ -2,31 +2,27 @@
 
 The prediction: where the end would be now if it had stayed at its anchor, by the camera's own motion. The
 residual (innovation): how far from there it is seen, with its covariance and chi-square (PointMotion). The
-ends that are not known to move also give the points that the camera's motion is found by (static_points) and
-the scale of the noise (observed_variance_scale). The evidence of tracks, which rests on these residuals among
-other things, is in vision/motion/motion_evidence.py.
+ends that are not known to move also give the scale of the noise (observed_variance_scale). The evidence of
+tracks, which rests on these residuals among other things, is in vision/motion/motion_evidence.py.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.types import FloatArray, Intrinsics, Pose
-from vision.depth.depth_mask import UNSEEN_M, depth_sigma_m
+from hal.compiled import compiled, inlined
+from hal.types import FloatArray, Intrinsics
 from vision.ego_motion.camera_motion import CameraEstimate
-from vision.ego_motion.reprojection import Anchors
 from vision.ego_motion.rolling_shutter import straight_rays
 from vision.fragments.store import AnchorEnds, FragmentStore
-from vision.motion.velocities import PointMotion, chi2_2d
+from vision.motion.anchor_depths import AnchorDepths, depth_steps
+from vision.motion.velocities import PointMotion
 from vision.numerics.order import quantile
 
-# Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
-_UNSEEN_SIGMA_M = 10.0
 _SETTLED_FRAMES = 3  # younger ends are hardly farther from their anchors than the noise
 _LEAST_ENDS = 16  # a third of fewer tells no scale
 _CHI2_THIRD = 0.811  # a third of static ends, 2 degrees of freedom, lies below
@@ -35,64 +31,9 @@ _SCALE_GAIN = 0.15  # of what is new in each frame: half of it in four, as the f
 _LEAST_SCALE = 0.3
 _MOST_SCALE = 8.0
 _STEPS_SHARE = 0.5  # flow errors of successive frames cancel in part
-_MOST_LOOKS = 6.0  # a running mean over so many; what they share does not average out, see below
-_SETTLED_LATE_FRAMES = 4.0  # between the plain mean of the first looks and the running one: 2.5 to 5
-_COMMON_NOISE = 0.5  # of depth: what neighbouring frames share, and no mean takes off
-_MIXED_SIGMAS = 3.0  # of depth, and 0.1 m: less is one surface
 _STATIC_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom, lie below
 _MIXED_ALONG_PX = 3.0  # how far an end slides along a fragment at least, where two surfaces cross
 _MIXED_ACROSS_PX = 0.3  # across it: twice what a clear end is known to
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AnchorDepths:
-    """What the depths (2N,) of anchored ends are good for: near_m, sigma_m and far_m are finite throughout,
-    known tells where they were measured; mixed, where the end lies on two surfaces."""
-
-    near_m: FloatArray
-    sigma_m: FloatArray
-    far_m: FloatArray
-    known: NDArray[np.bool_]
-    mixed: NDArray[np.bool_]
-
-
-def appraise(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
-    """Where depth is missing, the end is taken for a distant one whose depth is hardly known."""
-    known = np.isfinite(anchor.depth_m)
-    near_m = np.where(known, anchor.depth_m, UNSEEN_M)
-    far_m = np.where(known, anchor.far_m, UNSEEN_M)
-    single = depth_sigma_m(near_m, noise)
-    sigma_m = np.where(known, single * _averaged(anchor.looks), _UNSEEN_SIGMA_M)
-    return AnchorDepths(
-        near_m=near_m,
-        sigma_m=sigma_m,
-        far_m=far_m,
-        known=known,
-        mixed=far_m - near_m > 0.1 + _MIXED_SIGMAS * single,
-    )
-
-
-def static_points(
-    anchor: AnchorEnds,
-    depths: AnchorDepths,
-    pixel_cov: NDArray[np.float32],
-    moving: NDArray[np.bool_],
-    distant_m: float,
-) -> Anchors:
-    """The 2N ends as points to find the camera by. pixel_cov (N, 2, 3) and moving (N,) of the fragments.
-
-    An end on two surfaces could be on either. Where one of them is farther than distant_m away, it tells of
-    the camera's turn all the same: across its epipolar line. In a wide hall hardly any others may be left.
-    """
-    distant = depths.mixed & (depths.far_m > distant_m)
-    between_m = np.where(distant, depths.far_m - depths.near_m, 0.0)
-    return Anchors(
-        points_m=(anchor.direction * depths.near_m + anchor.origin).T,
-        range_m=anchor.direction.T,
-        depth_sigma_m=np.maximum(depths.sigma_m, between_m),
-        pixel_cov=pixel_cov.reshape(-1, 3).astype(float),
-        usable=~((depths.mixed & ~distant) | moving.repeat(2)),
-    )
 
 
 def residuals(
@@ -108,46 +49,41 @@ def residuals(
 
     variance_scale: how much larger the variance of static ends has been found than it was assumed.
     """
-    turn = now.pose.rotation.T
-    direction = turn @ anchor.direction
-    origin = turn @ (anchor.origin - now.pose.translation_m[:, None])
-    ray = straight_rays(store.ends_px.reshape(-1, 2), camera, now.sweep_rad).T[:2]
-    # Near and far surface at once, in the middle index: (3, 2, 2N), (2, 2, 2N).
-    surfaces = np.empty((2, len(depths.near_m)))
-    surfaces[0], surfaces[1] = depths.near_m, depths.far_m
-    static = direction[:, None] * surfaces + origin[:, None]
-    miss = ray[:, None] * static[2] - static[:2]
-    sigma = np.empty((2, len(depths.near_m)))
-    sigma[0], sigma[1] = depths.sigma_m, depth_sigma_m(depths.far_m, noise)
-    effect = (ray * direction[2] - direction[:2])[:, None] * (sigma * math.sqrt(variance_scale))
-    depth = static[2, 0]
-    in_front = depth > 0.1
-    squared = np.square(depth)
-    per_pixel = np.array([[1.0 / camera.fx**2], [1.0 / (camera.fx * camera.fy)], [1.0 / camera.fy**2]])
-    passing = static[:2, 1] / np.maximum(static[2, 1], 0.1) - static[:2, 0] / np.maximum(depth, 0.1)
-    passing *= np.array([[camera.fx], [camera.fy]])
-    covariance = _pixel_covariance(store, anchor, depths.mixed, passing)
-    covariance *= per_pixel * (variance_scale * squared)
-    covariance[::2] += _pose_variance(now.covariance, squared)
-    doubt = np.empty((3, 2, len(depth)))
-    doubt[:, 0], doubt[:, 1] = covariance, covariance * np.square(static[2, 1] / np.maximum(depth, 0.1))
-    chi2 = chi2_2d(miss.reshape(2, -1).T, doubt.reshape(3, -1).T, effect.reshape(2, -1).T).reshape(2, -1)
-    # What is where the far one of two surfaces would have it says nothing of how the near one moves.
-    behind = (chi2[0] > _STATIC_CHI2) & (chi2[1] <= _STATIC_CHI2)
-    depth_now = store.near_m.ravel().astype(float)
-    sigma_now = depth_sigma_m(np.where(np.isnan(depth_now), 1.0, depth_now), noise)
+    variance = now.covariance.diagonal().tolist()
+    static_m, ray, miss_m, covariance, depth_effect, static_chi2, told = _missed(
+        np.ascontiguousarray(anchor.direction),
+        np.ascontiguousarray(anchor.origin),
+        depths.near_m,
+        depths.sigma_m,
+        depths.far_m,
+        depths.mixed,
+        np.ascontiguousarray(straight_rays(store.ends_px.reshape(-1, 2), camera, now.sweep_rad).T),
+        np.ascontiguousarray(store.ends_px),
+        np.ascontiguousarray(store.pixel_cov),
+        anchor.lag_frames,
+        np.ascontiguousarray(now.pose.rotation),
+        np.ascontiguousarray(now.pose.translation_m),
+        max(variance[:3]),
+        max(variance[3:6]),
+        camera.fx,
+        camera.fy,
+        noise.floor_m,
+        noise.quadratic_per_m,
+        variance_scale,
+    )
+    step_m, step_sigma_m, step_lag_s = depth_steps(store, anchor, depths, static_m, noise)
     return PointMotion(
-        static_m=static[:, 0].T,
-        ray=ray.T,
+        static_m=static_m,
+        ray=ray,
         lag_s=anchor.lag_s.repeat(2),
-        miss_m=miss[:, 0].T,
-        covariance=covariance.T,
-        depth_effect=effect[:, 0].T,
-        depth_step_m=depth_now - depth,
-        depth_step_sigma_m=np.hypot(depths.sigma_m, sigma_now),
-        depth_lag_s=_depth_lag_s(anchor),
-        static_chi2=chi2.min(axis=0),
-        usable=depths.known & in_front & ~behind & np.isfinite(miss[0, 0] + miss[1, 0]),
+        miss_m=miss_m,
+        covariance=covariance,
+        depth_effect=depth_effect,
+        depth_step_m=step_m,
+        depth_step_sigma_m=step_sigma_m,
+        depth_lag_s=step_lag_s,
+        static_chi2=static_chi2,
+        usable=depths.known & told,
     )
 
 
@@ -167,62 +103,126 @@ def observed_variance_scale(
     return min(max(before + _SCALE_GAIN * (seen - before), _LEAST_SCALE), _MOST_SCALE)
 
 
-def _averaged(looks: FloatArray) -> FloatArray:
-    """(N,) what is left of the noise of depth after looks (N,) frames, whose noise is alike in part."""
-    result: FloatArray = np.maximum(1.0 / np.sqrt(np.maximum(looks, 1.0)), _COMMON_NOISE)
+@inlined
+def _squared_sigmas(
+    miss: tuple[float, float], covariance: tuple[float, float, float], effect: tuple[float, float]
+) -> float:
+    """Squared Mahalanobis length of miss under covariance (xx, xy, yy) plus effect effect'."""
+    a, b = miss
+    xx = covariance[0] + effect[0] * effect[0]
+    xy = covariance[1] + effect[0] * effect[1]
+    yy = covariance[2] + effect[1] * effect[1]
+    result: float = (yy * a * a - 2.0 * xy * a * b + xx * b * b) / max(xx * yy - xy * xy, 1e-18)
     return result
 
 
-def average_depth(store: FragmentStore, before: AnchorEnds, pose: Pose, noise: DepthNoise) -> None:
-    """Carry the depth of every end on as if it were static, and average it with what is measured now.
+@inlined
+def _slide(ends_px: NDArray[np.float32], passing: tuple[float, float]) -> tuple[float, float, float]:
+    """Covariance uu, uv, vv, px^2, of a mixed end of the fragment with ends_px (2, 2) beside that of others.
 
-    A measurement that does not fit begins anew: another surface, or something that moves in depth.
-    before: the ends in the frame before. pose: the camera now.
+    An end whose surroundings lie on two surfaces is often no corner of a body but the place where the outline
+    of one crosses a line of another: it slides along the fragment when either moves, by as much as they pass
+    each other in the image, passing (px). Across the fragment it is held as well as any.
     """
-    forward = pose.rotation[:, 2]
-    way = forward @ (before.origin - pose.translation_m[:, None])
-    carried = ((forward @ before.direction) * before.depth_m + way).reshape(-1, 2)
-    off = store.near_m - carried
-    fits = np.abs(off) <= 0.05 + 3.0 * depth_sigma_m(carried, noise)  # not where either is missing
-    looks = np.where(fits, np.minimum(store.looks + 1.0, _MOST_LOOKS), 1.0)
-    store.looks = looks.astype(np.float32)
-    store.depth_m = np.where(fits, carried + off / looks, store.near_m).astype(np.float32)
+    du = np.float64(ends_px[1, 0]) - np.float64(ends_px[0, 0])
+    dv = np.float64(ends_px[1, 1]) - np.float64(ends_px[0, 1])
+    squared = max(du * du + dv * dv, 1e-12)
+    along = (passing[0] * du + passing[1] * dv) ** 2 / squared
+    slide, rest = max(along, _MIXED_ALONG_PX**2) / squared, _MIXED_ACROSS_PX**2
+    return slide * du * du + rest, slide * du * dv, slide * dv * dv + rest
 
 
-def _depth_lag_s(anchor: AnchorEnds) -> FloatArray:
-    """(2N,) how long before now the averaged depth of the anchors was measured, on average."""
-    looks = anchor.looks
-    late_frames = np.where(looks < _MOST_LOOKS, 0.5 * (looks - 1.0), _SETTLED_LATE_FRAMES)
-    frame_s = (anchor.lag_s / anchor.lag_frames).repeat(2)
-    return anchor.lag_s.repeat(2) + late_frames * frame_s
+@inlined
+def _camera_axes(
+    rotation: FloatArray,
+    translation_m: FloatArray,
+    direction: FloatArray,
+    origin: FloatArray,
+) -> tuple[float, float, float, float, float, float]:
+    """A direction (3,) and an origin (3,) of the fixed frame as the camera with this pose has them."""
+    dx, dy, dz, x, y, z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        along, away = direction[i], origin[i] - translation_m[i]
+        dx += rotation[i, 0] * along
+        dy += rotation[i, 1] * along
+        dz += rotation[i, 2] * along
+        x += rotation[i, 0] * away
+        y += rotation[i, 1] * away
+        z += rotation[i, 2] * away
+    return dx, dy, dz, x, y, z
 
 
-def _pixel_covariance(
-    store: FragmentStore, anchor: AnchorEnds, mixed: NDArray[np.bool_], passing_px: FloatArray
-) -> FloatArray:
-    """(3, 2N) covariance xx, xy, yy of the ends in the image, px^2, since their anchors.
-
-    An end whose surroundings lie on two surfaces (mixed (2N,)) is often no corner of a body but the place
-    where the outline of one crosses a line of another: it slides along the fragment when either moves, by as
-    much as they pass each other in the image, passing_px (2, 2N). Across the fragment it is held as well as
-    any.
-    """
-    steps = np.maximum(1.0, _STEPS_SHARE * anchor.lag_frames).repeat(2)
-    result: FloatArray = store.pixel_cov.reshape(-1, 3).T * steps
-    ends = mixed.nonzero()[0]
-    both = store.ends_px[ends // 2].astype(float)
-    du, dv = (both[:, 1] - both[:, 0]).T
-    squared = np.maximum(du * du + dv * dv, 1e-12)
-    along = (passing_px[0, ends] * du + passing_px[1, ends] * dv) ** 2 / squared
-    slide, rest = np.maximum(along, _MIXED_ALONG_PX**2) / squared, _MIXED_ACROSS_PX**2
-    result[0, ends] += slide * du * du + rest
-    result[1, ends] += slide * du * dv
-    result[2, ends] += slide * dv * dv + rest
-    return result
-
-
-def _pose_variance(covariance: FloatArray, squared_depth: FloatArray) -> FloatArray:
-    """(N,) variance in metres across the view that the camera's own uncertainty makes at a depth."""
-    variance = covariance.diagonal().tolist()
-    result: FloatArray = max(variance[3:6]) + max(variance[:3]) * squared_depth
-    return result
+@compiled(
+    "float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], bool[::1], float64[:, ::1],"
+    " float32[:, :, ::1], float32[:, :, ::1], int64[::1], float64[:, ::1], float64[::1], float64, float64,"
+    " float64, float64, float64, float64, float64"
+)
+def _missed(
+    direction: FloatArray,
+    origin: FloatArray,
+    near_m: FloatArray,
+    sigma_m: FloatArray,
+    far_m: FloatArray,
+    mixed: NDArray[np.bool_],
+    straight: FloatArray,
+    ends_px: NDArray[np.float32],
+    pixel_cov: NDArray[np.float32],
+    lag_frames: NDArray[np.intp],
+    rotation: FloatArray,
+    translation_m: FloatArray,
+    turn_variance: float,
+    way_variance: float,
+    fx: float,
+    fy: float,
+    floor_m: float,
+    quadratic_per_m: float,
+    variance_scale: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+    """static_m, ray, miss_m, covariance, depth_effect and static_chi2 of PointMotion, and which of them tell
+    of what is near. straight (3, 2N): rays to where the ends are seen; variances: of the camera's pose."""
+    count = len(near_m)
+    static_m, ray, miss_m = np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2))
+    covariance, effect, chi2 = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
+    tells, noise = np.empty(count, np.bool_), math.sqrt(variance_scale)
+    for k in range(count):
+        dx, dy, dz, x0, y0, z0 = _camera_axes(rotation, translation_m, direction[:, k], origin[:, k])
+        u, v = straight[0, k], straight[1, k]
+        # Where the near surface and the far one would be.
+        x, y, z = dx * near_m[k] + x0, dy * near_m[k] + y0, dz * near_m[k] + z0
+        far_x, far_y, far_z = dx * far_m[k] + x0, dy * far_m[k] + y0, dz * far_m[k] + z0
+        ahead, far_ahead = max(z, 0.1), max(far_z, 0.1)
+        uu, uv, vv = pixel_cov[k // 2, k % 2]
+        steps = max(1.0, _STEPS_SHARE * lag_frames[k // 2])
+        uu, uv, vv = uu * steps, uv * steps, vv * steps
+        if mixed[k]:
+            passing = (far_x / far_ahead - x / ahead) * fx, (far_y / far_ahead - y / ahead) * fy
+            more_uu, more_uv, more_vv = _slide(ends_px[k // 2], passing)
+            uu, uv, vv = uu + more_uu, uv + more_uv, vv + more_vv
+        scaled = variance_scale * z * z
+        pose_variance = way_variance + turn_variance * z * z
+        xx, xy, yy = (
+            uu * scaled / (fx * fx) + pose_variance,
+            uv * scaled / (fx * fy),
+            vv * scaled / (fy * fy) + pose_variance,
+        )
+        turn_u, turn_v = (u * dz - dx) * noise, (v * dz - dy) * noise
+        near_effect = turn_u * sigma_m[k], turn_v * sigma_m[k]
+        near_miss = u * z - x, v * z - y
+        near_chi2 = _squared_sigmas(near_miss, (xx, xy, yy), near_effect)
+        far_sigma_m = floor_m + quadratic_per_m * far_m[k] * far_m[k]
+        more = (far_z / ahead) ** 2
+        far_chi2 = _squared_sigmas(
+            (u * far_z - far_x, v * far_z - far_y),
+            (xx * more, xy * more, yy * more),
+            (turn_u * far_sigma_m, turn_v * far_sigma_m),
+        )
+        static_m[k, 0], static_m[k, 1], static_m[k, 2] = x, y, z
+        ray[k, 0], ray[k, 1] = u, v
+        miss_m[k, 0], miss_m[k, 1] = near_miss
+        covariance[k, 0], covariance[k, 1], covariance[k, 2] = xx, xy, yy
+        effect[k, 0], effect[k, 1] = near_effect
+        chi2[k] = min(near_chi2, far_chi2)
+        # What is where the far one of two surfaces would have it says nothing of how the near one moves.
+        behind = near_chi2 > _STATIC_CHI2 and far_chi2 <= _STATIC_CHI2
+        tells[k] = z > 0.1 and not behind and math.isfinite(near_miss[0] + near_miss[1])
+    return static_m, ray, miss_m, covariance, effect, chi2, tells

@@ -1,7 +1,4 @@
-"""Least-squares velocities: of each fragment by its two ends, and of each body by all ends that belong to it.
-
-Also which moving fragments are neighbours that move alike (cluster), and which fragments are static or not.
-"""
+"""Least-squares velocities: of each fragment by its two ends, of each body by all ends that belong to it."""
 
 from __future__ import annotations
 
@@ -10,14 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.motion.velocities import (
-    NormalEquations,
-    PointMotion,
-    end_information,
-    normal_equations,
-    solve_velocity,
-)
+from vision.motion.candidates import cluster as cluster
+from vision.motion.candidates import long_static as long_static
+from vision.motion.candidates import moving_candidates as moving_candidates
+from vision.motion.velocities import PointMotion, normal_equations
 
 _ROBUST_CHI2 = 9.0  # 99 % of ends that go with the body, 2 degrees of freedom; others lose their weight
 _MEDIAN_CHI2 = 1.386  # of 2 degrees of freedom
@@ -25,11 +20,6 @@ _SPREAD_ENDS = 6  # fewer of them do not show how widely they scatter
 _MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom
 _ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
 _INDEPENDENT_DEPTHS = 10.0  # depth noise is shared by neighbours: a body never has more looks than these
-_STATIC_END_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom
-_STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
-_LONG_S = 0.26  # about the window of time in which motion is measured
-_NEAR_M = 0.5  # fragments of one body are no farther apart: it is a chain of neighbours that makes a group
-_VELOCITY_GATE_MPS = 0.5  # allowed for limbs, which go unlike their body, beside two sigmas
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,16 +48,15 @@ class FragmentVelocities:
 
 def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> FragmentVelocities:
     """Weighted least squares for the two ends of each fragment."""
-    per_end = np.empty((14, len(motion.lag_s)))
-    per_end[:12] = normal_equations(motion, motion.usable.astype(float)).table
-    known = motion.usable & (motion.depth_step_m == motion.depth_step_m)
-    root = known * motion.depth_lag_s / motion.depth_step_sigma_m
-    per_end[12] = root * root
-    per_end[13] = root * (np.where(known, motion.depth_step_m, 0.0) / motion.depth_step_sigma_m)
-    summed = per_end[:, 0::2] + per_end[:, 1::2]
-    equations = NormalEquations(summed[:12])
-    equations.add_depth(summed[12], summed[13])
-    return FragmentVelocities(per_end, *solve_velocity(equations, max_speed_mps))
+    per_end, velocity_mps, covariance = _fragments(
+        normal_equations(motion, motion.usable.astype(float)).table,
+        np.ascontiguousarray(motion.usable),
+        np.ascontiguousarray(motion.depth_step_m),
+        np.ascontiguousarray(motion.depth_step_sigma_m),
+        np.ascontiguousarray(motion.depth_lag_s),
+        max_speed_mps,
+    )
+    return FragmentVelocities(per_end, velocity_mps, covariance)
 
 
 def body_velocities(
@@ -83,116 +72,210 @@ def body_velocities(
     per_end (14, 2N): as in FragmentVelocities. owner (2N,): body of each end, -1 for none. start_mps (G, 3):
     velocity to judge outliers by at first.
     """
-    use = motion.usable & (owner >= 0)
-    member = np.zeros((bodies, len(owner)))
-    chosen = use.nonzero()[0]
-    member[owner[chosen], chosen] = 1.0
-    ends = member.sum(axis=1).astype(np.intp)
-    share = np.minimum(1.0, _INDEPENDENT_DEPTHS / np.maximum(ends, 1))
-    velocity = start_mps
-    safe_owner = np.where(use, owner, 0)
-    used, trust = use.astype(float), end_information(motion)
-    parties = _parties(chosen, owner, ends)
-    for scale in _ANNEAL:
-        chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
-        spread = _spread(chi2, parties)
-        weight = used / np.square(1.0 + chi2 / (scale * _ROBUST_CHI2 * spread.take(safe_owner)))
-        summed = per_end @ (member * weight).T
-        equations = NormalEquations(summed[:12])
-        equations.add_depth(summed[12] * share, summed[13] * share)
-        velocity, covariance = solve_velocity(equations, max_speed_mps)
-    chi2 = _end_chi2(motion, trust, velocity.T.take(safe_owner, axis=1))
-    agree = member @ (chi2 <= _ROBUST_CHI2) / np.maximum(ends, 1)
-    # What the model does not explain (limbs, turning, sliding) widens the result.
-    spread = _spread(chi2, parties)
-    bounded = np.minimum(chi2, _ROBUST_CHI2 * spread.take(safe_owner))
-    excess = (member * bounded).sum(axis=1) / np.maximum(2.0 * ends - 3.0, 1.0)
-    covariance = covariance * np.maximum(1.0, excess)[:, None, None]
-    unexplained = member @ (motion.static_chi2 > _MOVED_CHI2) / np.maximum(ends, 1)
-    return BodyVelocities(
-        velocity_mps=velocity, covariance=covariance, ends=ends, agreement=agree, unexplained=unexplained
+    first, members = _grouped(
+        np.ascontiguousarray(owner, np.int64), np.ascontiguousarray(motion.usable), bodies
     )
+    velocity_mps, covariance, agreement, unexplained = _bodies(
+        first,
+        members,
+        np.ascontiguousarray(motion.ray),
+        np.ascontiguousarray(motion.lag_s),
+        np.ascontiguousarray(motion.miss_m),
+        np.ascontiguousarray(motion.covariance),
+        np.ascontiguousarray(motion.depth_effect),
+        np.ascontiguousarray(motion.static_chi2),
+        np.ascontiguousarray(per_end),
+        np.ascontiguousarray(start_mps),
+        max_speed_mps,
+    )
+    return BodyVelocities(velocity_mps, covariance, np.diff(first), agreement, unexplained)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Parties:
-    """Who belongs to which of G bodies, the same in every iteration. chosen (M,): the ends that speak, owner
-    (M,): body of each. many (K,): the bodies with many ends. middle (K,): where the middle end of each of
-    them stands once the ends are sorted by body, then by any value."""
+@inlined
+def _solve(sums: FloatArray, max_speed_mps: float, velocity_mps: FloatArray, covariance: FloatArray) -> None:
+    """Put the velocity (3,) and its covariance (3, 3) that follow from sums (14,) over ends, see
+    FragmentVelocities, into the last two.
 
-    bodies: int
-    chosen: NDArray[np.intp]
-    owner: NDArray[np.intp]
-    many: NDArray[np.intp]
-    middle: NDArray[np.intp]
+    What the equations leave open is bounded by max_speed_mps (the paper's V_omax), never zero.
+    """
+    least = 1.0 / max_speed_mps**2
+    xx, xy, xz = sums[0] + least, sums[1], sums[2]
+    yy, yz, zz = sums[3] + least, sums[4], sums[5] + sums[12] + least
+    # The inverse, by the cofactors.
+    c00, c01, c02 = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    c11, c12, c22 = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    scale = 1.0 / (xx * c00 + xy * c01 + xz * c02)
+    c00, c01, c02 = c00 * scale, c01 * scale, c02 * scale
+    c11, c12, c22 = c11 * scale, c12 * scale, c22 * scale
+    x, y, z = sums[6], sums[7], sums[8] + sums[13]
+    velocity_mps[0] = c00 * x + c01 * y + c02 * z
+    velocity_mps[1] = c01 * x + c11 * y + c12 * z
+    velocity_mps[2] = c02 * x + c12 * y + c22 * z
+    # What an error of depth that all ends share makes of it.
+    x, y, z = sums[9], sums[10], sums[11]
+    x, y, z = c00 * x + c01 * y + c02 * z, c01 * x + c11 * y + c12 * z, c02 * x + c12 * y + c22 * z
+    covariance[0, 0], covariance[1, 1], covariance[2, 2] = c00 + x * x, c11 + y * y, c22 + z * z
+    covariance[0, 1] = covariance[1, 0] = c01 + x * y
+    covariance[0, 2] = covariance[2, 0] = c02 + x * z
+    covariance[1, 2] = covariance[2, 1] = c12 + y * z
 
 
-def _parties(chosen: NDArray[np.intp], owner: NDArray[np.intp], ends: NDArray[np.intp]) -> _Parties:
-    """ends (G,): how many of the ends chosen (M,) each body has; owner (2N,): of all ends."""
-    many = (ends >= _SPREAD_ENDS).nonzero()[0]
-    middle = (np.cumsum(ends) - ends + ends // 2)[many]
-    return _Parties(bodies=len(ends), chosen=chosen, owner=owner[chosen], many=many, middle=middle)
+@compiled("float64[:, ::1], bool[::1], float64[::1], float64[::1], float64[::1], float64")
+def _fragments(
+    equations: FloatArray,
+    usable: NDArray[np.bool_],
+    step_m: FloatArray,
+    sigma_m: FloatArray,
+    lag_s: FloatArray,
+    max_speed_mps: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """per_end, velocity_mps and covariance of FragmentVelocities. equations (12, 2N): of every end."""
+    ends = len(usable)
+    per_end = np.zeros((14, ends))
+    per_end[:12] = equations
+    for k in range(ends):
+        if usable[k] and not np.isnan(step_m[k]):
+            root = lag_s[k] / sigma_m[k]
+            per_end[12, k] = root * root
+            per_end[13, k] = root * (step_m[k] / sigma_m[k])
+    velocity_mps, covariance = np.empty((ends // 2, 3)), np.empty((ends // 2, 3, 3))
+    sums = np.empty(14)
+    for k in range(ends // 2):
+        for row in range(14):
+            sums[row] = per_end[row, 2 * k] + per_end[row, 2 * k + 1]
+        _solve(sums, max_speed_mps, velocity_mps[k], covariance[k])
+    return per_end, velocity_mps, covariance
 
 
-def _spread(chi2: FloatArray, parties: _Parties) -> FloatArray:
-    """(G,) how much more the ends of each body scatter than their own errors make them, by the median: >= 1.
+@compiled("int64[::1], bool[::1], int64")
+def _grouped(
+    owner: NDArray[np.int64], usable: NDArray[np.bool_], bodies: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """first (G + 1,), members (M,): the ends of body g that speak are members[first[g] : first[g + 1]]."""
+    first = np.zeros(bodies + 1, np.intp)
+    for k in range(len(owner)):
+        if usable[k] and 0 <= owner[k] < bodies:
+            first[owner[k] + 1] += 1
+    for g in range(bodies):
+        first[g + 1] += first[g]
+    members, filled = np.empty(first[bodies], np.intp), first.copy()
+    for k in range(len(owner)):
+        if usable[k] and 0 <= owner[k] < bodies:
+            members[filled[owner[k]]] = k
+            filled[owner[k]] += 1
+    return first, members
+
+
+@inlined
+def _middle(values: FloatArray) -> float:
+    """The one of values (M,) that would stand in the middle, at M // 2, if they were sorted (quickselect)."""
+    values, middle = values.copy(), len(values) // 2
+    low, high = 0, len(values) - 1
+    while low < high:
+        pivot, left, right = values[middle], low, high
+        while left <= right:
+            while values[left] < pivot:
+                left += 1
+            while pivot < values[right]:
+                right -= 1
+            if left <= right:
+                values[left], values[right] = values[right], values[left]
+                left += 1
+                right -= 1
+        if right < middle:
+            low = left
+        if left > middle:
+            high = right
+    result: float = values[middle]
+    return result
+
+
+@inlined
+def _spread(chi2: FloatArray) -> float:
+    """How much more the ends of a body, of which these are chi2 (M,), scatter than their own errors make
+    them, by the median: >= 1.
 
     Limbs are no outliers of a rigid body: where half of the ends do not fit, the robust weights have to
     widen until they do, or the velocity becomes that of whichever limb comes first.
     """
-    result = np.ones(parties.bodies)
-    seen = chi2.take(parties.chosen)
-    ordered = seen.take(np.lexsort((seen, parties.owner)))
-    result[parties.many] = np.maximum(1.0, ordered.take(parties.middle) / _MEDIAN_CHI2)
+    if len(chi2) < _SPREAD_ENDS:
+        return 1.0
+    result: float = max(1.0, _middle(chi2) / _MEDIAN_CHI2)
     return result
 
 
-def _end_chi2(motion: PointMotion, trust: FloatArray, velocity: FloatArray) -> FloatArray:
-    """(2N,) chi-square of each end if it moves with velocity (3, 2N). trust: see end_information."""
-    way = velocity * motion.lag_s
-    # Both coordinates at once, and both rows of the quadratic form.
-    miss = motion.miss_m.T - way[:2] + motion.ray.T * way[2]
-    weighted = (trust[:2] * miss[0] + trust[1:] * miss[1]) * miss
-    result: FloatArray = weighted[0] + weighted[1]
+@inlined
+def _information(covariance: FloatArray, effect: FloatArray, result: FloatArray) -> None:
+    """Put entries xx, xy, yy of the inverse of covariance (3,): xx, xy, yy, plus effect effect', with effect
+    (2,), into result (3,)."""
+    xx = covariance[0] + effect[0] * effect[0]
+    xy = covariance[1] + effect[0] * effect[1]
+    yy = covariance[2] + effect[1] * effect[1]
+    determinant = max(xx * yy - xy * xy, 1e-18)
+    result[0], result[1], result[2] = yy / determinant, -xy / determinant, xx / determinant
+
+
+@inlined
+def _chi2(
+    velocity_mps: FloatArray, ray: FloatArray, lag_s: float, miss_m: FloatArray, trust: FloatArray
+) -> float:
+    """Of an end with information trust (3,) if it moves with velocity (3,)."""
+    a = miss_m[0] - lag_s * (velocity_mps[0] - ray[0] * velocity_mps[2])
+    b = miss_m[1] - lag_s * (velocity_mps[1] - ray[1] * velocity_mps[2])
+    result: float = (trust[0] * a + trust[1] * b) * a + (trust[1] * a + trust[2] * b) * b
     return result
 
 
-def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(N,) fragments that no static surface explains: both ends miss, at either depth of a silhouette."""
-    chi2 = np.where(motion.usable, motion.static_chi2, 0.0)
-    one, other = chi2[0::2], chi2[1::2]
-    both = (one > _STATIC_END_CHI2) & (other > _STATIC_END_CHI2)
-    result: NDArray[np.bool_] = both & (one + other > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
-    return result
-
-
-def long_static(motion: PointMotion, age_s: FloatArray) -> NDArray[np.bool_]:
-    """(N,) fragments seen for a while, age_s (N,), both of whose ends are where something static would be."""
-    still = (motion.usable & (motion.static_chi2 <= _STATIC_END_CHI2)).reshape(-1, 2)
-    result: NDArray[np.bool_] = still[:, 0] & still[:, 1] & (age_s >= _LONG_S)
-    return result
-
-
-def cluster(
-    position_m: FloatArray, velocity: FloatArray, covariance: FloatArray, depth_sigma_m: FloatArray
-) -> NDArray[np.intp]:
-    """(M,) which group each of M moving fragments belongs to, as the index of its first one: neighbours in
-    space that move alike are of one body."""
-    count = len(position_m)
-    if count == 0:
-        return np.empty(0, np.intp)
-    gap = np.abs(position_m[:, None] - position_m[None])
-    sigma = depth_sigma_m[:, None] + depth_sigma_m[None]
-    near = (np.hypot(gap[..., 0], 0.6 * gap[..., 1]) <= _NEAR_M) & (gap[..., 2] <= _NEAR_M + sigma)
-    variance = np.diagonal(covariance, axis1=1, axis2=2)[:, :2]
-    tolerance = _VELOCITY_GATE_MPS + 2.0 * np.sqrt(variance[:, None] + variance[None])
-    alike = (np.abs(velocity[:, None, :2] - velocity[None, :, :2]) <= tolerance).all(axis=2)
-    linked = near & alike
-    group = np.arange(count)
-    while True:
-        lowest = np.where(linked, group[None], count).min(axis=1)
-        lowest = lowest[lowest]
-        if (lowest == group).all():
-            break
-        group = lowest
-    return group
+@compiled(
+    "int64[::1], int64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1],"
+    " float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64"
+)
+def _bodies(
+    first: NDArray[np.intp],
+    members: NDArray[np.intp],
+    ray: FloatArray,
+    lag_s: FloatArray,
+    miss_m: FloatArray,
+    covariance: FloatArray,
+    depth_effect: FloatArray,
+    static_chi2: FloatArray,
+    per_end: FloatArray,
+    start_mps: FloatArray,
+    max_speed_mps: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """velocity_mps, covariance, agreement and unexplained of BodyVelocities. first and members as of
+    _grouped, the others as of PointMotion."""
+    bodies = len(first) - 1
+    velocity_mps, spread_out = start_mps.copy(), np.empty((bodies, 3, 3))
+    agreement, unexplained = np.zeros(bodies), np.zeros(bodies)
+    trust, sums = np.empty((len(lag_s), 3)), np.empty(14)
+    for k in members:
+        _information(covariance[k], depth_effect[k], trust[k])
+    for g in range(bodies):
+        own = members[first[g] : first[g + 1]]
+        ends = len(own)
+        chi2 = np.empty(ends)
+        share = min(1.0, _INDEPENDENT_DEPTHS / max(ends, 1))
+        for scale in _ANNEAL:
+            for j in range(ends):
+                k = own[j]
+                chi2[j] = _chi2(velocity_mps[g], ray[k], lag_s[k], miss_m[k], trust[k])
+            admitted = scale * _ROBUST_CHI2 * _spread(chi2)
+            sums[:] = 0.0
+            for j in range(ends):
+                weight = 1.0 / (1.0 + chi2[j] / admitted) ** 2
+                for row in range(14):
+                    sums[row] += weight * per_end[row, own[j]]
+            sums[12:] *= share
+            _solve(sums, max_speed_mps, velocity_mps[g], spread_out[g])
+        for j in range(ends):
+            k = own[j]
+            chi2[j] = _chi2(velocity_mps[g], ray[k], lag_s[k], miss_m[k], trust[k])
+            agreement[g] += chi2[j] <= _ROBUST_CHI2
+            unexplained[g] += static_chi2[k] > _MOVED_CHI2
+        agreement[g] /= max(ends, 1)
+        unexplained[g] /= max(ends, 1)
+        # What the model does not explain (limbs, turning, sliding) widens the result.
+        excess = np.minimum(chi2, _ROBUST_CHI2 * _spread(chi2)).sum() / max(2.0 * ends - 3.0, 1.0)
+        spread_out[g] *= max(1.0, excess)
+    return velocity_mps, spread_out, agreement, unexplained

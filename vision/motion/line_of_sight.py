@@ -6,21 +6,22 @@ A camera that pitches feigns what goes up and down in the image, but nothing tha
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.numerics.symmetric import inverse
 
 _FLOOR_SIGMA_MPS = 0.03  # allowed for: an error of the camera's own motion, which no filter knows of
 _CONTRADICTION_SIGMAS = 2.5  # 99 % of velocities that are the same differ by less
 _CONFIRMING_SIGMAS = 2.5  # as clearly as what contradicts
 _LEAST_LEVEL = 1e-6  # straight up or down nothing is level
-_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # of the axes, in turn
-_IDENTITY = np.eye(3)
-_FLOOR = _IDENTITY * _FLOOR_SIGMA_MPS**2
+_FLOOR = _FLOOR_SIGMA_MPS**2
+_AXES = 3
+_NOWHERE = np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,43 +55,103 @@ class Split:
 def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray | None) -> Split:
     """Of velocity (..., T, 3) with covariance (..., T, 3, 3), seen along sight (T, 3). up (3,): the floor's
     normal, None where the floor is not known."""
-    value, variance = _component(velocity, covariance, sight)
-    along = value * value / (variance + _FLOOR_SIGMA_MPS**2)
-    onto_sight = sight[:, :, None] * sight[:, None, :]
-    onto = _IDENTITY - onto_sight
-    rest = velocity - value[..., None] * sight
-    # What goes across, and all of it: both at once.
-    vector, doubt = np.empty((2, *rest.shape)), np.empty((2, *covariance.shape))
-    vector[0], doubt[0] = rest, onto @ covariance @ onto + (onto_sight + _FLOOR)
-    vector[1], doubt[1] = velocity, covariance + _FLOOR
-    across, total = _squared_length(vector, doubt)
-    if up is None:
-        return Split(
-            value=value, variance=variance, rest=rest, along=along, across=across, total=total, level=across
-        )
-    # Their cross product; that of NumPy takes ten times as long.
-    aside = sight.take(_NEXT, axis=1) * up.take(_LAST) - sight.take(_LAST, axis=1) * up.take(_NEXT)
-    aside /= np.maximum(np.sqrt(np.square(aside).sum(axis=1)), _LEAST_LEVEL)[:, None]
-    sideways, sideways_variance = _component(velocity, covariance, aside)
-    level = sideways * sideways / (sideways_variance + _FLOOR_SIGMA_MPS**2)
+    value, variance, rest, along, across, total, level = _parts(
+        np.ascontiguousarray(velocity).reshape(-1, _AXES),
+        np.ascontiguousarray(covariance).reshape(-1, _AXES, _AXES),
+        np.ascontiguousarray(sight),
+        _NOWHERE if up is None else np.ascontiguousarray(up),
+    )
+    shape = velocity.shape[:-1]
+    across = across.reshape(shape)
     return Split(
-        value=value, variance=variance, rest=rest, along=along, across=across, total=total, level=level
+        value=value.reshape(shape),
+        variance=variance.reshape(shape),
+        rest=rest.reshape(velocity.shape),
+        along=along.reshape(shape),
+        across=across,
+        total=total.reshape(shape),
+        level=across if up is None else level.reshape(shape),
     )
 
 
-def _component(
-    velocity: FloatArray, covariance: FloatArray, direction: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """(..., T) of velocity (..., T, 3) in direction (T, 3), and its variance."""
-    value: FloatArray = (velocity * direction).sum(axis=-1)
-    variance: FloatArray = (direction[:, None, :] @ covariance @ direction[:, :, None])[..., 0, 0]
+@inlined
+def _component(velocity: FloatArray, covariance: FloatArray, direction: FloatArray) -> tuple[float, float]:
+    """Of velocity (3,) in direction (3,), and its variance."""
+    value, variance = 0.0, 0.0
+    for i in range(_AXES):
+        value += velocity[i] * direction[i]
+        for j in range(_AXES):
+            variance += direction[i] * covariance[i, j] * direction[j]
     return value, variance
 
 
-def _squared_length(vector: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(...,) of vector (..., 3) in sigmas of covariance (..., 3, 3)."""
-    result: FloatArray = (vector[..., None, :] @ inverse(covariance) @ vector[..., :, None])[..., 0, 0]
+@inlined
+def _squared_sigmas(vector: FloatArray, covariance: FloatArray) -> float:
+    """Squared length of vector (3,) in sigmas of covariance (3, 3), by the cofactors of that."""
+    c = covariance
+    c00 = c[1, 1] * c[2, 2] - c[1, 2] * c[1, 2]
+    c01 = c[0, 2] * c[1, 2] - c[0, 1] * c[2, 2]
+    c02 = c[0, 1] * c[1, 2] - c[0, 2] * c[1, 1]
+    c11 = c[0, 0] * c[2, 2] - c[0, 2] * c[0, 2]
+    c12 = c[0, 1] * c[0, 2] - c[0, 0] * c[1, 2]
+    c22 = c[0, 0] * c[1, 1] - c[0, 1] * c[0, 1]
+    x, y, z = vector[0], vector[1], vector[2]
+    squared = c00 * x * x + c11 * y * y + c22 * z * z + 2.0 * (c01 * x * y + c02 * x * z + c12 * y * z)
+    result: float = squared / (c[0, 0] * c00 + c[0, 1] * c01 + c[0, 2] * c02)
     return result
+
+
+@inlined
+def _put_across(covariance: FloatArray, variance: float, sight: FloatArray, doubt: FloatArray) -> None:
+    """Put (I - s s') C (I - s s') into doubt (3, 3): what is left of a covariance across sight s (3,), along
+    which its variance is s' C s. There it is 1 instead: doubt has to have an inverse."""
+    for i in range(_AXES):
+        for j in range(_AXES):
+            mixed = 0.0
+            for k in range(_AXES):
+                mixed += sight[i] * sight[k] * covariance[k, j] + covariance[i, k] * sight[k] * sight[j]
+            doubt[i, j] = covariance[i, j] - mixed + (variance + 1.0) * sight[i] * sight[j]
+
+
+@inlined
+def _put_aside(sight: FloatArray, up: FloatArray, aside: FloatArray) -> None:
+    """Put the unit vector across both into aside (3,)."""
+    aside[0] = sight[1] * up[2] - sight[2] * up[1]
+    aside[1] = sight[2] * up[0] - sight[0] * up[2]
+    aside[2] = sight[0] * up[1] - sight[1] * up[0]
+    length = math.sqrt(aside[0] * aside[0] + aside[1] * aside[1] + aside[2] * aside[2])
+    for i in range(_AXES):
+        aside[i] /= max(length, _LEAST_LEVEL)
+
+
+@compiled("float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[::1]")
+def _parts(
+    velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """value, variance, rest, along, across, total and level of Split, of velocities (K, 3): one of each of T
+    bodies, then another one of each, and so on."""
+    count = len(velocity)
+    value, variance, rest = np.empty(count), np.empty(count), np.empty((count, _AXES))
+    along, across, total, level = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+    doubt, aside = np.empty((_AXES, _AXES)), np.empty(_AXES)
+    for k in range(count):
+        own, spread, towards = velocity[k], covariance[k], sight[k % len(sight)]
+        value[k], variance[k] = _component(own, spread, towards)
+        along[k] = value[k] * value[k] / (variance[k] + _FLOOR)
+        for i in range(_AXES):
+            rest[k, i] = own[i] - value[k] * towards[i]
+        _put_across(spread, variance[k], towards, doubt)
+        for i in range(_AXES):
+            doubt[i, i] += _FLOOR
+        across[k] = _squared_sigmas(rest[k], doubt)
+        doubt[:] = spread
+        for i in range(_AXES):
+            doubt[i, i] += _FLOOR
+        total[k] = _squared_sigmas(own, doubt)
+        _put_aside(towards, up, aside)
+        sideways, sideways_variance = _component(own, spread, aside)
+        level[k] = sideways * sideways / (sideways_variance + _FLOOR)
+    return value, variance, rest, along, across, total, level
 
 
 @dataclass(frozen=True, slots=True, eq=False)

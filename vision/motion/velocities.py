@@ -19,8 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.numerics.symmetric import inverse_entries, whole
+
+_LEAST_DETERMINANT = 1e-18  # m^4, of a covariance: less is none
+# Where the six different entries of a symmetric matrix (3, 3) stand among its nine.
+_ALL = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,34 +53,9 @@ class PointMotion:
     usable: NDArray[np.bool_]
 
 
-def chi2_2d(miss: FloatArray, covariance: FloatArray, effect: FloatArray) -> FloatArray:
-    """(N,) squared Mahalanobis length of miss (N, 2) under covariance (N, 3) plus effect effect^T."""
-    xx = covariance[:, 0] + effect[:, 0] ** 2
-    xy = covariance[:, 1] + effect[:, 0] * effect[:, 1]
-    yy = covariance[:, 2] + effect[:, 1] ** 2
-    determinant = np.maximum(xx * yy - xy * xy, 1e-18)
-    a, b = miss[:, 0], miss[:, 1]
-    result: FloatArray = (yy * a * a - 2.0 * xy * a * b + xx * b * b) / determinant
-    return result
-
-
-def end_information(motion: PointMotion) -> FloatArray:
-    """(3, N) xx, xy, yy of the inverse covariance of miss_m, from pixels and from depth."""
-    xx, xy, yy = motion.covariance.T
-    a, b = motion.depth_effect.T
-    xx, xy, yy = xx + a * a, xy + a * b, yy + b * b
-    result = np.empty((3, len(xx)))
-    result[0], result[1], result[2] = yy, -xy, xx
-    result /= np.maximum(xx * yy - xy * xy, 1e-18)
-    return result
-
-
-_UNIT = np.array([[1.0], [0.0], [0.0], [1.0], [0.0], [1.0]])  # entries of the symmetric identity (3, 3)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class NormalEquations:
-    """Of the weighted least squares for V, one column of table (12, N) per point or sum of points.
+    """Of the weighted least squares for V, one column of table (12, N) per point.
 
     Rows 0 to 5: entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right side. Rows 9 to
     11, doubt: the right side that one sigma of a depth error common to all points of a body would make.
@@ -87,7 +66,7 @@ class NormalEquations:
     @property
     def matrix(self) -> FloatArray:
         """(N, 3, 3)."""
-        return whole(self.table[:6]).transpose(2, 0, 1)
+        return self.table.take(_ALL, axis=0).transpose(2, 0, 1)
 
     @property
     def rhs(self) -> FloatArray:
@@ -99,40 +78,49 @@ class NormalEquations:
         """(N, 3)."""
         return self.table[9:].T
 
-    def add_depth(self, information: FloatArray, measured: FloatArray) -> None:
-        """Measurements of V along z: their information (N,), and that times what they say (N,)."""
-        self.table[5] += information
-        self.table[8] += measured
-
 
 def normal_equations(motion: PointMotion, weight: FloatArray) -> NormalEquations:
     """The two image equations of each point, weighted by their covariance and weight (N,)."""
-    lag = motion.lag_s
-    xx, xy, yy = motion.covariance.T
-    scale = weight * lag / np.maximum(xx * yy - xy * xy, 1e-18)
-    pxx, pxy, pyy = yy * scale, xy * -scale, xx * scale
-    x, y = motion.ray.T
-    # Rows (1, 0, -x') T and (0, 1, -y') T with information [[pxx, pxy], [pxy, pyy]].
-    qx, qy = -(pxx * x + pxy * y), -(pxy * x + pyy * y)
-    table = np.empty((12, len(weight)))
-    table[0], table[1], table[2], table[3], table[4] = pxx, pxy, qx, pyy, qy
-    table[5] = -(qx * x + qy * y)
-    table[:6] *= lag
-    for row, vector in ((6, motion.miss_m), (9, motion.depth_effect)):
-        a, b = vector.T
-        table[row] = pxx * a + pxy * b
-        table[row + 1] = pxy * a + pyy * b
-        table[row + 2] = qx * a + qy * b
+    table = _equations(
+        np.ascontiguousarray(motion.ray),
+        np.ascontiguousarray(motion.lag_s),
+        np.ascontiguousarray(motion.miss_m),
+        np.ascontiguousarray(motion.covariance),
+        np.ascontiguousarray(motion.depth_effect),
+        np.ascontiguousarray(weight),
+    )
     return NormalEquations(table)
 
 
-def solve_velocity(equations: NormalEquations, max_speed_mps: float) -> tuple[FloatArray, FloatArray]:
-    """Velocity (N, 3) and covariance (N, 3, 3) from summed normal equations.
-
-    What the equations leave open is bounded by max_speed_mps (the paper's V_omax), never zero.
-    """
-    inverse = whole(inverse_entries(equations.table[:6] + _UNIT / max_speed_mps**2))
-    sides = equations.table[6:].reshape(2, 1, 3, -1)
-    velocity, common = (inverse * sides).sum(axis=2)
-    covariance = inverse + common[:, None] * common
-    return velocity.T, covariance.transpose(2, 0, 1)
+@compiled("float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
+def _equations(
+    ray: FloatArray,
+    lag_s: FloatArray,
+    miss_m: FloatArray,
+    covariance: FloatArray,
+    depth_effect: FloatArray,
+    weight: FloatArray,
+) -> FloatArray:
+    """(12, N) table of NormalEquations; zero where weight is, whatever else there is."""
+    table = np.zeros((12, len(weight)))
+    for k in range(len(weight)):
+        if weight[k] == 0.0:
+            continue
+        xx, xy, yy = covariance[k]
+        scale = weight[k] * lag_s[k] / max(xx * yy - xy * xy, _LEAST_DETERMINANT)
+        pxx, pxy, pyy = yy * scale, -xy * scale, xx * scale
+        x, y = ray[k]
+        # Rows (1, 0, -x') T and (0, 1, -y') T with information [[pxx, pxy], [pxy, pyy]].
+        qx, qy = -(pxx * x + pxy * y), -(pxy * x + pyy * y)
+        table[0, k] = pxx * lag_s[k]
+        table[1, k] = pxy * lag_s[k]
+        table[2, k] = qx * lag_s[k]
+        table[3, k] = pyy * lag_s[k]
+        table[4, k] = qy * lag_s[k]
+        table[5, k] = -(qx * x + qy * y) * lag_s[k]
+        for row, vector in ((6, miss_m[k]), (9, depth_effect[k])):
+            a, b = vector
+            table[row, k] = pxx * a + pxy * b
+            table[row + 1, k] = pxy * a + pyy * b
+            table[row + 2, k] = qx * a + qy * b
+    return table

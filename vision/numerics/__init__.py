@@ -1,1 +1,1 @@
-"""Small arrays: filters, medians, inverses."""
+"""Small arrays: filters, medians."""

@@ -6,15 +6,13 @@ import math
 
 import numpy as np
 
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.numerics.symmetric import inverse
 
 _VERTICAL_S = 0.1  # how long a vertical velocity lasts: limbs have one, bodies have not
-_IDENTITY = np.eye(6)
-# Position is moved by velocity; and where the blocks of a covariance stand.
-_BY_VELOCITY = np.eye(6, k=3)
-_OF_POSITION, _OF_VELOCITY = np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
-_OF_BOTH = _BY_VELOCITY + _BY_VELOCITY.T
+_UNKNOWNS = 6  # position, then velocity
+_MEASURED = 3  # of them at once: either
+_NOWHERE = np.zeros(3)
 
 
 def predict(
@@ -29,13 +27,15 @@ def predict(
 
     up (3,): what stands on the floor keeps no velocity along it; None where the floor is not known.
     """
-    move = _IDENTITY + dt_s * _BY_VELOCITY
-    if up is not None:
-        move[3:, 3:] -= ((1.0 - math.exp(-dt_s / _VERTICAL_S)) * up[:, None]) * up
-    spread = (accel_density * dt_s**3 / 3.0) * _OF_POSITION
-    spread += (accel_density * dt_s**2 / 2.0) * _OF_BOTH
-    spread += (accel_density * dt_s) * _OF_VELOCITY
-    return state @ move.T, move @ covariance @ move.T + spread
+    lost, along = (0.0, _NOWHERE) if up is None else (1.0 - math.exp(-dt_s / _VERTICAL_S), up)
+    return _carried(
+        np.ascontiguousarray(state),
+        np.ascontiguousarray(covariance),
+        np.ascontiguousarray(along),
+        lost,
+        dt_s,
+        accel_density,
+    )
 
 
 def update(
@@ -46,14 +46,13 @@ def update(
     first: int,
 ) -> tuple[FloatArray, FloatArray]:
     """After measuring three entries from index first (0: position, 3: velocity): (T, 3) with (T, 3, 3)."""
-    part = slice(first, first + 3)
-    innovation = measured - state[:, part]
-    gain = covariance[:, :, part] @ inverse(covariance[:, part, part] + noise)
-    new_state = state + (gain @ innovation[:, :, None])[:, :, 0]
-    keep = _IDENTITY - _pad(gain, first)
-    # Joseph's form: stays symmetric and positive whatever the rounding.
-    new_covariance = keep @ covariance @ keep.transpose(0, 2, 1) + gain @ noise @ gain.transpose(0, 2, 1)
-    return new_state, new_covariance
+    return _corrected(
+        np.ascontiguousarray(state),
+        np.ascontiguousarray(covariance),
+        np.ascontiguousarray(measured),
+        np.ascontiguousarray(noise),
+        first,
+    )
 
 
 def place(
@@ -70,7 +69,93 @@ def place(
     return new_state, new_covariance
 
 
-def _pad(gain: FloatArray, first: int) -> FloatArray:
-    full = np.zeros((len(gain), 6, 6))
-    full[:, :, first : first + 3] = gain
-    return full
+@inlined
+def _carry(vector: FloatArray, up: FloatArray, lost: float, dt_s: float) -> None:
+    """Move a vector (6,), position then velocity, dt_s on, in which so much of its velocity along up (3,) is
+    lost."""
+    along = lost * (up[0] * vector[3] + up[1] * vector[4] + up[2] * vector[5])
+    for i in range(3):
+        vector[i] += dt_s * vector[i + 3]
+        vector[i + 3] -= along * up[i]
+
+
+@compiled("float64[:, ::1], float64[:, :, ::1], float64[::1], float64, float64, float64")
+def _carried(
+    state: FloatArray,
+    covariance: FloatArray,
+    up: FloatArray,
+    lost: float,
+    dt_s: float,
+    accel_density: float,
+) -> tuple[FloatArray, FloatArray]:
+    """As predict. What is linear carries a covariance as it does a vector: each column, then each row."""
+    new_state, new_covariance = state.copy(), covariance.copy()
+    for t in range(len(state)):
+        _carry(new_state[t], up, lost, dt_s)
+        spread = new_covariance[t]
+        for j in range(_UNKNOWNS):
+            _carry(spread[:, j], up, lost, dt_s)
+        for i in range(_UNKNOWNS):
+            _carry(spread[i], up, lost, dt_s)
+        for i in range(3):
+            spread[i, i] += accel_density * dt_s**3 / 3.0
+            spread[i, i + 3] += accel_density * dt_s**2 / 2.0
+            spread[i + 3, i] += accel_density * dt_s**2 / 2.0
+            spread[i + 3, i + 3] += accel_density * dt_s
+    return new_state, new_covariance
+
+
+@inlined
+def _invert(matrix: FloatArray, result: FloatArray) -> None:
+    """The inverse of a symmetric matrix (3, 3), by its cofactors, into result."""
+    result[0, 0] = matrix[1, 1] * matrix[2, 2] - matrix[1, 2] * matrix[1, 2]
+    result[0, 1] = matrix[0, 2] * matrix[1, 2] - matrix[0, 1] * matrix[2, 2]
+    result[0, 2] = matrix[0, 1] * matrix[1, 2] - matrix[0, 2] * matrix[1, 1]
+    result[1, 1] = matrix[0, 0] * matrix[2, 2] - matrix[0, 2] * matrix[0, 2]
+    result[1, 2] = matrix[0, 1] * matrix[0, 2] - matrix[0, 0] * matrix[1, 2]
+    result[2, 2] = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[0, 1]
+    determinant = matrix[0, 0] * result[0, 0] + matrix[0, 1] * result[0, 1] + matrix[0, 2] * result[0, 2]
+    for i in range(3):
+        for j in range(i, 3):
+            result[i, j] /= determinant
+            result[j, i] = result[i, j]
+
+
+@inlined
+def _add_carried(change: FloatArray, covariance: FloatArray, result: FloatArray) -> None:
+    """Add change C change^T to result (6, 6), of a covariance C (K, K) and change (6, K)."""
+    for i in range(_UNKNOWNS):
+        for j in range(len(covariance)):
+            between = 0.0
+            for k in range(len(covariance)):
+                between += change[i, k] * covariance[k, j]
+            for k in range(_UNKNOWNS):
+                result[i, k] += between * change[k, j]
+
+
+@compiled("float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], int64")
+def _corrected(
+    state: FloatArray, covariance: FloatArray, measured: FloatArray, noise: FloatArray, first: int
+) -> tuple[FloatArray, FloatArray]:
+    """As update."""
+    new_state, new_covariance = state.copy(), np.zeros_like(covariance)
+    doubt, trust = np.empty((_MEASURED, _MEASURED)), np.empty((_MEASURED, _MEASURED))
+    gain, keep = np.empty((_UNKNOWNS, _MEASURED)), np.empty((_UNKNOWNS, _UNKNOWNS))
+    for t in range(len(state)):
+        for i in range(_MEASURED):
+            for j in range(_MEASURED):
+                doubt[i, j] = covariance[t, first + i, first + j] + noise[t, i, j]
+        _invert(doubt, trust)
+        for i in range(_UNKNOWNS):
+            for j in range(_UNKNOWNS):
+                keep[i, j] = 1.0 if i == j else 0.0
+            for j in range(_MEASURED):
+                gain[i, j] = 0.0
+                for m in range(_MEASURED):
+                    gain[i, j] += covariance[t, i, first + m] * trust[m, j]
+                keep[i, first + j] -= gain[i, j]
+                new_state[t, i] += gain[i, j] * (measured[t, j] - state[t, first + j])
+        # Joseph's form: stays symmetric and positive whatever the rounding.
+        _add_carried(keep, covariance[t], new_covariance[t])
+        _add_carried(gain, noise[t], new_covariance[t])
+    return new_state, new_covariance

@@ -16,6 +16,7 @@ from vision.ego_motion import camera_motion
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior, odometry_prior, steady_prior
 from vision.ego_motion.reprojection import Anchors
+from vision.ego_motion.robust_fit import fit
 
 CAMERA = Intrinsics(640, 480, 610.0, 610.0, 319.5, 239.5)
 SETTINGS = EgoMotionSettings()
@@ -160,12 +161,10 @@ def test_with_too_few_points_only_the_prior_speaks() -> None:
 
 
 def test_a_motion_whose_uncertainty_cannot_be_told_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = camera_motion._solve
-
     def singular(*given: Any) -> Any:
-        return replace(solve(*given), information=np.zeros((6, 6)))
+        return replace(fit(*given), information=np.zeros((8, 8)))
 
-    monkeypatch.setattr(camera_motion, "_solve", singular)
+    monkeypatch.setattr(camera_motion, "fit", singular)
     static, prior = anchors(), odometry()
     found = estimate(static, seen(static.points_m), IDENTITY, prior, GLOBAL_SHUTTER, CAMERA)
     assert not found.visual
@@ -207,3 +206,14 @@ def test_ends_on_upright_edges_count_across_them_only() -> None:
     assert found.visual
     yaw = vector_from_rotation((TRUE.inverse() @ found.pose).rotation)[1]
     assert abs(yaw) < 2e-4
+
+
+def test_points_behind_the_camera_have_no_say() -> None:
+    static = anchors()
+    behind = share(160, 0.3)
+    passed = replace(static, points_m=np.where(behind[:, None], -static.points_m, static.points_m))
+    found = estimate(passed, seen(static.points_m), IDENTITY, nothing_known(), GLOBAL_SHUTTER, CAMERA)
+    metres, radians = off(found)
+    assert metres < 1e-3
+    assert radians < 2e-4
+    assert found.inlier_ratio == pytest.approx(0.7, abs=0.02)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,9 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.camera.lens import project
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.fragments.store import FragmentStore
-from vision.motion.evidence import appraise, average_depth, observed_variance_scale, residuals, static_points
+from vision.motion import evidence
+from vision.motion.anchor_depths import appraise, average_depth, static_points
+from vision.motion.evidence import observed_variance_scale, residuals
 from vision.motion.velocities import PointMotion
 
 CAMERA = Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0)
@@ -215,3 +217,48 @@ def test_the_scatter_has_bounds_and_needs_enough_settled_ends() -> None:
     assert observed_variance_scale(wild, np.full(20, 2), nobody, 1.0) == 1.0
     assert observed_variance_scale(wild, old, ~nobody, 1.0) == 1.0
     assert observed_variance_scale(some(np.full(40, 1e6), usable=False), old, nobody, 1.0) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("miss", "covariance", "effect", "expected"),
+    [
+        ((3.0, 4.0), (9.0, 0.0, 16.0), (0.0, 0.0), 2.0),
+        # The inverse of [[2, 1], [1, 2]] is [[2, -1], [-1, 2]] / 3.
+        ((1.0, 0.0), (2.0, 1.0, 2.0), (0.0, 0.0), 2.0 / 3.0),
+        # Depth's effect (1, 0) doubles the variance along x.
+        ((2.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0), 3.0),
+        # Effect (1, 1) on the unit matrix makes [[2, 1], [1, 2]] again.
+        ((1.0, 0.0), (1.0, 0.0, 1.0), (1.0, 1.0), 2.0 / 3.0),
+    ],
+)
+def test_chi2_by_numbers(
+    miss: tuple[float, float],
+    covariance: tuple[float, float, float],
+    effect: tuple[float, float],
+    expected: float,
+) -> None:
+    assert evidence._squared_sigmas(miss, covariance, effect) == pytest.approx(expected)
+
+
+def test_of_no_fragments_there_are_no_residuals() -> None:
+    store = FragmentStore()
+    store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
+    anchor = store.anchors(2 * FRAME_NS, WINDOW_S)
+    depths = appraise(anchor, NOISE)
+    motion = residuals(store, anchor, depths, HERE, CAMERA, NOISE, 1.0)
+    assert motion.static_m.shape == (0, 3)
+    assert len(motion.usable) == len(motion.depth_step_m) == 0
+    moving = np.empty(0, np.bool_)
+    assert len(static_points(anchor, depths, store.pixel_cov, moving, 10.0).usable) == 0
+    average_depth(store, store.before(2 * FRAME_NS), STILL, NOISE)
+    assert store.depth_m.shape == store.looks.shape == (0, 2)
+
+
+def test_a_camera_that_went_past_an_end_does_not_use_it() -> None:
+    """Nor one whose way is no number."""
+    store = follow(going((0.0, 0.0, 0.0), 3)).store
+    anchor = store.anchors(4 * FRAME_NS, WINDOW_S)
+    depths = appraise(anchor, NOISE)
+    for beyond_m in (4.95, 6.0, np.nan):
+        now = replace(HERE, pose=Pose(np.eye(3), np.array([0.0, 0.0, beyond_m])))
+        assert not residuals(store, anchor, depths, now, CAMERA, NOISE, 1.0).usable.any()

@@ -12,7 +12,8 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth.depth_mask import UNSEEN_M
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.fragments.store import FragmentStore
-from vision.motion.evidence import appraise, residuals
+from vision.motion.anchor_depths import appraise
+from vision.motion.evidence import residuals
 from vision.motion.velocities import PointMotion
 
 CAMERA = Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0)

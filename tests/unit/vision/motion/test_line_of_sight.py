@@ -50,3 +50,28 @@ def test_many_velocities_are_split_at_once_as_one_by_one() -> None:
         np.testing.assert_allclose(together[k].across, alone.across)
         np.testing.assert_allclose(together[k].total, alone.total)
         np.testing.assert_allclose(together[k].level, alone.level)
+
+
+def test_squared_sigmas_are_those_of_a_general_solver() -> None:
+    """Whatever is correlated with whatever, seen from aside and from above."""
+    rng = np.random.default_rng(8)
+    root = rng.normal(size=(5, 3, 3))
+    doubt, velocity, sight = root @ root.transpose(0, 2, 1), rng.normal(size=(5, 3)), rng.normal(size=(5, 3))
+    sight /= np.linalg.norm(sight, axis=1)[:, None]
+    found = split(velocity, doubt, sight, UP)
+    floor = 0.0009 * np.eye(3)
+    for k in range(5):
+        total = velocity[k] @ np.linalg.solve(doubt[k] + floor, velocity[k])
+        assert found.total[k] == pytest.approx(total)
+        # Across: in the plane that two vectors at right angles to the line of sight span.
+        plane = np.linalg.svd(sight[k : k + 1])[2][1:]
+        inside = plane @ (doubt[k] + floor) @ plane.T
+        across = plane @ velocity[k]
+        assert found.across[k] == pytest.approx(across @ np.linalg.solve(inside, across))
+        np.testing.assert_allclose(found.rest[k], plane.T @ across, atol=1e-12)
+
+
+def test_of_no_tracks_there_is_nothing_to_split() -> None:
+    found = split(np.empty((4, 0, 3)), np.empty((4, 0, 3, 3)), np.empty((0, 3)), UP)
+    assert found.level.shape == (4, 0)
+    assert found[0].rest.shape == (0, 3)

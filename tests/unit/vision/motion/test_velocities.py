@@ -1,20 +1,11 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from hal.types import FloatArray
 from tests.support.point_motion import static_miss
-from vision.motion.velocities import (
-    NormalEquations,
-    PointMotion,
-    chi2_2d,
-    end_information,
-    normal_equations,
-    solve_velocity,
-)
+from vision.motion.velocities import PointMotion, normal_equations
 
 
 def points(static_m: FloatArray, ray: FloatArray, lag_s: float) -> PointMotion:
@@ -47,35 +38,6 @@ def test_length_ratio_and_lateral_speed_follow_from_the_point_equations() -> Non
     assert velocity[2] == pytest.approx(later_m - 4.0)  # -1 m/s
     assert velocity[0] == pytest.approx(20.0 / 300.0 * later_m)  # 0.2 m/s; eqs. 7 and 9: X' = x' Z'
     assert velocity[1] == pytest.approx(0.0)
-
-
-@pytest.mark.parametrize(
-    ("miss", "covariance", "effect", "expected"),
-    [
-        ((3.0, 4.0), (9.0, 0.0, 16.0), (0.0, 0.0), 2.0),
-        # The inverse of [[2, 1], [1, 2]] is [[2, -1], [-1, 2]] / 3.
-        ((1.0, 0.0), (2.0, 1.0, 2.0), (0.0, 0.0), 2.0 / 3.0),
-        # Depth's effect (1, 0) doubles the variance along x.
-        ((2.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0), 3.0),
-        # Effect (1, 1) on the unit matrix makes [[2, 1], [1, 2]] again.
-        ((1.0, 0.0), (1.0, 0.0, 1.0), (1.0, 1.0), 2.0 / 3.0),
-    ],
-)
-def test_chi2_by_numbers(
-    miss: tuple[float, float],
-    covariance: tuple[float, float, float],
-    effect: tuple[float, float],
-    expected: float,
-) -> None:
-    result = chi2_2d(np.array([miss]), np.array([covariance]), np.array([effect]))
-    np.testing.assert_allclose(result, [expected])
-
-
-def test_information_of_an_end_is_the_inverse_of_its_covariance() -> None:
-    base = points(np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, -0.2]]), 0.5)
-    motion = replace(base, covariance=np.array([[1.0, 0.5, 1.0]]), depth_effect=np.array([[1.0, 0.5]]))
-    # [[1, 0.5], [0.5, 1]] + [[1, 0.5], [0.5, 0.25]] = [[2, 1], [1, 1.25]], determinant 1.5.
-    np.testing.assert_allclose(end_information(motion)[:, 0], np.array([1.25, -1.0, 2.0]) / 1.5)
 
 
 def test_normal_equations_of_one_point_by_hand() -> None:
@@ -112,46 +74,15 @@ def test_correlated_pixels_are_weighted_by_the_inverse_of_their_covariance() -> 
     np.testing.assert_allclose(equations.doubt[0], rows.T @ weight @ [0.4, 0.1])
 
 
-def sums(matrix: FloatArray, rhs: list[float], doubt: list[float]) -> NormalEquations:
-    """One column of normal equations."""
-    upper = matrix[np.triu_indices(3)]
-    return NormalEquations(np.concatenate((upper, rhs, doubt))[:, None])
+def test_what_has_no_weight_says_nothing_even_if_it_is_no_number() -> None:
+    static, ray = np.tile([1.0, 0.0, 4.0], (2, 1)), np.tile([0.5, 0.0], (2, 1))
+    motion = points(static, ray, 2.0)
+    motion.miss_m[1] = motion.covariance[1] = np.nan
+    table = normal_equations(motion, np.array([3.0, 0.0])).table
+    np.testing.assert_array_equal(table[:, 0], normal_equations(motion, np.full(2, 3.0)).table[:, 0])
+    assert not table[:, 1].any()
 
 
-def test_what_nothing_measures_is_bounded_not_zero() -> None:
-    nothing = sums(np.zeros((3, 3)), [0.0] * 3, [0.0] * 3)
-    velocity, covariance = solve_velocity(nothing, 1.5)
-    np.testing.assert_allclose(velocity[0], 0.0)
-    np.testing.assert_allclose(covariance[0], 2.25 * np.eye(3))
-
-
-def test_solution_and_its_covariance_by_hand() -> None:
-    equations = sums(3.0 * np.eye(3), [3.0, 0.0, -6.0], [4.0, 0.0, 0.0])
-    velocity, covariance = solve_velocity(equations, 1.0)
-    # Information 3 + 1; one sigma of depth shifts the solution by (1, 0, 0).
-    np.testing.assert_allclose(velocity[0], [0.75, 0.0, -1.5])
-    np.testing.assert_allclose(covariance[0], np.diag([1.25, 0.25, 0.25]))
-
-
-def test_depth_adds_to_what_is_known_along_z() -> None:
-    equations = sums(np.eye(3), [0.0, 0.0, 1.0], [0.0] * 3)
-    equations.add_depth(np.array([2.0]), np.array([3.0]))
-    velocity, covariance = solve_velocity(equations, 1.0)
-    # Information 1 + 2 + 1, right side 1 + 3.
-    np.testing.assert_allclose(velocity[0], [0.0, 0.0, 1.0])
-    np.testing.assert_allclose(covariance[0], np.diag([0.5, 0.5, 0.25]))
-
-
-def test_stacks_of_bodies_are_solved_at_once_and_as_a_general_solver_does() -> None:
-    rng = np.random.default_rng(3)
-    roots = rng.normal(size=(7, 3, 3)) * [1.0, 30.0, 900.0]
-    matrices = roots @ roots.transpose(0, 2, 1)
-    rhs, doubt = rng.normal(size=(2, 7, 3))
-    columns = [sums(*given).table for given in zip(matrices, rhs.tolist(), doubt.tolist(), strict=True)]
-    stacked = NormalEquations(np.concatenate(columns, axis=1))
-    np.testing.assert_allclose(stacked.matrix, matrices)
-    velocity, covariance = solve_velocity(stacked, 2.0)
-    inverse = np.linalg.inv(matrices + 0.25 * np.eye(3))
-    common = (inverse @ doubt[:, :, None])[:, :, 0]
-    np.testing.assert_allclose(velocity, (inverse @ rhs[:, :, None])[:, :, 0], rtol=1e-7)
-    np.testing.assert_allclose(covariance, inverse + common[:, :, None] * common[:, None, :], rtol=1e-7)
+def test_of_no_points_there_are_no_equations() -> None:
+    nothing = points(np.empty((0, 3)), np.empty((0, 2)), 1.0)
+    assert normal_equations(nothing, np.empty(0)).matrix.shape == (0, 3, 3)

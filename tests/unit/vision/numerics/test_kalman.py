@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from hal.types import FloatArray
 from vision.numerics import kalman
 
 
@@ -109,3 +111,40 @@ def test_with_the_floor_known_the_covariance_stays_symmetric_and_positive() -> N
     across = np.array([0.8, 0.36, 0.0]) / np.hypot(0.8, 0.36)
     assert (upward < 0.05).all()
     assert (np.einsum("i,tij,j->t", across, covariance[:, 3:, 3:], across) > 0.4).all()
+
+
+def any_tracks(count: int) -> tuple[FloatArray, FloatArray]:
+    rng = np.random.default_rng(6)
+    root = rng.normal(size=(count, 6, 6))
+    return rng.normal(size=(count, 6)), root @ root.transpose(0, 2, 1) + 0.1 * np.eye(6)
+
+
+def test_several_tracks_are_predicted_as_by_the_matrix_of_their_motion() -> None:
+    state, covariance = any_tracks(4)
+    up = np.array([0.36, -0.8, -0.48])
+    move = np.eye(6)
+    move[:3, 3:] = 0.2 * np.eye(3)
+    move[3:, 3:] -= (1.0 - np.exp(-2.0)) * np.outer(up, up)
+    moved, spread = kalman.predict(state, covariance, 0.2, 0.0, up)
+    np.testing.assert_allclose(moved, state @ move.T)
+    np.testing.assert_allclose(spread, move @ covariance @ move.T, atol=1e-12)
+
+
+@pytest.mark.parametrize("first", [0, 3])
+def test_several_tracks_are_updated_as_by_the_equations_of_a_general_filter(first: int) -> None:
+    state, covariance = any_tracks(4)
+    rng = np.random.default_rng(7)
+    root = rng.normal(size=(4, 3, 3))
+    measured, noise = rng.normal(size=(4, 3)), root @ root.transpose(0, 2, 1) + 0.1 * np.eye(3)
+    found, spread = kalman.update(state, covariance, measured, noise, first)
+    select = np.eye(6)[first : first + 3]
+    for k in range(4):
+        gain = covariance[k] @ select.T @ np.linalg.inv(select @ covariance[k] @ select.T + noise[k])
+        np.testing.assert_allclose(found[k], state[k] + gain @ (measured[k] - select @ state[k]))
+        np.testing.assert_allclose(spread[k], (np.eye(6) - gain @ select) @ covariance[k], atol=1e-9)
+
+
+def test_of_no_tracks_there_is_nothing_to_filter() -> None:
+    state, covariance = np.empty((0, 6)), np.empty((0, 6, 6))
+    assert kalman.predict(state, covariance, 0.1, 0.3)[1].shape == (0, 6, 6)
+    assert kalman.update(state, covariance, np.empty((0, 3)), np.empty((0, 3, 3)), 3)[0].shape == (0, 6)

@@ -1,0 +1,279 @@
+"""Robust Gauss-Newton on the reprojection error: the camera that fits where anchored points are seen.
+
+For a pose of the camera: where the points of a View are predicted in the image, how far from there they are
+seen (the residual), and how that changes with each unknown, all in standard deviations. The unknowns are a
+small motion of the camera (rotation 3, translation 3) and its sweep (2). Depth moves a prediction along its
+epipolar line only: what its variance does there is taken off, by Sherman and Morrison.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.compiled import compiled, inlined
+from hal.types import FloatArray, Pose
+from vision.ego_motion.reprojection import View
+
+_GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
+_ITERATIONS = 6  # at most: two that anneal, the others until it has converged
+_ANNEAL = (32.0, 4.0)  # robust scale of the first iterations, falling to 1
+_CONVERGED_SIGMAS = 0.2  # a step of less is nothing beside what the pose may be off anyway
+_STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivatives say, to 0.01 px
+_LEAST_AHEAD_M = 0.1  # what is nearer is not in front of the camera
+_UNKNOWNS = 8  # rotation and translation (3 each), sweep about x and y
+_SWEEP = 6  # the first unknown that is no motion
+_RESIDUAL = _UNKNOWNS  # the column of the residual, after those of the derivatives
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """back (6,): the small motion of pose that leads back to where the fit began. information (8, 8), of a
+    small motion and the sweep. inliers: points that fit. free (8, 8), free_side (8,): normal equations of the
+    last step, from a sweep of free_from_rad (2,) on, without the prior of the sweep."""
+
+    pose: Pose
+    sweep_rad: FloatArray
+    back: FloatArray
+    information: FloatArray
+    inliers: int
+    free: FloatArray
+    free_side: FloatArray
+    free_from_rad: FloatArray
+
+
+def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
+    """Iteratively reweighted Gauss-Newton from start, which is known to sigma (8,)."""
+    began = np.empty((3, 4))
+    began[:, :3], began[:, 3] = start.rotation, start.translation_m
+    pose, sweep_rad, back, information, inliers, free, free_side, free_from_rad = _fitted(
+        view.lines, view.seen, view.doubt, began, np.ascontiguousarray(sigma)
+    )
+    return Fit(
+        pose=Pose(pose[:, :3].copy(), pose[:, 3].copy()),
+        sweep_rad=sweep_rad,
+        back=back,
+        information=information,
+        inliers=inliers,
+        free=free,
+        free_side=free_side,
+        free_from_rad=free_from_rad,
+    )
+
+
+@inlined
+def _moved(pose: FloatArray, step: FloatArray) -> FloatArray:
+    """A pose (3, 4), rotation and translation, after a small motion step (6,) of its own."""
+    x, y, z = step[0], step[1], step[2]
+    angle = math.sqrt(x * x + y * y + z * z)
+    result = pose.copy()
+    for i in range(3):
+        result[i, 3] += pose[i, 0] * step[3] + pose[i, 1] * step[4] + pose[i, 2] * step[5]
+    if angle < 1e-15:
+        return result
+    # Rodrigues' formula.
+    x, y, z, sine, cosine = x / angle, y / angle, z / angle, math.sin(angle), math.cos(angle)
+    rest = 1.0 - cosine
+    for i in range(3):
+        a, b, c = pose[i, 0], pose[i, 1], pose[i, 2]
+        along = rest * (a * x + b * y + c * z)
+        result[i, 0] = cosine * a + along * x + sine * (b * z - c * y)
+        result[i, 1] = cosine * b + along * y + sine * (c * x - a * z)
+        result[i, 2] = cosine * c + along * z + sine * (a * y - b * x)
+    return result
+
+
+@inlined
+def _back(pose: FloatArray, start: FloatArray) -> FloatArray:
+    """(6,) the small motion of a pose (3, 4) that leads back to start (3, 4)."""
+    result, turn = np.zeros(6), np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            result[3 + i] += pose[j, i] * (start[j, 3] - pose[j, 3])
+            for k in range(3):
+                turn[i, j] += pose[k, i] * start[k, j]
+    x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
+    angle = math.atan2(sine, 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0))
+    scale = 0.5 if sine < 1e-9 else 0.5 * angle / sine
+    result[0], result[1], result[2] = x * scale, y * scale, z * scale
+    return result
+
+
+@inlined
+def _turned_back(pose: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A vector of the fixed frame in the axes of the camera."""
+    return (
+        pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z,
+        pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z,
+        pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z,
+    )
+
+
+@inlined
+def _in_camera(pose: FloatArray, point_m: FloatArray) -> tuple[float, float, float]:
+    """A point (3,) of the fixed frame as the camera has it."""
+    return _turned_back(pose, point_m[0] - pose[0, 3], point_m[1] - pose[1, 3], point_m[2] - pose[2, 3])
+
+
+@inlined
+def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: FloatArray) -> FloatArray:
+    """A better pose to start from: turned by the median miss of all points, as far as sigma (8,) admits."""
+    across, down, turn = np.empty(len(seen)), np.empty(len(seen)), np.zeros(6)
+    for k in range(len(seen)):
+        x, y, z = _in_camera(start, lines[k, 0])
+        ahead = max(z, _LEAST_AHEAD_M)
+        across[k], down[k] = seen[k, 0] - x / ahead, seen[k, 1] - y / ahead
+    turn[0] = min(max(np.median(down), -3.0 * sigma[0]), 3.0 * sigma[0])
+    turn[1] = min(max(-np.median(across), -3.0 * sigma[1]), 3.0 * sigma[1])
+    return _moved(start, turn)
+
+
+@inlined
+def _linearised(
+    lines: FloatArray, seen: FloatArray, doubt: FloatArray, pose: FloatArray, sweep_rad: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+    """At a pose and sweep: table (N, 2, 9), by_depth (N, 2), shrink (N,), in_front (N,).
+
+    table, across and down the image, in sigmas: derivatives by the unknowns, then the residual. by_depth: the
+    derivative by depth; shrink: what the variance of depth takes off the square of an error along that.
+    """
+    count = len(seen)
+    table, by_depth = np.empty((count, 2, _UNKNOWNS + 1)), np.empty((count, 2))
+    shrink, in_front = np.empty(count), np.empty(count, np.bool_)
+    for k in range(count):
+        x, y, z = _in_camera(pose, lines[k, 0])
+        dx, dy, dz = _turned_back(pose, lines[k, 1, 0], lines[k, 1, 1], lines[k, 1, 2])
+        in_front[k] = z > _LEAST_AHEAD_M
+        inverse = 1.0 / max(z, _LEAST_AHEAD_M)
+        x, y = x * inverse, y * inverse
+        # The camera turns by w and goes by v: a point goes by -(w x p) - v in its frame.
+        across, down = table[k, 0], table[k, 1]
+        across[0], down[0] = x * y, 1.0 + y * y
+        across[1], down[1] = -1.0 - x * x, -x * y
+        across[2], down[2] = y, -x
+        across[3], down[3] = -inverse, 0.0
+        across[4], down[4] = 0.0, -inverse
+        across[5], down[5] = x * inverse, y * inverse
+        across[_RESIDUAL], down[_RESIDUAL] = seen[k, 0] - x, seen[k, 1] - y
+        for i in range(2):
+            across[_SWEEP + i], down[_SWEEP + i] = across[i] * seen[k, 2], down[i] * seen[k, 2]
+            across[_RESIDUAL] -= across[_SWEEP + i] * sweep_rad[i]
+            down[_RESIDUAL] -= down[_SWEEP + i] * sweep_rad[i]
+        own, mixed, other = doubt[k, 0], doubt[k, 1], doubt[k, 2]
+        for i in range(_UNKNOWNS + 1):
+            down[i] = down[i] * other + across[i] * mixed
+            across[i] *= own
+        dx, dy = inverse * (dx - x * dz), inverse * (dy - y * dz)
+        dx, dy = dx * own, dy * other + dx * mixed
+        by_depth[k, 0], by_depth[k, 1] = dx, dy
+        # Depth's share of the covariance: only along the epipolar line.
+        shrink[k] = doubt[k, 3] / (1.0 + doubt[k, 3] * (dx * dx + dy * dy))
+    return table, by_depth, shrink, in_front
+
+
+@inlined
+def _chi2(rows: FloatArray, by_depth: FloatArray, shrink: float) -> float:
+    """Of one point with rows (2, 9) in table."""
+    a, b = rows[0, _RESIDUAL], rows[1, _RESIDUAL]
+    along = a * by_depth[0] + b * by_depth[1]
+    result: float = a * a + b * b - shrink * along * along
+    return result
+
+
+@inlined
+def _assumed_variance(rows: FloatArray, sigma: FloatArray) -> float:
+    """Of where a point is seen, before anything is known but sigma (8,)."""
+    result = 0.0
+    for i in range(_UNKNOWNS):
+        result += sigma[i] * sigma[i] * (rows[0, i] * rows[0, i] + rows[1, i] * rows[1, i])
+    return result
+
+
+@inlined
+def _add(rows: FloatArray, by_depth: FloatArray, shrink: float, weight: float, normal: FloatArray) -> None:
+    """Add a point to the upper half of normal (8, 9): normal matrix and, in the last column, right side."""
+    for j in range(_UNKNOWNS + 1):
+        along = shrink * (rows[0, j] * by_depth[0] + rows[1, j] * by_depth[1])
+        a, b = weight * (rows[0, j] - along * by_depth[0]), weight * (rows[1, j] - along * by_depth[1])
+        for i in range(min(j + 1, _UNKNOWNS)):
+            normal[i, j] += rows[0, i] * a + rows[1, i] * b
+
+
+@inlined
+def _solved(matrix: FloatArray, side: FloatArray) -> FloatArray:
+    """x of matrix x = side, for a positive matrix (8, 8), by Cholesky's factor."""
+    factor, result = np.zeros_like(matrix), side.copy()
+    for i in range(_UNKNOWNS):
+        for j in range(i + 1):
+            rest = matrix[i, j]
+            for k in range(j):
+                rest -= factor[i, k] * factor[j, k]
+            factor[i, j] = math.sqrt(rest) if i == j else rest / factor[j, j]
+        for k in range(i):
+            result[i] -= factor[i, k] * result[k]
+        result[i] /= factor[i, i]
+    for i in range(_UNKNOWNS - 1, -1, -1):
+        for k in range(i + 1, _UNKNOWNS):
+            result[i] -= factor[k, i] * result[k]
+        result[i] /= factor[i, i]
+    return result
+
+
+@compiled("float64[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
+def _fitted(
+    lines: FloatArray, seen: FloatArray, doubt: FloatArray, start: FloatArray, sigma: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, int, FloatArray, FloatArray, FloatArray]:
+    """The fields of Fit; the poses (3, 4): rotation and translation."""
+    prior, pose, sweep_rad = 1.0 / np.square(sigma), _shifted(lines, seen, start, sigma), np.zeros(2)
+    table, by_depth, shrink, in_front = _linearised(lines, seen, doubt, pose, sweep_rad)
+    missing, gone = np.zeros(_UNKNOWNS), np.zeros(_UNKNOWNS)  # gone: since the image was linearised
+    missing[:_SWEEP] = _back(pose, start)
+    chi2, allowed = np.empty(len(seen)), np.zeros(len(seen), np.bool_)
+    for iteration in range(_ITERATIONS):
+        scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
+        normal = np.zeros((_UNKNOWNS, _UNKNOWNS + 1))
+        for k in range(len(seen)):
+            chi2[k] = _chi2(table[k], by_depth[k], shrink[k])
+            if iteration == 0:
+                gate = _GATE_CHI2 * (1.0 + _assumed_variance(table[k], sigma))
+                allowed[k] = in_front[k] and chi2[k] <= gate
+            if allowed[k] and in_front[k]:
+                weight = 1.0 / (scale * (1.0 + chi2[k] / (_GATE_CHI2 * scale)) ** 2)
+                _add(table[k], by_depth[k], shrink[k], weight, normal)
+        for i in range(_UNKNOWNS):
+            normal[i:, i] = normal[i, i:_UNKNOWNS]
+        # With the prior of the motion alone, then with that of the sweep, too.
+        free, free_side = normal[:, :_UNKNOWNS].copy(), normal[:, _RESIDUAL].copy()
+        free_from_rad = -missing[_SWEEP:]
+        for i in range(_SWEEP):
+            free[i, i] += prior[i]
+            free_side[i] += prior[i] * missing[i]
+        information, side = free.copy(), free_side.copy()
+        for i in range(_SWEEP, _UNKNOWNS):
+            information[i, i] += prior[i]
+            side[i] += prior[i] * missing[i]
+        step = _solved(information, side)
+        gone += step
+        # The step in standard deviations, squared.
+        if iteration >= len(_ANNEAL) and (step * side).sum() < _CONVERGED_SIGMAS**2:
+            break
+        if np.abs(gone).max() > _STRAIGHT:
+            pose, sweep_rad = _moved(pose, gone), sweep_rad + gone[_SWEEP:]
+            gone[:] = 0.0
+            table, by_depth, shrink, in_front = _linearised(lines, seen, doubt, pose, sweep_rad)
+            missing[:_SWEEP], missing[_SWEEP:] = _back(pose, start), -sweep_rad
+        else:
+            missing -= step
+            for k in range(len(seen)):
+                for i in range(_UNKNOWNS):
+                    table[k, 0, _RESIDUAL] -= step[i] * table[k, 0, i]
+                    table[k, 1, _RESIDUAL] -= step[i] * table[k, 1, i]
+    pose, inliers = _moved(pose, gone), 0
+    for k in range(len(seen)):
+        inliers += allowed[k] and chi2[k] <= _GATE_CHI2
+    sweep_rad = sweep_rad + gone[_SWEEP:]
+    return pose, sweep_rad, _back(pose, start), information, inliers, free, free_side, free_from_rad

@@ -1,0 +1,105 @@
+"""Where the ends of fragments are expected in the next image, by what was known of them before it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.compiled import compiled
+from hal.types import FloatArray, Intrinsics, Pose
+from vision.fragments.store import FragmentStore
+from vision.scene import Fragments
+
+_UNKNOWN_M = 5.0  # where depth is missing
+_LEAST_AHEAD_M = 0.1  # nearer nothing is seen
+
+
+def known_motion(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Which of the fragments ids (N,), in ascending order, tracking knew as moving, and how fast: (N,),
+    (N, 3), over ground in the camera's axes, 0 for what does not move."""
+    if previous is None:
+        return np.zeros(len(ids), np.bool_), np.zeros((len(ids), 3))
+    return _known_motion(
+        ids,
+        np.ascontiguousarray(previous.ids),
+        np.ascontiguousarray(previous.moving),
+        np.ascontiguousarray(previous.velocity_mps),
+    )
+
+
+def expected_px(
+    store: FragmentStore, velocity_mps: FloatArray, motion: Pose, dt_s: float, camera: Intrinsics
+) -> NDArray[np.float32]:
+    """(2N, 2) where the ends in store will be seen dt_s later, after motion of the camera; velocity_mps
+    (N, 3) of the fragments over ground, in the camera's axes before."""
+    return _expected_px(
+        np.ascontiguousarray(store.ends_px),
+        np.ascontiguousarray(store.near_m),
+        velocity_mps * dt_s,
+        np.ascontiguousarray(motion.rotation),
+        np.ascontiguousarray(motion.translation_m),
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+    )
+
+
+@compiled("int64[::1], int64[::1], bool[::1], float64[:, ::1]")
+def _known_motion(
+    ids: NDArray[np.int64],
+    known: NDArray[np.int64],
+    moved: NDArray[np.bool_],
+    velocity_mps: FloatArray,
+) -> tuple[NDArray[np.bool_], FloatArray]:
+    """As known_motion. ids (N,) and known (M,): both in ascending order."""
+    moving, result = np.zeros(len(ids), np.bool_), np.zeros((len(ids), 3))
+    place = 0
+    for k in range(len(ids)):
+        while place < len(known) and known[place] < ids[k]:
+            place += 1
+        if place == len(known):
+            break
+        if known[place] != ids[k] or not moved[place]:
+            continue
+        moving[k] = True
+        for i in range(3):
+            if not np.isnan(velocity_mps[place, i]):
+                result[k, i] = velocity_mps[place, i]
+    return moving, result
+
+
+@compiled(
+    "float32[:, :, ::1], float32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64, float64,"
+    " float64, float64"
+)
+def _expected_px(
+    ends_px: NDArray[np.float32],
+    near_m: NDArray[np.float32],
+    way_m: FloatArray,
+    rotation: FloatArray,
+    translation_m: FloatArray,
+    fx: float,
+    fy: float,
+    cx: float,
+    cy: float,
+) -> NDArray[np.float32]:
+    """As expected_px. way_m (N, 3): of the fragments meanwhile; rotation, translation_m: of the camera."""
+    result = np.empty((2 * len(ends_px), 2), np.float32)
+    point, moved = np.empty(3), np.empty(3)
+    for k in range(2 * len(ends_px)):
+        fragment, end = k // 2, k % 2
+        measured_m = near_m[fragment, end]
+        depth_m = _UNKNOWN_M if np.isnan(measured_m) else np.float64(measured_m)
+        # As rays of vision/camera/lens.py: in single precision.
+        point[0] = depth_m * ((ends_px[fragment, end, 0] - np.float32(cx)) / np.float32(fx))
+        point[1] = depth_m * ((ends_px[fragment, end, 1] - np.float32(cy)) / np.float32(fy))
+        point[2] = depth_m
+        moved[:] = 0.0
+        for i in range(3):
+            away_m = point[i] - translation_m[i] + way_m[fragment, i]
+            for j in range(3):
+                moved[j] += rotation[i, j] * away_m
+        inverse = 1.0 / max(moved[2], _LEAST_AHEAD_M)
+        result[k, 0], result[k, 1] = moved[0] * inverse * fx + cx, moved[1] * inverse * fy + cy
+    return result
