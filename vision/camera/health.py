@@ -8,6 +8,7 @@ from enum import Enum
 import numpy as np
 
 from config.perception import PerceptionConfig
+from hal.compiled import compiled
 from hal.types import RgbdFrame
 from vision.depth.depth_grid import DepthGrid
 from vision.fragments.edges import GreyImage
@@ -50,14 +51,14 @@ class HealthMonitor:
     def __init__(self, config: PerceptionConfig) -> None:
         self._config = config
         self._last_ns: int | None = None
-        self._last_grey: GreyImage | None = None
+        self._last_grey: GreyImage = np.empty((0, 0), np.uint8)
         self._same = 0
         self._earlier_ns: int | None = None
         self._earlier_frames = 0
 
     def check(self, frame: RgbdFrame, grey: GreyImage, grid: DepthGrid) -> FrameCheck:
         """The worst finding decides the condition; each finding has its sentence."""
-        sample = grey[_STEP // 2 :: _STEP, _STEP // 2 :: _STEP]
+        dark, bright, alike = _samples(grey, self._last_grey)
         continuity, gap_s = self._continuity(frame)
         problems: list[tuple[CameraCondition, str]] = []
         bad, poor = CameraCondition.UNTRUSTWORTHY, CameraCondition.DEGRADED
@@ -70,12 +71,11 @@ class HealthMonitor:
         elif continuity is Continuity.GAP:
             problems.append((poor, f"{gap_s:.2f} s without a frame: motion cannot be compared across it"))
         # Colour alone: a sensor's noise never repeats, whatever depth does beside it.
-        repeated = self._repeats(grey, sample)
+        # Hardly any gets past the comparison of samples.
+        repeated = alike and bool((self._last_grey == grey).all())
         self._same = self._same + 1 if repeated else 0
         if self._same >= _FROZEN_FRAMES:
             problems.append((bad, f"image has not changed by a single grey level for {self._same} frames"))
-        dark = float(np.count_nonzero(sample <= _BLACK_LEVEL)) / sample.size
-        bright = float(np.count_nonzero(sample >= _WHITE_LEVEL)) / sample.size
         usable_colour = max(dark, bright) < _BAD_SHARE
         if dark >= _BAD_SHARE:
             problems.append((bad, f"{dark:.0%} of the colour image is black: is the lens covered?"))
@@ -97,15 +97,6 @@ class HealthMonitor:
             continuity = Continuity.REPEATED
         return FrameCheck(usable_colour, usable_depth, continuity, _verdict(problems, share))
 
-    def _repeats(self, grey: GreyImage, sample: GreyImage) -> bool:
-        """Whether this is the image of the frame before. Hardly any gets past the first comparison."""
-        before = self._last_grey
-        if before is None or before.shape != grey.shape:
-            return False
-        if (before[_STEP // 2 :: _STEP, _STEP // 2 :: _STEP] != sample).any():
-            return False
-        return bool((before == grey).all())
-
     def _continuity(self, frame: RgbdFrame) -> tuple[Continuity, float]:
         if self._last_ns is None:
             return Continuity.FIRST, 0.0
@@ -126,6 +117,21 @@ class HealthMonitor:
             return Continuity.BACKWARD
         self._earlier_ns = None
         return Continuity.STEPPED
+
+
+@compiled("uint8[:, ::1], uint8[:, ::1]")
+def _samples(grey: GreyImage, before: GreyImage) -> tuple[float, float, bool]:
+    """Which share of an image's samples is black, which is white, and whether they are those of the image
+    before; of another size it is not."""
+    height, width = grey.shape
+    black, white, size, alike = 0, 0, 0, grey.shape == before.shape
+    for i in range(_STEP // 2, height, _STEP):
+        for j in range(_STEP // 2, width, _STEP):
+            size += 1
+            black += grey[i, j] <= _BLACK_LEVEL
+            white += grey[i, j] >= _WHITE_LEVEL
+            alike = alike and grey[i, j] == before[i, j]
+    return black / size, white / size, alike
 
 
 def worsened(health: CameraHealth, condition: CameraCondition, reason: str) -> CameraHealth:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
+from hal.compiled import compiled
 from hal.types import FloatArray, RgbdFrame
 from vision.bodies.tracks import Tracks
-from vision.depth.depth_mask import SurfaceDepth, depth_sigma_m
+from vision.depth.depth_mask import SurfaceDepth
 from vision.detection import Detection
 from vision.fragments.candidates import (
     NOTHING_NEW,
@@ -67,17 +68,62 @@ class Wanted:
 
 def wanted(tracks: Tracks, detection: Detection, config: PerceptionConfig) -> Wanted:
     """Of the tracks seen in this frame."""
-    away = (tracks.state[:, :3] - detection.pose.translation_m) @ detection.pose.rotation
-    few = tracks.fragments < np.where(tracks.moving, _ENOUGH_OF_A_MOVER, _FEW_FRAGMENTS)
-    seen = (tracks.seen_ns == detection.captured_ns) & (tracks.cells >= _MIN_CELLS)
-    chosen = (few & seen & (np.square(away).sum(axis=1) <= _REACH_M**2)).nonzero()[0]
-    depth_m = np.maximum(away[chosen, 2], 0.0)
-    gate_m = _GATE_M + _GATE_SIGMAS * depth_sigma_m(depth_m, config.depth_noise)
-    gate_m += 0.5 * np.minimum(tracks.extent_m[chosen, 2], _DEEPEST_M)
-    urgent = (tracks.evidence[chosen] > 0.0) | (tracks.sightings[chosen] < _URGENT_SIGHTINGS)
-    return Wanted(
-        ids=tracks.ids[chosen], box_px=tracks.bbox_px[chosen], depth_m=depth_m, gate_m=gate_m, urgent=urgent
+    noise = config.depth_noise
+    chosen, depth_m, gate_m, urgent = _told_of_by_too_few(
+        tracks.state,
+        tracks.extent_m,
+        tracks.moving,
+        tracks.evidence,
+        tracks.fragments,
+        tracks.cells,
+        tracks.sightings,
+        tracks.seen_ns,
+        detection.captured_ns,
+        detection.pose.rotation,
+        detection.pose.translation_m,
+        noise.floor_m,
+        noise.quadratic_per_m,
     )
+    return Wanted(tracks.ids[chosen], tracks.bbox_px[chosen], depth_m, gate_m, urgent)
+
+
+@compiled(
+    "float64[:, :], float64[:, :], bool_[:], float64[:], int64[:], int64[:], int64[:], int64[:], int64, "
+    "float64[:, :], float64[:], float64, float64"
+)
+def _told_of_by_too_few(
+    state: FloatArray,
+    extent_m: FloatArray,
+    moving: NDArray[np.bool_],
+    evidence: FloatArray,
+    fragments: NDArray[np.intp],
+    cells: NDArray[np.intp],
+    sightings: NDArray[np.intp],
+    seen_ns: NDArray[np.int64],
+    now_ns: int,
+    rotation: FloatArray,
+    camera_m: FloatArray,
+    floor_m: float,
+    quadratic_per_m: float,
+) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Which of the tracks are wanted, and depth_m, gate_m and urgent of these. floor_m and quadratic_per_m:
+    the noise of depth."""
+    chosen, depth_m, gate_m = np.empty(len(state), np.intp), np.empty(len(state)), np.empty(len(state))
+    urgent, count = np.empty(len(state), np.bool_), 0
+    for n in range(len(state)):
+        few = fragments[n] < (_ENOUGH_OF_A_MOVER if moving[n] else _FEW_FRAGMENTS)
+        if not few or seen_ns[n] != now_ns or cells[n] < _MIN_CELLS:
+            continue
+        x, y, z = state[n, 0] - camera_m[0], state[n, 1] - camera_m[1], state[n, 2] - camera_m[2]
+        if not x * x + y * y + z * z <= _REACH_M**2:
+            continue
+        depth = max(x * rotation[0, 2] + y * rotation[1, 2] + z * rotation[2, 2], 0.0)
+        gate = _GATE_M + _GATE_SIGMAS * (floor_m + quadratic_per_m * depth * depth)
+        gate += 0.5 * np.minimum(extent_m[n, 2], _DEEPEST_M)
+        chosen[count], depth_m[count], gate_m[count] = n, depth, gate
+        urgent[count] = evidence[n] > 0.0 or sightings[n] < _URGENT_SIGHTINGS
+        count += 1
+    return chosen[:count], depth_m[:count], gate_m[:count], urgent[:count]
 
 
 class Attention:
@@ -128,10 +174,11 @@ class Attention:
         if not ids:
             return None
         self._looked_ns = {one: at for one, at in self._looked_ns.items() if now_ns - at < _IDLE_NS}
-        waited_ns = np.array([now_ns - self._looked_ns.get(number, self._began_ns) for number in ids])
-        due = waited_ns >= np.where(bodies.urgent, _URGENT_NS, _IDLE_NS)
-        if not due.any():
-            return None
-        first = int(np.lexsort((-waited_ns, ~bodies.urgent, ~due))[0])
-        self._looked_ns[ids[first]] = now_ns
+        first, longest = None, (False, -1)
+        for index, (number, urgent) in enumerate(zip(ids, bodies.urgent.tolist(), strict=True)):
+            waited_ns = now_ns - self._looked_ns.get(number, self._began_ns)
+            if waited_ns >= (_URGENT_NS if urgent else _IDLE_NS) and (urgent, waited_ns) > longest:
+                first, longest = index, (urgent, waited_ns)
+        if first is not None:
+            self._looked_ns[ids[first]] = now_ns
         return first

@@ -8,17 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import FragmentSettings, PerceptionConfig
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray, RgbdFrame
-from vision.depth.depth_mask import SurfaceDepth, depth_sigma_m, surface_depth
+from vision.depth.depth_mask import SurfaceDepth, surface_depth
 from vision.fragments.edges import GreyImage
-from vision.fragments.segments import lengths_px, smaller_eigenvalue, snap_to_corners
+from vision.fragments.segments import snap_to_corners
 
 _TAKEN_PX = 6  # about half a search window: closer ends would follow the same pixels
-_NOISE_STRUCTURE = 220.0  # what image noise of 3 grey levels adds to both eigenvalues over 7x7 px
-_LEAST_STRUCTURE = 3.0  # of either eigenvalue: an end held so weakly is known to 3.5 px
-_STAIRS = 0.05  # of the larger eigenvalue, that the stairs of a coarsely sampled edge add to the smaller one
-_MATCH_SIGMA = 6.0  # grey levels by which two sights of the same patch differ
-_SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0], np.float32)  # where along a segment its depth is read
+# What image noise of 3 grey levels adds to both eigenvalues over 7x7 px.
+_NOISE_STRUCTURE = np.float32(220.0)
+_LEAST_STRUCTURE = np.float32(3.0)  # of either eigenvalue: an end held so weakly is known to 3.5 px
+_STAIRS = np.float32(0.05)  # of the larger eigenvalue, that a coarsely sampled edge adds to the smaller one
+_MATCH_VARIANCE = np.float32(6.0**2)  # of the grey levels in two sights of the same patch
+_HALF = np.float32(0.5)
+_PLACES = 5  # along a segment, evenly from end to end, where its depth is read
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,29 +54,31 @@ def held_ends(
     structure tensor at their ends (M, 2, 3). least_held: of its smaller eigenvalue at either end.
     """
     snapped, tensor = snap_to_corners(grey, segments_px)
-    held = smaller_eigenvalue(tensor[..., 0], tensor[..., 1], tensor[..., 2]).min(axis=1)
-    order = np.argsort(-held, kind="stable")
-    snapped, tensor = snapped[order], tensor[order]
-    wanted = (lengths_px(snapped) >= min_distance_px) & _not_taken(snapped, ends_px, grey.shape)
-    wanted &= held[order] >= least_held
-    return snapped[wanted], tensor[wanted]
+    height, width = grey.shape
+    present = np.ascontiguousarray(ends_px)
+    return _best_held(snapped, tensor, present, height, width, min_distance_px, least_held)
 
 
 def depth_along(segments_px: NDArray[np.float32], frame: RgbdFrame, config: PerceptionConfig) -> SurfaceDepth:
     """Depth along segments (N, 2, 2), from end to end: (N, 5) each."""
-    along = np.empty((len(segments_px), len(_SHARES), 2), np.float32)
-    for k in (0, 1):
-        begin, end = segments_px[:, :1, k], segments_px[:, 1:, k]
-        along[..., k] = begin + (end - begin) * _SHARES
     found = surface_depth(
         frame.depth,
         frame.depth_scale_m,
-        along.reshape(-1, 2),
+        _points_along(np.ascontiguousarray(segments_px)),
         config.min_depth_m,
         config.max_depth_m,
         config.depth_noise,
     )
-    return SurfaceDepth(*(part.reshape(-1, 5) for part in (found.near_m, found.far_m, found.holes)))
+    return SurfaceDepth(*(part.reshape(-1, _PLACES) for part in (found.near_m, found.far_m, found.holes)))
+
+
+def on_one_surface(near_m: FloatArray, config: PerceptionConfig) -> NDArray[np.bool_]:
+    """(N,) of near_m (N, 5) as in depth_along.
+
+    Inverse depth runs straight along a segment of one plane; a segment across a depth edge jumps.
+    """
+    noise = config.depth_noise
+    return _on_one_surface(np.ascontiguousarray(near_m), noise.floor_m, noise.quadratic_per_m)
 
 
 def new_fragments(
@@ -84,71 +89,134 @@ def new_fragments(
     settings: FragmentSettings,
 ) -> NewFragments:
     """Those picked (M,) of segments with what held_ends and depth_along say of them."""
-    return NewFragments(
-        segments_px[picked],
-        surface.near_m[picked, ::4].astype(np.float32),
-        surface.far_m[picked, ::4].astype(np.float32),
-        _flow_covariance(tensor[picked], settings.pixel_sigma_px),
-    )
+    floor_px2 = np.float32(settings.pixel_sigma_px**2)
+    return NewFragments(*_fragments(picked, segments_px, tensor, surface.near_m, surface.far_m, floor_px2))
 
 
-def on_one_surface(near_m: FloatArray, config: PerceptionConfig) -> NDArray[np.bool_]:
-    """(N,) of near_m (N, 5) as in depth_along.
+@inlined
+def _eigenvalues(uu: np.float32, uv: np.float32, vv: np.float32) -> tuple[np.float32, np.float32]:
+    """Of a structure tensor: the middle between its two eigenvalues, and how far they are from it."""
+    half_difference = _HALF * (uu - vv)
+    return _HALF * (uu + vv), np.sqrt(half_difference * half_difference + uv * uv)
 
-    Inverse depth runs straight along a segment of one plane; a segment across a depth edge jumps.
-    """
-    inverse = 1.0 / near_m
-    straight = inverse[:, :1] + (inverse[:, 4:] - inverse[:, :1]) * _SHARES
-    expected_m = 1.0 / straight[:, 1:4]
-    gate_m = 0.05 + 3.0 * depth_sigma_m(expected_m, config.depth_noise)
-    inside = np.abs(near_m[:, 1:4] - expected_m) <= gate_m
-    # One of the three samples in between may fall into a hole.
-    missing = np.isnan(near_m)
-    good = (inside | missing[:, 1:4]).all(axis=1) & (missing[:, 1:4].sum(axis=1) <= 1)
-    result: NDArray[np.bool_] = good & ~missing[:, 0] & ~missing[:, 4]
+
+@inlined
+def _take(taken: NDArray[np.bool_], end_px: NDArray[np.float32]) -> bool:
+    """Whether nobody had the place of an end (2,) yet: from now on it is taken. No end is beyond the rim."""
+    share = np.float32(1.0 / _TAKEN_PX)
+    row = min(max(int(end_px[1] * share), 0), taken.shape[0] - 1)
+    column = min(max(int(end_px[0] * share), 0), taken.shape[1] - 1)
+    free = not taken[row, column]
+    taken[row, column] = True
+    return free
+
+
+@compiled("float32[:, :, ::1], float32[:, :, ::1], float32[:, :, ::1], int64, int64, float64, float64")
+def _best_held(
+    segments_px: NDArray[np.float32],
+    tensor: NDArray[np.float32],
+    ends_px: NDArray[np.float32],
+    height: int,
+    width: int,
+    min_distance_px: float,
+    least_held: float,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What held_ends returns, of segments that are moved to corners already."""
+    taken = np.zeros((height // _TAKEN_PX + 1, width // _TAKEN_PX + 1), np.bool_)
+    for n in range(len(ends_px)):
+        _take(taken, ends_px[n, 0])
+        _take(taken, ends_px[n, 1])
+    held = np.full(len(segments_px), np.float32(np.inf))
+    for n in range(len(segments_px)):
+        for end in range(2):
+            middle, radius = _eigenvalues(tensor[n, end, 0], tensor[n, end, 1], tensor[n, end, 2])
+            held[n] = min(held[n], middle - radius)
+    wanted, count = np.empty(len(segments_px), np.intp), 0
+    for n in np.argsort(-held, kind="mergesort"):  # a stable one
+        first, second = _take(taken, segments_px[n, 0]), _take(taken, segments_px[n, 1])
+        du = segments_px[n, 0, 0] - segments_px[n, 1, 0]
+        dv = segments_px[n, 0, 1] - segments_px[n, 1, 1]
+        apart = np.sqrt(du * du + dv * dv) >= min_distance_px
+        if first and second and apart and held[n] >= least_held:
+            wanted[count] = n
+            count += 1
+    return segments_px[wanted[:count]], tensor[wanted[:count]]
+
+
+@compiled("float32[:, :, ::1]")
+def _points_along(segments_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(5 N, 2) pixels along segments (N, 2, 2), from end to end."""
+    result = np.empty((len(segments_px) * _PLACES, 2), np.float32)
+    for n in range(len(segments_px)):
+        for k in range(2):
+            begin, end = segments_px[n, 0, k], segments_px[n, 1, k]
+            for place in range(_PLACES):
+                result[n * _PLACES + place, k] = begin + (end - begin) * np.float32(place / (_PLACES - 1))
     return result
 
 
-def _not_taken(
-    candidates: NDArray[np.float32], ends_px: NDArray[np.float32], shape: tuple[int, ...]
-) -> NDArray[np.bool_]:
-    """Which candidates have both ends where no other fragment, old or earlier in the list, has one."""
-    columns = shape[1] // _TAKEN_PX + 1
-    taken = np.zeros((shape[0] // _TAKEN_PX + 1) * columns, np.bool_)
-    taken[_cells(ends_px, columns).ravel()] = True
-    cells = _cells(candidates, columns).ravel()
-    # Writing backwards leaves in each cell the first one that wants it.
-    first = np.empty(len(taken), np.intp)
-    first[cells[::-1]] = np.arange(len(cells))[::-1]
-    alone = (first.take(cells) == np.arange(len(cells))) & ~taken.take(cells)
-    result: NDArray[np.bool_] = alone[0::2] & alone[1::2]
+@compiled("float64[:, ::1], float64, float64")
+def _on_one_surface(near_m: FloatArray, floor_m: float, quadratic_per_m: float) -> NDArray[np.bool_]:
+    """What on_one_surface returns."""
+    result = np.empty(len(near_m), np.bool_)
+    for n in range(len(near_m)):
+        begin, end = 1.0 / near_m[n, 0], 1.0 / near_m[n, -1]
+        missing, jumps = 0, np.isnan(begin) or np.isnan(end)
+        for place in range(1, _PLACES - 1):
+            expected_m = 1.0 / (begin + (end - begin) * (place / (_PLACES - 1)))
+            gate_m = 0.05 + 3.0 * (floor_m + quadratic_per_m * expected_m * expected_m)
+            if np.isnan(near_m[n, place]):
+                missing += 1
+            elif not abs(near_m[n, place] - expected_m) <= gate_m:
+                jumps = True
+        # One of the three samples in between may fall into a hole.
+        result[n] = not jumps and missing <= 1
     return result
 
 
-def _cells(ends_px: NDArray[np.float32], columns: int) -> NDArray[np.intp]:
-    index = (ends_px * (1.0 / _TAKEN_PX)).astype(np.intp)
-    result: NDArray[np.intp] = index[:, :, 1] * columns + index[:, :, 0]
-    return result
-
-
-def _flow_covariance(tensor: NDArray[np.float32], floor_px: float) -> NDArray[np.float32]:
-    """(N, 2, 3) covariance of one flow step from the structure tensor (N, 2, 3): wide along an edge.
+@inlined
+def _flow_covariance(
+    uu: np.float32, uv: np.float32, vv: np.float32, floor_px2: np.float32
+) -> tuple[np.float32, np.float32, np.float32]:
+    """xx, xy, yy of one flow step from the structure tensor: wide along an edge.
 
     Image noise makes every direction look structured, and so do the stairs that a strong edge has where it
     is sampled coarsely; they wander along it as it turns. Both shares are taken off first, or an end on a
     straight edge would seem as well held along the edge as across it.
     """
-    uu, uv, vv = tensor[..., 0], tensor[..., 1], tensor[..., 2]
-    middle, half = 0.5 * (uu + vv), 0.5 * (uu - vv)
-    radius = np.sqrt(half * half + uv * uv)
-    larger = np.maximum(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
-    smaller = np.maximum(middle - radius - _NOISE_STRUCTURE - _STAIRS * larger, _LEAST_STRUCTURE)
+    middle, radius = _eigenvalues(uu, uv, vv)
+    larger = max(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
+    smaller = max(middle - radius - _NOISE_STRUCTURE - _STAIRS * larger, _LEAST_STRUCTURE)
     # The inverse has the same axes and the inverse eigenvalues.
-    across, along = _MATCH_SIGMA**2 / larger, _MATCH_SIGMA**2 / smaller
-    mean, spread = 0.5 * (across + along), 0.5 * (across - along)
-    scale = spread / np.maximum(radius, 1e-6)
-    floor = floor_px**2
-    result = np.empty(tensor.shape, np.float32)
-    result[..., 0], result[..., 2] = mean + scale * half + floor, mean - scale * half + floor
-    result[..., 1] = scale * uv
-    return result
+    across, along = _MATCH_VARIANCE / larger, _MATCH_VARIANCE / smaller
+    mean, spread = _HALF * (across + along), _HALF * (across - along)
+    scale = spread / max(radius, np.float32(1e-6))
+    half_difference = _HALF * (uu - vv)
+    return mean + scale * half_difference + floor_px2, scale * uv, mean - scale * half_difference + floor_px2
+
+
+@compiled(
+    "int64[:], float32[:, :, ::1], float32[:, :, ::1], float64[:, ::1], float64[:, ::1], float32",
+)
+def _fragments(
+    picked: NDArray[np.intp],
+    segments_px: NDArray[np.float32],
+    tensor: NDArray[np.float32],
+    near_m: FloatArray,
+    far_m: FloatArray,
+    floor_px2: np.float32,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """ends_px, near_m, far_m, pixel_cov of NewFragments."""
+    count = len(picked)
+    ends_px, covariance = np.empty((count, 2, 2), np.float32), np.empty((count, 2, 3), np.float32)
+    near, far = np.empty((count, 2), np.float32), np.empty((count, 2), np.float32)
+    for n in range(count):
+        one = picked[n]
+        for end in range(2):
+            place = end * (_PLACES - 1)
+            near[n, end], far[n, end] = near_m[one, place], far_m[one, place]
+            ends_px[n, end, 0], ends_px[n, end, 1] = segments_px[one, end, 0], segments_px[one, end, 1]
+            uu, uv, vv = tensor[one, end, 0], tensor[one, end, 1], tensor[one, end, 2]
+            xx, xy, yy = _flow_covariance(uu, uv, vv, floor_px2)
+            covariance[n, end, 0], covariance[n, end, 1], covariance[n, end, 2] = xx, xy, yy
+    return ends_px, near, far, covariance

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
+from hal.compiled import compiled
 from vision.fragments.edges import GreyImage
 from vision.numerics.order import median
 
@@ -17,6 +18,7 @@ _MIN_EIGENVALUE = 1e-5  # low: straight edges are to pass, and are held by the e
 # Eigenvalues are at hand; the other error that could be asked for would be worked out pixel by pixel.
 _FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 _EXPECTATION_PX = 2.0  # one sigma of where an end is expected, once what all have in common is taken off
+_RIM_PX = 2  # of the image: an end there is about to leave it
 
 # An image, then itself at half the size, at a quarter, and so on.
 Pyramid = tuple[GreyImage, ...]
@@ -63,16 +65,18 @@ def track(
     expected = guess + median((there - guess).T)
     back_guess = there - (expected - pixels)
     back, back_ok = _search(now[:2], before[:2], there, back_guess, settings.lk_window_px)
-    end = _held(there, expected, covariance)
-    miss = back - pixels
     height, width = now[0].shape
-    found = there_ok & back_ok
-    found &= mahalanobis(miss, covariance) <= settings.forward_backward_sigmas**2
-    near = np.abs(miss) <= settings.forward_backward_px
-    found &= near[:, 0] & near[:, 1]
-    u, v = end.T
-    found &= (u >= 2.0) & (u <= width - 3) & (v >= 2.0) & (v <= height - 3)
-    return Flow(end, found)
+    end, returned = _confirmed(
+        there,
+        expected,
+        back - pixels,
+        covariance,
+        settings.forward_backward_sigmas,
+        settings.forward_backward_px,
+        height,
+        width,
+    )
+    return Flow(end, there_ok & back_ok & returned)
 
 
 def _search(
@@ -103,27 +107,47 @@ def _search(
     return there, found[:, 0].astype(np.bool_)
 
 
-def _held(
-    found: NDArray[np.float32], expected: NDArray[np.float32], covariance: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """found (N, 2), with the part that the image cannot tell taken from expected (N, 2).
+@compiled("float32[:, ::1], float32[:, ::1]")
+def mahalanobis(miss: NDArray[np.float32], covariance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(N,) squared length of miss (N, 2) in sigmas of covariance (N, 3)."""
+    result = np.empty(len(miss), np.float32)
+    for n in range(len(miss)):
+        xx, xy, yy = covariance[n, 0], covariance[n, 1], covariance[n, 2]
+        a, b = miss[n, 0], miss[n, 1]
+        result[n] = (yy * a * a - np.float32(2.0) * xy * a * b + xx * b * b) / (xx * yy - xy * xy)
+    return result
+
+
+@compiled(
+    "float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float64, float64, int64, int64"
+)
+def _confirmed(
+    there: NDArray[np.float32],
+    expected: NDArray[np.float32],
+    miss: NDArray[np.float32],
+    covariance: NDArray[np.float32],
+    most_sigmas: float,
+    most_px: float,
+    height: int,
+    width: int,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Where ends are that were found there, with the part that the image cannot tell taken from expected; and
+    which of them came back but for a small miss (N, 2), and are inside of the image: (N, 2), (N,).
 
     Along a straight edge a search ends anywhere; across it, it ends on the edge. The two are weighted by
     covariance (N, 3) and by how far off an expectation usually is.
     """
+    end, good = np.empty_like(there), np.empty(len(there), np.bool_)
     prior = np.float32(_EXPECTATION_PX**2)
-    xx, xy, yy = covariance[:, 0] + prior, covariance[:, 1], covariance[:, 2] + prior
-    scale = prior / (xx * yy - xy * xy)
-    a, b = found[:, 0] - expected[:, 0], found[:, 1] - expected[:, 1]
-    result = np.empty_like(found)
-    result[:, 0] = expected[:, 0] + scale * (yy * a - xy * b)
-    result[:, 1] = expected[:, 1] + scale * (xx * b - xy * a)
-    return result
-
-
-def mahalanobis(miss: NDArray[np.float32], covariance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(N,) squared length of miss (N, 2) in sigmas of covariance (N, 3)."""
-    xx, xy, yy = covariance[:, 0], covariance[:, 1], covariance[:, 2]
-    a, b = miss[:, 0], miss[:, 1]
-    result: NDArray[np.float32] = (yy * a * a - 2.0 * xy * a * b + xx * b * b) / (xx * yy - xy * xy)
-    return result
+    squared = mahalanobis(miss, covariance)
+    for n in range(len(there)):
+        xx, xy, yy = covariance[n, 0] + prior, covariance[n, 1], covariance[n, 2] + prior
+        scale = prior / (xx * yy - xy * xy)
+        a, b = there[n, 0] - expected[n, 0], there[n, 1] - expected[n, 1]
+        u = expected[n, 0] + scale * (yy * a - xy * b)
+        v = expected[n, 1] + scale * (xx * b - xy * a)
+        end[n, 0], end[n, 1] = u, v
+        inside = u >= _RIM_PX and u <= width - 1 - _RIM_PX and v >= _RIM_PX and v <= height - 1 - _RIM_PX
+        near = abs(miss[n, 0]) <= most_px and abs(miss[n, 1]) <= most_px
+        good[n] = inside and near and squared[n] <= np.float32(most_sigmas**2)
+    return end, good

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray, RgbdFrame
 from vision.fragments.candidates import (
     NOTHING_NEW,
@@ -61,7 +62,8 @@ class Renewal:
         if room * _FEW_MISSING < settings.max_fragments:
             return NOTHING_NEW
         self._visits += 1
-        counts = _tile_counts(ends_px, settings.tile_px, *grey.shape)
+        height, width = grey.shape
+        counts = _tile_counts(np.ascontiguousarray(ends_px), settings.tile_px, height, width)
         parts = rows if room * _MANY_MISSING > settings.max_fragments else 1
         chosen = np.argsort(self._last_visit, kind="stable")[: parts if len(ends_px) else None]
         self._last_visit[chosen] = self._visits
@@ -70,7 +72,7 @@ class Renewal:
         return self._select(frame, grey, np.concatenate(found), ends_px, counts, (room, far_room))
 
     def _segments(
-        self, grey: GreyImage, counts: NDArray[np.intp], row: int, column: int
+        self, grey: GreyImage, counts: NDArray[np.int64], row: int, column: int
     ) -> NDArray[np.float32]:
         """Segments of one part, outside of tiles that are full."""
         settings = self._config.fragments
@@ -82,9 +84,9 @@ class Renewal:
             for size, index, count in zip(grey.shape, (row, column), self._threshold.shape[:2], strict=True)
         )
         edges = self._edges(grey[rows, columns], self._threshold[row, column])
-        free = counts < 2 * settings.fragments_per_tile
-        edges *= _pixels_of(free, settings.tile_px, rows, columns)
-        return find_segments(edges, settings.min_length_px, (columns.start, rows.start))
+        full = counts >= 2 * settings.fragments_per_tile
+        searched = _outside_of(full, settings.tile_px, edges, rows.start, columns.start)
+        return find_segments(searched, settings.min_length_px, (columns.start, rows.start))
 
     def _edges(self, grey: GreyImage, thresholds: FloatArray) -> GreyImage:
         """Edges of one part, block by block. The next visit looks closer where little was seen, less close
@@ -107,59 +109,96 @@ class Renewal:
         grey: GreyImage,
         candidates: NDArray[np.float32],
         ends_px: NDArray[np.float32],
-        counts: NDArray[np.intp],
+        counts: NDArray[np.int64],
         room: tuple[int, int],
     ) -> NewFragments:
         """Thin out to what the tiles lack; drop what has no depth, crosses a depth edge or is untrackable."""
         settings, config = self._config.fragments, self._config
-        missing = settings.fragments_per_tile - counts.ravel() // 2
-        candidates = longest_first(candidates)
-        tile = _tiles(candidates, settings.tile_px, counts.shape[1])
-        wanted = _rank_within(tile) < np.minimum(4 * missing, _CANDIDATES_PER_TILE).take(tile)
-        snapped, tensor = held_ends(grey, candidates[wanted], ends_px, _MIN_END_DISTANCE_PX)
+        tile_px, per_tile = settings.tile_px, settings.fragments_per_tile
+        wanted = _wanted(longest_first(candidates), counts, tile_px, per_tile)
+        snapped, tensor = held_ends(grey, wanted, ends_px, _MIN_END_DISTANCE_PX)
         surface = depth_along(snapped, frame, config)
-        near = surface.near_m
-        # Where nothing is measured at all, it is mostly far away: good to know the camera's turn by.
-        beyond = ~(near == near).any(axis=1)
-        beyond &= np.cumsum(beyond) <= room[1]
-        whole = (on_one_surface(near, config) | beyond).nonzero()[0]
-        tile = _tiles(snapped[whole], settings.tile_px, counts.shape[1])
-        picked = whole[_rank_within(tile) < missing[tile]][: max(0, room[0])]
+        whole = on_one_surface(surface.near_m, config)
+        picked = _picked(snapped, surface.near_m, whole, counts, tile_px, per_tile, *room)
         return new_fragments(picked, snapped, tensor, surface, settings)
 
 
-def _pixels_of(tiles: NDArray[np.bool_], tile_px: int, rows: slice, columns: slice) -> NDArray[np.bool_]:
-    """tiles (h, w) in the size of the image, of which only rows and columns are wanted."""
-    down, across = (np.arange(part.start, part.stop) // tile_px for part in (rows, columns))
-    result: NDArray[np.bool_] = tiles.take(across, axis=1).take(down, axis=0)
+@inlined
+def _tile(tiles: NDArray[np.int64], u: np.float32, v: np.float32, share: float) -> tuple[int, int]:
+    """Row and column of the tile with a pixel, of which share is a tile's; none is beyond the rim."""
+    row, column = int(v * np.float32(share)), int(u * np.float32(share))
+    return min(max(row, 0), tiles.shape[0] - 1), min(max(column, 0), tiles.shape[1] - 1)
+
+
+@compiled("float32[:, :, ::1], int64, int64, int64")
+def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width: int) -> NDArray[np.int64]:
+    """Ends per tile of an image."""
+    counts = np.zeros((-(-height // tile_px), -(-width // tile_px)), np.int64)
+    for n in range(len(ends_px)):
+        for end in range(2):
+            counts[_tile(counts, ends_px[n, end, 0], ends_px[n, end, 1], 1.0 / tile_px)] += 1
+    return counts
+
+
+@compiled("bool_[:, ::1], int64, uint8[:, ::1], int64, int64")
+def _outside_of(full: NDArray[np.bool_], tile_px: int, edges: GreyImage, top: int, left: int) -> GreyImage:
+    """edges without those in full tiles; its first pixel is in row top and column left of the image."""
+    result = edges.copy()
+    height, width = edges.shape
+    for i in range(top // tile_px, (top + height - 1) // tile_px + 1):
+        for j in range(left // tile_px, (left + width - 1) // tile_px + 1):
+            if full[i, j]:
+                row, column = i * tile_px - top, j * tile_px - left
+                result[max(row, 0) : row + tile_px, max(column, 0) : column + tile_px] = 0
     return result
 
 
-def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width: int) -> NDArray[np.intp]:
-    """Ends per tile."""
-    rows, columns = -(-height // tile_px), -(-width // tile_px)
-    flat = ends_px.reshape(-1, 2)
-    cell = (flat * (1.0 / tile_px)).astype(np.intp)  # no pixel is negative: cutting off rounds down
-    index = cell[:, 1] * columns + cell[:, 0]
-    return np.bincount(index, minlength=rows * columns).reshape(rows, columns)
+@compiled("float32[:, :, ::1], int64[:, ::1], int64, int64")
+def _wanted(
+    segments_px: NDArray[np.float32], counts: NDArray[np.int64], tile_px: int, per_tile: int
+) -> NDArray[np.float32]:
+    """The first few segments (N, 2, 2) with their middle in each tile where some are missing.
+
+    counts: ends in each tile; per_tile: segments that it is to have.
+    """
+    wanted, count, seen = np.empty(len(segments_px), np.intp), 0, np.zeros_like(counts)
+    for n in range(len(segments_px)):
+        u, v = segments_px[n, 0, 0] + segments_px[n, 1, 0], segments_px[n, 0, 1] + segments_px[n, 1, 1]
+        tile = _tile(counts, u, v, 0.5 / tile_px)
+        if seen[tile] < min(4 * (per_tile - counts[tile] // 2), _CANDIDATES_PER_TILE):
+            wanted[count] = n
+            count += 1
+        seen[tile] += 1
+    return segments_px[wanted[:count]]
 
 
-def _tiles(ends_px: NDArray[np.float32], tile_px: int, columns: int) -> NDArray[np.intp]:
-    """(N,) flat tile index of the middle of each segment."""
-    middle = ((ends_px[:, 0] + ends_px[:, 1]) * (0.5 / tile_px)).astype(np.intp)
-    result: NDArray[np.intp] = middle[:, 1] * columns + middle[:, 0]
-    return result
+@compiled("float32[:, :, ::1], float64[:, ::1], bool_[::1], int64[:, ::1], int64, int64, int64, int64")
+def _picked(
+    segments_px: NDArray[np.float32],
+    near_m: FloatArray,
+    whole: NDArray[np.bool_],
+    counts: NDArray[np.int64],
+    tile_px: int,
+    per_tile: int,
+    room: int,
+    far_room: int,
+) -> NDArray[np.intp]:
+    """Which of segments (N, 2, 2) fill up their tiles: no more than room, and far_room without any depth.
 
-
-def _rank_within(groups: NDArray[np.intp]) -> NDArray[np.intp]:
-    """(N,) how many earlier entries have the same group."""
-    if len(groups) == 0:
-        return np.empty(0, np.intp)
-    order = np.argsort(groups, kind="stable")
-    ordered = groups.take(order)
-    place = np.arange(len(groups))
-    starts = place.copy()
-    starts[1:] *= ordered[1:] != ordered[:-1]
-    rank = np.empty(len(groups), np.intp)
-    rank[order] = place - np.maximum.accumulate(starts)
-    return rank
+    near_m (N, 5): along them; whole (N,): on one surface. Where nothing is measured at all, it is mostly far
+    away: good to know the camera's turn by.
+    """
+    picked, count, seen = np.empty(len(segments_px), np.intp), 0, np.zeros_like(counts)
+    for n in range(len(segments_px)):
+        beyond = np.isnan(near_m[n]).all()
+        if beyond:
+            far_room -= 1
+        if not (whole[n] or (beyond and far_room >= 0)):
+            continue
+        u, v = segments_px[n, 0, 0] + segments_px[n, 1, 0], segments_px[n, 0, 1] + segments_px[n, 1, 1]
+        tile = _tile(counts, u, v, 0.5 / tile_px)
+        if seen[tile] < per_tile - counts[tile] // 2 and count < room:
+            picked[count] = n
+            count += 1
+        seen[tile] += 1
+    return picked[:count]

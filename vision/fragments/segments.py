@@ -7,23 +7,28 @@ it, so each end is moved to the most corner-like pixel close by.
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled, inlined
 from vision.fragments.contours import find_contours
 from vision.fragments.edges import GreyImage
 
-FloatImage = NDArray[np.float32]
+Reals = TypeVar("Reals", np.float32, NDArray[np.float32])
 
 _SNAP_PX = 4  # how far an end may be moved: edges end somewhat before a corner
 _WINDOW_PX = 3  # on either side: 7x7, less than the 11x11 that is followed
-_MARGIN_PX = _SNAP_PX + _WINDOW_PX + 2
-_ONES = np.ones(2 * _WINDOW_PX + 1)
+_REACH_PX = _SNAP_PX + _WINDOW_PX
+_MARGIN_PX = _REACH_PX + 2  # one for the gradient, one for what fills up a row
+_SIDE, _WINDOW, _ROWS = 2 * _SNAP_PX + 1, 2 * _WINDOW_PX + 1, 2 * _REACH_PX + 1
+_ROW = _ROWS + 1  # values kept of a row: the processor works on sixteen at a time
 # A segment of 32 px turns by somewhat more when an end moves by a pixel: finer says no more. Upright, level
 # and diagonal lines are met exactly.
 _ANGLE_RAD = math.pi / 120.0
+_VOTES = 0.8  # of a segment's pixels: the others may be missing, or beside the line
 
 
 def find_segments(edges: GreyImage, min_length_px: float, corner_px: tuple[int, int]) -> NDArray[np.float32]:
@@ -35,16 +40,10 @@ def find_segments(edges: GreyImage, min_length_px: float, corner_px: tuple[int, 
     return found
 
 
-def longest_first(segments_px: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Segments (N, 2, 2) by their length; of equal ones the first stays first."""
-    ordered: NDArray[np.float32] = segments_px[np.argsort(-lengths_px(segments_px), kind="stable")]
-    return ordered
-
-
 def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32]:
     """(N, 2, 2) segments of at least min_length_px that the probabilistic Hough transform finds."""
     found = cv2.HoughLinesP(
-        edges, 1.0, _ANGLE_RAD, int(0.8 * min_length_px), minLineLength=min_length_px, maxLineGap=3
+        edges, 1.0, _ANGLE_RAD, int(_VOTES * min_length_px), minLineLength=min_length_px, maxLineGap=3
     )
     if found is None:
         return np.empty((0, 2, 2), np.float32)
@@ -59,57 +58,105 @@ def snap_to_corners(
 
     Corner-like: largest smaller eigenvalue of the structure tensor (Shi and Tomasi).
     """
-    if len(ends_px) == 0:
-        return ends_px, np.empty((0, 2, 3), np.float32)
-    height, width = grey.shape
-    centre = np.rint(ends_px.reshape(-1, 2)).astype(np.intp)
-    column = np.minimum(np.maximum(centre[:, 0], _MARGIN_PX), width - 1 - _MARGIN_PX)
-    row = np.minimum(np.maximum(centre[:, 1], _MARGIN_PX), height - 1 - _MARGIN_PX)
-    # The ends lie close together in one band of the image: filtering that is less than filtering patches.
-    left, top = int(column.min()) - _MARGIN_PX, int(row.min()) - _MARGIN_PX
-    right, bottom = int(column.max()) + _MARGIN_PX + 1, int(row.max()) + _MARGIN_PX + 1
-    tensor = _structure(grey[top:bottom, left:right])
-    reach = np.arange(-_SNAP_PX, _SNAP_PX + 1)
-    around = (reach[:, None] * (right - left) + reach).ravel()
-    index = ((row - top) * (right - left) + (column - left))[:, None] + around
-    uu, uv, vv = (part.ravel().take(index) for part in tensor)
-    best = smaller_eigenvalue(uu, uv, vv).argmax(axis=1)
-    side = len(reach)
-    down = best // side
-    snapped = np.empty((len(best), 2), np.float32)
-    snapped[:, 0] = column + (best - down * side) - _SNAP_PX
-    snapped[:, 1] = row + down - _SNAP_PX
-    at_best = np.empty((len(best), 3), np.float32)
-    place = np.arange(len(best)) * around.size + best
-    for entry, part in enumerate((uu, uv, vv)):
-        part.take(place, out=at_best[:, entry])
-    return snapped.reshape(-1, 2, 2), at_best.reshape(-1, 2, 3)
+    if len(ends_px) > 0 and min(grey.shape) < 2 * _MARGIN_PX + 1:
+        raise ValueError(f"no end has its surroundings in an image of {grey.shape[1]}x{grey.shape[0]} pixels")
+    return _snapped(np.ascontiguousarray(grey), np.ascontiguousarray(ends_px))
 
 
-def _structure(grey: GreyImage) -> tuple[FloatImage, FloatImage, FloatImage]:
-    """uu, uv, vv of the structure tensor (H, W), summed over 7x7 px; not valid within 4 px of the border."""
-    du = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=1, scale=0.5)
-    dv = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=1, scale=0.5)
-    # Sums of whole quarters, far below 2^24 of them: exact, in whatever order they are added up.
-    uu, uv, vv = (
-        np.asarray(cv2.sepFilter2D(cv2.multiply(a, b), cv2.CV_32F, _ONES, _ONES), np.float32)
-        for a, b in ((du, du), (du, dv), (dv, dv))
-    )
-    return uu, uv, vv
-
-
-def smaller_eigenvalue(
-    uu: NDArray[np.float32], uv: NDArray[np.float32], vv: NDArray[np.float32]
-) -> NDArray[np.float32]:
+@inlined
+def smaller_eigenvalue(uu: Reals, uv: Reals, vv: Reals) -> Reals:
     """Of the symmetric 2x2 matrices with these entries."""
-    half_difference = 0.5 * (uu - vv)
-    smaller: NDArray[np.float32] = 0.5 * (uu + vv) - np.sqrt(half_difference * half_difference + uv * uv)
+    half = np.float32(0.5)
+    half_difference = half * (uu - vv)
+    smaller: Reals = half * (uu + vv) - np.sqrt(half_difference * half_difference + uv * uv)
     return smaller
 
 
+@inlined
+def _gradient_products(
+    grey: GreyImage, u: int, v: int, uu: NDArray[np.int32], uv: NDArray[np.int32], vv: NDArray[np.int32]
+) -> None:
+    """Of twice the gradient at the pixels within 7 px of u and v, row by row: into uu, uv, vv (15 * 16,)."""
+    patch = grey[v - _REACH_PX - 1 : v + _REACH_PX + 2, u - _REACH_PX - 1 : u + _REACH_PX + 3]
+    for i in range(_ROWS):
+        for j in range(_ROW):
+            du = np.int32(patch[i + 1, j + 2]) - np.int32(patch[i + 1, j])
+            dv = np.int32(patch[i + 2, j + 1]) - np.int32(patch[i, j + 1])
+            place = i * _ROW + j
+            uu[place], uv[place], vv[place] = du * du, du * dv, dv * dv
+
+
+@inlined
+def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], into: NDArray[np.float32]) -> None:
+    """A quarter of the sums of values (15 * 16,) over 7x7 px, at the pixels within 4 px: into (9 * 16,). Of a
+    row's sixteen sums the first nine are valid; over_rows (10 * 16,) is room to work in.
+
+    Whole quarters, far below 2^24 of them: exact.
+    """
+    for place in range(_SIDE * _ROW):
+        total = 0
+        for k in range(_WINDOW):
+            total += values[place + k * _ROW]
+        over_rows[place] = total
+    for place in range(_SIDE * _ROW):
+        total = 0
+        for k in range(_WINDOW):
+            total += over_rows[place + k]
+        into[place] = np.float32(0.25) * np.float32(np.int32(total))
+
+
+@inlined
+def _most_corner_like(
+    uu: NDArray[np.float32], uv: NDArray[np.float32], vv: NDArray[np.float32], held: NDArray[np.float32]
+) -> int:
+    """Place of the largest smaller eigenvalue, the first of equal ones; all (9 * 16,), of which the first
+    nine of a row are valid. held is room to work in."""
+    for place in range(_SIDE * _ROW):
+        held[place] = smaller_eigenvalue(uu[place], uv[place], vv[place])
+    best = 0
+    for i in range(_SIDE):
+        for place in range(i * _ROW, i * _ROW + _SIDE):
+            if held[place] > held[best]:
+                best = place
+    return best
+
+
+@compiled("uint8[:, ::1], float32[:, :, ::1]")
+def _snapped(
+    grey: GreyImage, ends_px: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What snap_to_corners returns."""
+    height, width = grey.shape
+    snapped, at_best = np.empty_like(ends_px), np.empty((len(ends_px), 2, 3), np.float32)
+    products = np.empty((3, _ROWS * _ROW), np.int32)
+    over_rows = np.zeros((_SIDE + 1) * _ROW, np.int32)
+    tensor, held = np.empty((3, _SIDE * _ROW), np.float32), np.empty(_SIDE * _ROW, np.float32)
+    for segment in range(len(ends_px)):
+        for end in range(2):
+            u = min(max(int(np.rint(ends_px[segment, end, 0])), _MARGIN_PX), width - 1 - _MARGIN_PX)
+            v = min(max(int(np.rint(ends_px[segment, end, 1])), _MARGIN_PX), height - 1 - _MARGIN_PX)
+            _gradient_products(grey, u, v, products[0], products[1], products[2])
+            for k in range(3):
+                _sums(products[k], over_rows, tensor[k])
+            best = _most_corner_like(tensor[0], tensor[1], tensor[2], held)
+            snapped[segment, end, 0] = u - _SNAP_PX + best % _ROW
+            snapped[segment, end, 1] = v - _SNAP_PX + best // _ROW
+            for k in range(3):
+                at_best[segment, end, k] = tensor[k, best]
+    return snapped, at_best
+
+
+@compiled("float32[:, :, ::1]")
 def lengths_px(ends_px: NDArray[np.float32]) -> NDArray[np.float32]:
     """(N,) L_t of the paper: distance between the two ends."""
-    difference = ends_px[:, 0] - ends_px[:, 1]
-    du, dv = difference.T
-    length: NDArray[np.float32] = np.sqrt(du * du + dv * dv)
+    length = np.empty(len(ends_px), np.float32)
+    for n in range(len(ends_px)):
+        du, dv = ends_px[n, 0, 0] - ends_px[n, 1, 0], ends_px[n, 0, 1] - ends_px[n, 1, 1]
+        length[n] = np.sqrt(du * du + dv * dv)
     return length
+
+
+@compiled("float32[:, :, ::1]")
+def longest_first(segments_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Segments (N, 2, 2) by their length; of equal ones the first stays first."""
+    return segments_px[np.argsort(-lengths_px(segments_px), kind="mergesort")]

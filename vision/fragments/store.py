@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.ego_motion.rolling_shutter import straight_rays
 
@@ -61,11 +62,11 @@ class FragmentStore:
         self.age_frames = np.empty(0, np.intp)
         self.pixel_cov = np.empty((0, 2, 3), np.float32)
         self.witness = np.empty(0, np.bool_)
-        # Direction (3), depth, far depth and looks of both ends: by frame and place.
-        self._history = np.empty((6, HISTORY, _FEWEST_PLACES, 2))
+        # By frame and place, of both ends: direction (3), depth, far depth and looks.
+        self._history = np.full((HISTORY, _FEWEST_PLACES, 2, 6), np.nan)
         self._place = np.empty(0, np.intp)
         self._stamps_ns = np.zeros(HISTORY, np.int64)
-        self._origins = np.zeros((3, HISTORY))
+        self._origins = np.zeros((HISTORY, 3))
         self._comparable = 0
         self._head = -1
 
@@ -114,14 +115,14 @@ class FragmentStore:
 
     def _free_places(self, count: int) -> NDArray[np.intp]:
         """Places in the history that no fragment has; it grows where they do not suffice."""
-        free = np.ones(self._history.shape[2], np.bool_)
+        free = np.ones(self._history.shape[1], np.bool_)
         free[self._place] = False
         places = free.nonzero()[0]
         missing = count - len(places)
         if missing > 0:
             more = max(missing, len(free))
-            room = np.empty((6, HISTORY, more, 2))
-            self._history = np.concatenate((self._history, room), axis=2)
+            room = np.full((HISTORY, more, 2, 6), np.nan)
+            self._history = np.concatenate((self._history, room), axis=1)
             places = np.concatenate((places, np.arange(len(free), len(free) + more)))
         return places[:count]
 
@@ -130,14 +131,13 @@ class FragmentStore:
         straight_rays."""
         self._head = (self._head + 1) % HISTORY
         self._comparable = min(self._comparable + 1, HISTORY)
-        frame, place = self._history[:, self._head], self._place
         direction = pose.rotation @ straight_rays(self.ends_px.reshape(-1, 2), camera, sweep_rad).T
-        ends = np.empty((6, len(place), 2))
-        ends[:3] = direction.reshape(3, -1, 2)
-        ends[3], ends[4], ends[5] = self.depth_m, self.far_m, self.looks
-        frame[:, place] = ends
+        ends = np.empty((len(self), 2, 6))
+        ends[..., :3] = direction.T.reshape(-1, 2, 3)
+        ends[..., 3], ends[..., 4], ends[..., 5] = self.depth_m, self.far_m, self.looks
+        self._history[self._head, self._place] = ends
         self._stamps_ns[self._head] = stamp_ns
-        self._origins[:, self._head] = pose.translation_m
+        self._origins[self._head] = pose.translation_m
         self.age_frames += 1
 
     def break_history(self) -> None:
@@ -149,30 +149,69 @@ class FragmentStore:
 
         Call between tracking and commit: the history then ends with the frame before.
         """
-        back = np.arange(1, self._comparable + 1)
-        slots = (self._head - back + 1) % HISTORY
-        ages_s: FloatArray = np.multiply(now_ns - self._stamps_ns[slots], 1e-9, dtype=np.float64)
-        reach = max(1, int(np.count_nonzero(ages_s <= window_s)))
-        lag = np.minimum(np.maximum(self.age_frames, 1), reach)
-        return self._sight(slots.take(lag - 1), lag, ages_s.take(lag - 1))
+        return self._look_back(now_ns, self._comparable, window_s)
 
     def before(self, now_ns: int) -> AnchorEnds:
         """The last sight of each fragment: in the frame before."""
-        slot = np.full(len(self), self._head)
-        lag_s = (now_ns - int(self._stamps_ns[self._head])) * 1e-9
-        return self._sight(slot, np.ones(len(self), np.intp), np.full(len(self), lag_s))
+        return self._look_back(now_ns, 1, np.inf)
 
-    def _sight(self, slot: NDArray[np.intp], lag: NDArray[np.intp], lag_s: FloatArray) -> AnchorEnds:
-        """What the history holds of each fragment in its frame slot (N,)."""
-        rows = self._history.reshape(6, -1, 2).take(slot * self._history.shape[2] + self._place, axis=1)
-        rows = rows.reshape(6, -1)
-        origin = self._origins.take(slot.repeat(2), axis=1)
+    def _look_back(self, now_ns: int, most_frames: int, window_s: float) -> AnchorEnds:
+        """By no more than most_frames."""
+        ends, origin, lag, lag_s = _sights(
+            self._history,
+            self._origins,
+            self._stamps_ns,
+            self._head,
+            self._place,
+            self.age_frames,
+            now_ns,
+            most_frames,
+            window_s,
+        )
         return AnchorEnds(
-            direction=rows[:3],
+            direction=ends[:3],
             origin=origin,
-            depth_m=rows[3],
-            far_m=rows[4],
-            looks=rows[5],
+            depth_m=ends[3],
+            far_m=ends[4],
+            looks=ends[5],
             lag_frames=lag,
             lag_s=lag_s,
         )
+
+
+@compiled(
+    "float64[:, :, :, ::1], float64[:, ::1], int64[::1], int64, int64[::1], int64[::1], int64, int64, float64"
+)
+def _sights(
+    history: FloatArray,
+    origins: FloatArray,
+    stamps_ns: NDArray[np.int64],
+    head: int,
+    place: NDArray[np.intp],
+    age_frames: NDArray[np.intp],
+    now_ns: int,
+    most_frames: int,
+    window_s: float,
+) -> tuple[FloatArray, FloatArray, NDArray[np.intp], FloatArray]:
+    """The oldest sight of each fragment within window_s, at least the last one: ends (6, 2 N), the camera's
+    origin then (3, 2 N), and by how many frames and seconds (N,) that is back.
+
+    head: the last frame of history and stamps_ns, which are rings.
+    """
+    within = 0
+    for back in range(most_frames):
+        if (now_ns - stamps_ns[(head - back) % HISTORY]) * 1e-9 <= window_s:
+            within += 1
+    count = len(place)
+    ends, origin = np.empty((6, 2 * count)), np.empty((3, 2 * count))
+    lag_frames, lag_s = np.empty(count, np.intp), np.empty(count)
+    for n in range(count):
+        lag = min(max(age_frames[n], 1), max(within, 1))
+        frame = (head - lag + 1) % HISTORY
+        lag_frames[n], lag_s[n] = lag, (now_ns - stamps_ns[frame]) * 1e-9
+        for column in range(2 * n, 2 * n + 2):
+            for k in range(6):
+                ends[k, column] = history[frame, place[n], column - 2 * n, k]
+            for k in range(3):
+                origin[k, column] = origins[frame, k]
+    return ends, origin, lag_frames, lag_s

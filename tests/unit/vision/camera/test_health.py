@@ -10,7 +10,7 @@ import pytest
 from config.perception import FragmentSettings, PerceptionConfig
 from hal.types import RgbdFrame
 from tests.support.painted import FRAME_NS, MOUNT, QVGA, box, drive, floor, record, vector, wall
-from vision.camera.health import worsened
+from vision.camera.health import _samples, worsened
 from vision.perception import Perception
 from vision.scene import CameraCondition, CameraHealth, Scene
 
@@ -81,6 +81,19 @@ def test_black_and_saturated_images(level: int, sentence: str) -> None:
         health = scenes(frames)[k].health
         assert health.condition is UNTRUSTWORTHY
         assert sentence in health.reason
+
+
+def test_samples_are_black_white_or_neither_and_the_same_as_before_or_not() -> None:
+    """One in 16 px each way, beginning at the eighth: six by three."""
+    grey = np.full((56, 97), 13, np.uint8)
+    grey[8, 8], grey[24, 8], grey[40, 88] = 12, 242, 243
+    assert _samples(grey, grey.copy()) == (1 / 18, 1 / 18, True)
+    for place in ((8, 8), (40, 88)):
+        other = grey.copy()
+        other[place] += 1
+        assert not _samples(grey, other)[2]
+    assert not _samples(grey, np.empty((0, 0), np.uint8))[2]
+    assert not _samples(grey, np.full((97, 56), 13, np.uint8))[2]
 
 
 def test_a_frozen_image_is_not_trusted_from_its_second_repetition_on() -> None:

@@ -146,6 +146,38 @@ def test_ends_are_moved_to_the_corner_nearby() -> None:
     assert smaller_eigenvalue(*np.moveaxis(along, -1, 0)).max() == pytest.approx(0.0, abs=1e-2)
 
 
+def tensor_at(grey: NDArray[np.uint8], u: int, v: int) -> tuple[float, float, float]:
+    """uu, uv, vv of the structure tensor over 7x7 px around one pixel."""
+    patch = grey[v - 4 : v + 5, u - 4 : u + 5].astype(float)
+    du, dv = 0.5 * (patch[1:-1, 2:] - patch[1:-1, :-2]), 0.5 * (patch[2:, 1:-1] - patch[:-2, 1:-1])
+    return float((du * du).sum()), float((du * dv).sum()), float((dv * dv).sum())
+
+
+@pytest.mark.parametrize("end_px", [(0.0, 0.0), (39.0, 29.0), (17.4, 12.6), (9.0, 20.0), (30.0, 9.0)])
+@pytest.mark.parametrize("levels", [2, 256])
+def test_an_end_goes_where_it_is_held_best_and_of_equal_places_to_the_first(
+    end_px: tuple[float, float], levels: int
+) -> None:
+    """9 px from the border of the image the surroundings of all places end."""
+    grey = np.random.default_rng(3).integers(0, levels, (30, 40), dtype=np.uint8)
+    middle_u, middle_v = (min(max(round(x), 9), size - 10) for x, size in zip(end_px, (40, 30), strict=True))
+    around = [(middle_u + right, middle_v + down) for down in range(-4, 5) for right in range(-4, 5)]
+    tensors = np.array([tensor_at(grey, u, v) for u, v in around], np.float32)
+    best = int(smaller_eigenvalue(*tensors.T.copy()).argmax())
+    snapped, tensor = snap_to_corners(grey, np.array([[end_px, end_px]], np.float32))
+    np.testing.assert_array_equal(snapped, [[around[best]] * 2])
+    np.testing.assert_array_equal(tensor, [[tensors[best]] * 2])
+
+
+def test_in_an_image_too_small_for_any_surroundings_there_are_no_ends() -> None:
+    grey = np.zeros((18, 40), np.uint8)
+    snapped, tensor = snap_to_corners(grey, np.empty((0, 2, 2), np.float32))
+    assert snapped.shape == (0, 2, 2)
+    assert tensor.shape == (0, 2, 3)
+    with pytest.raises(ValueError, match="40x18"):
+        snap_to_corners(grey, np.ones((1, 2, 2), np.float32))
+
+
 def test_ends_at_the_rim_of_the_image_stay_inside() -> None:
     rng = np.random.default_rng(3)
     grey = rng.integers(0, 255, (200, 300), dtype=np.uint8)

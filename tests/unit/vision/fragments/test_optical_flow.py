@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
 from vision.fragments.edges import GreyImage
-from vision.fragments.optical_flow import Flow, mahalanobis, pyramid
+from vision.fragments.optical_flow import Flow, _confirmed, mahalanobis, pyramid
 from vision.fragments.optical_flow import track as track_in
 
 SETTINGS = FragmentSettings()
@@ -134,3 +134,36 @@ def test_an_end_may_slide_along_its_edge_but_not_across() -> None:
     covariance = np.array([[4.0, 0.0, 0.04]] * 2, np.float32)
     miss = np.array([[1.0, 0.0], [0.0, 1.0]], np.float32)
     np.testing.assert_allclose(mahalanobis(miss, covariance), [0.25, 25.0], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("place", "miss", "good"),
+    [
+        ((2.0, 2.0), (0.0, 0.0), True),
+        ((97.0, 57.0), (0.0, 0.0), True),
+        ((1.99, 30.0), (0.0, 0.0), False),
+        ((30.0, 57.01), (0.0, 0.0), False),
+        # Three sigmas of 2 px along u, but no more than 4 px; three of 0.5 px along v.
+        ((30.0, 30.0), (3.9, 0.0), True),
+        ((30.0, 30.0), (4.1, 0.0), False),
+        ((30.0, 30.0), (0.0, 1.4), True),
+        ((30.0, 30.0), (0.0, -1.6), False),
+        ((30.0, 30.0), (float("nan"), 0.0), False),
+    ],
+)
+def test_what_comes_back_inside_of_the_image_is_confirmed(
+    place: tuple[float, float], miss: tuple[float, float], good: bool
+) -> None:
+    there, off = np.array([place], np.float32), np.array([miss], np.float32)
+    covariance = np.array([[4.0, 0.0, 0.25]], np.float32)
+    end, confirmed = _confirmed(there, there, off, covariance, 3.0, 4.0, 60, 100)
+    np.testing.assert_array_equal(end, there)
+    assert confirmed.tolist() == [good]
+
+
+def test_along_its_edge_an_end_is_where_it_is_expected_and_across_where_it_is_found() -> None:
+    """Variances 12 and 0 px^2 of the search against 4 of the expectation: a quarter and all of the way."""
+    there, expected = np.array([[38.0, 38.0]], np.float32), np.array([[30.0, 30.0]], np.float32)
+    covariance, none = np.array([[12.0, 0.0, 0.0]], np.float32), np.zeros((1, 2), np.float32)
+    end, _ = _confirmed(there, expected, none, covariance, 3.0, 4.0, 60, 100)
+    np.testing.assert_allclose(end, [[32.0, 38.0]], rtol=1e-6)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from config.perception import FragmentSettings, PerceptionConfig
 from hal.types import RgbdFrame
 from tests.support.painted import VGA
-from vision.fragments.renewal import PART_PX, Renewal
+from vision.fragments.renewal import PART_PX, Renewal, _outside_of, _picked, _tile_counts, _wanted
 
 
 def picture() -> tuple[RgbdFrame, NDArray[np.uint8]]:
@@ -79,6 +79,67 @@ def test_while_few_are_missing_it_does_not_look(missing: int, searched: bool) ->
     if not searched:
         after = renewal.find(frame, grey, present(140), 0)
         np.testing.assert_array_equal(after.ends_px, first.find(frame, grey, present(140), 0).ends_px)
+
+
+def segments(*middles: tuple[float, float]) -> NDArray[np.float32]:
+    """Level ones of 20 px around middles (u, v)."""
+    ends = np.repeat(np.array(middles, np.float32).reshape(-1, 1, 2), 2, axis=1)
+    ends[:, 0, 0] -= 10.0
+    ends[:, 1, 0] += 10.0
+    return ends
+
+
+def test_ends_are_counted_by_tile_up_to_the_rim_of_the_image() -> None:
+    """130x90 px are four columns and three rows of tiles of 40 px, the last ones cut."""
+    ends = np.array([[[0.0, 0.0], [39.9, 39.9]], [[40.0, 39.0], [129.0, 89.0]]], np.float32)
+    expected = np.zeros((3, 4), np.int64)
+    expected[0, 0], expected[0, 1], expected[2, 3] = 2, 1, 1
+    np.testing.assert_array_equal(_tile_counts(ends, 40, 90, 130), expected)
+    assert not _tile_counts(present(0), 40, 90, 130).any()
+
+
+@pytest.mark.parametrize(("top", "left"), [(0, 0), (72, 35), (40, 80), (79, 41)])
+def test_nothing_is_searched_in_full_tiles(top: int, left: int) -> None:
+    """Of a part that begins anywhere in the image."""
+    full = np.random.default_rng(2).random((5, 6)) < 0.5
+    edges = np.full((100, 130), 255, np.uint8)
+    whole = np.repeat(np.repeat(full, 40, axis=0), 40, axis=1)
+    searched = _outside_of(full, 40, edges, top, left)
+    np.testing.assert_array_equal(searched == 0, whole[top : top + 100, left : left + 130])
+    assert edges.all()
+
+
+def test_a_tile_is_offered_the_first_few_segments_and_none_when_it_is_full() -> None:
+    """Three tiles that hold none, one and two of the two fragments, that is ends twice as many."""
+    counts = np.array([[0, 2, 4]])
+    row = segments(*((20.0 + 40.0 * (k % 3), 1.0 + k) for k in range(18)))
+    np.testing.assert_array_equal(_wanted(row, counts, 40, 2), row[[0, 1, 3, 4, 6, 7, 9, 10]])
+    # A middle at the border of two tiles is in the second one.
+    assert len(_wanted(segments((79.5, 5.0), (80.0, 5.0)), counts, 40, 2)) == 1
+
+
+def picked(near_m: list[float], room: int = 9, far_room: int = 9, whole: bool = True) -> list[int]:
+    """Of segments in turn in an empty tile and in one that lacks one fragment."""
+    turns = segments(*((20.0 + 40.0 * (k % 2), 5.0) for k in range(len(near_m))))
+    depth = np.repeat(np.array(near_m).reshape(-1, 1), 5, axis=1)
+    good = ~np.isnan(depth[:, 0]) & whole
+    result: list[int] = _picked(turns, depth, good, np.array([[0, 2]]), 40, 2, room, far_room).tolist()
+    return result
+
+
+def test_tiles_are_filled_up_in_turn_while_there_is_room() -> None:
+    assert picked([3.0] * 8) == [0, 1, 2]
+    assert picked([3.0] * 8, room=2) == [0, 1]
+    assert picked([3.0] * 8, room=-1) == []
+    assert picked([3.0] * 8, whole=False) == []
+    assert picked([]) == []
+
+
+def test_only_so_many_without_any_depth_and_these_take_a_place_as_well() -> None:
+    nowhere = float("nan")
+    assert picked([nowhere, 3.0, nowhere, nowhere, 3.0], far_room=1) == [0, 1, 4]
+    assert picked([nowhere, 3.0, nowhere, nowhere, 3.0]) == [0, 1, 2]
+    assert picked([nowhere] * 4, far_room=0) == []
 
 
 def slope() -> tuple[RgbdFrame, NDArray[np.uint8]]:
