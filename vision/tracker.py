@@ -1,9 +1,9 @@
 """track: what was detected -> the Scene. Bodies with stable ids and filtered velocity, moving or static.
 
 Terms (cell, part, track, body, surface, region): vision/__init__.py. Order of the steps: obstacles (velocity
-of fragments), arrivals, regions, masks, grouping (cells to tracks), births, carving, grounding, merging,
-division (cut out, reach down, join, split), sightings (filters), adoption (fragments to tracks), obstacles
-(velocity of bodies), judgement, report.
+of fragments), arrivals, regions, masks, votes, grouping (cells to tracks), births, carving, grounding,
+merging, division (cut out, reach down, join, split), sightings (filters), adoption (fragments to tracks),
+obstacles (velocity of bodies), judgement, report.
 """
 
 from __future__ import annotations
@@ -12,9 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
-from hal.types import PlanarPose
-from vision.bodies import births, carving, division, grounding, grouping, masks, merging, report, sightings
-from vision.bodies.adoption import adopt
+from hal.compiled import compiled
+from hal.types import FloatArray, PlanarPose
+from vision.bodies import (
+    births,
+    carving,
+    division,
+    grounding,
+    grouping,
+    masks,
+    merging,
+    report,
+    sightings,
+    votes,
+)
+from vision.bodies.adoption import adopt, inherited
 from vision.bodies.arrivals import Changes, FreeMemory
 from vision.bodies.judgement import judge
 from vision.bodies.tracks import Tracks
@@ -36,7 +48,31 @@ _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: 0.28 m/s i
 _FORGET_S = 0.5  # who goes behind a post is out again by then; for longer the decision remembers
 _FORGET_YOUNG_S = 0.15  # some frames: what was hardly seen is taken for a speckle
 _LONG_AGO_NS = 10**9  # as seen last, of what is to be forgotten now: more than the former
-_IDENTITY = np.eye(3)
+
+
+@compiled("float64[:, :], float64[:, :, :], float64[:], int64[::1], float64, float64[:, :]")
+def _measured(
+    velocity_mps: FloatArray,
+    covariance: FloatArray,
+    swing: FloatArray,
+    use: NDArray[np.intp],
+    share: float,
+    rotation: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Velocities (K, 3) of those to use (K,), in the fixed frame that rotation leads to, and their covariance
+    (K, 3, 3): share times as much as given, and swing, the variance of limbs, in any direction."""
+    velocity, noise = np.zeros((len(use), 3)), np.zeros((len(use), 3, 3))
+    for k in range(len(use)):
+        t = use[k]
+        for i in range(3):
+            for m in range(3):
+                velocity[k, i] += rotation[i, m] * velocity_mps[t, m]
+            for j in range(3):
+                for m in range(3):
+                    for n in range(3):
+                        noise[k, i, j] += rotation[i, m] * covariance[t, m, n] * share * rotation[j, n]
+            noise[k, i, i] += swing[t]
+    return velocity, noise
 
 
 class Tracker:
@@ -68,7 +104,7 @@ class Tracker:
         tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.up(detection))
         before_ns = detection.captured_ns if self._last_ns is None else self._last_ns
         self._last_ns = max(detection.captured_ns, before_ns)
-        owner = self._owners(detection.ids)
+        owner = inherited(self._fragment_ids, self._fragment_owner, detection.ids, tracks.ids)
         standing = regions.standing(detection.grid, self._clearance_m)
         velocities = least_squares.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
         if detection.health.condition is not CameraCondition.UNTRUSTWORTHY or detection.restarted:
@@ -78,17 +114,6 @@ class Tracker:
         tracks.keep(unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S))
         self._fragment_ids, self._fragment_owner = detection.ids, owner
         return self._percept(detection, standing, owner, velocities, robot_pose)
-
-    def _owners(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(N,) track id of each fragment as of the frame before, -1 for none."""
-        known, owner = self._fragment_ids, self._fragment_owner
-        result = np.full(len(ids), -1, np.int64)
-        if len(known):
-            place = np.minimum(known.searchsorted(ids), len(known) - 1)
-            same = known[place] == ids
-            result[same] = owner[place[same]]
-        result[self._tracks.index_of(result) < 0] = -1
-        return result
 
     def _follow(
         self,
@@ -108,7 +133,7 @@ class Tracker:
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
         owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)
-        arrivals = np.bincount(whole[changes.arrived], minlength=len(tracks) + 1)[1:]
+        arrivals = masks.count_cells(whole, changes.arrived_cells, len(tracks))
         if detection.dt_s > 0 and len(tracks):
             self._measure_velocities(detection, owner, velocities, arrivals, measured.cells)
         self._surfaces = masks.surfaces(grid, labels, tracks.ids, pose)
@@ -148,14 +173,14 @@ class Tracker:
         predicted = masks.predict(self._surfaces, index, shift, grid, pose)
         count, parts = regions.components(grid, standing)
         measured = regions.measure(grid, parts, count)
-        ballot = masks.count_votes(parts, count, predicted, len(tracks), mover)
+        ballot = votes.count_votes(parts, count, predicted, len(tracks), mover)
         sight, distance_m = tracks.sight(pose.translation_m)
         overdue = tracks.overdue(changes.stayed_s, sight, self._free.resolves_m(distance_m))
-        ballot, hidden = masks.withdraw(ballot, parts, predicted, changes.stayed, overdue, mover)
+        ballot, hidden = votes.withdraw(ballot, parts, predicted, changes.stayed, overdue, mover)
         tracks.hide(hidden)
-        came = np.bincount(parts[changes.arrived], minlength=count + 1)[1:]
-        ballot = masks.release(ballot, measured.cells, came, mover)
-        tracks.guessed = masks.guessed(ballot, mover)
+        came = masks.count_cells(parts, changes.arrived_cells, count)
+        ballot = votes.release(ballot, measured.cells, came, mover)
+        tracks.guessed = votes.guessed(ballot, mover)
         bodies = sightings.expected_bodies(tracks, pose, self._config.depth_noise)
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
@@ -165,7 +190,7 @@ class Tracker:
         winner = births.begin(
             tracks, detection, parts, measured, came, winner, self._body_height_m, speed_mps
         )
-        return masks.divide(parts, predicted, ballot, winner)
+        return votes.divide(parts, predicted, ballot, winner)
 
     def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes) -> IntGrid:
         """Merge what is one body and split what is two; the same labels where there is nothing to do."""
@@ -199,7 +224,7 @@ class Tracker:
         tracks, settings = self._tracks, self._config.motion
         rotation = detection.pose.rotation
         index = tracks.index_of(owner)
-        tracks.fragments = np.bincount(index[index >= 0], minlength=len(tracks)).astype(np.intp)
+        tracks.fragments = np.bincount(index + 1, minlength=len(tracks) + 1)[1:]
         body = least_squares.body_velocities(
             detection.motion,
             velocities.per_end,
@@ -208,19 +233,21 @@ class Tracker:
             tracks.state[:, 3:] @ rotation,
             settings.max_speed_mps,
         )
-        use = limbs.believable(body)
-        if use.any():
+        use = limbs.believable(body).nonzero()[0]
+        if len(use):
             # Windows overlap: each frame brings dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
-            going = np.where(tracks.moving, tracks.speed_mps, 0.0)
-            swing = limbs.variance(body, going)[use]
-            noise = body.covariance[use] * (lag_s / detection.dt_s) + swing[:, None, None] * _IDENTITY
+            going = tracks.speed_mps * tracks.moving
+            velocity, noise = _measured(
+                body.velocity_mps,
+                body.covariance,
+                limbs.variance(body, going),
+                use,
+                lag_s / detection.dt_s,
+                rotation,
+            )
             tracks.state[use], tracks.covariance[use] = kalman.update(
-                tracks.state[use],
-                tracks.covariance[use],
-                body.velocity_mps[use] @ rotation.T,
-                rotation @ noise @ rotation.T,
-                3,
+                tracks.state.take(use, axis=0), tracks.covariance.take(use, axis=0), velocity, noise, 3
             )
         longer = np.where(limbs.restless(body), detection.dt_s, -detection.dt_s)
         tracks.unrest_s = np.maximum(tracks.unrest_s + longer, 0.0)
@@ -228,11 +255,9 @@ class Tracker:
         seen = evidence_of(tracks, detection, body, goes, arrivals, cells, self._config.depth_noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
-        tracks.unproven_s = np.where(verdict.proven, 0.0, tracks.unproven_s + detection.dt_s)
-        tracks.moving_s = np.where(verdict.moving, tracks.moving_s + detection.dt_s, 0.0)
-        tracks.has_moved |= verdict.moving
         tracks.confidence, tracks.stands = verdict.confidence, verdict.stands
-        tracks.calm_s = np.where(tracks.evidence > 0.0, 0.0, tracks.calm_s + detection.dt_s)
+        tracks.has_moved |= verdict.moving
+        tracks.count_on(verdict.proven, detection.dt_s)
 
     def _percept(
         self,

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.bodies.tracks import Tracks
-from vision.depth.depth_mask import depth_sigma_m
+from vision.depth.depth_grid import FloatGrid
 from vision.depth.regions import IntGrid
 from vision.detection import Detection
 from vision.motion.least_squares import long_static
@@ -27,6 +28,32 @@ _SAME_DEPTH_M = 0.05  # closer than this, beside the noise, is at the same depth
 _NEARER = 0.1  # per metre, against the depth by which a fragment is off
 
 
+def inherited(
+    known: NDArray[np.int64], owner: NDArray[np.int64], ids: NDArray[np.int64], tracks: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """(N,) id of the track that each fragment of ids (N,) belonged to a frame before, -1 for none.
+
+    known (M,), owner (M,): the fragments then, and their tracks. tracks (T,): those there still are. All ids
+    grow.
+    """
+    return _inherited(known, owner, ids, tracks)
+
+
+@compiled("int64[::1], int64[::1], int64[::1], int64[::1]")
+def _inherited(
+    known: NDArray[np.int64], owner: NDArray[np.int64], ids: NDArray[np.int64], tracks: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    result = np.full(len(ids), -1, np.int64)
+    for k in range(len(ids)):
+        place = np.searchsorted(known, ids[k])
+        if place == len(known) or known[place] != ids[k]:
+            continue
+        track = np.searchsorted(tracks, owner[place])
+        if track < len(tracks) and tracks[track] == owner[place]:
+            result[k] = owner[place]
+    return result
+
+
 def adopt(
     tracks: Tracks, detection: Detection, labels: IntGrid, owner: NDArray[np.int64], noise: DepthNoise
 ) -> NDArray[np.int64]:
@@ -38,21 +65,68 @@ def adopt(
     grid = detection.grid
     if len(tracks) == 0 or len(owner) == 0:
         return np.full(len(owner), -1, np.int64)
-    ends = detection.ends_px.astype(float)
-    u, v = (ends[:, :1, k] + (ends[:, 1:, k] - ends[:, :1, k]) * _ALONG for k in (0, 1))
-    cells = grid.cells(u + _BESIDE_PX, v - _ABOVE_PX)
-    there = labels.ravel().take(cells)
-    near = np.fmin(detection.near_m[:, 0], detection.near_m[:, 1]).astype(float)
-    depth = grid.depth_m.ravel().take(cells)
-    gap = np.abs(depth - near[:, None])
-    sigma = depth_sigma_m(near, noise)[:, None]
-    agrees = (there > 0) & (gap <= _LEAST_GATE_M + 2.0 * sigma)
-    # Of two bodies in one place of the image, the one at whose depth the fragment is; where noise hides
-    # the difference, the nearer one: an outline belongs to what is in front.
-    off = np.maximum(gap - _SAME_DEPTH_M - sigma, 0.0) + _NEARER * depth
-    best = np.where(agrees, off, np.inf).argmin(axis=1)
-    track = there[np.arange(len(there)), best] - 1
-    ids = np.where(agrees[:, :_ON_IT].any(axis=1), tracks.ids[track], -1)
     age_s: FloatArray = np.multiply(detection.age_frames, detection.dt_s, dtype=np.float64)
-    still = long_static(detection.motion, age_s)
-    return np.where(still & tracks.moving[track] & (ids != owner), -1, ids)
+    return _adopted(
+        detection.ends_px,
+        detection.near_m,
+        grid.depth_m,
+        labels,
+        grid.offset_px,
+        grid.step_px,
+        noise.floor_m,
+        noise.quadratic_per_m,
+        tracks.ids,
+        tracks.moving,
+        long_static(detection.motion, age_s),
+        owner,
+    )
+
+
+@inlined
+def _cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
+    """Row or column of the grid, of so many."""
+    return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
+
+
+@compiled(
+    "float32[:, :, :], float32[:, :], float32[:, ::1], int32[:, ::1], float64, float64, float64, float64,"
+    "int64[::1], boolean[::1], boolean[:], int64[::1]"
+)
+def _adopted(
+    ends_px: NDArray[np.float32],
+    near_m: NDArray[np.float32],
+    depth_m: FloatGrid,
+    labels: IntGrid,
+    offset_px: float,
+    step_px: float,
+    floor_m: float,
+    quadratic_per_m: float,
+    ids: NDArray[np.int64],
+    moving: NDArray[np.bool_],
+    still: NDArray[np.bool_],
+    owner: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """As adopt; still (N,): fragments that have long been."""
+    height, width = labels.shape
+    result = np.full(len(ends_px), -1, np.int64)
+    for k in range(len(ends_px)):
+        own_m = float(np.fmin(near_m[k, 0], near_m[k, 1]))
+        u, v = float(ends_px[k, 0, 0]), float(ends_px[k, 0, 1])
+        across, down = float(ends_px[k, 1, 0]) - u, float(ends_px[k, 1, 1]) - v
+        sigma_m = floor_m + quadratic_per_m * own_m * own_m
+        track, least, on_it = -1, np.inf, False
+        for i in range(len(_ALONG)):
+            row = _cell(v + down * _ALONG[i] - _ABOVE_PX[i], offset_px, step_px, height)
+            column = _cell(u + across * _ALONG[i] + _BESIDE_PX[i], offset_px, step_px, width)
+            there_m, gap_m = depth_m[row, column], abs(depth_m[row, column] - own_m)
+            if labels[row, column] == 0 or not gap_m <= _LEAST_GATE_M + 2.0 * sigma_m:
+                continue
+            on_it = on_it or i < _ON_IT
+            # Of two bodies in one place of the image, the one at whose depth the fragment is; where noise
+            # hides the difference, the nearer one: an outline belongs to what is in front.
+            off = max(gap_m - _SAME_DEPTH_M - sigma_m, 0.0) + np.float32(_NEARER) * there_m
+            if off < least:
+                track, least = labels[row, column] - 1, off
+        if on_it and not (still[k] and moving[track] and ids[track] != owner[k]):
+            result[k] = ids[track]
+    return result

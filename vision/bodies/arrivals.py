@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.depth.regions import IntGrid
 
 # Every second view at 30 frames a second: a look back takes whichever is close to it.
 _KEEP_EVERY_S = 0.06
@@ -31,7 +33,10 @@ _SIGMAS = 3.5  # of what is compared, two in ten thousand cells by chance; neigh
 _CELL_NOISE_OVER_TIME = 0.55
 _NEIGHBOURS = 5  # of a cell and its eight neighbours, this many must have arrived
 _UNKNOWN = np.float32(1e3)  # 1/m, of what was not measured: nothing is nearer, so that nothing has come there
+_NEAREST_M = np.float32(0.1)  # nearer, a point projects anywhere
 _BLOCK = np.ones((3, 3), np.uint8)
+
+Lead = tuple[np.float32, np.float32, np.float32, np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,10 +48,12 @@ class _Memory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Changes:
-    """arrived (h, w): surfaces in space that was seen free. stayed (h, w): surfaces that were seen there
-    before, stayed_s ago (0.0: no such look); what was hidden or not measured then is neither."""
+    """arrived (h, w): surfaces in space that was seen free, and as flat cells (K,). stayed (h, w): surfaces
+    that were seen there before, stayed_s ago (0.0: no such look); what was hidden or not measured then is
+    neither."""
 
     arrived: BoolGrid
+    arrived_cells: NDArray[np.intp]
     stayed: BoolGrid
     stayed_s: float
 
@@ -64,25 +71,16 @@ class FreeMemory:
 
     def changes(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> Changes:
         """What has come and what has stayed, of the cells of mask (h, w)."""
-        arrived, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
-        cells = np.flatnonzero(mask)
-        points = grid.points(cells)
-        came = np.zeros(len(cells), np.bool_)
+        came, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
         for wanted_s in _LOOK_BACK_S:
             memory = self._memory_of(now_ns, wanted_s)
             if memory is None:
                 continue
-            nearer, inside, margin = self._compare(grid, points, pose, memory)
-            came |= inside & (nearer > margin)
+            nearer, same = self._compare(grid, mask, pose, memory)
+            came |= nearer
             if wanted_s == _LOOK_BACK_S[-1]:
-                stayed.ravel()[cells] = inside & (np.abs(nearer) <= margin)
-                stayed_s = (now_ns - memory.stamp_ns) * 1e-9
-        if not came.any():
-            return Changes(arrived, stayed, stayed_s)
-        arrived.ravel()[cells] = came
-        block, outside = (3, 3), cv2.BORDER_CONSTANT
-        count = cv2.boxFilter(arrived.view(np.uint8), -1, block, normalize=False, borderType=outside)
-        return Changes(arrived & (np.asarray(count) >= _NEIGHBOURS), stayed, stayed_s)
+                stayed, stayed_s = same, (now_ns - memory.stamp_ns) * 1e-9
+        return Changes(*_in_company(came, np.flatnonzero(came)), stayed, stayed_s)
 
     def resolves_m(self, distance_m: FloatArray) -> FloatArray:
         """(N,) how much nearer or farther a surface at distance_m (N,) has to be to be told from another."""
@@ -113,15 +111,120 @@ class FreeMemory:
         return best
 
     def _compare(
-        self, grid: DepthGrid, points: FloatGrid, pose: Pose, memory: _Memory
-    ) -> tuple[FloatGrid, NDArray[np.bool_], FloatGrid]:
-        """(K,) by how much points (3, K), camera axes now, are nearer, in 1/m, than what memory saw there;
-        which of them it may have seen, and by how much noise may have it so."""
-        relative = memory.pose.inverse() @ pose
-        there = relative.rotation.astype(np.float32) @ points
-        there += relative.translation_m.astype(np.float32)[:, None]
-        cell, inside, inverse = grid.project(there)
-        seen = memory.nearest_inverse.ravel().take(cell)
-        sigma = np.float32(np.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m)
-        margin = np.float32(_MARGIN_M) * inverse * inverse + np.float32(_SIGMAS) * sigma
-        return inverse - seen, inside, margin
+        self, grid: DepthGrid, mask: BoolGrid, pose: Pose, memory: _Memory
+    ) -> tuple[BoolGrid, BoolGrid]:
+        """(h, w) which cells of mask are nearer than what memory saw there, and which are as near, as far as
+        noise tells."""
+        sigma_1pm = math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
+        return _compared(
+            grid.depth_m,
+            grid.x,
+            grid.y,
+            mask,
+            pose.rotation,
+            pose.translation_m,
+            memory.pose.rotation,
+            memory.pose.translation_m,
+            memory.nearest_inverse,
+            np.float32(_SIGMAS) * np.float32(sigma_1pm),
+        )
+
+
+@inlined
+def _lead(
+    outer_rotation: FloatArray, outer_m: FloatArray, rotation: FloatArray, origin_m: FloatArray, axis: int
+) -> Lead:
+    """What leads from the axes of a pose, rotation and origin_m, to one coordinate in those of another."""
+    x, y, z, shift_m = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        along = outer_rotation[i, axis]
+        x, y, z = x + along * rotation[i, 0], y + along * rotation[i, 1], z + along * rotation[i, 2]
+        shift_m += along * (origin_m[i] - outer_m[i])
+    return np.float32(x), np.float32(y), np.float32(z), np.float32(shift_m)
+
+
+@inlined
+def _led(lead: Lead, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
+    return lead[0] * x + lead[1] * y + lead[2] * z + lead[3]
+
+
+@inlined
+def _put_row(
+    depth_m: FloatGrid,
+    ray_x: FloatGrid,
+    ray_y: FloatGrid,
+    row: int,
+    leads: tuple[Lead, Lead, Lead],
+    cell: IntGrid,
+    inverse: FloatGrid,
+) -> None:
+    """Put into cell (w,) which flat one each cell of a row is in the other view, -1: outside of it; and its
+    inverse depth there into inverse (w,). Without a branch, so that the processor does several at once."""
+    columns, width, height = np.int32(len(ray_x)), np.float32(len(ray_x)), np.float32(len(ray_y))
+    left, top, zero = ray_x[0], ray_y[0], np.float32(0.0)
+    per_column, per_row = np.float32(1.0) / (ray_x[1] - left), np.float32(1.0) / (ray_y[1] - top)
+    to_x, to_y, to_z = leads
+    for j in range(columns):
+        z = depth_m[row, j]
+        x, y = ray_x[j] * z, ray_y[row] * z
+        there_m = _led(to_z, x, y, z)
+        inverse[j] = np.float32(1.0) / there_m
+        u = (_led(to_x, x, y, z) * inverse[j] - left) * per_column + np.float32(0.5)
+        v = (_led(to_y, x, y, z) * inverse[j] - top) * per_row + np.float32(0.5)
+        inside = (there_m > _NEAREST_M) & (u >= zero) & (v >= zero) & (u < width) & (v < height)
+        cell[j] = np.int32(v) * columns + np.int32(u) if inside else np.int32(-1)
+
+
+@compiled(
+    "float32[:, ::1], float32[::1], float32[::1], boolean[:, ::1], float64[:, :], float64[:], float64[:, :],"
+    "float64[:], float32[:, ::1], float32"
+)
+def _compared(
+    depth_m: FloatGrid,
+    ray_x: FloatGrid,
+    ray_y: FloatGrid,
+    mask: BoolGrid,
+    rotation: FloatArray,
+    origin_m: FloatArray,
+    old_rotation: FloatArray,
+    old_origin_m: FloatArray,
+    seen_inverse: FloatGrid,
+    noise_1pm: np.float32,
+) -> tuple[BoolGrid, BoolGrid]:
+    """As _compare; rotation and origin_m of the camera, now and when seen_inverse (h, w) was seen."""
+    height, width = depth_m.shape
+    nearer, same = np.zeros((height, width), np.bool_), np.zeros((height, width), np.bool_)
+    cell, inverse, seen = np.empty(width, np.int32), np.empty(width, np.float32), seen_inverse.ravel()
+    leads = (
+        _lead(old_rotation, old_origin_m, rotation, origin_m, 0),
+        _lead(old_rotation, old_origin_m, rotation, origin_m, 1),
+        _lead(old_rotation, old_origin_m, rotation, origin_m, 2),
+    )
+    for i in range(height):
+        if not mask[i].any():
+            continue
+        _put_row(depth_m, ray_x, ray_y, i, leads, cell, inverse)
+        for j in range(width):
+            if mask[i, j] and cell[j] >= 0:
+                ahead = inverse[j] - seen[cell[j]]
+                margin = np.float32(_MARGIN_M) * inverse[j] * inverse[j] + noise_1pm
+                nearer[i, j], same[i, j] = ahead > margin, abs(ahead) <= margin
+    return nearer, same
+
+
+@compiled("boolean[:, ::1], int64[::1]")
+def _in_company(mask: BoolGrid, cells: NDArray[np.intp]) -> tuple[BoolGrid, NDArray[np.intp]]:
+    """(h, w) those of cells (K,), the flat ones of mask (h, w), of whose 3x3 neighbourhood enough are in it;
+    and these as flat ones."""
+    height, width = mask.shape
+    result, kept, number = np.zeros((height, width), np.bool_), np.empty(len(cells), np.intp), 0
+    for cell in cells:
+        row, column, count = cell // width, cell % width, 0
+        for i in range(max(row - 1, 0), min(row + 2, height)):
+            for j in range(max(column - 1, 0), min(column + 2, width)):
+                count += mask[i, j]
+        if count >= _NEIGHBOURS:
+            result[row, column] = True
+            kept[number] = cell
+            number += 1
+    return result, kept[:number]

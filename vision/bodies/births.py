@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from vision.bodies.tracks import Tracks
 from vision.depth import regions
-from vision.depth.depth_grid import DepthGrid
+from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import IntGrid, Regions
 from vision.detection import Detection
 
@@ -57,7 +58,16 @@ def reaching_down(grid: DepthGrid, labels: IntGrid, count: int, body_height_m: f
     """(count,) parts 1..count of labels (h, w) seen below body_height_m; all where heights are not known."""
     if grid.height_m is None:
         return np.ones(count, np.bool_)
-    low = np.flatnonzero((labels > 0) & (grid.height_m < body_height_m))
-    cells = np.bincount(labels.ravel().take(low), minlength=count + 1)[1:]
-    result: NDArray[np.bool_] = cells >= _MIN_CELLS // 2
-    return result
+    return _low(labels, grid.height_m, np.float32(body_height_m), count)
+
+
+@compiled("int32[:, ::1], float32[:, ::1], float32, int64")
+def _low(labels: IntGrid, height_m: FloatGrid, body_height_m: np.float32, count: int) -> NDArray[np.bool_]:
+    """As reaching_down, where heights (h, w) are known."""
+    rows, columns = labels.shape
+    cells = np.zeros(count, np.intp)
+    for i in range(rows):
+        for j in range(columns):
+            if labels[i, j] > 0 and height_m[i, j] < body_height_m:
+                cells[labels[i, j] - 1] += 1
+    return cells >= _MIN_CELLS // 2

@@ -5,11 +5,13 @@ Terms: vision/__init__.py.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.bodies.division import LOW, WITHIN
 from vision.depth.depth_grid import DepthGrid
@@ -18,7 +20,7 @@ from vision.depth.regions import Regions
 LOAD_M = 0.8  # by so much farther back a load may begin than what carries it
 THROUGH_M = 1.5  # by so much farther back a vehicle may be seen through itself
 LEAST_SAMPLES = 3  # of the cells between two: something is there
-_ALONG = np.linspace(0.0, 1.0, 24)[:, None]  # from one to another
+_SAMPLES = 24  # from one to another
 _MOSTLY = 0.7  # of its width: a load juts out beyond its carrier by no more
 _TOUCHING_PX = 16.0  # four cells: the rims between two depths are of neither
 
@@ -37,29 +39,49 @@ def boxes(regions: Regions) -> Boxes:
     return Boxes(regions.position_m - half, regions.position_m + half)
 
 
-def gaps_m(a: Boxes, first: NDArray[np.intp], b: Boxes, second: NDArray[np.intp]) -> FloatArray:
-    """(K,) distance between box first[k] of a and box second[k] of b, 0 where they touch; or of any shape
-    that first and second are broadcast to."""
-    gap = np.maximum(a.low_m[first] - b.high_m[second], b.low_m[second] - a.high_m[first])
-    result: FloatArray = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=-1))
-    return result
+@dataclass(frozen=True, slots=True, eq=False)
+class Relations:
+    """How K boxes lie to K others, (K,) each. gap_m: between them in space, 0 where they touch. overlap:
+    share of the one that the other covers in the image. stacked: there the lower end of the one is the upper
+    end of the other, for most of its width. within: there it lies within the other and is at most half as
+    tall, as nobody behind somebody else is."""
+
+    gap_m: FloatArray
+    overlap: FloatArray
+    stacked: NDArray[np.bool_]
+    within: NDArray[np.bool_]
 
 
-def stacked(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
-    """(K,) whether the lower end of box a[k] is the upper end of box b[k] in the image, for most of the
-    width of a[k]; (K, 4) each: u0, v0, u1, v1."""
-    shared = np.minimum(a[:, 2], b[:, 2]) - np.maximum(a[:, 0], b[:, 0])
-    apart = np.abs(a[:, 3] - b[:, 1])
-    result: NDArray[np.bool_] = (shared >= _MOSTLY * (a[:, 2] - a[:, 0])) & (apart <= _TOUCHING_PX)
-    return result
+def relations(regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]) -> Relations:
+    """How regions one (K,) lie to regions other (K,)."""
+    return Relations(*_relations(regions.position_m, regions.extent_m, regions.bbox_px, one, other))
 
 
-def seen_through(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
-    """(K,) whether box a[k] lies within box b[k] in the image and is at most half as tall, as nobody behind
-    somebody else is; (K, 4) each: u0, v0, u1, v1."""
-    low = a[:, 3] - a[:, 1] <= LOW * (b[:, 3] - b[:, 1])
-    result: NDArray[np.bool_] = low & (overlaps(a, b) >= WITHIN)
-    return result
+@compiled("float64[:, :], float64[:, :], float64[:, :], int64[:], int64[:]")
+def _relations(
+    position_m: FloatArray,
+    extent_m: FloatArray,
+    bbox_px: FloatArray,
+    one: NDArray[np.intp],
+    other: NDArray[np.intp],
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
+    gap_m, overlap = np.empty(len(one)), np.empty(len(one))
+    on_top, within = np.empty(len(one), np.bool_), np.empty(len(one), np.bool_)
+    for k in range(len(one)):
+        a, b = one[k], other[k]
+        squared = 0.0
+        for i in range(3):
+            apart_m = abs(position_m[a, i] - position_m[b, i]) - 0.5 * (extent_m[a, i] + extent_m[b, i])
+            squared += max(apart_m, 0.0) ** 2
+        gap_m[k] = math.sqrt(squared)
+        left, top, right, bottom = bbox_px[a, 0], bbox_px[a, 1], bbox_px[a, 2], bbox_px[a, 3]
+        u0, v0, u1, v1 = bbox_px[b, 0], bbox_px[b, 1], bbox_px[b, 2], bbox_px[b, 3]
+        width, height = right - left, bottom - top
+        across, down = min(right, u1) - max(left, u0), min(bottom, v1) - max(top, v0)
+        overlap[k] = max(across, 0.0) * max(down, 0.0) / max(width * height, 1.0)
+        on_top[k] = across >= _MOSTLY * width and abs(bottom - v0) <= _TOUCHING_PX
+        within[k] = height <= LOW * (v1 - v0) and overlap[k] >= WITHIN
+    return gap_m, overlap, on_top, within
 
 
 def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -75,6 +97,33 @@ def cells_between(
     grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """(24, K) cells in the image on the way from the middle of region one[k] to that of other[k]."""
-    middle = 0.5 * (regions.bbox_px[:, :2] + regions.bbox_px[:, 2:])
-    u, v = (k[one] + (k[other] - k[one]) * _ALONG for k in middle.T)
-    return grid.cells(u, v)
+    height, width = grid.depth_m.shape
+    return _cells_between(regions.bbox_px, one, other, grid.offset_px, grid.step_px, height, width)
+
+
+@inlined
+def _cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
+    """Row or column of the grid, of so many."""
+    return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
+
+
+@compiled("float64[:, :], int64[:], int64[:], float64, float64, int64, int64")
+def _cells_between(
+    bbox_px: FloatArray,
+    one: NDArray[np.intp],
+    other: NDArray[np.intp],
+    offset_px: float,
+    step_px: float,
+    height: int,
+    width: int,
+) -> NDArray[np.intp]:
+    cells = np.empty((_SAMPLES, len(one)), np.intp)
+    for k in range(len(one)):
+        a, b = bbox_px[one[k]], bbox_px[other[k]]
+        u, v = 0.5 * (a[0] + a[2]), 0.5 * (a[1] + a[3])
+        across, down = 0.5 * (b[0] + b[2]) - u, 0.5 * (b[1] + b[3]) - v
+        for i in range(_SAMPLES):
+            share = i / (_SAMPLES - 1)
+            row = _cell(v + down * share, offset_px, step_px, height)
+            cells[i, k] = row * width + _cell(u + across * share, offset_px, step_px, width)
+    return cells

@@ -10,16 +10,20 @@ vision/__init__.py.
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
+from hal.compiled import compiled
 from hal.types import FloatArray
+from vision.bodies.ends import near_ends
 from vision.bodies.judgement import IMPLAUSIBLE
 from vision.bodies.tracks import Tracks
 from vision.depth import regions
-from vision.depth.depth_grid import BoolGrid, DepthGrid
+from vision.depth.depth_grid import BoolGrid
 from vision.depth.depth_mask import depth_sigma_m
 from vision.depth.regions import IntGrid, Regions
 from vision.detection import Detection
@@ -31,15 +35,12 @@ _COMPACT_M = 1.6  # wider or deeper than any one body with what it carries: it m
 _BODY_M = 0.85  # nobody is wider (SINGLE_WIDTH_M of vision/bodies/division.py)
 _CALM_S = 0.9  # for so long, what has come to rest is where free space was seen
 _MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py)
-_AROUND_M = 0.2  # cells so close to a moving fragment are of its body; a body is about twice as wide
 _MIN_FRAGMENTS = 2  # one alone may be an end that slides
 # One alone, on somebody who walks along a wall: seen for so long, level, and surely so fast.
 _LONE_S = 0.25
 _LONE_MPS, _LONE_SIGMAS = 0.4, 4.0  # a slow walk, as surely as a verdict asks for
 _LEVEL = 0.3  # of its speed may go up or down: an end that slides along an upright edge does
 _BLOCK = np.ones((3, 3), np.uint8)
-_AGREE_M = 0.3  # about a body's depth, and
-_AGREE_PER_M2 = 0.015  # two sigmas of depth by the default noise
 
 
 def carve(
@@ -62,25 +63,24 @@ def carve(
     suspicious = least_squares.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not arrived.any():
         return labels
-    mover = tracks.mover
-    # Where the lines of something wider than a body stand while a part of it arrives, somebody touches it.
-    touched = tracks.stands & (tracks.calm_s >= _CALM_S) & (measured.extent_m[:, 0] > _BODY_M)
-    compact = (measured.extent_m[:, 0] <= _COMPACT_M) & (
-        measured.extent_m[:, 2]
-        <= _COMPACT_M + 2.0 * depth_sigma_m(measured.position_m[:, 2], config.depth_noise)
+    searched, overgrown = _in_question(
+        tracks.mover,
+        tracks.moving,
+        tracks.stands & (tracks.calm_s >= _CALM_S),
+        measured.position_m,
+        measured.extent_m,
+        config.depth_noise.floor_m,
+        config.depth_noise.quadratic_per_m,
     )
-    searched, overgrown = ~mover & (~compact | touched), tracks.moving & ~compact
-    chosen = np.zeros(len(tracks) + 1, np.bool_)
-    chosen[1:] = searched | overgrown
-    if not chosen.any():
+    asked = searched | overgrown
+    if not asked.any():
         return labels
-    looked_at = chosen.take(labels)
+    looked_at = _cells_of(labels, asked)
     shown = arrived & looked_at
     shown |= _around_moving_fragments(detection, velocities, suspicious, looked_at, config)
     if not shown.any():
         return labels
-    chosen[1:] = searched
-    inside = chosen.take(labels) if overgrown.any() else looked_at
+    inside = _cells_of(labels, searched) if overgrown.any() else looked_at
     labels = _cut_back(tracks, detection, labels, overgrown, shown, config)
     seeds = shown & inside
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
@@ -99,6 +99,42 @@ def carve(
     first = len(tracks)
     _start(tracks, detection, suspects, SUSPECT_EVIDENCE, config)
     return np.where(own > 0, own + first, labels).astype(np.int32)
+
+
+@compiled("boolean[:], boolean[:], boolean[:], float64[:, :], float64[:, :], float64, float64")
+def _in_question(
+    mover: NDArray[np.bool_],
+    moving: NDArray[np.bool_],
+    calm: NDArray[np.bool_],
+    position_m: FloatArray,
+    extent_m: FloatArray,
+    floor_m: float,
+    quadratic_per_m: float,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(T,) tracks that may hide a mover; and movers that have grown larger than any body."""
+    searched, overgrown = np.zeros(len(mover), np.bool_), np.zeros(len(mover), np.bool_)
+    for t in range(len(mover)):
+        depth_m = position_m[t, 2]
+        deepest_m = _COMPACT_M + 2.0 * (floor_m + quadratic_per_m * depth_m * depth_m)
+        compact = extent_m[t, 0] <= _COMPACT_M and extent_m[t, 2] <= deepest_m
+        # Where the lines of something wider than a body stand while a part of it arrives, somebody touches
+        # it.
+        touched = calm[t] and extent_m[t, 0] > _BODY_M
+        searched[t] = not mover[t] and (not compact or touched)
+        overgrown[t] = moving[t] and not compact
+    return searched, overgrown
+
+
+@compiled("int32[:, ::1], boolean[::1]")
+def _cells_of(labels: IntGrid, chosen: NDArray[np.bool_]) -> BoolGrid:
+    """(h, w) the cells of tracks chosen (T,)."""
+    height, width = labels.shape
+    result = np.zeros((height, width), np.bool_)
+    for i in range(height):
+        for j in range(width):
+            if labels[i, j] > 0:
+                result[i, j] = chosen[labels[i, j] - 1]
+    return result
 
 
 def _cut_back(
@@ -144,64 +180,51 @@ def _around_moving_fragments(
     motion = detection.motion
     if len(chosen) == 0:
         return result
-    velocity, covariance = velocities.velocity_mps[chosen], velocities.covariance[chosen]
-    position = 0.5 * (motion.static_m[2 * chosen] + motion.static_m[2 * chosen + 1])
+    position, velocity, covariance = _of_chosen(
+        motion.static_m, velocities.velocity_mps, velocities.covariance, chosen
+    )
     sigma = depth_sigma_m(position[:, 2], config.depth_noise)
     group = least_squares.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
-    seen_s = detection.age_frames[chosen].astype(float) * detection.dt_s
+    seen_s = detection.age_frames.take(chosen).astype(float) * detection.dt_s
     chosen = chosen[company | _alone(seen_s, velocity, covariance, config.motion.max_speed_mps)]
     if len(chosen) == 0:
         return result
-    return _near_ends(
+    return near_ends(
         detection.grid, looked_at, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
     )
 
 
+@compiled("float64[:, :], float64[:, :], float64[:, :, :], int64[::1]")
+def _of_chosen(
+    static_m: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, chosen: NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of fragments chosen (K,): (K, 3) the middle of their ends, of static_m (2N, 3); velocity (K, 3) and
+    covariance (K, 3, 3)."""
+    position, velocity = np.empty((len(chosen), 3)), np.empty((len(chosen), 3))
+    spread = np.empty((len(chosen), 3, 3))
+    for k in range(len(chosen)):
+        n = chosen[k]
+        position[k] = 0.5 * (static_m[2 * n] + static_m[2 * n + 1])
+        velocity[k], spread[k] = velocity_mps[n], covariance[n]
+    return position, velocity, spread
+
+
+@compiled("float64[::1], float64[:, :], float64[:, :, :], float64")
 def _alone(
     seen_s: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, max_speed_mps: float
 ) -> NDArray[np.bool_]:
     """(K,) fragments, seen for seen_s (K,), whose velocity (K, 3), in the camera's axes, with covariance
     (K, 3, 3) needs no other one beside it to be believed."""
-    speed = np.sqrt(np.square(velocity_mps).sum(axis=1))
-    # Along its way: v' C v / v'v is the variance there.
-    along = np.einsum("ki,kij,kj->k", velocity_mps, covariance, velocity_mps)
-    sure = (speed >= _LONE_MPS) & (speed**2 > _LONE_SIGMAS * np.sqrt(along))
-    level = np.abs(velocity_mps[:, 1]) <= _LEVEL * speed
-    result: NDArray[np.bool_] = (seen_s >= _LONE_S) & sure & level & (speed <= IMPLAUSIBLE * max_speed_mps)
-    return result
-
-
-def _near_ends(
-    grid: DepthGrid,
-    looked_at: BoolGrid,
-    ends_px: NDArray[np.float32],
-    depth_m: NDArray[np.float32],
-    focal_px: float,
-) -> BoolGrid:
-    """(h, w) those cells of looked_at (h, w) that are close to the ends (N, 2, 2), at their depth (N, 2)."""
-    result = np.zeros(grid.depth_m.shape, np.bool_)
-    depth = depth_m.ravel().astype(float)
-    known = np.isfinite(depth)
-    ends, depth = ends_px.reshape(-1, 2)[known].astype(float), depth[known]
-    if len(depth) == 0:
-        return result
-    rows, columns = grid.rows(ends[:, 1]), grid.columns(ends[:, 0])
-    # No cell farther away than this can be close to an end: the others need not be looked at.
-    reach_cells = int(_AROUND_M * focal_px / (grid.step_px * float(depth.min()))) + 2
-    top, left = max(int(rows.min()) - reach_cells, 0), max(int(columns.min()) - reach_cells, 0)
-    box = slice(top, int(rows.max()) + reach_cells + 1), slice(left, int(columns.max()) + reach_cells + 1)
-    if not looked_at[box].any():
-        return result
-    rows, columns = rows - top, columns - left
-    seeds = np.ones(result[box].shape, np.uint8)
-    seeds[rows, columns] = 0
-    distance, found = cv2.distanceTransformWithLabels(seeds, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
-    label: IntGrid = np.asarray(found, np.int32)
-    there = np.zeros(int(label.max()) + 1)
-    there[label[rows, columns]] = depth
-    nearest_m = there.take(label)
-    reach = np.asarray(distance) * (grid.step_px / (_AROUND_M * focal_px)) * nearest_m <= 1.0
-    agrees = np.abs(grid.depth_m[box] - nearest_m) <= _AGREE_M + _AGREE_PER_M2 * nearest_m * nearest_m
-    result[box] = reach & agrees & looked_at[box]
+    result = np.zeros(len(seen_s), np.bool_)
+    for k in range(len(seen_s)):
+        v, along = velocity_mps[k], 0.0
+        speed = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+        for i in range(3):
+            for j in range(3):
+                along += v[i] * covariance[k, i, j] * v[j]
+        # v' C v / v'v is the variance along its way.
+        sure = speed >= _LONE_MPS and speed**2 > _LONE_SIGMAS * math.sqrt(along)
+        level = abs(v[1]) <= _LEVEL * speed
+        result[k] = seen_s[k] >= _LONE_S and sure and level and speed <= IMPLAUSIBLE * max_speed_mps
     return result

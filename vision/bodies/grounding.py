@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.depth.depth_grid import DepthGrid
+from hal.compiled import compiled, inlined
+from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import IntGrid, Regions, exchanged, measure
-from vision.numerics.order import median
 
 _SAME_M = 0.3  # about a body's depth, and
 _SAME_PER_M2 = 0.015  # two sigmas of depth by the default noise
@@ -35,8 +35,8 @@ def ground(
     standing = np.concatenate(([False], ~mover))
     result, grown = labels, np.zeros(len(mover), np.bool_)
     for track in (chosen & (measured.cells > 0)).nonzero()[0].tolist():
-        below = _below(grid, labels, track, standing)
-        if below is not None:
+        below = _below(grid.depth_m, grid.y, labels, track + 1, standing)
+        if len(below):
             result = labels.copy() if result is labels else result
             result.ravel()[below] = track + 1
             grown[track] = True
@@ -45,31 +45,46 @@ def ground(
     return result, exchanged(measured, measure(grid, result, len(mover)), grown)
 
 
+@inlined
+def _median_depth_m(depth_m: FloatGrid, labels: IntGrid, label: int, first: int, last: int) -> np.float32:
+    """Of the cells with that label in rows first to last, of which there is one at least."""
+    found_m = np.sort(depth_m[first : last + 1].ravel()[labels[first : last + 1].ravel() == label])
+    middle = len(found_m) // 2
+    odd = len(found_m) % 2 == 1
+    result: np.float32 = found_m[middle] if odd else np.float32(0.5) * (found_m[middle - 1] + found_m[middle])
+    return result
+
+
+@compiled("float32[:, ::1], float32[::1], int32[:, ::1], int64, boolean[::1]")
 def _below(
-    grid: DepthGrid, labels: IntGrid, track: int, standing: NDArray[np.bool_]
-) -> NDArray[np.intp] | None:
-    """Flat cells below those labelled track + 1 that belong to it, column by column; None: there are none."""
-    cells = np.flatnonzero(labels == track + 1)
-    rows = cells // labels.shape[1]
-    columns = cells - rows * labels.shape[1]
-    top, bottom, left, right = int(rows[0]), int(rows[-1]), int(columns.min()), int(columns.max()) + 1
-    lowest = cells[rows >= bottom - (bottom - top + 1) // _LOWEST]
-    depth_m = float(median(grid.depth_m.ravel().take(lowest)))
-    # In each of its columns the lowest row of its own, which is written last.
-    foot = np.full(right - left, len(labels), np.intp)
-    foot[columns - left] = rows
-    box = slice(top, None), slice(left, right)
-    under = np.arange(top, len(labels))[:, None] > foot
-    there, found_m = labels[box], grid.depth_m[box]
-    same = np.abs(found_m - depth_m) <= _SAME_M + _SAME_PER_M2 * depth_m * depth_m
-    # Without data, or on the rim of a jump in depth, nothing parts them.
-    parts = under & ~same & (found_m > 0.0)
-    taken = under & same & standing.take(there) & (there > 0) & ~np.logical_or.accumulate(parts, axis=0)
-    if not taken.any():
-        return None
-    row, column = np.nonzero(taken)
+    depth_m: FloatGrid, ray_y: FloatGrid, labels: IntGrid, label: int, standing: NDArray[np.bool_]
+) -> NDArray[np.intp]:
+    """Flat cells below those with that label that belong to them, column by column. standing: of the labels,
+    whether cells may be taken from them."""
+    height, width = labels.shape
+    # The rows it is in; in each of its columns the lowest row of its own.
+    top, bottom, foot = height, -1, np.full(width, height, np.intp)
+    for i in range(height):
+        for j in range(width):
+            if labels[i, j] == label:
+                top, bottom, foot[j] = min(top, i), i, i
+    taken = np.empty(height * width, np.intp)
+    if bottom < 0:
+        return taken[:0]
+    own_m = _median_depth_m(depth_m, labels, label, bottom - (bottom - top + 1) // _LOWEST, bottom)
+    same_m = np.float32(_SAME_M + _SAME_PER_M2 * own_m * own_m)
+    count, lowest = 0, 0
+    for j in range(width):
+        for i in range(foot[j] + 1, height):
+            found_m, there = depth_m[i, j], labels[i, j]
+            if abs(found_m - own_m) > same_m:
+                # Without data, or on the rim of a jump in depth, nothing parts them.
+                if found_m > 0.0:
+                    break
+            elif there > 0 and standing[there]:
+                taken[count] = i * width + j
+                count, lowest = count + 1, max(lowest, i)
     # It may stand with one foot, and has no more feet than it shows.
-    if (grid.y[int(row.max()) + top] - grid.y[bottom]) * depth_m < _HOVERS_M:
-        return None
-    flat: NDArray[np.intp] = (row + top) * labels.shape[1] + column + left
-    return flat
+    if (ray_y[lowest] - ray_y[bottom]) * own_m < np.float32(_HOVERS_M):
+        return taken[:0]
+    return taken[:count]

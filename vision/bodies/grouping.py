@@ -17,17 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.bodies.boxes import (
-    LEAST_SAMPLES,
-    LOAD_M,
-    THROUGH_M,
-    boxes,
-    cells_between,
-    gaps_m,
-    seen_through,
-    stacked,
-)
+from vision.bodies.boxes import LEAST_SAMPLES, LOAD_M, THROUGH_M, cells_between, relations
 from vision.bodies.division import NEARER_INVERSE
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
@@ -68,19 +60,60 @@ def expected_in(
     result = np.zeros((len(parts.cells), len(mover)), np.bool_)
     if not mover.any():
         return result
-    half = 0.5 * bodies.extent_m[:, :2]
-    room = np.maximum(bodies.box_m[:, 2:] - bodies.box_m[:, :2] - half, half) + _CLOSE_M
-    offset = parts.position_m[:, None] - bodies.centre_m
-    inside = (np.abs(offset[..., :2]) <= room).all(axis=2) & (parts.cells > 0)[:, None] & mover
-    inside &= np.abs(offset[..., 2]) <= _SAME_DEPTH_M + bodies.sigma_m
-    main = np.full(len(bodies.sigma_m) + 1, -1, np.intp)
-    fewest_first = np.argsort(votes)
-    main[winner[fewest_first]] = fewest_first
-    part, track = np.nonzero(inside & (main[1:] >= 0))
-    if len(part) == 0:
-        return result
-    result[part, track] = something_nearer_between(grid, parts, part, main[track + 1])
+    result, main = _with_room(
+        parts.position_m,
+        parts.cells,
+        winner,
+        votes,
+        bodies.centre_m,
+        bodies.extent_m,
+        bodies.box_m,
+        bodies.sigma_m,
+        mover,
+    )
+    part, track = np.nonzero(result)
+    if len(part):
+        result[part, track] = something_nearer_between(grid, parts, part, main[track])
     return result
+
+
+@compiled(
+    "float64[:, :], int64[:], int32[::1], int64[:], float64[:, :], float64[:, :], float64[:, :],"
+    "float64[::1], boolean[::1]"
+)
+def _with_room(
+    position_m: FloatArray,
+    cells: NDArray[np.intp],
+    winner: NDArray[np.int32],
+    votes: NDArray[np.intp],
+    centre_m: FloatArray,
+    extent_m: FloatArray,
+    box_m: FloatArray,
+    sigma_m: FloatArray,
+    mover: NDArray[np.bool_],
+) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """(P, T) which parts a mover makes room for, at its depth; and (T,) which part is surely its own: without
+    one it makes no room."""
+    result, main = np.zeros((len(cells), len(mover)), np.bool_), np.full(len(mover), -1, np.intp)
+    for p in range(len(winner)):
+        t = winner[p] - 1
+        if 0 <= t < len(mover) and (main[t] < 0 or votes[p] >= votes[main[t]]):
+            main[t] = p
+    for t in range(len(mover)):
+        if not mover[t] or main[t] < 0:
+            continue
+        half_x, half_y = 0.5 * extent_m[t, 0], 0.5 * extent_m[t, 1]
+        room_x = max(box_m[t, 2] - box_m[t, 0] - half_x, half_x) + _CLOSE_M
+        room_y = max(box_m[t, 3] - box_m[t, 1] - half_y, half_y) + _CLOSE_M
+        room_z = _SAME_DEPTH_M + sigma_m[t]
+        for p in range(len(cells)):
+            result[p, t] = (
+                cells[p] > 0
+                and abs(position_m[p, 0] - centre_m[t, 0]) <= room_x
+                and abs(position_m[p, 1] - centre_m[t, 1]) <= room_y
+                and abs(position_m[p, 2] - centre_m[t, 2]) <= room_z
+            )
+    return result, main
 
 
 def something_nearer_between(
@@ -102,25 +135,33 @@ def detach(
     votes (P,): how many cells spoke for the winner. expected (P, T): parts that stay with it all the same, as
     those do that stand on the main one in the image, or are seen through it, and were its own before.
     """
-    owned = (winner > 0).nonzero()[0]
-    if len(owned) == 0:
+    main = _main_parts(winner, votes)
+    beside = (main != np.arange(len(main))).nonzero()[0]
+    if len(beside) == 0:
         return winner
-    order = owned[np.lexsort((-votes[owned], winner[owned]))]
-    track = winner[order]
-    is_main = np.concatenate(([True], track[1:] != track[:-1]))
-    if is_main.all():
-        return winner
-    main = order[np.maximum.accumulate(np.where(is_main, np.arange(len(order)), 0))]
-    box = boxes(parts)
-    gap = gaps_m(box, order, box, main)
-    own, of = parts.bbox_px[order], parts.bbox_px[main]
-    carried = (gap <= LOAD_M) & stacked(own, of)
-    carried |= (gap <= THROUGH_M) & seen_through(own, of)
-    carried &= votes[order] >= _MOSTLY * parts.cells[order]
-    far = (gap > _APART_M) & ~expected[order, track - 1] & ~carried
+    lie = relations(parts, beside, main[beside])
+    carried = ((lie.gap_m <= LOAD_M) & lie.stacked) | ((lie.gap_m <= THROUGH_M) & lie.within)
+    carried &= votes[beside] >= _MOSTLY * parts.cells[beside]
+    far = (lie.gap_m > _APART_M) & ~expected[beside, winner[beside] - 1] & ~carried
     result = winner.copy()
-    result[order[far]] = 0
+    result[beside[far]] = 0
     return result
+
+
+@compiled("int32[::1], int64[:]")
+def _main_parts(winner: NDArray[np.int32], votes: NDArray[np.intp]) -> NDArray[np.intp]:
+    """(P,) the part with the most votes, the first of these, of those with the same winner; of nobody's part
+    itself."""
+    parts = len(winner)
+    main = np.arange(parts)
+    for p in range(parts):
+        for other in range(parts):
+            same = winner[p] > 0 and winner[other] == winner[p]
+            if same and (
+                votes[other] > votes[main[p]] or (votes[other] == votes[main[p]] and other < main[p])
+            ):
+                main[p] = other
+    return main
 
 
 def attach(
@@ -132,16 +173,17 @@ def attach(
 ) -> NDArray[np.int32]:
     """winner (P,) with new parts (indices) given to the track that they are small beside and close to, or to
     the one that is expected there (P, T). alive (T,): the tracks that may get them, which move or moved."""
-    of_mover = ((winner > 0) & np.concatenate(([False], alive))[winner]).nonzero()[0]
-    if len(of_mover) == 0 or len(new_parts) == 0:
+    if len(new_parts) == 0 or not alive.any():
         return winner
-    box = boxes(parts)
-    a, b = new_parts[:, None], of_mover
-    gap = gaps_m(box, a, box, b)
-    gap[expected[a, winner[b] - 1]] = 0.0
-    gap[parts.cells[a] > _SMALL_SHARE * parts.cells[b]] = np.inf
-    best = gap.argmin(axis=1)
-    close = gap[np.arange(len(new_parts)), best] <= _CLOSE_M
+    of_mover = ((winner > 0) & np.concatenate(([False], alive))[winner]).nonzero()[0]
+    if len(of_mover) == 0:
+        return winner
+    a, b = new_parts.repeat(len(of_mover)), np.tile(of_mover, len(new_parts))
+    gap_m = relations(parts, a, b).gap_m
+    gap_m[expected[a, winner[b] - 1]] = 0.0
+    gap_m[parts.cells[a] > _SMALL_SHARE * parts.cells[b]] = np.inf
+    gap_m = gap_m.reshape(len(new_parts), -1)
+    nearest, close = of_mover[gap_m.argmin(axis=1)], gap_m.min(axis=1) <= _CLOSE_M
     result = winner.copy()
-    result[new_parts[close]] = winner[of_mover[best[close]]]
+    result[new_parts[close]] = winner[nearest[close]]
     return result

@@ -1,20 +1,9 @@
-"""Which cells of the depth grid belong to which track. Terms: vision/__init__.py.
+"""Where the cells of each track are expected in the next frame, and found. Terms: vision/__init__.py.
 
 Connected depth alone would merge a person with the wall that the person passes. So each track remembers the
-cells that it covered, and these vote:
-
-1. predict: the old cells of each track move with the camera and, for movers, with the track's velocity. A
-   cell where they arrive belongs to the prediction if the depth measured there agrees.
-2. count_votes: each predicted cell is one vote of its track for the connected part in which it lies. A few
-   stray votes do not count, and of several static tracks in a part only the strongest stays.
-3. withdraw: an exception. A mover that must have gone on loses what was there before and is claimed by what
-   stands: it went behind that, at about its depth.
-4. release: another one. A standing track loses a newly arrived part if the rest of the track was there
-   before: somebody who stood beside furniture has left it.
-5. divide: a part with one voter goes to that track as a whole. A part with several voters (at most one of
-   them is static) is divided: each cell goes to the nearest vote.
-
-Between 4 and 5, vision/bodies/grouping.py corrects to which track a whole part goes.
+cells that it covered. These move with the camera and, for movers, with the track's velocity. A cell where
+they arrive belongs to the prediction if the depth measured there agrees. To which track it goes, the
+prediction does not decide alone: vision/bodies/votes.py.
 """
 
 from __future__ import annotations
@@ -24,20 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
-from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
-from vision.depth.regions import IntGrid, spread_labels
+from vision.depth.depth_grid import DepthGrid, FloatGrid
+from vision.depth.regions import IntGrid
 
-_LEAST_VOTES = 4  # cells: fewer are strays of a prediction that is off by a cell
-_SHARE_OF_PART = 0.15  # of all votes in it, or
-_SHARE_OF_TRACK = 0.30  # of all votes of the track, whichever is less: else they are strays, too
-_CAME_CELLS = 20  # as much as an arrival that proves by itself (vision/bodies/judgement.py), and
-_CAME_SHARE = 0.3  # of the part: who leaves furniture comes out of it side first
-_LEAVING_SHARE = 0.75  # of what stands: a larger part is the thing itself
-_STAYED_SHARE = 0.7  # of its votes: the rest is where the rims of both lie
 _DEPTH_GATE_INVERSE = 0.03  # 1/m, as large as a jump in depth may be within one part, and
 _DEPTH_GATE_M = 0.25  # what may come nearer as a body turns or bends, beside its own velocity
-_NOBODY = np.zeros(1, np.int32)
+_NEAREST_M = np.float32(0.1)  # nearer, a point projects anywhere
+
+Lead = tuple[np.float32, np.float32, np.float32, np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,8 +46,26 @@ NO_TRACK_SURFACES = TrackSurfaces(
 
 def surfaces(grid: DepthGrid, labels: IntGrid, ids: NDArray[np.int64], pose: Pose) -> TrackSurfaces:
     """The surfaces of tracks with ids (T,), where labels (h, w) holds index + 1, 0 for none."""
-    cells = np.flatnonzero(labels > 0)
-    return TrackSurfaces(grid.points(cells), labels.ravel().take(cells) - 1, ids, pose)
+    return TrackSurfaces(*_points_of(grid.depth_m, grid.x, grid.y, labels), ids, pose)
+
+
+@compiled("float32[:, ::1], float32[::1], float32[::1], int32[:, ::1]")
+def _points_of(
+    depth_m: FloatGrid, ray_x: FloatGrid, ray_y: FloatGrid, labels: IntGrid
+) -> tuple[FloatGrid, NDArray[np.int32]]:
+    """points_m (3, K) of all labelled cells and their owner (K,), label - 1."""
+    height, width = labels.shape
+    count = np.count_nonzero(labels)
+    points_m, owner = np.empty((3, count), np.float32), np.empty(count, np.int32)
+    k = 0
+    for i in range(height):
+        for j in range(width):
+            if labels[i, j] == 0:
+                continue
+            points_m[0, k], points_m[1, k] = ray_x[j] * depth_m[i, j], ray_y[i] * depth_m[i, j]
+            points_m[2, k], owner[k] = depth_m[i, j], labels[i, j] - 1
+            k += 1
+    return points_m, owner
 
 
 def predict(
@@ -73,161 +76,106 @@ def predict(
     index (T,): what track each one of before is now, -1: gone. shift_m (now's tracks, 3): way of each since
     then, in the fixed frame that before.pose and pose are given in.
     """
-    result = np.zeros(grid.depth_m.shape, np.int32)
-    if len(before.owner) == 0:
-        return result
-    number = (index + 1).astype(np.int32)
-    relative = pose.inverse() @ before.pose
-    there = relative.rotation.astype(np.float32) @ before.points_m
-    there += relative.translation_m.astype(np.float32)[:, None]
-    if shift_m.any():
-        # Of what is gone, any way will do.
-        way = shift_m[index] @ pose.rotation
-        there += way.T.astype(np.float32).take(before.owner, axis=1)
-    cell, inside, expected = grid.project(there)
-    measured = grid.inverse_depth.ravel().take(cell)
-    gate = np.float32(_DEPTH_GATE_INVERSE) + np.float32(_DEPTH_GATE_M) * expected * expected
-    agrees = inside & (measured > 0) & (np.abs(measured - expected) <= gate)
-    if not number.all():
-        agrees &= number.take(before.owner) > 0
-    chosen = agrees.nonzero()[0]
-    _write_nearest(
-        result.ravel(), cell.take(chosen), number.take(before.owner.take(chosen)), expected.take(chosen)
+    return _predicted(
+        before.points_m,
+        before.owner,
+        index,
+        shift_m,
+        before.pose.rotation,
+        before.pose.translation_m,
+        pose.rotation,
+        pose.translation_m,
+        grid.inverse_depth,
+        grid.x,
+        grid.y,
     )
+
+
+@inlined
+def _lead(
+    outer_rotation: FloatArray, outer_m: FloatArray, rotation: FloatArray, origin_m: FloatArray, axis: int
+) -> Lead:
+    """What leads from the axes of a pose, rotation and origin_m, to one coordinate in those of another."""
+    x, y, z, shift_m = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        along = outer_rotation[i, axis]
+        x, y, z = x + along * rotation[i, 0], y + along * rotation[i, 1], z + along * rotation[i, 2]
+        shift_m += along * (origin_m[i] - outer_m[i])
+    return np.float32(x), np.float32(y), np.float32(z), np.float32(shift_m)
+
+
+@inlined
+def _led(lead: Lead, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
+    return lead[0] * x + lead[1] * y + lead[2] * z + lead[3]
+
+
+@compiled(
+    "float32[:, ::1], int32[::1], int64[::1], float64[:, :], float64[:, :], float64[:], float64[:, :],"
+    "float64[:], float32[:, ::1], float32[::1], float32[::1]"
+)
+def _predicted(
+    points_m: FloatGrid,
+    owner: NDArray[np.int32],
+    index: NDArray[np.intp],
+    shift_m: FloatArray,
+    old_rotation: FloatArray,
+    old_origin_m: FloatArray,
+    rotation: FloatArray,
+    origin_m: FloatArray,
+    inverse_depth: FloatGrid,
+    ray_x: FloatGrid,
+    ray_y: FloatGrid,
+) -> IntGrid:
+    """As predict; rotation and origin_m of the camera, when the points were seen and now."""
+    height, width = inverse_depth.shape
+    result, nearest = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
+    left, top = ray_x[0], ray_y[0]
+    per_column, per_row = np.float32(1.0) / (ray_x[1] - left), np.float32(1.0) / (ray_y[1] - top)
+    to_x = _lead(rotation, origin_m, old_rotation, old_origin_m, 0)
+    to_y = _lead(rotation, origin_m, old_rotation, old_origin_m, 1)
+    to_z = _lead(rotation, origin_m, old_rotation, old_origin_m, 2)
+    way_m = np.zeros(shift_m.shape, np.float32)  # in the camera's axes now
+    for track in range(len(shift_m)):
+        for i in range(3):
+            way_m[track, i] = (
+                shift_m[track, 0] * rotation[0, i]
+                + shift_m[track, 1] * rotation[1, i]
+                + shift_m[track, 2] * rotation[2, i]
+            )
+    for k in range(len(owner)):
+        track = index[owner[k]]
+        if track < 0:
+            continue
+        x, y, z = points_m[0, k], points_m[1, k], points_m[2, k]
+        there_m = _led(to_z, x, y, z) + way_m[track, 2]
+        if not there_m > _NEAREST_M:
+            continue
+        expected = np.float32(1.0) / there_m
+        x, y = _led(to_x, x, y, z) + way_m[track, 0], _led(to_y, x, y, z) + way_m[track, 1]
+        column = (x * expected - left) * per_column + np.float32(0.5)
+        row = (y * expected - top) * per_row + np.float32(0.5)
+        if not (0.0 <= column < width and 0.0 <= row < height):
+            continue
+        i, j = int(row), int(column)
+        measured = inverse_depth[i, j]
+        gate = np.float32(_DEPTH_GATE_INVERSE) + np.float32(_DEPTH_GATE_M) * expected * expected
+        if not (measured > 0 and abs(measured - expected) <= gate):
+            continue
+        # Of those that want the same cell the nearest has it, the last of those that are as near.
+        if expected >= nearest[i, j]:
+            nearest[i, j], result[i, j] = expected, track + 1
     return result
 
 
-def _write_nearest(
-    into: NDArray[np.int32],
-    cell: NDArray[np.intp],
-    value: NDArray[np.int32],
-    inverse_depth: NDArray[np.float32],
-) -> None:
-    """Into each cell (M,) of into its value (M,); of those that want the same cell, the nearest one's."""
-    into[cell] = value
-    held = np.zeros(len(into), np.float32)
-    held[cell] = inverse_depth
-    # What is written last stays. Most cells are wanted once; only what is nearer than the last has to be
-    # written again, the nearest last.
-    nearer = (inverse_depth > held.take(cell)).nonzero()[0]
-    nearer = nearer[np.argsort(inverse_depth.take(nearer), kind="stable")]
-    into[cell.take(nearer)] = value.take(nearer)
+def count_cells(labels: IntGrid, cells: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """(count,) how many of the flat cells (K,) are of each of the parts 1..count of labels (h, w)."""
+    return _counted(labels, cells, count)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ballot:
-    """present (P, T): the tracks that a part may belong to. cast (P, T): votes for each. winner (P,): track
-    index + 1 of the one with the most, 0 for none. votes (P,): the winner's."""
-
-    present: NDArray[np.bool_]
-    cast: NDArray[np.intp]
-    winner: NDArray[np.int32]
-    votes: NDArray[np.intp]
-
-
-def count_votes(
-    parts: IntGrid, count: int, predicted: IntGrid, tracks: int, mover: NDArray[np.bool_]
-) -> Ballot:
-    """How the cells predicted (h, w), track index + 1, vote in the connected parts 1..count of parts.
-
-    mover (T,): tracks that move, or may: only these divide a part; of the static ones the strongest stays.
-    """
-    if tracks == 0 or count == 0:
-        nobody, cast = np.zeros(count, np.int32), np.zeros((count, tracks), np.intp)
-        return Ballot(cast.astype(np.bool_), cast, nobody, nobody.astype(np.intp))
-    votes = _votes(parts, predicted, (parts > 0) & (predicted > 0), (count, tracks))
-    total, own = votes.sum(axis=1)[:, None], votes.sum(axis=0)
-    least = np.minimum(_SHARE_OF_PART * total, _SHARE_OF_TRACK * own)
-    present = votes >= np.maximum(least, _LEAST_VOTES)
-    # Of the static tracks the strongest stays.
-    static_votes = np.where(mover, 0, votes) * present
-    strongest = static_votes.argmax(axis=1)[:, None] == np.arange(tracks)
-    present &= mover | (strongest & (static_votes > 0))
-    return elect(present, votes)
-
-
-def _votes(parts: IntGrid, predicted: IntGrid, voters: BoolGrid, shape: tuple[int, int]) -> NDArray[np.intp]:
-    """(P, T) how many of the cells voters (h, w) speak for each track in each part; shape: P, T."""
-    ballots = np.flatnonzero(voters)
-    pair = parts.ravel().take(ballots) * shape[1] + predicted.ravel().take(ballots) - (shape[1] + 1)
-    return np.bincount(pair, minlength=shape[0] * shape[1]).reshape(shape)
-
-
-def elect(present: NDArray[np.bool_], cast: NDArray[np.intp]) -> Ballot:
-    """The ballot of P parts, each for the one with the most votes, cast (P, T), of those present."""
-    best, each = np.where(present, cast, -1).argmax(axis=1), np.arange(len(cast))
-    claimed = present[each, best]
-    return Ballot(present, cast, ((best + 1) * claimed).astype(np.int32), cast[each, best] * claimed)
-
-
-def guessed(ballot: Ballot, mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(T,) movers, mover (T,), all of whose parts something that stands claims as well: where such a mover
-    ends is a guess."""
-    shared = np.any(ballot.present & ~mover, axis=1, keepdims=True)
-    result: NDArray[np.bool_] = (
-        mover & np.any(ballot.present, axis=0) & ~np.any(ballot.present & ~shared, axis=0)
-    )
+@compiled("int32[:, ::1], int64[::1], int64")
+def _counted(labels: IntGrid, cells: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    flat, result = labels.ravel(), np.zeros(count, np.intp)
+    for cell in cells:
+        if flat[cell] > 0:
+            result[flat[cell] - 1] += 1
     return result
-
-
-def release(
-    ballot: Ballot, cells: NDArray[np.intp], arrived: NDArray[np.intp], mover: NDArray[np.bool_]
-) -> Ballot:
-    """ballot without what stands for parts that have come while the rest of it was there: somebody who stood
-    beside furniture, as one part with it, has left it.
-
-    cells (P,) of the parts; arrived (P,): those where free space was seen. mover (T,): keep what is theirs.
-    """
-    came = (arrived >= _CAME_CELLS) & (arrived >= _CAME_SHARE * cells)
-    if not (came.any() and ballot.present.any()):
-        return ballot
-    whole, rest = cells @ ballot.present, (cells * ~came) @ ballot.present
-    leaves = ~mover & (rest > 0)
-    left = ballot.present & leaves & came[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
-    return elect(ballot.present & ~left, ballot.cast)
-
-
-def withdraw(
-    ballot: Ballot,
-    parts: IntGrid,
-    predicted: IntGrid,
-    stayed: BoolGrid,
-    overdue: NDArray[np.bool_],
-    mover: NDArray[np.bool_],
-) -> tuple[Ballot, NDArray[np.bool_]]:
-    """ballot without movers that must have gone on for parts that something that stands claims as well, if
-    most of their votes there are for surfaces that have stayed: they went behind them, at about their depth.
-    And which tracks (T,) have lost all of their parts so.
-
-    parts, predicted and mover as for count_votes; stayed (h, w); overdue (T,): the movers in question.
-    """
-    present = ballot.present
-    doubtful = present & overdue & np.any(present & ~mover, axis=1, keepdims=True)
-    if not doubtful.any():
-        return ballot, np.zeros(len(mover), np.bool_)
-    votes = _votes(parts, predicted, (parts > 0) & (predicted > 0) & stayed, present.shape)
-    left = present & ~(doubtful & (votes >= _STAYED_SHARE * ballot.cast))
-    hidden: NDArray[np.bool_] = np.any(present, axis=0) & ~np.any(left, axis=0)
-    return elect(left, ballot.cast), hidden
-
-
-def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:
-    """(h, w) track index + 1: whole parts to their winner (P,), shared ones by the nearest vote."""
-    labels = np.concatenate((_NOBODY, winner)).take(parts)
-    shared = np.zeros(len(winner) + 1, np.bool_)
-    count, tracks = ballot.present.shape
-    # Nobody shares in the part of a track that begins just now.
-    shared[1:] = (ballot.present.sum(axis=1) > 1) & (winner > 0) & (winner <= tracks)
-    if not shared.any():
-        return labels
-    allowed = np.zeros((count + 1, tracks + 1), np.bool_)
-    allowed[1:, 1:] = ballot.present
-    inside = shared.take(parts)
-    cells = np.flatnonzero(inside)
-    part, vote = parts.ravel().take(cells), predicted.ravel().take(cells)
-    seeds = np.zeros(parts.shape, np.int32)
-    seeds.ravel()[cells] = vote * allowed[part, vote]
-    filled = spread_labels(seeds, inside).ravel().take(cells)
-    fits = allowed[part, filled]
-    labels.ravel()[cells[fits]] = filled[fits]
-    return labels

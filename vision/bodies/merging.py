@@ -11,17 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.bodies.boxes import (
-    LEAST_SAMPLES,
-    LOAD_M,
-    THROUGH_M,
-    boxes,
-    cells_between,
-    gaps_m,
-    overlaps,
-    seen_through,
-    stacked,
-)
+from vision.bodies.boxes import LEAST_SAMPLES, LOAD_M, THROUGH_M, boxes, cells_between, relations
 from vision.bodies.division import LOW_BESIDE, NEARER_INVERSE, SINGLE_WIDTH_M, split
 from vision.bodies.grouping import something_nearer_between
 from vision.depth.depth_grid import BoolGrid, DepthGrid
@@ -50,10 +40,10 @@ _GOES_MPS = 0.3  # what goes more slowly goes like whatever stands
 class _Pairs:
     """K pairs of tracks, as indices small (K,) and large (K,).
 
-    small_px, large_px (K, 4): their boxes in the image, u0, v0, u1, v1. gap_m (K,): between their boxes in
-    space. overlapping (K,): half of the small one's box in the image is within the other. fits (K,): by their
-    size they could be one; slim (K,): together they are no wider than anybody. perhaps_alike (K,): their
-    velocities do not contradict; much_alike, exactly_alike (K,): they surely go so.
+    small_px, large_px (K, 4): their boxes in the image, u0, v0, u1, v1. gap_m, stacked, within (K,): see
+    Relations. overlapping (K,): half of the small one's box in the image is within the other. fits (K,): by
+    their size they could be one; slim (K,): together they are no wider than anybody. perhaps_alike (K,):
+    their velocities do not contradict; much_alike, exactly_alike (K,): they surely go so.
     """
 
     small: NDArray[np.intp]
@@ -61,6 +51,8 @@ class _Pairs:
     small_px: FloatArray
     large_px: FloatArray
     gap_m: FloatArray
+    stacked: BoolArray
+    within: BoolArray
     overlapping: BoolArray
     fits: BoolArray
     slim: BoolArray
@@ -127,14 +119,17 @@ def _paired(
     known = np.maximum(sigma_mps[small], sigma_mps[large]) <= _KNOWN_SIGMA_MPS
     right_m = np.maximum(box.high_m[small, 0], box.high_m[large, 0])
     left_m = np.minimum(box.low_m[small, 0], box.low_m[large, 0])
-    overlapping = overlaps(small_px, large_px) >= _OVERLAP
+    lie = relations(regions, small, large)
+    overlapping = lie.overlap >= _OVERLAP
     slim = right_m - left_m <= SINGLE_WIDTH_M
     return _Pairs(
         small,
         large,
         small_px,
         large_px,
-        gap_m=gaps_m(box, small, box, large),
+        gap_m=lie.gap_m,
+        stacked=lie.stacked,
+        within=lie.within,
         overlapping=overlapping,
         fits=(cells[small] <= _SMALL_SHARE * cells[large]) | slim | overlapping,
         slim=slim,
@@ -152,14 +147,12 @@ def _beside(pairs: _Pairs) -> BoolArray:
 
 def _carried(pairs: _Pairs) -> BoolArray:
     """(K,) a load on its carrier, even if it is farther back: the mast of a cart."""
-    on_top = stacked(pairs.small_px, pairs.large_px)
-    return on_top & pairs.exactly_alike & pairs.fits & (pairs.gap_m <= LOAD_M)
+    return pairs.stacked & pairs.exactly_alike & pairs.fits & (pairs.gap_m <= LOAD_M)
 
 
 def _seen_through(pairs: _Pairs) -> BoolArray:
     """(K,) what is seen through a vehicle and surely goes much as it does: its own far side."""
-    within = seen_through(pairs.small_px, pairs.large_px)
-    return within & pairs.much_alike & (pairs.gap_m <= THROUGH_M)
+    return pairs.within & pairs.much_alike & (pairs.gap_m <= THROUGH_M)
 
 
 def _pushed(pairs: _Pairs) -> BoolArray:

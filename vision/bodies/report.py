@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.bodies.boxes import overlaps
 from vision.bodies.tracks import Tracks
@@ -30,46 +33,126 @@ _PIECE_M2 = 0.5
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
     """The tracks seen often enough, in the camera axes of the detection."""
-    pose = detection.pose
-    local = (tracks.state[:, :3] - pose.translation_m) @ pose.rotation
-    velocity = tracks.state[:, 3:] @ pose.rotation
-    covariance = pose.rotation.T @ tracks.covariance[:, 3:, 3:] @ pose.rotation
+    pose, camera, moving = detection.pose, detection.camera, tracks.moving
+    local, velocity, covariance = _in_camera(
+        tracks.state, tracks.covariance, pose.rotation, pose.translation_m
+    )
     unseen_s: FloatArray = np.multiply(detection.captured_ns - tracks.seen_ns, 1e-9, dtype=np.float64)
-    listed = (tracks.sightings >= MIN_SIGHTINGS) & (local[:, 2] > 0.0) & _expected(tracks, unseen_s)
-    bbox, unseen = tracks.bbox_px, unseen_s != 0.0
-    # What is above the robot may end there. What goes has legs behind what hides them; of slivers that is
-    # hard to tell.
-    listed &= ~tracks.overhead | (tracks.moving & (tracks.cells >= _OVERHEAD_CELLS))
-    # A mover that is out of sight, but for a sliver, is where it goes, whole, and not where its rest is seen.
-    whole = tracks.moving & (unseen | tracks.sliver)
-    if unseen.any():
-        listed &= ~unseen | _in_view(local, detection)
-    if whole.any():
-        expected_px, rest = _expected_px(tracks.box_m, local, detection), ~unseen
-        expected_px[rest, :2] = np.minimum(expected_px[rest, :2], bbox[rest, :2])
-        expected_px[rest, 2:] = np.maximum(expected_px[rest, 2:], bbox[rest, 2:])
-        bbox = np.where(whole[:, None], expected_px, bbox)
-    told = tracks.moving & ~_pieces(tracks, listed, bbox, local[:, 2], detection.camera.fx)
+    lens = (camera.fx, camera.fy, camera.cx, camera.cy, float(camera.width), float(camera.height))
+    listed, bbox = _listed(
+        local,
+        tracks.covariance,
+        unseen_s,
+        tracks.sightings,
+        tracks.cells,
+        moving,
+        tracks.sliver,
+        tracks.overhead,
+        tracks.box_m,
+        tracks.bbox_px,
+        *lens,
+    )
+    told = moving & ~_pieces(tracks, listed, bbox, local[:, 2], camera.fx)
     result = []
+    ids, born_ns, fragments_on = tracks.ids.tolist(), tracks.born_ns.tolist(), tracks.fragments.tolist()
+    score, unseen, goes = tracks.confidence.tolist(), unseen_s.tolist(), told.tolist()
     for t in listed.nonzero()[0].tolist():
-        moving = bool(told[t])
         u0, v0, u1, v1 = bbox[t].tolist()
         result.append(
             Obstacle(
-                id=int(tracks.ids[t]),
+                id=ids[t],
                 bbox_px=(u0, v0, u1, v1),
                 position_m=local[t],
                 extent_m=tracks.extent_m[t].copy(),
                 velocity_mps=velocity[t],
                 velocity_cov=covariance[t],
-                moving=moving,
-                score=float(tracks.confidence[t]) if moving else _STATIC_SCORE,
-                fragments=int(tracks.fragments[t]),
-                age_s=(detection.captured_ns - int(tracks.born_ns[t])) * 1e-9,
-                unseen_s=float(unseen_s[t]),
+                moving=goes[t],
+                score=score[t] if goes[t] else _STATIC_SCORE,
+                fragments=fragments_on[t],
+                age_s=(detection.captured_ns - born_ns[t]) * 1e-9,
+                unseen_s=unseen[t],
             )
         )
     return tuple(result)
+
+
+@compiled("float64[:, ::1], float64[:, :, ::1], float64[:, :], float64[:]")
+def _in_camera(
+    state: FloatArray, covariance: FloatArray, rotation: FloatArray, translation_m: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Position (T, 3), velocity (T, 3) and its covariance (T, 3, 3) in the axes of a camera at rotation and
+    translation_m."""
+    count = len(state)
+    local, velocity, spread = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3, 3))
+    for t in range(count):
+        for i in range(3):
+            for k in range(3):
+                local[t, i] += rotation[k, i] * (state[t, k] - translation_m[k])
+                velocity[t, i] += rotation[k, i] * state[t, 3 + k]
+            for j in range(3):
+                for k in range(3):
+                    for m in range(3):
+                        spread[t, i, j] += rotation[k, i] * covariance[t, 3 + k, 3 + m] * rotation[m, j]
+    return local, velocity, spread
+
+
+@inlined
+def _known(unseen_s: float, cells: int, moving: bool, sliver: bool, sigma_mps: float) -> bool:
+    """Whether it is known well enough where a track went since it was seen."""
+    if unseen_s > _LISTED_UNSEEN_S or (moving and not sigma_mps * unseen_s <= _WAY_SIGMA_M):
+        return False
+    # What was seen last of somebody who went behind something tells little of where he is now.
+    return not (moving and sliver) or cells >= _LAST_CELLS
+
+
+@compiled(
+    "float64[:, ::1], float64[:, :, ::1], float64[::1], int64[::1], int64[::1], boolean[::1], boolean[::1],"
+    "boolean[::1], float64[:, ::1], float64[:, ::1], float64, float64, float64, float64, float64, float64"
+)
+def _listed(
+    local: FloatArray,
+    covariance: FloatArray,
+    unseen_s: FloatArray,
+    sightings: NDArray[np.intp],
+    cells: NDArray[np.intp],
+    moving: NDArray[np.bool_],
+    sliver: NDArray[np.bool_],
+    overhead: NDArray[np.bool_],
+    box_m: FloatArray,
+    bbox_px: FloatArray,
+    fx: float,
+    fy: float,
+    cx: float,
+    cy: float,
+    width: float,
+    height: float,
+) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Which tracks (T,) are shown; and where (T, 4) in the image they are, cut at its border."""
+    listed, bbox = np.zeros(len(local), np.bool_), bbox_px.copy()
+    for t in range(len(local)):
+        x, y, z = local[t, 0], local[t, 1], max(local[t, 2], 0.1)
+        sigma_mps = math.sqrt(covariance[t, 3, 3] + covariance[t, 4, 4] + covariance[t, 5, 5])
+        listed[t] = sightings[t] >= MIN_SIGHTINGS and local[t, 2] > 0.0
+        listed[t] = listed[t] and _known(unseen_s[t], cells[t], moving[t], sliver[t], sigma_mps)
+        # What is above the robot may end there. What goes has legs behind what hides them; of slivers that is
+        # hard to tell.
+        legs = moving[t] and cells[t] >= _OVERHEAD_CELLS
+        listed[t] = listed[t] and (not overhead[t] or legs)
+        unseen = unseen_s[t] != 0.0
+        if unseen:
+            u, v = x / z * fx + cx, y / z * fy + cy
+            listed[t] = listed[t] and 0.0 <= u < width and 0.0 <= v < height
+        # A mover that is out of sight, but for a sliver, is where it goes, whole, and not where its rest is
+        # seen.
+        if moving[t] and (unseen or sliver[t]):
+            left, right = (x + box_m[t, 0]) / z * fx + cx, (x + box_m[t, 2]) / z * fx + cx
+            top, bottom = (y + box_m[t, 1]) / z * fy + cy, (y + box_m[t, 3]) / z * fy + cy
+            bbox[t, 0], bbox[t, 2] = min(max(left, 0.0), width), min(max(right, 0.0), width)
+            bbox[t, 1], bbox[t, 3] = min(max(top, 0.0), height), min(max(bottom, 0.0), height)
+            if not unseen:
+                bbox[t, 0], bbox[t, 1] = min(bbox[t, 0], bbox_px[t, 0]), min(bbox[t, 1], bbox_px[t, 1])
+                bbox[t, 2], bbox[t, 3] = max(bbox[t, 2], bbox_px[t, 2]), max(bbox[t, 3], bbox_px[t, 3])
+    return listed, bbox
 
 
 def _pieces(
@@ -89,35 +172,6 @@ def _pieces(
     return result
 
 
-def _expected(tracks: Tracks, unseen_s: FloatArray) -> NDArray[np.bool_]:
-    """(T,) of which it is known well enough where they went since they were seen unseen_s (T,) ago."""
-    known = ~tracks.moving | (tracks.velocity_sigma_mps * unseen_s <= _WAY_SIGMA_M)
-    # What was seen last of somebody who went behind something tells little of where he is now.
-    known &= ~(tracks.moving & tracks.sliver) | (tracks.cells >= _LAST_CELLS)
-    result: NDArray[np.bool_] = (unseen_s <= _LISTED_UNSEEN_S) & known
-    return result
-
-
-def _expected_px(box_m: FloatArray, local_m: FloatArray, detection: Detection) -> FloatArray:
-    """(T, 4) boxes in the image, cut at its border, of bodies at local_m (T, 3) with edges box_m (T, 4)."""
-    camera = detection.camera
-    depth = np.maximum(local_m[:, 2:], 0.1)
-    u = (local_m[:, :1] + box_m[:, 0::2]) / depth * camera.fx + camera.cx
-    v = (local_m[:, 1:2] + box_m[:, 1::2]) / depth * camera.fy + camera.cy
-    u, v = np.clip(u, 0.0, camera.width), np.clip(v, 0.0, camera.height)
-    return np.stack((u[:, 0], v[:, 0], u[:, 1], v[:, 1]), axis=1)
-
-
-def _in_view(local_m: FloatArray, detection: Detection) -> NDArray[np.bool_]:
-    """(T,) whether points (T, 3) of the camera frame project into the image."""
-    camera = detection.camera
-    depth = np.maximum(local_m[:, 2], 0.1)
-    u = local_m[:, 0] / depth * camera.fx + camera.cx
-    v = local_m[:, 1] / depth * camera.fy + camera.cy
-    result: NDArray[np.bool_] = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
-    return result
-
-
 def fragments(
     detection: Detection,
     owner: NDArray[np.int64],
@@ -126,22 +180,56 @@ def fragments(
 ) -> Fragments:
     """The fragments with their owners (N,) and whether these move (N,)."""
     camera = detection.camera
-    depth = (0.5 * (detection.near_m[:, 0] + detection.near_m[:, 1])).astype(float)
-    middle = (0.5 * (detection.ends_px[:, 0] + detection.ends_px[:, 1])).astype(float)
-    position = np.empty((len(depth), 3))
-    position[:, 0] = (middle[:, 0] - camera.cx) / camera.fx * depth
-    position[:, 1] = (middle[:, 1] - camera.cy) / camera.fy * depth
-    position[:, 2] = depth
-    usable = detection.motion.usable.reshape(-1, 2)
-    measured = (usable[:, 0] | usable[:, 1])[:, None]
-    sigma = np.sqrt(np.diagonal(velocities.covariance, axis1=1, axis2=2))
+    depth, position, velocity, sigma = _of_fragments(
+        detection.ends_px,
+        detection.near_m,
+        detection.motion.usable,
+        velocities.velocity_mps,
+        velocities.covariance,
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+    )
     return Fragments(
         ids=detection.ids,
         ends_px=detection.ends_px,
         depth_m=depth,
         position_m=position,
-        velocity_mps=np.where(measured, velocities.velocity_mps, np.nan),
-        velocity_sigma_mps=np.where(measured, sigma, np.nan),
+        velocity_mps=velocity,
+        velocity_sigma_mps=sigma,
         moving=moving,
         obstacle_id=owner,
     )
+
+
+@compiled(
+    "float32[:, :, :], float32[:, :], boolean[:], float64[:, :], float64[:, :, :], float64, float64,"
+    "float64, float64"
+)
+def _of_fragments(
+    ends_px: NDArray[np.float32],
+    near_m: NDArray[np.float32],
+    usable: NDArray[np.bool_],
+    velocity_mps: FloatArray,
+    covariance: FloatArray,
+    fx: float,
+    fy: float,
+    cx: float,
+    cy: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Depth (N,) and position (N, 3) of their middles; velocity (N, 3) and its sigma (N, 3), NaN where
+    neither of the two ends is usable."""
+    count = len(ends_px)
+    depth, position = np.empty(count), np.empty((count, 3))
+    velocity, sigma = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
+    for k in range(count):
+        depth[k] = np.float32(0.5) * (near_m[k, 0] + near_m[k, 1])
+        u = np.float32(0.5) * (ends_px[k, 0, 0] + ends_px[k, 1, 0])
+        v = np.float32(0.5) * (ends_px[k, 0, 1] + ends_px[k, 1, 1])
+        position[k, 0], position[k, 1] = (u - cx) / fx * depth[k], (v - cy) / fy * depth[k]
+        position[k, 2] = depth[k]
+        if usable[2 * k] or usable[2 * k + 1]:
+            for i in range(3):
+                velocity[k, i], sigma[k, i] = velocity_mps[k, i], math.sqrt(covariance[k, i, i])
+    return depth, position, velocity, sigma

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.types import FloatArray, Intrinsics, Pose
+from hal.compiled import compiled
+from hal.types import FloatArray, Pose
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
-from vision.depth.depth_mask import depth_sigma_m
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
@@ -35,57 +35,203 @@ _CUT_SIGMA_M = 1.0  # in height, of what reaches beyond the image above or below
 _CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it does not average out
 _SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
 _AREA_MEMORY_S = 0.32  # a tenth of what is new each frame at 30 a second
-_SLIVER = 0.4  # of its usual surface
+_SLIVER_SHARE = 0.4  # of its usual surface
 _JUMP_M = 0.3  # and two sigmas of depth: a centre farther from where it was expected has jumped
+# What is seen of a track: hardly anything; or as above, in that order.
+_UNSEEN, _SMOOTH, _ROUGH, _CUT, _SLIVER = range(5)
 
 
 def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
     """Update tracks with the surfaces measured, entry k for track k; without cells they stay as predicted."""
-    visible = measured.cells >= MIN_CELLS
-    tracks.clean_s[~visible] = 0.0
-    seen = visible.nonzero()[0]
-    if len(seen) == 0:
-        return
-    position = detection.pose.apply(measured.position_m[seen])
-    depth = measured.position_m[seen, 2]
-    covariance = _centre_covariance(measured, seen, detection.pose.rotation, noise)
-    area_m2 = measured.cells[seen] * np.square(depth)
-    usual_m2 = np.where(tracks.sightings[seen] == 0, area_m2, tracks.area_m2[seen])
-    change = np.abs(area_m2 - usual_m2) / usual_m2
-    jump = np.sqrt(np.square(position - tracks.state[seen, :3]).sum(axis=1))
-    steady = jump <= _JUMP_M + 2.0 * depth_sigma_m(depth, noise)
-    steady &= detection.motion_known  # else the camera's own error would be theirs
-    smooth = measured.wide[seen] & (change <= _SAME_AREA) & steady
-    # What is left to see of a mover that goes behind something is not where its body is.
-    sliver = tracks.moving[seen] & (area_m2 < _SLIVER * usual_m2)
-    rough = ~smooth & ~sliver & steady & tracks.moving[seen]
-    cut = ~smooth & ~sliver & ~rough
-    tracks.sliver[seen] = sliver & ~_at_border(measured.bbox_px[seen], detection)
-    located, doubt = (smooth | rough).nonzero()[0], covariance
-    if rough.any():
-        shift_m = np.where(rough, _SHIFT_SHARE * measured.extent_m[seen, :2].max(axis=1), 0.0)
-        doubt = covariance + np.square(shift_m)[:, None, None] * np.eye(3)
-    tracks.locate(seen[located], position[located], doubt[located])
-    tracks.relocate(seen[cut], position[cut], covariance[cut])
-    clean = smooth & measured.whole[seen]
-    tracks.clean_s[seen] = np.where(clean, tracks.clean_s[seen] + detection.dt_s, 0.0)
-    tracks.growth_mps[seen] = change * measured.extent_m[seen, 0] / _AREA_MEMORY_S
-    gain = -math.expm1(-detection.dt_s / _AREA_MEMORY_S)
-    tracks.area_m2[seen] = np.where(sliver, usual_m2, usual_m2 + gain * (area_m2 - usual_m2))
-    tracks.seen_ns[seen] = detection.captured_ns
-    tracks.sightings[seen] += 1
-    tracks.bbox_px[seen] = measured.bbox_px[seen]
-    shown = seen[(measured.whole[seen] & ~sliver) | (tracks.sightings[seen] == 1)]
-    tracks.box_m[shown] = _box_m(measured, shown, detection.camera)
-    tracks.extent_m[seen] = measured.extent_m[seen]
-    tracks.cells[seen] = measured.cells[seen]
+    dt_s, rotation = detection.dt_s, detection.pose.rotation
+    kind, centre_m, change, tracks.area_m2 = _kinds(
+        measured.cells,
+        measured.position_m,
+        measured.wide,
+        rotation,
+        detection.pose.translation_m,
+        tracks.state,
+        tracks.sightings,
+        tracks.area_m2,
+        tracks.moving,
+        detection.motion_known,
+        -math.expm1(-dt_s / _AREA_MEMORY_S),
+        noise.floor_m,
+        noise.quadratic_per_m,
+    )
+    visible, smooth, sliver = kind != _UNSEEN, kind == _SMOOTH, kind == _SLIVER
+    doubt_m2 = _centre_covariances(
+        kind,
+        measured.position_m,
+        measured.extent_m,
+        measured.tall,
+        rotation,
+        noise.floor_m,
+        noise.quadratic_per_m,
+    )
+    located, cut = (smooth | (kind == _ROUGH)).nonzero()[0], (kind == _CUT).nonzero()[0]
+    tracks.locate(located, centre_m.take(located, axis=0), doubt_m2.take(located, axis=0))
+    tracks.relocate(cut, centre_m.take(cut, axis=0), doubt_m2.take(cut, axis=0))
+    whole = measured.whole
+    tracks.sliver = np.where(visible, sliver & ~_at_border(measured.bbox_px, detection), tracks.sliver)
+    tracks.clean_s = np.where(smooth & whole, tracks.clean_s + dt_s, 0.0)
+    growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
+    tracks.growth_mps = np.where(visible, growth_mps, tracks.growth_mps)
+    tracks.seen_ns[visible] = detection.captured_ns
+    tracks.sightings += visible
+    shown = visible & ((whole & ~sliver) | (tracks.sightings == 1))
+    camera = detection.camera
+    tracks.box_m = _boxes_m(
+        tracks.box_m,
+        shown,
+        measured.bbox_px,
+        measured.position_m,
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+    )
+    np.copyto(tracks.bbox_px, measured.bbox_px, where=visible[:, None])
+    np.copyto(tracks.extent_m, measured.extent_m, where=visible[:, None])
+    np.copyto(tracks.cells, measured.cells, where=visible)
+
+
+@compiled(
+    "int64[:], float64[:, :], boolean[:], float64[:, :], float64[:], float64[:, ::1], int64[::1],"
+    "float64[::1], boolean[::1], boolean, float64, float64, float64"
+)
+def _kinds(
+    cells: NDArray[np.intp],
+    position_m: FloatArray,
+    wide: NDArray[np.bool_],
+    rotation: FloatArray,
+    translation_m: FloatArray,
+    state: FloatArray,
+    sightings: NDArray[np.intp],
+    area_m2: FloatArray,
+    moving: NDArray[np.bool_],
+    motion_known: bool,
+    gain: float,
+    floor_m: float,
+    quadratic_per_m: float,
+) -> tuple[NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
+    """(T,) what kind each surface is of; (T, 3) where its centre is in the fixed frame; (T,) by what share of
+    its usual area it differs; and (T,) that area, with as much of what is new as gain says."""
+    kind, change, usual_m2 = np.full(len(cells), _UNSEEN), np.zeros(len(cells)), area_m2.copy()
+    centre_m = np.zeros((len(cells), 3))
+    for t in range(len(cells)):
+        if cells[t] < MIN_CELLS:
+            continue
+        depth_m = position_m[t, 2]
+        now_m2 = cells[t] * (depth_m * depth_m)
+        if sightings[t] == 0:
+            usual_m2[t] = now_m2
+        change[t] = abs(now_m2 - usual_m2[t]) / usual_m2[t]
+        squared = 0.0
+        for i in range(3):
+            centre_m[t, i] = translation_m[i]
+            for k in range(3):
+                centre_m[t, i] += rotation[i, k] * position_m[t, k]
+            squared += (centre_m[t, i] - state[t, i]) ** 2
+        expected_m = _JUMP_M + 2.0 * (floor_m + quadratic_per_m * depth_m * depth_m)
+        # Else the camera's own error would be theirs.
+        steady = motion_known and math.sqrt(squared) <= expected_m
+        if wide[t] and change[t] <= _SAME_AREA and steady:
+            kind[t] = _SMOOTH
+        elif moving[t] and now_m2 < _SLIVER_SHARE * usual_m2[t]:
+            # What is left to see of a mover that goes behind something is not where its body is.
+            kind[t] = _SLIVER
+            continue
+        elif moving[t] and steady:
+            kind[t] = _ROUGH
+        else:
+            kind[t] = _CUT
+        usual_m2[t] += gain * (now_m2 - usual_m2[t])
+    return kind, centre_m, change, usual_m2
+
+
+@compiled("int64[::1], float64[:, :], float64[:, :], boolean[:], float64[:, :], float64, float64")
+def _centre_covariances(
+    kind: NDArray[np.intp],
+    position_m: FloatArray,
+    extent_m: FloatArray,
+    tall: NDArray[np.bool_],
+    rotation: FloatArray,
+    floor_m: float,
+    quadratic_per_m: float,
+) -> FloatArray:
+    """(T, 3, 3) of the centres of the surfaces seen, in the fixed frame that rotation leads to."""
+    covariance, variance = np.zeros((len(kind), 3, 3)), np.empty(3)
+    for t in range(len(kind)):
+        if kind[t] == _UNSEEN:
+            continue
+        size_m, depth_m = max(extent_m[t, 0], extent_m[t, 1]), position_m[t, 2]
+        across_m = _CENTRE_SIGMA_M + _CENTRE_SHARE * size_m
+        along_m = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * extent_m[t, 2]
+        noise_m = _CENTRE_NOISE * (floor_m + quadratic_per_m * depth_m * depth_m)
+        variance[0] = across_m**2
+        variance[1] = across_m**2 if tall[t] else _CUT_SIGMA_M**2
+        variance[2] = along_m**2 + noise_m**2
+        if kind[t] == _ROUGH:
+            variance += (_SHIFT_SHARE * size_m) ** 2
+        for i in range(3):
+            for j in range(3):
+                for k in range(3):
+                    covariance[t, i, j] += rotation[i, k] * variance[k] * rotation[j, k]
+    return covariance
+
+
+@compiled("float64[:, ::1], boolean[::1], float64[:, :], float64[:, :], float64, float64, float64, float64")
+def _boxes_m(
+    box_m: FloatArray,
+    shown: NDArray[np.bool_],
+    bbox_px: FloatArray,
+    position_m: FloatArray,
+    fx: float,
+    fy: float,
+    cx: float,
+    cy: float,
+) -> FloatArray:
+    """box_m (T, 4), of those shown (T,) anew: left, upper, right and lower edge from their centres, at their
+    depth."""
+    result = box_m.copy()
+    for t in range(len(shown)):
+        if shown[t]:
+            x, y, z = position_m[t, 0], position_m[t, 1], position_m[t, 2]
+            result[t, 0], result[t, 2] = (bbox_px[t, 0] - cx) / fx * z - x, (bbox_px[t, 2] - cx) / fx * z - x
+            result[t, 1], result[t, 3] = (bbox_px[t, 1] - cy) / fy * z - y, (bbox_px[t, 3] - cy) / fy * z - y
+    return result
 
 
 def expected_bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> ExpectedBodies:
     """Where the bodies of tracks are expected by a camera at pose."""
-    centre_m = pose.inverse().apply(tracks.state[:, :3])
-    sigma_m: FloatArray = np.asarray(depth_sigma_m(np.maximum(centre_m[:, 2], 0.0), noise), np.float64)
+    centre_m, sigma_m = _expected(
+        tracks.state,
+        pose.rotation,
+        pose.translation_m,
+        noise.floor_m,
+        noise.quadratic_per_m,
+    )
     return ExpectedBodies(centre_m, tracks.extent_m, tracks.box_m, sigma_m)
+
+
+@compiled("float64[:, ::1], float64[:, :], float64[:], float64, float64")
+def _expected(
+    state: FloatArray,
+    rotation: FloatArray,
+    translation_m: FloatArray,
+    floor_m: float,
+    quadratic_per_m: float,
+) -> tuple[FloatArray, FloatArray]:
+    """centre_m and sigma_m of ExpectedBodies."""
+    centre_m, sigma_m = np.zeros((len(state), 3)), np.empty(len(state))
+    for t in range(len(state)):
+        for i in range(3):
+            for k in range(3):
+                centre_m[t, i] += rotation[k, i] * (state[t, k] - translation_m[k])
+        depth_m = max(centre_m[t, 2], 0.0)
+        sigma_m[t] = floor_m + quadratic_per_m * depth_m * depth_m
+    return centre_m, sigma_m
 
 
 def up(detection: Detection) -> FloatArray | None:
@@ -100,19 +246,18 @@ def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) 
     if ego.dt_s <= 0.0:
         return np.zeros(len(sight))
     way = detection.pose.rotation @ ego.motion.translation_m / ego.dt_s
-    ahead = sight @ way
-    turn: FloatArray = np.sqrt(np.maximum(way @ way - ahead * ahead, 0.0))
-    return turn / np.maximum(distance_m, 0.1)
+    return _turns(way, sight, distance_m)
 
 
-def _box_m(measured: Regions, seen: NDArray[np.intp], camera: Intrinsics) -> FloatArray:
-    """(K, 4) left, upper, right and lower edge of surfaces seen (K,) from their centres, at their depth."""
-    centre_m = measured.position_m[seen]
-    middle_px = np.array([camera.cx, camera.cy, camera.cx, camera.cy])
-    focal_px = np.array([camera.fx, camera.fy, camera.fx, camera.fy])
-    edges_m: FloatArray = (measured.bbox_px[seen] - middle_px) / focal_px * centre_m[:, 2:]
-    edges_m -= centre_m.take((0, 1, 0, 1), axis=1)
-    return edges_m
+@compiled("float64[:], float64[:, ::1], float64[::1]")
+def _turns(way: FloatArray, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
+    """As view_radps; way (3,) of the camera in a second."""
+    squared = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+    turn = np.empty(len(sight))
+    for t in range(len(sight)):
+        ahead = sight[t, 0] * way[0] + sight[t, 1] * way[1] + sight[t, 2] * way[2]
+        turn[t] = math.sqrt(max(squared - ahead * ahead, 0.0)) / max(distance_m[t], 0.1)
+    return turn
 
 
 def _at_border(bbox_px: FloatArray, detection: Detection) -> NDArray[np.bool_]:
@@ -121,19 +266,4 @@ def _at_border(bbox_px: FloatArray, detection: Detection) -> NDArray[np.bool_]:
     result: NDArray[np.bool_] = (bbox_px[:, 0] <= step_px) | (
         bbox_px[:, 2] >= detection.camera.width - step_px
     )
-    return result
-
-
-def _centre_covariance(
-    measured: Regions, seen: NDArray[np.intp], rotation: FloatArray, noise: DepthNoise
-) -> FloatArray:
-    """(K, 3, 3) of the centres of the surfaces seen (K,), in the fixed frame that rotation leads to."""
-    extent, sigma = measured.extent_m[seen], depth_sigma_m(measured.position_m[seen, 2], noise)
-    covariance = np.zeros((len(seen), 3, 3))
-    across = _CENTRE_SIGMA_M + _CENTRE_SHARE * extent[:, :2].max(axis=1)
-    covariance[:, 0, 0] = np.square(across)
-    covariance[:, 1, 1] = np.where(measured.tall[seen], np.square(across), _CUT_SIGMA_M**2)
-    along = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * extent[:, 2]
-    covariance[:, 2, 2] = np.square(along) + np.square(_CENTRE_NOISE * sigma)
-    result: FloatArray = rotation @ covariance @ rotation.T
     return result

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.numerics import kalman
 
@@ -76,8 +77,7 @@ class Tracks:
     @property
     def speed_mps(self) -> FloatArray:
         """(T,) as filtered."""
-        result: FloatArray = np.sqrt(np.square(self.state[:, 3:]).sum(axis=1))
-        return result
+        return _speeds(self.state)
 
     @property
     def velocity_sigma_mps(self) -> FloatArray:
@@ -99,10 +99,7 @@ class Tracks:
 
     def index_of(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
         """(N,) index of each track id, -1 where there is none (any more)."""
-        if len(self) == 0:
-            return np.full(len(ids), -1, np.intp)
-        place = np.minimum(self.ids.searchsorted(ids), len(self) - 1)
-        return np.where(self.ids[place] == ids, place, -1)
+        return _places(self.ids, ids)
 
     def start(
         self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
@@ -137,28 +134,21 @@ class Tracks:
     def predict(self, dt_s: float, accel_density: float, up: FloatArray | None) -> None:
         """Move every track on. up (3,): along the floor's normal nothing keeps going; None: not known."""
         if len(self) and dt_s > 0:
-            # Both filters at once: the calls cost more than what they compute.
-            states = np.concatenate((self.state, self.surface_state))
-            covariances = np.concatenate((self.covariance, self.surface_covariance))
-            states, covariances = kalman.predict(states, covariances, dt_s, accel_density, up)
-            count = len(self)
-            self.state, self.surface_state = states[:count], states[count:]
-            self.covariance, self.surface_covariance = covariances[:count], covariances[count:]
+            self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_density, up)
+            self.surface_state, self.surface_covariance = kalman.predict(
+                self.surface_state, self.surface_covariance, dt_s, accel_density, up
+            )
 
     def follow_trails(self, dt_s: float) -> NDArray[np.bool_]:
         """Take in where the centres are, dt_s on; (T,) whether they really go about as fast as the velocities
         say. Once a frame."""
-        self.trailing_m += -math.expm1(-dt_s / _TRAIL_S) * (self.state[:, :3] - self.trailing_m)
-        velocity, behind_s = self.state[:, 3:], dt_s / math.expm1(dt_s / _TRAIL_S)
-        way = ((self.state[:, :3] - self.trailing_m) * velocity).sum(axis=1) / behind_s
-        result: NDArray[np.bool_] = way > _GOING_SHARE * np.square(velocity).sum(axis=1)
-        return result
+        gain, behind_s = -math.expm1(-dt_s / _TRAIL_S), dt_s / math.expm1(dt_s / _TRAIL_S)
+        self.trailing_m, goes = _followed(self.state, self.trailing_m, gain, behind_s)
+        return goes
 
     def sight(self, camera_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(T, 3) unit vectors from a camera at camera_m (3,) to the centres, and (T,) their distances."""
-        away_m = self.state[:, :3] - camera_m
-        distance_m = np.sqrt(np.square(away_m).sum(axis=1))
-        return away_m / np.maximum(distance_m, 0.1)[:, None], distance_m
+        return _sight(self.state, camera_m)
 
     def overdue(self, elapsed_s: float, sight: FloatArray, resolves_m: FloatArray) -> NDArray[np.bool_]:
         """(T,) movers of which nothing has proved just now that they go on, and which by their velocity are
@@ -166,13 +156,14 @@ class Tracks:
         along it by what depth can tell apart there, resolves_m (T,). sight (T, 3): unit vectors."""
         if elapsed_s <= 0.0:
             return np.zeros(len(self), np.bool_)
-        way_m = elapsed_s * self.state[:, 3:]
-        along_m = (way_m * sight).sum(axis=1)
-        across_m = np.sqrt(np.maximum(np.square(way_m).sum(axis=1) - np.square(along_m), 0.0))
-        gone = across_m >= _GONE_SHARE * self.extent_m[:, ::2].max(axis=1)
-        gone |= np.abs(along_m) >= np.maximum(resolves_m, _GONE_SHARE * self.extent_m[:, 2])
-        result: NDArray[np.bool_] = self.moving & (self.unproven_s >= _UNPROVEN_S) & gone
-        return result
+        asked = self.moving & (self.unproven_s >= _UNPROVEN_S)
+        return _gone(asked, self.state, self.extent_m, sight, resolves_m, elapsed_s)
+
+    def count_on(self, proven: NDArray[np.bool_], dt_s: float) -> None:
+        """For how long it has been so, after a verdict, dt_s after the last. proven (T,): by this frame."""
+        self.unproven_s = np.where(proven, 0.0, self.unproven_s + dt_s)
+        self.moving_s = np.where(self.moving, self.moving_s + dt_s, 0.0)
+        self.calm_s = np.where(self.evidence > 0.0, 0.0, self.calm_s + dt_s)
 
     def hide(self, chosen: NDArray[np.bool_]) -> None:
         """Tracks of which nothing is to be seen any more, behind what stands there."""
@@ -183,21 +174,103 @@ class Tracks:
         """The centres of tracks index (K,) were seen at position_m (K, 3) with covariance noise (K, 3, 3)."""
         if len(index) == 0:
             return
-        states = np.concatenate((self.state[index], self.surface_state[index]))
-        covariances = np.concatenate((self.covariance[index], self.surface_covariance[index]))
-        measured, doubt = np.concatenate((position_m, position_m)), np.concatenate((noise, noise))
-        states, covariances = kalman.update(states, covariances, measured, doubt, 0)
-        count = len(index)
-        self.state[index], self.surface_state[index] = states[:count], states[count:]
-        self.covariance[index], self.surface_covariance[index] = covariances[:count], covariances[count:]
+        self.state[index], self.covariance[index] = kalman.update(
+            self.state.take(index, axis=0), self.covariance.take(index, axis=0), position_m, noise, 0
+        )
+        self.surface_state[index], self.surface_covariance[index] = kalman.update(
+            self.surface_state.take(index, axis=0),
+            self.surface_covariance.take(index, axis=0),
+            position_m,
+            noise,
+            0,
+        )
 
     def relocate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
         """As locate, where the centre says nothing of the velocity."""
         if len(index) == 0:
             return
         self.state[index], self.covariance[index] = kalman.place(
-            self.state[index], self.covariance[index], position_m, noise
+            self.state.take(index, axis=0), self.covariance.take(index, axis=0), position_m, noise
         )
         self.surface_state[index], self.surface_covariance[index] = kalman.place(
-            self.surface_state[index], self.surface_covariance[index], position_m, noise
+            self.surface_state.take(index, axis=0),
+            self.surface_covariance.take(index, axis=0),
+            position_m,
+            noise,
         )
+
+
+@compiled("int64[::1], int64[::1]")
+def _places(known: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.intp]:
+    """(N,) where each of ids (N,) stands among those known, which grow; -1: nowhere."""
+    result = np.full(len(ids), -1, np.intp)
+    for k in range(len(ids)):
+        place = np.searchsorted(known, ids[k])
+        if place < len(known) and known[place] == ids[k]:
+            result[k] = place
+    return result
+
+
+@compiled("float64[:, ::1]")
+def _speeds(state: FloatArray) -> FloatArray:
+    """As Tracks.speed_mps."""
+    speed_mps = np.empty(len(state))
+    for t in range(len(state)):
+        x, y, z = state[t, 3], state[t, 4], state[t, 5]
+        speed_mps[t] = math.sqrt(x * x + y * y + z * z)
+    return speed_mps
+
+
+@compiled("float64[:, ::1], float64[:, ::1], float64, float64")
+def _followed(
+    state: FloatArray, trailing_m: FloatArray, gain: float, behind_s: float
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """trailing_m (T, 3) a step on, and follow_trails; behind_s: by so much it trails what goes steadily."""
+    trails_m, goes = trailing_m.copy(), np.empty(len(state), np.bool_)
+    for t in range(len(state)):
+        way, squared = 0.0, 0.0
+        for i in range(3):
+            speed = state[t, 3 + i]
+            trails_m[t, i] += gain * (state[t, i] - trails_m[t, i])
+            way += (state[t, i] - trails_m[t, i]) * speed
+            squared += speed * speed
+        goes[t] = way / behind_s > _GOING_SHARE * squared
+    return trails_m, goes
+
+
+@compiled("float64[:, ::1], float64[:]")
+def _sight(state: FloatArray, camera_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """As Tracks.sight."""
+    sight, distance_m = np.empty((len(state), 3)), np.empty(len(state))
+    for t in range(len(state)):
+        squared = 0.0
+        for i in range(3):
+            sight[t, i] = state[t, i] - camera_m[i]
+            squared += sight[t, i] * sight[t, i]
+        distance_m[t] = math.sqrt(squared)
+        sight[t] /= max(distance_m[t], 0.1)
+    return sight, distance_m
+
+
+@compiled("boolean[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64")
+def _gone(
+    asked: NDArray[np.bool_],
+    state: FloatArray,
+    extent_m: FloatArray,
+    sight: FloatArray,
+    resolves_m: FloatArray,
+    elapsed_s: float,
+) -> NDArray[np.bool_]:
+    """(T,) those asked for that are clearly no longer where they were elapsed_s ago."""
+    gone = np.zeros(len(asked), np.bool_)
+    for t in range(len(asked)):
+        along_m, squared = 0.0, 0.0
+        for i in range(3):
+            way_m = elapsed_s * state[t, 3 + i]
+            along_m += way_m * sight[t, i]
+            squared += way_m * way_m
+        across_m = math.sqrt(max(squared - along_m * along_m, 0.0))
+        width_m, depth_m = max(extent_m[t, 0], extent_m[t, 2]), extent_m[t, 2]
+        far = across_m >= _GONE_SHARE * width_m or abs(along_m) >= max(resolves_m[t], _GONE_SHARE * depth_m)
+        gone[t] = asked[t] and far
+    return gone

@@ -169,3 +169,21 @@ def test_what_depth_tells_apart_grows_with_the_square_of_the_distance() -> None:
     grid = grid_of(just)
     stayed = memory((0, wall(4.0))).changes(grid, grid.valid, AT_ORIGIN, 600 * MS).stayed
     assert stayed[inner(just)].all()
+
+
+def test_at_the_border_of_the_image_there_are_no_neighbours_outside() -> None:
+    """A corner has three of them, four with itself; what arrives at the left is none at the right."""
+    corner = BACK.copy()
+    corner[:6, :6] = 3.0
+    found = arrived(memory((0, BACK)), corner)
+    expected = corner == 3.0
+    expected[[0, 0, 5, 5], [0, 5, 0, 5]] = False
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_what_has_arrived_is_told_as_flat_cells_too() -> None:
+    grid = grid_of(nearest(BODY, BACK))
+    changes = memory((0, BACK)).changes(grid, grid.valid, AT_ORIGIN, 200 * MS)
+    np.testing.assert_array_equal(changes.arrived_cells, np.flatnonzero(changes.arrived))
+    nothing = FreeMemory(NOISE).changes(grid, grid.valid, AT_ORIGIN, 200 * MS)
+    assert len(nothing.arrived_cells) == 0

@@ -78,3 +78,22 @@ def test_a_surface_that_something_nearer_reaches_over_tells_nothing_of_its_motio
         measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
         sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
     assert (tracks.clean_s[0] > 0.1) == whole
+
+
+def test_of_what_is_not_seen_nothing_changes_but_how_long_it_has_been_seen() -> None:
+    tracks = Tracks()
+    tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 0.0, 0)
+    tracks.clean_s[:] = 0.4
+    few = np.zeros((60, 80), np.int32)
+    few[30, 40 : 40 + sightings.MIN_CELLS - 1] = 1
+    grid = grid_of(np.where(few > 0, 2.0, 0.0))
+    sightings.see(tracks, detection(grid, 1), regions.measure(grid, few, 1), DepthNoise())
+    assert tracks.clean_s.tolist() == [0.0]
+    assert tracks.sightings.tolist() == [0]
+    assert tracks.seen_ns.tolist() == [0]
+    assert tracks.cells.tolist() == [0]
+    np.testing.assert_array_equal(tracks.state[0], [0.0, 0.0, 3.0, 0.0, 0.0, 0.0])
+    assert not tracks.box_m.any()
+    nobody = Tracks()
+    sightings.see(nobody, detection(grid, 1), regions.measure(grid, np.zeros_like(few), 0), DepthNoise())
+    assert len(nobody) == 0

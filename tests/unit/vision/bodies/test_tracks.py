@@ -78,3 +78,13 @@ def test_what_is_hidden_is_known_as_a_sliver_without_cells() -> None:
     tracks.hide(np.array([False, True]))
     assert tracks.sliver.tolist() == [False, True]
     assert tracks.cells.tolist() == [100, 0]
+
+
+def test_ids_that_are_not_there_have_no_index() -> None:
+    tracks = Tracks()
+    wanted = np.array([-1, 1, 2, 3, 4])
+    np.testing.assert_array_equal(tracks.index_of(wanted), np.full(5, -1))
+    tracks.start(np.zeros((3, 3)), 0.2, 1.5, 0.0, 0)
+    tracks.keep(np.array([True, False, True]))
+    np.testing.assert_array_equal(tracks.index_of(wanted), [-1, 0, -1, 1, -1])
+    assert len(tracks.index_of(np.empty(0, np.int64))) == 0

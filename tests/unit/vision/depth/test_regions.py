@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hal.types import Pose
-from vision.bodies.carving import _near_ends
+from vision.bodies.ends import near_ends
 from vision.bodies.masks import predict, surfaces
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import components, measure, spread_labels, unhidden
@@ -175,7 +175,7 @@ def test_cells_near_an_end_are_those_within_20_cm_at_its_depth() -> None:
     depth[:, 20:] = 4.0
     grid = grid_of(depth)
     ends = np.array([[[42.0, 42.0], [np.nan, np.nan]]], np.float32)
-    found = _near_ends(grid, grid.valid, np.nan_to_num(ends), np.array([[2.0, np.nan]], np.float32), 400.0)
+    found = near_ends(grid, grid.valid, np.nan_to_num(ends), np.array([[2.0, np.nan]], np.float32), 400.0)
     for row, column in np.ndindex(*SHAPE):
         away_m = np.hypot(row - 10, column - 10) * 0.02
         if away_m < 0.18 and column < 20:
@@ -187,4 +187,4 @@ def test_cells_near_an_end_are_those_within_20_cm_at_its_depth() -> None:
 def test_without_depth_no_cell_is_near() -> None:
     nowhere = np.full((1, 2), np.nan, np.float32)
     grid = grid_of(flat(2.0))
-    assert not _near_ends(grid, grid.valid, np.zeros((1, 2, 2), np.float32), nowhere, 400.0).any()
+    assert not near_ends(grid, grid.valid, np.zeros((1, 2, 2), np.float32), nowhere, 400.0).any()

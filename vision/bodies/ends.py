@@ -1,0 +1,120 @@
+"""Which cells are close to ends of fragments, at their depth. Terms: vision/__init__.py."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.compiled import compiled, inlined
+from hal.types import FloatArray
+from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.depth.regions import IntGrid
+
+_AROUND_M = 0.2  # cells so close to a moving fragment are of its body; a body is about twice as wide
+_AGREE_M = 0.3  # about a body's depth, and
+_AGREE_PER_M2 = 0.015  # two sigmas of depth by the default noise
+
+
+def near_ends(
+    grid: DepthGrid,
+    looked_at: BoolGrid,
+    ends_px: NDArray[np.float32],
+    depth_m: NDArray[np.float32],
+    focal_px: float,
+) -> BoolGrid:
+    """(h, w) those cells of looked_at (h, w) that are close to the ends (N, 2, 2), at their depth (N, 2)."""
+    seeds, top, left, rows, columns, end_m = _seeds(
+        ends_px, depth_m, looked_at, _AROUND_M * focal_px / grid.step_px, grid.offset_px, grid.step_px
+    )
+    if len(end_m) == 0:
+        return np.zeros(grid.depth_m.shape, np.bool_)
+    distance, label = cv2.distanceTransformWithLabels(seeds, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
+    return _within_reach(
+        np.asarray(distance, np.float32),
+        np.asarray(label, np.int32),
+        top,
+        left,
+        rows,
+        columns,
+        end_m,
+        grid.depth_m,
+        looked_at,
+        np.float32(grid.step_px / (_AROUND_M * focal_px)),
+    )
+
+
+@inlined
+def _cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
+    """Row or column of the grid, of so many."""
+    return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
+
+
+@compiled("float32[:, :, :], float32[:, :], boolean[:, ::1], float64, float64, float64")
+def _seeds(
+    ends_px: NDArray[np.float32],
+    depth_m: NDArray[np.float32],
+    looked_at: BoolGrid,
+    reach_at_1m: float,
+    offset_px: float,
+    step_px: float,
+) -> tuple[NDArray[np.uint8], int, int, NDArray[np.intp], NDArray[np.intp], FloatArray]:
+    """The part of the grid with all cells that can be close to an end, 0 where ends are; its top and left;
+    row and column of the ends in it, and their depth: no ends if none of the cells there is looked_at.
+    reach_at_1m: in cells, less farther away."""
+    height, width = looked_at.shape
+    rows, columns = np.empty(depth_m.size, np.intp), np.empty(depth_m.size, np.intp)
+    end_m, count = np.empty(depth_m.size), 0
+    for n in range(len(depth_m)):
+        for k in range(2):
+            if np.isfinite(depth_m[n, k]):
+                rows[count] = _cell(float(ends_px[n, k, 1]), offset_px, step_px, height)
+                columns[count] = _cell(float(ends_px[n, k, 0]), offset_px, step_px, width)
+                end_m[count] = depth_m[n, k]
+                count += 1
+    rows, columns, end_m = rows[:count], columns[:count], end_m[:count]
+    if count == 0:
+        return np.empty((0, 0), np.uint8), 0, 0, rows, columns, end_m
+    reach = int(reach_at_1m / end_m.min()) + 2
+    top, bottom = max(rows.min() - reach, 0), min(rows.max() + reach + 1, height)
+    left, right = max(columns.min() - reach, 0), min(columns.max() + reach + 1, width)
+    if not looked_at[top:bottom, left:right].any():
+        count = 0
+    seeds = np.ones((bottom - top, right - left), np.uint8)
+    for k in range(count):
+        rows[k] -= top
+        columns[k] -= left
+        seeds[rows[k], columns[k]] = 0
+    return seeds, top, left, rows[:count], columns[:count], end_m[:count]
+
+
+@compiled(
+    "float32[:, ::1], int32[:, ::1], int64, int64, int64[::1], int64[::1], float64[::1], float32[:, ::1],"
+    "boolean[:, ::1], float32"
+)
+def _within_reach(
+    distance: FloatGrid,
+    label: IntGrid,
+    top: int,
+    left: int,
+    rows: NDArray[np.intp],
+    columns: NDArray[np.intp],
+    end_m: FloatArray,
+    depth_m: FloatGrid,
+    looked_at: BoolGrid,
+    per_cell: np.float32,
+) -> BoolGrid:
+    """As near_ends. distance in cells to the nearest end, and its label: of the part of the grid of _seeds.
+    per_cell: of the reach, 1 m away."""
+    result = np.zeros(looked_at.shape, np.bool_)
+    nearest_m = np.zeros(label.max() + 1)
+    for k in range(len(end_m)):
+        nearest_m[label[rows[k], columns[k]]] = end_m[k]
+    for i in range(label.shape[0]):
+        for j in range(label.shape[1]):
+            if looked_at[top + i, left + j]:
+                there_m = nearest_m[label[i, j]]
+                off_m = abs(depth_m[top + i, left + j] - there_m)
+                close = distance[i, j] * per_cell * there_m <= 1.0
+                result[top + i, left + j] = close and off_m <= _AGREE_M + _AGREE_PER_M2 * there_m * there_m
+    return result

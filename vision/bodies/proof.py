@@ -1,0 +1,300 @@
+"""What one frame proves of each track: that it moves, that it stands, or neither.
+
+The kinds of proof are those of vision/bodies/judgement.py, which adds them up: one rule each, for one track.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import MotionSettings
+from hal.compiled import compiled, inlined
+from hal.types import FloatArray
+from vision.motion.line_of_sight import second_opinion, split
+from vision.motion.motion_evidence import MotionEvidence
+
+BoolArray = NDArray[np.bool_]
+
+_HOLDING_SQUARED_SIGMAS = 4.0  # two sigmas: it still seems to go
+_ENDS_ACROSS = 4  # two fragments: across, where an end is seen tells by itself
+_ENDS_ALONG = 8  # four fragments: along, only how far ends are apart tells, and that slides
+_LEVEL_SHARE = 0.5  # of the threshold: with less than that, what goes up or down needs as many ends as along
+_MIN_AGREEMENT = 0.18  # of the ends: bodies whose limbs disagree still speak
+_UNREST_SHARE = 0.5  # of the threshold
+_LASTING_UNREST_S = 0.4  # longer than a limb swings one way
+_LIKELY_SHARE = 0.25  # of the threshold: two of four sigmas; a slow machine on legs stays at two and a half
+_OWN_PROOF = 3.0  # squared sigmas of this frame alone: the filter does not speak of the past only
+_SHARED_PROOF = 0.55  # of the threshold, where fragments and surface say the same
+_SPEED_PER_METRE = 0.02  # of distance: by so much more the least speed is, as all errors grow with it
+_ARRIVED_CELLS = 8  # fewer come and go with noise at a rim
+_ARRIVED_SHARE = 0.05  # of the surface: who walks arrives with one side of himself
+_MUCH_CELLS = 20  # about a forearm 4 m away
+_MUCH_SHARE = 0.2  # of the surface: more than a rim that noise widens
+_STANDING_SHARE = 0.6  # of the least speed: what is slower stands
+_KNOWN_SPEED = 2.0  # of the least speed: with less doubt than this, a slow mover has stopped
+_CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
+_CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewhat longer
+_CLEAR_WAY = 4.0  # times the noise of one pixel's depth: no noise that neighbours share feigns so long a way
+_CLEAN_LOOKS = 2.5  # three of them, where frames are few
+_EVEN_CELLS = 48  # fewer lie on two or three patches of depth noise, and go to and fro with these
+_COMPACT_M = 2.2  # a tall person; larger things are seen in part only, and their middle wanders
+_WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
+_LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them is carved out
+# The velocity as filtered, of this frame's fragments, of the surface; the first less the last.
+_FILTERED, _OWN, _SURFACE, _APART = range(4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proof:
+    """Of T tracks, (T,) each. moves: proven; strength: how many times as clearly as it has to be. stands: its
+    fragments are sure; over: that it goes, if it did, is over, by these or otherwise; goes_on: nothing new
+    proves that it moves, but nothing speaks against it. sigmas: squared, of the velocity as filtered."""
+
+    moves: BoolArray
+    strength: FloatArray
+    stands: BoolArray
+    over: BoolArray
+    goes_on: BoolArray
+    sigmas: FloatArray
+
+
+class _Part(NamedTuple):
+    """A velocity of one track, and its parts: see Split."""
+
+    speed_mps: float
+    sigma_mps: float
+    value: float
+    along: float
+    across: float
+    total: float
+    level: float
+
+
+class _Second(NamedTuple):
+    """What its surface says of that of its fragments: see SecondOpinion."""
+
+    denies_along: bool
+    denies_across: bool
+    confirms_along: bool
+    confirms_across: bool
+
+
+class _Ends(NamedTuple):
+    """Of one track's fragments. agreeing: 0 where these are too small a share of all."""
+
+    all: int
+    agreeing: float
+    restless: bool
+    unrest_s: float
+
+
+class _Surface(NamedTuple):
+    """What is seen of one track. wander_mps: so fast its centre may go while it stands."""
+
+    cells: int
+    size_m: float
+    clean_s: float
+    wander_mps: float
+    depth_sigma_m: float
+
+
+@inlined
+def _by_fragments(filtered: _Part, own: _Part, second: _Second, ends: _Ends, threshold: float) -> bool:
+    """Whether filter and fragments show a velocity that the surface does not deny, or that it shares."""
+    many, some = ends.agreeing >= _ENDS_ALONG, ends.agreeing >= _ENDS_ACROSS
+    across = _shown_across(filtered, own, threshold) and (some or ends.restless)
+    across = across and (not second.denies_across or many)
+    across = across and (filtered.level > _LEVEL_SHARE * threshold or many or ends.restless)
+    along = filtered.along > threshold and own.along > 0.5 * threshold
+    along = along and many and not second.denies_along
+    less = _SHARED_PROOF * threshold
+    shared = filtered.along > less and second.confirms_along and own.along > _OWN_PROOF
+    shared = shared or (filtered.across > less and second.confirms_across and own.across > _OWN_PROOF)
+    return across or along or (shared and (ends.agreeing >= 2 or ends.restless))
+
+
+@inlined
+def _shown_across(filtered: _Part, own: _Part, threshold: float) -> bool:
+    """Whether filter and fragments say that it goes across the line of sight, however few these are."""
+    return filtered.across > threshold and own.across > 0.5 * threshold
+
+
+@inlined
+def _by_unrest(filtered: _Part, ends: _Ends, threshold: float) -> bool:
+    """Whether many ends, by whatever each of them does, bear out the filter's velocity.
+
+    That of a slow body with swinging limbs never becomes clear. Where its ends have denied for longer than
+    any limb swings one way, it need only be likely.
+    """
+    share = _LIKELY_SHARE if ends.unrest_s >= _LASTING_UNREST_S else _UNREST_SHARE
+    return ends.restless and ends.all >= _ENDS_ALONG and filtered.total > share * threshold
+
+
+@inlined
+def _by_arrival(filtered: _Part, arrived: bool, threshold: float) -> bool:
+    """Whether what has arrived bears out the filter's velocity."""
+    return arrived and filtered.total > 0.5 * threshold
+
+
+@inlined
+def _by_surface(centre: _Part, seen: _Surface, least_mps: float, dt_s: float, threshold: float) -> bool:
+    """Whether the centre of a whole, compact surface moves too long and too clearly for an accident.
+
+    A new viewpoint shows other sides of a thing that stands still, so its centre wanders with the view, and
+    it wanders while more and more of it comes to be seen: that much speed proves nothing. Nor does a few
+    cells' way along the line of sight: a wall seen through a chair has not many more. Along it a longer time
+    is asked for, unless the way is far beyond what depth is off by.
+    """
+    looks_s = _CLEAN_LOOKS * dt_s
+    far = abs(centre.value) * seen.clean_s >= _CLEAR_WAY * seen.depth_sigma_m
+    long_s = max(_CLEAN_ACROSS_S if far else _CLEAN_ALONG_S, looks_s)
+    clear = centre.across > threshold and seen.clean_s >= max(_CLEAN_ACROSS_S, looks_s)
+    even = seen.cells >= _EVEN_CELLS
+    clear = clear or (even and centre.along > threshold and seen.clean_s >= long_s)
+    return clear and seen.size_m <= _COMPACT_M and centre.speed_mps > least_mps + seen.wander_mps
+
+
+@inlined
+def _holds(filtered: _Part, goes: bool, arrived: bool, least_mps: float) -> bool:
+    """Whether a mover still goes, though nothing new proves it."""
+    going = (goes and filtered.total > _HOLDING_SQUARED_SIGMAS) or arrived
+    return going and filtered.speed_mps > _STANDING_SHARE * least_mps
+
+
+@inlined
+def _waits(filtered: _Part, own: _Part, fast: bool, agreeing: float, threshold: float) -> bool:
+    """What one fragment alone shows is no proof, but no reason either to forget what more of them showed."""
+    return fast and _shown_across(filtered, own, threshold) and agreeing >= 2
+
+
+@inlined
+def _stands(own: _Part, agreeing: float, least_mps: float) -> bool:
+    """Whether this frame's fragments are sure that it stands."""
+    slow = own.speed_mps < _STANDING_SHARE * least_mps
+    return slow and own.sigma_mps < 0.5 * least_mps and agreeing >= _ENDS_ACROSS
+
+
+@inlined
+def _part(velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: int, t: int) -> _Part:
+    """Velocity k of track t; for the arguments see _proofs."""
+    v, c, of = velocity[k, t], covariance[k, t], parts[:, k, t]
+    speed_mps = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    sigma_mps = math.sqrt(c[0, 0] + c[1, 1] + c[2, 2])
+    return _Part(speed_mps, sigma_mps, of[0], of[1], of[2], of[3], of[4])
+
+
+@compiled(
+    "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], boolean[:, ::1], float64[:],"
+    "int64[:], float64[:], boolean[:], float64[:], int64[:], int64[:], float64[:],"
+    "float64[:], float64[:], float64[:], boolean[:], boolean[:], boolean[:], boolean,"
+    "float64, float64, float64"
+)
+def _proofs(
+    velocity: FloatArray,
+    covariance: FloatArray,
+    parts: FloatArray,
+    opinion: BoolArray,
+    least_mps: FloatArray,
+    ends: NDArray[np.intp],
+    agreement: FloatArray,
+    restless: BoolArray,
+    unrest_s: FloatArray,
+    arrived: NDArray[np.intp],
+    cells: NDArray[np.intp],
+    size_m: FloatArray,
+    clean_s: FloatArray,
+    wander_mps: FloatArray,
+    depth_sigma_m: FloatArray,
+    goes: BoolArray,
+    guessed: BoolArray,
+    moving: BoolArray,
+    trusted: bool,
+    fastest_mps: float,
+    dt_s: float,
+    threshold: float,
+) -> tuple[BoolArray, FloatArray, BoolArray, BoolArray, BoolArray]:
+    """moves, strength, stands, over and goes_on of Proof. velocity (4, T, 3), covariance (4, T, 3, 3) and
+    parts (5, 4, T), value to level of Split: of each of the four velocities. opinion (4, T): SecondOpinion.
+    threshold: squared sigmas."""
+    count = len(moving)
+    moves, stands = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    over, goes_on, strength = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count)
+    for t in range(count):
+        filtered = _part(velocity, covariance, parts, _FILTERED, t)
+        own = _part(velocity, covariance, parts, _OWN, t)
+        centre = _part(velocity, covariance, parts, _SURFACE, t)
+        second = _Second(opinion[0, t], opinion[1, t], opinion[2, t], opinion[3, t])
+        alike = agreement[t] * ends[t]
+        told = _Ends(ends[t], alike if agreement[t] >= _MIN_AGREEMENT else 0.0, restless[t], unrest_s[t])
+        seen = _Surface(cells[t], size_m[t], clean_s[t], wander_mps[t], depth_sigma_m[t])
+        some = arrived[t] >= _ARRIVED_CELLS and arrived[t] >= _ARRIVED_SHARE * cells[t]
+        much = arrived[t] >= _MUCH_CELLS and arrived[t] >= _MUCH_SHARE * cells[t]
+        possible = filtered.speed_mps <= fastest_mps and size_m[t] <= _LARGEST_M
+        fast = filtered.speed_mps > least_mps[t]
+        evident = (
+            _by_fragments(filtered, own, second, told, threshold)
+            or _by_unrest(filtered, told, threshold)
+            or _by_arrival(filtered, some, threshold)
+            or _by_surface(centre, seen, least_mps[t], dt_s, threshold)
+        )
+        # Where a mover has stopped was free space until a moment ago: no proof that it still goes.
+        stopped = moving[t] and not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
+        moves[t] = trusted and possible and ((evident and fast) or (much and not stopped))
+        shown = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(own.along, own.across))
+        strength[t] = np.minimum(shown / threshold, told.agreeing / _ENDS_ACROSS)
+        stands[t] = _stands(own, told.agreeing, least_mps[t])
+        slow = filtered.speed_mps < _STANDING_SHARE * least_mps[t]
+        # What nothing tells from what stands around it, and no fragment tells of: its cells would go on over
+        # a wall for as long as its velocity has them go.
+        lost = moving[t] and guessed[t] and ends[t] == 0 and not some
+        over[t] = stands[t] or (stopped and slow) or lost
+        holds = moving[t] and _holds(filtered, goes[t], some, least_mps[t])
+        waits = possible and _waits(filtered, own, fast, alike, threshold)
+        goes_on[t] = holds or waits or (restless[t] and not moving[t])
+    return moves, strength, stands, over, goes_on
+
+
+def prove(
+    seen: MotionEvidence, moving: BoolArray, fastest_mps: float, dt_s: float, settings: MotionSettings
+) -> Proof:
+    """Of T tracks, of which moving (T,) moved by the last verdict. fastest_mps: no body is faster."""
+    velocity, covariance = np.empty((4, len(moving), 3)), np.empty((4, len(moving), 3, 3))
+    velocity[_FILTERED], covariance[_FILTERED] = seen.velocity, seen.covariance
+    velocity[_OWN], covariance[_OWN] = seen.own_velocity, seen.own_covariance
+    velocity[_SURFACE], covariance[_SURFACE] = seen.surface_velocity, seen.surface_covariance
+    velocity[_APART] = seen.velocity - seen.surface_velocity
+    covariance[_APART] = seen.covariance + seen.surface_covariance
+    parts = split(velocity, covariance, seen.sight, seen.up)
+    second = second_opinion(parts[_FILTERED], parts[_SURFACE], parts[_APART])
+    least_mps = settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m
+    wander_mps = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps
+    proofs = _proofs(
+        velocity,
+        covariance,
+        np.array((parts.value, parts.along, parts.across, parts.total, parts.level)),
+        np.array((second.denies_along, second.denies_across, second.confirms_along, second.confirms_across)),
+        least_mps,
+        seen.ends,
+        seen.agreement,
+        seen.restless,
+        seen.unrest_s,
+        seen.arrived,
+        seen.cells,
+        seen.size_m,
+        seen.clean_s,
+        wander_mps,
+        seen.depth_sigma_m,
+        seen.goes,
+        seen.guessed,
+        moving,
+        seen.trusted,
+        fastest_mps,
+        dt_s,
+        settings.sigmas**2,
+    )
+    return Proof(*proofs, parts.total[_FILTERED])
