@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.types import FloatArray
 from vision.bodies.tracks import Tracks
+from vision.depth.connected import IntGrid
 from vision.depth.depth_mask import depth_sigma_m
-from vision.depth.regions import IntGrid
 from vision.detection import Detection
 from vision.motion.least_squares import long_static
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid
-from vision.depth.regions import IntGrid, Regions, exchanged, measure
+from vision.depth.regions import Regions, exchanged, measure
 from vision.numerics.order import median
 
 _SAME_M = 0.3  # about a body's depth, and

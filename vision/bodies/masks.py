@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray, Pose
+from vision.depth.connected import IntGrid, spread_labels
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
-from vision.depth.regions import IntGrid, spread_labels
 
 _LEAST_VOTES = 4  # cells: fewer are strays of a prediction that is off by a cell
 _SHARE_OF_PART = 0.15  # of all votes in it, or
