@@ -103,5 +103,6 @@ def test_figures_of_a_reel(reel: Reel) -> None:
     assert "vision.fragments.edges.find_edges" in figures.functions
     assert set(figures.as_json()) == {
         "total", "elapsed", "detect", "track", "bare_opencv", "whole_images", "first_frame",
-        "ratio_of_medians", "median_ratio", "ratio_to_whole_images", "opencv_functions", "modules", "functions",
+        "ratio_of_medians", "median_ratio", "ratio_to_whole_images", "opencv_functions", "modules",
+        "functions",
     }  # fmt: skip
