@@ -6,10 +6,9 @@ of the algorithm. Every one is compiled when its module is imported, never in th
 on the disk: beside its file, or, where that may not be written, in the user's cache, or in NUMBA_CACHE_DIR.
 The first import takes a minute or two for all of them, and says so; later ones take a moment.
 
-Rules: a step takes numbers and arrays, does not change them, and returns new ones. It calls nothing compiled
-in another file, since what is kept on the disk is made anew only when its own file changes, and what it calls
-stands above it. With
-NUMBA_DISABLE_JIT=1 all of them run as plain Python, for a debugger.
+Rules: a step takes numbers and arrays, does not change them, and returns new ones. What it calls, and the
+constants that it uses, stand in its own file, above it: what is kept on the disk is made anew only when that
+file changes. With NUMBA_DISABLE_JIT=1 all of them run as plain Python, for a debugger.
 """
 
 from __future__ import annotations

@@ -203,24 +203,23 @@ def _measured(
 def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
     """regions as measured, wide only where nothing nearer hides a part, either, and where it ends at an edge
     in depth: what was divided from its surroundings by guess has its middle where the guess put it."""
-    hidden, overlapped = _hidden_cells(grid.inverse_depth, labels, len(regions.cells))
+    hidden, overlapped = _hidden_cells(grid.inverse_depth, labels, len(regions.cells), np.float32(LEAST_JUMP))
     least = _OCCLUDED_SHARE * regions.rows
     return replace(regions, wide=regions.wide & (hidden <= least), overlapped=overlapped > least)
 
 
-@compiled("float32[:, ::1], int32[:, ::1], int64")
+@compiled("float32[:, ::1], int32[:, ::1], int64, float32")
 def _hidden_cells(
-    inverse: FloatGrid, labels: IntGrid, count: int
+    inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """(count,) cells at the left or right rim of each part beside which something else stands nearer, or
     another part goes on at the same depth; and (count,) those that end at another part, which is nearer.
 
     Beside what stands nearer a stereo camera measures nothing, and the far side of a jump is of no part: what
-    comes after that gap is the neighbour.
+    comes after that gap is the neighbour. jump: in 1/m; less is noise.
     """
     room = max(count, labels.max()) + 1
     hidden, overlapped = np.zeros(room, np.intp), np.zeros(room, np.intp)
-    jump = np.float32(LEAST_JUMP)
     for i in range(labels.shape[0]):
         neighbour = -1  # the last cell of a part in this row
         for j in range(labels.shape[1]):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
+import inspect
 import pkgutil
 import subprocess
 import sys
@@ -101,19 +103,44 @@ def modules() -> Iterator[ModuleType]:
                 yield importlib.import_module(found.name)
 
 
-def test_no_step_calls_what_is_compiled_in_another_file() -> None:
-    """It would go on with what that was before a change: only a change of its own file makes it anew."""
-    steps = {
-        (module.__name__, step)
+def steps() -> list[Any]:
+    """Every compiled step of the project, and what is inlined into one."""
+    return [
+        step
         for module in modules()
         for step in vars(module).values()
         if isinstance(step, Dispatcher) and step.py_func.__module__ == module.__name__
+    ]
+
+
+def assigned_in(module: ModuleType) -> set[str]:
+    """Names that are defined at the top of a module itself, not imported by it."""
+    tree = ast.parse(inspect.getsource(module))
+    names = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    targets = [node.targets for node in tree.body if isinstance(node, ast.Assign)]
+    return names | {
+        name.id
+        for several in targets
+        for target in several
+        for name in ast.walk(target)
+        if isinstance(name, ast.Name)
     }
-    called = {
-        (name, f"{inner.py_func.__module__}.{inner.py_func.__name__}")
-        for name, step in steps
-        for inner in map(step.py_func.__globals__.get, step.py_func.__code__.co_names)
-        if isinstance(inner, Dispatcher) and inner.py_func.__module__ != name
+
+
+def test_what_a_step_calls_and_its_constants_stand_in_its_own_file() -> None:
+    """It would go on with what these were before a change: only a change of its own file makes it anew."""
+    own = {
+        module.__name__: assigned_in(module)
+        for module in {sys.modules[s.py_func.__module__] for s in steps()}
     }
-    assert len(steps) > 10
-    assert called == set()
+    foreign = {
+        (step.py_func.__module__, step.py_func.__name__, name)
+        for step in steps()
+        for name in step.py_func.__code__.co_names
+        if isinstance(
+            step.py_func.__globals__.get(name), Dispatcher | int | float | np.generic | np.ndarray | tuple
+        )
+        if name not in own[step.py_func.__module__]
+    }
+    assert len(steps()) > 10
+    assert foreign == set()
