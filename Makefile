@@ -39,6 +39,7 @@ $(VENV)/ready: requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) --no-deps -r requirements.lock
 	$(PIP) --no-deps --no-build-isolation --editable .
+	$(BIN)/python -c 'import controller.build, controller.campaign.command'
 	touch $@
 
 $(VENV)/ready-dev: $(VENV)/ready requirements-dev.lock

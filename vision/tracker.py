@@ -30,11 +30,12 @@ from vision.bodies.adoption import adopt, inherited
 from vision.bodies.arrivals import Changes, FreeMemory
 from vision.bodies.judgement import judge
 from vision.bodies.tracks import Tracks
-from vision.depth import regions
+from vision.depth import connected, regions
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid
 from vision.depth.depth_guard import free_space
 from vision.depth.near_floor import NearFloor
-from vision.depth.regions import IntGrid, Regions
+from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.fragments.attention import wanted
 from vision.motion import least_squares, limbs
@@ -105,7 +106,7 @@ class Tracker:
         before_ns = detection.captured_ns if self._last_ns is None else self._last_ns
         self._last_ns = max(detection.captured_ns, before_ns)
         owner = inherited(self._fragment_ids, self._fragment_owner, detection.ids, tracks.ids)
-        standing = regions.standing(detection.grid, self._clearance_m)
+        standing = connected.standing(detection.grid, self._clearance_m)
         velocities = least_squares.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
         if detection.health.condition is not CameraCondition.UNTRUSTWORTHY or detection.restarted:
             owner = self._follow(detection, standing, owner, velocities, elapsed_s)
@@ -171,7 +172,7 @@ class Tracker:
         shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
         index = tracks.index_of(self._surfaces.track_id)
         predicted = masks.predict(self._surfaces, index, shift, grid, pose)
-        count, parts = regions.components(grid, standing)
+        count, parts = connected.components(grid, standing)
         measured = regions.measure(grid, parts, count)
         ballot = votes.count_votes(parts, count, predicted, len(tracks), mover)
         sight, distance_m = tracks.sight(pose.translation_m)

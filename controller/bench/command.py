@@ -157,7 +157,7 @@ def _reel_figures(
         return Perception(config, reel.mount, body.height_m, body.clearance_m)
 
     with progress(label, 2 * passes * len(reel.frames)) as tick:
-        return measure_perception(reel, make, passes, _stopwatches, tick)
+        return measure_perception(reel, make, config.fragments, passes, _stopwatches, tick)
 
 
 def _renderer_figures(config: AppConfig, plan: Plan) -> RendererFigures:

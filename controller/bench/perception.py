@@ -9,10 +9,12 @@ from dataclasses import dataclass, field
 from types import ModuleType
 
 import vision
+from config.perception import FragmentSettings
 from controller.bench.figures import Durations, Stopwatches, median_ratio
 from controller.bench.opencv_calls import recorded_calls, time_bare
 from controller.bench.reel import Reel, Tick
 from controller.bench.stages import Spent, StageFigures, StageWatch, modules_of, summarise, watched
+from controller.bench.whole_images import WholeImages
 from hal.types import Pose, RgbdFrame
 from vision.perception import Perception
 
@@ -33,13 +35,14 @@ class SideBySide:
     """Nanoseconds of each frame, the same index for the same frame: perception, and OpenCV alone.
 
     Processor time, but for elapsed_ns of detect and track together. opencv_ns: by function name. first_ns:
-    the first frame of each pass, which is in none of the other lists.
+    the first frame of each pass, which is in none of the other lists. whole_ns: see WholeImages.
     """
 
     detect_ns: list[int] = field(default_factory=list)
     track_ns: list[int] = field(default_factory=list)
     elapsed_ns: list[int] = field(default_factory=list)
     bare_ns: list[int] = field(default_factory=list)
+    whole_ns: list[int] = field(default_factory=list)
     opencv_ns: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
     first_ns: list[int] = field(default_factory=list)
 
@@ -48,13 +51,14 @@ class SideBySide:
         """detect and track together."""
         return [detect + track for detect, track in zip(self.detect_ns, self.track_ns, strict=True)]
 
-    def add(self, spent: FrameTime, opencv_ns: dict[str, int]) -> None:
+    def add(self, spent: FrameTime, opencv_ns: dict[str, int], whole_ns: int) -> None:
         """One frame; a function that it does not call takes no time in it."""
         known = len(self.detect_ns)
         self.detect_ns.append(spent.detect_ns)
         self.track_ns.append(spent.track_ns)
         self.elapsed_ns.append(spent.elapsed_ns)
         self.bare_ns.append(sum(opencv_ns.values()))
+        self.whole_ns.append(whole_ns)
         for name in opencv_ns.keys() | self.opencv_ns.keys():
             samples = self.opencv_ns[name]
             samples.extend([0] * (known - len(samples)))
@@ -65,16 +69,19 @@ class SideBySide:
 class PerceptionFigures:
     """Of one reel. total: detect and track, in processor time; elapsed: the same by a clock on the wall.
     ratio_of_medians and median_ratio: perception over bare OpenCV, once of the two medians and once frame by
-    frame. functions and modules: names as in the code."""
+    frame. whole, ratio_to_whole: the paper's calls on whole images, perception over these. functions and
+    modules: names as in the code."""
 
     total: Durations
     elapsed: Durations
     detect: Durations
     track: Durations
     bare: Durations
+    whole: Durations
     first: Durations
     ratio_of_medians: float
     median_ratio: float
+    ratio_to_whole: float
     opencv: dict[str, Durations]
     modules: dict[str, StageFigures]
     functions: dict[str, StageFigures]
@@ -87,9 +94,11 @@ class PerceptionFigures:
             "detect": self.detect.as_json(),
             "track": self.track.as_json(),
             "bare_opencv": self.bare.as_json(),
+            "whole_images": self.whole.as_json(),
             "first_frame": self.first.as_json(),
             "ratio_of_medians": round(self.ratio_of_medians, 4),
             "median_ratio": round(self.median_ratio, 4),
+            "ratio_to_whole_images": round(self.ratio_to_whole, 4),
             "opencv_functions": {name: durations.as_json() for name, durations in self.opencv.items()},
             "modules": {name: stage.as_json() for name, stage in self.modules.items()},
             "functions": {name: stage.as_json() for name, stage in self.functions.items()},
@@ -97,29 +106,37 @@ class PerceptionFigures:
 
 
 def measure_perception(
-    reel: Reel, make: MakePerception, passes: int, stopwatches: Stopwatches, tick: Tick
+    reel: Reel,
+    make: MakePerception,
+    settings: FragmentSettings,
+    passes: int,
+    stopwatches: Stopwatches,
+    tick: Tick,
 ) -> PerceptionFigures:
     """Side by side first, then once more with a stopwatch on every function. Two ticks a frame and pass.
 
-    make: a new perception, for each pass over reel.
+    make: a new perception, for each pass over reel; settings: its fragments'.
     """
     modules = modules_of(vision)
     side = SideBySide()
     for _ in range(passes):
-        run_side_by_side(reel, make, modules, stopwatches, side, tick)
+        run_side_by_side(reel, make, settings, modules, stopwatches, side, tick)
     spent: list[dict[str, Spent]] = []
     for _ in range(passes):
         spent.extend(run_watched(reel, make, modules, stopwatches.processor_ns, tick))
     total, bare = Durations.of(side.total_ns), Durations.of(side.bare_ns)
+    whole = Durations.of(side.whole_ns)
     return PerceptionFigures(
         total=total,
         elapsed=Durations.of(side.elapsed_ns),
         detect=Durations.of(side.detect_ns),
         track=Durations.of(side.track_ns),
         bare=bare,
+        whole=whole,
         first=Durations.of(side.first_ns),
         ratio_of_medians=total.median_ms / bare.median_ms,
         median_ratio=median_ratio(side.total_ns, side.bare_ns),
+        ratio_to_whole=total.median_ms / whole.median_ms,
         opencv=_slowest_first({name: Durations.of(ns) for name, ns in side.opencv_ns.items()}),
         modules=summarise(spent, group=_module_of),
         functions=summarise(spent),
@@ -129,18 +146,19 @@ def measure_perception(
 def run_side_by_side(
     reel: Reel,
     make: MakePerception,
+    settings: FragmentSettings,
     modules: Sequence[ModuleType],
     stopwatches: Stopwatches,
     result: SideBySide,
     tick: Tick,
 ) -> None:
-    """Every frame through three: a perception that is timed and untouched, one whose OpenCV calls are
-    recorded, and those calls alone.
+    """Every frame through four: a perception that is timed and untouched, one whose OpenCV calls are
+    recorded, those calls alone, and the paper's calls on the whole image.
 
     Which of the timed two goes first changes from frame to frame: neither shall always find warm caches.
     The first frame searches the whole image, as after every restart, and is kept apart.
     """
-    timed, recorded = make(), make()
+    timed, recorded, whole = make(), make(), WholeImages(settings, stopwatches.processor_ns)
     for index, (frame, odometry) in enumerate(zip(reel.frames, reel.odometry, strict=True)):
         with recorded_calls(modules) as calls:
             recorded.perceive(frame, odometry, None)
@@ -149,10 +167,11 @@ def run_side_by_side(
         spent = _time(timed, frame, odometry, stopwatches)
         if index % 2 == 1:
             opencv_ns = time_bare(calls, stopwatches.processor_ns)
+        whole_ns = whole.step(frame.colour)
         if index == 0:
             result.first_ns.append(spent.detect_ns + spent.track_ns)
         else:
-            result.add(spent, opencv_ns)
+            result.add(spent, opencv_ns, whole_ns)
         tick()
 
 

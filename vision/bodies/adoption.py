@@ -12,8 +12,8 @@ from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.bodies.tracks import Tracks
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import FloatGrid
-from vision.depth.regions import IntGrid
 from vision.detection import Detection
 from vision.motion.least_squares import long_static
 

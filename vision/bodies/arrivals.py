@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
-from vision.depth.regions import IntGrid
 
 # Every second view at 30 frames a second: a look back takes whichever is close to it.
 _KEEP_EVERY_S = 0.06

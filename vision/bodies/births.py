@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from vision.bodies.tracks import Tracks
 from vision.depth import regions
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
-from vision.depth.regions import IntGrid, Regions
+from vision.depth.regions import Regions
 from vision.detection import Detection
 
 # About 0.1 x 0.1 m 4 m away, as sim.yaml's camera sees it: what is smaller comes and goes with noise.

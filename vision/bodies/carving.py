@@ -22,10 +22,11 @@ from hal.types import FloatArray
 from vision.bodies.ends import near_ends
 from vision.bodies.judgement import IMPLAUSIBLE
 from vision.bodies.tracks import Tracks
-from vision.depth import regions
+from vision.depth import connected, regions
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid
 from vision.depth.depth_mask import depth_sigma_m
-from vision.depth.regions import IntGrid, Regions
+from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.motion import least_squares
 from vision.motion.least_squares import FragmentVelocities
@@ -87,7 +88,7 @@ def carve(
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
     if np.count_nonzero(grown) < _MIN_CELLS:
         return labels
-    count, parts = regions.components(grid, grown)
+    count, parts = connected.components(grid, grown)
     cells = np.bincount(parts.ravel(), minlength=count + 1)
     keep = (cells[1:] >= _MIN_CELLS).nonzero()[0] + 1
     if len(keep) == 0:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
-from vision.depth.regions import IntGrid
 from vision.numerics.order import median, quantile, quantiles
 
 SINGLE_WIDTH_M = 0.85  # nobody is wider

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
-from vision.depth.regions import IntGrid
 
 _AROUND_M = 0.2  # cells so close to a moving fragment are of its body; a body is about twice as wide
 _AGREE_M = 0.3  # about a body's depth, and

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
-from vision.depth.regions import IntGrid, Regions, exchanged, measure
+from vision.depth.regions import Regions, exchanged, measure
 
 _SAME_M = 0.3  # about a body's depth, and
 _SAME_PER_M2 = 0.015  # two sigmas of depth by the default noise

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
-from vision.depth.regions import IntGrid
 
 _DEPTH_GATE_INVERSE = 0.03  # 1/m, as large as a jump in depth may be within one part, and
 _DEPTH_GATE_M = 0.25  # what may come nearer as a body turns or bends, beside its own velocity

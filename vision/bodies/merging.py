@@ -14,8 +14,9 @@ from hal.types import FloatArray
 from vision.bodies.boxes import LEAST_SAMPLES, LOAD_M, THROUGH_M, boxes, cells_between, relations
 from vision.bodies.division import LOW_BESIDE, NEARER_INVERSE, SINGLE_WIDTH_M, split
 from vision.bodies.grouping import something_nearer_between
+from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
-from vision.depth.regions import IntGrid, Regions
+from vision.depth.regions import Regions
 
 BoolArray = NDArray[np.bool_]
 

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from vision.depth.connected import IntGrid, spread_labels
 from vision.depth.depth_grid import BoolGrid
-from vision.depth.regions import IntGrid, spread_labels
 
 _LEAST_VOTES = 4  # cells: fewer are strays of a prediction that is off by a cell
 _SHARE_OF_PART = 0.15  # of all votes in it, or

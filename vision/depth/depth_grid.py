@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
+from hal.compiled import compiled, inlined
 from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
-from vision.depth.depth_mask import depth_sigma_m, measurable_m
+from vision.depth.depth_mask import measurable_m
 
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
@@ -24,6 +25,7 @@ BoolGrid = NDArray[np.bool_]
 CELL_HEIGHT_NOISE = 0.4
 _FARTHEST = np.uint16(65535)  # raw depth of what is not valid: sorts behind all that is
 _NEAREST_M = 0.1  # nearer, a point projects anywhere
+_FOUR_FROM_PX = 4  # cells so large take four samples each, smaller ones their middle pixel
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
 
 
@@ -96,22 +98,18 @@ class DepthGrid:
         return (flat * inside.view(np.uint8)).astype(np.intp), inside, inverse
 
 
-@np.errstate(divide="ignore")  # what comes of a division by zero is left out; once, for it takes a while
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
     """Sub-sample the depth of frame; depth outside [min_depth_m, max_depth_m] is not valid, nor is the
     largest number, at which far depth is cut off."""
-    step = config.grid_step_px
-    scale_m = frame.depth_scale_m
-    if step >= 4:
-        raw, offset = _four_samples(frame.depth, step, scale_m), step // 4 + 0.5 * (step // 2)
-    else:
-        raw, offset = frame.depth[step // 2 :: step, step // 2 :: step], float(step // 2)
-    depth_m = raw * np.float32(scale_m)
-    range_m = measurable_m(config.max_depth_m, scale_m)
-    beyond = depth_m > range_m
-    valid = (depth_m >= config.min_depth_m) & ~beyond
-    inverse = _smooth(raw, scale_m, _inverted(depth_m, valid), valid)
-    depth_m = _inverted(inverse, valid)
+    step, scale_m = config.grid_step_px, np.float32(frame.depth_scale_m)
+    range_m = measurable_m(config.max_depth_m, frame.depth_scale_m)
+    offset = step // 4 + 0.5 * (step // 2) if step >= _FOUR_FROM_PX else float(step // 2)
+    raw, valid, beyond = _sampled(
+        np.ascontiguousarray(frame.depth), step, scale_m, np.float32(config.min_depth_m), np.float32(range_m)
+    )
+    # The middle one of raw depths is that of their inverses, and whole numbers are sorted faster.
+    middle = np.asarray(cv2.medianBlur(raw, 5), np.uint16)
+    inverse, depth_m = _smoothed(raw, middle, scale_m)
     view = _view(frame.intrinsics, mount, depth_m.shape, step, offset)
     x, y = view.x, view.y
     if mount is None:
@@ -133,7 +131,15 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
             up=None,
             range_m=range_m,
         )
-    sigma_m = np.float32(CELL_HEIGHT_NOISE) * depth_sigma_m(depth_m, config.depth_noise)
+    noise = config.depth_noise
+    forward_m, height_m, height_sigma_m = _over_floor(
+        depth_m,
+        view.ahead,
+        view.drop,
+        np.float32(mount.height_m),
+        np.float32(noise.floor_m),
+        np.float32(noise.quadratic_per_m),
+    )
     return DepthGrid(
         step_px=step,
         offset_px=offset,
@@ -143,9 +149,9 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
         beyond=beyond,
         x=x,
         y=y,
-        forward_m=depth_m * view.ahead,
-        height_m=np.float32(mount.height_m) - depth_m * view.drop,
-        height_sigma_m=sigma_m * np.abs(view.drop),
+        forward_m=forward_m,
+        height_m=height_m,
+        height_sigma_m=height_sigma_m,
         camera_height_m=mount.height_m,
         pitch_rad=mount.pitch_rad,
         up=np.array([0.0, -math.cos(mount.pitch_rad), -math.sin(mount.pitch_rad)]),
@@ -155,7 +161,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
-    """Where the cells look: x (w,), y (h,) as in DepthGrid. ahead, drop (h, 1): metres along the floor and
+    """Where the cells look: x (w,), y (h,) as in DepthGrid. ahead, drop (h,): metres along the floor and
     metres down per metre of depth."""
 
     x: FloatGrid
@@ -175,51 +181,90 @@ def _view(
     y = (v - np.float32(camera.cy)) / np.float32(camera.fy)
     pitch_rad = 0.0 if mount is None else mount.pitch_rad
     cosine, sine = np.float32(math.cos(pitch_rad)), np.float32(math.sin(pitch_rad))
-    view = _View(x, y, (cosine - y * sine)[:, None], (y * cosine + sine)[:, None])
+    view = _View(x, y, cosine - y * sine, y * cosine + sine)
     for values in (view.x, view.y, view.ahead, view.drop):
         values.setflags(write=False)
     return view
 
 
-def _inverted(values: FloatGrid, valid: BoolGrid) -> FloatGrid:
-    """1 / values where valid, else 0. valid values are not zero; what comes of the others is left out."""
-    inverted = np.float32(1.0) / values
-    return np.asarray(cv2.copyTo(inverted, valid.view(np.uint8)), np.float32)
-
-
-def _smooth(raw: DepthImage, scale_m: float, inverse: FloatGrid, valid: BoolGrid) -> FloatGrid:
-    """Median over 5x5 cells, but a cell that differs much keeps its own: a thin pole, a rim of a body.
-
-    The middle one of raw depths is that of their inverses, and whole numbers are sorted faster. Without
-    data, an inverse depth of 0, is the farthest.
-    """
-    known = np.maximum(raw, (~valid).view(np.uint8) * _FARTHEST)
-    middle = np.asarray(cv2.medianBlur(known, 5), np.uint16)
-    median = _inverted(middle * np.float32(scale_m), middle < _FARTHEST)
-    same = valid & (np.abs(inverse - median) <= np.float32(_AGREE_INVERSE))
-    return np.asarray(cv2.copyTo(median, same.view(np.uint8), inverse), np.float32)
-
-
-def _four_samples(depth: DepthImage, step: int, scale_m: float) -> DepthImage:
-    """One value per step x step block out of four samples: the mean of the middle two, or, where these
-    lie on two surfaces, the nearer. A block with more than one sample without data has none."""
-    rows, columns = depth.shape[0] // step * step, depth.shape[1] // step * step
-    low, high = step // 4, step // 4 + step // 2
-    a, b, c, d = (
-        np.ascontiguousarray(depth[row:rows:step, column:columns:step])
-        for row in (low, high)
-        for column in (low, high)
-    )
-    first = np.maximum(np.minimum(a, b), np.minimum(c, d))
-    second = np.minimum(np.maximum(a, b), np.maximum(c, d))
-    nearer, farther = np.minimum(first, second), np.maximum(first, second)
-    gap = farther - nearer
-    # 1/nearer - 1/farther <= k, without a division; in one type each, or NumPy converts piece by piece.
-    reach = nearer.astype(np.float32)
-    reach *= farther.astype(np.float32)
-    reach *= np.float32(_AGREE_INVERSE * scale_m)
-    same = gap.astype(np.float32) <= reach
-    gap >>= 1
-    gap *= same.astype(np.uint16)
-    nearer += gap
+@inlined
+def _of_four(depth: DepthImage, row: int, column: int, low: int, high: int, agree: np.float32) -> int:
+    """One raw depth of four samples of the block at row and column: the mean of the middle two, or, where
+    these lie on two surfaces, the nearer. A block with more than one sample without data has none."""
+    a, b = depth[row + low, column + low], depth[row + low, column + high]
+    c, d = depth[row + high, column + low], depth[row + high, column + high]
+    first = max(min(a, b), min(c, d))
+    second = min(max(a, b), max(c, d))
+    nearer, farther = int(min(first, second)), int(max(first, second))
+    # 1/nearer - 1/farther <= k, without a division.
+    if np.float32(farther - nearer) <= np.float32(nearer) * np.float32(farther) * agree:
+        nearer += (farther - nearer) // 2
     return nearer
+
+
+@compiled("uint16[:, ::1], int64, float32, float32, float32")
+def _sampled(
+    depth: DepthImage, step: int, scale_m: np.float32, min_m: np.float32, range_m: np.float32
+) -> tuple[DepthImage, BoolGrid, BoolGrid]:
+    """(h, w) raw depth of one cell per step x step block, _FARTHEST where it is not valid; valid; beyond."""
+    four = step >= _FOUR_FROM_PX
+    rest = 0 if four else step - 1 - step // 2
+    height, width = (depth.shape[0] + rest) // step, (depth.shape[1] + rest) // step
+    raw = np.empty((height, width), np.uint16)
+    valid, beyond = np.empty((height, width), np.bool_), np.empty((height, width), np.bool_)
+    agree = np.float32(_AGREE_INVERSE) * scale_m
+    low, high = step // 4, step // 4 + step // 2
+    for i in range(height):
+        for j in range(width):
+            if four:
+                value = _of_four(depth, step * i, step * j, low, high, agree)
+            else:
+                value = int(depth[step * i + step // 2, step * j + step // 2])
+            depth_m = np.float32(value) * scale_m
+            beyond[i, j] = depth_m > range_m
+            valid[i, j] = min_m <= depth_m <= range_m
+            raw[i, j] = value if valid[i, j] else _FARTHEST
+    return raw, valid, beyond
+
+
+@compiled("uint16[:, ::1], uint16[:, ::1], float32")
+def _smoothed(raw: DepthImage, middle: DepthImage, scale_m: np.float32) -> tuple[FloatGrid, FloatGrid]:
+    """Inverse depth (h, w) and depth of the cells, both 0 where not valid: their median over 5x5 cells, as in
+    middle (h, w), but a cell that differs much keeps its own: a thin pole, a rim of a body.
+
+    Without data, an inverse depth of 0, is the farthest.
+    """
+    one, zero = np.float32(1.0), np.float32(0.0)
+    inverse, depth_m = np.zeros(raw.shape, np.float32), np.zeros(raw.shape, np.float32)
+    for i in range(raw.shape[0]):
+        for j in range(raw.shape[1]):
+            if raw[i, j] == _FARTHEST:
+                continue
+            own = one / (np.float32(raw[i, j]) * scale_m)
+            median = one / (np.float32(middle[i, j]) * scale_m) if middle[i, j] < _FARTHEST else zero
+            inverse[i, j] = median if abs(own - median) <= np.float32(_AGREE_INVERSE) else own
+            depth_m[i, j] = one / inverse[i, j]
+    return inverse, depth_m
+
+
+@compiled("float32[:, ::1], float32[::1], float32[::1], float32, float32, float32")
+def _over_floor(
+    depth_m: FloatGrid,
+    ahead: FloatGrid,
+    drop: FloatGrid,
+    camera_height_m: np.float32,
+    floor_m: np.float32,
+    quadratic_per_m: np.float32,
+) -> tuple[FloatGrid, FloatGrid, FloatGrid]:
+    """forward_m, height_m, height_sigma_m of cells of depth_m (h, w). ahead, drop (h,): see _View. floor_m,
+    quadratic_per_m: of depth_sigma_m."""
+    forward_m, height_m = np.empty(depth_m.shape, np.float32), np.empty(depth_m.shape, np.float32)
+    height_sigma_m = np.empty(depth_m.shape, np.float32)
+    for i in range(depth_m.shape[0]):
+        share = np.float32(CELL_HEIGHT_NOISE) * abs(drop[i])
+        for j in range(depth_m.shape[1]):
+            depth = depth_m[i, j]
+            forward_m[i, j] = depth * ahead[i]
+            height_m[i, j] = camera_height_m - depth * drop[i]
+            height_sigma_m[i, j] = share * (floor_m + quadratic_per_m * depth * depth)
+    return forward_m, height_m, height_sigma_m

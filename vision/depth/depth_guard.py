@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.depth.level_bands import LevelBands, level_bands
@@ -18,11 +18,7 @@ from vision.depth.near_floor import FLOOR_EXCESS
 from vision.scene import NEVER_M, FreeSpace
 
 _SUPPORT = 3  # this many cells of a band must agree before they are a surface
-_HOLE_ROWS = 2  # one row is lost to noise now and then
 _BLANK_SHARE = 0.1  # of a band's cells: stray ones are measured even where something covers the lens
-# Band and distance in one whole number: 80 bands, and up to 64 m in steps of 4 micrometres.
-_BAND_SHIFT = 24
-_UNITS_PER_M = 2.0**18
 _LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5  # as level and as steep as a ray may be to have a tangent worth telling
 
 
@@ -37,7 +33,7 @@ def free_space(
     only.
     """
     bands, blind_m = level_bands(grid), 0.0
-    nearest = _nearest_m(grid, obstacle, bands)
+    nearest = _nearest_m(grid.forward_m, obstacle, bands.band, len(bands))
     if math.isfinite(grid.pitch_rad):
         known, blind_m = _known_m(grid, bands, max_depth_m, unmeasured_m)
         # What stands there hides what is behind it.
@@ -65,7 +61,8 @@ def _blank(
     blank = (known_m <= 0.0) & np.isinf(nearest_m)
     if blank.any():
         rows = len(grid.y)
-        measured = bands.count(grid.valid | grid.beyond, rows).sum(axis=0, dtype=np.int64)
+        measured = (grid.valid | grid.beyond).ravel()[bands.cells] & (bands.cells >= 0)
+        measured = np.count_nonzero(measured.reshape(rows, -1, bands.width), axis=(0, 2))
         blank &= measured <= _BLANK_SHARE * rows * bands.width
     return blank
 
@@ -87,36 +84,23 @@ def _up_tan(grid: DepthGrid) -> float:
     return math.tan(min(up_rad, _UPRIGHT_RAD))
 
 
-def _nearest_m(grid: DepthGrid, obstacle: BoolGrid, bands: LevelBands) -> FloatArray:
+@compiled("float32[:, ::1], boolean[:, ::1], int32[:, ::1], int64")
+def _nearest_m(forward_m: FloatGrid, obstacle: BoolGrid, band: NDArray[np.int32], bands: int) -> FloatArray:
     """(B,) forward distance of the nearest surface that enough obstacle cells agree on, inf without."""
-    if bands.band is not None:
-        return _nearest_fanned_m(grid.forward_m, obstacle, bands.band, len(bands))
-    mask, columns = obstacle.view(np.uint8), obstacle.shape[1]
-    support = min(_SUPPORT, len(obstacle) * bands.width)
-    _, top, _, height = cv2.boundingRect(mask)  # the rows in which something stands
-    forward = np.full((max(height, support), len(bands) * bands.width), np.inf, np.float32)
-    if height > 0:
-        rows = slice(top, top + height)
-        cv2.copyTo(grid.forward_m[rows], mask[rows], forward[:height, :columns])
-    upright = np.asarray(cv2.transpose(forward), np.float32).reshape(len(bands), -1)
-    return np.sort(upright, axis=1)[:, support - 1].astype(float)
-
-
-def _nearest_fanned_m(
-    forward_m: FloatGrid, obstacle: BoolGrid, band: NDArray[np.int32], bands: int
-) -> FloatArray:
-    """The same where each cell has its band (h, w)."""
-    cells = np.flatnonzero(obstacle)
-    # Sorted by band and then by distance: whole numbers of 32 bits are sorted fastest.
-    key = (np.maximum(forward_m.ravel().take(cells), 0.0) * np.float32(_UNITS_PER_M)).astype(np.int32)
-    key += band.ravel().take(cells) << _BAND_SHIFT
-    key.sort()
-    begin = key.searchsorted(np.arange(bands + 1, dtype=np.int32) << _BAND_SHIFT)
-    last = begin[:-1] + _SUPPORT - 1
-    nearest = np.full(bands, np.inf)
-    there = last < begin[1:]
-    nearest[there] = (key[last[there]] & ((1 << _BAND_SHIFT) - 1)) / _UNITS_PER_M
-    return nearest
+    # The nearest few of each band, in order.
+    nearest = np.full((bands, _SUPPORT), np.inf)
+    for i in range(obstacle.shape[0]):
+        for j in range(obstacle.shape[1]):
+            if not obstacle[i, j]:
+                continue
+            kept, place = nearest[band[i, j]], _SUPPORT - 1
+            if not forward_m[i, j] < kept[place]:
+                continue
+            while place > 0 and forward_m[i, j] < kept[place - 1]:
+                kept[place] = kept[place - 1]
+                place -= 1
+            kept[place] = max(forward_m[i, j], np.float32(0.0))
+    return nearest[:, -1].copy()
 
 
 def _known_m(
@@ -133,29 +117,51 @@ def _known_m(
     floor_depth = grid.camera_height_m / drop[rows]
     floor_forward = floor_depth * (cos_pitch - y[rows] * sin_pitch)
     limit_m = (FLOOR_EXCESS * floor_depth).astype(np.float32)
-    lower = slice(len(grid.y) - len(rows), None)
-    seen = grid.valid[lower] & (grid.depth_m[lower] <= limit_m[::-1, None])
-    hole = bands.count(seen, len(grid.y))[::-1] < 0.5 * bands.width
-    shown = ~hole
-    blank = int(np.count_nonzero(floor_depth < unmeasured_m))
-    if blank:
-        # Too near to be measured. What is measured there, but not on the floor, is a hole as elsewhere.
-        nothing = ~(grid.valid[-blank:] | grid.beyond[-blank:])
-        hole[:blank] &= bands.count(nothing, len(grid.y))[::-1] < 0.5 * bands.width
-    # A single row may be lost to noise; two in a row are a hole. After the last row one is sure.
-    run = np.ones((len(rows) + 1, len(bands)), np.bool_)
-    run[:-1] = hole
-    for shift in range(1, _HOLE_ROWS):
-        run[: len(rows) - shift] &= hole[shift:]
-    first = run.argmax(axis=0)
+    unmeasured = int(np.count_nonzero(floor_depth < unmeasured_m))
     # Where even the uppermost ray meets the floor, nothing beyond that was looked at.
     horizon_m = max_depth_m if len(rows) < len(grid.y) else floor_forward[-1]
-    reach = np.concatenate((floor_forward, (horizon_m,)))
-    # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known. Nor is it where a
-    # hole comes before any floor.
-    known = np.minimum(reach[first], max_depth_m)
-    nowhere, blind_m = first == 0, 0.0
-    if blank:
-        nowhere |= ~shown.any(axis=0) | (shown.argmax(axis=0) >= first)
-        blind_m = float(floor_forward[blank - 1])
-    return np.where(nowhere, 0.0, known).astype(float), blind_m
+    reach_m = np.minimum(np.concatenate((floor_forward, (horizon_m,))), max_depth_m)
+    first = _first_hole(grid.valid, grid.beyond, grid.depth_m, bands.cells, bands.width, limit_m, unmeasured)
+    # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known.
+    known: FloatArray = np.where(first == 0, 0.0, reach_m[first])
+    return known, float(floor_forward[unmeasured - 1]) if unmeasured else 0.0
+
+
+@compiled("boolean[:, ::1], boolean[:, ::1], float32[:, ::1], int32[:, ::1], int64, float32[::1], int64")
+def _first_hole(
+    valid: BoolGrid,
+    beyond: BoolGrid,
+    depth_m: FloatGrid,
+    cells: NDArray[np.int32],
+    width: int,
+    limit_m: NDArray[np.float32],
+    unmeasured: int,
+) -> NDArray[np.intp]:
+    """(B,) row from the bottom on, 0 the lowest, at which the floor ends: the first of two in a row that show
+    less than half of it; the last one may be alone; len(limit_m) where there is none. 0 where a hole comes
+    before any floor.
+
+    limit_m (k,): what is farther in the lowest k rows is no floor. unmeasured: so many of these are too near
+    to be measured: no data there is no hole, but what is measured and is no floor is one as elsewhere.
+    """
+    bands, rows = cells.shape[1] // width, len(limit_m)
+    depth, is_valid, is_beyond = depth_m.ravel(), valid.ravel(), beyond.ravel()
+    result = np.empty(bands, np.intp)
+    for band in range(bands):
+        first, shown, before = rows, False, False
+        for row in range(rows):
+            floor, nothing = 0, 0
+            for place in range(band * width, (band + 1) * width):
+                cell = cells[len(cells) - 1 - row, place]
+                if cell >= 0:
+                    floor += is_valid[cell] and depth[cell] <= limit_m[row]
+                    nothing += not (is_valid[cell] or is_beyond[cell])
+            hole = 2 * floor < width and not (row < unmeasured and 2 * nothing >= width)
+            shown |= 2 * floor >= width
+            # A single row may be lost to noise.
+            if hole and (before or row == rows - 1):
+                first = row - 1 if before else row
+                break
+            before = hole
+        result[band] = first if shown or not unmeasured else 0
+    return result

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.depth.depth_grid import BoolGrid, DepthGrid
+from vision.depth.depth_grid import DepthGrid
 
 BANDS = 80  # across 60 degrees: 8 cm wide 6 m ahead
 _FAN_BANDS = 1.5  # columns will do where no cell is farther than so many bands from where it belongs
@@ -28,31 +28,17 @@ class LevelBands:
     """bearing_tan (B,): right over forward of the middles; half_width_tan. width: cells of one row in a band.
 
     band (h, w): which one each cell lies in, at the sides the last one. cells (h, B * width): the flat cells
-    along each row, band after band, h * w where the image ends. Both None where a band is width columns.
+    along each row, band after band, -1 where the image ends.
     """
 
     bearing_tan: FloatArray
     half_width_tan: float
     width: int
-    band: NDArray[np.int32] | None
-    cells: NDArray[np.intp] | None
+    band: NDArray[np.int32]
+    cells: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.bearing_tan)
-
-    def count(self, chosen: BoolGrid, height: int) -> NDArray[np.uint8]:
-        """(k, B) how many of chosen (k, w), the lowest k of height rows, are set, by row and band; beside the
-        image there are none."""
-        rows = chosen
-        if self.cells is not None:
-            all_rows = np.zeros(height * chosen.shape[1] + 1, np.bool_)
-            all_rows[-1 - chosen.size : -1] = chosen.ravel()
-            rows = all_rows.take(self.cells[height - len(chosen) :])
-        count = np.zeros((len(chosen), len(self)), np.uint8)
-        for column in range(self.width):
-            part = rows[:, column :: self.width]
-            count[:, : part.shape[1]] += part
-        return count
 
 
 def level_bands(grid: DepthGrid) -> LevelBands:
@@ -71,25 +57,31 @@ def _bands(
     bands = -(-columns // width)  # the last one may reach beyond the image: nothing is seen there
     middle: FloatArray = x0 + step * (width * np.arange(bands, dtype=np.float64) + 0.5 * (width - 1))
     half_width = 0.5 * width * step
-    if pitch_rad is None:
-        return LevelBands(bearing_tan=middle, half_width_tan=half_width, width=width, band=None, cells=None)
-    cosine, sine = math.cos(pitch_rad), math.sin(pitch_rad)
-    tilt = cosine - 0.5 * (y0 + y1) * sine
-    middle /= tilt
-    half_width /= tilt
-    ahead = np.maximum(cosine - np.linspace(y0, y1, rows) * sine, _LEAST_AHEAD)[:, None]
-    x = x0 + step * np.arange(columns)
-    off = max(abs(x0), abs(float(x[-1]))) * float(np.abs(1.0 / ahead - 1.0 / tilt).max())
-    if off <= _FAN_BANDS * 2.0 * half_width:
-        return LevelBands(bearing_tan=middle, half_width_tan=half_width, width=width, band=None, cells=None)
-    edge = middle[0] - half_width
-    band = np.floor((x / ahead - edge) / (2.0 * half_width)).clip(0, bands - 1).astype(np.int32)
-    # So close to each other that none is left out in the row that sees farthest ahead.
-    width = math.ceil(2.0 * half_width * float(ahead.max()) / step)
-    along = edge + 2.0 * half_width / width * (np.arange(bands * width) + 0.5)
-    column = np.rint((along * ahead - x0) / step).astype(np.intp)
-    inside = (column >= 0) & (column < columns)
-    cells = np.where(inside, column + columns * np.arange(rows)[:, None], rows * columns)
-    for values in (band, cells):
-        values.setflags(write=False)
-    return LevelBands(bearing_tan=middle, half_width_tan=half_width, width=width, band=band, cells=cells)
+    column = np.arange(columns)
+    band = np.broadcast_to(column // width, (rows, columns))
+    cells = np.arange(bands * width) + columns * np.arange(rows)[:, None]
+    cells[:, columns:] = -1
+    if pitch_rad is not None:
+        cosine, sine = math.cos(pitch_rad), math.sin(pitch_rad)
+        tilt = cosine - 0.5 * (y0 + y1) * sine
+        middle /= tilt
+        half_width /= tilt
+        ahead = np.maximum(cosine - np.linspace(y0, y1, rows) * sine, _LEAST_AHEAD)[:, None]
+        x = x0 + step * column
+        off = max(abs(x0), abs(float(x[-1]))) * float(np.abs(1.0 / ahead - 1.0 / tilt).max())
+        if off > _FAN_BANDS * 2.0 * half_width:
+            edge = middle[0] - half_width
+            band = np.floor((x / ahead - edge) / (2.0 * half_width)).clip(0, bands - 1)
+            # So close to each other that none is left out in the row that sees farthest ahead.
+            width = math.ceil(2.0 * half_width * float(ahead.max()) / step)
+            along = edge + 2.0 * half_width / width * (np.arange(bands * width) + 0.5)
+            nearest = np.rint((along * ahead - x0) / step).astype(np.intp)
+            inside = (nearest >= 0) & (nearest < columns)
+            cells = np.where(inside, nearest + columns * np.arange(rows)[:, None], -1)
+    return LevelBands(
+        bearing_tan=middle,
+        half_width_tan=half_width,
+        width=width,
+        band=np.ascontiguousarray(band, np.int32),
+        cells=np.ascontiguousarray(cells, np.int32),
+    )

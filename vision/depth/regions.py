@@ -1,4 +1,4 @@
-"""Connected depth: the parts of the view that stand out of the floor, and what each of them measures.
+"""What each part of the view measures: box, centre, size, and what hides some of it.
 
 Terms (cell, part, region): vision/__init__.py.
 """
@@ -7,20 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.depth.depth_grid import BoolGrid, DepthGrid
-from vision.numerics.order import median
+from vision.depth.connected import LEAST_JUMP, MOST_JUMP, IntGrid
+from vision.depth.depth_grid import DepthGrid, FloatGrid
 
-IntGrid = NDArray[np.int32]
-
-# 1/m: 0.15 m at 5 m, below which it is noise; a body's depth at 3 m, above which a slope is no excuse.
-_LEAST_JUMP = 0.006
-_MOST_JUMP = 0.03
-_SPECKLE_CELLS = 6  # fewer are taken for wrong matches of a stereo camera
 _UNIFORM = 3.46  # a uniform spread is this many standard deviations long
 _FOOT_M, _FOOT_PER_METRE = 0.12, 0.015  # taken for floor: standing()'s clearance and margins
 _OCCLUDED_SHARE = 0.15  # of its rows: at fewer rims it is noise that is nearer
@@ -68,197 +62,183 @@ def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> R
     )
 
 
-def standing(grid: DepthGrid, clearance_m: float) -> BoolGrid:
-    """(h, w) cells that stand out of the floor; every valid cell where the floor is not known."""
-    if grid.height_m is None or grid.height_sigma_m is None:
-        return grid.valid
-    margin = (
-        np.float32(clearance_m) + np.float32(3.0) * grid.height_sigma_m + np.float32(0.008) * grid.depth_m
-    )
-    result: BoolGrid = grid.valid & (grid.height_m > margin)
-    return result
-
-
-def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
-    """Connected parts of mask, parted where depth jumps: how many, and labels (h, w), 0 for none.
-
-    Depth noise of a stereo camera is constant in inverse depth, so that is where a jump is measured. The
-    far side of a jump is taken out, so that a pole one cell wide stays whole.
-    """
-    inverse = grid.inverse_depth
-    # Cell by cell as they lie, which is faster than row by row; from the end of a row to the next is no step.
-    across = np.empty_like(inverse)
-    np.subtract(inverse.ravel()[1:], inverse.ravel()[:-1], out=across.ravel()[:-1])
-    across[:, -1] = 0.0
-    down = inverse[1:] - inverse[:-1]
-    inner = np.abs(across[::2, :-1][mask[::2, 1:] & mask[::2, :-1]])
-    typical = float(median(inner)) if len(inner) else 0.0
-    jump = np.float32(min(max(12.0 * typical, _LEAST_JUMP), _MOST_JUMP))
-    kept = mask & (across <= jump)
-    kept.ravel()[1:] &= (across >= -jump).ravel()[:-1]
-    kept[1:] &= down >= -jump
-    kept[:-1] &= down <= jump
-    # Counting the cells here is a fraction of the work of OpenCV's own statistics.
-    count, found = cv2.connectedComponents(kept.view(np.uint8), connectivity=4)
-    labels: IntGrid = np.asarray(found, np.int32)
-    cells = np.flatnonzero(kept)
-    label = labels.ravel().take(cells)
-    # Renumber, leaving out the speckles.
-    large = np.bincount(label, minlength=count) >= _SPECKLE_CELLS
-    number = (np.cumsum(large) * large).astype(np.int32)
-    labels.ravel()[cells] = number.take(label)
-    return int(number.max()), labels
-
-
-def _sorted_cells(labels: IntGrid, count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Cells labelled 1..count in the order of their labels, then row by row: label and flat index of each."""
-    flat = np.flatnonzero(labels > 0)
-    label = labels.ravel().take(flat)
-    bits = labels.size.bit_length()
-    if count.bit_length() + bits > 31:
-        order = np.argsort(label, kind="stable")
-        return label[order], flat[order].astype(np.int32)
-    # One number holds both: sorting numbers is faster than finding an order and following it.
-    both = (label << bits) | flat.astype(np.int32)
-    both.sort()
-    return both >> bits, both & ((1 << bits) - 1)
-
-
 def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     """Boxes, centres and sizes of the parts 1..count of labels (h, w); entry k - 1 is part k.
 
     wide knows of the image's border only; see unhidden.
     """
-    height, width = labels.shape
-    label, flat = _sorted_cells(labels, count)
-    ends = label.searchsorted(np.arange(count + 1), side="right")
-    starts, cells = ends[:-1], ends[1:] - ends[:-1]
-    # Box, centre and size of each, in this order.
-    table, reach = np.zeros((10, count)), np.zeros(count, np.intp)
-    wide, tall, nothing = np.zeros((3, count), np.bool_)
-    result = Regions(
-        cells=cells,
-        rows=reach,
-        bbox_px=table[:4].T,
-        position_m=table[4:7].T,
-        extent_m=table[7:].T,
-        wide=wide,
-        tall=tall,
-        overlapped=nothing,
+    on_floor = grid.up is not None
+    cells, edges, bbox_px, position_m, extent_m = _measured(
+        grid.inverse_depth,
+        labels,
+        count,
+        grid.x,
+        grid.y,
+        float(grid.step_px),
+        grid.offset_px,
+        grid.up if grid.up is not None else np.zeros(3),
+        grid.camera_height_m if on_floor else np.nan,
     )
-    if len(flat) == 0:
-        return result
-    present = cells.nonzero()[0]
-    starts, number = starts[present], cells[present]
-    rows = flat // np.int32(width)
-    columns = flat - rows * np.int32(width)
-    left, right = np.minimum.reduceat(columns, starts), np.maximum.reduceat(columns, starts)
-    top, bottom = rows[starts], rows[starts + number - 1]
-    inverse = grid.inverse_depth.ravel().take(flat)
-    mean_inverse = np.add.reduceat(inverse, starts) / number
-    spread = np.sqrt(np.maximum(np.add.reduceat(inverse * inverse, starts) / number - mean_inverse**2, 0.0))
-    found = np.empty((10, len(present)))
-    box, centre, size = found[:4], found[4:7], found[7:]
-    depth = centre[2] = 1.0 / mean_inverse
-    centre[0] = np.add.reduceat(grid.x.take(columns), starts) / number * depth
-    centre[1] = np.add.reduceat(grid.y.take(rows), starts) / number * depth
-    box[0], box[1], box[2], box[3] = left, top, right, bottom
-    box *= grid.step_px
-    box[:2] += grid.offset_px - 0.5 * grid.step_px
-    box[2:] += grid.offset_px + 0.5 * grid.step_px
-    box[3] = np.maximum(box[3], _foot_px(grid, bottom, centre[0] / depth, depth))
-    size[0] = _width_m(grid, columns, inverse, starts, number, left, right)
-    size[1] = (grid.y[bottom] - grid.y[top]) * depth
-    size[2] = _UNIFORM * spread * depth * depth
-    table[:, present] = found
-    wide[present] = (left > 0) & (right < width - 1)
-    tall[present] = (top > 0) & (bottom < height - 1)
-    reach[present] = bottom - top + 1
-    return result
+    left, top, right, bottom = edges.T
+    present, (height, width) = cells > 0, labels.shape
+    return Regions(
+        cells=cells,
+        rows=bottom - top + 1,
+        bbox_px=bbox_px,
+        position_m=position_m,
+        extent_m=extent_m,
+        wide=present & (left > 0) & (right < width - 1),
+        tall=present & (top > 0) & (bottom < height - 1),
+        overlapped=np.zeros(count, np.bool_),
+    )
 
 
-def _width_m(
-    grid: DepthGrid,
-    columns: IntGrid,
-    inverse: NDArray[np.floating],
-    starts: NDArray[np.intp],
-    number: NDArray[np.intp],
-    left: IntGrid,
-    right: IntGrid,
-) -> FloatArray:
-    """(R,) from the left to the right rim of parts, each at its own depth: whoever looks along a side of a
-    body would take it for wider, at the depth of its middle, than it is."""
-    rim = (right - left) // _RIM
-    low, high = columns <= (left + rim).repeat(number), columns >= (right - rim).repeat(number)
-    ends_m = []
-    for x, of in ((grid.x[left], low), (grid.x[right], high)):
-        share = of.astype(np.float32)
-        cells = np.add.reduceat(share, starts).astype(np.intp)
-        ends_m.append(x * cells / np.add.reduceat(inverse * share, starts))
-    # What goes back and outwards has its far end on the inner rim.
-    width: FloatArray = np.abs(ends_m[1] - ends_m[0])
-    return width
+@inlined
+def _edges(labels: IntGrid, count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """(R,) cells of parts 1..count of labels (h, w), and (R, 4) their first and last columns and rows: left,
+    top, right, bottom; 0, 0, 0, -1 of those without cells."""
+    height, width = labels.shape
+    cells, edges = np.zeros(count, np.intp), np.zeros((count, 4), np.intp)
+    edges[:, 3] = -1
+    for i in range(height):
+        for j in range(width):
+            part = labels[i, j] - 1
+            if part < 0 or part >= count:
+                continue
+            edge = edges[part]
+            if cells[part] == 0:
+                edge[0], edge[1], edge[2] = j, i, j
+            cells[part] += 1
+            edge[0], edge[2], edge[3] = min(edge[0], j), max(edge[2], j), i
+    return cells, edges
+
+
+@inlined
+def _foot_px(
+    y: FloatGrid,
+    step_px: float,
+    offset_px: float,
+    up: FloatArray,
+    height_m: float,
+    middle_x: float,
+    depth_m: float,
+    bottom: int,
+) -> float:
+    """Image row where a part that nearly reaches down to the floor stands on it; -inf for others. height_m:
+    of the camera.
+
+    The lowest hand's breadth of a body is taken for floor, as the noise of depth demands.
+    """
+    # On the floor: camera height = - up . ray * depth.
+    floor_y = (-height_m / depth_m - up[2] - up[0] * middle_x) / up[1]
+    if not (floor_y - y[bottom]) * depth_m <= _FOOT_M + _FOOT_PER_METRE * depth_m:
+        return -np.inf
+    row = float((floor_y - y[0]) / (y[1] - y[0])) * step_px + offset_px
+    return min(row, offset_px + (len(y) - 0.5) * step_px)
+
+
+@compiled(
+    "float32[:, ::1], int32[:, ::1], int64, float32[::1], float32[::1], "
+    "float64, float64, float64[::1], float64"
+)
+def _measured(
+    inverse: FloatGrid,
+    labels: IntGrid,
+    count: int,
+    x: FloatGrid,
+    y: FloatGrid,
+    step_px: float,
+    offset_px: float,
+    up: FloatArray,
+    height_m: float,
+) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
+    """cells (R,), edges (R, 4) as in _edges, bbox_px (R, 4), position_m and extent_m (R, 3) of the parts.
+    height_m: of the camera, NaN where the floor is not known; up (3,): its normal."""
+    cells, edges = _edges(labels, count)
+    # Sums over each part: inverse depth, its square, x, y; and over its left and its right rim, which are
+    # measured each at its own depth: cells, inverse depth. Whoever looks along a side of a body would take it
+    # for wider, at the depth of its middle, than it is.
+    sums, rims = np.zeros((count, 4)), np.zeros((count, 4))
+    for i in range(labels.shape[0]):
+        for j in range(labels.shape[1]):
+            part = labels[i, j] - 1
+            if part < 0 or part >= count:
+                continue
+            value, left, right = float(inverse[i, j]), edges[part, 0], edges[part, 2]
+            rim = (right - left) // _RIM
+            sums[part, 0] += value
+            sums[part, 1] += value * value
+            sums[part, 2] += x[j]
+            sums[part, 3] += y[i]
+            if j <= left + rim:
+                rims[part, 0] += 1.0
+                rims[part, 1] += value
+            if j >= right - rim:
+                rims[part, 2] += 1.0
+                rims[part, 3] += value
+    bbox_px, position_m, extent_m = np.zeros((count, 4)), np.zeros((count, 3)), np.zeros((count, 3))
+    for part in range(count):
+        if cells[part] == 0:
+            continue
+        left, top, right, bottom = edges[part]
+        mean, mean_square, mean_x, mean_y = sums[part] / cells[part]
+        depth_m = 1.0 / mean
+        bbox_px[part, 0] = left * step_px + (offset_px - 0.5 * step_px)
+        bbox_px[part, 1] = top * step_px + (offset_px - 0.5 * step_px)
+        bbox_px[part, 2] = right * step_px + (offset_px + 0.5 * step_px)
+        bbox_px[part, 3] = bottom * step_px + (offset_px + 0.5 * step_px)
+        if height_m == height_m:
+            foot_px = _foot_px(y, step_px, offset_px, up, height_m, mean_x, depth_m, bottom)
+            bbox_px[part, 3] = max(bbox_px[part, 3], foot_px)
+        position_m[part] = mean_x * depth_m, mean_y * depth_m, depth_m
+        # What goes back and outwards has its far end on the inner rim.
+        extent_m[part, 0] = abs(
+            x[right] * rims[part, 2] / rims[part, 3] - x[left] * rims[part, 0] / rims[part, 1]
+        )
+        extent_m[part, 1] = (y[bottom] - y[top]) * depth_m
+        extent_m[part, 2] = _UNIFORM * np.sqrt(max(mean_square - mean * mean, 0.0)) * depth_m * depth_m
+    return cells, edges, bbox_px, position_m, extent_m
 
 
 def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
     """regions as measured, wide only where nothing nearer hides a part, either, and where it ends at an edge
     in depth: what was divided from its surroundings by guess has its middle where the guess put it."""
-    hidden = _hidden_cells(grid, labels, len(regions.cells))
-    overlapped = _overlapped_cells(grid, labels, len(regions.cells))
+    hidden, overlapped = _hidden_cells(grid.inverse_depth, labels, len(regions.cells), np.float32(LEAST_JUMP))
     least = _OCCLUDED_SHARE * regions.rows
     return replace(regions, wide=regions.wide & (hidden <= least), overlapped=overlapped > least)
 
 
-def _foot_px(
-    grid: DepthGrid, bottom: NDArray[np.intp], middle_x: FloatArray, depth_m: FloatArray
-) -> FloatArray:
-    """(R,) image row where a part that nearly reaches down to the floor stands on it; -inf for others.
-
-    The lowest hand's breadth of a body is taken for floor, as the noise of depth demands.
-    """
-    if grid.up is None:
-        return np.full(len(bottom), -np.inf)
-    # On the floor: camera height = - up . ray * depth.
-    floor_y = (-grid.camera_height_m / depth_m - grid.up[2] - grid.up[0] * middle_x) / grid.up[1]
-    missing_m = (floor_y - grid.y[bottom]) * depth_m
-    row = (floor_y - grid.y[0]) / float(grid.y[1] - grid.y[0]) * grid.step_px + grid.offset_px
-    end = grid.offset_px + (len(grid.y) - 0.5) * grid.step_px
-    stands = missing_m <= _FOOT_M + _FOOT_PER_METRE * depth_m
-    result: FloatArray = np.where(stands, np.minimum(row, end), -np.inf)
-    return result
-
-
-def _hidden_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.intp]:
+@compiled("float32[:, ::1], int32[:, ::1], int64, float32")
+def _hidden_cells(
+    inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """(count,) cells at the left or right rim of each part beside which something else stands nearer, or
-    another part goes on at the same depth."""
-    inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    rims = (flat[1:] != flat[:-1]).nonzero()[0]
-    rims = rims[(rims + 1) % labels.shape[1] > 0]  # not from the end of a row to the next one
-    left, right = flat.take(rims), flat.take(rims + 1)
-    step = inverse.take(rims + 1) - inverse.take(rims)
-    jumps = np.abs(step) > np.float32(_LEAST_JUMP)
-    shared = ~jumps & (left > 0) & (right > 0)
-    hidden = np.concatenate((np.where(step > 0, left, right)[jumps], left[shared], right[shared]))
-    return np.bincount(hidden, minlength=count + 1)[1:]
-
-
-def _overlapped_cells(grid: DepthGrid, labels: IntGrid, count: int) -> NDArray[np.intp]:
-    """(count,) cells at the left or right rim of each part that end at another part, which is nearer.
+    another part goes on at the same depth; and (count,) those that end at another part, which is nearer.
 
     Beside what stands nearer a stereo camera measures nothing, and the far side of a jump is of no part: what
-    comes after that gap is the neighbour.
+    comes after that gap is the neighbour. jump: in 1/m; less is noise.
     """
-    inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
-    owned = (flat > 0).nonzero()[0]
-    label = flat.take(owned)
-    rims = (label[1:] != label[:-1]).nonzero()[0]
-    first, second = owned.take(rims), owned.take(rims + 1)
-    apart = second - first
-    near = (apart <= _GAP_CELLS + 1) & (second % labels.shape[1] >= apart)  # not from one row to the next
-    step = inverse.take(second) - inverse.take(first)
-    farther = np.where(step > 0.0, label.take(rims), label.take(rims + 1))
-    jumps = np.abs(step) > np.float32(_LEAST_JUMP)
-    return np.bincount(farther[near & jumps], minlength=count + 1)[1:]
+    room = max(count, labels.max()) + 1
+    hidden, overlapped = np.zeros(room, np.intp), np.zeros(room, np.intp)
+    for i in range(labels.shape[0]):
+        neighbour = -1  # the last cell of a part in this row
+        for j in range(labels.shape[1]):
+            here = labels[i, j]
+            if j > 0 and labels[i, j - 1] != here:
+                beside, step = labels[i, j - 1], inverse[i, j] - inverse[i, j - 1]
+                if abs(step) > jump:
+                    hidden[beside if step > 0 else here] += 1
+                elif beside > 0 and here > 0:
+                    hidden[beside] += 1
+                    hidden[here] += 1
+            if here == 0:
+                continue
+            if neighbour >= 0 and labels[i, neighbour] != here and j - neighbour <= _GAP_CELLS + 1:
+                step = inverse[i, j] - inverse[i, neighbour]
+                if abs(step) > jump:
+                    overlapped[labels[i, neighbour] if step > 0 else here] += 1
+            neighbour = j
+    return hidden[1 : count + 1].copy(), overlapped[1 : count + 1].copy()
 
 
 def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[np.bool_]:
@@ -270,29 +250,9 @@ def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[
     below = np.zeros(len(rims), inverse.dtype)
     for step in range(1, _GAP_CELLS + 1):
         below = np.maximum(below, inverse.take(np.minimum(rims + step * width, len(flat) - 1)))
-    nearer = below - inverse.take(rims) > np.float32(_MOST_JUMP)
+    nearer = below - inverse.take(rims) > np.float32(MOST_JUMP)
     cells = np.bincount(flat.take(rims[nearer]), minlength=len(regions.cells) + 1)[1:]
     across = (regions.bbox_px[:, 2] - regions.bbox_px[:, 0]) / grid.step_px
     tall = regions.extent_m[:, 1] >= _HEAD_M
     result: NDArray[np.bool_] = tall & (regions.cells > 0) & (cells >= _HIDDEN_SHARE * across)
-    return result
-
-
-def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:
-    """labels (h, w) with every unlabelled (0) cell of mask given the label of the nearest labelled cell."""
-    owned = labels > 0
-    if not owned.any():
-        return labels
-    # Nothing outside of the cells in question is nearer to one of them than what is inside.
-    u, v, width, height = cv2.boundingRect((mask | owned).view(np.uint8))
-    box = slice(v, v + height), slice(u, u + width)
-    inner, owned = labels[box], owned[box]
-    _, found = cv2.distanceTransformWithLabels(
-        (~owned).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    nearest: IntGrid = np.asarray(found, np.int32)
-    table = np.zeros(int(nearest.max()) + 1, np.int32)
-    table[nearest[owned]] = inner[owned]
-    result = labels.copy()
-    result[box] = np.where(mask[box] & ~owned, table.take(nearest), inner)
     return result

@@ -41,9 +41,11 @@ def perception(total_ms: float, bare_ms: float) -> PerceptionFigures:
         detect=duration(0.75 * total_ms),
         track=duration(0.25 * total_ms),
         bare=duration(bare_ms),
+        whole=duration(2.0 * bare_ms),
         first=duration(3.0 * total_ms),
         ratio_of_medians=total_ms / bare_ms,
         median_ratio=1.21,
+        ratio_to_whole=0.5 * total_ms / bare_ms,
         opencv={"Canny": duration(0.5)},
         modules={
             "vision.fragments.edges": StageFigures(1.0, 0.1, 0.5),
@@ -90,7 +92,7 @@ def test_text_is_the_json() -> None:
 def test_the_table_says_what_was_measured() -> None:
     lines = list(report().lines())
     (row,) = [line for line in lines if line.startswith("simulated 640x480")]
-    assert " ".join(row.split()[2:]) == "4.80 9.60 3.60 1.20 4.00 1.20 1.21 14.40 5.00 10.00"
+    assert " ".join(row.split()[2:]) == "4.80 9.60 3.60 1.20 4.00 1.20 1.21 8.00 0.60 14.40 5.00 10.00"
     text = "\n".join(lines)
     assert "A CPU, 2 cores" in lines[0]
     assert "0.10 + 0.50" in text

@@ -25,6 +25,7 @@ from vision.perception import Perception
 
 DESK = Path(__file__).parents[3] / "recordings" / "desk_rpy"
 MODULES = modules_of(vision)
+SETTINGS = PerceptionConfig().fragments
 
 
 @pytest.fixture(scope="module")
@@ -52,12 +53,13 @@ def steady_clock(step_ns: int) -> Iterator[int]:
 
 def test_functions_that_a_frame_does_not_call_take_no_time_in_it() -> None:
     side = SideBySide()
-    side.add(FrameTime(5, 1, 10), {"Canny": 2})
-    side.add(FrameTime(6, 2, 11), {"Canny": 3, "LUT": 4})
-    side.add(FrameTime(7, 3, 12), {"LUT": 1})
+    side.add(FrameTime(5, 1, 10), {"Canny": 2}, 20)
+    side.add(FrameTime(6, 2, 11), {"Canny": 3, "LUT": 4}, 21)
+    side.add(FrameTime(7, 3, 12), {"LUT": 1}, 22)
     assert side.total_ns == [6, 8, 10]
     assert side.elapsed_ns == [10, 11, 12]
     assert side.bare_ns == [2, 7, 1]
+    assert side.whole_ns == [20, 21, 22]
     assert dict(side.opencv_ns) == {"Canny": [2, 3, 0], "LUT": [0, 4, 1]}
 
 
@@ -71,10 +73,11 @@ def test_side_by_side_times_perception_and_its_calls(reel: Reel) -> None:
     assert expected[1] > 0
     side, ticks = SideBySide(), Ticks()
     stopwatches = Stopwatches(steady_clock(1000).__next__, steady_clock(7).__next__)
-    run_side_by_side(reel, make, MODULES, stopwatches, side, ticks)
+    run_side_by_side(reel, make, SETTINGS, MODULES, stopwatches, side, ticks)
     assert side.detect_ns == side.track_ns == [1000, 1000]
     assert side.elapsed_ns == [7, 7]
     assert side.bare_ns == expected[1:]
+    assert side.whole_ns == [1000, 1000]
     assert side.first_ns == [2000]
     assert ticks.count == 3
 
@@ -90,14 +93,16 @@ def test_a_watched_pass_sees_the_stages(reel: Reel) -> None:
 def test_figures_of_a_reel(reel: Reel) -> None:
     ticks = Ticks()
     stopwatches = Stopwatches(time.process_time_ns, time.perf_counter_ns)
-    figures = measure_perception(reel, make, 2, stopwatches, ticks)
+    figures = measure_perception(reel, make, SETTINGS, 2, stopwatches, ticks)
     assert ticks.count == 2 * 2 * 3
     assert figures.total.count == figures.bare.count == 4
     assert figures.first.count == 2
     assert figures.ratio_of_medians == pytest.approx(figures.total.median_ms / figures.bare.median_ms)
+    assert figures.ratio_to_whole == pytest.approx(figures.total.median_ms / figures.whole.median_ms)
     assert {"vision.fragments.edges", "vision.tracker"} <= set(figures.modules)
     assert "vision.fragments.edges.find_edges" in figures.functions
     assert set(figures.as_json()) == {
-        "total", "elapsed", "detect", "track", "bare_opencv", "first_frame", "ratio_of_medians",
-        "median_ratio", "opencv_functions", "modules", "functions",
+        "total", "elapsed", "detect", "track", "bare_opencv", "whole_images", "first_frame",
+        "ratio_of_medians", "median_ratio", "ratio_to_whole_images", "opencv_functions", "modules",
+        "functions",
     }  # fmt: skip

@@ -70,3 +70,14 @@ def test_the_governor_s_socket_has_a_folder() -> None:
 )
 def test_ports_and_cameras_may_be_opened(group: str) -> None:
     assert f"DeviceAllow=char-{group} rw" in UNIT.read_text().splitlines()
+
+
+def test_what_it_compiles_at_its_first_start_can_be_kept_and_waited_for() -> None:
+    """The project's folder and the user's home may not be written to by the service."""
+    lines = UNIT.read_text().splitlines()
+    kept = next(line for line in lines if line.startswith("Environment=NUMBA_CACHE_DIR="))
+    folder = next(line for line in lines if line.startswith("CacheDirectory="))
+    assert kept.endswith("/var/cache/" + folder.partition("=")[2])
+    seconds = next(line for line in lines if line.startswith("TimeoutStartSec="))
+    assert int(seconds.partition("=")[2]) >= 600
+    assert "/var/cache/treadwatch" in PAGE

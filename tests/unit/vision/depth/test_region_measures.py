@@ -21,7 +21,7 @@ from tests.support.grids import (
     plate,
     wall,
 )
-from vision.depth import regions
+from vision.depth import connected, regions
 
 CELL_M = STEP_PX / CAMERA.fx  # of a cell one metre away
 
@@ -190,7 +190,7 @@ def test_parts_are_parted_where_depth_jumps_and_speckles_left_out() -> None:
     depth_m[3, 3:8] = 2.0  # five cells
     depth_m[6:8, 3:6] = 2.0  # six
     grid = grid_of(depth_m)
-    count, labels = regions.components(grid, grid.valid)
+    count, labels = connected.components(grid, grid.valid)
     assert count == 3
     assert not labels[3, 3:8].any()
     for number in (1, 2, 3):
@@ -203,14 +203,14 @@ def test_a_jump_is_measured_in_inverse_depth(behind_m: float, count: int) -> Non
     depth_m = wall(4.0)
     depth_m[:, 40:] = behind_m
     grid = grid_of(depth_m)
-    assert regions.components(grid, grid.valid)[0] == count
+    assert connected.components(grid, grid.valid)[0] == count
 
 
 def test_a_pole_one_cell_wide_is_a_part() -> None:
     depth_m = wall(5.0)
     depth_m[10:50, 40] = 2.0
     grid = grid_of(depth_m)
-    count, labels = regions.components(grid, grid.valid)
+    count, labels = connected.components(grid, grid.valid)
     assert count == 2
     assert (labels[12:48, 40] == labels[30, 40]).all()
     assert labels[30, 40] != labels[30, 10]
@@ -221,13 +221,13 @@ def test_only_what_stands_out_of_the_floor_is_standing() -> None:
     body = plate(3.0, (-0.3, 0.3), (-0.2, 1.0))
     depth_m = nearest(np.where(floor_m < 8.0, floor_m, 0.0), body)
     grid = grid_of(depth_m, LEVEL_UP, 1.0)
-    standing = regions.standing(grid, 0.05)
+    standing = connected.standing(grid, 0.05)
     assert grid.height_m is not None
     # Margin at 3 m: 0.05 + 3 * 0.01 + 0.008 * 3 = 0.104.
     np.testing.assert_array_equal(standing[body > 0.0], grid.height_m[body > 0.0] > 0.104)
     assert not standing[body == 0.0].any()
     unknown = grid_of(depth_m)
-    np.testing.assert_array_equal(regions.standing(unknown, 0.05), unknown.valid)
+    np.testing.assert_array_equal(connected.standing(unknown, 0.05), unknown.valid)
 
 
 def test_labels_spread_to_the_nearest_cells_of_the_mask_only() -> None:
@@ -235,15 +235,15 @@ def test_labels_spread_to_the_nearest_cells_of_the_mask_only() -> None:
     labels[20, 10], labels[20, 30] = 1, 2
     mask = np.zeros((ROWS, COLUMNS), np.bool_)
     mask[20, 5:36] = True
-    spread = regions.spread_labels(labels, mask)
+    spread = connected.spread_labels(labels, mask)
     np.testing.assert_array_equal(spread[20, 5:20], 1)
     np.testing.assert_array_equal(spread[20, 21:36], 2)
     assert not spread[~mask].any()
     empty = np.zeros_like(labels)
-    assert regions.spread_labels(empty, mask) is empty
+    assert connected.spread_labels(empty, mask) is empty
 
 
 def test_nothing_measured_is_nothing() -> None:
     grid = grid_of(no_depth())
-    assert regions.components(grid, grid.valid)[0] == 0
+    assert connected.components(grid, grid.valid)[0] == 0
     assert regions.measure(grid, labelled(), 1).cells.tolist() == [0]

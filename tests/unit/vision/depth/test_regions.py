@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from hal.types import Pose
 from vision.bodies.ends import near_ends
 from vision.bodies.masks import predict, surfaces
+from vision.depth.connected import components, spread_labels
 from vision.depth.depth_grid import DepthGrid
-from vision.depth.regions import components, measure, spread_labels, unhidden
+from vision.depth.regions import measure, unhidden
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 SHAPE = (24, 32)

@@ -1,0 +1,56 @@
+"""The paper's chain of OpenCV calls on whole images: what a search everywhere takes.
+
+Canny, contours, Hough, and Lucas-Kanade there and back for as many ends as perception follows, with its own
+settings and nothing around them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from config.perception import FragmentSettings
+from hal.types import ColourImage
+from vision.fragments.edges import GreyImage, find_edges
+from vision.fragments.segments import hough_segments, longest_first
+
+
+class WholeImages:
+    """Keeps the image before, and the ends that were found in it."""
+
+    def __init__(self, settings: FragmentSettings, stopwatch_ns: Callable[[], int]) -> None:
+        self._settings = settings
+        self._stopwatch_ns = stopwatch_ns
+        self._before: GreyImage | None = None
+        self._ends_px = np.empty((0, 2), np.float32)
+
+    def step(self, colour: ColourImage) -> int:
+        """Nanoseconds of the calls on the next image; the first one has nothing to be followed."""
+        settings = self._settings
+        began_ns = self._stopwatch_ns()
+        grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY), np.uint8)
+        edges = find_edges(grey, 0.5 * (settings.canny_least + settings.canny_most))
+        cv2.findContours(edges, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+        segments_px = hough_segments(edges, settings.min_length_px)
+        if self._before is not None and len(self._ends_px):
+            there = self._follow(self._before, grey, self._ends_px)
+            self._follow(grey, self._before, there)
+        spent_ns = self._stopwatch_ns() - began_ns
+        self._before = grey
+        self._ends_px = longest_first(segments_px)[: settings.max_fragments].reshape(-1, 2)
+        return spent_ns
+
+    def _follow(self, before: GreyImage, now: GreyImage, pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+        side = self._settings.lk_window_px
+        there, _, _ = cv2.calcOpticalFlowPyrLK(
+            before,
+            now,
+            pixels,
+            pixels.copy(),
+            winSize=(side, side),
+            maxLevel=self._settings.lk_levels,
+        )
+        return np.asarray(there, np.float32)

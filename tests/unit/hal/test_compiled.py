@@ -1,0 +1,146 @@
+"""What a compiled step promises: ready at import, exact types, nothing changed, nothing stale."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import pkgutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from numba.core.dispatcher import Dispatcher
+from numpy.typing import NDArray
+
+import controller
+import hal
+import sim
+import vision
+from hal.compiled import compiled, inlined
+from hal.types import FloatArray
+
+
+@inlined
+def _half(value: float) -> float:
+    return 0.5 * value
+
+
+@compiled("float64[:, ::1], float64")
+def _halves_over(values: FloatArray, divisor: float) -> tuple[FloatArray, int]:
+    """(N, M) half of each value over divisor, and how many there are."""
+    result = np.empty(values.shape)
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            result[i, j] = _half(values[i, j]) / divisor
+    return result, values.size
+
+
+VALUES = np.array([[2.0, 4.0, 6.0], [0.0, -1.0, 8.0]])
+
+
+def test_a_step_returns_what_its_loop_says() -> None:
+    halves, count = _halves_over(VALUES, 2.0)
+    np.testing.assert_array_equal(halves, [[0.5, 1.0, 1.5], [0.0, -0.25, 2.0]])
+    assert count == 6
+
+
+def test_division_by_zero_is_as_in_numpy() -> None:
+    halves, _ = _halves_over(VALUES, 0.0)
+    assert np.isinf(halves[0]).all()
+    assert np.isnan(halves[1, 0])
+
+
+def test_arrays_that_may_not_be_written_to_are_welcome() -> None:
+    locked = VALUES.copy()
+    locked.setflags(write=False)
+    np.testing.assert_array_equal(_halves_over(locked, 2.0)[0], _halves_over(VALUES, 2.0)[0])
+
+
+@pytest.mark.parametrize("values", [VALUES.astype(np.float32), VALUES[:, ::2], VALUES[0]])
+def test_another_type_is_refused_and_not_compiled_in_the_middle_of_a_drive(values: NDArray[Any]) -> None:
+    with pytest.raises(TypeError, match="No matching definition"):
+        _halves_over(values, 2.0)
+
+
+def test_where_nothing_can_be_kept_it_is_compiled_all_the_same() -> None:
+    """A function of no file, for which the compiler finds no place."""
+    scope: dict[str, Any] = {}
+    exec(compile("def twice(value):\n    return 2.0 * value\n", "<nowhere>", "exec"), scope)
+    assert compiled("float64")(scope["twice"])(1.5) == 3.0
+
+
+def test_an_error_in_a_step_is_told_when_its_module_is_imported() -> None:
+    def wrong(value: float) -> float:
+        return value + "one"  # type: ignore[operator]
+
+    with pytest.raises(Exception, match="No implementation of function"):
+        compiled("float64")(wrong)
+
+
+def test_without_the_compiler_it_is_plain_python() -> None:
+    program = (
+        "from hal.compiled import compiled\n"
+        "step = compiled('float64')(lambda value: type(value).__name__)\n"
+        "assert step('text') == 'str'\n"
+    )
+    environment = {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def modules() -> Iterator[ModuleType]:
+    for package in (hal, vision, sim, controller):
+        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if not found.name.endswith("__main__"):
+                yield importlib.import_module(found.name)
+
+
+def steps() -> list[Any]:
+    """Every compiled step of the project, and what is inlined into one."""
+    return [
+        step
+        for module in modules()
+        for step in vars(module).values()
+        if isinstance(step, Dispatcher) and step.py_func.__module__ == module.__name__
+    ]
+
+
+def assigned_in(module: ModuleType) -> set[str]:
+    """Names that are defined at the top of a module itself, not imported by it."""
+    tree = ast.parse(inspect.getsource(module))
+    names = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    targets = [node.targets for node in tree.body if isinstance(node, ast.Assign)]
+    return names | {
+        name.id
+        for several in targets
+        for target in several
+        for name in ast.walk(target)
+        if isinstance(name, ast.Name)
+    }
+
+
+def test_what_a_step_calls_and_its_constants_stand_in_its_own_file() -> None:
+    """It would go on with what these were before a change: only a change of its own file makes it anew."""
+    own = {
+        module.__name__: assigned_in(module)
+        for module in {sys.modules[s.py_func.__module__] for s in steps()}
+    }
+    foreign = {
+        (step.py_func.__module__, step.py_func.__name__, name)
+        for step in steps()
+        for name in step.py_func.__code__.co_names
+        if isinstance(
+            step.py_func.__globals__.get(name), Dispatcher | int | float | np.generic | np.ndarray | tuple
+        )
+        if name not in own[step.py_func.__module__]
+    }
+    assert len(steps()) > 10
+    assert foreign == set()

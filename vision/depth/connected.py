@@ -1,0 +1,125 @@
+"""Parts: the cells that stand out of the floor, parted where depth jumps. Terms: vision/__init__.py."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hal.compiled import compiled, inlined
+from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+
+IntGrid = NDArray[np.int32]
+
+# 1/m: 0.15 m at 5 m, below which it is noise; a body's depth at 3 m, above which a slope is no excuse.
+LEAST_JUMP = 0.006
+MOST_JUMP = 0.03
+_USUAL_STEPS = 12.0  # of the middle one from cell to cell: so much more is a jump
+_SPECKLE_CELLS = 6  # fewer are taken for wrong matches of a stereo camera
+
+
+def standing(grid: DepthGrid, clearance_m: float) -> BoolGrid:
+    """(h, w) cells that stand out of the floor; every valid cell where the floor is not known."""
+    if grid.height_m is None or grid.height_sigma_m is None:
+        return grid.valid
+    return _above_floor(grid.valid, grid.depth_m, grid.height_m, grid.height_sigma_m, np.float32(clearance_m))
+
+
+@compiled("boolean[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32")
+def _above_floor(
+    valid: BoolGrid, depth_m: FloatGrid, height_m: FloatGrid, sigma_m: FloatGrid, clearance_m: np.float32
+) -> BoolGrid:
+    result = np.empty(valid.shape, np.bool_)
+    for i in range(valid.shape[0]):
+        for j in range(valid.shape[1]):
+            margin_m = clearance_m + np.float32(3.0) * sigma_m[i, j] + np.float32(0.008) * depth_m[i, j]
+            result[i, j] = valid[i, j] and height_m[i, j] > margin_m
+    return result
+
+
+def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
+    """Connected parts of mask, parted where depth jumps: how many, and labels (h, w), 0 for none.
+
+    Depth noise of a stereo camera is constant in inverse depth, so that is where a jump is measured. The
+    far side of a jump is taken out, so that a pole one cell wide stays whole.
+    """
+    kept = _without_jumps(grid.inverse_depth, mask)
+    # Counting the cells here is a fraction of the work of OpenCV's own statistics.
+    count, found = cv2.connectedComponents(kept, connectivity=4)
+    return _without_speckles(np.asarray(found, np.int32), count)
+
+
+@inlined
+def _usual_step(inverse: FloatGrid, mask: BoolGrid) -> float:
+    """The middle one of the steps from cell to cell within mask, in every second row; 0 without any."""
+    height, width = inverse.shape
+    steps = np.empty(((height + 1) // 2) * width, np.float32)
+    count = 0
+    for i in range(0, height, 2):
+        for j in range(width - 1):
+            if mask[i, j] and mask[i, j + 1]:
+                steps[count] = abs(inverse[i, j + 1] - inverse[i, j])
+                count += 1
+    if count == 0:
+        return 0.0
+    ordered = np.partition(steps[:count], count // 2)
+    upper = float(ordered[count // 2])
+    return upper if count % 2 else 0.5 * (float(ordered[: count // 2].max()) + upper)
+
+
+@compiled("float32[:, ::1], boolean[:, ::1]")
+def _without_jumps(inverse: FloatGrid, mask: BoolGrid) -> NDArray[np.uint8]:
+    """(h, w) 1 where mask is, but for the far side of each jump."""
+    usual = _USUAL_STEPS * _usual_step(inverse, mask)
+    jump = np.float32(min(max(usual, LEAST_JUMP), MOST_JUMP))
+    height, width = inverse.shape
+    kept = np.zeros((height, width), np.uint8)
+    for i in range(height):
+        for j in range(width):
+            if not mask[i, j]:
+                continue
+            here = inverse[i, j]
+            far_side = j + 1 < width and inverse[i, j + 1] - here > jump
+            far_side |= j > 0 and inverse[i, j - 1] - here > jump
+            far_side |= i + 1 < height and inverse[i + 1, j] - here > jump
+            far_side |= i > 0 and inverse[i - 1, j] - here > jump
+            kept[i, j] = not far_side
+    return kept
+
+
+@compiled("int32[:, ::1], int64")
+def _without_speckles(labels: IntGrid, count: int) -> tuple[int, IntGrid]:
+    """Labels 1..n for those of labels (h, w), below count, that are no speckles, in their order; and n."""
+    cells = np.zeros(count, np.int64)
+    for part in labels.flat:
+        cells[part] += 1
+    number, parts = np.zeros(count, np.int32), 0
+    for label in range(1, len(cells)):
+        if cells[label] >= _SPECKLE_CELLS:
+            parts += 1
+            number[label] = parts
+    result = np.empty(labels.shape, np.int32)
+    for i in range(labels.shape[0]):
+        for j in range(labels.shape[1]):
+            result[i, j] = number[labels[i, j]]
+    return parts, result
+
+
+def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:
+    """labels (h, w) with every unlabelled (0) cell of mask given the label of the nearest labelled cell."""
+    owned = labels > 0
+    if not owned.any():
+        return labels
+    # Nothing outside of the cells in question is nearer to one of them than what is inside.
+    u, v, width, height = cv2.boundingRect((mask | owned).view(np.uint8))
+    box = slice(v, v + height), slice(u, u + width)
+    inner, owned = labels[box], owned[box]
+    _, found = cv2.distanceTransformWithLabels(
+        (~owned).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    nearest: IntGrid = np.asarray(found, np.int32)
+    table = np.zeros(int(nearest.max()) + 1, np.int32)
+    table[nearest[owned]] = inner[owned]
+    result = labels.copy()
+    result[box] = np.where(mask[box] & ~owned, table.take(nearest), inner)
+    return result
