@@ -15,7 +15,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import FloatGrid
 from vision.detection import Detection
-from vision.motion.least_squares import long_static
+from vision.motion.candidates import long_static
 
 # Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor. Last,
 # beside it: an outline lies on the rim, where the cells may be those of the body behind.

@@ -54,16 +54,20 @@ class Relations:
 
 def relations(regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]) -> Relations:
     """How regions one (K,) lie to regions other (K,)."""
-    return Relations(*_relations(regions.position_m, regions.extent_m, regions.bbox_px, one, other))
+    return Relations(
+        *_relations(regions.position_m, regions.extent_m, regions.bbox_px, one, other, LOW, WITHIN)
+    )
 
 
-@compiled("float64[:, :], float64[:, :], float64[:, :], int64[:], int64[:]")
+@compiled("float64[:, :], float64[:, :], float64[:, :], int64[:], int64[:], float64, float64")
 def _relations(
     position_m: FloatArray,
     extent_m: FloatArray,
     bbox_px: FloatArray,
     one: NDArray[np.intp],
     other: NDArray[np.intp],
+    low: float,
+    mostly: float,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     gap_m, overlap = np.empty(len(one)), np.empty(len(one))
     on_top, within = np.empty(len(one), np.bool_), np.empty(len(one), np.bool_)
@@ -80,7 +84,7 @@ def _relations(
         across, down = min(right, u1) - max(left, u0), min(bottom, v1) - max(top, v0)
         overlap[k] = max(across, 0.0) * max(down, 0.0) / max(width * height, 1.0)
         on_top[k] = across >= _MOSTLY * width and abs(bottom - v0) <= _TOUCHING_PX
-        within[k] = height <= LOW * (v1 - v0) and overlap[k] >= WITHIN
+        within[k] = height <= low * (v1 - v0) and overlap[k] >= mostly
     return gap_m, overlap, on_top, within
 
 

@@ -28,7 +28,7 @@ from vision.depth.depth_grid import BoolGrid
 from vision.depth.depth_mask import depth_sigma_m
 from vision.depth.regions import Regions
 from vision.detection import Detection
-from vision.motion import least_squares
+from vision.motion import candidates
 from vision.motion.least_squares import FragmentVelocities
 
 SUSPECT_EVIDENCE = 0.3  # gone in 0.09 s where nothing speaks for motion, in 0.6 s where hints do
@@ -61,7 +61,7 @@ def carve(
     if len(tracks) == 0:
         return labels
     grid = detection.grid
-    suspicious = least_squares.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
+    suspicious = candidates.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not arrived.any():
         return labels
     searched, overgrown = _in_question(
@@ -185,10 +185,10 @@ def _around_moving_fragments(
         motion.static_m, velocities.velocity_mps, velocities.covariance, chosen
     )
     sigma = depth_sigma_m(position[:, 2], config.depth_noise)
-    group = least_squares.cluster(position, velocity, covariance, sigma)
+    group = candidates.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
     seen_s = detection.age_frames.take(chosen).astype(float) * detection.dt_s
-    chosen = chosen[company | _alone(seen_s, velocity, covariance, config.motion.max_speed_mps)]
+    chosen = chosen[company | _alone(seen_s, velocity, covariance, IMPLAUSIBLE * config.motion.max_speed_mps)]
     if len(chosen) == 0:
         return result
     return near_ends(
@@ -213,10 +213,10 @@ def _of_chosen(
 
 @compiled("float64[::1], float64[:, :], float64[:, :, :], float64")
 def _alone(
-    seen_s: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, max_speed_mps: float
+    seen_s: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, most_mps: float
 ) -> NDArray[np.bool_]:
     """(K,) fragments, seen for seen_s (K,), whose velocity (K, 3), in the camera's axes, with covariance
-    (K, 3, 3) needs no other one beside it to be believed."""
+    (K, 3, 3) needs no other one beside it to be believed. most_mps: faster ones are mistakes."""
     result = np.zeros(len(seen_s), np.bool_)
     for k in range(len(seen_s)):
         v, along = velocity_mps[k], 0.0
@@ -227,5 +227,5 @@ def _alone(
         # v' C v / v'v is the variance along its way.
         sure = speed >= _LONE_MPS and speed**2 > _LONE_SIGMAS * math.sqrt(along)
         level = abs(v[1]) <= _LEVEL * speed
-        result[k] = seen_s[k] >= _LONE_S and sure and level and speed <= IMPLAUSIBLE * max_speed_mps
+        result[k] = seen_s[k] >= _LONE_S and sure and level and speed <= most_mps
     return result

@@ -24,7 +24,6 @@ BoolGrid = NDArray[np.bool_]
 # vision/bodies/arrivals.py.
 CELL_HEIGHT_NOISE = 0.4
 _FARTHEST = np.uint16(65535)  # raw depth of what is not valid: sorts behind all that is
-_NEAREST_M = 0.1  # nearer, a point projects anywhere
 _FOUR_FROM_PX = 4  # cells so large take four samples each, smaller ones their middle pixel
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
 
@@ -84,18 +83,6 @@ class DepthGrid:
         np.multiply(self.y.take(rows), depth, out=result[1])
         result[2] = depth
         return result
-
-    def project(self, points: FloatGrid) -> tuple[NDArray[np.intp], BoolGrid, FloatGrid]:
-        """Flat cell index (K,) of camera coordinates (3, K), which of them fall into the grid, and their
-        inverse depths, those of the nearest 10 cm cut off."""
-        height, width = self.depth_m.shape
-        x, y, z = points
-        inverse = np.reciprocal(np.maximum(z, np.float32(_NEAREST_M)))
-        column = (x * inverse - self.x[0]) * (1.0 / (self.x[1] - self.x[0])) + 0.5
-        row = (y * inverse - self.y[0]) * (1.0 / (self.y[1] - self.y[0])) + 0.5
-        inside = (z > _NEAREST_M) & (column >= 0) & (row >= 0) & (column < width) & (row < height)
-        flat = row.astype(np.int32) * width + column.astype(np.int32)
-        return (flat * inside.view(np.uint8)).astype(np.intp), inside, inverse
 
 
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:

@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.motion.candidates import cluster as cluster
-from vision.motion.candidates import long_static as long_static
-from vision.motion.candidates import moving_candidates as moving_candidates
 from vision.motion.velocities import PointMotion, normal_equations
 
 _ROBUST_CHI2 = 9.0  # 99 % of ends that go with the body, 2 degrees of freedom; others lose their weight
