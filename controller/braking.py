@@ -3,8 +3,8 @@
 decide, shape, the speed that the camera's range admits, the envelope report, the campaign's oracle and the
 tests all ask this file, so "the distance we brake at >= the distance the profile needs" can be tested.
 
-Plain floats on purpose: one call costs about a microsecond, a NumPy call on one number ten times that, and
-nobody needs these for arrays in the control loop (controller/profile.py samples whole profiles in arrays).
+Plain floats on purpose: nobody needs these for arrays in the control loop (controller/profile.py samples
+whole profiles in arrays), and a compiled call costs a fraction of a microsecond.
 
 Symbols: A is the greatest deceleration, J the greatest jerk, tau the latency, V_o the obstacle's own speed
 towards the robot. An infinite J with tau = 0 gives the formulas of Daeef 2020 (problem statement).
@@ -16,6 +16,7 @@ import math
 from dataclasses import dataclass
 
 from config.robot import Limits
+from hal.compiled import compiled, inlined
 
 _NEWTON_STEPS = 60
 _CONVERGED = 1e-14
@@ -59,7 +60,7 @@ def stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
     the robot never reverses. Raises ValueError for a negative or unknown speed or acceleration.
     """
     _check_state(v_mps, a_mps2)
-    return Stop(*_stop(v_mps, a_mps2, limits))
+    return Stop(*_one_stop(v_mps, a_mps2, limits.decel_mps2, limits.jerk_mps3))
 
 
 def required_distance(
@@ -76,9 +77,9 @@ def required_distance(
     the obstacle itself towards the robot; what moves away counts as standing.
     """
     _check_state(v_mps, a_mps2)
-    distance_m, time_s = _stop(v_mps, a_mps2, limits)
+    decel_mps2, jerk_mps3 = limits.decel_mps2, limits.jerk_mps3
     towards_mps = max(closing_mps, 0.0)
-    return (v_mps + towards_mps) * latency_s + distance_m + towards_mps * time_s + margin_m
+    return _required_m(v_mps, a_mps2, towards_mps, latency_s, decel_mps2, jerk_mps3) + margin_m
 
 
 def speed_for_distance(
@@ -101,41 +102,21 @@ def speed_for_distance(
     # Even who stands needs what comes nearer during the latency.
     if free_m <= towards_mps * latency_s:
         return 0.0
-    if abs(a_mps2) > limits.decel_mps2:
-        return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, limits)
-    j = limits.jerk_mps3
-    # In terms of u = v + a^2 / 2J, every a adds only a linear term and a constant to the law for a = 0.
-    extra_s = latency_s + a_mps2 / j
-    shift_mps = a_mps2 * a_mps2 / (2.0 * j)
-    constant_m = (
-        a_mps2**3 / (3.0 * j * j) - extra_s * shift_mps + towards_mps * (latency_s + a_mps2 / j) - free_m
-    )
-    speed = _solve_from_steady(extra_s, towards_mps, constant_m, limits) - shift_mps
-    if a_mps2 < 0.0 and speed < shift_mps:
-        return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, limits)
-    return max(speed, 0.0)
+    return _speed_for(free_m, a_mps2, towards_mps, latency_s, limits.decel_mps2, limits.jerk_mps3)
 
 
 def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float:
     """From steady v down to steady end_mps <= v: by symmetry the mean speed times the time, in metres."""
     if not 0.0 <= end_mps <= v_mps:
         raise ValueError(f"can only slow down to a speed in 0..{v_mps} m/s, asked for {end_mps}")
-    drop_mps = v_mps - end_mps
-    return 0.5 * (v_mps + end_mps) * _steady_stop_s(drop_mps, limits.decel_mps2, limits.jerk_mps3)
+    return _slowing_m(v_mps, end_mps, limits.decel_mps2, limits.jerk_mps3)
 
 
 def speed_before_section(distance_m: float, section_mps: float, limits: BrakeLimits) -> float:
     """The greatest steady speed from which section_mps is reached within distance_m."""
     if distance_m <= 0.0:
         return section_mps
-    low, high = section_mps, section_mps + math.sqrt(2.0 * limits.decel_mps2 * distance_m)
-    for _ in range(_NEWTON_STEPS):
-        middle = 0.5 * (low + high)
-        if slowing_distance(middle, section_mps, limits) <= distance_m:
-            low = middle
-        else:
-            high = middle
-    return low
+    return _before_section(distance_m, section_mps, limits.decel_mps2, limits.jerk_mps3)
 
 
 def letting_go_distance(v_mps: float, a_mps2: float, limits: BrakeLimits) -> float:
@@ -169,47 +150,60 @@ def _check_state(v_mps: float, a_mps2: float) -> None:
         raise ValueError(f"a stop needs a known speed >= 0 and acceleration, got {v_mps} m/s, {a_mps2} m/s2")
 
 
-def _stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> tuple[float, float]:
-    """Distance and time of stop(): plain numbers, of which a control step needs a dozen."""
-    big_a, j = limits.decel_mps2, limits.jerk_mps3
-    if math.isinf(j):
-        return v_mps * v_mps / (2.0 * big_a), v_mps / big_a
-    if a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * j):
-        return _standstill_while_letting_go(v_mps, a_mps2, j)
-    excess = abs(a_mps2) - big_a
-    if excess > 0.0:
-        return _bring_inside_then_stop(v_mps, a_mps2, excess / j, limits)
-    speed_at_rest_of_a = v_mps + a_mps2 * a_mps2 / (2.0 * j)
-    time_s = _steady_stop_s(speed_at_rest_of_a, big_a, j)
-    distance_m = 0.5 * speed_at_rest_of_a * time_s
-    return distance_m + a_mps2 * v_mps / j + a_mps2**3 / (3.0 * j * j), time_s + a_mps2 / j
-
-
+@inlined
 def _steady_stop_s(v_mps: float, big_a: float, j: float) -> float:
     """How long from a = 0: a trapezoid of deceleration, or a triangle when A is not reached."""
     reached = v_mps * j >= big_a * big_a
     return v_mps / big_a + big_a / j if reached else 2.0 * math.sqrt(v_mps / j)
 
 
-def _standstill_while_letting_go(v_mps: float, a_mps2: float, j: float) -> tuple[float, float]:
-    """Easing a < 0 off at J, the robot stands before a has gone."""
-    time_s = (-a_mps2 - math.sqrt(max(a_mps2 * a_mps2 - 2.0 * j * v_mps, 0.0))) / j
-    return v_mps * time_s + a_mps2 * time_s**2 / 2.0 + j * time_s**3 / 6.0, time_s
+@inlined
+def _stop_within(v_mps: float, a_mps2: float, big_a: float, j: float) -> tuple[float, float]:
+    """Distance and time of stop() from an acceleration within the limits."""
+    if a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * j):
+        # Easing a < 0 off at J, the robot stands before a has gone.
+        time_s = (-a_mps2 - math.sqrt(max(a_mps2 * a_mps2 - 2.0 * j * v_mps, 0.0))) / j
+        return v_mps * time_s + a_mps2 * time_s**2 / 2.0 + j * time_s**3 / 6.0, time_s
+    speed_at_rest_of_a = v_mps + a_mps2 * a_mps2 / (2.0 * j)
+    time_s = _steady_stop_s(speed_at_rest_of_a, big_a, j)
+    distance_m = 0.5 * speed_at_rest_of_a * time_s
+    return distance_m + a_mps2 * v_mps / j + a_mps2**3 / (3.0 * j * j), time_s + a_mps2 / j
 
 
-def _bring_inside_then_stop(
-    v_mps: float, a_mps2: float, ease_s: float, limits: BrakeLimits
-) -> tuple[float, float]:
-    j = math.copysign(limits.jerk_mps3, a_mps2)
-    eased_m = v_mps * ease_s + a_mps2 * ease_s**2 / 2.0 - j * ease_s**3 / 6.0
-    eased_mps = v_mps + a_mps2 * ease_s - j * ease_s**2 / 2.0
-    rest_m, rest_s = _stop(max(eased_mps, 0.0), math.copysign(limits.decel_mps2, a_mps2), limits)
+@inlined
+def _stop(v_mps: float, a_mps2: float, big_a: float, j: float) -> tuple[float, float]:
+    """Distance and time of stop()."""
+    if math.isinf(j):
+        return v_mps * v_mps / (2.0 * big_a), v_mps / big_a
+    ease_s = (abs(a_mps2) - big_a) / j
+    if ease_s <= 0.0 or (a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * j)):
+        return _stop_within(v_mps, a_mps2, big_a, j)
+    # First bring the acceleration inside the limits.
+    towards = math.copysign(j, a_mps2)
+    eased_m = v_mps * ease_s + a_mps2 * ease_s**2 / 2.0 - towards * ease_s**3 / 6.0
+    eased_mps = v_mps + a_mps2 * ease_s - towards * ease_s**2 / 2.0
+    rest_m, rest_s = _stop_within(max(eased_mps, 0.0), math.copysign(big_a, a_mps2), big_a, j)
     return eased_m + rest_m, ease_s + rest_s
 
 
-def _solve_from_steady(linear_s: float, towards_mps: float, constant_m: float, limits: BrakeLimits) -> float:
+@inlined
+def _required(
+    v_mps: float, a_mps2: float, towards_mps: float, latency_s: float, big_a: float, j: float
+) -> float:
+    distance_m, time_s = _stop(v_mps, a_mps2, big_a, j)
+    return (v_mps + towards_mps) * latency_s + distance_m + towards_mps * time_s
+
+
+@inlined
+def _slowing(v_mps: float, end_mps: float, big_a: float, j: float) -> float:
+    return 0.5 * (v_mps + end_mps) * _steady_stop_s(v_mps - end_mps, big_a, j)
+
+
+@inlined
+def _solve_from_steady(
+    linear_s: float, towards_mps: float, constant_m: float, big_a: float, j: float
+) -> float:
     """The u >= 0 with S_0(u) + linear_s u + V_o T_0(u) + constant_m = 0."""
-    big_a, j = limits.decel_mps2, limits.jerk_mps3
     b = linear_s + big_a / (2.0 * j) + towards_mps / big_a
     c = constant_m + towards_mps * big_a / j
     discriminant = big_a * big_a * b * b - 2.0 * big_a * c
@@ -233,17 +227,66 @@ def _solve_from_steady(linear_s: float, towards_mps: float, constant_m: float, l
     return x * x
 
 
+@inlined
 def _bisect_speed(
-    free_m: float, a_mps2: float, towards_mps: float, latency_s: float, limits: BrakeLimits
+    free_m: float, a_mps2: float, towards_mps: float, latency_s: float, big_a: float, j: float
 ) -> float:
     """The rare states: the law is not one closed form, but it still grows with the speed."""
     # Too fast: easing the acceleration off sheds a^2 / J at most, and from what is left v^2 / 2A is too far.
     # free_m is below 0 only by rounding of what is next to nothing.
     room_m = max(free_m, 0.0)
-    low, high = 0.0, math.sqrt(2.0 * limits.decel_mps2 * room_m) + abs(a_mps2) + a_mps2**2 / limits.jerk_mps3
+    low, high = 0.0, math.sqrt(2.0 * big_a * room_m) + abs(a_mps2) + a_mps2**2 / j
     for _ in range(_NEWTON_STEPS):
         middle = 0.5 * (low + high)
-        if required_distance(middle, a_mps2, towards_mps, latency_s, limits) <= free_m:
+        if _required(middle, a_mps2, towards_mps, latency_s, big_a, j) <= free_m:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@compiled("float64, float64, float64, float64")
+def _one_stop(v_mps: float, a_mps2: float, big_a: float, j: float) -> tuple[float, float]:
+    return _stop(v_mps, a_mps2, big_a, j)
+
+
+@compiled("float64, float64, float64, float64, float64, float64")
+def _required_m(
+    v_mps: float, a_mps2: float, towards_mps: float, latency_s: float, big_a: float, j: float
+) -> float:
+    return _required(v_mps, a_mps2, towards_mps, latency_s, big_a, j)
+
+
+@compiled("float64, float64, float64, float64")
+def _slowing_m(v_mps: float, end_mps: float, big_a: float, j: float) -> float:
+    return _slowing(v_mps, end_mps, big_a, j)
+
+
+@compiled("float64, float64, float64, float64, float64, float64")
+def _speed_for(
+    free_m: float, a_mps2: float, towards_mps: float, latency_s: float, big_a: float, j: float
+) -> float:
+    """speed_for_distance(), for more than what comes nearer during the latency."""
+    if abs(a_mps2) > big_a:
+        return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, big_a, j)
+    # In terms of u = v + a^2 / 2J, every a adds only a linear term and a constant to the law for a = 0.
+    extra_s = latency_s + a_mps2 / j
+    shift_mps = a_mps2 * a_mps2 / (2.0 * j)
+    constant_m = (
+        a_mps2**3 / (3.0 * j * j) - extra_s * shift_mps + towards_mps * (latency_s + a_mps2 / j) - free_m
+    )
+    speed = _solve_from_steady(extra_s, towards_mps, constant_m, big_a, j) - shift_mps
+    if a_mps2 < 0.0 and speed < shift_mps:
+        return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, big_a, j)
+    return max(speed, 0.0)
+
+
+@compiled("float64, float64, float64, float64")
+def _before_section(distance_m: float, section_mps: float, big_a: float, j: float) -> float:
+    low, high = section_mps, section_mps + math.sqrt(2.0 * big_a * distance_m)
+    for _ in range(_NEWTON_STEPS):
+        middle = 0.5 * (low + high)
+        if _slowing(middle, section_mps, big_a, j) <= distance_m:
             low = middle
         else:
             high = middle

@@ -13,6 +13,7 @@ import numpy as np
 from config.robot import Limits
 from controller.braking import BrakeLimits
 from controller.decision.limits import Motion
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
 _STANDING_MPS = 1e-9
@@ -36,74 +37,24 @@ class SpeedRamps:
         jerk_mps3: float,
         latency_s: float = 0.0,
     ) -> None:
-        # Columns (N, 1): what is asked for are tables of N ramps at K times.
-        target = targets_mps[:, None]
-        v, a = np.empty(target.shape), np.empty(target.shape)
-        v[:, 0], a[:, 0] = v_mps, a_mps2
-        # Up or down, judged by the speed that remains when a has been let go of.
-        sign = np.where(target >= v + a * np.abs(a) / (2.0 * jerk_mps3), 1.0, -1.0)
-        start = sign * a
-        bound = np.maximum(np.where(sign > 0.0, accel_mps2, decel_mps2), start)
-        wanted = sign * (target - v)
-        peak = np.minimum(np.sqrt(np.maximum(jerk_mps3 * wanted + start * start / 2.0, 0.0)), bound)
-        self._t1 = np.maximum(peak - start, 0.0) / jerk_mps3
-        self._t3 = peak / jerk_mps3
-        in_ramps = (2.0 * peak * peak - start * start) / (2.0 * jerk_mps3)
-        self._t2 = np.where(peak > 0.0, np.maximum(wanted - in_ramps, 0.0) / np.maximum(peak, 1e-12), 0.0)
-        self._v, self._a, self._target = v, a, target
-        self._jerk, self._peak = sign * jerk_mps3, sign * peak
-        self._v1 = v + a * self._t1 + self._jerk * self._t1**2 / 2.0
-        self._v2 = self._v1 + self._peak * self._t2
-        self._latency_s = latency_s
+        self._v, self._a = np.empty(len(targets_mps)), np.empty(len(targets_mps))
+        self._v[:], self._a[:] = v_mps, a_mps2
+        self._targets, self._latency_s = targets_mps, latency_s
+        self._bounds = accel_mps2, decel_mps2, jerk_mps3
 
     @property
     def duration_s(self) -> FloatArray:
         """(N,) until the target speed is reached, latency included."""
-        duration: FloatArray = self._latency_s + self._t1 + self._t2 + self._t3
-        return duration[:, 0]
+        return self._latency_s + _durations(self._v, self._a, self._targets, *self._bounds)
 
     def state(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance m, speed m/s and acceleration m/s^2 after t_s: (N, K), or (1, K) for the same times of
         all ramps; all results are (N, K)."""
-        phases = self._split(t_s)
-        _, x1, x2, x3, _ = phases
-        a, j, peak = self._a, self._jerk, self._peak
-        speed = self._v + a * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0
-        acceleration = np.where(x2 + x3 > 0.0, peak - j * x3, a + j * x1)
-        return self._distance(*phases), np.maximum(speed, 0.0), acceleration
+        return _states(self._v, self._a, self._targets, *self._bounds, self._latency_s, t_s)
 
     def distance(self, t_s: FloatArray) -> FloatArray:
         """(N, K) distance m after t_s: (N, K) or (1, K)."""
-        return self._distance(*self._split(t_s))
-
-    def _distance(
-        self, held: FloatArray, x1: FloatArray, x2: FloatArray, x3: FloatArray, x4: FloatArray
-    ) -> FloatArray:
-        j, peak = self._jerk, self._peak
-        distance: FloatArray = (
-            self._v * (held + x1)
-            + self._a * x1**2 / 2.0
-            + j * x1**3 / 6.0
-            + self._v1 * x2
-            + peak * x2**2 / 2.0
-            + self._v2 * x3
-            + peak * x3**2 / 2.0
-            - j * x3**3 / 6.0
-            + self._target * x4
-        )
-        return distance
-
-    def _split(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """How long each phase has lasted at t_s: latency, jerk, constant, jerk back, done."""
-        t1, t2, t3 = self._t1, self._t2, self._t3
-        held = np.minimum(t_s, self._latency_s)
-        rest = t_s - held
-        x1 = np.minimum(rest, t1)
-        after = rest - t1
-        x2 = np.minimum(np.maximum(after, 0.0), t2)
-        after = after - t2
-        x3 = np.minimum(np.maximum(after, 0.0), t3)
-        return held, x1, x2, x3, np.maximum(after - t3, 0.0)
+        return self.state(t_s)[0]
 
 
 def comfortable(limits: Limits, motion: Motion, targets_mps: FloatArray) -> SpeedRamps:
@@ -137,3 +88,75 @@ def stop_step(v_mps: float, a_mps2: float, limits: BrakeLimits, dt_s: float) -> 
     _, speed, acceleration = ramp.state(np.full((1, 1), dt_s))
     v, a = float(speed[0, 0]), float(acceleration[0, 0])
     return (v, a) if v > _STANDING_MPS else (0.0, 0.0)
+
+
+@inlined
+def _ramp(
+    v: float, a: float, target: float, accel: float, decel: float, jerk: float
+) -> tuple[float, float, float, float, float]:
+    """How long a ramp takes to bring the acceleration to its peak, at it and back to 0; the signed jerk of
+    the first part and the peak."""
+    # Up or down, judged by the speed that remains when a has been let go of.
+    sign = 1.0 if target >= v + a * abs(a) / (2.0 * jerk) else -1.0
+    start = sign * a
+    bound = max(accel if sign > 0.0 else decel, start)
+    wanted = sign * (target - v)
+    peak = min(math.sqrt(max(jerk * wanted + start * start / 2.0, 0.0)), bound)
+    in_ramps = (2.0 * peak * peak - start * start) / (2.0 * jerk)
+    steady_s = max(wanted - in_ramps, 0.0) / max(peak, 1e-12) if peak > 0.0 else 0.0
+    return max(peak - start, 0.0) / jerk, steady_s, peak / jerk, sign * jerk, sign * peak
+
+
+@compiled("float64[:], float64[:], float64[:], float64, float64, float64")
+def _durations(
+    v: FloatArray, a: FloatArray, target: FloatArray, accel: float, decel: float, jerk: float
+) -> FloatArray:
+    """(N,) of ramps (N,)."""
+    durations = np.empty(len(target))
+    for k in range(len(target)):
+        t1, t2, t3, _, _ = _ramp(v[k], a[k], target[k], accel, decel, jerk)
+        durations[k] = t1 + t2 + t3
+    return durations
+
+
+@compiled("float64[:], float64[:], float64[:], float64, float64, float64, float64, float64[:, :]")
+def _states(
+    v: FloatArray,
+    a: FloatArray,
+    target: FloatArray,
+    accel: float,
+    decel: float,
+    jerk: float,
+    latency_s: float,
+    t_s: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Distance, speed and acceleration (N, K) of ramps (N,) after t_s (N, K) or (1, K)."""
+    shape = len(target), t_s.shape[1]
+    distance, speed, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
+    for k in range(shape[0]):
+        t1, t2, t3, j, peak = _ramp(v[k], a[k], target[k], accel, decel, jerk)
+        v1 = v[k] + a[k] * t1 + j * t1**2 / 2.0
+        v2 = v1 + peak * t2
+        for i in range(shape[1]):
+            # How long each phase has lasted: latency, jerk, constant, jerk back, done.
+            t = t_s[min(k, len(t_s) - 1), i]
+            held = min(t, latency_s)
+            x1 = min(t - held, t1)
+            after = t - held - t1
+            x2 = min(max(after, 0.0), t2)
+            x3 = min(max(after - t2, 0.0), t3)
+            x4 = max(after - t2 - t3, 0.0)
+            distance[k, i] = (
+                v[k] * (held + x1)
+                + a[k] * x1**2 / 2.0
+                + j * x1**3 / 6.0
+                + v1 * x2
+                + peak * x2**2 / 2.0
+                + v2 * x3
+                + peak * x3**2 / 2.0
+                - j * x3**3 / 6.0
+                + target[k] * x4
+            )
+            speed[k, i] = max(v[k] + a[k] * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0, 0.0)
+            acceleration[k, i] = peak - j * x3 if x2 + x3 > 0.0 else a[k] + j * x1
+    return distance, speed, acceleration

@@ -24,6 +24,7 @@ from config.scenario import (
     Shelf,
     Wall,
 )
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from sim.models.bodies import rectangle, regular_polygon
 from sim.models.person import person_footprint
@@ -66,18 +67,15 @@ class PlanarWorld:
         """Work out at once what look() will be asked for at times_s (T,): far cheaper than one by one."""
         times_s = np.append(times_s[times_s < self.end_s], self.end_s)
         self._foreseen_at = {t_s: k for k, t_s in enumerate(times_s.tolist())}
-        self._foreseen = self._movers_at(times_s)
+        self._foreseen = self._all_at(times_s)
 
     def look(self, t_s: float) -> tuple[FloatArray, FloatArray]:
-        """Polygons (N, K, 2) and velocities (N, 2) of all bodies at t_s."""
-        polygons, velocity = self._still_polygons.copy(), np.zeros((len(self), 2))
+        """Polygons (N, K, 2) and velocities (N, 2) of all bodies at t_s. Not to be written to."""
         t_s = min(t_s, self.end_s)
-        row, (outlines, speeds) = self._foreseen_at.get(t_s), self._foreseen
+        row, (polygons, velocity) = self._foreseen_at.get(t_s), self._foreseen
         if row is None:
-            row, (outlines, speeds) = 0, self._movers_at(np.array([t_s]))
-        polygons[self._movers] = outlines[row]
-        velocity[self._movers] = speeds[row]
-        return polygons, velocity
+            row, (polygons, velocity) = 0, self._all_at(np.array([t_s]))
+        return polygons[row], velocity[row]
 
     def over(self, times_s: FloatArray, body: int) -> FloatArray:
         """Polygons (T, K, 2) of one body at times_s (T,)."""
@@ -91,13 +89,13 @@ class PlanarWorld:
         x0, x1, y0, y1 = room.x_min_m, room.x_max_m, room.y_min_m, room.y_max_m
         return np.array([[x1, y0], [x1, y1], [x0, y1], [x0, y0]])
 
-    def _movers_at(self, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Polygons (T, M, K, 2) and velocities (T, M, 2) of the M movers."""
-        count, movers = len(times_s), len(self._movers)
-        polygons, velocity = np.empty((count, movers, self._corners, 2)), np.empty((count, movers, 2))
-        for k, body in enumerate(self._movers):
+    def _all_at(self, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Polygons (T, N, K, 2) and velocities (T, N, 2) of all bodies."""
+        polygons = np.repeat(self._still_polygons[None], len(times_s), axis=0)
+        velocity = np.zeros((len(times_s), len(self), 2))
+        for body in self._movers:
             states = self._trajectories[body].over(times_s)
-            polygons[:, k], velocity[:, k] = self._place(states, body), states[:, 3:]
+            polygons[:, body], velocity[:, body] = self._place(states, body), states[:, 3:]
         return polygons, velocity
 
     def _place(self, states: FloatArray, body: int) -> FloatArray:
@@ -158,37 +156,65 @@ def separation(a: FloatArray, b: FloatArray) -> FloatArray:
     As sim.contact.polygon_distance, for many pairs at once: where they overlap, minus the shortest way that
     separates them. A repeated corner does not matter.
     """
-    gap = np.maximum(_widest_gap(a, b), _widest_gap(b, a))
-    apart = np.flatnonzero(gap > 0.0)
-    if len(apart):
-        one, other = a[apart], b[apart]
-        gap[apart] = np.minimum(_corner_distance(one, other), _corner_distance(other, one))
-    return gap
+    assert len(a) == len(b)
+    return _separation(a, b)
 
 
 def overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
-    """(P,) where separation() is 0 or less; what a's edges keep apart is not looked at from b's."""
-    touching: NDArray[np.bool_] = _widest_gap(a, b) <= 0.0
-    left = np.flatnonzero(touching)
-    touching[left] = _widest_gap(b[left], a[left]) <= 0.0
-    return touching
+    """(P,) where separation() is 0 or less."""
+    assert len(a) == len(b)
+    return _overlap(a, b)
 
 
-def _widest_gap(a: FloatArray, b: FloatArray) -> FloatArray:
-    edges = np.roll(a, -1, axis=1) - a
-    length = np.hypot(edges[..., 0], edges[..., 1])
-    real = length > 1e-12
-    normals = np.stack((edges[..., 1], -edges[..., 0]), axis=2) / np.where(real, length, 1.0)[..., None]
-    gaps = np.einsum("plx,pkx->pkl", b, normals).min(axis=2) - (a * normals).sum(axis=2)
-    widest: FloatArray = np.where(real, gaps, -math.inf).max(axis=1)
+@inlined
+def _widest_gap(a: FloatArray, b: FloatArray) -> float:
+    """The widest gap between a polygon (K, 2) and another one (L, 2) that any edge of the first one shows."""
+    widest = -math.inf
+    for k in range(len(a)):
+        following = (k + 1) % len(a)
+        edge_x, edge_y = a[following, 0] - a[k, 0], a[following, 1] - a[k, 1]
+        length = math.hypot(edge_x, edge_y)
+        if length <= 1e-12:
+            continue
+        normal_x, normal_y = edge_y / length, -edge_x / length
+        nearest = math.inf
+        for j in range(len(b)):
+            nearest = min(nearest, b[j, 0] * normal_x + b[j, 1] * normal_y)
+        widest = max(widest, nearest - (a[k, 0] * normal_x + a[k, 1] * normal_y))
     return widest
 
 
-def _corner_distance(corners: FloatArray, polygon: FloatArray) -> FloatArray:
-    edge = np.roll(polygon, -1, axis=1) - polygon
-    square = np.maximum((edge * edge).sum(axis=2), 1e-24)[:, None]
-    to_corner = corners[:, :, None] - polygon[:, None]
-    share = np.clip((to_corner * edge[:, None]).sum(axis=3) / square, 0.0, 1.0)
-    away = to_corner - share[..., None] * edge[:, None]
-    nearest: FloatArray = np.sqrt((away * away).sum(axis=3).min(axis=(1, 2)))
-    return nearest
+@inlined
+def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
+    """The least distance of corners (K, 2) from the edges of a polygon (L, 2)."""
+    nearest = math.inf
+    for j in range(len(polygon)):
+        following = (j + 1) % len(polygon)
+        edge_x, edge_y = polygon[following, 0] - polygon[j, 0], polygon[following, 1] - polygon[j, 1]
+        square = max(edge_x * edge_x + edge_y * edge_y, 1e-24)
+        for k in range(len(corners)):
+            dx, dy = corners[k, 0] - polygon[j, 0], corners[k, 1] - polygon[j, 1]
+            share = min(max((dx * edge_x + dy * edge_y) / square, 0.0), 1.0)
+            dx, dy = dx - share * edge_x, dy - share * edge_y
+            nearest = min(nearest, dx * dx + dy * dy)
+    return math.sqrt(nearest)
+
+
+@compiled("float64[:, :, :], float64[:, :, :]")
+def _separation(a: FloatArray, b: FloatArray) -> FloatArray:
+    gaps = np.empty(len(a))
+    for p in range(len(a)):
+        one, other = a[p], b[p]
+        gaps[p] = max(_widest_gap(one, other), _widest_gap(other, one))
+        if gaps[p] > 0.0:
+            gaps[p] = min(_corner_distance(one, other), _corner_distance(other, one))
+    return gaps
+
+
+@compiled("float64[:, :, :], float64[:, :, :]")
+def _overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
+    touching = np.empty(len(a), np.bool_)
+    for p in range(len(a)):
+        one, other = a[p], b[p]
+        touching[p] = _widest_gap(one, other) <= 0.0 and _widest_gap(other, one) <= 0.0
+    return touching

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from controller.campaign.stage import Stage
+from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose
 from sim.planar import PlanarWorld
 
@@ -15,6 +16,7 @@ _FIELD_RAD = math.radians(270.0)
 _RAYS = 271
 _RANGE_M = 12.0
 _PERIOD_S = 0.066
+_NOTHING = np.full(_RAYS, np.inf)
 
 
 class PlanarScanner:
@@ -46,23 +48,49 @@ class PlanarScanner:
 
     def _scan(self, pose: PlanarPose, t_s: float) -> FloatArray:
         polygons = self._world.look(t_s)[0][self._at_height]
-        room = np.repeat(self._world.room_polygon(), 1, axis=0)
-        corners = [*polygons, room]
-        nearest = np.full(_RAYS, np.inf)
-        for polygon in corners:
-            local = _seen_from(pose, polygon)
-            local[:, 0] -= self._front_m
-            off = local[:, 1] * self._cos[:, None] - local[:, 0] * self._sin[:, None]
-            along = local[:, 0] * self._cos[:, None] + local[:, 1] * self._sin[:, None]
-            next_off, next_along = np.roll(off, -1, axis=1), np.roll(along, -1, axis=1)
-            drop = off - next_off
-            share = off / np.where(np.abs(drop) < 1e-12, np.inf, drop)
-            reach = along + share * (next_along - along)
-            hit = np.where((off * next_off <= 0.0) & (reach > 0.0), reach, np.inf).min(axis=1)
-            nearest = np.minimum(nearest, hit)
+        shift = pose.x_m, pose.y_m, pose.heading_rad, self._front_m
+        nearest = _nearest(_NOTHING, self._world.room_polygon()[None], self._cos, self._sin, *shift)
+        nearest = _nearest(nearest, polygons, self._cos, self._sin, *shift)
         seen = nearest < _RANGE_M
         x = nearest[seen] * self._cos[seen] + self._front_m
         return np.stack((x, nearest[seen] * self._sin[seen]), axis=1)
+
+
+@compiled("float64[:], float64[:, :, ::1], float64[:], float64[:], float64, float64, float64, float64")
+def _nearest(
+    so_far_m: FloatArray,
+    polygons: FloatArray,
+    ray_cos: FloatArray,
+    ray_sin: FloatArray,
+    x_m: float,
+    y_m: float,
+    heading_rad: float,
+    front_m: float,
+) -> FloatArray:
+    """(R,) how far rays reach until they meet the first edge of polygons (N, K, 2), or what they met so far.
+    They begin front_m ahead of a body at x_m, y_m, and their angles are to its heading."""
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    nearest, corners = so_far_m.copy(), polygons.shape[1]
+    forward, left = np.empty(corners), np.empty(corners)
+    for polygon in polygons:
+        for j in range(corners):
+            dx, dy = polygon[j, 0] - x_m, polygon[j, 1] - y_m
+            forward[j], left[j] = dx * cos + dy * sin - front_m, dy * cos - dx * sin
+        for j in range(corners):
+            following = (j + 1) % corners
+            for ray in range(len(nearest)):
+                c, s = ray_cos[ray], ray_sin[ray]
+                off = left[j] * c - forward[j] * s
+                next_off = left[following] * c - forward[following] * s
+                if off * next_off > 0.0:
+                    continue
+                drop = off - next_off
+                share = off / drop if abs(drop) >= 1e-12 else 0.0
+                along = forward[j] * c + left[j] * s
+                reach = along + share * (forward[following] * c + left[following] * s - along)
+                if 0.0 < reach < nearest[ray]:
+                    nearest[ray] = reach
+    return nearest
 
 
 def _on_floor(pose: PlanarPose, points: FloatArray) -> FloatArray:

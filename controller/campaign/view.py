@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 
 from config.camera import SimulatedCameraConfig
 from config.robot import Mount
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray, PlanarPose
 from sim.planar import PlanarWorld
 from vision.scene import NEVER_M
+
+IntArray = NDArray[np.intp]
+BoolArray = NDArray[np.bool_]
 
 BANDS = 80
 _NEAR_M = 0.1
@@ -25,7 +29,7 @@ class PlanarView:
     body, inf where it does not or is covered by something nearer. free_m (B,): where the first thing that
     hides what is behind it stands, the building included."""
 
-    bodies: NDArray[np.intp]
+    bodies: IntArray
     forward_m: FloatArray
     free_m: FloatArray
 
@@ -42,7 +46,7 @@ class PlanarEye:
         hangs_m: float = math.inf,
     ) -> None:
         """hangs_m: what begins so high hangs, and hides nothing of the floor behind it."""
-        self._world, self._mount = world, mount
+        self._mount, self._z_m, self._room = mount, world.z_m, world.room_polygon()
         self.range_m = camera.depth_max_m
         left, right = (-0.5 - camera.cx) / camera.fx, (camera.width - 0.5 - camera.cx) / camera.fx
         edges = np.linspace(left, right, BANDS + 1) / math.cos(mount.pitch_rad)
@@ -54,69 +58,149 @@ class PlanarEye:
         self._down_tan, self.up_tan = math.tan(down), math.tan(up)
         sees_floor = self._down_tan > mount.height_m / NEVER_M
         self.floor_from_m = mount.height_m / self._down_tan if sees_floor else NEVER_M
-        z_m = world.z_m
+        z_m = self._z_m
         self._hides = (z_m[:, 0] < min(mount.height_m, hangs_m)) & (z_m[:, 1] > mount.height_m)
-        # (2, K + 1, N + 1): the outlines of all bodies and, at the end, of the building, by corners; each is
-        # closed by its first one.
-        outlines, room = world.look(0.0)[0], world.room_polygon()
-        corners = max(outlines.shape[1], len(room))
-        self._outlines = np.empty((2, corners + 1, len(world) + 1))
-        self._outlines[:, :-1, -1] = room[np.minimum(np.arange(corners), len(room) - 1)].T
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> PlanarView:
         """polygons (N, K, 2) of all bodies now; pose of the robot."""
-        outlines = self._outlines
-        outlines[:, :-1, :-1] = polygons.T
-        outlines[:, -1] = outlines[:, 0]
-        forward, right = self._in_camera(outlines[0], outlines[1], pose)
-        reach = self._edge_tan * forward
-        near = (forward.max(axis=0) > _NEAR_M) & (forward.min(axis=0) < self.range_m)
-        near &= ((right - reach).min(axis=0) < 0.0) & ((right + reach).max(axis=0) > 0.0)
-        near[-1] = True  # the building, which is not a body
-        chosen = near.nonzero()[0]
-        forward, right = forward.take(chosen, 1), right.take(chosen, 1)
-        hits = self._hits(forward, right)
-        bodies, room, hits = chosen[:-1], hits[-1], hits[:-1]
-        unmet = np.isinf(hits.min(axis=1)).nonzero()[0]
-        if len(unmet):
-            hits[unmet] = self._thin_ones(forward[:, unmet], right[:, unmet])
-        hiding = hits.take(self._hides[bodies].nonzero()[0], 0)
-        free = np.minimum(hiding.min(axis=0, initial=np.inf), room)
-        np.putmask(hits, (hits > free + _TOUCHING_M) | ~self._in_frame(bodies, hits), np.inf)
-        return PlanarView(bodies, hits, free)
+        return PlanarView(
+            *_look(
+                polygons,
+                self._room,
+                self._z_m,
+                self._hides,
+                self.bearing_tan,
+                self.half_width_tan,
+                self._edge_tan,
+                self.range_m,
+                self._mount.height_m,
+                self._down_tan,
+                self.up_tan,
+                *self.place(pose),
+            )
+        )
 
-    def _in_camera(self, x_m: FloatArray, y_m: FloatArray, pose: PlanarPose) -> tuple[FloatArray, FloatArray]:
-        """Forward and right (...) of the camera, on the level, of points x_m (...), y_m (...)."""
+    def place(self, pose: PlanarPose) -> tuple[float, float, float, float]:
+        """x_m and y_m of the camera on the floor, and the cosine and sine of where it looks; pose of the
+        robot."""
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        dx, dy = x_m - pose.x_m, y_m - pose.y_m
-        return dx * cos + dy * sin - self._mount.forward_m, self._mount.left_m + dx * sin - dy * cos
+        forward_m, left_m = self._mount.forward_m, self._mount.left_m
+        return (
+            pose.x_m + forward_m * cos - left_m * sin,
+            pose.y_m + forward_m * sin + left_m * cos,
+            cos,
+            sin,
+        )
 
-    def _hits(self, forward: FloatArray, right: FloatArray) -> FloatArray:
-        """(M, B) forward distance at which each ray first meets an edge of each polygon (K + 1, M)."""
-        # All pairs of a ray and an edge at once: to pick the few that meet would take longer.
-        off = right[:, :, None] - self.bearing_tan * forward[:, :, None]
-        here, there = off[:-1], off[1:]
-        drop = here - there
-        share = here / np.where(np.abs(drop) < 1e-12, np.inf, drop)
-        start = forward[:-1, :, None]
-        z = start + share * (forward[1:, :, None] - start)
-        met = (here * there <= 0.0) & (z > _NEAR_M)
-        nearest: FloatArray = np.where(met, z, np.inf).min(axis=0)
-        return nearest
 
-    def _thin_ones(self, forward: FloatArray, right: FloatArray) -> FloatArray:
-        """(M, B) for bodies that no ray has met: a pole may stand between two, and is seen all the same."""
-        ahead = forward.min(axis=0)
-        tangent = right / np.maximum(forward, _NEAR_M)
-        low, high = tangent.min(axis=0) - self.half_width_tan, tangent.max(axis=0) + self.half_width_tan
-        thin = (ahead > _NEAR_M) & (high - low <= 4.0 * self.half_width_tan)
-        between = (self.bearing_tan > low[:, None]) & (self.bearing_tan < high[:, None])
-        return np.where(thin[:, None] & between, ahead[:, None], np.inf)
+@inlined
+def _in_camera(
+    polygon: FloatArray,
+    eye_x: float,
+    eye_y: float,
+    cos: float,
+    sin: float,
+    forward: FloatArray,
+    right: FloatArray,
+) -> None:
+    """Corners (K, 2), and the first one again, forward and to the right (K + 1,) of the camera."""
+    count = len(polygon)
+    for j in range(count + 1):
+        dx, dy = polygon[j % count, 0] - eye_x, polygon[j % count, 1] - eye_y
+        forward[j], right[j] = dx * cos + dy * sin, dx * sin - dy * cos
 
-    def _in_frame(self, bodies: NDArray[np.intp], hits: FloatArray) -> NDArray[np.bool_]:
-        """Whether any of its height is between the upper and the lower edge of the image."""
-        z_m, eye_m = self._world.z_m.take(bodies, 0), self._mount.height_m
-        above = z_m[:, 1:] > eye_m - hits * self._down_tan
-        below = z_m[:, :1] < eye_m + hits * self.up_tan
-        seen: NDArray[np.bool_] = above & below & (hits < self.range_m)
-        return seen
+
+@inlined
+def _may_be_seen(forward: FloatArray, right: FloatArray, edge_tan: float, range_m: float) -> bool:
+    """Whether a polygon may reach into the view."""
+    nearest, farthest, leftmost, rightmost = math.inf, -math.inf, math.inf, -math.inf
+    for j in range(len(forward)):
+        nearest, farthest = min(nearest, forward[j]), max(farthest, forward[j])
+        reach = edge_tan * forward[j]
+        leftmost, rightmost = min(leftmost, right[j] - reach), max(rightmost, right[j] + reach)
+    return farthest > _NEAR_M and nearest < range_m and leftmost < 0.0 and rightmost > 0.0
+
+
+@inlined
+def _meet(forward: FloatArray, right: FloatArray, bearing_tan: FloatArray, hits: FloatArray) -> bool:
+    """How far ahead each ray (B,) first meets an edge of a polygon; returns whether any does."""
+    met = False
+    hits[:] = math.inf
+    for j in range(len(forward) - 1):
+        for b in range(len(bearing_tan)):
+            here = right[j] - bearing_tan[b] * forward[j]
+            there = right[j + 1] - bearing_tan[b] * forward[j + 1]
+            if here * there > 0.0:
+                continue
+            drop = here - there
+            share = here / drop if abs(drop) >= 1e-12 else 0.0
+            z = forward[j] + share * (forward[j + 1] - forward[j])
+            if z > _NEAR_M and z < hits[b]:
+                hits[b], met = z, True
+    return met
+
+
+@inlined
+def _show_thin(
+    forward: FloatArray, right: FloatArray, bearing_tan: FloatArray, half_width_tan: float, hits: FloatArray
+) -> None:
+    """Of a body that no ray has met: a pole may stand between two, and is seen all the same."""
+    ahead, low, high = math.inf, math.inf, -math.inf
+    for j in range(len(forward)):
+        tangent = right[j] / max(forward[j], _NEAR_M)
+        ahead, low, high = min(ahead, forward[j]), min(low, tangent), max(high, tangent)
+    low, high = low - half_width_tan, high + half_width_tan
+    if ahead > _NEAR_M and high - low <= 4.0 * half_width_tan:
+        for b in range(len(bearing_tan)):
+            if low < bearing_tan[b] < high:
+                hits[b] = ahead
+
+
+@compiled(
+    "float64[:, :, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64[::1], float64, float64,"
+    "float64, float64, float64, float64, float64, float64, float64, float64"
+)
+def _look(
+    polygons: FloatArray,
+    room: FloatArray,
+    z_m: FloatArray,
+    hides: BoolArray,
+    bearing_tan: FloatArray,
+    half_width_tan: float,
+    edge_tan: float,
+    range_m: float,
+    eye_m: float,
+    down_tan: float,
+    up_tan: float,
+    eye_x: float,
+    eye_y: float,
+    cos: float,
+    sin: float,
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """The fields of PlanarView for a camera at eye_x, eye_y, eye_m over the floor."""
+    count, corners, bands = len(polygons), polygons.shape[1], len(bearing_tan)
+    bodies, hits = np.empty(count, np.intp), np.empty((count, bands))
+    forward, right, free = np.empty(len(room) + 1), np.empty(len(room) + 1), np.empty(bands)
+    _in_camera(room, eye_x, eye_y, cos, sin, forward, right)
+    _meet(forward, right, bearing_tan, free)
+    forward, right, seen = np.empty(corners + 1), np.empty(corners + 1), 0
+    for k in range(count):
+        _in_camera(polygons[k], eye_x, eye_y, cos, sin, forward, right)
+        if not _may_be_seen(forward, right, edge_tan, range_m):
+            continue
+        if not _meet(forward, right, bearing_tan, hits[seen]):
+            _show_thin(forward, right, bearing_tan, half_width_tan, hits[seen])
+        if hides[k]:
+            for b in range(bands):
+                free[b] = min(free[b], hits[seen, b])
+        bodies[seen] = k
+        seen += 1
+    for row in range(seen):
+        low_m, high_m = z_m[bodies[row], 0], z_m[bodies[row], 1]
+        for b in range(bands):
+            z = hits[row, b]
+            # In the frame is what has any of its height between the upper and the lower edge of the image.
+            in_frame = z < range_m and high_m > eye_m - z * down_tan and low_m < eye_m + z * up_tan
+            if z > free[b] + _TOUCHING_M or not in_frame:
+                hits[row, b] = math.inf
+    return bodies[:seen], hits[:seen], free

@@ -43,6 +43,7 @@ from controller.decision.worst_case import WorstCase
 from hal.types import CameraMount
 
 _COARSE_S = 0.5
+_NONE = np.zeros(0, np.bool_)
 _SAME_SURFACE_M = 0.8
 # So long somebody must head for the way until he counts as coming in, and head elsewhere until he does not;
 # meanwhile the worst case is what is reckoned with.
@@ -64,7 +65,7 @@ class Appraiser:
         self._enters = Debounced(_SETTLES_S)
         self._of: Bodies | None = None
         self._watched = no_bodies(0)
-        self._remembered = np.zeros(0, np.bool_)
+        self._remembered = _NONE
 
     def limits(
         self, known: Knowledge, s_m: float, motion: Motion, base_mps: float, now_s: float
@@ -111,7 +112,7 @@ class Appraiser:
         self._of = bodies = known.bodies
         watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
         self._watched = bodies.select(watched)
-        self._remembered = known.remembered[watched]
+        self._remembered = known.remembered[watched] if len(self._watched) else _NONE
         self._inside.intersection_update(bodies.ids.tolist())
 
     def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.decision import SightConfig
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
 IntArray = NDArray[np.intp]
@@ -66,16 +67,15 @@ class BlindCorners:
         """Surfaces of one scene in the order of their bands (P,): forward distance, path coordinates, and
         half of the swept width there. band_tan: width of a band. front_s_m: where the robot's front is.
         stands (P,): no face is made of what moves, people who walk one behind the other least of all."""
-        beside = np.abs(d_m) - half_width_m
         for corner in self._corners:
             # Nearer than this, too little of the face is in view to be sure.
             corner.sightings -= 1 if corner.s_m - front_s_m > _SURE_M else 0
-        close = stands & (beside > 0.0) & (beside <= self._beside_m) & (s_m - front_s_m < _LOOK_AHEAD_M)
-        near = close.nonzero()[0]
-        on_left = d_m[near] > 0.0
-        for left, rows in ((False, near[~on_left][::-1]), (True, near[on_left])):
-            for end in self._ends(rows, bands, forward_m, s_m, d_m, band_tan):
-                self._note(float(s_m[end]), left, float(beside[end]))
+        ends = _faces_end(
+            bands, forward_m, s_m, d_m, half_width_m, stands, band_tan, front_s_m, self._beside_m
+        )
+        for end in ends.tolist():
+            beside_m = float(abs(d_m[end]) - half_width_m[end])
+            self._note(float(s_m[end]), bool(d_m[end] > 0.0), beside_m)
         self._corners = [one for one in self._corners if one.sightings > 0 and one.s_m > front_s_m - _SAME_M]
 
     def nearest(self, front_s_m: float) -> BlindCorner | None:
@@ -86,44 +86,6 @@ class BlindCorners:
         first = min(ahead, key=lambda one: one.s_m)
         return BlindCorner(first.s_m, first.beside_m)
 
-    def _ends(
-        self,
-        rows: IntArray,
-        bands: IntArray,
-        forward_m: FloatArray,
-        s_m: FloatArray,
-        d_m: FloatArray,
-        band_tan: float,
-    ) -> list[int]:
-        """The far ends of long faces among rows, which come from the edge of the view inwards."""
-        if not len(rows):
-            return []
-        along, aside, number = (one[rows[1:]] - one[rows[:-1]] for one in (s_m, d_m, bands))
-        # So much of a face that runs along the way lies between two bands.
-        step_m = forward_m**2 * band_tan / np.maximum(np.abs(d_m), 0.1)
-        flat_m = _SLACK * step_m[rows[:-1]] + _STEP_ASIDE_M
-        goes_on = (np.abs(number) == 1) & (along > -_STEP_ASIDE_M) & (along < flat_m)
-        goes_on &= np.abs(aside) < _STEP_ASIDE_M
-        last = [*(~goes_on).nonzero()[0].tolist(), len(rows) - 1]
-        first = [0, *(k + 1 for k in last[:-1])]
-        faces = [(int(rows[j]), int(rows[k])) for j, k in zip(first, last, strict=True)]
-        return [
-            end
-            for began, end in faces
-            if s_m[end] - s_m[began] >= _FACE_M
-            and self._opens(end, bands, forward_m, rows, _PASSAGE_M + float(step_m[end]))
-        ]
-
-    def _opens(
-        self, here: int, bands: IntArray, forward_m: FloatArray, rows: IntArray, least_m: float
-    ) -> bool:
-        """Whether the view past the end goes on for more than least_m: what is behind the face is hidden."""
-        inward = 1 if rows[-1] > rows[0] or len(rows) == 1 else -1
-        beyond = here + inward
-        if not 0 <= beyond < len(bands) or abs(bands[beyond] - bands[here]) != 1:
-            return True
-        return bool(forward_m[beyond] - forward_m[here] > least_m)
-
     def _note(self, s_m: float, left: bool, beside_m: float) -> None:
         for corner in self._corners:
             if corner.left == left and abs(corner.s_m - s_m) < _SAME_M:
@@ -132,3 +94,60 @@ class BlindCorners:
                 corner.beside_m += 0.3 * (beside_m - corner.beside_m)
                 return
         self._corners.append(_Corner(s_m, left, beside_m, 1))
+
+
+@inlined
+def _flat_m(forward_m: float, d_m: float, band_tan: float) -> float:
+    """So much of a face that runs along the way lies between two bands."""
+    return forward_m**2 * band_tan / max(abs(d_m), 0.1)
+
+
+@inlined
+def _opens(end: int, beyond: int, bands: IntArray, forward_m: FloatArray, least_m: float) -> bool:
+    """Whether the view past the end of a face goes on for more than least_m: what is behind it is hidden."""
+    if not 0 <= beyond < len(bands) or abs(bands[beyond] - bands[end]) != 1:
+        return True
+    return bool(forward_m[beyond] - forward_m[end] > least_m)
+
+
+@compiled("int64[:], float64[:], float64[:], float64[:], float64[:], boolean[:], float64, float64, float64")
+def _faces_end(
+    bands: IntArray,
+    forward_m: FloatArray,
+    s_m: FloatArray,
+    d_m: FloatArray,
+    half_width_m: FloatArray,
+    stands: NDArray[np.bool_],
+    band_tan: float,
+    front_s_m: float,
+    most_beside_m: float,
+) -> IntArray:
+    """(E,) which of the surfaces (P,) are far ends of long faces."""
+    count, found = len(bands), 0
+    ends = np.empty(count, np.intp)
+    for inward in (-1, 1):
+        # On either side from the edge of the view inwards: on the right against the order of the bands.
+        began = last = -1
+        for n in range(count + 1):
+            k = n if inward > 0 else count - 1 - n
+            if n < count:
+                aside_m = abs(d_m[k]) - half_width_m[k]
+                close = stands[k] and 0.0 < aside_m <= most_beside_m and s_m[k] - front_s_m < _LOOK_AHEAD_M
+                if not close or (d_m[k] > 0.0) != (inward > 0):
+                    continue
+                if last >= 0:
+                    along_m, flat_m = s_m[k] - s_m[last], _flat_m(forward_m[last], d_m[last], band_tan)
+                    if (
+                        abs(bands[k] - bands[last]) == 1
+                        and -_STEP_ASIDE_M < along_m < _SLACK * flat_m + _STEP_ASIDE_M
+                        and abs(d_m[k] - d_m[last]) < _STEP_ASIDE_M
+                    ):
+                        last = k
+                        continue
+            if last >= 0 and s_m[last] - s_m[began] >= _FACE_M:
+                least_m = _PASSAGE_M + _flat_m(forward_m[last], d_m[last], band_tan)
+                if _opens(last, last + inward, bands, forward_m, least_m):
+                    ends[found] = last
+                    found += 1
+            began = last = k
+    return ends[:found]

@@ -9,9 +9,10 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.geometry import camera_in_floor
+from hal.compiled import compiled, inlined
+from hal.geometry import camera_in_body
 from hal.types import CameraMount, FloatArray, PlanarPose
-from vision.scene import Obstacle, Scene
+from vision.scene import Scene
 
 # Nothing in a hall is further, larger or faster: such numbers are faults of perception.
 _FARTHEST_M = 200.0
@@ -71,6 +72,27 @@ class Bodies:
         # For a few rows, take() is ten times as fast as an index.
         return Bodies(self.captured_ns, *[array.take(rows, 0) for array in _arrays_of(self)])
 
+    def gone_on(self, captured_ns: int, xy_m: FloatArray, unseen_s: FloatArray) -> Bodies:
+        """The same later on, at xy_m (N, 2)."""
+        return Bodies(
+            captured_ns,
+            self.ids,
+            xy_m,
+            self.velocity_mps,
+            self.measured_mps,
+            self.surprise_mps,
+            self.covariance,
+            self.half_view_m,
+            self.half_across_m,
+            self.view_rad,
+            self.top_m,
+            self.bottom_m,
+            self.moving,
+            self.age_s,
+            unseen_s,
+            self.tracked_s,
+        )
+
     def joined(self, other: Bodies) -> Bodies:
         """These and, behind them, others; the time is that of these."""
         if not len(other):
@@ -82,11 +104,9 @@ class Bodies:
 
     def covers(self, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
         """(P, N) whether floor points (P, 2) lie on a body, within reach_m (P,) along the view and side_m."""
-        offset = points_m[:, None, :] - self.xy_m
-        cos, sin = np.cos(self.view_rad), np.sin(self.view_rad)
-        along = np.abs(offset[..., 0] * cos + offset[..., 1] * sin)
-        across = np.abs(offset[..., 1] * cos - offset[..., 0] * sin)
-        return (along <= self.half_view_m + reach_m[:, None]) & (across <= self.half_across_m + side_m)
+        return _covers(
+            points_m, reach_m, side_m, self.xy_m, self.view_rad, self.half_view_m, self.half_across_m
+        )
 
 
 _arrays_of = attrgetter(*(name for name in Bodies.__slots__ if name != "captured_ns"))
@@ -108,11 +128,12 @@ _NOBODY = Bodies(
     unseen_s=np.zeros(0),
     tracked_s=np.zeros(0),
 )
+_NO_ARRAYS = _arrays_of(_NOBODY)
 
 
 def no_bodies(captured_ns: int) -> Bodies:
     """An empty scene's."""
-    return Bodies(captured_ns, *_arrays_of(_NOBODY))
+    return Bodies(captured_ns, *_NO_ARRAYS)
 
 
 def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float) -> Bodies:
@@ -132,31 +153,35 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
         dtype=np.float64,
     ).reshape(-1, len(_MOST))
     seen_s = np.array([(one.age_s, one.unseen_s) for one in scene.obstacles], np.float64)
-    _check(scene.obstacles, measured, seen_s)
-    optical, extent, speed = measured[:, _POSITION], measured[:, _EXTENT], measured[:, _VELOCITY]
-    spread = measured[:, _COVARIANCE].reshape(-1, 3, 3)
-    camera = camera_in_floor(pose, mount)
-    floor = camera.rotation[:2]
-    position = camera.apply(optical)
-    covariance = floor @ spread @ floor.T
     moving = np.array([one.moving for one in scene.obstacles], np.bool_)
-    velocity = speed @ floor.T
-    half_across, half_height, half_seen = (extent / 2.0).T
-    half_view = np.maximum(half_seen, depth_m / 2.0)
-    forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
+    camera = camera_in_body(mount)
+    impossible, on_floor, covariance, (half_view, half_across, view_rad, top, bottom) = _boxes(
+        measured,
+        seen_s,
+        moving,
+        depth_m,
+        camera.rotation,
+        camera.translation_m,
+        pose.x_m,
+        pose.y_m,
+        pose.heading_rad,
+    )
+    if impossible >= 0:
+        raise SceneError(_complaint(scene.obstacles[impossible].id, measured[impossible]))
+    xy, measured_mps, velocity, surprise = on_floor
     return Bodies(
         captured_ns=scene.captured_ns,
         ids=np.array([one.id for one in scene.obstacles], np.int64),
-        xy_m=position[:, :2] + (half_view - half_seen)[:, None] * forward,
-        velocity_mps=np.where(moving[:, None], velocity, 0.0),
-        measured_mps=velocity,
-        surprise_mps=np.zeros(velocity.shape),
+        xy_m=xy,
+        velocity_mps=velocity,
+        measured_mps=measured_mps,
+        surprise_mps=surprise,
         covariance=covariance,
         half_view_m=half_view,
         half_across_m=half_across,
-        view_rad=np.full(len(moving), pose.heading_rad),
-        top_m=position[:, 2] + half_height,
-        bottom_m=position[:, 2] - half_height,
+        view_rad=view_rad,
+        top_m=top,
+        bottom_m=bottom,
         moving=moving,
         age_s=seen_s[:, 0],
         unseen_s=seen_s[:, 1],
@@ -164,18 +189,101 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     )
 
 
-def _check(obstacles: tuple[Obstacle, ...], measured: FloatArray, seen_s: FloatArray) -> None:
-    """Written so that NaN fails every comparison."""
-    possible, known = (measured >= _LEAST) & (measured <= _MOST), seen_s >= 0.0
-    if possible.all() and known.all():
-        return
-    k = int((possible.all(axis=1) & known.all(axis=1)).argmin())
-    position, extent, velocity = (measured[k, part] for part in (_POSITION, _EXTENT, _VELOCITY))
-    raise SceneError(
-        f"obstacle {obstacles[k].id} is impossible: position {_list(position)} m, "
-        f"size {_list(extent)} m, velocity {_list(velocity)} m/s"
+def _complaint(number: int, measured: FloatArray) -> str:
+    position, extent, velocity = (measured[part].tolist() for part in (_POSITION, _EXTENT, _VELOCITY))
+    return (
+        f"obstacle {number} is impossible: position {_list(position)} m, size {_list(extent)} m, "
+        f"velocity {_list(velocity)} m/s"
     )
 
 
-def _list(values: FloatArray) -> str:
-    return "(" + ", ".join(f"{float(value):.2f}" for value in np.ravel(values)) + ")"
+def _list(values: list[float]) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in values) + ")"
+
+
+@compiled("float64[:, :], float64[:], float64, float64[:, :], float64[:], float64[:], float64[:]")
+def _covers(
+    points_m: FloatArray,
+    reach_m: FloatArray,
+    side_m: float,
+    xy_m: FloatArray,
+    view_rad: FloatArray,
+    half_view_m: FloatArray,
+    half_across_m: FloatArray,
+) -> NDArray[np.bool_]:
+    covered = np.empty((len(points_m), len(xy_m)), np.bool_)
+    for k in range(len(xy_m)):
+        cos, sin = math.cos(view_rad[k]), math.sin(view_rad[k])
+        for i in range(len(points_m)):
+            dx, dy = points_m[i, 0] - xy_m[k, 0], points_m[i, 1] - xy_m[k, 1]
+            covered[i, k] = (
+                abs(dx * cos + dy * sin) <= half_view_m[k] + reach_m[i]
+                and abs(dy * cos - dx * sin) <= half_across_m[k] + side_m
+            )
+    return covered
+
+
+@inlined
+def _dot(one: FloatArray, other: FloatArray) -> float:
+    """Of two vectors (3,)."""
+    return float(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
+
+
+@compiled(
+    "float64[:, ::1], float64[:, ::1], boolean[::1], float64, float64[:, :], float64[:],"
+    "float64, float64, float64"
+)
+def _boxes(
+    measured: FloatArray,
+    seen_s: FloatArray,
+    moving: NDArray[np.bool_],
+    depth_m: float,
+    in_body: FloatArray,
+    in_body_m: FloatArray,
+    x_m: float,
+    y_m: float,
+    heading_rad: float,
+) -> tuple[int, FloatArray, FloatArray, FloatArray]:
+    """The first of N obstacles that is impossible, -1: none is; of Bodies, (4, N, 2) xy_m, measured_mps,
+    velocity_mps and surprise_mps, the covariance, and (5, N) half_view_m, half_across_m, view_rad, top_m and
+    bottom_m. in_body (3, 3), in_body_m (3,): the camera's pose in a body that stands at x_m, y_m."""
+    count, impossible = len(measured), -1
+    on_floor, covariance, sizes = np.zeros((4, count, 2)), np.empty((count, 2, 2)), np.empty((5, count))
+    xy, measured_mps, velocity, _ = on_floor
+    half_view, half_across, view_rad, top, bottom = sizes
+    view_rad[:] = heading_rad
+    cos, sin, turn = math.cos(heading_rad), math.sin(heading_rad), np.empty((2, 3))
+    for j in range(3):
+        turn[0, j] = cos * in_body[0, j] - sin * in_body[1, j]
+        turn[1, j] = sin * in_body[0, j] + cos * in_body[1, j]
+    from_x = x_m + cos * in_body_m[0] - sin * in_body_m[1]
+    from_y = y_m + sin * in_body_m[0] + cos * in_body_m[1]
+    for k in range(count):
+        one = measured[k]
+        # Written so that NaN fails every comparison.
+        possible = seen_s[k, 0] >= 0.0 and seen_s[k, 1] >= 0.0
+        for j in range(len(one)):
+            possible = possible and _LEAST[j] <= one[j] <= _MOST[j]
+        if not possible:
+            impossible = k
+            break
+        position, extent, speed = one[_POSITION], one[_EXTENT], one[_VELOCITY]
+        half_seen = extent[2] / 2.0
+        half_view[k], half_across[k] = max(half_seen, depth_m / 2.0), extent[0] / 2.0
+        deeper_m = half_view[k] - half_seen
+        xy[k, 0] = _dot(turn[0], position) + from_x + deeper_m * cos
+        xy[k, 1] = _dot(turn[1], position) + from_y + deeper_m * sin
+        middle_m = _dot(in_body[2], position) + in_body_m[2]
+        top[k], bottom[k] = middle_m + extent[1] / 2.0, middle_m - extent[1] / 2.0
+        spread = one[_COVARIANCE].reshape(3, 3)
+        for i in range(2):
+            measured_mps[k, i] = _dot(turn[i], speed)
+            if moving[k]:
+                velocity[k, i] = measured_mps[k, i]
+            for j in range(2):
+                covariance[k, i, j] = (
+                    turn[i, 0] * _dot(spread[0], turn[j])
+                    + turn[i, 1] * _dot(spread[1], turn[j])
+                    + turn[i, 2] * _dot(spread[2], turn[j])
+                )
+    return impossible, on_floor, covariance, sizes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from operator import attrgetter
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from config.robot import Body
 from controller.decision.bodies import Bodies
 from controller.path.path import Path
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
 _STEP_M = 0.1
@@ -19,30 +21,30 @@ _BEHIND_M = 2.0
 
 
 class Corridor:
-    """The swept width along one path. All s are of the turning centre."""
+    """The swept width along one path. All s are of the turning centre. half_widths_m (W,): at places that are
+    _STEP_M apart, from overhang_m before the path's beginning on."""
 
     def __init__(self, path: Path, body: Body) -> None:
         self.path = path
         self.front_m, self.rear_m, self.height_m = body.front_m, body.rear_m, body.height_m
-        overhang_m = max(body.front_m, body.rear_m)
-        self._s = np.arange(-overhang_m, path.length_m + overhang_m + _STEP_M, _STEP_M)
+        self.overhang_m = max(body.front_m, body.rear_m)
+        s_m = np.arange(-self.overhang_m, path.length_m + self.overhang_m + _STEP_M, _STEP_M)
         # A bend is felt from where the front enters it until the tail has left it.
-        around = self._s[:, None] + np.linspace(-overhang_m, overhang_m, 11)
+        around = s_m[:, None] + np.linspace(-self.overhang_m, self.overhang_m, 11)
         bend = np.abs(path.curvatures(around)).max(axis=1)
         half_m = body.width_m / 2.0
         radius = 1.0 / np.maximum(bend, 1e-9)
-        outer = np.sqrt((radius + half_m) ** 2 + overhang_m**2) - radius
-        self._half_width = np.where(bend > 1e-6, outer, half_m)
+        outer = np.sqrt((radius + half_m) ** 2 + self.overhang_m**2) - radius
+        self.half_widths_m: FloatArray = np.where(bend > 1e-6, outer, half_m)
         self.straight = not (bend > 1e-6).any()
-        self._half_m = half_m
 
     def half_width(self, s_m: FloatArray) -> FloatArray:
         """Half of the swept width at s_m, in metres; on bends the outer corner's, on both sides."""
-        if self.straight:
-            same = np.empty(s_m.shape)
-            same.fill(self._half_m)
-            return same
-        return np.interp(s_m, self._s, self._half_width)
+        return _half_widths(s_m.reshape(-1), self.half_widths_m, self.overhang_m).reshape(s_m.shape)
+
+    def half_width_at(self, s_m: float) -> float:
+        """The same at one place."""
+        return _one_half_width(s_m, self.half_widths_m, self.overhang_m)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,8 +53,7 @@ class Placed:
 
     s_m, d_m: centre. heading_rad: of the path there. half_s_m: half size along the path. lo_m, hi_m: between
     these positions of the robot's turning centre, the robot's length and the body's overlap along the path.
-    clear_m: free floor between the body's side and the swept corridor; negative: inside it. (On a straight
-    path heading and half size are (N, 1): they do not change.)
+    clear_m: free floor between the body's side and the swept corridor; negative: inside it.
     """
 
     s_m: FloatArray
@@ -80,17 +81,77 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
 
     The path is looked at from a little behind near_s_m to reach_m ahead of it.
     """
-    x = bodies.xy_m[:, :1] + bodies.velocity_mps[:, :1] * times_s
-    y = bodies.xy_m[:, 1:] + bodies.velocity_mps[:, 1:] * times_s
-    s, d, heading = corridor.path.locate(x, y, near_s_m - _BEHIND_M, near_s_m + reach_m)
-    if corridor.straight:
-        heading = heading[:, :1]
-    turned = bodies.view_rad[:, None] - heading
-    cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
-    along, across = bodies.half_view_m[:, None], bodies.half_across_m[:, None]
-    half_s, half_d = cos * along + sin * across, sin * along + cos * across
-    lo, hi = s - half_s - corridor.front_m, s + half_s + corridor.rear_m
-    return Placed(s, d, heading, half_s, lo, hi, np.abs(d) - half_d - corridor.half_width(s))
+    reach = near_s_m - _BEHIND_M, near_s_m + reach_m
+    s, d, heading = corridor.path.locate(bodies.xy_m, bodies.velocity_mps, times_s, *reach)
+    half_s, lo, hi, clear = _extents(
+        s,
+        d,
+        heading,
+        bodies.view_rad,
+        bodies.half_view_m,
+        bodies.half_across_m,
+        corridor.half_widths_m,
+        corridor.overhang_m,
+        corridor.front_m,
+        corridor.rear_m,
+    )
+    return Placed(s, d, heading, half_s, lo, hi, clear)
+
+
+@inlined
+def _half_width(s_m: float, half_widths_m: FloatArray, overhang_m: float) -> float:
+    """Between the places that are _STEP_M apart, from overhang_m before the path's beginning on."""
+    # The other way round, what is not a number would be no place at all.
+    place = min(max(0.0, (s_m + overhang_m) / _STEP_M), len(half_widths_m) - 1.0)
+    k = min(int(place), len(half_widths_m) - 2)
+    return float(half_widths_m[k] + (place - k) * (half_widths_m[k + 1] - half_widths_m[k]))
+
+
+@compiled("float64, float64[::1], float64")
+def _one_half_width(s_m: float, half_widths_m: FloatArray, overhang_m: float) -> float:
+    return _half_width(s_m, half_widths_m, overhang_m)
+
+
+@compiled("float64[:], float64[::1], float64")
+def _half_widths(s_m: FloatArray, half_widths_m: FloatArray, overhang_m: float) -> FloatArray:
+    half_width = np.empty(len(s_m))
+    for k in range(len(s_m)):
+        half_width[k] = _half_width(s_m[k], half_widths_m, overhang_m)
+    return half_width
+
+
+@compiled(
+    "float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:], float64[:], float64[:], float64[::1],"
+    "float64, float64, float64"
+)
+def _extents(
+    s_m: FloatArray,
+    d_m: FloatArray,
+    heading_rad: FloatArray,
+    view_rad: FloatArray,
+    half_view_m: FloatArray,
+    half_across_m: FloatArray,
+    half_widths_m: FloatArray,
+    overhang_m: float,
+    front_m: float,
+    rear_m: float,
+) -> FloatArray:
+    """(4, N, K) half_s_m, lo_m, hi_m and clear_m of Placed, for bodies (N,) that are at s_m, d_m (N, K)."""
+    extents = np.empty((4, *s_m.shape))
+    half_s, lo, hi, clear = extents
+    for k in range(len(s_m)):
+        along, across = half_view_m[k], half_across_m[k]
+        cos = sin = 0.0
+        for j in range(s_m.shape[1]):
+            if j == 0 or heading_rad[k, j] != heading_rad[k, j - 1]:
+                turned = view_rad[k] - heading_rad[k, j]
+                cos, sin = abs(math.cos(turned)), abs(math.sin(turned))
+            half_s[k, j] = cos * along + sin * across
+            lo[k, j] = s_m[k, j] - half_s[k, j] - front_m
+            hi[k, j] = s_m[k, j] + half_s[k, j] + rear_m
+            beside = abs(d_m[k, j]) - (sin * along + cos * across)
+            clear[k, j] = beside - _half_width(s_m[k, j], half_widths_m, overhang_m)
+    return extents
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,17 +179,24 @@ _courses_of = attrgetter(*Course.__slots__)
 
 def course_of(bodies: Bodies, heading_rad: FloatArray) -> Course:
     """heading_rad (N,): of the path where each body is."""
-    cos, sin = np.cos(heading_rad), np.sin(heading_rad)
-    x, y = bodies.velocity_mps.T
-    more_x, more_y = bodies.surprise_mps.T
-    xx, yy = bodies.covariance[:, 0, 0], bodies.covariance[:, 1, 1]
-    mixed = bodies.covariance[:, 0, 1] + bodies.covariance[:, 1, 0]
-    turned = mixed * cos * sin
-    return Course(
-        x * cos + y * sin,
-        y * cos - x * sin,
-        np.sqrt(np.maximum(xx * cos * cos + turned + yy * sin * sin, 0.0)),
-        np.sqrt(np.maximum(xx * sin * sin - turned + yy * cos * cos, 0.0)),
-        more_x * cos + more_y * sin,
-        more_y * cos - more_x * sin,
-    )
+    return Course(*_seen_along(bodies.velocity_mps, bodies.surprise_mps, bodies.covariance, heading_rad))
+
+
+@compiled("float64[:, :], float64[:, :], float64[:, :, :], float64[:]")
+def _seen_along(
+    velocity_mps: FloatArray, surprise_mps: FloatArray, covariance: FloatArray, heading_rad: FloatArray
+) -> FloatArray:
+    """(6, N) the fields of Course."""
+    course = np.empty((6, len(heading_rad)))
+    along, left, sigma_along, sigma_left, more_along, more_left = course
+    for k in range(len(heading_rad)):
+        cos, sin = math.cos(heading_rad[k]), math.sin(heading_rad[k])
+        x, y = velocity_mps[k, 0], velocity_mps[k, 1]
+        along[k], left[k] = x * cos + y * sin, y * cos - x * sin
+        x, y = surprise_mps[k, 0], surprise_mps[k, 1]
+        more_along[k], more_left[k] = x * cos + y * sin, y * cos - x * sin
+        xx, yy = covariance[k, 0, 0], covariance[k, 1, 1]
+        turned = (covariance[k, 0, 1] + covariance[k, 1, 0]) * cos * sin
+        sigma_along[k] = math.sqrt(max(xx * cos * cos + turned + yy * sin * sin, 0.0))
+        sigma_left[k] = math.sqrt(max(xx * sin * sin - turned + yy * cos * cos, 0.0))
+    return course

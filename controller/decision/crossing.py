@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from controller.decision.corridor import Placed
 from controller.profile import SpeedRamps
+from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
 # So unlikely that it will not come into the way, an obstacle that heads for it cannot become.
@@ -38,7 +39,7 @@ class Conflict:
 
 
 def comes_in(
-    placed: Placed, times_s: FloatArray, sigma_side_mps: FloatArray, unsure_m: FloatArray | float = 0.0
+    placed: Placed, times_s: FloatArray, sigma_side_mps: FloatArray, unsure_m: FloatArray | None = None
 ) -> NDArray[np.bool_]:
     """(N,) which bodies are, or are likely to come, within the swept width. times_s (K,) begins at 0 = now.
 
@@ -46,11 +47,8 @@ def comes_in(
     What an unlikely entry could do is watched by controller/decision/contingency.py. unsure_m (N,): so much
     nearer to the way they may be than where they are placed.
     """
-    clear = placed.clear_m - np.reshape(unsure_m, (-1, 1))
-    found: NDArray[np.bool_] = (clear[:, 0] <= 0.0) | (
-        (clear + _likely(times_s, sigma_side_mps)).min(axis=1) <= 0.0
-    )
-    return found
+    nearer_m = np.zeros(len(sigma_side_mps)) if unsure_m is None else unsure_m
+    return _comes_in(placed.clear_m, times_s, sigma_side_mps, nearer_m)
 
 
 def find_conflicts(
@@ -64,56 +62,12 @@ def find_conflicts(
 
     Leaving must be certain, the spread added: hope is no reason to go.
     """
-    clear = placed.clear_m.take(rows, 0) - margin_m[rows, None]
-    likely = clear + _likely(times_s, sigma_side_mps[rows])
-    certain = clear - sigma_side_mps[rows, None] * times_s
-    found = []
-    for k, row in enumerate(rows.tolist()):
-        entry = 0.0 if clear[k, 0] <= 0.0 else max(_first_below(likely[k], times_s), 0.0)
-        if math.isinf(entry):
-            continue
-        found.append(_conflict(placed, times_s, row, entry, _first_above(certain[k], times_s, entry)))
-    return found
-
-
-def _likely(times_s: FloatArray, sigma_side_mps: FloatArray) -> FloatArray:
-    return np.minimum(sigma_side_mps[:, None] * times_s, _MOST_SPREAD_M)
-
-
-def _first_below(values: FloatArray, times_s: FloatArray) -> float:
-    """When values first fall to 0, between the samples; inf: never."""
-    below = values <= 0.0
-    if not below.any():
-        return math.inf
-    k = int(below.argmax())
-    if k == 0:
-        return float(times_s[0])
-    share = values[k - 1] / (values[k - 1] - values[k])
-    return float(times_s[k - 1] + share * (times_s[k] - times_s[k - 1]))
-
-
-def _first_above(values: FloatArray, times_s: FloatArray, after_s: float) -> float:
-    above = (values > 0.0) & (times_s > after_s)
-    if not above.any():
-        return math.inf
-    k = int(above.argmax())
-    if k == 0 or values[k - 1] > 0.0:
-        return float(times_s[k])
-    share = -values[k - 1] / (values[k] - values[k - 1])
-    return float(times_s[k - 1] + share * (times_s[k] - times_s[k - 1]))
-
-
-def _conflict(placed: Placed, times_s: FloatArray, row: int, in_s: float, out_s: float) -> Conflict:
-    end_s = min(out_s, float(times_s[-1]))
-    lo, hi = placed.lo_m[row], placed.hi_m[row]
-    return Conflict(
-        row,
-        in_s,
-        out_s,
-        float(np.interp(in_s, times_s, lo)),
-        float(np.interp(end_s, times_s, lo)),
-        float(np.interp(in_s, times_s, hi)),
-    )
+    conflicts = _conflicts(placed.clear_m, placed.lo_m, placed.hi_m, times_s, sigma_side_mps, margin_m, rows)
+    return [
+        Conflict(row, *times_and_places)
+        for row, times_and_places in zip(rows.tolist(), conflicts.tolist(), strict=True)
+        if math.isfinite(times_and_places[0])
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,21 +96,136 @@ def choices(
     leaves = math.isfinite(conflict.out_s)
     if not leaves:
         times[2] = times[0]
-    at_in, at_first, at_out = ramps.distance(times[None, :]).T + s_m
-    room = np.minimum(conflict.lo_in_m - at_in, conflict.lo_out_m - at_out) - margin_m
-    yield_mps = _greatest_with_room(room, speeds_mps) if leaves else 0.0
-    passes = at_first > conflict.hi_in_m
-    first_mps = float(speeds_mps[int(passes.argmax())]) if passes.any() else math.inf
-    return Choice(yield_mps, first_mps)
+    return Choice(
+        *_bounds(
+            ramps.distance(times[None, :]),
+            speeds_mps,
+            s_m,
+            conflict.lo_in_m,
+            conflict.lo_out_m,
+            conflict.hi_in_m,
+            margin_m,
+            leaves,
+        )
+    )
 
 
-def _greatest_with_room(room: FloatArray, speeds_mps: FloatArray) -> float:
-    """Where the falling room becomes 0, between two speeds; 0 where even standing is too near."""
-    short = room < 0.0
-    if not short.any():
-        return math.inf
-    k = int(short.argmax())
-    if k == 0:
+@inlined
+def _likely(clear_m: float, t_s: float, sigma_mps: float) -> float:
+    """How far away somebody is, who is reckoned at clear_m, with the spread added."""
+    return clear_m + min(sigma_mps * t_s, _MOST_SPREAD_M)
+
+
+@inlined
+def _is_0_s(from_s: float, from_m: float, to_s: float, to_m: float) -> float:
+    """When what changes evenly from from_m to to_m is 0."""
+    return from_s + from_m / (from_m - to_m) * (to_s - from_s)
+
+
+@inlined
+def _enters_s(clear_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_mps: float) -> float:
+    """When somebody likely comes within margin_m, between the samples; inf: never."""
+    before_m = clear_m[0] - margin_m
+    if before_m <= 0.0:
         return 0.0
-    share = room[k - 1] / (room[k - 1] - room[k])
-    return float(speeds_mps[k - 1] + share * (speeds_mps[k] - speeds_mps[k - 1]))
+    for j in range(1, len(times_s)):
+        here_m = _likely(clear_m[j] - margin_m, times_s[j], sigma_mps)
+        if here_m <= 0.0:
+            return _is_0_s(times_s[j - 1], before_m, times_s[j], here_m)
+        before_m = here_m
+    return math.inf
+
+
+@inlined
+def _leaves_s(
+    clear_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_mps: float, after_s: float
+) -> float:
+    """When somebody is certainly farther away than margin_m, after after_s."""
+    before_m = math.inf
+    for j in range(len(times_s)):
+        here_m, t_s = clear_m[j] - margin_m - sigma_mps * times_s[j], float(times_s[j])
+        if here_m > 0.0 and t_s > after_s:
+            return t_s if before_m > 0.0 else _is_0_s(times_s[j - 1], before_m, t_s, here_m)
+        before_m = here_m
+    return math.inf
+
+
+@inlined
+def _at(t_s: float, times_s: FloatArray, values: FloatArray) -> float:
+    """Between the samples; before and behind them as the first and last one."""
+    for j in range(1, len(times_s)):
+        if t_s <= times_s[j]:
+            share = max((t_s - times_s[j - 1]) / (times_s[j] - times_s[j - 1]), 0.0)
+            return float(values[j - 1] + share * (values[j] - values[j - 1]))
+    return float(values[-1])
+
+
+@compiled("float64[:, :], float64[:], float64[:], float64[:]")
+def _comes_in(
+    clear_m: FloatArray, times_s: FloatArray, sigma_mps: FloatArray, nearer_m: FloatArray
+) -> NDArray[np.bool_]:
+    """(N,) who is nearer than 0 at once, or likely to be at some time."""
+    found = np.zeros(len(clear_m), np.bool_)
+    for k in range(len(clear_m)):
+        found[k] = clear_m[k, 0] - nearer_m[k] <= 0.0
+        for j in range(len(times_s)):
+            if found[k]:
+                break
+            found[k] = _likely(clear_m[k, j] - nearer_m[k], times_s[j], sigma_mps[k]) <= 0.0
+    return found
+
+
+@compiled("float64[:, :], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], int64[:]")
+def _conflicts(
+    clear_m: FloatArray,
+    lo_m: FloatArray,
+    hi_m: FloatArray,
+    times_s: FloatArray,
+    sigma_mps: FloatArray,
+    margin_m: FloatArray,
+    rows: NDArray[np.intp],
+) -> FloatArray:
+    """(R, 5) in_s, out_s, lo_in_m, lo_out_m and hi_in_m of Conflict for each of rows (R,); in_s is inf where
+    there is none."""
+    found = np.empty((len(rows), 5))
+    for i in range(len(rows)):
+        k = rows[i]
+        in_s = _enters_s(clear_m[k], margin_m[k], times_s, sigma_mps[k])
+        out_s = _leaves_s(clear_m[k], margin_m[k], times_s, sigma_mps[k], in_s)
+        found[i, 0], found[i, 1] = in_s, out_s
+        found[i, 2] = _at(in_s, times_s, lo_m[k])
+        found[i, 3] = _at(out_s, times_s, lo_m[k])
+        found[i, 4] = _at(in_s, times_s, hi_m[k])
+    return found
+
+
+@compiled("float64[:, :], float64[:], float64, float64, float64, float64, float64, boolean")
+def _bounds(
+    distance_m: FloatArray,
+    speeds_mps: FloatArray,
+    s_m: float,
+    lo_in_m: float,
+    lo_out_m: float,
+    hi_in_m: float,
+    margin_m: float,
+    leaves: bool,
+) -> tuple[float, float]:
+    """The fields of Choice, for a conflict with somebody who leaves, or does not. distance_m (N, 3): how far
+    the robot at s_m comes until the other enters, until it should have passed, and until the other has left.
+    """
+    yield_mps = math.inf if leaves else 0.0
+    before_m = 0.0
+    for k in range(len(speeds_mps) if leaves else 0):
+        room_m = min(lo_in_m - (distance_m[k, 0] + s_m), lo_out_m - (distance_m[k, 2] + s_m)) - margin_m
+        if room_m < 0.0:
+            # Where the falling room becomes 0, between two speeds; 0 where even standing is too near.
+            yield_mps = 0.0
+            if k > 0:
+                share = before_m / (before_m - room_m)
+                yield_mps = speeds_mps[k - 1] + share * (speeds_mps[k] - speeds_mps[k - 1])
+            break
+        before_m = room_m
+    for k in range(len(speeds_mps)):
+        if distance_m[k, 1] + s_m > hi_in_m:
+            return yield_mps, speeds_mps[k]
+    return yield_mps, math.inf

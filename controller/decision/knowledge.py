@@ -21,15 +21,17 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.decision.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.decision.corridor import Corridor
+from controller.decision.going import SETTLED_S
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
-from controller.decision.memory import SETTLED_S, OutOfView
+from controller.decision.memory import OutOfView
 from controller.decision.sight import Sight
 from controller.decision.steadying import SteadyVelocities
 from controller.decision.surfaces import NO_SURFACES, surfaces_of
 from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
+from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import CameraCondition, CameraHealth, Scene
 
@@ -82,12 +84,13 @@ class Knowledge:
         self._poses = PoseHistory()
         # Of the K bodies that were seen, which became boxes (K,), and those, steadied.
         self._boxed = np.zeros(0, np.bool_)
+        self._unboxed: Bodies | None = None
         self._boxes = no_bodies(0)
         self._steady = SteadyVelocities()
         self._memory = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
         self.edge_tan, self.near_m, self.up_tan = 0.5, config.sight.near_m, math.inf
-        # Of the last scenes: when they were captured, and floor points (K, 2) where something was.
-        self._places: deque[tuple[int, FloatArray]] = deque()
+        # Of the last scenes: when they were captured, and floor points (K, 2) and (M, 2) where something was.
+        self._places: deque[tuple[int, FloatArray, FloatArray]] = deque()
         self._captured_ns: int | None = None
         self._scene_fault = ""
 
@@ -104,7 +107,7 @@ class Knowledge:
         """Take over what does not hang on the path: who is seen, who was seen and may come back, how fast
         they go, what hides them, and what the camera is worth."""
         self.bodies, self._boxes = before.bodies, before._boxes
-        self._seen, self._boxed = before._seen, before._boxed
+        self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
         self._steady, self._memory, self._places = before._steady, before._memory, before._places
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
         self.health, self.edge_tan = before.health, before.edge_tan
@@ -119,7 +122,9 @@ class Knowledge:
     @property
     def unboxed(self) -> Bodies:
         """Seen, but as surfaces only."""
-        return self._seen.select(~self._boxed)
+        if self._unboxed is None:
+            self._unboxed = self._seen.select(~self._boxed)
+        return self._unboxed
 
     def update(
         self, scene: Scene | None, pose: PlanarPose, on_path: OnPath, v_mps: float, now_ns: int
@@ -169,13 +174,9 @@ class Knowledge:
         except SceneError as error:
             return str(error)
         s_m = self.corridor.path.project(pose, on_path.s_m).s_m
-        boxed = np.maximum(seen.half_view_m, seen.half_across_m) <= _SPRAWLING_M
-        boxed &= seen.half_across_m > _STRIP_M
-        boxed |= seen.moving
+        boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving)
         if len(scene.free_space.bearing_tan):
-            self.edge_tan = (
-                float(np.abs(scene.free_space.bearing_tan).max()) + scene.free_space.half_width_tan
-            )
+            self.edge_tan = _outermost(scene.free_space.bearing_tan) + scene.free_space.half_width_tan
         self.near_m = self._memory.near_m = max(self._config.sight.near_m, scene.free_space.floor_from_m)
         self.up_tan = self._memory.up_tan = scene.free_space.up_tan
         self.surfaces = surfaces = surfaces_of(scene.free_space, pose, self._mount, self._noise)
@@ -184,11 +185,10 @@ class Knowledge:
         standing = v_mps <= STANDING_MPS
         remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, scene.free_space)
         self.bodies = boxes.joined(remembered)
-        self._boxes, self._seen, self._boxed = boxes, seen, boxed
-        half_width_m = float(self.corridor.half_width(np.array([s_m]))[0])
-        self.lens.look(scene.free_space, half_width_m, self._mount.left_m)
+        self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
+        self.lens.look(scene.free_space, self.corridor.half_width_at(s_m), self._mount.left_m)
         self.sight.look(scene.free_space, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
-        self._places.append((scene.captured_ns, np.concatenate((surfaces.points_m, seen.xy_m))))
+        self._places.append((scene.captured_ns, surfaces.points_m, seen.xy_m))
         self.health = scene.health
         self._captured_ns = scene.captured_ns
         return ""
@@ -198,10 +198,29 @@ class Knowledge:
         that of what is settled, its tracked_s stays."""
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
-        if not self._places or not (bodies.age_s < SETTLED_S).any():
+        if not self._places or not np.count_nonzero(bodies.age_s < SETTLED_S):
             return bodies
-        captured_ns, points = self._places[0]
+        captured_ns, *places = self._places[0]
         if captured_ns > bodies.captured_ns - _BEFORE_NS:
             return bodies
+        points = np.concatenate(places)
         there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
         return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, SETTLED_S), bodies.age_s))
+
+
+@compiled("float64[:], float64[:], boolean[:]")
+def _boxed(
+    half_view_m: FloatArray, half_across_m: FloatArray, moving: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(N,) who is reckoned with as a box: who moves, and what neither sprawls nor is a strip."""
+    boxed = np.empty(len(moving), np.bool_)
+    for k in range(len(moving)):
+        sprawls = max(half_view_m[k], half_across_m[k]) > _SPRAWLING_M
+        boxed[k] = moving[k] or (half_across_m[k] > _STRIP_M and not sprawls)
+    return boxed
+
+
+@compiled("float64[:]")
+def _outermost(bearing_tan: FloatArray) -> float:
+    """How far to either side the bands (B,) lie at most."""
+    return float(np.abs(bearing_tan).max())

@@ -12,7 +12,11 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
+from hal.types import FloatArray
 from vision.scene import FreeSpace
+
+BoolArray = NDArray[np.bool_]
 
 COVERED = "right before the camera nothing is seen, neither floor nor what stands on it"
 
@@ -38,25 +42,33 @@ class LensCover:
         blank = _blank(free)
         if len(self._shown) != len(blank):
             self._shown = np.zeros(len(blank), np.bool_)
-        self._shown |= ~blank
-        ahead = np.abs(free.bearing_tan * _LENS_M - left_m) <= half_width_m
-        hides = ahead & blank & self._shown
-        never = np.count_nonzero(ahead & ~self._shown)
-        wide = 2.0 * free.half_width_tan * _longest_run(hides) >= _HIDES_TAN
-        self._found.append(bool(wide or not len(blank) or 2 * never > np.count_nonzero(ahead)))
+        self._shown, hidden, ahead, never = _right_ahead(
+            free.bearing_tan, blank, self._shown, half_width_m, left_m
+        )
+        wide = 2.0 * free.half_width_tan * hidden >= _HIDES_TAN
+        self._found.append(wide or not len(blank) or 2 * never > ahead)
         self.covered = 2 * sum(self._found) > len(self._found)
 
 
-def _blank(free: FreeSpace) -> NDArray[np.bool_]:
+def _blank(free: FreeSpace) -> BoolArray:
     """(B,) bands without any data; what perception does not tell of them is as what the scan shows."""
     if free.blank is not None:
         return free.blank
     return ~(free.known_m > 0.0) & ~np.isfinite(free.nearest_m)
 
 
-def _longest_run(chosen: NDArray[np.bool_]) -> int:
-    """How many of chosen (B,) are set side by side."""
-    if not chosen.any():
-        return 0
-    turns = np.flatnonzero(np.diff(chosen.astype(np.int8), prepend=0, append=0))
-    return int((turns[1::2] - turns[::2]).max())
+@compiled("float64[:], boolean[:], boolean[:], float64, float64")
+def _right_ahead(
+    bearing_tan: FloatArray, blank: BoolArray, shown: BoolArray, half_width_m: float, left_m: float
+) -> tuple[BoolArray, int, int, int]:
+    """Which bands (B,) have ever shown something, those before this scene being shown; how many right ahead
+    side by side do not any more; how many are ahead, and how many of these never have."""
+    shown = shown | ~blank
+    longest, run, ahead, never = 0, 0, 0, 0
+    for b in range(len(bearing_tan)):
+        within = abs(bearing_tan[b] * _LENS_M - left_m) <= half_width_m
+        run = run + 1 if within and blank[b] and shown[b] else 0
+        longest = max(longest, run)
+        ahead += within
+        never += within and not shown[b]
+    return shown, longest, ahead, never

@@ -16,11 +16,15 @@ from config.decision import DecisionConfig
 from controller.decision.blind_corners import BlindCorners
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
-from controller.decision.surfaces import Surfaces, bands_at
+from controller.decision.surfaces import Surfaces, seen_of
 from controller.decision.view_edges import LEAST_TAN, above_from_m, consented_m
 from hal.clocks import NS_PER_S
+from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
 
 _CELL_M = 0.2
 _NEVER_NS = -(2**62)
@@ -76,9 +80,19 @@ class Sight:
             points, s_m, s_m + self._sight.range_m + 2.0
         )
         half_width = self._corridor.half_width(surface_s)
-        side = np.abs(surface_d) - surfaces.half_band_m
-        inside = (side <= half_width + self._lateral_m) & (surface_s > s_m)
         belongs = surfaces.of(explained_by)
+        in_corridor, nearest_s, stands = _beside_the_way(
+            bands,
+            surface_s,
+            surface_d,
+            half_width,
+            surfaces.half_band_m,
+            belongs,
+            explained_by.moving,
+            s_m,
+            self._lateral_m,
+            len(free.bearing_tan),
+        )
         self.corners.look(
             bands,
             forward,
@@ -87,16 +101,9 @@ class Sight:
             half_width,
             2.0 * free.half_width_tan,
             s_m + self._corridor.front_m,
-            # As matrices of yes and no: whether a point belongs to any who moves.
-            ~(belongs @ explained_by.moving),
+            stands,
         )
-        way = inside.nonzero()[0]
-        way_s = surface_s[way]
-        if len(way) and len(explained_by):
-            way_s = way_s[~belongs.take(way, 0).any(axis=1)]
-        self._note_surface(way_s, s_m, standing)
-        in_corridor = np.zeros(len(free.bearing_tan), np.bool_)
-        in_corridor[bands] = inside
+        self._note_surface(nearest_s, s_m, standing)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
     def _take_edges(self, free: FreeSpace) -> None:
@@ -112,9 +119,8 @@ class Sight:
             above_m = min(above_m, _MOST_ABOVE_M)
         self._lost_m = max(self._floor_from_m, above_m)
 
-    def _note_surface(self, surfaces_s: FloatArray, s_m: float, standing: bool) -> None:
-        nearest = float(surfaces_s.min()) if len(surfaces_s) else math.inf
-        self._nearest.append(nearest)
+    def _note_surface(self, nearest_s_m: float, s_m: float, standing: bool) -> None:
+        self._nearest.append(nearest_s_m)
         before = self.surface_s_m
         steady = sorted(self._nearest)[len(self._nearest) // 2]
         # What goes out of sight below or above the view because the robot drives on is still there; what goes
@@ -132,51 +138,97 @@ class Sight:
         pose: PlanarPose,
         s_m: float,
         captured_ns: int,
-        surface_in_corridor: NDArray[np.bool_],
+        in_corridor: BoolArray,
     ) -> None:
-        """Mark the cells whose width was seen; then find the first one ahead that is not known."""
+        """Mark the cells whose width was seen; then find the first one ahead that is not known. in_corridor
+        (B,): in which bands a surface is, which limits the speed itself: behind it nothing has to be seen."""
         first = int(self._cells.searchsorted(s_m))
         last = int(self._cells.searchsorted(s_m + self._sight.range_m + self._mount.forward_m))
         if last > first and len(free.bearing_tan):
-            seen = self._lanes_seen(free, pose, first, last, surface_in_corridor)
-            self._seen_ns[first:last][seen >= self._sight.known_share] = captured_ns
-        memory_ns = round(self._sight.memory_s * NS_PER_S)
-        fresh = self._seen_ns >= captured_ns - memory_ns
+            # What is too near to be measured was not seen, however far the scan goes beyond it. Nor was what
+            # is below the view, where that is more than could be consented to.
+            least_m = free.blind_m + 0.5 * _CELL_M if free.blind_m > 0.0 else 0.0
+            if self._floor_from_m > self._near_m:
+                least_m = max(least_m, self._floor_from_m)
+            lanes = self._lanes[:, first:last]
+            # The far edge of a cell, so that a cell is not known for the sake of its beginning.
+            seen = seen_of(free, pose, self._mount, lanes, 0.5 * _CELL_M, least_m, in_corridor)
+            self._seen_ns = _marked(self._seen_ns, first, seen, self._sight.known_share, captured_ns)
         # Too near to be seen again: what was once seen free stays so, others' bodies are watched elsewhere.
-        near = self._cells <= s_m + self._mount.forward_m + self._near_m + _CELL_M
-        known = fresh | (near & (self._seen_ns > _NEVER_NS)) | (self._cells <= self._consent_s_m)
-        unknown = (~known[first:]).nonzero()[0]
-        self.known_s_m = float(self._cells[first + unknown[0]]) - 0.5 * _CELL_M if len(unknown) else math.inf
+        near_s_m = s_m + self._mount.forward_m + self._near_m + _CELL_M
+        memory_ns = round(self._sight.memory_s * NS_PER_S)
+        unknown = _first_unknown(
+            self._seen_ns, self._cells, first, captured_ns - memory_ns, near_s_m, self._consent_s_m
+        )
+        known = unknown == len(self._cells)
+        self.known_s_m = math.inf if known else float(self._cells[unknown]) - 0.5 * _CELL_M
 
     def _lanes_of(self, cells: FloatArray) -> FloatArray:
-        """(2, L, C) points across the swept width at each cell: they depend on the path alone."""
-        x, y, heading = self._corridor.path.poses(cells)
-        half = self._corridor.half_width(cells)
-        lanes = np.linspace(-1.0, 1.0, _LANES)[:, None]
+        """(2, C, L) points across the swept width at each cell: they depend on the path alone."""
+        x, y, heading = (values[:, None] for values in self._corridor.path.poses(cells))
+        half = self._corridor.half_width(cells)[:, None]
+        lanes = np.linspace(-1.0, 1.0, _LANES)
         return np.stack((x - np.sin(heading) * half * lanes, y + np.cos(heading) * half * lanes))
 
-    def _lanes_seen(
-        self,
-        free: FreeSpace,
-        pose: PlanarPose,
-        first: int,
-        last: int,
-        surface_in_corridor: NDArray[np.bool_],
-    ) -> FloatArray:
-        """(C,) share of the width of the cells first..last that was seen as free, or lies behind a surface in
-        the corridor: that surface limits the speed itself."""
-        px, py = self._lanes[:, :, first:last]
-        forward, band = bands_at(free, pose, self._mount, px, py)
-        within = np.minimum(np.maximum(band, 0), len(free.bearing_tan) - 1)
-        # What is too near to be measured was not seen, however far the scan goes beyond it. Nor was what is
-        # below the view, where that is more than could be consented to.
-        least_m = free.blind_m + 0.5 * _CELL_M if free.blind_m > 0.0 else 0.0
-        if self._floor_from_m > self._near_m:
-            least_m = max(least_m, self._floor_from_m)
-        in_view = (forward > least_m) & (band == within)
-        # The far edge of a cell, so that a cell is not known for the sake of its beginning.
-        far_edge = forward + 0.5 * _CELL_M
-        surface_m = np.where(surface_in_corridor, free.nearest_m, np.inf)
-        seen = in_view & ((far_edge <= free.known_m[within]) | (far_edge >= surface_m[within]))
-        share: FloatArray = seen.sum(axis=0) / _LANES
-        return share
+
+@compiled(
+    "int64[:], float64[:], float64[:], float64[:], float64[:], boolean[:, :], boolean[:],"
+    "float64, float64, int64"
+)
+def _beside_the_way(
+    bands: NDArray[np.intp],
+    surface_s_m: FloatArray,
+    surface_d_m: FloatArray,
+    half_width_m: FloatArray,
+    half_band_m: FloatArray,
+    belongs: BoolArray,
+    moving: BoolArray,
+    s_m: float,
+    lateral_m: float,
+    bands_count: int,
+) -> tuple[BoolArray, float, BoolArray]:
+    """In which of the B bands a surface is in the corridor (B,); where the nearest of those is that no body
+    explains, inf: there is none; and which surfaces (P,) belong to nobody who moves. belongs (P, N): which
+    of them belong to which bodies; moving (N,): of these."""
+    in_corridor, stands = np.zeros(bands_count, np.bool_), np.ones(len(bands), np.bool_)
+    nearest_s = math.inf
+    for i in range(len(bands)):
+        explained = False
+        for k in range(len(moving)):
+            if belongs[i, k]:
+                explained = True
+                stands[i] &= not moving[k]
+        aside_m = abs(surface_d_m[i]) - half_band_m[i]
+        if aside_m <= half_width_m[i] + lateral_m and surface_s_m[i] > s_m:
+            in_corridor[bands[i]] = True
+            if not explained:
+                nearest_s = min(nearest_s, surface_s_m[i])
+    return in_corridor, nearest_s, stands
+
+
+@compiled("int64[:], int64, int64[:], float64, int64")
+def _marked(seen_ns: IntArray, first: int, lanes: IntArray, known_share: float, captured_ns: int) -> IntArray:
+    """The cells (C,); from first on, those are seen now of which enough lanes (K,) are."""
+    marked = seen_ns.copy()
+    for k in range(len(lanes)):
+        if lanes[k] / _LANES >= known_share:
+            marked[first + k] = captured_ns
+    return marked
+
+
+@compiled("int64[:], float64[:], int64, int64, float64, float64")
+def _first_unknown(
+    seen_ns: IntArray,
+    cells_m: FloatArray,
+    first: int,
+    since_ns: int,
+    near_s_m: float,
+    consent_s_m: float,
+) -> int:
+    """The first of the cells (C,) from first on that was not seen since since_ns; up to near_s_m, not ever;
+    up to consent_s_m none is unknown. C: none is."""
+    for c in range(first, len(cells_m)):
+        near, consent = cells_m[c] <= near_s_m, cells_m[c] <= consent_s_m
+        if not (seen_ns[c] >= since_ns or (near and seen_ns[c] > _NEVER_NS) or consent):
+            return c
+    return len(cells_m)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.decision import DecisionConfig
 from config.robot import Limits
@@ -16,6 +17,7 @@ from controller.decision.knowledge import Knowledge
 from controller.decision.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
 from controller.decision.outline import outline_of
 from controller.decision.view_edges import visible_from_m
+from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray
 
 _INSIDE_BODY_M = 0.05
@@ -86,27 +88,19 @@ class StandingLimits:
         self._of, self._corridor = known.bodies, known.corridor
         self._near, self._outlines_m = [], {}
         bodies = known.bodies
-        standing = ~bodies.moving
-        if not standing.any():
+        if np.count_nonzero(bodies.moving) == len(bodies):
             return
         sight, margins = self._config.sight, self._config.margins
         placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
         clear_m = self._clear(known, placed, s_m, before)
         near = clear_m <= margins.lateral_m + margins.graze_m
-        self._inside.difference_update(bodies.ids[standing & ~near].tolist())
-        rows = (standing & near).nonzero()[0]
-        if not len(rows):
-            return
-        stop_m = self._standing_off(known, bodies, placed)
-        columns = (
-            bodies.ids,
-            placed.lo_m[:, 0],
-            placed.hi_m[:, 0],
-            clear_m,
-            bodies.age_s,
-            stop_m,
-        )
-        self._near = [_Near(*of) for of in zip(*(one[rows].tolist() for one in columns), strict=True)]
+        self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
+        rows = (near & ~bodies.moving).nonzero()[0]
+        if len(rows):
+            stop_m = self._standing_off(known, bodies, placed)
+            near_ones = _columns(rows, placed.lo_m, placed.hi_m, clear_m, bodies.age_s, stop_m)
+            numbers = bodies.ids[rows].tolist()
+            self._near = [_Near(number, *of) for number, of in zip(numbers, near_ones.tolist(), strict=True)]
 
     def _clear(self, known: Knowledge, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
         """(N,) free floor beside the swept corridor; in bends, by the outlines when they were last seen
@@ -135,9 +129,9 @@ class StandingLimits:
         )
         front_m = known.corridor.front_m - self._mount.forward_m
         stop_m = self._config.margins.stop_m
-        hangs = bodies.bottom_m > self._mount.height_m
-        most_m = np.maximum(max(known.near_m, stop_m), np.where(hangs, _MOST_OFF_M, 0.0))
-        return np.clip(visible_m - front_m, stop_m, most_m)
+        return _standing_off(
+            visible_m, bodies.bottom_m, self._mount.height_m, front_m, stop_m, max(known.near_m, stop_m)
+        )
 
     def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:
         """A young obstacle may be confirmed first while an emergency stop fits even if it came at V_o."""
@@ -152,3 +146,33 @@ class StandingLimits:
             self._config.margins.stop_m,
         )
         return needed <= gap.distance_m
+
+
+@compiled("int64[:], float64[:, :], float64[:, :], float64[:], float64[:], float64[:]")
+def _columns(
+    rows: NDArray[np.intp],
+    lo_m: FloatArray,
+    hi_m: FloatArray,
+    clear_m: FloatArray,
+    age_s: FloatArray,
+    stop_m: FloatArray,
+) -> FloatArray:
+    """(R, 5) what _Near says of rows (R,), but for the number."""
+    near = np.empty((len(rows), 5))
+    for i in range(len(rows)):
+        k = rows[i]
+        near[i] = lo_m[k, 0], hi_m[k, 0], clear_m[k], age_s[k], stop_m[k]
+    return near
+
+
+@compiled("float64[:], float64[:], float64, float64, float64, float64")
+def _standing_off(
+    visible_m: FloatArray, bottom_m: FloatArray, height_m: float, front_m: float, stop_m: float, most_m: float
+) -> FloatArray:
+    """(N,) so far before a body, at least stop_m, that it is visible_m (N,) before the camera, but no farther
+    than most_m, or what hangs is stood off at most."""
+    off = np.empty(len(visible_m))
+    for k in range(len(visible_m)):
+        hangs = bottom_m[k] > height_m
+        off[k] = min(max(visible_m[k] - front_m, stop_m), max(most_m, _MOST_OFF_M if hangs else 0.0))
+    return off

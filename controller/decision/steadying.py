@@ -8,12 +8,15 @@ case.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.clocks import NS_PER_S
+from hal.compiled import compiled
 from hal.types import FloatArray
 
 # How people change their velocity: by so much in a second, growing with the root of time.
@@ -30,6 +33,7 @@ class SteadyVelocities:
 
     def __init__(self) -> None:
         self._ids = np.zeros(0, np.int64)
+        self._moved = np.zeros(0, np.bool_)
         self._velocity: FloatArray = np.zeros((0, 2))
         self._variance: FloatArray = np.zeros((0, 2))
         self._captured_ns = 0
@@ -38,23 +42,59 @@ class SteadyVelocities:
         """The bodies with averaged velocities; the rest of what was measured is their surprise_mps."""
         dt_s = max((seen.captured_ns - self._captured_ns) / NS_PER_S, 1e-3)
         self._captured_ns = seen.captured_ns
-        if not seen.moving.any():
+        moving = seen.moving
+        if not np.count_nonzero(moving):
             self._ids = self._ids[:0]
             return seen
-        measured = seen.velocity_mps
-        spread = np.diagonal(seen.covariance, axis1=1, axis2=2)
-        velocity, variance = measured.copy(), spread.copy()
-        now, before = np.nonzero((seen.ids[:, None] == self._ids) & seen.moving[:, None])
-        if len(now):
-            expected = self._variance[before] + _CHANGES_MPS**2 * dt_s
-            gain = expected / (expected + spread[now] * max(_ALIKE_S / dt_s, 1.0))
-            velocity[now] = self._velocity[before] + gain * (measured[now] - self._velocity[before])
-            variance[now] = (1.0 - gain) * expected
-        moving = seen.moving
-        self._ids, self._velocity, self._variance = seen.ids[moving], velocity[moving], variance[moving]
-        if not len(now):
-            return seen
-        differs = measured - velocity
-        beyond_noise = np.maximum(np.abs(differs) - _NOISE_SIGMAS * np.sqrt(spread), 0.0)
-        surprise = _GOES_ON * np.sign(differs) * beyond_noise
+        velocity, variance, surprise = _averaged(
+            seen.ids,
+            moving,
+            seen.velocity_mps,
+            seen.covariance,
+            self._ids,
+            self._moved,
+            self._velocity,
+            self._variance,
+            dt_s,
+        )
+        self._ids, self._moved, self._velocity, self._variance = seen.ids, moving, velocity, variance
         return replace(seen, velocity_mps=velocity, surprise_mps=surprise)
+
+
+@compiled(
+    "int64[:], boolean[:], float64[:, :], float64[:, :, :],"
+    "int64[:], boolean[:], float64[:, :], float64[:, :], float64"
+)
+def _averaged(
+    ids: NDArray[np.int64],
+    moving: NDArray[np.bool_],
+    measured_mps: FloatArray,
+    covariance: FloatArray,
+    before_ids: NDArray[np.int64],
+    moved: NDArray[np.bool_],
+    before_mps: FloatArray,
+    before_variance: FloatArray,
+    dt_s: float,
+) -> FloatArray:
+    """(3, N, 2) velocity, its variance and the surprise of bodies of which M moved before, too."""
+    result = np.zeros((3, *measured_mps.shape))
+    velocity, variance, surprise = result
+    alike = max(_ALIKE_S / dt_s, 1.0)
+    for k in range(len(ids)):
+        before = -1
+        for m in range(len(before_ids)):
+            if moving[k] and moved[m] and ids[k] == before_ids[m]:
+                before = m
+        for axis in range(2):
+            measured, spread = measured_mps[k, axis], covariance[k, axis, axis]
+            velocity[k, axis], variance[k, axis] = measured, spread
+            if before < 0:
+                continue
+            expected = before_variance[before, axis] + _CHANGES_MPS**2 * dt_s
+            gain = expected / (expected + spread * alike)
+            average = before_mps[before, axis] + gain * (measured - before_mps[before, axis])
+            velocity[k, axis], variance[k, axis] = average, (1.0 - gain) * expected
+            differs = measured - average
+            beyond_noise = max(abs(differs) - _NOISE_SIGMAS * math.sqrt(spread), 0.0)
+            surprise[k, axis] = _GOES_ON * math.copysign(beyond_noise, differs)
+    return result

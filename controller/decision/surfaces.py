@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from controller.decision.bodies import Bodies
+from hal.compiled import compiled, inlined
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
@@ -34,7 +35,7 @@ class Surfaces:
 
     def of(self, bodies: Bodies) -> NDArray[np.bool_]:
         """(P, N) which points belong to which bodies: along the view, depth may be off."""
-        reach_m = AROUND_M + _DEPTH_SIGMAS * self.noise.quadratic_per_m * self.forward_m**2
+        reach_m = _reach_m(self.forward_m, _DEPTH_SIGMAS * self.noise.quadratic_per_m)
         return bodies.covers(self.points_m, reach_m, AROUND_M)
 
 
@@ -45,14 +46,14 @@ def surfaces_of(
     free: FreeSpace, pose: PlanarPose, mount: CameraMount, noise: DepthNoise = TYPICAL_DEPTH_NOISE
 ) -> Surfaces:
     """What was seen of free by a camera that a body at pose carried. noise: of its depth."""
-    shows = np.isfinite(free.nearest_m)
-    bands = (shows & np.isfinite(free.bearing_tan)).nonzero()[0]
-    forward = free.nearest_m[bands]
-    ahead = forward + mount.forward_m
-    left = mount.left_m - forward * free.bearing_tan[bands]
-    seen_m = np.where(shows, free.nearest_m, np.fmax(free.known_m, 0.0))
-    points = floor_points(pose, ahead, left)
-    return Surfaces(seen_m, bands, forward, forward * free.half_width_tan, points, noise)
+    seen_m, bands, forward, half_band_m, points = _surfaces(
+        free.bearing_tan,
+        free.half_width_tan,
+        free.nearest_m,
+        free.known_m,
+        *_eye(pose, mount),
+    )
+    return Surfaces(seen_m, bands, forward, half_band_m, points, noise)
 
 
 def floor_points(pose: PlanarPose, ahead_m: FloatArray, left_m: FloatArray) -> FloatArray:
@@ -69,10 +70,166 @@ def bands_at(
 ) -> tuple[FloatArray, NDArray[np.intp]]:
     """(...) each: how far ahead of the camera floor points x_m (...), y_m (...) lie, in metres, and in which
     band of free. A number that none of them has is beside the view; behind the camera it means nothing."""
+    forward, band = _bands_at(
+        x_m.reshape(-1),
+        y_m.reshape(-1),
+        free.bearing_tan[0] - free.half_width_tan,
+        2.0 * free.half_width_tan,
+        *_eye(pose, mount),
+    )
+    return forward.reshape(x_m.shape), band.reshape(x_m.shape)
+
+
+def seen_of(
+    free: FreeSpace,
+    pose: PlanarPose,
+    mount: CameraMount,
+    points_m: FloatArray,
+    before_m: float,
+    least_m: float,
+    hides: NDArray[np.bool_],
+) -> NDArray[np.int64]:
+    """(R,) how many of R rows of floor points (2, R, K) were seen as free, up to before_m behind them, or lie
+    behind a surface in a band that hides (B,) what is behind it. Nearer than least_m none is seen."""
+    return _seen_of(
+        points_m,
+        before_m,
+        hides,
+        free.nearest_m,
+        free.known_m,
+        least_m,
+        free.bearing_tan[0] - free.half_width_tan,
+        2.0 * free.half_width_tan,
+        *_eye(pose, mount),
+    )
+
+
+def _eye(pose: PlanarPose, mount: CameraMount) -> tuple[float, float, float, float]:
+    """x_m and y_m of the camera on the floor, and the cosine and sine of where it looks."""
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    dx, dy = x_m - pose.x_m, y_m - pose.y_m
-    forward: FloatArray = dx * cos + dy * sin - mount.forward_m
-    right = mount.left_m + dx * sin - dy * cos
-    left_edge = free.bearing_tan[0] - free.half_width_tan
-    band = np.floor((right / np.maximum(forward, 1e-3) - left_edge) / (2.0 * free.half_width_tan))
-    return forward, band.astype(np.intp)
+    return (
+        pose.x_m + mount.forward_m * cos - mount.left_m * sin,
+        pose.y_m + mount.forward_m * sin + mount.left_m * cos,
+        cos,
+        sin,
+    )
+
+
+@compiled("float64[:], float64")
+def _reach_m(forward_m: FloatArray, off_per_m: float) -> FloatArray:
+    """(P,) so far along the view a point may be off a body that it belongs to."""
+    return AROUND_M + off_per_m * forward_m * forward_m
+
+
+@compiled("float64[:], float64, float64[:], float64[:], float64, float64, float64, float64")
+def _surfaces(
+    bearing_tan: FloatArray,
+    half_width_tan: float,
+    nearest_m: FloatArray,
+    known_m: FloatArray,
+    eye_x: float,
+    eye_y: float,
+    cos: float,
+    sin: float,
+) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
+    """The fields of Surfaces, for a camera at eye_x, eye_y that looks along cos, sin."""
+    count, found = len(bearing_tan), 0
+    seen, bands, forward = np.empty(count), np.empty(count, np.intp), np.empty(count)
+    half_band, points = np.empty(count), np.empty((count, 2))
+    for b in range(count):
+        z = nearest_m[b]
+        if not math.isfinite(z):
+            seen[b] = known_m[b] if known_m[b] > 0.0 else 0.0
+            continue
+        seen[b] = z
+        if not math.isfinite(bearing_tan[b]):
+            continue
+        right = z * bearing_tan[b]
+        points[found, 0], points[found, 1] = eye_x + z * cos + right * sin, eye_y + z * sin - right * cos
+        bands[found], forward[found], half_band[found] = b, z, z * half_width_tan
+        found += 1
+    return seen, bands[:found], forward[:found], half_band[:found], points[:found]
+
+
+@inlined
+def _band_at(
+    x_m: float,
+    y_m: float,
+    first_tan: float,
+    width_tan: float,
+    eye_x: float,
+    eye_y: float,
+    cos: float,
+    sin: float,
+) -> tuple[float, int]:
+    """bands_at() for one point; the first band begins at first_tan, each is width_tan wide."""
+    dx, dy = x_m - eye_x, y_m - eye_y
+    forward, right = dx * cos + dy * sin, dx * sin - dy * cos
+    band = (right / max(forward, 1e-3) - first_tan) / width_tan
+    return forward, math.floor(band) if math.isfinite(band) else -1
+
+
+@compiled("float64[:], float64[:], float64, float64, float64, float64, float64, float64")
+def _bands_at(
+    x_m: FloatArray,
+    y_m: FloatArray,
+    first_tan: float,
+    width_tan: float,
+    eye_x: float,
+    eye_y: float,
+    cos: float,
+    sin: float,
+) -> tuple[FloatArray, NDArray[np.intp]]:
+    """bands_at() for points (P,)."""
+    forward, band = np.empty(len(x_m)), np.empty(len(x_m), np.intp)
+    for k in range(len(x_m)):
+        forward[k], band[k] = _band_at(
+            x_m[k],
+            y_m[k],
+            first_tan,
+            width_tan,
+            eye_x,
+            eye_y,
+            cos,
+            sin,
+        )
+    return forward, band
+
+
+@compiled(
+    "float64[:, :, :], float64, boolean[:], float64[:], float64[:], float64,"
+    "float64, float64, float64, float64, float64, float64"
+)
+def _seen_of(
+    points_m: FloatArray,
+    before_m: float,
+    hides: NDArray[np.bool_],
+    nearest_m: FloatArray,
+    known_m: FloatArray,
+    least_m: float,
+    first_tan: float,
+    width_tan: float,
+    eye_x: float,
+    eye_y: float,
+    cos: float,
+    sin: float,
+) -> NDArray[np.int64]:
+    """seen_of() of the same camera."""
+    seen = np.zeros(points_m.shape[1], np.int64)
+    for row in range(points_m.shape[1]):
+        for k in range(points_m.shape[2]):
+            forward, b = _band_at(
+                points_m[0, row, k],
+                points_m[1, row, k],
+                first_tan,
+                width_tan,
+                eye_x,
+                eye_y,
+                cos,
+                sin,
+            )
+            if not (0 <= b < len(known_m) and forward > least_m):
+                continue
+            reach_m = forward + before_m
+            seen[row] += reach_m <= known_m[b] or (hides[b] and reach_m >= nearest_m[b])
+    return seen

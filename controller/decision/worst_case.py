@@ -22,6 +22,7 @@ from controller.decision.corridor import Course, Placed
 from controller.decision.decision import Reason
 from controller.decision.limits import ALONGSIDE_M, LEAVES_ASLANT, UNSEEN_SIGMAS, Limit, Motion, allowed
 from controller.profile import SpeedRamps, comfortable
+from hal.compiled import compiled
 from hal.types import FloatArray
 
 # Fine where stops from low speeds end, coarser for the long ones.
@@ -142,37 +143,36 @@ class WorstCase:
 
     def _reach(self, bodies: Bodies, placed: Placed, course: Course, since_s: float) -> Reach:
         prediction = self._config.prediction
-        sigmas = prediction.sigmas
-        # Who goes the robot's way does not see it coming and is beside it for long; who comes towards it sees
-        # it after a while and keeps its lane; all others may have become faster or turned since they left the
-        # view.
-        aslant_mps = np.maximum(np.abs(course.left_mps), _GOES_MPS)
-        outwards = course.left_mps * placed.d_m[:, 0] > 0.0
-        unaware = course.along_mps > np.where(outwards, LEAVES_ASLANT, 1.0) * aslant_mps
-        comes = course.along_mps < -aslant_mps
-        leaves = outwards & ~unaware & (placed.clear_m[:, 0] > 0.0)
-        sideways = np.where(unaware, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
-        sideways = np.where(comes & (bodies.age_s >= _SEES_S), prediction.oncoming_mps2, sideways)
-        # Turning in, one also becomes slower along the path.
-        beside = placed.clear_m[:, 0] > 0.0
-        along = np.where(unaware & beside, prediction.cut_in_mps2, prediction.manoeuvre_mps2)
-        unsure_s = np.where(leaves, 0.0, UNSEEN_SIGMAS * bodies.unseen_s)
+        since, spread_along, spread_left, speed, along, sideways, unsure_along, unsure_left = _may_do(
+            course.along_mps,
+            course.left_mps,
+            course.sigma_along_mps,
+            course.sigma_left_mps,
+            course.surprise_along_mps,
+            course.surprise_left_mps,
+            placed.d_m[:, 0],
+            placed.clear_m[:, 0],
+            bodies.moving,
+            bodies.age_s,
+            bodies.unseen_s,
+            since_s,
+            prediction.sigmas,
+            prediction.cut_in_mps2,
+            prediction.manoeuvre_mps2,
+            prediction.oncoming_mps2,
+            LEAVES_ASLANT,
+            UNSEEN_SIGMAS,
+        )
         return reach(
             placed,
             self.times_s,
-            since_s + np.where(comes | leaves, 0.0, bodies.unseen_s),
-            spread_mps=(
-                np.maximum(sigmas * course.sigma_along_mps, np.abs(course.surprise_along_mps)),
-                np.maximum(sigmas * course.sigma_left_mps, np.abs(course.surprise_left_mps)),
-            ),
-            speed_mps=np.hypot(course.along_mps, course.left_mps),
-            manoeuvre_mps2=(
-                np.where(bodies.moving, along, 0.0),
-                np.where(bodies.moving, sideways, 0.0),
-            ),
+            since,
+            spread_mps=(spread_along, spread_left),
+            speed_mps=speed,
+            manoeuvre_mps2=(along, sideways),
             most_mps=self._limits.max_obstacle_speed_mps,
             margin_m=self._config.margins.least_m,
-            unsure_m=(unsure_s * course.sigma_along_mps, unsure_s * course.sigma_left_mps),
+            unsure_m=(unsure_along, unsure_left),
         )
 
     def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:
@@ -186,3 +186,56 @@ class WorstCase:
             latency_s=latency_s,
         )
         return stops(ramps, self.times_s)
+
+
+@compiled(
+    "float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64[:],"
+    "boolean[:], float64[:], float64[:], float64, float64, float64, float64, float64, float64, float64"
+)
+def _may_do(
+    along_mps: FloatArray,
+    left_mps: FloatArray,
+    sigma_along_mps: FloatArray,
+    sigma_left_mps: FloatArray,
+    surprise_along_mps: FloatArray,
+    surprise_left_mps: FloatArray,
+    d_m: FloatArray,
+    clear_m: FloatArray,
+    moving: NDArray[np.bool_],
+    age_s: FloatArray,
+    unseen_s: FloatArray,
+    since_s: float,
+    sigmas: float,
+    cut_in_mps2: float,
+    manoeuvre_mps2: float,
+    oncoming_mps2: float,
+    leaves_aslant: float,
+    unseen_sigmas: float,
+) -> FloatArray:
+    """(8, N) what reach() asks about bodies (N,): since_s, spread_mps along and to the left, speed_mps,
+    manoeuvre_mps2 along and sideways, unsure_m along and to the left."""
+    answers = np.zeros((8, len(along_mps)))
+    since, spread_along, spread_left, speed, along, sideways, unsure_along, unsure_left = answers
+    for k in range(len(along_mps)):
+        # Who goes the robot's way does not see it coming and is beside it for long; who comes towards it sees
+        # it after a while and keeps its lane; all others may have become faster or turned since they left the
+        # view.
+        aslant_mps = max(abs(left_mps[k]), _GOES_MPS)
+        outwards, beside = left_mps[k] * d_m[k] > 0.0, clear_m[k] > 0.0
+        unaware = along_mps[k] > (leaves_aslant if outwards else 1.0) * aslant_mps
+        comes = along_mps[k] < -aslant_mps
+        leaves = outwards and beside and not unaware
+        if moving[k]:
+            # Turning in, one also becomes slower along the path.
+            along[k] = cut_in_mps2 if unaware and beside else manoeuvre_mps2
+            sideways[k] = cut_in_mps2 if unaware else manoeuvre_mps2
+            if comes and age_s[k] >= _SEES_S:
+                sideways[k] = oncoming_mps2
+        since[k] = since_s + (0.0 if comes or leaves else unseen_s[k])
+        speed[k] = math.hypot(along_mps[k], left_mps[k])
+        spread_along[k] = max(sigmas * sigma_along_mps[k], abs(surprise_along_mps[k]))
+        spread_left[k] = max(sigmas * sigma_left_mps[k], abs(surprise_left_mps[k]))
+        if not leaves:
+            unsure_along[k] = unseen_sigmas * unseen_s[k] * sigma_along_mps[k]
+            unsure_left[k] = unseen_sigmas * unseen_s[k] * sigma_left_mps[k]
+    return answers

@@ -1,7 +1,7 @@
 """The planned path: where the robot is along it, how it bends, and how fast it may be driven.
 
-Every measure is closed-form on a piece of constant curvature (controller/path/path_pieces.py), and points are
-projected in arrays over pieces; where all that is looked at is straight, without a search.
+Every measure is closed-form on a piece of constant curvature (controller/path/path_pieces.py); where along it
+points are, controller/path/projection.py tells.
 
 Path coordinates: s_m along the path from its start, d_m to the left of it.
 """
@@ -9,7 +9,6 @@ Path coordinates: s_m along the path from its start, d_m to the left of it.
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,18 +17,15 @@ from numpy.typing import NDArray
 from config.loader import ConfigError
 from config.path import ArcSpec, PathSpec
 from config.robot import Robot
-from controller.path.path_pieces import EXTENSION_M, pieces_of, sinc
+from controller.path.path_pieces import pieces_of, sinc
 from controller.path.path_speeds import YAW_RATE_FOR_THE_BEND, section_speeds
+from controller.path.projection import Projection
 from hal.geometry import wrap_angle_rad
 from hal.types import FloatArray, PlanarPose
 
 IntArray = NDArray[np.intp]
 
-_SAMPLE_M = 0.25
-_ROUNDS = 2
-_STRAIGHT_1PM = 1e-7
-# Near the centre of a bend "along the path" loses its sense; such a point is beside it, far inside.
-_INNERMOST = 0.05
+_NOW = np.zeros(1)
 _LOOK_BACK_M = 0.25
 _LOOK_AHEAD_M = 2.0
 _SLOWEST_BEND_MPS = 0.1
@@ -59,24 +55,16 @@ class Path:
         pieces = pieces_of(spec)
         self.length_m = pieces[-1].s_m
         _check_bends(spec, robot)
-        self._pieces = pieces
-        self._starts = [piece.s_m for piece in pieces]
         self._s = np.array([piece.s_m for piece in pieces])
         self._x = np.array([piece.x_m for piece in pieces])
         self._y = np.array([piece.y_m for piece in pieces])
         self._heading = np.array([piece.heading_rad for piece in pieces])
         self._curvature = np.array([piece.curvature_1pm for piece in pieces])
-        samples = np.arange(-EXTENSION_M, self.length_m + EXTENSION_M + _SAMPLE_M, _SAMPLE_M)
-        self._sample_x, self._sample_y, _ = self.poses(samples)
+        self._projection = Projection(pieces, self.poses)
         self._check_doubling_back(robot.body.width_m)
         speed_s, speed = section_speeds(spec, robot, self._curvature[1:-1], self._s[1:-1])
         self._speed_step_m = float(speed_s[1] - speed_s[0])
         self._speed: list[float] = speed.tolist()
-        # Straight on from a piece without a bend to the next one: how far that goes.
-        self._straight_to = list(range(len(pieces)))
-        for k in range(len(pieces) - 2, -1, -1):
-            if pieces[k].curvature_1pm == 0.0 == pieces[k + 1].curvature_1pm:
-                self._straight_to[k] = self._straight_to[k + 1]
 
     @property
     def start(self) -> PlanarPose:
@@ -114,93 +102,29 @@ class Path:
     def project(self, pose: PlanarPose, hint_s_m: float) -> OnPath:
         """The pose in path coordinates, searched near hint_s_m only, so that it cannot jump to another turn
         of the path: at most 0.25 m behind the hint and 2 m ahead of it."""
-        low, high = hint_s_m - _LOOK_BACK_M, hint_s_m + _LOOK_AHEAD_M
-        first = max(math.ceil((low + EXTENSION_M) / _SAMPLE_M), 0)
-        last = max(int((high + EXTENSION_M) / _SAMPLE_M), first) + 1
-        dx, dy = pose.x_m - self._sample_x[first:last], pose.y_m - self._sample_y[first:last]
-        s = (first + int((dx * dx + dy * dy).argmin())) * _SAMPLE_M - EXTENSION_M
-        ahead, left, turned, bend = self._one_seen_from(s, pose)
-        for _ in range(_ROUNDS):
-            if abs(bend) < _STRAIGHT_1PM:
-                step = ahead
-            else:
-                step = math.atan2(bend * ahead, max(1.0 - bend * left, _INNERMOST)) / bend
-            before, s = s, min(max(s + step, low), high)
-            if s == before:
-                break
-            ahead, left, turned, bend = self._one_seen_from(s, pose)
-        return OnPath(s, math.copysign(math.hypot(ahead, left), left), turned)
-
-    def _one_seen_from(self, s_m: float, pose: PlanarPose) -> tuple[float, float, float, float]:
-        """The pose ahead, to the left of and turned against the path at s_m, and the curvature there. The
-        same as _seen_from in plain floats, ten times as fast for a single one."""
-        piece = self._pieces[max(bisect_right(self._starts, s_m) - 1, 0)]
-        along = s_m - piece.s_m
-        bend = piece.curvature_1pm
-        half_turn = 0.5 * bend * along
-        chord = along * (math.sin(half_turn) / half_turn if abs(half_turn) > _STRAIGHT_1PM else 1.0)
-        middle = piece.heading_rad + half_turn
-        dx = pose.x_m - piece.x_m - chord * math.cos(middle)
-        dy = pose.y_m - piece.y_m - chord * math.sin(middle)
-        heading = middle + half_turn
-        cos, sin = math.cos(heading), math.sin(heading)
-        turned = wrap_angle_rad(pose.heading_rad - heading)
-        return dx * cos + dy * sin, dy * cos - dx * sin, turned, bend
+        s, d, heading = self._projection.project(
+            pose.x_m, pose.y_m, hint_s_m - _LOOK_BACK_M, hint_s_m + _LOOK_AHEAD_M
+        )
+        return OnPath(s, d, wrap_angle_rad(pose.heading_rad - heading))
 
     def project_points(
         self, points_m: FloatArray, from_s_m: float = -math.inf, to_s_m: float = math.inf
     ) -> tuple[FloatArray, FloatArray]:
         """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m."""
-        return self.locate(points_m[:, 0], points_m[:, 1], from_s_m, to_s_m)[:2]
+        s, d, _ = self._projection.locate(points_m, np.zeros(points_m.shape), _NOW, from_s_m, to_s_m)
+        return s[:, 0], d[:, 0]
 
     def locate(
-        self, x_m: FloatArray, y_m: FloatArray, from_s_m: float, to_s_m: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The same of points x_m, y_m, with the path's heading_rad there (not wrapped), each of one shape.
-
-        From the nearest of samples 0.25 m apart, on the circle that the path is there: exact but for the
-        steps of a blend, and those take a second round.
-        """
-        low = min(max(from_s_m, -EXTENSION_M), self.length_m + EXTENSION_M - _SAMPLE_M)
-        high = min(max(to_s_m, low + _SAMPLE_M), self.length_m + EXTENSION_M)
-        piece = max(bisect_right(self._starts, low) - 1, 0)
-        if self._curvature[piece] == 0.0 and self._straight_to[piece] >= bisect_right(self._starts, high) - 1:
-            return self._locate_on_line(piece, x_m, y_m, low, high)
-        first = math.ceil((low + EXTENSION_M) / _SAMPLE_M)
-        last = max(int((high + EXTENSION_M) / _SAMPLE_M), first) + 1
-        dx = x_m[..., None] - self._sample_x[first:last]
-        dy = y_m[..., None] - self._sample_y[first:last]
-        s = (first + (dx * dx + dy * dy).argmin(axis=-1)) * _SAMPLE_M - EXTENSION_M
-        for _ in range(_ROUNDS):
-            ahead, left, bend, _ = self._seen_from(s, x_m, y_m)
-            inward = np.maximum(1.0 - bend * left, _INNERMOST)
-            curved = np.where(np.abs(bend) < _STRAIGHT_1PM, _STRAIGHT_1PM, bend)
-            s = np.minimum(np.maximum(s + np.arctan2(curved * ahead, inward) / curved, low), high)
-        ahead, left, _, heading = self._seen_from(s, x_m, y_m)
-        return s, np.copysign(np.hypot(ahead, left), left), heading
-
-    def _locate_on_line(
-        self, number: int, x_m: FloatArray, y_m: FloatArray, low: float, high: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        piece = self._pieces[number]
-        cos, sin = math.cos(piece.heading_rad), math.sin(piece.heading_rad)
-        dx, dy = x_m - piece.x_m, y_m - piece.y_m
-        along = dx * cos + dy * sin + piece.s_m
-        left = dy * cos - dx * sin
-        s = np.minimum(np.maximum(along, low), high)
-        headings = np.empty(s.shape)
-        headings.fill(piece.heading_rad)
-        return s, np.copysign(np.hypot(along - s, left), left), headings
-
-    def _seen_from(
-        self, s_m: FloatArray, x_m: FloatArray, y_m: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Each point ahead and to the left of the path's pose at its s_m; the curvature and heading there."""
-        k = self._piece_at(s_m)
-        x, y, heading = self._poses_on(k, s_m)
-        cos, sin = np.cos(heading), np.sin(heading)
-        dx, dy = x_m - x, y_m - y
-        return dx * cos + dy * sin, dy * cos - dx * sin, self._curvature[k], heading
+        self,
+        points_m: FloatArray,
+        velocity_mps: FloatArray,
+        times_s: FloatArray,
+        from_s_m: float,
+        to_s_m: float,
+    ) -> FloatArray:
+        """(3, N, K) the same, with the path's heading_rad there (not wrapped), of what goes on from points_m
+        with velocity_mps (N, 2), times_s (K,) from now."""
+        return self._projection.locate(points_m, velocity_mps, times_s, from_s_m, to_s_m)
 
     def speed_limit(self, s_m: float) -> float:
         """The greatest speed at s_m so that every section and bend ahead is entered slowly enough, m/s."""

@@ -27,6 +27,16 @@ def test_on_a_bend_the_outer_front_corner_sweeps_further() -> None:
     assert corridor.half_width(np.array([-0.3]))[0] == pytest.approx(expected)
 
 
+def test_before_and_behind_the_path_it_is_as_wide_as_at_its_ends() -> None:
+    corridor = Corridor(arc_path(3.0, 90.0), BODY)
+    places = [-50.0, -0.5, -0.44, 1.23, 4.0, 500.0]
+    widths = corridor.half_width(np.array(places))
+    assert (widths[0], widths[-1]) == (widths[1], 0.4)
+    assert [corridor.half_width_at(s_m) for s_m in places] == widths.tolist()
+    # Where nobody knows the place, it has some width.
+    assert corridor.half_width_at(math.nan) == widths[0]
+
+
 def test_a_standing_body_blocks_the_robot_from_front_to_tail() -> None:
     corridor = Corridor(line_path(), BODY)
     placed = place(box(8.0, 0.9), corridor, np.array([0.0, 4.0]), 0.0, 12.0)

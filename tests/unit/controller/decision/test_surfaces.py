@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.perception import DepthNoise
-from controller.decision.surfaces import bands_at, surfaces_of
+from controller.decision.surfaces import bands_at, seen_of, surfaces_of
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
 from vision.scene import FreeSpace
@@ -61,3 +61,32 @@ def test_a_surface_stands_in_its_own_band_wherever_the_robot_does() -> None:
     _, to_the_left = bands_at(free, pose, mount, *(surfaces.points_m - right).T)
     assert (to_the_right >= 4).all()
     assert (to_the_left < 0).all()
+
+
+def rows(*at: tuple[float, float]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """(2, R, 1) points so far ahead and to the right of the camera."""
+    ahead_m, right_m = np.array(at).T
+    return np.stack((0.5 + ahead_m, -right_m))[:, :, None]
+
+
+def test_floor_was_seen_up_to_the_free_end_of_its_band() -> None:
+    """Bands 0.01 wide around bearings of 0, 0.01 and 0.02; the last one is not known at all."""
+    free = ahead([math.inf, math.inf, math.inf], [4.0, 2.0, math.nan])
+    points = rows((3.9, 0.0), (3.95, 0.0), (3.9, 0.039), (1.9, 0.019), (1.9, 0.038), (1.9, 0.1), (1.9, -0.1))
+    seen = seen_of(free, HERE, MOUNT, points, 0.1, 0.0, np.zeros(3, np.bool_))
+    assert seen.tolist() == [1, 0, 0, 1, 0, 0, 0]
+    # What is too near was not seen, nor what is behind the camera.
+    near = rows((1.0, 0.0), (1.01, 0.0), (-1.0, 0.0))
+    assert seen_of(free, HERE, MOUNT, near, 0.1, 1.0, np.zeros(3, np.bool_)).tolist() == [0, 1, 0]
+
+
+def test_behind_a_surface_that_limits_the_speed_itself_floor_is_as_good_as_seen() -> None:
+    free = ahead([3.0, 3.0], [2.9, 2.9])
+    points = rows((2.85, 0.0), (2.9, 0.0), (6.0, 0.0), (6.0, 0.06))
+    assert seen_of(free, HERE, MOUNT, points, 0.1, 0.0, np.array([True, False])).tolist() == [0, 1, 1, 0]
+
+
+def test_a_row_counts_each_of_its_points() -> None:
+    lanes = np.stack((np.full((1, 3), 2.5), np.array([[0.0, -0.02, -5.0]])))
+    free = ahead([math.inf, math.inf], [4.0, 4.0])
+    assert seen_of(free, HERE, MOUNT, lanes, 0.1, 0.0, np.zeros(2, np.bool_)).tolist() == [2]

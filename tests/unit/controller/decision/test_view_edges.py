@@ -18,7 +18,7 @@ from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
 from controller.campaign.task import yardstick
 from controller.decision.knowledge import Knowledge
-from controller.decision.view_edges import lowest_seen_m, visible_from_m
+from controller.decision.view_edges import beyond_edges, visible_from_m
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from sim.families import generate
@@ -130,11 +130,10 @@ def test_what_hangs_is_stood_off_so_far_that_its_going_is_seen(up_tan: float, of
 
 
 def test_no_view_ends_where_the_robot_is() -> None:
-    """A near_m of 0: all that is not high enough to be in view is below it, and nothing divides by zero."""
-    with np.errstate(all="raise"):
-        found = lowest_seen_m(np.array([0.0, 1.0]), 0.6, 0.0)
-    assert found[0] == 0.6
-    assert found[1] < 0.0
+    """A near_m of 0: what begins behind the camera is below its view, and nothing divides by zero."""
+    pallets = box(0.0, 0.0, top_m=0.15).joined(box(1.0, 0.0, top_m=0.15))
+    found = beyond_edges(pallets, np.array([-0.01, 1.0]), 0.6, 0.0, math.inf)
+    assert found.tolist() == [True, False]
 
 
 def test_where_a_body_can_be_seen_from() -> None:

@@ -96,6 +96,26 @@ def test_points_beside_lines_and_arcs() -> None:
     assert d[4] == pytest.approx(-1.6)
 
 
+def test_what_goes_on_is_where_a_point_there_would_be() -> None:
+    """Along the first line alone, and where bends are looked at."""
+    points, velocity = np.array([[2.0, 0.7], [4.0, 1.2]]), np.array([[0.2, 0.3], [0.5, -0.4]])
+    times = np.array([0.0, 0.5, 2.0])
+    for to_s_m in (3.5, 9.0):
+        s, d, heading = HOOK.locate(points, velocity, times, 0.0, to_s_m)
+        assert s.shape == d.shape == heading.shape == (2, 3)
+        for k, t_s in enumerate(times.tolist()):
+            expected = HOOK.project_points(points + t_s * velocity, 0.0, to_s_m)
+            assert (s[:, k].tolist(), d[:, k].tolist()) == (expected[0].tolist(), expected[1].tolist())
+        assert heading[0, 0] == 0.0
+
+
+@pytest.mark.parametrize("to_s_m", [3.5, 9.0])
+def test_what_is_nowhere_is_nowhere_along_the_path(to_s_m: float) -> None:
+    s, d = HOOK.project_points(np.array([[math.nan, 1.0], [1.0, 1.0]]), 0.0, to_s_m)
+    assert math.isnan(d[0])
+    assert (s[1], d[1]) == pytest.approx((1.0, 1.0))
+
+
 def test_points_beyond_the_end_are_measured_straight_on() -> None:
     s, d = HOOK.project_points(np.array([[14.0, 7.25], [-0.5, 0.0]]))
     assert s.tolist() == pytest.approx([HOOK.length_m + 1.0, -0.5])
