@@ -4,6 +4,7 @@ A body of the last scene that is missing in this one is kept while its place is 
 
 * Standing (seen for 0.5 s at least; the robot drives): kept where it was, until its place is in view again,
   a seen body covers it, or it lies 2 m behind the camera. If the robot stood, the body went away: dropped.
+  Beside the edge, within the view: dropped once a robot that stands sees through its place.
 * Moving: goes on with its last velocity for 2 s, or for 6 s if that leads towards the robot's axis or along
   with the robot. Dropped earlier where its place is well within the view or lies 2 m behind the camera.
 * Judged standing (a verdict takes some frames), but clearly measured as coming (or as going anywhere,
@@ -35,6 +36,7 @@ from controller.decision.going import (
     may_come,
     out_or_coming,
 )
+from controller.decision.seen_through import SeenThrough
 from controller.decision.view_edges import beyond_edges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
@@ -64,6 +66,7 @@ class OutOfView:
     def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
         self._mount, self.near_m, self.up_tan = mount, near_m, math.inf
         self._mistaken_mps = IMPLAUSIBLE * max_obstacle_speed_mps
+        self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
         # How those that stand by the verdict were measured when they were last seen, of whom clearly came.
@@ -113,6 +116,7 @@ class OutOfView:
             gone = gone.select(gone.moving | ((gone.age_s >= SETTLED_S) & (not standing)))
             bodies, since = bodies.joined(gone), np.concatenate((since, np.full(len(gone), dt_s)))
         if not len(bodies):
+            self._seen_through.forget()
             return no_bodies(seen.captured_ns)
         some_move = np.count_nonzero(bodies.moving) > 0
         xy_m = self._gone_on(bodies, dt_s, pose) if some_move else bodies.xy_m
@@ -127,6 +131,11 @@ class OutOfView:
         kept = _not_seen(kept, part_of, bodies.ids, seen.ids)
         if some_move:
             kept &= ~_rests(bodies, kept)
+        if standing:
+            edges = edge_tan, self.near_m, self.up_tan
+            kept &= ~self._seen_through.gone(bodies, pose, *edges, free)
+        else:
+            self._seen_through.forget()
         self._since_s, self._bodies = since[kept], bodies.select(kept)
         if some_move:
             self._bodies = self._kept_out(self._bodies, pose, free)

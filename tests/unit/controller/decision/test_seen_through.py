@@ -1,0 +1,81 @@
+"""What is remembered beside the edge of the view: gone once a robot that stands sees through its place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.decision.bodies import Bodies
+from controller.decision.seen_through import SeenThrough
+from hal.types import CameraMount, PlanarPose
+from tests.support.bodies import box
+from vision.scene import FreeSpace
+
+MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
+EDGE, NEAR_M, UP = 0.7, 1.3, 0.4
+AT = PlanarPose(10.0, 0.0, 0.0)
+BANDS = np.linspace(-EDGE + 0.01, EDGE - 0.01, 70)
+ALL_FREE = FreeSpace(BANDS, 0.01, np.full(70, np.inf), np.full(70, 8.0))
+UNKNOWN = FreeSpace(BANDS, 0.01, np.full(70, np.inf), np.zeros(70))
+
+
+def strip(left_m: float = 0.55, ahead_m: float = 1.4, top_m: float = 0.5) -> Bodies:
+    """Ahead of the camera, which is at 10.4 m."""
+    return box(10.4 + ahead_m, left_m, top_m=top_m, half_across_m=0.03)
+
+
+def scenes_until_gone(body: Bodies, free: FreeSpace, most: int = 30) -> int | None:
+    seen_through = SeenThrough(MOUNT)
+    for scene in range(1, most + 1):
+        if seen_through.gone(body, AT, EDGE, NEAR_M, UP, free).all():
+            return scene
+    return None
+
+
+def test_it_is_gone_when_its_place_was_seen_to_be_free_five_times_on_end() -> None:
+    assert scenes_until_gone(strip(), ALL_FREE) == 5
+
+
+def test_a_scene_in_which_it_is_not_seen_through_begins_anew() -> None:
+    seen_through = SeenThrough(MOUNT)
+    free = [ALL_FREE] * 4 + [UNKNOWN] + [ALL_FREE] * 5
+    gone = [bool(seen_through.gone(strip(), AT, EDGE, NEAR_M, UP, one).any()) for one in free]
+    assert gone == [False] * 9 + [True]
+
+
+def test_a_robot_that_drove_begins_anew() -> None:
+    seen_through = SeenThrough(MOUNT)
+    for _ in range(4):
+        seen_through.gone(strip(), AT, EDGE, NEAR_M, UP, ALL_FREE)
+    seen_through.forget()
+    assert not seen_through.gone(strip(), AT, EDGE, NEAR_M, UP, ALL_FREE).any()
+
+
+@pytest.mark.parametrize("distance_m", [1.3, 1.39])
+@pytest.mark.parametrize("what", ["known", "nearest"])
+def test_it_stays_where_not_all_of_its_place_is_free(distance_m: float, what: str) -> None:
+    """A surface there, or floor that was not seen, in one of its bands."""
+    place = int(np.abs(BANDS - (-0.55 / 1.4)).argmin())
+    known, nearest = ALL_FREE.known_m.copy(), ALL_FREE.nearest_m.copy()
+    (known if what == "known" else nearest)[place] = distance_m
+    assert scenes_until_gone(strip(), replace(ALL_FREE, known_m=known, nearest_m=nearest)) is None
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        strip(left_m=0.93),  # at the very edge: it may stand just outside of it
+        strip(ahead_m=0.9, left_m=0.3, top_m=0.1),  # below the view
+        strip(ahead_m=-0.5, left_m=0.2),  # behind the camera
+        replace(strip(), moving=np.array([True])),
+    ],
+)
+def test_what_would_not_be_seen_there_and_who_moves_stays(body: Bodies) -> None:
+    assert scenes_until_gone(body, ALL_FREE) is None
+
+
+def test_nothing_is_seen_through_without_bands() -> None:
+    nothing = FreeSpace(np.zeros(0), 0.01, np.zeros(0), np.zeros(0))
+    assert scenes_until_gone(strip(), nothing) is None
