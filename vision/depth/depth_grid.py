@@ -189,28 +189,43 @@ def _of_four(depth: DepthImage, row: int, column: int, low: int, high: int, agre
     return nearer
 
 
+@inlined
+def _row(
+    depth: DepthImage,
+    row: int,
+    step: int,
+    agree: np.float32,
+    into: NDArray[np.uint16],
+) -> None:
+    """Raw depth of the blocks whose uppermost row of pixels this is."""
+    for j in range(len(into)):
+        if step >= _FOUR_FROM_PX:
+            into[j] = _of_four(depth, row, step * j, step // 4, step // 4 + step // 2, agree)
+        else:
+            into[j] = depth[row + step // 2, step * j + step // 2]
+
+
 @compiled("uint16[:, ::1], int64, float32, float32, float32")
 def _sampled(
     depth: DepthImage, step: int, scale_m: np.float32, min_m: np.float32, range_m: np.float32
 ) -> tuple[DepthImage, BoolGrid, BoolGrid]:
     """(h, w) raw depth of one cell per step x step block, _FARTHEST where it is not valid; valid; beyond."""
-    four = step >= _FOUR_FROM_PX
-    rest = 0 if four else step - 1 - step // 2
+    rest = 0 if step >= _FOUR_FROM_PX else step - 1 - step // 2
     height, width = (depth.shape[0] + rest) // step, (depth.shape[1] + rest) // step
     raw = np.empty((height, width), np.uint16)
     valid, beyond = np.empty((height, width), np.bool_), np.empty((height, width), np.bool_)
     agree = np.float32(_AGREE_INVERSE) * scale_m
-    low, high = step // 4, step // 4 + step // 2
     for i in range(height):
+        if step == _FOUR_FROM_PX:
+            # A step known to the compiler takes half of the time.
+            _row(depth, step * i, _FOUR_FROM_PX, agree, raw[i])
+        else:
+            _row(depth, step * i, step, agree, raw[i])
         for j in range(width):
-            if four:
-                value = _of_four(depth, step * i, step * j, low, high, agree)
-            else:
-                value = int(depth[step * i + step // 2, step * j + step // 2])
-            depth_m = np.float32(value) * scale_m
+            depth_m = np.float32(raw[i, j]) * scale_m
             beyond[i, j] = depth_m > range_m
             valid[i, j] = min_m <= depth_m <= range_m
-            raw[i, j] = value if valid[i, j] else _FARTHEST
+            raw[i, j] = raw[i, j] if valid[i, j] else _FARTHEST
     return raw, valid, beyond
 
 

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from vision.fragments.edges import GreyImage
 
 _PIECE = 1.5  # a piece of a contour is at most this many times the least length
@@ -31,19 +32,36 @@ def find_contours(edges: GreyImage, min_length_px: float) -> Contours:
     """
     found, _ = cv2.findContours(edges, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     kept = [curve for curve in found if len(curve) >= 2.0 * min_length_px]
-    remaining = np.zeros_like(edges)
     if not kept:
-        return Contours(np.empty((0, 2, 2), np.float32), remaining)
-    points = np.concatenate(kept)[:, 0, :]
-    remaining.ravel()[points[:, 1] * edges.shape[1] + points[:, 0]] = 255
+        return Contours(np.empty((0, 2, 2), np.float32), np.zeros_like(edges))
     lengths = np.array([len(curve) for curve in kept])
-    starts = np.cumsum(lengths) - lengths
     pieces = np.ceil(lengths / (_PIECE * min_length_px)).astype(np.intp)
-    owner = np.repeat(np.arange(len(kept)), pieces)
-    rank = np.arange(len(owner)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    step = (lengths / pieces)[owner]
-    first = starts[owner] + (rank * step).astype(np.intp)
-    last = starts[owner] + np.minimum(((rank + 1) * step).astype(np.intp), lengths[owner] - 1)
-    ends_px = np.empty((len(owner), 2, 2), np.float32)
-    ends_px[:, 0], ends_px[:, 1] = points[first], points[last]
-    return Contours(ends_px, remaining)
+    points = np.asarray(np.concatenate(kept)[:, 0, :], np.int32)
+    return Contours(*_drawn(points, lengths, pieces, int(pieces.sum()), *edges.shape))
+
+
+@compiled("int32[:, :], int64[::1], int64[::1], int64, int64, int64")
+def _drawn(
+    points: NDArray[np.int32],
+    lengths: NDArray[np.intp],
+    pieces: NDArray[np.intp],
+    count: int,
+    height: int,
+    width: int,
+) -> tuple[NDArray[np.float32], GreyImage]:
+    """The two ends of each of count pieces, and an image of all points (N, 2). lengths: how many of the
+    points are of each curve, in turn; pieces: into how many it is cut."""
+    ends_px, image = np.empty((count, 2, 2), np.float32), np.zeros((height, width), np.uint8)
+    start, one = 0, 0
+    for curve in range(len(lengths)):
+        step = lengths[curve] / pieces[curve]
+        for rank in range(pieces[curve]):
+            last = min(int((rank + 1) * step), lengths[curve] - 1)
+            for axis in range(2):
+                ends_px[one, 0, axis] = points[start + int(rank * step), axis]
+                ends_px[one, 1, axis] = points[start + last, axis]
+            one += 1
+        start += lengths[curve]
+    for n in range(len(points)):
+        image[points[n, 1], points[n, 0]] = 255
+    return ends_px, image
