@@ -79,7 +79,7 @@ def surface_depth(
 
 
 @inlined
-def _sorted_samples(
+def _samples(
     depth: DepthImage,
     u: float,
     v: float,
@@ -87,24 +87,30 @@ def _sorted_samples(
     min_m: np.float32,
     into_m: NDArray[np.float32],
 ) -> int:
-    """How many of the samples around a pixel are no holes; into_m (_SAMPLES,) begins with these, the nearest
-    first. Close to the border they lie to one side, within the image."""
+    """How many of the samples around a pixel are no holes; into_m (_SAMPLES,) begins with these. Close to the
+    border they lie to one side, within the image."""
     height, width = depth.shape
     column = min(max(int(np.rint(u)), _REACH_PX), width - 1 - _REACH_PX)
     row = min(max(int(np.rint(v)), _REACH_PX), height - 1 - _REACH_PX)
     count = 0
     for i in range(row - _REACH_PX, row + _REACH_PX + 1, _EVERY_PX):
         for j in range(column - _REACH_PX, column + _REACH_PX + 1, _EVERY_PX):
-            sample_m = depth[i, j] * scale_m
-            if sample_m < min_m:
-                continue
-            place = count
-            while place > 0 and into_m[place - 1] > sample_m:
-                into_m[place] = into_m[place - 1]
-                place -= 1
-            into_m[place] = sample_m
-            count += 1
+            into_m[count] = depth[i, j] * scale_m
+            count += into_m[count] >= min_m
     return count
+
+
+@inlined
+def _note_nearest(sample_m: NDArray[np.float32], count: int, nearest_m: NDArray[np.float32]) -> None:
+    """The nearest of the first count samples, in order, into nearest_m (_NEAR_RANK + 1,)."""
+    nearest_m[:] = np.inf
+    for j in range(count):
+        # Handed down from place to place, without a branch: a processor that guesses wrong takes longer.
+        farther_m = sample_m[j]
+        for place in range(_NEAR_RANK + 1):
+            held_m = nearest_m[place]
+            nearest_m[place] = held_m if held_m < farther_m else farther_m
+            farther_m = farther_m if held_m < farther_m else held_m
 
 
 @compiled("uint16[:, ::1], float64[:, ::1], float32, float32, float32, float64, float64")
@@ -118,29 +124,30 @@ def _surfaces(
     quadratic_per_m: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """near_m, far_m and holes, (N,) each. max_m: of the near surface."""
-    count = len(pixels)
+    count, none = len(pixels), np.float32(0.0)
     near_m, far_m, holes = np.full(count, np.nan), np.full(count, np.nan), np.empty(count)
-    sample_m = np.empty(_SAMPLES, np.float32)
+    sample_m, nearest_m = np.empty(_SAMPLES, np.float32), np.empty(_NEAR_RANK + 1, np.float32)
     for k in range(count):
-        measured = _sorted_samples(depth, pixels[k, 0], pixels[k, 1], scale_m, min_m, sample_m)
+        measured = _samples(depth, pixels[k, 0], pixels[k, 1], scale_m, min_m, sample_m)
         holes[k] = 1.0 - measured / _SAMPLES
-        within = measured
-        while within > 0 and sample_m[within - 1] > max_m:
-            within -= 1
+        within = 0
+        for j in range(measured):
+            within += sample_m[j] <= max_m
         if within < _MIN_SUPPORT:
             continue
+        _note_nearest(sample_m, measured, nearest_m)
         # With holes around, the same share of what is valid decides.
-        anchor_m = sample_m[min(_NEAR_RANK, within // 3)]
+        anchor_m = nearest_m[min(_NEAR_RANK, within // 3)]
         gate_m = np.float32(0.06 + 3.0 * (floor_m + quadratic_per_m * anchor_m * anchor_m))
         near_sum, near_count, far_sum, far_count = 0.0, 0, 0.0, 0
         for j in range(measured):
             behind_m = sample_m[j] - anchor_m
-            if behind_m > gate_m:
-                far_sum += sample_m[j]
-                far_count += 1
-            elif behind_m >= -gate_m and j < within:
-                near_sum += sample_m[j]
-                near_count += 1
+            far = behind_m > gate_m
+            near = (abs(behind_m) <= gate_m) & (sample_m[j] <= max_m)
+            far_sum += sample_m[j] if far else none
+            near_sum += sample_m[j] if near else none
+            far_count += far
+            near_count += near
         if near_count < 2:
             continue
         near_m[k] = near_sum / near_count

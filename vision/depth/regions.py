@@ -68,7 +68,7 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     wide knows of the image's border only; see unhidden.
     """
     on_floor = grid.up is not None
-    cells, edges, bbox_px, position_m, extent_m = _measured(
+    cells, rows, bbox_px, position_m, extent_m, wide, tall = _measured(
         grid.inverse_depth,
         labels,
         count,
@@ -79,18 +79,8 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
         grid.up if grid.up is not None else np.zeros(3),
         grid.camera_height_m if on_floor else np.nan,
     )
-    left, top, right, bottom = edges.T
-    present, (height, width) = cells > 0, labels.shape
-    return Regions(
-        cells=cells,
-        rows=bottom - top + 1,
-        bbox_px=bbox_px,
-        position_m=position_m,
-        extent_m=extent_m,
-        wide=present & (left > 0) & (right < width - 1),
-        tall=present & (top > 0) & (bottom < height - 1),
-        overlapped=np.zeros(count, np.bool_),
-    )
+    overlapped = np.zeros(count, np.bool_)
+    return Regions(cells, rows, bbox_px, position_m, extent_m, wide, tall, overlapped)
 
 
 @inlined
@@ -151,10 +141,19 @@ def _measured(
     offset_px: float,
     up: FloatArray,
     height_m: float,
-) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
-    """cells (R,), edges (R, 4) as in _edges, bbox_px (R, 4), position_m and extent_m (R, 3) of the parts.
+) -> tuple[
+    NDArray[np.intp],
+    NDArray[np.intp],
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    NDArray[np.bool_],
+    NDArray[np.bool_],
+]:
+    """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), wide and tall (R,) of the parts.
     height_m: of the camera, NaN where the floor is not known; up (3,): its normal."""
-    cells, edges = _edges(labels, count)
+    (cells, edges), rows = _edges(labels, count), np.zeros(count, np.intp)
+    wide, tall = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     # Sums over each part: inverse depth, its square, x, y; and over its left and its right rim, which are
     # measured each at its own depth: cells, inverse depth. Whoever looks along a side of a body would take it
     # for wider, at the depth of its middle, than it is.
@@ -181,6 +180,9 @@ def _measured(
         if cells[part] == 0:
             continue
         left, top, right, bottom = edges[part]
+        rows[part] = bottom - top + 1
+        wide[part] = left > 0 and right < labels.shape[1] - 1
+        tall[part] = top > 0 and bottom < labels.shape[0] - 1
         mean, mean_square, mean_x, mean_y = sums[part] / cells[part]
         depth_m = 1.0 / mean
         bbox_px[part, 0] = left * step_px + (offset_px - 0.5 * step_px)
@@ -197,7 +199,7 @@ def _measured(
         )
         extent_m[part, 1] = (y[bottom] - y[top]) * depth_m
         extent_m[part, 2] = _UNIFORM * np.sqrt(max(mean_square - mean * mean, 0.0)) * depth_m * depth_m
-    return cells, edges, bbox_px, position_m, extent_m
+    return cells, rows, bbox_px, position_m, extent_m, wide, tall
 
 
 def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
