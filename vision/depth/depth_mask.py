@@ -124,7 +124,7 @@ def _surfaces(
     quadratic_per_m: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """near_m, far_m and holes, (N,) each. max_m: of the near surface."""
-    count, none = len(pixels), np.float32(0.0)
+    count = len(pixels)
     near_m, far_m, holes = np.full(count, np.nan), np.full(count, np.nan), np.empty(count)
     sample_m, nearest_m = np.empty(_SAMPLES, np.float32), np.empty(_NEAR_RANK + 1, np.float32)
     for k in range(count):
@@ -144,8 +144,8 @@ def _surfaces(
             behind_m = sample_m[j] - anchor_m
             far = behind_m > gate_m
             near = (abs(behind_m) <= gate_m) & (sample_m[j] <= max_m)
-            far_sum += sample_m[j] if far else none
-            near_sum += sample_m[j] if near else none
+            far_sum += float(sample_m[j]) if far else 0.0
+            near_sum += float(sample_m[j]) if near else 0.0
             far_count += far
             near_count += near
         if near_count < 2:
