@@ -4,27 +4,49 @@ NumPy goes over an array once for each operation, and a frame has some hundred s
 longer than what they computed. A compiled step goes over the cells, the pixels or the ends once, in the words
 of the algorithm. Every one is compiled when its module is imported, never in the middle of a drive, and kept
 on the disk: beside its file, or, where that may not be written, in the user's cache, or in NUMBA_CACHE_DIR.
-The first import takes a minute or two for all of them, and says so; later ones take a moment.
+The first import takes a minute or two for all of them, and says so; later ones take a moment. What was kept
+and cannot be read any more is made anew; where nothing can be kept, every start compiles, and says so.
 
-Rules: a step takes numbers and arrays, does not change them, and returns new ones. What it calls, and the
-constants that it uses, stand in its own file, above it: what is kept on the disk is made anew only when that
-file changes. With NUMBA_DISABLE_JIT=1 all of them run as plain Python, for a debugger.
+Rules: a step takes numbers and arrays, does not change them, and returns new ones; parts that are inlined may
+fill the arrays they are given. What a step calls, and the constants that it uses, stand in its own file,
+above it: what is kept on the disk is made anew only when that file changes. No index is checked: what a step
+reads by has to be in range. With NUMBA_DISABLE_JIT=1 all of them run as plain Python, for a debugger; there
+1.0 / 0.0 is an error.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from pickle import PickleError
 from typing import Any, ParamSpec, TypeVar
 
 from numba import njit, types
 from numba.core import sigutils
+from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 _FIRST_TIME = "treadwatch: compiling for this processor, which is done once and takes a minute or two\n"
-_told: list[str] = []
+_EVERY_TIME = (
+    "treadwatch: what is compiled for this processor cannot be kept, so every start takes a minute or two; "
+    "NUMBA_CACHE_DIR may name a folder for it ({})\n"
+)
+_told: set[str] = set()
+# What reading or writing its files raises: a full disk, no place for them, half a file and what comes of it.
+_NOT_KEPT = (
+    OSError,
+    RuntimeError,
+    EOFError,
+    PickleError,
+    ValueError,
+    LookupError,
+    AttributeError,
+    ImportError,
+    TypeError,
+)
 
 
 def compiled(arguments: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -35,12 +57,12 @@ def compiled(arguments: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
     def build(function: Callable[P, R]) -> Callable[P, R]:
         try:
-            return _build(function, signature, kept=True)
-        except RuntimeError as error:
-            if "cannot cache" not in str(error):
-                raise
-            # Nowhere to keep it: neither beside the file, nor in the user's cache, nor in NUMBA_CACHE_DIR.
-            return _build(function, signature, kept=False)
+            return _kept(function, signature)
+        except NumbaError:
+            raise  # an error in the step itself
+        except _NOT_KEPT as error:
+            _say(_EVERY_TIME, str(error).partition("\n")[0])
+        return _build(function, signature, kept=False)
 
     return build
 
@@ -51,17 +73,40 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     return result
 
 
-def _build(function: Callable[P, R], signature: tuple[types.Type, ...], kept: bool) -> Callable[P, R]:
-    result: Callable[P, R] = njit([signature], cache=kept, error_model="numpy")(function)
-    if kept and not _told and _is_new(result):
-        _told.append(_FIRST_TIME)
-        sys.stderr.write(_FIRST_TIME)
+def _kept(function: Callable[P, R], signature: tuple[types.Type, ...]) -> Callable[P, R]:
+    """From the disk, or compiled and kept there. Raises what reading and writing its files may raise, and
+    NumbaError."""
+    try:
+        step = _build(function, signature, kept=True)
+    except NumbaError:
+        raise
+    except _NOT_KEPT:
+        # Damaged: whoever cut the power while it was written left half a file.
+        step = _build(function, signature, kept=True, anew=True)
+    if isinstance(step, Dispatcher) and step.stats.cache_misses:
+        _say(_FIRST_TIME)
+    return step
+
+
+def _build(
+    function: Callable[P, R], signature: tuple[types.Type, ...], *, kept: bool, anew: bool = False
+) -> Callable[P, R]:
+    """anew: whatever is kept of it counts for nothing."""
+    step: Any = njit(cache=kept, error_model="numpy")(function)
+    if isinstance(step, Dispatcher):  # else plain Python, with NUMBA_DISABLE_JIT=1
+        if anew:
+            step.recompile()  # nothing yet, but what is kept is forgotten with it
+        step.compile(signature)
+        step.disable_compile()
+    result: Callable[P, R] = step
     return result
 
 
-def _is_new(step: Any) -> bool:
-    """Whether it was compiled just now; False for plain Python, with NUMBA_DISABLE_JIT=1."""
-    return hasattr(step, "stats") and bool(step.stats.cache_misses)
+def _say(sentence: str, *values: str) -> None:
+    """On standard error, once."""
+    if sentence not in _told:
+        _told.add(sentence)
+        sys.stderr.write(sentence.format(*values))
 
 
 def _read_only(argument: types.Type) -> types.Type:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 import importlib
 import inspect
+import os
 import pkgutil
+import resource
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -68,11 +70,77 @@ def test_another_type_is_refused_and_not_compiled_in_the_middle_of_a_drive(value
         _halves_over(values, 2.0)
 
 
-def test_where_nothing_can_be_kept_it_is_compiled_all_the_same() -> None:
+def test_where_nothing_can_be_kept_it_is_compiled_all_the_same_and_says_so(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A function of no file, for which the compiler finds no place."""
+    monkeypatch.setattr("hal.compiled._told", set())
     scope: dict[str, Any] = {}
     exec(compile("def twice(value):\n    return 2.0 * value\n", "<nowhere>", "exec"), scope)
     assert compiled("float64")(scope["twice"])(1.5) == 3.0
+    compiled("float64")(scope["twice"])
+    told = capsys.readouterr().err
+    assert told.count("cannot be kept") == 1
+    assert "NUMBA_CACHE_DIR" in told
+
+
+STEP = """
+from hal.compiled import compiled
+
+@compiled("float64")
+def twice(value):
+    return 2.0 * value
+
+print(twice(1.5))
+"""
+
+
+def run_step(folder: Path, most_bytes: int | None = None) -> tuple[int, str, str]:
+    """Exit code, output and errors of a program with one step, whose compiled form is kept in folder; no file
+    may grow beyond most_bytes."""
+    program, root = folder / "step.py", str(Path(__file__).resolve().parents[3])
+    program.write_text(STEP, encoding="utf-8")
+    # What stands in its file is made anew when that changes: here it does not.
+    os.utime(program, (1.0, 1.0))
+    environment = {"NUMBA_CACHE_DIR": str(folder / "kept"), "PYTHONPATH": root, "PATH": os.environ["PATH"]}
+
+    def limit() -> None:
+        if most_bytes is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+
+    done = subprocess.run(
+        [sys.executable, "-B", str(program)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=limit,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("left_bytes", [0, 20])
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_what_is_kept_is_read_again_and_made_anew_where_it_is_damaged(
+    tmp_path: Path, ending: str, left_bytes: int
+) -> None:
+    code, answer, told = run_step(tmp_path)
+    assert (code, answer) == (0, "3.0\n")
+    assert "compiling for this processor" in told
+    assert run_step(tmp_path) == (0, "3.0\n", "")
+    (file,) = (tmp_path / "kept").rglob(f"*.{ending}")
+    file.write_bytes(file.read_bytes()[:left_bytes])
+    code, answer, told = run_step(tmp_path)
+    assert (code, answer) == (0, "3.0\n")
+    assert "compiling for this processor" in told
+    assert run_step(tmp_path) == (0, "3.0\n", "")
+
+
+def test_a_full_disk_keeps_nothing_and_hinders_nobody(tmp_path: Path) -> None:
+    code, answer, told = run_step(tmp_path, most_bytes=200)
+    assert (code, answer) == (0, "3.0\n")
+    assert "cannot be kept" in told
+    assert "File too large" in told
 
 
 def test_an_error_in_a_step_is_told_when_its_module_is_imported() -> None:
