@@ -21,36 +21,61 @@ ALL_FREE = FreeSpace(BANDS, 0.01, np.full(70, np.inf), np.full(70, 8.0))
 UNKNOWN = FreeSpace(BANDS, 0.01, np.full(70, np.inf), np.zeros(70))
 
 
+PERIOD_S = 0.1
+
+
 def strip(left_m: float = 0.55, ahead_m: float = 1.4, top_m: float = 0.5) -> Bodies:
     """Ahead of the camera, which is at 10.4 m."""
     return box(10.4 + ahead_m, left_m, top_m=top_m, half_across_m=0.03)
 
 
-def scenes_until_gone(body: Bodies, free: FreeSpace, most: int = 30) -> int | None:
-    seen_through = SeenThrough(MOUNT)
-    for scene in range(1, most + 1):
-        if seen_through.gone(body, AT, EDGE, NEAR_M, UP, free).all():
-            return scene
-    return None
+def gone_in(
+    seen_through: SeenThrough, body: Bodies, free: list[FreeSpace], headings_rad: list[float]
+) -> list[bool]:
+    """Whether it is gone, scene by scene."""
+    return [
+        bool(
+            seen_through.gone(
+                replace(body, captured_ns=round(k * PERIOD_S * 1e9)),
+                replace(AT, heading_rad=heading_rad),
+                EDGE,
+                NEAR_M,
+                UP,
+                one,
+            ).all()
+        )
+        for k, (one, heading_rad) in enumerate(zip(free, headings_rad, strict=True))
+    ]
 
 
-def test_it_is_gone_when_its_place_was_seen_to_be_free_five_times_on_end() -> None:
-    assert scenes_until_gone(strip(), ALL_FREE) == 5
+def gone_after_s(body: Bodies, free: FreeSpace) -> float | None:
+    gone = gone_in(SeenThrough(MOUNT), body, [free] * 30, [0.0] * 30)
+    return gone.index(True) * PERIOD_S if True in gone else None
+
+
+def test_it_is_gone_when_its_place_was_seen_to_be_free_for_half_a_second() -> None:
+    assert gone_after_s(strip(), ALL_FREE) == pytest.approx(0.5)
 
 
 def test_a_scene_in_which_it_is_not_seen_through_begins_anew() -> None:
-    seen_through = SeenThrough(MOUNT)
-    free = [ALL_FREE] * 4 + [UNKNOWN] + [ALL_FREE] * 5
-    gone = [bool(seen_through.gone(strip(), AT, EDGE, NEAR_M, UP, one).any()) for one in free]
-    assert gone == [False] * 9 + [True]
+    free = [ALL_FREE] * 5 + [UNKNOWN] + [ALL_FREE] * 6
+    assert gone_in(SeenThrough(MOUNT), strip(), free, [0.0] * 12) == [False] * 11 + [True]
+
+
+def test_a_robot_that_turns_in_place_begins_anew() -> None:
+    """By more than what odometry wanders; while it goes on turning, nothing is gone at all."""
+    turned, turning = [0.0] * 5 + [0.01] * 6, [0.005 * k for k in range(30)]
+    assert gone_in(SeenThrough(MOUNT), strip(), [ALL_FREE] * 11, turned) == [False] * 10 + [True]
+    assert not any(gone_in(SeenThrough(MOUNT), strip(), [ALL_FREE] * 30, turning))
+    wandering = [0.002 * (k % 2) for k in range(6)]
+    assert gone_in(SeenThrough(MOUNT), strip(), [ALL_FREE] * 6, wandering)[-1]
 
 
 def test_a_robot_that_drove_begins_anew() -> None:
     seen_through = SeenThrough(MOUNT)
-    for _ in range(4):
-        seen_through.gone(strip(), AT, EDGE, NEAR_M, UP, ALL_FREE)
+    assert not any(gone_in(seen_through, strip(), [ALL_FREE] * 5, [0.0] * 5))
     seen_through.forget()
-    assert not seen_through.gone(strip(), AT, EDGE, NEAR_M, UP, ALL_FREE).any()
+    assert gone_in(seen_through, strip(), [ALL_FREE] * 6, [0.0] * 6) == [False] * 5 + [True]
 
 
 @pytest.mark.parametrize("distance_m", [1.3, 1.39])
@@ -60,7 +85,7 @@ def test_it_stays_where_not_all_of_its_place_is_free(distance_m: float, what: st
     place = int(np.abs(BANDS - (-0.55 / 1.4)).argmin())
     known, nearest = ALL_FREE.known_m.copy(), ALL_FREE.nearest_m.copy()
     (known if what == "known" else nearest)[place] = distance_m
-    assert scenes_until_gone(strip(), replace(ALL_FREE, known_m=known, nearest_m=nearest)) is None
+    assert gone_after_s(strip(), replace(ALL_FREE, known_m=known, nearest_m=nearest)) is None
 
 
 @pytest.mark.parametrize(
@@ -73,9 +98,9 @@ def test_it_stays_where_not_all_of_its_place_is_free(distance_m: float, what: st
     ],
 )
 def test_what_would_not_be_seen_there_and_who_moves_stays(body: Bodies) -> None:
-    assert scenes_until_gone(body, ALL_FREE) is None
+    assert gone_after_s(body, ALL_FREE) is None
 
 
 def test_nothing_is_seen_through_without_bands() -> None:
     nothing = FreeSpace(np.zeros(0), 0.01, np.zeros(0), np.zeros(0))
-    assert scenes_until_gone(strip(), nothing) is None
+    assert gone_after_s(strip(), nothing) is None
