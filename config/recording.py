@@ -33,7 +33,8 @@ def _five_coefficients(value: tuple[float, ...]) -> tuple[float, ...]:
 
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[Number, Field(gt=0)]
-Pixels = Annotated[int, BeforeValidator(_whole_number), Field(gt=0, le=4096)]
+# Fewer show nothing: what looks around a pixel has no room (vision/depth/depth_grid.py).
+Pixels = Annotated[int, BeforeValidator(_whole_number), Field(ge=32, le=4096)]
 
 # How far a rotation matrix written with few digits may be from orthonormal.
 _ROTATION_TOLERANCE = 1e-3

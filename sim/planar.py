@@ -150,19 +150,24 @@ def _padded(shape: FloatArray, corners: int) -> FloatArray:
     return np.concatenate((shape, np.repeat(shape[-1:], corners - len(shape), axis=0)))
 
 
+def _check_pairs(a: FloatArray, b: FloatArray) -> None:
+    if len(a) != len(b):
+        raise ValueError(f"{len(a)} polygons cannot be paired with {len(b)}")
+
+
 def separation(a: FloatArray, b: FloatArray) -> FloatArray:
     """(P,) distance of convex polygons a (P, K, 2) and b (P, L, 2), counter-clockwise, pair by pair.
 
     As sim.contact.polygon_distance, for many pairs at once: where they overlap, minus the shortest way that
-    separates them. A repeated corner does not matter.
+    separates them. A repeated corner does not matter. Raises ValueError if there are not as many of each.
     """
-    assert len(a) == len(b)
+    _check_pairs(a, b)
     return _separation(a, b)
 
 
 def overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
-    """(P,) where separation() is 0 or less."""
-    assert len(a) == len(b)
+    """(P,) where separation() is 0 or less; raises ValueError as it does."""
+    _check_pairs(a, b)
     return _overlap(a, b)
 
 

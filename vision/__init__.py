@@ -7,8 +7,8 @@ vision/detector.py turns a frame into a Detection, vision/tracker.py turns that 
 * fixed frame: the coordinate frame in which the detector keeps the camera's pose and the tracker its tracks.
 * cell: one element of the coarse depth grid (vision/depth/depth_grid.py); it stands for a few pixels each
   way.
-* part: cells of one frame that are connected without a jump in depth (vision/depth/regions.py). Parts have no
-  past.
+* part: cells of one frame that are connected without a jump in depth (vision/depth/connected.py). Parts have
+  no past.
 * body: a physical thing, a person or a vehicle for example. Depth may merge two bodies or split one.
 * track: what is kept of one body from frame to frame: id, filter, verdict (vision/bodies/tracks.py). Comments
   on slip and vibration, however, mean the crawler tracks that the robot drives on.

@@ -26,7 +26,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
-MIN_CELLS = 6  # as many as a part has (_SPECKLE_CELLS of vision/depth/regions.py)
+MIN_CELLS = 6  # as many as a part has (_SPECKLE_CELLS of vision/depth/connected.py)
 _CENTRE_SIGMA_M = 0.015  # of the centre of the smallest thing: a cell is as wide 2.3 m away
 _CENTRE_SHARE = 0.0125  # of its size, across the line of sight: cells at the rim come and go
 _CENTRE_DEPTH_SHARE = 0.04  # of its size along the line of sight, where what is seen of it changes more

@@ -29,7 +29,7 @@ from vision.depth.depth_grid import BoolGrid
 _LEAST_VOTES = 4  # cells: fewer are strays of a prediction that is off by a cell
 _SHARE_OF_PART = 0.15  # of all votes in it, or
 _SHARE_OF_TRACK = 0.30  # of all votes of the track, whichever is less: else they are strays, too
-_CAME_CELLS = 20  # as much as an arrival that proves by itself (vision/bodies/judgement.py), and
+_CAME_CELLS = 20  # as much as an arrival that proves by itself (vision/bodies/proof.py), and
 _CAME_SHARE = 0.3  # of the part: who leaves furniture comes out of it side first
 _LEAVING_SHARE = 0.75  # of what stands: a larger part is the thing itself
 _STAYED_SHARE = 0.7  # of its votes: the rest is where the rims of both lie

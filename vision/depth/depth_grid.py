@@ -19,11 +19,12 @@ FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
 
 # Noise of a cell's height over what one pixel's depth would make: of a median of many pixels, but neighbours,
-# so not as little as their count tells. An estimate; standing() in vision/depth/regions.py has a margin
+# so not as little as their count tells. An estimate; standing() in vision/depth/connected.py has a margin
 # beside it. From one look to another it has been measured, and is more: _CELL_NOISE_OVER_TIME in
 # vision/bodies/arrivals.py.
 CELL_HEIGHT_NOISE = 0.4
 _FARTHEST = np.uint16(65535)  # raw depth of what is not valid: sorts behind all that is
+_LEAST_SIDE_PX = 32  # as config/recording.py and config/camera.py ask for
 _FOUR_FROM_PX = 4  # cells so large take four samples each, smaller ones their middle pixel
 _AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
 
@@ -56,23 +57,6 @@ class DepthGrid:
     up: FloatArray | None
     range_m: float
 
-    def columns(self, pixels_u: FloatArray) -> NDArray[np.intp]:
-        """Grid columns of image columns, clipped to the grid."""
-        index = np.rint((pixels_u - self.offset_px) / self.step_px).astype(np.intp)
-        clipped: NDArray[np.intp] = np.minimum(np.maximum(index, 0), self.depth_m.shape[1] - 1)
-        return clipped
-
-    def rows(self, pixels_v: FloatArray) -> NDArray[np.intp]:
-        """Grid rows of image rows, clipped to the grid."""
-        index = np.rint((pixels_v - self.offset_px) / self.step_px).astype(np.intp)
-        clipped: NDArray[np.intp] = np.minimum(np.maximum(index, 0), self.depth_m.shape[0] - 1)
-        return clipped
-
-    def cells(self, pixels_u: FloatArray, pixels_v: FloatArray) -> NDArray[np.intp]:
-        """Flat grid cells of image points, clipped to the grid."""
-        flat: NDArray[np.intp] = self.rows(pixels_v) * self.depth_m.shape[1] + self.columns(pixels_u)
-        return flat
-
     def points(self, cells: NDArray[np.intp]) -> FloatGrid:
         """(3, K) camera coordinates of flat cell indices (K,)."""
         rows = cells // self.depth_m.shape[1]
@@ -87,7 +71,13 @@ class DepthGrid:
 
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
     """Sub-sample the depth of frame; depth outside [min_depth_m, max_depth_m] is not valid, nor is the
-    largest number, at which far depth is cut off."""
+    largest number, at which far depth is cut off.
+
+    Raises ValueError for an image of less than 32 x 32 pixels: what looks around a pixel has no room there.
+    """
+    if min(frame.depth.shape) < _LEAST_SIDE_PX:
+        sides = f"{frame.depth.shape[1]}x{frame.depth.shape[0]}"
+        raise ValueError(f"depth of {sides} pixels, where at least {_LEAST_SIDE_PX} are needed each way")
     step, scale_m = config.grid_step_px, np.float32(frame.depth_scale_m)
     range_m = measurable_m(config.max_depth_m, frame.depth_scale_m)
     offset = step // 4 + 0.5 * (step // 2) if step >= _FOUR_FROM_PX else float(step // 2)

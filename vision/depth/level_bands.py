@@ -78,10 +78,13 @@ def _bands(
             nearest = np.rint((along * ahead - x0) / step).astype(np.intp)
             inside = (nearest >= 0) & (nearest < columns)
             cells = np.where(inside, nearest + columns * np.arange(rows)[:, None], -1)
-    return LevelBands(
+    found = LevelBands(
         bearing_tan=middle,
         half_width_tan=half_width,
         width=width,
         band=np.ascontiguousarray(band, np.int32),
         cells=np.ascontiguousarray(cells, np.int32),
     )
+    for shared in (found.bearing_tan, found.band, found.cells):
+        shared.setflags(write=False)
+    return found

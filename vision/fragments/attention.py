@@ -29,7 +29,7 @@ from vision.fragments.candidates import (
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
-_FEW_FRAGMENTS = 4  # eight ends are what a verdict along the line of sight takes (vision/bodies/judgement.py)
+_FEW_FRAGMENTS = 4  # eight ends are what a verdict along the line of sight takes (vision/bodies/proof.py)
 _ENOUGH_OF_A_MOVER = 2  # to follow it, its surface helps
 _MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py): less is a sliver
 _REACH_M = 9.0  # short of the depth mask's 10 m by about the noise of depth there

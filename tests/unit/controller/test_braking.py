@@ -71,6 +71,14 @@ def test_too_slow_to_let_go_ends_at_standstill() -> None:
     assert stop.distance_m == pytest.approx(0.105 * 0.3 - 0.25 * 0.09 + 0.027 / 6.0)
 
 
+def test_too_slow_to_let_go_from_harder_braking_than_allowed() -> None:
+    """v 1.6, a -3, J 2: v(t) = 1.6 - 3 t + t^2 is zero at t = (3 - sqrt(2.6)) / 2, before a is -0.6."""
+    stop = braking.stop(1.6, -3.0, BrakeLimits(0.6, 2.0))
+    time_s = (3.0 - math.sqrt(2.6)) / 2.0
+    assert stop.time_s == pytest.approx(time_s)
+    assert stop.distance_m == pytest.approx(1.6 * time_s - 1.5 * time_s**2 + time_s**3 / 3.0)
+
+
 def test_ease_out_alone_where_rounding_leaves_less_than_nothing() -> None:
     """v = a^2 / 2J in floats, but a^2 - 2 J v = -1e-19."""
     stop = braking.stop(0.0005, -0.03, BrakeLimits(0.3, 0.9))
@@ -154,6 +162,12 @@ def test_inverse_in_the_short_case() -> None:
     """A not reached, no latency: v = (J d^2)^(1/3)."""
     limits = BrakeLimits(1.0, 1.0)
     assert braking.speed_for_distance(0.1, limits) == pytest.approx(0.01 ** (1 / 3), abs=1e-12)
+
+
+def test_inverse_in_the_short_case_with_an_oncoming_obstacle() -> None:
+    """v 0.04 under J 1 stands after 2 * 0.2 s and 0.02 * 0.4 m, in which the obstacle comes 0.5 * 0.4 m."""
+    speed = braking.speed_for_distance(0.008 + 0.2, BrakeLimits(1.0, 1.0), closing_mps=0.5)
+    assert speed == pytest.approx(0.04, abs=1e-12)
 
 
 def test_inverse_with_an_oncoming_obstacle() -> None:

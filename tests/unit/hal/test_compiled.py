@@ -181,6 +181,23 @@ def steps() -> list[Any]:
     ]
 
 
+# Parts that more than one file needs; a step may call none of another file.
+COPIES = {"_cell", "_lead", "_led"}
+
+
+def test_copies_of_a_part_are_the_same_word_for_word() -> None:
+    found: dict[str, list[str]] = {name: [] for name in COPIES}
+    for step in steps():
+        name = step.py_func.__name__
+        if name in COPIES:
+            (function,) = ast.parse(inspect.getsource(step.py_func)).body
+            assert isinstance(function, ast.FunctionDef)
+            found[name].append("\n".join(map(ast.unparse, function.body[1:])))
+    assert {name: len(texts) > 1 and len(set(texts)) == 1 for name, texts in found.items()} == dict.fromkeys(
+        COPIES, True
+    )
+
+
 def assigned_in(module: ModuleType) -> set[str]:
     """Names that are defined at the top of a module itself, not imported by it."""
     tree = ast.parse(inspect.getsource(module))
@@ -196,7 +213,8 @@ def assigned_in(module: ModuleType) -> set[str]:
 
 
 def test_what_a_step_calls_and_its_constants_stand_in_its_own_file() -> None:
-    """It would go on with what these were before a change: only a change of its own file makes it anew."""
+    """It would go on with what these were before a change: only a change of its own file makes it anew. The
+    same holds for a constant of its own that is reckoned from another file's."""
     own = {
         module.__name__: assigned_in(module)
         for module in {sys.modules[s.py_func.__module__] for s in steps()}
@@ -212,3 +230,20 @@ def test_what_a_step_calls_and_its_constants_stand_in_its_own_file() -> None:
     }
     assert len(steps()) > 10
     assert foreign == set()
+    assert reckoned_from_elsewhere() == set()
+
+
+def reckoned_from_elsewhere() -> set[tuple[str, str]]:
+    """Module and constant, used by a step, of those that rest on a value of another module."""
+    found = set()
+    for step in steps():
+        module = sys.modules[step.py_func.__module__]
+        for node in ast.parse(inspect.getsource(module)).body:
+            if not isinstance(node, ast.Assign) or not isinstance(node.targets[0], ast.Name):
+                continue
+            name = node.targets[0].id
+            if name in step.py_func.__code__.co_names:
+                used = {one.id for one in ast.walk(node.value) if isinstance(one, ast.Name)}
+                imported = used - assigned_in(module) - {"np", "math", "range", "len", "tuple"}
+                found |= {(module.__name__, name) for _ in imported}
+    return found

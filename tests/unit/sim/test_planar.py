@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from config.scenario import (
     Shelf,
     Wall,
 )
+from hal.types import FloatArray
 from sim.contact import polygon_distance
 from sim.planar import PlanarWorld, overlap, separation
 from sim.world import World
@@ -114,3 +116,10 @@ def test_separation_is_the_exact_distance_of_every_pair() -> None:
     assert max(exact) > 0.5
     assert separation(a, padded) == pytest.approx(np.array(exact), abs=1e-9)
     assert overlap(a, padded).tolist() == [distance <= 0.0 for distance in exact]
+
+
+@pytest.mark.parametrize("measure", [separation, overlap])
+def test_polygons_without_a_partner_are_refused(measure: Callable[[FloatArray, FloatArray], object]) -> None:
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    with pytest.raises(ValueError, match="2 polygons cannot be paired with 1"):
+        measure(np.stack((square, square)), square[None])

@@ -8,31 +8,38 @@ import pytest
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, RgbdFrame
 from tests.support.grids import CAMERA, COLUMNS, OFFSET_PX, ROWS, STEP_PX, grid_of
+from vision.bodies.boxes import _cell
 from vision.depth.depth_grid import make_grid
 
 GRID = grid_of(np.random.default_rng(1).uniform(2.0, 4.0, (ROWS, COLUMNS)))
 
 
 def test_the_cell_of_an_image_point_is_the_nearest_one() -> None:
-    row, column = np.indices((ROWS, COLUMNS))
-    u, v = OFFSET_PX + STEP_PX * (column + 0.4), OFFSET_PX + STEP_PX * (row - 0.4)
-    flat = np.arange(ROWS * COLUMNS).reshape(ROWS, COLUMNS)
-    np.testing.assert_array_equal(GRID.cells(u.astype(float), v.astype(float)), flat)
+    """As in the three files that ask for it (tests/unit/hal/test_compiled.py holds them together)."""
+    for cell in range(COLUMNS):
+        for off in (-0.4, 0.0, 0.4):
+            assert _cell(OFFSET_PX + STEP_PX * (cell + off), OFFSET_PX, STEP_PX, COLUMNS) == cell
 
 
 def test_an_image_point_beside_the_grid_has_the_cell_at_its_rim() -> None:
     far = 10.0 * STEP_PX * COLUMNS
-    u, v = np.array([-far, far, -far, far]), np.array([-far, -far, far, far])
-    last = ROWS * COLUMNS - 1
-    np.testing.assert_array_equal(GRID.cells(u, v), [0, COLUMNS - 1, last - COLUMNS + 1, last])
+    assert _cell(-far, OFFSET_PX, STEP_PX, COLUMNS) == 0
+    assert _cell(far, OFFSET_PX, STEP_PX, COLUMNS) == COLUMNS - 1
 
 
 def test_the_points_of_cells_are_seen_in_these_cells() -> None:
-    cells = np.arange(ROWS * COLUMNS)
-    x, y, z = GRID.points(cells).astype(float)
-    found = GRID.cells(x / z * CAMERA.fx + CAMERA.cx, y / z * CAMERA.fy + CAMERA.cy)
-    np.testing.assert_array_equal(found, cells)
+    row, column = np.indices((ROWS, COLUMNS)).reshape(2, -1)
+    x, y, z = GRID.points(row * COLUMNS + column).astype(float)
+    np.testing.assert_allclose(x / z * CAMERA.fx + CAMERA.cx, OFFSET_PX + STEP_PX * column, atol=1e-3)
+    np.testing.assert_allclose(y / z * CAMERA.fy + CAMERA.cy, OFFSET_PX + STEP_PX * row, atol=1e-3)
     np.testing.assert_array_equal(z, GRID.depth_m.ravel())
+
+
+@pytest.mark.parametrize("shape", [(31, 40), (40, 31)])
+def test_an_image_without_room_to_look_around_is_refused(shape: tuple[int, int]) -> None:
+    raw, colour = np.full(shape, 2000, np.uint16), np.zeros((*shape, 3), np.uint8)
+    with pytest.raises(ValueError, match=f"depth of {shape[1]}x{shape[0]} pixels, where at least 32"):
+        make_grid(RgbdFrame(colour, raw, 0.001, 0, 0.0, 0, CAMERA), PerceptionConfig(), None)
 
 
 @pytest.mark.parametrize("mount", [None, CameraMount(0.0, 0.0, 0.5, 0.0)])
