@@ -13,16 +13,16 @@ towards the robot. An infinite J with tau = 0 gives the formulas of Daeef 2020 (
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from config.robot import Limits
 from hal.compiled import compiled, inlined
+from hal.records import record
 
 _NEWTON_STEPS = 60
 _CONVERGED = 1e-14
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class BrakeLimits:
     """How hard a stop may be. jerk_mps3 may be infinite (the paper's model); both must be positive."""
 
@@ -34,7 +34,7 @@ class BrakeLimits:
             raise ValueError(f"limits must be positive: {self.decel_mps2} m/s2, {self.jerk_mps3} m/s3")
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Stop:
     """What a stop takes until standstill."""
 

@@ -13,7 +13,6 @@ The only importer of ruckig. Its traps (verified with 0.19.4) and what is done a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from ruckig import (  # type: ignore[import-not-found]  # a compiled module without stubs
     ControlInterface,
@@ -29,6 +28,7 @@ from controller import braking
 from controller.braking import BrakeLimits
 from controller.chassis_lag import ChassisLag
 from controller.profile import stop_step
+from hal.records import record
 
 # The closing at the path's end is planned a little gentler than what is allowed, so that what the odometry
 # corrects on the way can still be followed.
@@ -44,7 +44,7 @@ _TINY = 1e-9
 _TOLERANCE = 1e-7
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class ShapedSpeed:
     """One point of the profile. fault: why it is the stop profile instead of ruckig's, "" if it is not."""
 

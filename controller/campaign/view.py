@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from config.camera import SimulatedCameraConfig
 from config.robot import Mount
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, PlanarPose
 from sim.planar import PlanarWorld
 from vision.scene import NEVER_M
@@ -23,7 +23,7 @@ _NEAR_M = 0.1
 _TOUCHING_M = 1e-6
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class PlanarView:
     """One look. bodies (M,): which ones were looked at. forward_m (M, B): where each band's ray meets each
     body, inf where it does not or is covered by something nearer. free_m (B,): where the first thing that

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from operator import attrgetter
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.geometry import camera_in_body
+from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import Scene
 
@@ -29,7 +29,7 @@ class SceneError(Exception):
     """A scene says something impossible: which obstacle and what."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Bodies:
     """N boxes at captured_ns.
 

@@ -13,7 +13,6 @@ emergency stop from each speed, latency included, is followed in time against al
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +20,13 @@ from numpy.typing import NDArray
 from controller.decision.corridor import Placed
 from controller.profile import SpeedRamps
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import FloatArray
 
 _STANDING_MPS = 0.02
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Reach:
     """What N obstacles could block at K times: inside (N, K) whether, lo_m, hi_m (N, K) which positions."""
 
@@ -81,7 +81,7 @@ def reach(
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Stops:
     """R emergency stops at K times: distance_m (R, K), moves (R, K) whether the robot does not stand yet."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from operator import attrgetter
 
 import numpy as np
@@ -13,6 +12,7 @@ from config.robot import Body
 from controller.decision.bodies import Bodies
 from controller.path.path import Path
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray
 
 _STEP_M = 0.1
@@ -47,7 +47,7 @@ class Corridor:
         return _one_half_width(s_m, self.half_widths_m, self.overhang_m)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Placed:
     """N bodies at K times in path coordinates, each (N, K).
 
@@ -154,7 +154,7 @@ def _extents(
     return extents
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Course:
     """How N bodies go, seen from the path where they are: speed along it and to its left, the standard
     deviation of either, and by how much the newest measurement differs; each (N,)."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from config.decision import Release
 from controller import braking
 from controller.braking import BrakeLimits
 from controller.decision.decision import Reason, Rule
+from hal.records import record
 
 # So far the front may be past the near side of something that still counts as ahead.
 ALONGSIDE_M = 0.1
@@ -26,7 +26,7 @@ BLOCKING_RULES: frozenset[Rule] = frozenset(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Limit:
     """A speed that must not be exceeded now. urgent: comfort braking no longer suffices."""
 
@@ -35,7 +35,7 @@ class Limit:
     urgent: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Motion:
     """The robot now: speed and acceleration as commanded, and the latency until a new command acts."""
 
@@ -44,7 +44,7 @@ class Motion:
     latency_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Gap:
     """Free way of the robot's front to something ahead.
 

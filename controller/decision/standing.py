@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from controller.decision.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_bef
 from controller.decision.outline import outline_of
 from controller.decision.view_edges import visible_from_m
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import CameraMount, FloatArray
 
 _INSIDE_BODY_M = 0.05
@@ -28,7 +28,7 @@ _MOST_OFF_M = 3.0
 _NOW = np.zeros(1)
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class _Near:
     """What may stand in the corridor; lo_m, hi_m, clear_m: see corridor.Placed. stop_m: where to stand before
     it."""

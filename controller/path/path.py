@@ -9,7 +9,6 @@ Path coordinates: s_m along the path from its start, d_m to the left of it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from controller.path.path_pieces import pieces_of, sinc
 from controller.path.path_speeds import YAW_RATE_FOR_THE_BEND, section_speeds
 from controller.path.projection import Projection
 from hal.geometry import wrap_angle_rad
+from hal.records import record
 from hal.types import FloatArray, PlanarPose
 
 IntArray = NDArray[np.intp]
@@ -36,7 +36,7 @@ class PathError(ConfigError):
     """The path cannot be driven by this robot: what, where and what to do, in one line."""
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class OnPath:
     """A pose in path coordinates: s_m along, d_m to the left, heading_rad relative to the path."""
 
