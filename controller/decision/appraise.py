@@ -89,7 +89,8 @@ class Appraiser:
         # Who is in the way is; and of who is out of sight nothing is measured that could be noise.
         at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
         enters = self._enters.update(watched.ids, comes, at_once, now_s)
-        base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
+        for limit in found:
+            base_mps = min(base_mps, limit.speed_mps)
         in_the_way, chosen_mps = self._moving.limits(
             watched, placed, course, enters, s_m, motion, base_mps, now_s
         )
@@ -127,23 +128,28 @@ class Appraiser:
             )
         if known.lens.covered:
             urgent = bool(known.bodies.moving.any())
-            found.append(Limit(0.0, Reason("unseen", f"{COVERED}: stop", distance_m=0.0), urgent=urgent))
+            found.append(Limit(0.0, _covered, urgent=urgent))
         if sight.known_s_m < known.corridor.path.length_m + known.corridor.front_m:
-            gap = Gap(sight.known_s_m - front_m)
-            limit = stop_before(gap, motion, self._comfort, margins.least_m, -math.inf, "unseen", "")
-            sentence = (
-                f"the floor is not seen to be free beyond {max(gap.distance_m, 0.0):.1f} m: "
-                f"{allowed(limit.speed_mps)}"
-            )
-            reason = Reason(
-                "unseen",
-                sentence,
-                distance_m=gap.distance_m,
-                required_m=limit.reason.required_m,
-                margin_m=limit.reason.margin_m,
-            )
-            found.append(Limit(limit.speed_mps, reason))
+            found.append(self._unseen(Gap(sight.known_s_m - front_m), motion))
         return found
+
+    def _unseen(self, gap: Gap, motion: Motion) -> Limit:
+        """The end of the floor that was seen to be free."""
+        least_m = self._config.margins.least_m
+        limit = stop_before(gap, motion, self._comfort, least_m, -math.inf, "unseen", "")
+
+        def why() -> Reason:
+            beyond = f"the floor is not seen to be free beyond {max(gap.distance_m, 0.0):.1f} m: "
+            required_m, margin_m = limit.reason.required_m, limit.reason.margin_m
+            return Reason(
+                "unseen",
+                beyond + allowed(limit.speed_mps),
+                distance_m=gap.distance_m,
+                required_m=required_m,
+                margin_m=margin_m,
+            )
+
+        return Limit(limit.speed_mps, why)
 
     def _corner(self, corner: BlindCorner | None, front_m: float, motion: Motion) -> list[Limit]:
         """Past a blind corner, slow enough that whoever steps out has a chance."""
@@ -154,8 +160,16 @@ class Appraiser:
         rolls_m = motion.v_mps * motion.latency_s
         rolls_m += braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
         speed = braking.speed_before_section(ahead_m - rolls_m, slow_mps, self._comfort)
-        sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
-        return [Limit(speed, Reason("corner", sentence + allowed(speed), distance_m=ahead_m))]
+
+        def why() -> Reason:
+            sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
+            return Reason("corner", sentence + allowed(speed), distance_m=ahead_m)
+
+        return [Limit(speed, why)]
+
+
+def _covered() -> Reason:
+    return Reason("unseen", f"{COVERED}: stop", distance_m=0.0)
 
 
 def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:

@@ -15,7 +15,7 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Limits, Robot
 from controller import braking
 from controller.decision.appraise import Appraiser
-from controller.decision.decision import Action, Decision, Reason, Rule
+from controller.decision.decision import Action, Decision, Reason, RivalRule, Rule
 from controller.decision.knowledge import Knowledge
 from controller.decision.limits import (
     BACKWARDS_MPS,
@@ -63,7 +63,7 @@ class DecisionMaker:
         self._now_ns: int | None = None
         self._emergency = False
         self._stuck_since_ns: int | None = None
-        self._last: Limit | None = None
+        self._last: Reason | None = None
 
     def take_path(self, path: Path, known: Knowledge) -> None:
         """Go on along another path, of which this is known already; what hysteresis needs is kept."""
@@ -88,7 +88,7 @@ class DecisionMaker:
         motion = Motion(v_mps, at.a_mps2, self._latency_s)
         on_way = self._path_limit(path, on_path, motion)
         limits = self._camera_limits(known)
-        base_mps = min(limit.speed_mps for limit in (on_way, *limits))
+        base_mps = min(on_way.speed_mps, _least(limits).speed_mps)
         limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(on_way, limits, motion, now_ns)
 
@@ -115,7 +115,7 @@ class DecisionMaker:
         self._gate.step(0.0, v, 0.0, now_ns)
         self._stuck_since_ns = None
         reason = Reason("fault", f"{fault}: stop")
-        self._last = Limit(0.0, reason)
+        self._last = reason
         action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
         return Decision(action, 0.0, reason, self._emergency)
 
@@ -135,17 +135,20 @@ class DecisionMaker:
         end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
         if section <= end:
             rule: Rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
-            return Limit(section, Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
-        required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
-        reason = Reason(
-            "target",
-            f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
-            distance_m=left_m,
-            closing_mps=0.0,
-            required_m=required,
-            margin_m=left_m - required,
-        )
-        return Limit(end, reason)
+            return Limit(section, lambda: Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
+
+        def why() -> Reason:
+            required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
+            return Reason(
+                "target",
+                f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
+                distance_m=left_m,
+                closing_mps=0.0,
+                required_m=required,
+                margin_m=left_m - required,
+            )
+
+        return Limit(end, why)
 
     def _camera_limits(self, known: Knowledge) -> list[Limit]:
         sight, limits = self._config.sight, self._robot.limits
@@ -153,11 +156,12 @@ class DecisionMaker:
             # Blind among people who were moving a moment ago, or for so long that somebody may have come
             # since: comfort would be at their cost.
             urgent = bool(known.bodies.moving.any()) or known.since_s > sight.blind_s
-            return [Limit(0.0, Reason("camera", f"{known.fault}: stop"), urgent=urgent)]
+            reason = Reason("camera", f"{known.fault}: stop")
+            return [Limit(0.0, lambda: reason, urgent=urgent)]
         found = [self._range_limit(known, limits)]
         if known.health.condition is CameraCondition.DEGRADED:
             sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"
-            found.append(Limit(sight.degraded_mps, Reason("camera", sentence)))
+            found.append(Limit(sight.degraded_mps, lambda: Reason("camera", sentence)))
         return found
 
     def _range_limit(self, known: Knowledge, limits: Limits) -> Limit:
@@ -170,15 +174,17 @@ class DecisionMaker:
             closing_mps=limits.max_obstacle_speed_mps,
             margin_m=self._config.margins.least_m,
         )
-        return Limit(speed, Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed(speed)}"))
+        return Limit(
+            speed, lambda: Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed(speed)}")
+        )
 
     def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
         top_mps = self._robot.limits.max_speed_mps
-        watched = min(limits, key=lambda limit: limit.speed_mps)
-        raw_mps = self._start_or_creep(watched, motion)
-        if raw_mps < watched.speed_mps:
-            sentence = f"{watched.reason.sentence}: too little to go for"
-            watched = replace(watched, reason=replace(watched.reason, sentence=sentence))
+        least = _least(limits)
+        watched = least.reason
+        raw_mps = self._start_or_creep(least.speed_mps, watched.rule, motion)
+        if raw_mps < least.speed_mps:
+            watched = replace(watched, sentence=f"{watched.sentence}: too little to go for")
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
             self._last = watched
@@ -194,33 +200,33 @@ class DecisionMaker:
             action = Action.KEEP
         return Decision(action, target_mps, reason, self._emergency, self._stuck_since_ns)
 
-    def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
+    def _start_or_creep(self, speed_mps: float, rule: Rule | RivalRule, motion: Motion) -> float:
         """No creeping up to what blocks the way, and no start for a way that is hardly free."""
-        if limit.reason.rule not in BLOCKING_RULES:
-            return limit.speed_mps
+        if rule not in BLOCKING_RULES:
+            return speed_mps
         release = self._config.release
         least = release.creep_mps
         if motion.v_mps <= STANDING_MPS:
             least = starts_at_mps(release, self._comfort)
-            if limit.reason.rule == "worst case":
+            if rule == "worst case":
                 # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
                 least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
-        return limit.speed_mps if limit.speed_mps >= least else 0.0
+        return speed_mps if speed_mps >= least else 0.0
 
-    def _reason(self, watched: Limit, on_way: Limit, raw_mps: float, gated_mps: float) -> Reason:
+    def _reason(self, watched: Reason, on_way: Limit, raw_mps: float, gated_mps: float) -> Reason:
         if on_way.speed_mps <= gated_mps:
             return on_way.reason
         if gated_mps >= raw_mps or self._last is None:
-            return watched.reason
-        held = self._last.reason
+            return watched
+        held = self._last
         return Reason(
             "release",
             f"not yet faster after: {held.sentence}",
             held.obstacle_id,
-            watched.reason.distance_m,
-            watched.reason.closing_mps,
-            watched.reason.required_m,
-            watched.reason.margin_m,
+            watched.distance_m,
+            watched.closing_mps,
+            watched.required_m,
+            watched.margin_m,
         )
 
     def _brakes_hard(self, limits: list[Limit], allowed_mps: float, motion: Motion) -> bool:
@@ -246,3 +252,12 @@ class DecisionMaker:
         if target_mps < v_mps - band or stopping:
             return Action.DECREASE
         return Action.KEEP
+
+
+def _least(limits: list[Limit]) -> Limit:
+    """The first of those that allow the least."""
+    least = limits[0]
+    for limit in limits:
+        if limit.speed_mps < least.speed_mps:
+            least = limit
+    return least
