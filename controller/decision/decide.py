@@ -129,9 +129,11 @@ class DecisionMaker:
         """The least that robot, section, bend and end of the path allow."""
         left_m = path.length_m - on_path.s_m
         ahead_s = on_path.s_m + motion.v_mps * motion.latency_s
-        # Who accelerates brakes only once that has ended; but no section is left before it has been left.
-        steady_s = ahead_s + braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
-        section = min(path.speed_limit(ahead_s), path.speed_limit(steady_s))
+        section = path.speed_limit(ahead_s)
+        if motion.a_mps2 > 0.0:
+            # Who accelerates brakes only once that has ended; but no section is left before it has been left.
+            steady_s = ahead_s + braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
+            section = min(section, path.speed_limit(steady_s))
         end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
         if section <= end:
             rule: Rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
