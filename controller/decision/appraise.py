@@ -114,7 +114,8 @@ class Appraiser:
         watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
         self._watched = bodies.select(watched)
         self._remembered = known.remembered[watched] if len(self._watched) else _NONE
-        self._inside.intersection_update(bodies.ids.tolist())
+        if self._inside:
+            self._inside.intersection_update(bodies.ids.tolist())
 
     def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
         """The nearest unexplained surface, and the end of the floor that was seen to be free."""

@@ -94,7 +94,8 @@ class StandingLimits:
         placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
         clear_m = self._clear(known, placed, s_m, before)
         near = clear_m <= margins.lateral_m + margins.graze_m
-        self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
+        if self._inside:
+            self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
         rows = (near & ~bodies.moving).nonzero()[0]
         if len(rows):
             stop_m = self._standing_off(known, bodies, placed)
@@ -105,9 +106,9 @@ class StandingLimits:
     def _clear(self, known: Knowledge, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
         """(N,) free floor beside the swept corridor; in bends, by the outlines when they were last seen
         whole, by number before this scene, as long as nothing nearer is seen of them."""
-        clear_m: FloatArray = placed.clear_m[:, 0].copy()
         if known.corridor.straight:
-            return clear_m
+            return placed.clear_m[:, 0]
+        clear_m = placed.clear_m[:, 0].copy()
         standing, near_m = ~known.bodies.moving, self._config.margins.lateral_m + _BESIDE_M
         beside = standing & (clear_m <= near_m) & (placed.hi_m[:, 0] > s_m)
         bodies, depth_m = known.bodies.select(beside), self._config.prediction.body_depth_m

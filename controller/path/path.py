@@ -137,17 +137,28 @@ class Path:
     def _check_doubling_back(self, width_m: float) -> None:
         s = np.append(np.arange(0.0, self.length_m, width_m / 4.0), self.length_m)
         x, y, heading = self.poses(s)
-        for k in range(len(s)):
-            near = np.hypot(x[k:] - x[k], y[k:] - y[k]) < width_m
-            turned = np.abs((heading[k:] - heading[k] + math.pi) % (2.0 * math.pi) - math.pi)
-            again = np.flatnonzero(near & (turned > _OPPOSED_RAD))
-            if not len(again):
-                continue
-            first, second = s[k], s[k + again[0]]
+        first, again = _swept_twice(x, y, heading, width_m)
+        if again > first:
             raise PathError(
-                f"path: doubles back on itself: the robot would sweep the same floor at {first:.1f} m and, "
-                f"the other way, at {second:.1f} m; widen the turn to a radius above {width_m / 2:.2f} m"
+                "path: doubles back on itself: the robot would sweep the same floor at "
+                f"{s[first]:.1f} m and, the other way, at {s[again]:.1f} m; "
+                f"widen the turn to a radius above {width_m / 2:.2f} m"
             )
+
+
+@compiled("float64[:], float64[:], float64[:], float64")
+def _swept_twice(
+    x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray, width_m: float
+) -> tuple[int, int]:
+    """The first two of poses (S,) that are nearer to each other than width_m and opposed; 0, 0: there are
+    none."""
+    for k in range(len(x_m)):
+        for j in range(k, len(x_m)):
+            if math.hypot(x_m[j] - x_m[k], y_m[j] - y_m[k]) < width_m:
+                turned = (heading_rad[j] - heading_rad[k] + math.pi) % (2.0 * math.pi) - math.pi
+                if abs(turned) > _OPPOSED_RAD:
+                    return k, j
+    return 0, 0
 
 
 @compiled("float64[::1], float64")
