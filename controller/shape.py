@@ -76,6 +76,7 @@ class SpeedShaper:
         self._v, self._a = 0.0, 0.0
         self._otg = Ruckig(1)
         self._problem, self._trajectory = _problem_within(limits), Trajectory(1)
+        self._solves_within: BrakeLimits | None = None
 
     @property
     def v_mps(self) -> float:
@@ -185,7 +186,9 @@ class SpeedShaper:
         problem, trajectory = self._problem, self._trajectory
         problem.current_velocity, problem.current_acceleration = [self._v], [self._a]
         problem.target_velocity = [target_mps]
-        problem.min_acceleration, problem.max_jerk = [-brake.decel_mps2], [brake.jerk_mps3]
+        if brake is not self._solves_within:
+            problem.min_acceleration, problem.max_jerk = [-brake.decel_mps2], [brake.jerk_mps3]
+            self._solves_within = brake
         result = self._otg.calculate(problem, trajectory)
         if result not in (Result.Working, Result.Finished):
             raise ArithmeticError(f"no profile, result {result}")

@@ -119,20 +119,30 @@ class Appraiser:
 
     def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
         """The nearest unexplained surface, and the end of the floor that was seen to be free."""
-        margins, sight = self._config.margins, known.sight
+        sight = known.sight
         front_m = s_m + known.corridor.front_m
         found = self._corner(sight.corners.nearest(front_m), front_m, motion)
         if math.isfinite(sight.surface_s_m):
-            gap = Gap(sight.surface_s_m - front_m, obstacle_id=_owner(known, sight.surface_s_m, s_m))
-            found.append(
-                stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", "stands")
-            )
+            found.append(self._surface(known, sight.surface_s_m, s_m, motion))
         if known.lens.covered:
             urgent = bool(known.bodies.moving.any())
             found.append(Limit(0.0, _covered, urgent=urgent))
         if sight.known_s_m < known.corridor.path.length_m + known.corridor.front_m:
             found.append(self._unseen(Gap(sight.known_s_m - front_m), motion))
         return found
+
+    def _surface(self, known: Knowledge, surface_s_m: float, s_m: float, motion: Motion) -> Limit:
+        """The nearest surface that no box explains. Whose it is matters to the words alone."""
+        margins, ahead_m = self._config.margins, surface_s_m - (s_m + known.corridor.front_m)
+
+        def before(gap: Gap) -> Limit:
+            return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", "stands")
+
+        def why() -> Reason:
+            return before(Gap(ahead_m, obstacle_id=_owner(known, surface_s_m, s_m))).reason
+
+        limit = before(Gap(ahead_m))
+        return Limit(limit.speed_mps, why, limit.urgent)
 
     def _unseen(self, gap: Gap, motion: Motion) -> Limit:
         """The end of the floor that was seen to be free."""

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from operator import attrgetter
 
 from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
-from config.robot import Limits, Robot
+from config.robot import Robot
 from controller import braking
 from controller.decision.appraise import Appraiser
 from controller.decision.decision import Action, Decision, Reason, RivalRule, Rule
@@ -39,6 +40,7 @@ _OVER_COMFORT_MPS = 0.05
 # The target point is closed in on by the shaper; the limit that is reported for it must not do so earlier.
 _END_SLACK_M = 0.02
 _AT_END_M = 0.02
+_speed_of = attrgetter("speed_mps")
 
 
 class DecisionMaker:
@@ -56,6 +58,7 @@ class DecisionMaker:
         self._comfort = braking.comfort(robot.limits)
         self._range_brake = braking.emergency(robot.limits) if config.emergency_caps_range else self._comfort
         self._latency_s = period_s + config.chassis_delay_s
+        self._sees_m = config.sight.range_m + mount.forward_m - robot.body.front_m
         self._path: Path | None = None
         self._known: Knowledge | None = None
         self._appraiser = Appraiser(config, robot.limits, mount)
@@ -97,12 +100,10 @@ class DecisionMaker:
         before, self._now_ns = self._now_ns, now_ns
         if before is not None and now_ns < before:
             return f"time went back by {(before - now_ns) / NS_PER_S:.3f} s"
-        if not math.isfinite(pose.x_m + pose.y_m + pose.heading_rad):
-            return "where the robot is is not known"
-        if not math.isfinite(on_path.s_m + on_path.d_m + on_path.heading_rad):
-            return "where the robot is on its path is not known"
-        if not (math.isfinite(v_mps) and math.isfinite(at.a_mps2)):
-            return "how fast the robot is is not known"
+        on_floor = pose.x_m + pose.y_m + pose.heading_rad
+        along = on_path.s_m + on_path.d_m + on_path.heading_rad
+        if not math.isfinite(on_floor + along + v_mps + at.a_mps2):
+            return _unknown(on_floor, along)
         if v_mps < BACKWARDS_MPS:
             return f"the robot moves backwards at {-v_mps:.2f} m/s"
         if abs(on_path.d_m) > self._config.off_path_m:
@@ -153,27 +154,28 @@ class DecisionMaker:
         return Limit(end, why)
 
     def _camera_limits(self, known: Knowledge) -> list[Limit]:
-        sight, limits = self._config.sight, self._robot.limits
+        sight = self._config.sight
         if known.fault:
             # Blind among people who were moving a moment ago, or for so long that somebody may have come
             # since: comfort would be at their cost.
             urgent = bool(known.bodies.moving.any()) or known.since_s > sight.blind_s
             reason = Reason("camera", f"{known.fault}: stop")
             return [Limit(0.0, lambda: reason, urgent=urgent)]
-        found = [self._range_limit(known, limits)]
+        found = [self._range_limit(known.age_s)]
         if known.health.condition is CameraCondition.DEGRADED:
             sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"
             found.append(Limit(sight.degraded_mps, lambda: Reason("camera", sentence)))
         return found
 
-    def _range_limit(self, known: Knowledge, limits: Limits) -> Limit:
-        """What may come from beyond the range at V_omax must still find the robot standing."""
-        sees_m = self._config.sight.range_m + self._mount.forward_m - self._robot.body.front_m
+    def _range_limit(self, age_s: float) -> Limit:
+        """What may come from beyond the range at V_omax must still find the robot standing; age_s: since the
+        last look."""
+        sees_m = self._sees_m
         speed = braking.speed_for_distance(
             sees_m,
             self._range_brake,
-            latency_s=self._latency_s + known.age_s,
-            closing_mps=limits.max_obstacle_speed_mps,
+            latency_s=self._latency_s + age_s,
+            closing_mps=self._robot.limits.max_obstacle_speed_mps,
             margin_m=self._config.margins.least_m,
         )
         return Limit(
@@ -236,8 +238,9 @@ class DecisionMaker:
         held back for a while."""
         if motion.v_mps <= STANDING_MPS:
             return False
-        urgent = any(limit.urgent for limit in limits)
-        return urgent or (self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS)
+        if self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS:
+            return True
+        return any(limit.urgent for limit in limits)
 
     def _note_stuck(self, target_mps: float, motion: Motion, reason: Reason, now_ns: int) -> None:
         blocked = reason.rule in BLOCKING_RULES or reason.rule == "release"
@@ -256,10 +259,15 @@ class DecisionMaker:
         return Action.KEEP
 
 
+def _unknown(on_floor: float, along: float) -> str:
+    """What is no number: on_floor of the robot's pose, along of its place on the path, or else its speed."""
+    if not math.isfinite(on_floor):
+        return "where the robot is is not known"
+    if not math.isfinite(along):
+        return "where the robot is on its path is not known"
+    return "how fast the robot is is not known"
+
+
 def _least(limits: list[Limit]) -> Limit:
     """The first of those that allow the least."""
-    least = limits[0]
-    for limit in limits:
-        if limit.speed_mps < least.speed_mps:
-            least = limit
-    return least
+    return min(limits, key=_speed_of)

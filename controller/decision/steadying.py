@@ -9,7 +9,6 @@ case.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +57,7 @@ class SteadyVelocities:
             dt_s,
         )
         self._ids, self._moved, self._velocity, self._variance = seen.ids, moving, velocity, variance
-        return replace(seen, velocity_mps=velocity, surprise_mps=surprise)
+        return seen.but(velocity_mps=velocity, surprise_mps=surprise)
 
 
 @compiled(
