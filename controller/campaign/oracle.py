@@ -77,13 +77,15 @@ class Lattice:
         return _NEVER
 
     def _step(self, states: list[int]) -> list[int]:
-        slower, faster = [0, *states[:-1]], [*states[1:], 0]
-        return [
-            ((less | bits << 1 | more << 2) << 2 * k >> 1) & allowed
-            for k, (less, bits, more, allowed) in enumerate(
-                zip(slower, states, faster, self._allowed, strict=True)
-            )
-        ]
+        following = []
+        for k, allowed in enumerate(self._allowed):
+            bits = states[k] << (2 * k)
+            if k > 0:
+                bits |= states[k - 1] << (2 * k - 1)
+            if k < _LEVELS:
+                bits |= states[k + 1] << (2 * k + 1)
+            following.append(bits & allowed)
+        return following
 
 
 def _bits(flags: NDArray[np.bool_]) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,7 @@ def as_measured(bodies: Bodies, mistaken_mps: float) -> Bodies:
     if not goes.any():
         return bodies
     velocity = np.where(goes[:, None], bodies.measured_mps, bodies.velocity_mps)
-    return bodies.but(velocity_mps=velocity, moving=bodies.moving | goes)
+    return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)
 
 
 def alike(bodies: Bodies, seen: Bodies) -> BoolArray:

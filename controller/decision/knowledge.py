@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,7 +205,7 @@ class Knowledge:
             return bodies
         points = np.concatenate(places)
         there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
-        return bodies.but(age_s=np.where(there, np.maximum(bodies.age_s, SETTLED_S), bodies.age_s))
+        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, SETTLED_S), bodies.age_s))
 
 
 @compiled("float64[:], float64[:], boolean[:]")

@@ -21,6 +21,7 @@ A body of the last scene that is missing in this one is kept while its place is 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +94,7 @@ class OutOfView:
             return seen
         velocity = seen.velocity_mps.copy()
         velocity[leaves] = [self._coming[ids[k]] for k in np.flatnonzero(leaves).tolist()]
-        return seen.but(velocity_mps=velocity, moving=seen.moving | leaves)
+        return replace(seen, velocity_mps=velocity, moving=seen.moving | leaves)
 
     def update(
         self,
@@ -122,7 +123,7 @@ class OutOfView:
             return no_bodies(seen.captured_ns)
         some_move = np.count_nonzero(bodies.moving) > 0
         xy_m = self._gone_on(bodies, dt_s, pose) if some_move else bodies.xy_m
-        bodies = bodies.but(captured_ns=seen.captured_ns, xy_m=xy_m, unseen_s=bodies.unseen_s + dt_s)
+        bodies = bodies.gone_on(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
         part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
         kept = self._hidden(bodies, pose, edge_tan)
         if some_move:
@@ -188,7 +189,7 @@ class OutOfView:
             turned_mps = _TURNS_MPS2 * float(self._since_s[k])
             np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
             unseen_s[k] = 0.0
-        return bodies.but(xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
+        return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
 
     def _hidden(self, bodies: Bodies, pose: PlanarPose, edge_tan: float) -> BoolArray:
         """(N,) beside, below or above the view, and not behind the camera by more than a robot's length. At

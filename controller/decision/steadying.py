@@ -9,6 +9,7 @@ case.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +58,7 @@ class SteadyVelocities:
             dt_s,
         )
         self._ids, self._moved, self._velocity, self._variance = seen.ids, moving, velocity, variance
-        return seen.but(velocity_mps=velocity, surprise_mps=surprise)
+        return replace(seen, velocity_mps=velocity, surprise_mps=surprise)
 
 
 @compiled(

@@ -106,15 +106,13 @@ def seen_of(
 
 def _eye(pose: PlanarPose, mount: CameraMount) -> tuple[float, float, float, float]:
     """x_m and y_m of the camera on the floor, and the cosine and sine of where it looks."""
-    return _carried(pose.x_m, pose.y_m, pose.heading_rad, mount.forward_m, mount.left_m)
-
-
-@compiled("float64, float64, float64, float64, float64")
-def _carried(
-    x_m: float, y_m: float, heading_rad: float, forward_m: float, left_m: float
-) -> tuple[float, float, float, float]:
-    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    return x_m + forward_m * cos - left_m * sin, y_m + forward_m * sin + left_m * cos, cos, sin
+    cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    return (
+        pose.x_m + mount.forward_m * cos - mount.left_m * sin,
+        pose.y_m + mount.forward_m * sin + mount.left_m * cos,
+        cos,
+        sin,
+    )
 
 
 @compiled("float64[:], float64")
