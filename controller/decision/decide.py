@@ -16,7 +16,7 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller import braking
 from controller.decision.appraise import Appraiser
-from controller.decision.decision import Action, Decision, Reason, RivalRule, Rule
+from controller.decision.decision import Action, Decision, Reason, Rule
 from controller.decision.knowledge import Knowledge
 from controller.decision.limits import (
     BACKWARDS_MPS,
@@ -185,16 +185,17 @@ class DecisionMaker:
     def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
         top_mps = self._robot.limits.max_speed_mps
         least = _least(limits)
-        watched = least.reason
-        raw_mps = self._start_or_creep(least.speed_mps, watched.rule, motion)
-        if raw_mps < least.speed_mps:
-            watched = replace(watched, sentence=f"{watched.sentence}: too little to go for")
+        raw_mps = self._start_or_creep(least, motion)
+        watched: Reason | None = None
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
-            self._last = watched
+            self._last = watched = _in_words(least, raw_mps)
         gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
         target_mps = min(gated_mps, on_way.speed_mps)
-        reason = self._reason(watched, on_way, raw_mps, gated_mps)
+        if on_way.speed_mps <= gated_mps:
+            reason = on_way.reason
+        else:
+            reason = self._reason(watched or _in_words(least, raw_mps), raw_mps, gated_mps)
         self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         action = self._action(target_mps, motion.v_mps)
@@ -204,22 +205,22 @@ class DecisionMaker:
             action = Action.KEEP
         return Decision(action, target_mps, reason, self._emergency, self._stuck_since_ns)
 
-    def _start_or_creep(self, speed_mps: float, rule: Rule | RivalRule, motion: Motion) -> float:
+    def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
         """No creeping up to what blocks the way, and no start for a way that is hardly free."""
+        release, standing = self._config.release, motion.v_mps <= STANDING_MPS
+        least = starts_at_mps(release, self._comfort) if standing else release.creep_mps
+        if limit.speed_mps >= least:
+            return limit.speed_mps
+        rule = limit.reason.rule
         if rule not in BLOCKING_RULES:
-            return speed_mps
-        release = self._config.release
-        least = release.creep_mps
-        if motion.v_mps <= STANDING_MPS:
-            least = starts_at_mps(release, self._comfort)
-            if rule == "worst case":
-                # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
-                least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
-        return speed_mps if speed_mps >= least else 0.0
+            return limit.speed_mps
+        if standing and rule == "worst case":
+            # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
+            least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
+        return limit.speed_mps if limit.speed_mps >= least else 0.0
 
-    def _reason(self, watched: Reason, on_way: Limit, raw_mps: float, gated_mps: float) -> Reason:
-        if on_way.speed_mps <= gated_mps:
-            return on_way.reason
+    def _reason(self, watched: Reason, raw_mps: float, gated_mps: float) -> Reason:
+        """For less than what the path allows: what is watched now, or what was while that is held back."""
         if gated_mps >= raw_mps or self._last is None:
             return watched
         held = self._last
@@ -266,6 +267,14 @@ def _unknown(on_floor: float, along: float) -> str:
     if not math.isfinite(along):
         return "where the robot is on its path is not known"
     return "how fast the robot is is not known"
+
+
+def _in_words(limit: Limit, speed_mps: float) -> Reason:
+    """Why only speed_mps is left of it."""
+    reason = limit.reason
+    if speed_mps < limit.speed_mps:
+        return replace(reason, sentence=f"{reason.sentence}: too little to go for")
+    return reason
 
 
 def _least(limits: list[Limit]) -> Limit:
