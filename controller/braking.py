@@ -13,16 +13,16 @@ towards the robot. An infinite J with tau = 0 gives the formulas of Daeef 2020 (
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from config.robot import Limits
 from hal.compiled import compiled, inlined
+from hal.records import record
 
 _NEWTON_STEPS = 60
 _CONVERGED = 1e-14
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class BrakeLimits:
     """How hard a stop may be. jerk_mps3 may be infinite (the paper's model); both must be positive."""
 
@@ -34,7 +34,7 @@ class BrakeLimits:
             raise ValueError(f"limits must be positive: {self.decel_mps2} m/s2, {self.jerk_mps3} m/s3")
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Stop:
     """What a stop takes until standstill."""
 
@@ -59,8 +59,10 @@ def stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
     a deceleration in time (v < a^2 / 2J, only after a fault), the deceleration drops to zero at standstill:
     the robot never reverses. Raises ValueError for a negative or unknown speed or acceleration.
     """
-    _check_state(v_mps, a_mps2)
-    return Stop(*_one_stop(v_mps, a_mps2, limits.decel_mps2, limits.jerk_mps3))
+    distance_m, time_s = _one_stop(v_mps, a_mps2, limits.decel_mps2, limits.jerk_mps3)
+    if math.isnan(distance_m):
+        _check_state(v_mps, a_mps2)
+    return Stop(distance_m, time_s)
 
 
 def required_distance(
@@ -76,10 +78,11 @@ def required_distance(
     S_n = (V + V_o) tau + S(V, a) + V_o T(V, a) + margin (motion-formulas 4.8). closing_mps is the speed of
     the obstacle itself towards the robot; what moves away counts as standing.
     """
-    _check_state(v_mps, a_mps2)
     decel_mps2, jerk_mps3 = limits.decel_mps2, limits.jerk_mps3
-    towards_mps = max(closing_mps, 0.0)
-    return _required_m(v_mps, a_mps2, towards_mps, latency_s, decel_mps2, jerk_mps3) + margin_m
+    required_m = _required_m(v_mps, a_mps2, closing_mps, latency_s, decel_mps2, jerk_mps3)
+    if math.isnan(required_m):
+        _check_state(v_mps, a_mps2)
+    return required_m + margin_m
 
 
 def speed_for_distance(
@@ -97,12 +100,9 @@ def speed_for_distance(
     v = -A b + sqrt(A^2 b^2 + 2 A d) with b = tau + A / 2J + V_o / A (4.7), else the root of a cubic in
     sqrt(v).
     """
-    towards_mps = max(closing_mps, 0.0)
-    free_m = distance_m - margin_m
-    # Even who stands needs what comes nearer during the latency.
-    if free_m <= towards_mps * latency_s:
-        return 0.0
-    return _speed_for(free_m, a_mps2, towards_mps, latency_s, limits.decel_mps2, limits.jerk_mps3)
+    return _speed_for(
+        distance_m - margin_m, a_mps2, closing_mps, latency_s, limits.decel_mps2, limits.jerk_mps3
+    )
 
 
 def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float:
@@ -172,7 +172,9 @@ def _stop_within(v_mps: float, a_mps2: float, big_a: float, j: float) -> tuple[f
 
 @inlined
 def _stop(v_mps: float, a_mps2: float, big_a: float, j: float) -> tuple[float, float]:
-    """Distance and time of stop()."""
+    """Distance and time of stop(); NaN from a speed below 0, or from what is not known."""
+    if not (0.0 <= v_mps < math.inf and math.isfinite(a_mps2)):
+        return math.nan, math.nan
     if math.isinf(j):
         return v_mps * v_mps / (2.0 * big_a), v_mps / big_a
     ease_s = (abs(a_mps2) - big_a) / j
@@ -252,9 +254,9 @@ def _one_stop(v_mps: float, a_mps2: float, big_a: float, j: float) -> tuple[floa
 
 @compiled("float64, float64, float64, float64, float64, float64")
 def _required_m(
-    v_mps: float, a_mps2: float, towards_mps: float, latency_s: float, big_a: float, j: float
+    v_mps: float, a_mps2: float, closing_mps: float, latency_s: float, big_a: float, j: float
 ) -> float:
-    return _required(v_mps, a_mps2, towards_mps, latency_s, big_a, j)
+    return _required(v_mps, a_mps2, max(closing_mps, 0.0), latency_s, big_a, j)
 
 
 @compiled("float64, float64, float64, float64")
@@ -264,9 +266,13 @@ def _slowing_m(v_mps: float, end_mps: float, big_a: float, j: float) -> float:
 
 @compiled("float64, float64, float64, float64, float64, float64")
 def _speed_for(
-    free_m: float, a_mps2: float, towards_mps: float, latency_s: float, big_a: float, j: float
+    free_m: float, a_mps2: float, closing_mps: float, latency_s: float, big_a: float, j: float
 ) -> float:
-    """speed_for_distance(), for more than what comes nearer during the latency."""
+    """speed_for_distance() without a margin."""
+    towards_mps = max(closing_mps, 0.0)
+    # Even who stands needs what comes nearer during the latency.
+    if free_m <= towards_mps * latency_s:
+        return 0.0
     if abs(a_mps2) > big_a:
         return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, big_a, j)
     # In terms of u = v + a^2 / 2J, every a adds only a linear term and a constant to the law for a = 0.

@@ -25,6 +25,7 @@ from hal.types import CameraMount, PlanarPose, Pose
 from vision.scene import EgoMotion
 
 HISTORY_S = 2.0
+_HISTORY_NS = round(HISTORY_S * NS_PER_S)
 # The way behind is kept as legs so short that each is straight; beyond this many the oldest are settled.
 LEG_M = 0.05
 LEG_RAD = 0.02
@@ -44,14 +45,15 @@ class PoseHistory:
 
     def append(self, stamp_ns: int, pose: PlanarPose) -> None:
         """Add a pose; a stamp that does not advance replaces the last one."""
-        while self._stamps_ns and self._stamps_ns[-1] >= stamp_ns:
-            self._stamps_ns.pop()
-            self._poses.pop()
-        self._stamps_ns.append(stamp_ns)
-        self._poses.append(pose)
-        while self._stamps_ns[0] < stamp_ns - HISTORY_S * NS_PER_S:
-            self._stamps_ns.popleft()
-            self._poses.popleft()
+        stamps_ns, poses, oldest_ns = self._stamps_ns, self._poses, stamp_ns - _HISTORY_NS
+        while stamps_ns and stamps_ns[-1] >= stamp_ns:
+            stamps_ns.pop()
+            poses.pop()
+        stamps_ns.append(stamp_ns)
+        poses.append(pose)
+        while stamps_ns[0] < oldest_ns:
+            stamps_ns.popleft()
+            poses.popleft()
 
     def at(self, stamp_ns: int) -> PlanarPose | None:
         """The pose at stamp_ns between two known ones; None where it is not known."""

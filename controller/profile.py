@@ -54,7 +54,7 @@ class SpeedRamps:
 
     def distance(self, t_s: FloatArray) -> FloatArray:
         """(N, K) distance m after t_s: (N, K) or (1, K)."""
-        return self.state(t_s)[0]
+        return _distances(self._v, self._a, self._targets, *self._bounds, self._latency_s, t_s)
 
 
 def comfortable(limits: Limits, motion: Motion, targets_mps: FloatArray) -> SpeedRamps:
@@ -107,6 +107,41 @@ def _ramp(
     return max(peak - start, 0.0) / jerk, steady_s, peak / jerk, sign * jerk, sign * peak
 
 
+@inlined
+def _state(
+    t: float,
+    v: float,
+    a: float,
+    target: float,
+    latency_s: float,
+    ramp: tuple[float, float, float, float, float],
+) -> tuple[float, float, float]:
+    """Distance, speed and acceleration at t, of a ramp from v and a to target."""
+    t1, t2, t3, j, peak = ramp
+    v1 = v + a * t1 + j * t1**2 / 2.0
+    v2 = v1 + peak * t2
+    # How long each phase has lasted: latency, jerk, constant, jerk back, done.
+    held = min(t, latency_s)
+    x1 = min(t - held, t1)
+    after = t - held - t1
+    x2 = min(max(after, 0.0), t2)
+    x3 = min(max(after - t2, 0.0), t3)
+    x4 = max(after - t2 - t3, 0.0)
+    distance = (
+        v * (held + x1)
+        + a * x1**2 / 2.0
+        + j * x1**3 / 6.0
+        + v1 * x2
+        + peak * x2**2 / 2.0
+        + v2 * x3
+        + peak * x3**2 / 2.0
+        - j * x3**3 / 6.0
+        + target * x4
+    )
+    speed = max(v + a * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0, 0.0)
+    return distance, speed, peak - j * x3 if x2 + x3 > 0.0 else a + j * x1
+
+
 @compiled("float64[:], float64[:], float64[:], float64, float64, float64")
 def _durations(
     v: FloatArray, a: FloatArray, target: FloatArray, accel: float, decel: float, jerk: float
@@ -134,29 +169,30 @@ def _states(
     shape = len(target), t_s.shape[1]
     distance, speed, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
     for k in range(shape[0]):
-        t1, t2, t3, j, peak = _ramp(v[k], a[k], target[k], accel, decel, jerk)
-        v1 = v[k] + a[k] * t1 + j * t1**2 / 2.0
-        v2 = v1 + peak * t2
+        ramp = _ramp(v[k], a[k], target[k], accel, decel, jerk)
         for i in range(shape[1]):
-            # How long each phase has lasted: latency, jerk, constant, jerk back, done.
             t = t_s[min(k, len(t_s) - 1), i]
-            held = min(t, latency_s)
-            x1 = min(t - held, t1)
-            after = t - held - t1
-            x2 = min(max(after, 0.0), t2)
-            x3 = min(max(after - t2, 0.0), t3)
-            x4 = max(after - t2 - t3, 0.0)
-            distance[k, i] = (
-                v[k] * (held + x1)
-                + a[k] * x1**2 / 2.0
-                + j * x1**3 / 6.0
-                + v1 * x2
-                + peak * x2**2 / 2.0
-                + v2 * x3
-                + peak * x3**2 / 2.0
-                - j * x3**3 / 6.0
-                + target[k] * x4
+            distance[k, i], speed[k, i], acceleration[k, i] = _state(
+                t, v[k], a[k], target[k], latency_s, ramp
             )
-            speed[k, i] = max(v[k] + a[k] * x1 + j * x1**2 / 2.0 + peak * (x2 + x3) - j * x3**2 / 2.0, 0.0)
-            acceleration[k, i] = peak - j * x3 if x2 + x3 > 0.0 else a[k] + j * x1
     return distance, speed, acceleration
+
+
+@compiled("float64[:], float64[:], float64[:], float64, float64, float64, float64, float64[:, :]")
+def _distances(
+    v: FloatArray,
+    a: FloatArray,
+    target: FloatArray,
+    accel: float,
+    decel: float,
+    jerk: float,
+    latency_s: float,
+    t_s: FloatArray,
+) -> FloatArray:
+    """The distance of _states() alone."""
+    distance = np.empty((len(target), t_s.shape[1]))
+    for k in range(len(target)):
+        ramp = _ramp(v[k], a[k], target[k], accel, decel, jerk)
+        for i in range(t_s.shape[1]):
+            distance[k, i] = _state(t_s[min(k, len(t_s) - 1), i], v[k], a[k], target[k], latency_s, ramp)[0]
+    return distance

@@ -13,7 +13,6 @@ The only importer of ruckig. Its traps (verified with 0.19.4) and what is done a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from ruckig import (  # type: ignore[import-not-found]  # a compiled module without stubs
     ControlInterface,
@@ -29,6 +28,7 @@ from controller import braking
 from controller.braking import BrakeLimits
 from controller.chassis_lag import ChassisLag
 from controller.profile import stop_step
+from hal.records import record
 
 # The closing at the path's end is planned a little gentler than what is allowed, so that what the odometry
 # corrects on the way can still be followed.
@@ -44,7 +44,7 @@ _TINY = 1e-9
 _TOLERANCE = 1e-7
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class ShapedSpeed:
     """One point of the profile. fault: why it is the stop profile instead of ruckig's, "" if it is not."""
 
@@ -76,6 +76,7 @@ class SpeedShaper:
         self._v, self._a = 0.0, 0.0
         self._otg = Ruckig(1)
         self._problem, self._trajectory = _problem_within(limits), Trajectory(1)
+        self._solves_within: BrakeLimits | None = None
 
     @property
     def v_mps(self) -> float:
@@ -185,7 +186,9 @@ class SpeedShaper:
         problem, trajectory = self._problem, self._trajectory
         problem.current_velocity, problem.current_acceleration = [self._v], [self._a]
         problem.target_velocity = [target_mps]
-        problem.min_acceleration, problem.max_jerk = [-brake.decel_mps2], [brake.jerk_mps3]
+        if brake is not self._solves_within:
+            problem.min_acceleration, problem.max_jerk = [-brake.decel_mps2], [brake.jerk_mps3]
+            self._solves_within = brake
         result = self._otg.calculate(problem, trajectory)
         if result not in (Result.Working, Result.Finished):
             raise ArithmeticError(f"no profile, result {result}")

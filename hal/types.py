@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.records import record
+
 FloatArray = NDArray[np.float64]
 ColourImage = NDArray[np.uint8]
 DepthImage = NDArray[np.uint16]
@@ -95,7 +97,7 @@ class Pose:
         return points_m @ self.rotation.T + self.translation_m
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class PlanarPose:
     """The body on the floor of a fixed frame (odometry or world): metres, radians."""
 
@@ -117,7 +119,7 @@ class CameraMount:
     pitch_rad: float
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Setpoint:
     """What the chassis shall do from stamp_ns on: a point of the jerk-limited profile."""
 

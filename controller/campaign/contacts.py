@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.campaign.drive import DriveLog
-from controller.campaign.stage import Stage
+from controller.campaign.stage import Stage, circles_around, reach_of
+from hal.compiled import compiled
 from hal.types import FloatArray
 from sim.planar import separation
 
@@ -28,10 +29,18 @@ class Contact:
     v_mps: float
 
 
-def _furthest(moves: FloatArray) -> FloatArray:
-    """(T,) the furthest of moves (T, K, 2)."""
-    furthest: FloatArray = np.sqrt((moves * moves).sum(axis=2).max(axis=1))
-    return furthest
+@compiled("float64[:, :, :], int64")
+def _moved_m(polygons: FloatArray, stride: int) -> FloatArray:
+    """(T,) how far any corner of polygons (T, K, 2) has moved at most since each stride-th of them."""
+    moved = np.empty(len(polygons))
+    for t in range(len(polygons)):
+        since, square = t // stride * stride, 0.0
+        for k in range(polygons.shape[1]):
+            dx = polygons[t, k, 0] - polygons[since, k, 0]
+            dy = polygons[t, k, 1] - polygons[since, k, 1]
+            square = max(square, dx * dx + dy * dy)
+        moved[t] = math.sqrt(square)
+    return moved
 
 
 class DriveClearance:
@@ -68,13 +77,10 @@ class DriveClearance:
 
     def _around(self, body: int, times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The body's polygons (T, K, 2), and (T,) the distance of circles around it and the robot."""
-        robot = self._stage.robot.body
         polygons = self._stage.world.over(times, body)
-        middle = polygons.mean(axis=1)
-        radius = np.sqrt(((polygons - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
-        reach = math.hypot(max(robot.front_m, robot.rear_m), 0.5 * robot.width_m)
-        gap = np.hypot(middle[:, 0] - poses[:, 0], middle[:, 1] - poses[:, 1]) - radius - reach
-        return polygons, gap
+        x, y, radius = circles_around(polygons).T
+        reach = reach_of(self._stage.robot.body)
+        return polygons, np.hypot(x - poses[:, 0], y - poses[:, 1]) - radius - reach
 
     def _gap(
         self, polygons: FloatArray, gap: FloatArray, poses: FloatArray, exact_below_m: float
@@ -86,10 +92,9 @@ class DriveClearance:
             return gap
         robots, others = self._stage.robots(poses[near]), polygons[near]
         # Every tenth step first: until the next ones, neither corner of both comes nearer than it has moved.
-        tenth = np.arange(len(near)) // _STRIDE * _STRIDE
         sampled = separation(robots[::_STRIDE], others[::_STRIDE])
-        moved = _furthest(robots - robots[tenth]) + _furthest(others - others[tenth])
-        at_least = sampled[tenth // _STRIDE] - moved
+        moved = _moved_m(robots, _STRIDE) + _moved_m(others, _STRIDE)
+        at_least = sampled[np.arange(len(near)) // _STRIDE] - moved
         matters = (
             at_least < max(min(self.least_m, float(sampled.min())), min(exact_below_m, 2.0)) + _ROUNDING_M
         )

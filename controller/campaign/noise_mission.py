@@ -24,6 +24,7 @@ from controller.path.path import OnPath
 from controller.record.tally import SetpointTally
 from controller.shape import SpeedShaper
 from hal.clocks import NS_PER_S
+from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import CameraCondition, CameraHealth, Scene
 
@@ -54,13 +55,15 @@ class _Base:
         self.v_mps += change
 
 
+@compiled("int64, float64, float64")
 def _exposures(steps: int, dt_s: float, fps: float) -> FloatArray:
     """The times of those of so many control steps at which a frame is taken."""
-    times: list[float] = []
+    times, count = np.empty(steps), 0
     for k in range(steps):
-        if len(times) / fps <= k * dt_s + 1e-9:
-            times.append(k * dt_s)
-    return np.array(times)
+        if count / fps <= k * dt_s + 1e-9:
+            times[count] = k * dt_s
+            count += 1
+    return times[:count]
 
 
 class _Eyes:
@@ -138,7 +141,7 @@ class _NoiseDrive:
 
     def run(self) -> DriveLog:
         """All control steps until the drive is over."""
-        for k, off_m in enumerate(self._off_m):
+        for k, off_m in enumerate(self._off_m.tolist()):
             t_s = k * self._dt_s
             pose = self._stage.pose(self._base.s_m, off_m)
             decision = self._decide(t_s, pose, off_m)
@@ -202,12 +205,13 @@ class _NoiseDrive:
         return self._standing_s >= GIVE_UP_S and t_s > max(self._stage.world.end_s, 0.0) + GIVE_UP_S
 
 
-def _off_path_m(white: FloatArray, dt_s: float) -> list[float]:
+@compiled("float64[:], float64")
+def _off_path_m(white: FloatArray, dt_s: float) -> FloatArray:
     """How far to the left of its path the robot is at each control step: white noise (N,), made slow."""
     keep = math.exp(-dt_s / _OFF_PATH_S)
     shake_m = _OFF_PATH_SIGMA_M * math.sqrt(1.0 - keep * keep)
-    off_m, found = 0.0, []
-    for value in white.tolist():
-        off_m = keep * off_m + shake_m * value
-        found.append(off_m)
-    return found
+    off_m, all_m = 0.0, np.empty(len(white))
+    for k in range(len(white)):
+        off_m = keep * off_m + shake_m * white[k]
+        all_m[k] = off_m
+    return all_m

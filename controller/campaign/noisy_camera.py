@@ -63,11 +63,11 @@ class NoisyCamera:
         polygons, velocity = self._stage.world.look(t_s)
         view = self.eye.look(polygons, true_pose)
         self._tracks.advance(velocity, t_s, self._random)
-        self._tracks.sight(view, true_pose, t_s, self._random)
+        self._tracks.sight(view, t_s, self._random)
         return Scene(
             captured_ns=round(t_s * NS_PER_S),
             sequence=sequence,
-            obstacles=self._tracks.obstacles(true_pose, t_s),
+            obstacles=self._tracks.obstacles(view, t_s),
             free_space=self._free_space(view),
             ego_motion=self._ego_motion,
             health=_GOOD,
@@ -77,7 +77,7 @@ class NoisyCamera:
     def _free_space(self, view: PlanarView) -> FreeSpace:
         """What the bands show: the nearest thing in the robot's height, and how far the floor is free."""
         noise, eye = self._noise, self.eye
-        (nearest, known), blind = _scanned(
+        distances, blind = _scanned(
             view.bodies,
             view.forward_m,
             view.free_m,
@@ -93,8 +93,8 @@ class NoisyCamera:
         return FreeSpace(
             eye.bearing_tan,
             eye.half_width_tan,
-            nearest,
-            known,
+            distances[0],
+            distances[1],
             floor_from_m=eye.floor_from_m,
             up_tan=eye.up_tan,
             blank=blind,

@@ -11,7 +11,7 @@ from config.camera import SimulatedCameraConfig
 from controller.campaign.noise_model import NoiseModel
 from controller.campaign.view import PlanarEye, PlanarView
 from hal.compiled import compiled, inlined
-from hal.types import FloatArray, PlanarPose
+from hal.types import FloatArray
 from vision.scene import Obstacle
 
 BoolArray = NDArray[np.bool_]
@@ -64,7 +64,7 @@ class NoisyTracks:
         )
         self._keeps = math.exp(-self._period_s / self._noise.wander_s)
 
-    def sight(self, view: PlanarView, pose: PlanarPose, t_s: float, random: np.random.Generator) -> None:
+    def sight(self, view: PlanarView, t_s: float, random: np.random.Generator) -> None:
         """Take in what this frame shows."""
         noise, eye = self._noise, self._eye
         chance = random.random(len(self._tracks))
@@ -78,7 +78,7 @@ class NoisyTracks:
             eye.half_width_tan,
             eye.range_m,
             self._least_m,
-            *eye.place(pose),
+            *view.place,
             t_s,
             self._period_s,
             noise.missed_share,
@@ -90,14 +90,14 @@ class NoisyTracks:
             noise.forget_s,
         )
 
-    def obstacles(self, pose: PlanarPose, t_s: float) -> tuple[Obstacle, ...]:
-        """As perception lists them."""
+    def obstacles(self, view: PlanarView, t_s: float) -> tuple[Obstacle, ...]:
+        """As perception lists them to who has this view."""
         noise = self._noise
         told, vectors, covariances = _measured(
             self._tracks,
             self._middle_m,
             self._to_optical,
-            *self._eye.place(pose),
+            *view.place,
             t_s,
             noise.sightings,
             noise.kept_by_tracker * noise.depth_sigma_1pm,
@@ -110,22 +110,22 @@ class NoisyTracks:
             noise.first_velocity_fades_s,
         )
         return tuple(
-            Obstacle(
-                id=int(number),
-                bbox_px=_BOX_PX,
-                position_m=position,
-                extent_m=extent,
-                velocity_mps=velocity,
-                velocity_cov=covariance,
-                moving=moves > 0.0,
-                score=0.9 if moves > 0.0 else 0.5,
-                fragments=8,
-                age_s=age_s,
-                unseen_s=unseen_s,
-            )
-            for (number, moves, age_s, unseen_s), (position, extent, velocity), covariance in zip(
-                told.tolist(), vectors, covariances, strict=True
-            )
+            [
+                Obstacle(
+                    id=int(number),
+                    bbox_px=_BOX_PX,
+                    position_m=vectors[k, 0],
+                    extent_m=vectors[k, 1],
+                    velocity_mps=vectors[k, 2],
+                    velocity_cov=covariances[k],
+                    moving=moves > 0.0,
+                    score=0.9 if moves > 0.0 else 0.5,
+                    fragments=8,
+                    age_s=age_s,
+                    unseen_s=unseen_s,
+                )
+                for k, (number, moves, age_s, unseen_s) in enumerate(told.tolist())
+            ]
         )
 
 

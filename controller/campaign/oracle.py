@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from controller import braking
 from controller.campaign.stage import Stage
+from hal.compiled import compiled
 from hal.types import FloatArray
 
 _LEVELS = 24
@@ -99,16 +100,22 @@ def free_time_s(s_m: FloatArray, speed_mps: FloatArray, accel_mps2: float, jerk_
     """
     v2 = np.minimum(speed_mps, math.inf) ** 2
     v2[0] = v2[-1] = 0.0
-    rise = 2.0 * accel_mps2 * np.diff(s_m)
-    for k, step in enumerate(rise.tolist()):
-        v2[k + 1] = min(v2[k + 1], v2[k] + step)
-    for k in range(len(rise) - 1, -1, -1):
-        v2[k] = min(v2[k], v2[k + 1] + rise[k])
-    v = np.sqrt(v2)
+    v = np.sqrt(_reached(v2, 2.0 * accel_mps2 * np.diff(s_m)))
     trapezoid_s = float((2.0 * np.diff(s_m) / np.maximum(v[:-1] + v[1:], 1e-9)).sum())
     peak = float(v.max())
     jerk_s = braking.stop(peak, 0.0, braking.BrakeLimits(accel_mps2, jerk_mps3)).time_s - peak / accel_mps2
     return trapezoid_s + jerk_s
+
+
+@compiled("float64[:], float64[:]")
+def _reached(v2: FloatArray, rise: FloatArray) -> FloatArray:
+    """The squares of speeds (N,) that neither rise nor fall faster than by rise (N - 1,)."""
+    v2 = v2.copy()
+    for k in range(len(rise)):
+        v2[k + 1] = min(v2[k + 1], v2[k] + rise[k])
+    for k in range(len(rise) - 1, -1, -1):
+        v2[k] = min(v2[k], v2[k + 1] + rise[k])
+    return v2
 
 
 def solve(stage: Stage, top_mps: float, horizon_s: float) -> OracleTime:

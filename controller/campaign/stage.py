@@ -50,15 +50,11 @@ class Stage:
         s_m = np.arange(0.0, self.path.length_m + _SWEEP_STEP_M, _SWEEP_STEP_M)
         poses = self.path_poses(s_m)
         robots = self.robots(poses)
-        body = self.robot.body
-        reach_m = float(np.hypot(max(body.front_m, body.rear_m), 0.5 * body.width_m))
+        reach_m = reach_of(self.robot.body)
         for k in np.flatnonzero(self.in_height).tolist():
             moves = bool(self.world.moves[k])
             polygons = self.world.over(times_s if moves else times_s[:1], k)
-            middle = polygons.mean(axis=1)
-            radius = np.sqrt(((polygons - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
-            away = np.hypot(middle[:, None, 0] - poses[:, 0], middle[:, None, 1] - poses[:, 1])
-            when, where = np.nonzero(away < reach_m + radius[:, None])
+            when, where = _near(circles_around(polygons), poses, reach_m)
             if not len(when):
                 continue
             touch = overlap(robots[where], polygons[when])
@@ -67,6 +63,47 @@ class Stage:
                 for one in [stretches[t]] if moves else stretches:
                     one.append(stretch)
         return stretches
+
+
+def reach_of(body: Body) -> float:
+    """The radius of a circle around a robot's turning centre that holds all of it."""
+    return math.hypot(max(body.front_m, body.rear_m), 0.5 * body.width_m)
+
+
+@compiled("float64[:, :, :]")
+def circles_around(polygons: FloatArray) -> FloatArray:
+    """(T, 3) middle and radius of circles that hold polygons (T, K, 2)."""
+    circles = np.empty((len(polygons), 3))
+    for t in range(len(polygons)):
+        x = y = square = 0.0
+        for k in range(polygons.shape[1]):
+            x, y = x + polygons[t, k, 0], y + polygons[t, k, 1]
+        x, y = x / polygons.shape[1], y / polygons.shape[1]
+        for k in range(polygons.shape[1]):
+            square = max(square, (polygons[t, k, 0] - x) ** 2 + (polygons[t, k, 1] - y) ** 2)
+        circles[t] = x, y, math.sqrt(square)
+    return circles
+
+
+@compiled("float64[:, ::1], float64[:, ::1], float64")
+def _near(
+    circles: FloatArray, poses: FloatArray, reach_m: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Which of circles (T, 3) meet a circle of reach_m around which of poses (S, 3), in their order."""
+    meets, count = np.empty((len(circles), len(poses)), np.bool_), 0
+    for t in range(len(circles)):
+        square = (reach_m + circles[t, 2]) ** 2
+        for s in range(len(poses)):
+            dx, dy = circles[t, 0] - poses[s, 0], circles[t, 1] - poses[s, 1]
+            meets[t, s] = dx * dx + dy * dy < square
+            count += meets[t, s]
+    when, where, found = np.empty(count, np.intp), np.empty(count, np.intp), 0
+    for t in range(len(circles)):
+        for s in range(len(poses)):
+            if meets[t, s]:
+                when[found], where[found] = t, s
+                found += 1
+    return when, where
 
 
 @compiled("float64[:, ::1], float64, float64")

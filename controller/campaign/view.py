@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from config.camera import SimulatedCameraConfig
 from config.robot import Mount
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray, PlanarPose
 from sim.planar import PlanarWorld
 from vision.scene import NEVER_M
@@ -23,15 +23,16 @@ _NEAR_M = 0.1
 _TOUCHING_M = 1e-6
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class PlanarView:
     """One look. bodies (M,): which ones were looked at. forward_m (M, B): where each band's ray meets each
     body, inf where it does not or is covered by something nearer. free_m (B,): where the first thing that
-    hides what is behind it stands, the building included."""
+    hides what is behind it stands, the building included. place: PlanarEye.place() of the camera."""
 
     bodies: IntArray
     forward_m: FloatArray
     free_m: FloatArray
+    place: tuple[float, float, float, float]
 
 
 class PlanarEye:
@@ -63,22 +64,22 @@ class PlanarEye:
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> PlanarView:
         """polygons (N, K, 2) of all bodies now; pose of the robot."""
-        return PlanarView(
-            *_look(
-                polygons,
-                self._room,
-                self._z_m,
-                self._hides,
-                self.bearing_tan,
-                self.half_width_tan,
-                self._edge_tan,
-                self.range_m,
-                self._mount.height_m,
-                self._down_tan,
-                self.up_tan,
-                *self.place(pose),
-            )
+        place = self.place(pose)
+        bodies, forward_m, free_m = _look(
+            polygons,
+            self._room,
+            self._z_m,
+            self._hides,
+            self.bearing_tan,
+            self.half_width_tan,
+            self._edge_tan,
+            self.range_m,
+            self._mount.height_m,
+            self._down_tan,
+            self.up_tan,
+            *place,
         )
+        return PlanarView(bodies, forward_m, free_m, place)
 
     def place(self, pose: PlanarPose) -> tuple[float, float, float, float]:
         """x_m and y_m of the camera on the floor, and the cosine and sine of where it looks; pose of the

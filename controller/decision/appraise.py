@@ -89,7 +89,8 @@ class Appraiser:
         # Who is in the way is; and of who is out of sight nothing is measured that could be noise.
         at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
         enters = self._enters.update(watched.ids, comes, at_once, now_s)
-        base_mps = min([base_mps, *(limit.speed_mps for limit in found)])
+        for limit in found:
+            base_mps = min(base_mps, limit.speed_mps)
         in_the_way, chosen_mps = self._moving.limits(
             watched, placed, course, enters, s_m, motion, base_mps, now_s
         )
@@ -113,37 +114,53 @@ class Appraiser:
         watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
         self._watched = bodies.select(watched)
         self._remembered = known.remembered[watched] if len(self._watched) else _NONE
-        self._inside.intersection_update(bodies.ids.tolist())
+        if self._inside:
+            self._inside.intersection_update(bodies.ids.tolist())
 
     def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
         """The nearest unexplained surface, and the end of the floor that was seen to be free."""
-        margins, sight = self._config.margins, known.sight
+        sight = known.sight
         front_m = s_m + known.corridor.front_m
         found = self._corner(sight.corners.nearest(front_m), front_m, motion)
         if math.isfinite(sight.surface_s_m):
-            gap = Gap(sight.surface_s_m - front_m, obstacle_id=_owner(known, sight.surface_s_m, s_m))
-            found.append(
-                stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", "stands")
-            )
+            found.append(self._surface(known, sight.surface_s_m, s_m, motion))
         if known.lens.covered:
             urgent = bool(known.bodies.moving.any())
-            found.append(Limit(0.0, Reason("unseen", f"{COVERED}: stop", distance_m=0.0), urgent=urgent))
+            found.append(Limit(0.0, _covered, urgent=urgent))
         if sight.known_s_m < known.corridor.path.length_m + known.corridor.front_m:
-            gap = Gap(sight.known_s_m - front_m)
-            limit = stop_before(gap, motion, self._comfort, margins.least_m, -math.inf, "unseen", "")
-            sentence = (
-                f"the floor is not seen to be free beyond {max(gap.distance_m, 0.0):.1f} m: "
-                f"{allowed(limit.speed_mps)}"
-            )
-            reason = Reason(
-                "unseen",
-                sentence,
-                distance_m=gap.distance_m,
-                required_m=limit.reason.required_m,
-                margin_m=limit.reason.margin_m,
-            )
-            found.append(Limit(limit.speed_mps, reason))
+            found.append(self._unseen(Gap(sight.known_s_m - front_m), motion))
         return found
+
+    def _surface(self, known: Knowledge, surface_s_m: float, s_m: float, motion: Motion) -> Limit:
+        """The nearest surface that no box explains. Whose it is matters to the words alone."""
+        margins, ahead_m = self._config.margins, surface_s_m - (s_m + known.corridor.front_m)
+
+        def before(gap: Gap) -> Limit:
+            return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, "depth", "stands")
+
+        def why() -> Reason:
+            return before(Gap(ahead_m, obstacle_id=_owner(known, surface_s_m, s_m))).reason
+
+        limit = before(Gap(ahead_m))
+        return Limit(limit.speed_mps, why, limit.urgent)
+
+    def _unseen(self, gap: Gap, motion: Motion) -> Limit:
+        """The end of the floor that was seen to be free."""
+        least_m = self._config.margins.least_m
+        limit = stop_before(gap, motion, self._comfort, least_m, -math.inf, "unseen", "")
+
+        def why() -> Reason:
+            beyond = f"the floor is not seen to be free beyond {max(gap.distance_m, 0.0):.1f} m: "
+            required_m, margin_m = limit.reason.required_m, limit.reason.margin_m
+            return Reason(
+                "unseen",
+                beyond + allowed(limit.speed_mps),
+                distance_m=gap.distance_m,
+                required_m=required_m,
+                margin_m=margin_m,
+            )
+
+        return Limit(limit.speed_mps, why)
 
     def _corner(self, corner: BlindCorner | None, front_m: float, motion: Motion) -> list[Limit]:
         """Past a blind corner, slow enough that whoever steps out has a chance."""
@@ -154,8 +171,16 @@ class Appraiser:
         rolls_m = motion.v_mps * motion.latency_s
         rolls_m += braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
         speed = braking.speed_before_section(ahead_m - rolls_m, slow_mps, self._comfort)
-        sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
-        return [Limit(speed, Reason("corner", sentence + allowed(speed), distance_m=ahead_m))]
+
+        def why() -> Reason:
+            sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
+            return Reason("corner", sentence + allowed(speed), distance_m=ahead_m)
+
+        return [Limit(speed, why)]
+
+
+def _covered() -> Reason:
+    return Reason("unseen", f"{COVERED}: stop", distance_m=0.0)
 
 
 def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from config.decision import SightConfig
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray
 
 IntArray = NDArray[np.intp]
@@ -38,7 +39,7 @@ class _Corner:
     sightings: int
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class BlindCorner:
     """At s_m along the path, beside_m beside the swept width."""
 

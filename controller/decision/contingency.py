@@ -13,33 +13,26 @@ emergency stop from each speed, latency included, is followed in time against al
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.corridor import Placed
 from controller.profile import SpeedRamps
-from hal.compiled import compiled
+from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray
 
 _STANDING_MPS = 0.02
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Reach:
     """What N obstacles could block at K times: inside (N, K) whether, lo_m, hi_m (N, K) which positions."""
 
     inside: NDArray[np.bool_]
     lo_m: FloatArray
     hi_m: FloatArray
-
-    def select(self, rows: NDArray[np.bool_]) -> Reach:
-        """Only these obstacles."""
-        chosen = rows.nonzero()[0]
-        if len(chosen) == len(rows):
-            return self
-        return Reach(self.inside.take(chosen, 0), self.lo_m.take(chosen, 0), self.hi_m.take(chosen, 0))
 
 
 def reach(
@@ -52,8 +45,10 @@ def reach(
     most_mps: float,
     margin_m: float,
     unsure_m: tuple[FloatArray, FloatArray] | None = None,
+    of: NDArray[np.bool_] | None = None,
 ) -> Reach:
-    """Grow the bodies by what they could do in times_s (K,) from now; they were placed since_s (N,) ago.
+    """Grow the bodies by what they could do in times_s (K,) from now; they were placed since_s (N,) ago, at
+    these times and maybe later ones. Those that do not count, of (N,), block nothing; None: all do.
 
     unsure_m: how well that place was known, along the path and across it, (N,); None: exactly.
     spread_mps: by how much their velocities may be other than thought, manoeuvre_mps2: by how much they may
@@ -77,11 +72,12 @@ def reach(
             unsure_across,
             most_mps,
             margin_m,
+            np.ones(len(since_s), np.bool_) if of is None else of,
         )
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Stops:
     """R emergency stops at K times: distance_m (R, K), moves (R, K) whether the robot does not stand yet."""
 
@@ -101,21 +97,27 @@ def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
     return _least_room(stopping.distance_m, stopping.moves, s_m, reached.inside, reached.lo_m, reached.hi_m)
 
 
-def stands_in_time(stopping: Stops, reached: Reach) -> NDArray[np.bool_]:
-    """(R,) which stops are over before anything could be in the way at all, however near it is."""
-    first = int(reached.inside.any(axis=0).argmax())
-    return ~stopping.moves[:, max(first - 1, 0)]
+def how_many_stand(stopping: Stops, s_m: float, reached: Reach, of: NDArray[np.bool_]) -> int:
+    """How many of the stops, from the first one on, stay short of all those obstacles that count: of (N,)."""
+    moves = stopping.moves
+    return _first_too_far(stopping.distance_m, moves, s_m, reached.inside, reached.lo_m, reached.hi_m, of)
+
+
+def last_in_time(stopping: Stops, reached: Reach) -> int:
+    """The last of the stops that are over before anything could be in the way at all, however near it is;
+    -1: none is."""
+    return _last_in_time(stopping.moves, reached.inside)
 
 
 def gets_through(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:
     """Whether a single ramp to a speed stays clear of everything at all times."""
-    at = s_m + ramp.distance(times_s[None, :])
-    return not bool((reached.inside & (at > reached.lo_m) & (at < reached.hi_m)).any())
+    way_m = ramp.distance(times_s[None, :])[0]
+    return _gets_through(way_m, s_m, reached.inside, reached.lo_m, reached.hi_m)
 
 
 @compiled(
     "float64[:, :], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], float64[:], float64[:],"
-    "float64[:], float64[:], float64[:], float64[:], float64, float64"
+    "float64[:], float64[:], float64[:], float64[:], float64, float64, boolean[:]"
 )
 def _grown(
     clear_m: FloatArray,
@@ -132,6 +134,7 @@ def _grown(
     unsure_across_m: FloatArray,
     most_mps: float,
     margin_m: float,
+    of: NDArray[np.bool_],
 ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
     """The fields of Reach."""
     shape = len(since_s), len(times_s)
@@ -143,7 +146,7 @@ def _grown(
             t = times_s[j] + since_s[k]
             furthest = (most_mps + speed_mps[k]) * t
             across = min(spread_across_mps[k] * t + 0.5 * change_across_mps2[k] * t * t, furthest)
-            if clear_m[k, j] - (unsure_across_m[k] + across) <= 0.0:
+            if of[k] and clear_m[k, j] - (unsure_across_m[k] + across) <= 0.0:
                 along = min(spread_along_mps[k] * t + 0.5 * change_along_mps2[k] * t * t, furthest)
                 along += unsure_along_m[k]
                 was_inside = True
@@ -151,6 +154,14 @@ def _grown(
                 highest = max(highest, hi_m[k, j] + along)
             inside[k, j], lo[k, j], hi[k, j] = was_inside, lowest, highest
     return inside, lo, hi
+
+
+@inlined
+def _room(
+    at_m: float, j: int, inside: NDArray[np.bool_], lo_m: FloatArray, hi_m: FloatArray, k: int
+) -> float:
+    """From at_m to what obstacle k could block at time j."""
+    return float(lo_m[k, j] - at_m) if inside[k, j] and at_m < hi_m[k, j] else math.inf
 
 
 @compiled("float64[:, :], boolean[:, :], float64, boolean[:, :], float64[:, :], float64[:, :]")
@@ -168,8 +179,51 @@ def _least_room(
         for j in range(distance_m.shape[1]):
             if not moves[i, j]:
                 continue
-            at = s_m + distance_m[i, j]
             for k in range(len(inside)):
-                if inside[k, j] and at < hi_m[k, j]:
-                    least[i] = min(least[i], lo_m[k, j] - at)
+                least[i] = min(least[i], _room(s_m + distance_m[i, j], j, inside, lo_m, hi_m, k))
     return least
+
+
+@compiled("float64[:, :], boolean[:, :], float64, boolean[:, :], float64[:, :], float64[:, :], boolean[:]")
+def _first_too_far(
+    distance_m: FloatArray,
+    moves: NDArray[np.bool_],
+    s_m: float,
+    inside: NDArray[np.bool_],
+    lo_m: FloatArray,
+    hi_m: FloatArray,
+    of: NDArray[np.bool_],
+) -> int:
+    """The first of R stops that has no room before those obstacles (N,) that count; R: none."""
+    for i in range(len(distance_m)):
+        for j in range(distance_m.shape[1]):
+            if not moves[i, j]:
+                continue
+            for k in range(len(inside)):
+                if of[k] and _room(s_m + distance_m[i, j], j, inside, lo_m, hi_m, k) < 0.0:
+                    return i
+    return len(distance_m)
+
+
+@compiled("boolean[:, :], boolean[:, :]")
+def _last_in_time(moves: NDArray[np.bool_], inside: NDArray[np.bool_]) -> int:
+    """last_in_time() of stops that move (R, K) and obstacles that could be inside (N, K)."""
+    first = 0
+    for j in range(inside.shape[1] - 1, -1, -1):
+        if inside[:, j].any():
+            first = j
+    for i in range(len(moves) - 1, -1, -1):
+        if not moves[i, max(first - 1, 0)]:
+            return i
+    return -1
+
+
+@compiled("float64[:], float64, boolean[:, :], float64[:, :], float64[:, :]")
+def _gets_through(
+    way_m: FloatArray, s_m: float, inside: NDArray[np.bool_], lo_m: FloatArray, hi_m: FloatArray
+) -> bool:
+    for k in range(len(inside)):
+        for j in range(len(way_m)):
+            if inside[k, j] and lo_m[k, j] < s_m + way_m[j] < hi_m[k, j]:
+                return False
+    return True

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from operator import attrgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from config.robot import Body
 from controller.decision.bodies import Bodies
 from controller.path.path import Path
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray
 
 _STEP_M = 0.1
@@ -47,7 +45,7 @@ class Corridor:
         return _one_half_width(s_m, self.half_widths_m, self.overhang_m)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Placed:
     """N bodies at K times in path coordinates, each (N, K).
 
@@ -64,17 +62,6 @@ class Placed:
     hi_m: FloatArray
     clear_m: FloatArray
 
-    def select(self, rows: NDArray[np.bool_], count: int) -> Placed:
-        """Only these bodies, at the first count times."""
-        chosen = rows.nonzero()[0]
-        arrays = [array[:, :count] for array in _arrays_of(self)]
-        if len(chosen) < len(rows):
-            arrays = [array.take(chosen, 0) for array in arrays]
-        return Placed(*arrays)
-
-
-_arrays_of = attrgetter(*Placed.__slots__)
-
 
 def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: float, reach_m: float) -> Placed:
     """Where the bodies are times_s (K,) after they were seen if they go on as they do.
@@ -82,11 +69,10 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
     The path is looked at from a little behind near_s_m to reach_m ahead of it.
     """
     reach = near_s_m - _BEHIND_M, near_s_m + reach_m
-    s, d, heading = corridor.path.locate(bodies.xy_m, bodies.velocity_mps, times_s, *reach)
-    half_s, lo, hi, clear = _extents(
-        s,
-        d,
-        heading,
+    # Taking rows by number is quicker than unpacking an array.
+    located = corridor.path.locate(bodies.xy_m, bodies.velocity_mps, times_s, *reach)
+    extents = _extents(
+        located,
         bodies.view_rad,
         bodies.half_view_m,
         bodies.half_across_m,
@@ -95,7 +81,7 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
         corridor.front_m,
         corridor.rear_m,
     )
-    return Placed(s, d, heading, half_s, lo, hi, clear)
+    return Placed(located[0], located[1], located[2], extents[0], extents[1], extents[2], extents[3])
 
 
 @inlined
@@ -120,14 +106,9 @@ def _half_widths(s_m: FloatArray, half_widths_m: FloatArray, overhang_m: float) 
     return half_width
 
 
-@compiled(
-    "float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:], float64[:], float64[:], float64[::1],"
-    "float64, float64, float64"
-)
+@compiled("float64[:, :, ::1], float64[:], float64[:], float64[:], float64[::1], float64, float64, float64")
 def _extents(
-    s_m: FloatArray,
-    d_m: FloatArray,
-    heading_rad: FloatArray,
+    located: FloatArray,
     view_rad: FloatArray,
     half_view_m: FloatArray,
     half_across_m: FloatArray,
@@ -136,7 +117,9 @@ def _extents(
     front_m: float,
     rear_m: float,
 ) -> FloatArray:
-    """(4, N, K) half_s_m, lo_m, hi_m and clear_m of Placed, for bodies (N,) that are at s_m, d_m (N, K)."""
+    """(4, N, K) half_s_m, lo_m, hi_m and clear_m of Placed, for bodies (N,); located (3, N, K): its first
+    three."""
+    s_m, d_m, heading_rad = located
     extents = np.empty((4, *s_m.shape))
     half_s, lo, hi, clear = extents
     for k in range(len(s_m)):
@@ -154,7 +137,7 @@ def _extents(
     return extents
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Course:
     """How N bodies go, seen from the path where they are: speed along it and to its left, the standard
     deviation of either, and by how much the newest measurement differs; each (N,)."""
@@ -166,20 +149,11 @@ class Course:
     surprise_along_mps: FloatArray
     surprise_left_mps: FloatArray
 
-    def select(self, rows: NDArray[np.bool_]) -> Course:
-        """Only these bodies."""
-        chosen = rows.nonzero()[0]
-        if len(chosen) == len(rows):
-            return self
-        return Course(*[array.take(chosen) for array in _courses_of(self)])
-
-
-_courses_of = attrgetter(*Course.__slots__)
-
 
 def course_of(bodies: Bodies, heading_rad: FloatArray) -> Course:
     """heading_rad (N,): of the path where each body is."""
-    return Course(*_seen_along(bodies.velocity_mps, bodies.surprise_mps, bodies.covariance, heading_rad))
+    of = _seen_along(bodies.velocity_mps, bodies.surprise_mps, bodies.covariance, heading_rad)
+    return Course(of[0], of[1], of[2], of[3], of[4], of[5])
 
 
 @compiled("float64[:, :], float64[:, :], float64[:, :, :], float64[:]")

@@ -10,7 +10,6 @@ controller/decision/moving.py makes limits of these choices and keeps them from 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +17,14 @@ from numpy.typing import NDArray
 from controller.decision.corridor import Placed
 from controller.profile import SpeedRamps
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import FloatArray
 
 # So unlikely that it will not come into the way, an obstacle that heads for it cannot become.
 _MOST_SPREAD_M = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Conflict:
     """row: of the body. in_s, out_s: from now; out_s is inf where it does not leave within the horizon.
     lo_in_m to hi_in_m: positions of the robot that it blocks when it enters; lo_out_m: from where on it does
@@ -70,7 +70,7 @@ def find_conflicts(
     ]
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Choice:
     """For one conflict: speeds up to yield_mps let it pass first, speeds from first_mps on pass before it
     (inf: none does)."""

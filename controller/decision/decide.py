@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from operator import attrgetter
 
 from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
-from config.robot import Limits, Robot
+from config.robot import Robot
 from controller import braking
 from controller.decision.appraise import Appraiser
 from controller.decision.decision import Action, Decision, Reason, Rule
@@ -39,6 +40,7 @@ _OVER_COMFORT_MPS = 0.05
 # The target point is closed in on by the shaper; the limit that is reported for it must not do so earlier.
 _END_SLACK_M = 0.02
 _AT_END_M = 0.02
+_speed_of = attrgetter("speed_mps")
 
 
 class DecisionMaker:
@@ -56,6 +58,7 @@ class DecisionMaker:
         self._comfort = braking.comfort(robot.limits)
         self._range_brake = braking.emergency(robot.limits) if config.emergency_caps_range else self._comfort
         self._latency_s = period_s + config.chassis_delay_s
+        self._sees_m = config.sight.range_m + mount.forward_m - robot.body.front_m
         self._path: Path | None = None
         self._known: Knowledge | None = None
         self._appraiser = Appraiser(config, robot.limits, mount)
@@ -63,7 +66,7 @@ class DecisionMaker:
         self._now_ns: int | None = None
         self._emergency = False
         self._stuck_since_ns: int | None = None
-        self._last: Limit | None = None
+        self._last: Reason | None = None
 
     def take_path(self, path: Path, known: Knowledge) -> None:
         """Go on along another path, of which this is known already; what hysteresis needs is kept."""
@@ -88,7 +91,7 @@ class DecisionMaker:
         motion = Motion(v_mps, at.a_mps2, self._latency_s)
         on_way = self._path_limit(path, on_path, motion)
         limits = self._camera_limits(known)
-        base_mps = min(limit.speed_mps for limit in (on_way, *limits))
+        base_mps = min(on_way.speed_mps, _least(limits).speed_mps)
         limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(on_way, limits, motion, now_ns)
 
@@ -97,12 +100,10 @@ class DecisionMaker:
         before, self._now_ns = self._now_ns, now_ns
         if before is not None and now_ns < before:
             return f"time went back by {(before - now_ns) / NS_PER_S:.3f} s"
-        if not math.isfinite(pose.x_m + pose.y_m + pose.heading_rad):
-            return "where the robot is is not known"
-        if not math.isfinite(on_path.s_m + on_path.d_m + on_path.heading_rad):
-            return "where the robot is on its path is not known"
-        if not (math.isfinite(v_mps) and math.isfinite(at.a_mps2)):
-            return "how fast the robot is is not known"
+        on_floor = pose.x_m + pose.y_m + pose.heading_rad
+        along = on_path.s_m + on_path.d_m + on_path.heading_rad
+        if not math.isfinite(on_floor + along + v_mps + at.a_mps2):
+            return _unknown(on_floor, along)
         if v_mps < BACKWARDS_MPS:
             return f"the robot moves backwards at {-v_mps:.2f} m/s"
         if abs(on_path.d_m) > self._config.off_path_m:
@@ -115,7 +116,7 @@ class DecisionMaker:
         self._gate.step(0.0, v, 0.0, now_ns)
         self._stuck_since_ns = None
         reason = Reason("fault", f"{fault}: stop")
-        self._last = Limit(0.0, reason)
+        self._last = reason
         action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
         return Decision(action, 0.0, reason, self._emergency)
 
@@ -129,62 +130,72 @@ class DecisionMaker:
         """The least that robot, section, bend and end of the path allow."""
         left_m = path.length_m - on_path.s_m
         ahead_s = on_path.s_m + motion.v_mps * motion.latency_s
-        # Who accelerates brakes only once that has ended; but no section is left before it has been left.
-        steady_s = ahead_s + braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
-        section = min(path.speed_limit(ahead_s), path.speed_limit(steady_s))
+        section = path.speed_limit(ahead_s)
+        if motion.a_mps2 > 0.0:
+            # Who accelerates brakes only once that has ended; but no section is left before it has been left.
+            steady_s = ahead_s + braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
+            section = min(section, path.speed_limit(steady_s))
         end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
         if section <= end:
             rule: Rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
-            return Limit(section, Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
-        required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
-        reason = Reason(
-            "target",
-            f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
-            distance_m=left_m,
-            closing_mps=0.0,
-            required_m=required,
-            margin_m=left_m - required,
-        )
-        return Limit(end, reason)
+            return Limit(section, lambda: Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
+
+        def why() -> Reason:
+            required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
+            return Reason(
+                "target",
+                f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
+                distance_m=left_m,
+                closing_mps=0.0,
+                required_m=required,
+                margin_m=left_m - required,
+            )
+
+        return Limit(end, why)
 
     def _camera_limits(self, known: Knowledge) -> list[Limit]:
-        sight, limits = self._config.sight, self._robot.limits
+        sight = self._config.sight
         if known.fault:
             # Blind among people who were moving a moment ago, or for so long that somebody may have come
             # since: comfort would be at their cost.
             urgent = bool(known.bodies.moving.any()) or known.since_s > sight.blind_s
-            return [Limit(0.0, Reason("camera", f"{known.fault}: stop"), urgent=urgent)]
-        found = [self._range_limit(known, limits)]
+            reason = Reason("camera", f"{known.fault}: stop")
+            return [Limit(0.0, lambda: reason, urgent=urgent)]
+        found = [self._range_limit(known.age_s)]
         if known.health.condition is CameraCondition.DEGRADED:
             sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"
-            found.append(Limit(sight.degraded_mps, Reason("camera", sentence)))
+            found.append(Limit(sight.degraded_mps, lambda: Reason("camera", sentence)))
         return found
 
-    def _range_limit(self, known: Knowledge, limits: Limits) -> Limit:
-        """What may come from beyond the range at V_omax must still find the robot standing."""
-        sees_m = self._config.sight.range_m + self._mount.forward_m - self._robot.body.front_m
+    def _range_limit(self, age_s: float) -> Limit:
+        """What may come from beyond the range at V_omax must still find the robot standing; age_s: since the
+        last look."""
+        sees_m = self._sees_m
         speed = braking.speed_for_distance(
             sees_m,
             self._range_brake,
-            latency_s=self._latency_s + known.age_s,
-            closing_mps=limits.max_obstacle_speed_mps,
+            latency_s=self._latency_s + age_s,
+            closing_mps=self._robot.limits.max_obstacle_speed_mps,
             margin_m=self._config.margins.least_m,
         )
-        return Limit(speed, Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed(speed)}"))
+        return Limit(
+            speed, lambda: Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed(speed)}")
+        )
 
     def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
         top_mps = self._robot.limits.max_speed_mps
-        watched = min(limits, key=lambda limit: limit.speed_mps)
-        raw_mps = self._start_or_creep(watched, motion)
-        if raw_mps < watched.speed_mps:
-            sentence = f"{watched.reason.sentence}: too little to go for"
-            watched = replace(watched, reason=replace(watched.reason, sentence=sentence))
+        least = _least(limits)
+        raw_mps = self._start_or_creep(least, motion)
+        watched: Reason | None = None
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
-            self._last = watched
+            self._last = watched = _in_words(least, raw_mps)
         gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
         target_mps = min(gated_mps, on_way.speed_mps)
-        reason = self._reason(watched, on_way, raw_mps, gated_mps)
+        if on_way.speed_mps <= gated_mps:
+            reason = on_way.reason
+        else:
+            reason = self._reason(watched or _in_words(least, raw_mps), raw_mps, gated_mps)
         self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         action = self._action(target_mps, motion.v_mps)
@@ -196,31 +207,31 @@ class DecisionMaker:
 
     def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
         """No creeping up to what blocks the way, and no start for a way that is hardly free."""
-        if limit.reason.rule not in BLOCKING_RULES:
+        release, standing = self._config.release, motion.v_mps <= STANDING_MPS
+        least = starts_at_mps(release, self._comfort) if standing else release.creep_mps
+        if limit.speed_mps >= least:
             return limit.speed_mps
-        release = self._config.release
-        least = release.creep_mps
-        if motion.v_mps <= STANDING_MPS:
-            least = starts_at_mps(release, self._comfort)
-            if limit.reason.rule == "worst case":
-                # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
-                least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
+        rule = limit.reason.rule
+        if rule not in BLOCKING_RULES:
+            return limit.speed_mps
+        if standing and rule == "worst case":
+            # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
+            least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
-    def _reason(self, watched: Limit, on_way: Limit, raw_mps: float, gated_mps: float) -> Reason:
-        if on_way.speed_mps <= gated_mps:
-            return on_way.reason
+    def _reason(self, watched: Reason, raw_mps: float, gated_mps: float) -> Reason:
+        """For less than what the path allows: what is watched now, or what was while that is held back."""
         if gated_mps >= raw_mps or self._last is None:
-            return watched.reason
-        held = self._last.reason
+            return watched
+        held = self._last
         return Reason(
             "release",
             f"not yet faster after: {held.sentence}",
             held.obstacle_id,
-            watched.reason.distance_m,
-            watched.reason.closing_mps,
-            watched.reason.required_m,
-            watched.reason.margin_m,
+            watched.distance_m,
+            watched.closing_mps,
+            watched.required_m,
+            watched.margin_m,
         )
 
     def _brakes_hard(self, limits: list[Limit], allowed_mps: float, motion: Motion) -> bool:
@@ -228,8 +239,9 @@ class DecisionMaker:
         held back for a while."""
         if motion.v_mps <= STANDING_MPS:
             return False
-        urgent = any(limit.urgent for limit in limits)
-        return urgent or (self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS)
+        if self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS:
+            return True
+        return any(limit.urgent for limit in limits)
 
     def _note_stuck(self, target_mps: float, motion: Motion, reason: Reason, now_ns: int) -> None:
         blocked = reason.rule in BLOCKING_RULES or reason.rule == "release"
@@ -246,3 +258,25 @@ class DecisionMaker:
         if target_mps < v_mps - band or stopping:
             return Action.DECREASE
         return Action.KEEP
+
+
+def _unknown(on_floor: float, along: float) -> str:
+    """What is no number: on_floor of the robot's pose, along of its place on the path, or else its speed."""
+    if not math.isfinite(on_floor):
+        return "where the robot is is not known"
+    if not math.isfinite(along):
+        return "where the robot is on its path is not known"
+    return "how fast the robot is is not known"
+
+
+def _in_words(limit: Limit, speed_mps: float) -> Reason:
+    """Why only speed_mps is left of it."""
+    reason = limit.reason
+    if speed_mps < limit.speed_mps:
+        return replace(reason, sentence=f"{reason.sentence}: too little to go for")
+    return reason
+
+
+def _least(limits: list[Limit]) -> Limit:
+    """The first of those that allow the least."""
+    return min(limits, key=_speed_of)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
+
+from hal.records import record
 
 # What limits the speed; docs/design.md ("Observations") says what each of them means.
 Rule = Literal[
@@ -30,7 +31,7 @@ class Action(Enum):
     DECREASE = "decrease"
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Reason:
     """Why the target is what it is: the limit that won.
 
@@ -50,7 +51,7 @@ class Reason:
     margin_m: float = math.nan
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Decision:
     """emergency: brake harder than comfort. stuck_since_ns: since when the robot has been standing before
     something that blocks its path; None while it is not."""

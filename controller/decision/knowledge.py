@@ -173,21 +173,21 @@ class Knowledge:
             seen = bodies_of(scene, pose, self._mount, self._config.prediction.body_depth_m)
         except SceneError as error:
             return str(error)
-        s_m = self.corridor.path.project(pose, on_path.s_m).s_m
+        free, s_m = scene.free_space, self.corridor.path.project(pose, on_path.s_m).s_m
         boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving)
-        if len(scene.free_space.bearing_tan):
-            self.edge_tan = _outermost(scene.free_space.bearing_tan) + scene.free_space.half_width_tan
-        self.near_m = self._memory.near_m = max(self._config.sight.near_m, scene.free_space.floor_from_m)
-        self.up_tan = self._memory.up_tan = scene.free_space.up_tan
-        self.surfaces = surfaces = surfaces_of(scene.free_space, pose, self._mount, self._noise)
+        if len(free.bearing_tan):
+            self.edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
+        self.near_m = self._memory.near_m = max(self._config.sight.near_m, free.floor_from_m)
+        self.up_tan = self._memory.up_tan = free.up_tan
+        self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
         boxes = self._steady.update(self._recognise(seen.select(boxed)))
         boxes = self._memory.leaving(boxes, pose, self.edge_tan)
         standing = v_mps <= STANDING_MPS
-        remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, scene.free_space)
+        remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, free)
         self.bodies = boxes.joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
-        self.lens.look(scene.free_space, self.corridor.half_width_at(s_m), self._mount.left_m)
-        self.sight.look(scene.free_space, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
+        self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
+        self.sight.look(free, surfaces, pose, s_m, scene.captured_ns, boxes, standing)
         self._places.append((scene.captured_ns, surfaces.points_m, seen.xy_m))
         self.health = scene.health
         self._captured_ns = scene.captured_ns

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 
 from config.decision import Release
 from controller import braking
 from controller.braking import BrakeLimits
 from controller.decision.decision import Reason, Rule
+from hal.records import record
 
 # So far the front may be past the near side of something that still counts as ahead.
 ALONGSIDE_M = 0.1
@@ -26,16 +27,22 @@ BLOCKING_RULES: frozenset[Rule] = frozenset(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Limit:
-    """A speed that must not be exceeded now. urgent: comfort braking no longer suffices."""
+    """A speed that must not be exceeded now. why: puts it into words, which only the least of all limits is
+    asked for. urgent: comfort braking no longer suffices."""
 
     speed_mps: float
-    reason: Reason
+    why: Callable[[], Reason]
     urgent: bool = False
 
+    @property
+    def reason(self) -> Reason:
+        """In words; made anew each time."""
+        return self.why()
 
-@dataclass(frozen=True, slots=True)
+
+@record(frozen=True, slots=True)
 class Motion:
     """The robot now: speed and acceleration as commanded, and the latency until a new command acts."""
 
@@ -44,7 +51,7 @@ class Motion:
     latency_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Gap:
     """Free way of the robot's front to something ahead.
 
@@ -87,9 +94,12 @@ def stop_before(
         motion.v_mps, motion.a_mps2, gap.closing_mps, motion.latency_s, comfort, margin_m
     )
     spare = room_m - required
-    sentence = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: {allowed(speed)}"
-    reason = Reason(rule, sentence, gap.obstacle_id, gap.distance_m, gap.closing_mps, required, spare)
-    return Limit(speed, reason, urgent=motion.v_mps > 0.0 and spare < least_m - margin_m)
+
+    def why() -> Reason:
+        sentence = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: {allowed(speed)}"
+        return Reason(rule, sentence, gap.obstacle_id, gap.distance_m, gap.closing_mps, required, spare)
+
+    return Limit(speed, why, urgent=motion.v_mps > 0.0 and spare < least_m - margin_m)
 
 
 def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:

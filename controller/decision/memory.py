@@ -76,6 +76,9 @@ class OutOfView:
     def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
         """The bodies seen; standing ones that perception no longer sees but still expects, out of view,
         count as moving if they came towards the robot's axis: with the velocity measured last."""
+        if not len(seen):
+            self._widest_of, self._coming = seen.ids, {}
+            return seen
         # At the edge of the view, everybody gets narrow.
         self._widest_half_m = _widest(seen.ids, seen.half_across_m, self._widest_of, self._widest_half_m)
         self._widest_of = seen.ids
@@ -136,7 +139,9 @@ class OutOfView:
             kept &= ~self._seen_through.gone(bodies, pose, *edges, free)
         else:
             self._seen_through.forget()
-        self._since_s, self._bodies = since[kept], bodies.select(kept)
+        if np.count_nonzero(kept) < len(kept):
+            since, bodies = since[kept], bodies.select(kept)
+        self._since_s, self._bodies = since, bodies
         if some_move:
             self._bodies = self._kept_out(self._bodies, pose, free)
         return self._bodies

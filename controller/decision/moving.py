@@ -169,20 +169,18 @@ class MovingLimits:
         worth_mps = _WORTH_ARRIVING_MPS if conflict.out_s <= _FORESEEN_S else math.inf
         if choice.yield_mps < min(stays.speed_mps, worth_mps):
             return Choice(stays.speed_mps, choice.first_mps), stays
-        sentence = (
-            f"obstacle {number} crosses {max(conflict.lo_in_m - s_m, 0.0):.1f} m ahead until "
-            f"{conflict.out_s:.1f} s from now: {allowed(choice.yield_mps)}"
-        )
-        reason = Reason(
-            "crossing",
-            sentence,
-            number,
-            conflict.lo_in_m - s_m,
-            stays.reason.closing_mps,
-            stays.reason.required_m,
-            stays.reason.margin_m,
-        )
-        return choice, Limit(choice.yield_mps, reason)
+
+        def why() -> Reason:
+            ahead_m, waits = conflict.lo_in_m - s_m, stays.reason
+            sentence = (
+                f"obstacle {number} crosses {max(ahead_m, 0.0):.1f} m ahead until "
+                f"{conflict.out_s:.1f} s from now: {allowed(choice.yield_mps)}"
+            )
+            return Reason(
+                "crossing", sentence, number, ahead_m, waits.closing_mps, waits.required_m, waits.margin_m
+            )
+
+        return choice, Limit(choice.yield_mps, why)
 
     def _settle(
         self, offers: list[tuple[Conflict, Choice, Limit]], bodies: Bodies, base_mps: float

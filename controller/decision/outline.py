@@ -7,7 +7,6 @@ the box of something seen corner-on reach into a corridor that it leaves free.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
 from controller.decision.surfaces import Surfaces
+from hal.records import record
 from hal.types import FloatArray
 
 # The outline may have no wider gap, in bands, or something of the body was not seen.
@@ -25,7 +25,7 @@ _SHADOW_BANDS = 2
 _BEHIND_M = 0.15
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class Outline:
     """clear_m: free floor between what is in view of a body and the swept corridor; negative: inside it; inf:
     nothing is in view. whole: it was seen from end to end, and all of it is in view."""

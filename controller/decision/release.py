@@ -20,12 +20,13 @@ class _Least:
 
     def update(self, value: float, now_ns: int) -> float:
         """With value seen at now_ns."""
-        while self._lately and self._lately[-1][1] >= value:
-            self._lately.pop()
-        self._lately.append((now_ns, value))
-        while self._lately[0][0] < now_ns - self._delay_ns:
-            self._lately.popleft()
-        return self._lately[0][1]
+        lately, since_ns = self._lately, now_ns - self._delay_ns
+        while lately and lately[-1][1] >= value:
+            lately.pop()
+        lately.append((now_ns, value))
+        while lately[0][0] < since_ns:
+            lately.popleft()
+        return lately[0][1]
 
 
 class ReleaseGate:

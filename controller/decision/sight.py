@@ -55,6 +55,7 @@ class Sight:
         self._seen_ns = np.full(len(self._cells), _NEVER_NS, np.int64)
         # Under the nose and beside it nothing can be seen: what the robot stands before is free by consent.
         self._near_m = self._floor_from_m = self._lost_m = self._sight.near_m
+        self._edges = math.nan, math.nan
         self._consent_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = math.inf
@@ -109,6 +110,10 @@ class Sight:
     def _take_edges(self, free: FreeSpace) -> None:
         """What is below the view of a camera that is higher than usual cannot be seen before the start
         either: by consent it is free, but for a stretch that is too long for that."""
+        edges = free.floor_from_m, free.up_tan
+        if edges == self._edges:
+            return
+        self._edges = edges
         self._floor_from_m = max(self._sight.near_m, free.floor_from_m)
         near_m = consented_m(self._sight.near_m, free.floor_from_m)
         if near_m > self._near_m:
@@ -142,8 +147,7 @@ class Sight:
     ) -> None:
         """Mark the cells whose width was seen; then find the first one ahead that is not known. in_corridor
         (B,): in which bands a surface is, which limits the speed itself: behind it nothing has to be seen."""
-        first = int(self._cells.searchsorted(s_m))
-        last = int(self._cells.searchsorted(s_m + self._sight.range_m + self._mount.forward_m))
+        first, last = _between(self._cells, s_m, s_m + self._sight.range_m + self._mount.forward_m)
         if last > first and len(free.bearing_tan):
             # What is too near to be measured was not seen, however far the scan goes beyond it. Nor was what
             # is below the view, where that is more than could be consented to.
@@ -204,6 +208,12 @@ def _beside_the_way(
             if not explained:
                 nearest_s = min(nearest_s, surface_s_m[i])
     return in_corridor, nearest_s, stands
+
+
+@compiled("float64[:], float64, float64")
+def _between(cells_m: FloatArray, from_s_m: float, to_s_m: float) -> tuple[int, int]:
+    """The first of the cells (C,) from from_s_m on, and the first one from to_s_m on."""
+    return int(np.searchsorted(cells_m, from_s_m)), int(np.searchsorted(cells_m, to_s_m))
 
 
 @compiled("int64[:], int64, int64[:], float64, int64")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from controller.path.path import OnPath, Path
+from hal.records import record
 from hal.types import PlanarPose
 from vision.scene import Scene
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Situation:
     """All that is known when a control step decides. path, pose and scene.robot_pose are in one frame.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from controller.decision.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_bef
 from controller.decision.outline import outline_of
 from controller.decision.view_edges import visible_from_m
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import CameraMount, FloatArray
 
 _INSIDE_BODY_M = 0.05
@@ -28,7 +28,7 @@ _MOST_OFF_M = 3.0
 _NOW = np.zeros(1)
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class _Near:
     """What may stand in the corridor; lo_m, hi_m, clear_m: see corridor.Placed. stop_m: where to stand before
     it."""
@@ -94,7 +94,8 @@ class StandingLimits:
         placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
         clear_m = self._clear(known, placed, s_m, before)
         near = clear_m <= margins.lateral_m + margins.graze_m
-        self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
+        if self._inside:
+            self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
         rows = (near & ~bodies.moving).nonzero()[0]
         if len(rows):
             stop_m = self._standing_off(known, bodies, placed)
@@ -105,9 +106,9 @@ class StandingLimits:
     def _clear(self, known: Knowledge, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
         """(N,) free floor beside the swept corridor; in bends, by the outlines when they were last seen
         whole, by number before this scene, as long as nothing nearer is seen of them."""
-        clear_m: FloatArray = placed.clear_m[:, 0].copy()
         if known.corridor.straight:
-            return clear_m
+            return placed.clear_m[:, 0]
+        clear_m = placed.clear_m[:, 0].copy()
         standing, near_m = ~known.bodies.moving, self._config.margins.lateral_m + _BESIDE_M
         beside = standing & (clear_m <= near_m) & (placed.hi_m[:, 0] > s_m)
         bodies, depth_m = known.bodies.select(beside), self._config.prediction.body_depth_m

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from controller.decision.bodies import Bodies
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
@@ -19,7 +19,7 @@ AROUND_M = 0.3
 _DEPTH_SIGMAS = 3.5
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Surfaces:
     """P points, left to right. bands (P,): of the B bands of the free space, which they are of. forward_m
     (P,) from the camera. half_band_m (P,): half of the width that a point stands for. points_m (P, 2). seen_m

@@ -17,7 +17,16 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
-from controller.decision.contingency import Reach, Stops, gets_through, reach, room, stands_in_time, stops
+from controller.decision.contingency import (
+    Reach,
+    Stops,
+    gets_through,
+    how_many_stand,
+    last_in_time,
+    reach,
+    room,
+    stops,
+)
 from controller.decision.corridor import Course, Placed
 from controller.decision.decision import Reason
 from controller.decision.limits import ALONGSIDE_M, LEAVES_ASLANT, UNSEEN_SIGMAS, Limit, Motion, allowed
@@ -77,15 +86,14 @@ class WorstCase:
         """
         unsure_m = UNSEEN_SIGMAS * course.sigma_along_mps * bodies.unseen_s
         rows = placed.lo_m[:, 0] + unsure_m > s_m - ALONGSIDE_M
-        if not rows.any():
+        if not np.count_nonzero(rows):
             return None
-        bodies, placed = bodies.select(rows), placed.select(rows, len(self.times_s))
-        reached = self._reach(bodies, placed, course.select(rows), since_s)
+        reached = self._reach(bodies, placed, course, since_s, rows)
         self._prepare(motion.latency_s)
-        if reached.lo_m[:, -1].min() > s_m + self._furthest_m:
+        if min(reached.lo_m[:, -1].tolist()) > s_m + self._furthest_m:
             return None
         young = bodies.age_s < self._config.prediction.confirm_s
-        speed = self._speed(reached, young, enters[rows], s_m)
+        speed = self._speed(reached, young, enters, s_m)
         if speed >= min(chosen_mps, self._limits.max_speed_mps) and speed >= motion.v_mps:
             return None
         go = comfortable(self._limits, motion, np.array([chosen_mps]))
@@ -98,13 +106,15 @@ class WorstCase:
             if not urgent and motion.v_mps <= speed + _SOFT_MPS:
                 # Foresight may wait a moment; braking for every breath of noise would only delay going on.
                 speed = motion.v_mps
-        row = int(np.argmin(placed.lo_m[:, 0]))
+        row = int(np.where(rows, placed.lo_m[:, 0], math.inf).argmin())
         number = int(bodies.ids[row])
         gap_m = float(placed.lo_m[row, 0]) - s_m
-        sentence = (
-            f"obstacle {number}, {max(gap_m, 0.0):.1f} m ahead, could step into the way: {allowed(speed)}"
-        )
-        return Limit(speed, Reason("worst case", sentence, number, gap_m), urgent)
+
+        def why() -> Reason:
+            ahead = f"obstacle {number}, {max(gap_m, 0.0):.1f} m ahead"
+            return Reason("worst case", f"{ahead}, could step into the way: {allowed(speed)}", number, gap_m)
+
+        return Limit(speed, why, urgent)
 
     def _speed(
         self, reached: Reach, young: NDArray[np.bool_], enters: NDArray[np.bool_], s_m: float
@@ -114,21 +124,22 @@ class WorstCase:
         For confirmed ones with foresight, but not below what suffices right beside them. What is hardly seen
         yet may be confirmed first while there is time for that. Who keeps clear is passed at beside_mps.
         """
-        speed = self._greatest(self._foreseen, reached.select(~young), s_m)
+        speed = self._greatest(self._foreseen, reached, ~young, s_m)
         if math.isfinite(speed):
-            soon = self._speeds[stands_in_time(self._at_once, reached)]
-            speed = max(speed, float(soon.max(initial=0.0)))
-        if young.any():
-            speed = min(speed, self._greatest(self._confirming, reached.select(young), s_m))
+            soon = last_in_time(self._at_once, reached)
+            if soon >= 0:
+                speed = max(speed, float(self._speeds[soon]))
+        if np.count_nonzero(young):
+            speed = min(speed, self._greatest(self._confirming, reached, young, s_m))
         beside_mps = self._config.prediction.beside_mps
         if speed >= beside_mps:
             return speed
-        return max(speed, min(self._greatest(self._foreseen, reached.select(enters), s_m), beside_mps))
+        return max(speed, min(self._greatest(self._foreseen, reached, enters, s_m), beside_mps))
 
-    def _greatest(self, stopping: Stops, reached: Reach, s_m: float) -> float:
-        """The greatest speed whose stop stays short of everything; inf: all of them do."""
-        fails = (room(stopping, s_m, reached) < 0.0).nonzero()[0]
-        return float(self._speeds[max(int(fails[0]) - 1, 0)]) if len(fails) else math.inf
+    def _greatest(self, stopping: Stops, reached: Reach, of: NDArray[np.bool_], s_m: float) -> float:
+        """The greatest speed whose stop stays short of all those that count, of (N,); inf: all of them do."""
+        stand = how_many_stand(stopping, s_m, reached, of)
+        return float(self._speeds[max(stand - 1, 0)]) if stand < len(self._speeds) else math.inf
 
     def _prepare(self, latency_s: float) -> None:
         if latency_s == self._latency_s:
@@ -141,9 +152,11 @@ class WorstCase:
         # Which of the two waits longer is the configuration's choice.
         self._furthest_m = float(max(self._foreseen.distance_m.max(), self._confirming.distance_m.max()))
 
-    def _reach(self, bodies: Bodies, placed: Placed, course: Course, since_s: float) -> Reach:
+    def _reach(
+        self, bodies: Bodies, placed: Placed, course: Course, since_s: float, of: NDArray[np.bool_]
+    ) -> Reach:
         prediction = self._config.prediction
-        since, spread_along, spread_left, speed, along, sideways, unsure_along, unsure_left = _may_do(
+        may_do = _may_do(
             course.along_mps,
             course.left_mps,
             course.sigma_along_mps,
@@ -166,13 +179,14 @@ class WorstCase:
         return reach(
             placed,
             self.times_s,
-            since,
-            spread_mps=(spread_along, spread_left),
-            speed_mps=speed,
-            manoeuvre_mps2=(along, sideways),
+            may_do[0],
+            spread_mps=(may_do[1], may_do[2]),
+            speed_mps=may_do[3],
+            manoeuvre_mps2=(may_do[4], may_do[5]),
             most_mps=self._limits.max_obstacle_speed_mps,
             margin_m=self._config.margins.least_m,
-            unsure_m=(unsure_along, unsure_left),
+            unsure_m=(may_do[6], may_do[7]),
+            of=of,
         )
 
     def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:

@@ -57,7 +57,7 @@ def near_limits(
             f"the floor of the arc was never seen beyond {gap.distance_m:.1f} m: {allowed(limit.speed_mps)}"
         )
         reason = Reason("unseen", sentence, distance_m=gap.distance_m, required_m=limit.reason.required_m)
-        found.append(Limit(limit.speed_mps, reason))
+        found.append(Limit(limit.speed_mps, lambda: reason))
     return found
 
 

@@ -9,7 +9,6 @@ Path coordinates: s_m along the path from its start, d_m to the left of it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,9 @@ from config.robot import Robot
 from controller.path.path_pieces import pieces_of, sinc
 from controller.path.path_speeds import YAW_RATE_FOR_THE_BEND, section_speeds
 from controller.path.projection import Projection
+from hal.compiled import compiled
 from hal.geometry import wrap_angle_rad
+from hal.records import record
 from hal.types import FloatArray, PlanarPose
 
 IntArray = NDArray[np.intp]
@@ -36,7 +37,7 @@ class PathError(ConfigError):
     """The path cannot be driven by this robot: what, where and what to do, in one line."""
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class OnPath:
     """A pose in path coordinates: s_m along, d_m to the left, heading_rad relative to the path."""
 
@@ -64,7 +65,7 @@ class Path:
         self._check_doubling_back(robot.body.width_m)
         speed_s, speed = section_speeds(spec, robot, self._curvature[1:-1], self._s[1:-1])
         self._speed_step_m = float(speed_s[1] - speed_s[0])
-        self._speed: list[float] = speed.tolist()
+        self._speed = speed
 
     @property
     def start(self) -> PlanarPose:
@@ -111,8 +112,8 @@ class Path:
         self, points_m: FloatArray, from_s_m: float = -math.inf, to_s_m: float = math.inf
     ) -> tuple[FloatArray, FloatArray]:
         """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m."""
-        s, d, _ = self._projection.locate(points_m, np.zeros(points_m.shape), _NOW, from_s_m, to_s_m)
-        return s[:, 0], d[:, 0]
+        located = self._projection.locate(points_m, np.zeros(points_m.shape), _NOW, from_s_m, to_s_m)
+        return located[0, :, 0], located[1, :, 0]
 
     def locate(
         self,
@@ -128,9 +129,7 @@ class Path:
 
     def speed_limit(self, s_m: float) -> float:
         """The greatest speed at s_m so that every section and bend ahead is entered slowly enough, m/s."""
-        place = min(max(s_m, 0.0), self.length_m) / self._speed_step_m
-        k = min(int(place), len(self._speed) - 2)
-        return self._speed[k] + (place - k) * (self._speed[k + 1] - self._speed[k])
+        return _between(self._speed, min(max(0.0, s_m), self.length_m) / self._speed_step_m)
 
     def _piece_at(self, s_m: FloatArray) -> IntArray:
         return np.maximum(self._s.searchsorted(s_m, side="right") - 1, 0)
@@ -138,17 +137,35 @@ class Path:
     def _check_doubling_back(self, width_m: float) -> None:
         s = np.append(np.arange(0.0, self.length_m, width_m / 4.0), self.length_m)
         x, y, heading = self.poses(s)
-        for k in range(len(s)):
-            near = np.hypot(x[k:] - x[k], y[k:] - y[k]) < width_m
-            turned = np.abs((heading[k:] - heading[k] + math.pi) % (2.0 * math.pi) - math.pi)
-            again = np.flatnonzero(near & (turned > _OPPOSED_RAD))
-            if not len(again):
-                continue
-            first, second = s[k], s[k + again[0]]
+        first, again = _swept_twice(x, y, heading, width_m)
+        if again > first:
             raise PathError(
-                f"path: doubles back on itself: the robot would sweep the same floor at {first:.1f} m and, "
-                f"the other way, at {second:.1f} m; widen the turn to a radius above {width_m / 2:.2f} m"
+                "path: doubles back on itself: the robot would sweep the same floor at "
+                f"{s[first]:.1f} m and, the other way, at {s[again]:.1f} m; "
+                f"widen the turn to a radius above {width_m / 2:.2f} m"
             )
+
+
+@compiled("float64[:], float64[:], float64[:], float64")
+def _swept_twice(
+    x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray, width_m: float
+) -> tuple[int, int]:
+    """The first two of poses (S,) that are nearer to each other than width_m and opposed; 0, 0: there are
+    none."""
+    for k in range(len(x_m)):
+        for j in range(k, len(x_m)):
+            if math.hypot(x_m[j] - x_m[k], y_m[j] - y_m[k]) < width_m:
+                turned = (heading_rad[j] - heading_rad[k] + math.pi) % (2.0 * math.pi) - math.pi
+                if abs(turned) > _OPPOSED_RAD:
+                    return k, j
+    return 0, 0
+
+
+@compiled("float64[::1], float64")
+def _between(values: FloatArray, place: float) -> float:
+    """At a place between two of values (S,), counted from the first one."""
+    k = min(int(place), len(values) - 2)
+    return float(values[k] + (place - k) * (values[k + 1] - values[k]))
 
 
 def _check_bends(spec: PathSpec, robot: Robot) -> None:

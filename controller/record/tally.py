@@ -58,12 +58,13 @@ class SetpointTally:
         self.max_accel_mps2 = max(self.max_accel_mps2, abs(accel_mps2))
         self.max_jerk_mps3 = max(self.max_jerk_mps3, abs(jerk_mps3))
         self.emergency_count += sent.a_mps2 < -self.limits.max_accel_mps2 - TOLERANCE
+        limits = self.limits
         self.violations += (
-            sent.v_mps > self.limits.max_speed_mps + TOLERANCE
+            sent.v_mps > limits.max_speed_mps + TOLERANCE
             or sent.v_mps < -TOLERANCE
-            or accel_mps2 > self.limits.max_accel_mps2 + TOLERANCE
-            or accel_mps2 < -self.limits.emergency_decel_mps2 - TOLERANCE
-            or abs(jerk_mps3) > self.limits.emergency_jerk_mps3 + TOLERANCE
+            or accel_mps2 > limits.max_accel_mps2 + TOLERANCE
+            or accel_mps2 < -limits.emergency_decel_mps2 - TOLERANCE
+            or abs(jerk_mps3) > limits.emergency_jerk_mps3 + TOLERANCE
         )
         self._last, self._steps = sent, 0
 

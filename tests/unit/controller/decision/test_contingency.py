@@ -7,7 +7,7 @@ import pytest
 
 from config.robot import Body
 from controller.decision.bodies import Bodies
-from controller.decision.contingency import Reach, gets_through, reach, room, stands_in_time, stops
+from controller.decision.contingency import Reach, gets_through, last_in_time, reach, room, stops
 from controller.decision.corridor import Corridor, place
 from controller.profile import SpeedRamps
 from hal.types import FloatArray
@@ -139,5 +139,5 @@ def test_what_may_happen_along_and_across_is_told_apart() -> None:
 def test_a_stop_that_is_over_in_time_needs_no_room() -> None:
     """It could be in the way after 2 s at the earliest, right before the robot's nose."""
     near = reached(box(0.9, 0.65 + 1.0, 0.01, 0.0), manoeuvre_mps2=0.5)
-    assert stands_in_time(stops(stop_from(1.0), TIMES), near)[0]
-    assert not stands_in_time(stops(stop_from(1.5), TIMES), near)[0]
+    assert last_in_time(stops(stop_from(1.0), TIMES), near) == 0
+    assert last_in_time(stops(stop_from(1.5), TIMES), near) == -1
