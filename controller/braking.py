@@ -113,7 +113,10 @@ def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float
 
 
 def speed_before_section(distance_m: float, section_mps: float, limits: BrakeLimits) -> float:
-    """The greatest steady speed from which section_mps is reached within distance_m."""
+    """The greatest steady speed from which section_mps is reached within distance_m. Raises ValueError for a
+    section_mps that is negative or not known."""
+    if not section_mps >= 0.0:
+        raise ValueError(f"a section's speed is 0 or more, got {section_mps} m/s")
     if distance_m <= 0.0:
         return section_mps
     return _before_section(distance_m, section_mps, limits.decel_mps2, limits.jerk_mps3)

@@ -6,16 +6,16 @@ Positions and velocities are in the camera optical frame (x right, y down, z for
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.records import record
 from hal.types import FloatArray, PlanarPose, Pose
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Obstacle:
     """A thing that the robot could touch, seen by its fragments or by depth alone.
 
@@ -46,7 +46,7 @@ class Obstacle:
 NEVER_M = 100.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class FreeSpace:
     """A scan made of the depth image: what stands between the floor and the robot's height.
 
@@ -80,7 +80,7 @@ class CameraCondition(Enum):
     UNTRUSTWORTHY = "untrustworthy"
 
 
-@dataclass(frozen=True, slots=True)
+@record(frozen=True, slots=True)
 class CameraHealth:
     """condition, and why in a plain sentence ("" when good). valid_depth_ratio: share of the depth
     image that was measured, also beyond the depth mask, 0..1."""
@@ -90,7 +90,7 @@ class CameraHealth:
     valid_depth_ratio: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class EgoMotion:
     """The camera's own motion between the frame before and this one.
 
@@ -108,7 +108,7 @@ class EgoMotion:
     sigma_rotation_rad: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Fragments:
     """The featured fragments of the paper: N line segments, tracked from frame to frame.
 
@@ -127,7 +127,7 @@ class Fragments:
     obstacle_id: NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@record(frozen=True, slots=True, eq=False)
 class Scene:
     """All that one frame says to the decision. robot_pose: the body in the odometry frame at
     captured_ns as perception used it; None without odometry."""

@@ -27,7 +27,7 @@ from controller.decision.limits import STANDING_MPS
 from controller.decision.memory import OutOfView
 from controller.decision.sight import Sight
 from controller.decision.steadying import SteadyVelocities
-from controller.decision.surfaces import NO_SURFACES, surfaces_of
+from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
 from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
@@ -170,6 +170,7 @@ class Knowledge:
         if pose is None:
             return "where the robot was when the scene was taken is not known"
         try:
+            check_scan(scene.free_space)
             seen = bodies_of(scene, pose, self._mount, self._config.prediction.body_depth_m)
         except SceneError as error:
             return str(error)

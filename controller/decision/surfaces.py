@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
-from controller.decision.bodies import Bodies
+from controller.decision.bodies import Bodies, SceneError
 from hal.compiled import compiled, inlined
 from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -40,6 +40,15 @@ class Surfaces:
 
 
 NO_SURFACES = Surfaces(np.zeros(0), np.zeros(0, np.intp), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+
+
+def check_scan(free: FreeSpace) -> None:
+    """Raises SceneError where free does not tell the same of every band: what reads it goes by number."""
+    bands = free.bearing_tan.shape
+    blank = np.zeros(bands, np.bool_) if free.blank is None else free.blank
+    alike = len(bands) == 1 and free.nearest_m.shape == free.known_m.shape == blank.shape == bands
+    if not (alike and free.bearing_tan.dtype == free.nearest_m.dtype == free.known_m.dtype == np.float64):
+        raise SceneError("the scan of the free space is impossible: its bands are not told of alike")
 
 
 def surfaces_of(

@@ -23,6 +23,7 @@ from controller.decision.knowledge import Knowledge
 from controller.decision.lens_cover import COVERED
 from controller.decision.limits import Limit, Motion, speed_to_decide_by
 from controller.decision.situation import Situation
+from controller.decision.surfaces import check_scan
 from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand, why_stop
 from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
@@ -143,6 +144,7 @@ class SpeedGovernor:
         if scene.health.condition is CameraCondition.UNTRUSTWORTHY:
             return  # the decision gets it and stops; nothing is learned of the ground
         try:
+            check_scan(scene.free_space)
             bodies = bodies_of(scene, then, self._mount, self._decision.prediction.body_depth_m)
         except SceneError:
             return  # the decision says so and stops

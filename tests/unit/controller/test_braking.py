@@ -275,6 +275,12 @@ def test_impossible_limits_are_refused(a: float, j: float) -> None:
         BrakeLimits(a, j)
 
 
+@pytest.mark.parametrize("section_mps", [-0.1, math.nan])
+def test_a_section_without_a_speed_is_refused(section_mps: float) -> None:
+    with pytest.raises(ValueError, match="a section's speed is 0 or more"):
+        braking.speed_before_section(2.0, section_mps, BrakeLimits(0.3, 0.6))
+
+
 def test_speeding_up_is_no_slowing_down() -> None:
     with pytest.raises(ValueError, match="can only slow down"):
         braking.slowing_distance(0.5, 1.0, BrakeLimits(0.3, 0.6))

@@ -109,6 +109,13 @@ def test_an_oncoming_one_takes_room_while_the_robot_brakes_only() -> None:
     assert room_for(1.0, near) < 0.0
 
 
+def test_who_is_past_something_needs_no_room_before_it() -> None:
+    """Its far end is at 5.2 m; the robot's rear, 0.5 m behind, leaves it at 5.9 m with a margin of 0.2 m."""
+    standing = reached(box(5.0, 0.0))
+    assert room(stops(stop_from(1.0), TIMES), 5.6, standing)[0] < 0.0
+    assert room(stops(stop_from(1.0), TIMES), 6.0, standing)[0] == np.inf
+
+
 def test_what_is_never_in_the_way_takes_no_room() -> None:
     assert room_for(1.5, reached(box(5.0, 2.0, -1.0, 0.0))) == np.inf
 

@@ -16,7 +16,8 @@ from controller.decision.knowledge import Knowledge
 from controller.path.path import OnPath
 from hal.types import PlanarPose
 from tests.support.deciding import MOUNT, PATH, Bench, obstacle
-from vision.scene import Obstacle
+from tests.support.scenes import free_space
+from vision.scene import FreeSpace, Obstacle
 
 START = OnPath(0.0, 0.0, 0.0)
 
@@ -64,6 +65,27 @@ def test_of_what_leaves_the_view_the_last_strip_is_not_all_that_is_remembered() 
     assert known.bodies.ids.tolist() == [5]
     assert known.remembered.tolist() == [True]
     assert known.bodies.half_across_m.tolist() == [0.25]
+
+
+FREE = free_space()
+N = len(FREE.bearing_tan)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        replace(FREE, nearest_m=np.full(3, np.inf)),
+        replace(FREE, known_m=np.zeros(0)),
+        replace(FREE, blank=np.zeros(2, np.bool_)),
+        replace(FREE, nearest_m=np.full(N, np.inf, np.float32)),
+        replace(FREE, bearing_tan=np.zeros((1, N))),
+    ],
+)
+def test_a_scan_that_does_not_tell_the_same_of_every_band_is_none(broken: FreeSpace) -> None:
+    bench = Bench()
+    decision = bench.step(bench.scene(free=broken))
+    assert decision.target_speed_mps == 0.0
+    assert "its bands are not told of alike" in decision.reason.sentence
 
 
 def test_depth_is_as_noisy_as_the_configuration_says() -> None:

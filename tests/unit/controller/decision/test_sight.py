@@ -75,6 +75,19 @@ def test_a_surface_beside_the_corridor_does_not_count() -> None:
     assert Watch().look(free(inside), times=5).surface_s_m == pytest.approx(3.4)
 
 
+def test_a_surface_beside_or_behind_the_robot_does_not_count() -> None:
+    """Seen 0.3 and 0.6 m ahead of a camera 0.5 m behind the turning centre."""
+    mount = replace(MOUNT, forward_m=-0.5)
+    found = []
+    for nearest_m in (0.3, 0.6):
+        sight, seen = Sight(Corridor(line_path(), BODY), mount, DecisionConfig(), 0.0), free(nearest_m)
+        at = PlanarPose(0.0, 0.0, 0.0)
+        for frame in range(5):
+            sight.look(seen, surfaces_of(seen, at, mount), at, 0.0, frame * FRAME_NS, no_bodies(0), False)
+        found.append(sight.surface_s_m)
+    assert found == [math.inf, pytest.approx(0.1)]
+
+
 def test_one_frame_does_not_brake_and_three_do() -> None:
     watch = Watch()
     watch.look(free(), times=5)
