@@ -33,8 +33,9 @@ def _five_coefficients(value: tuple[float, ...]) -> tuple[float, ...]:
 
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[Number, Field(gt=0)]
+Pixels = Annotated[int, BeforeValidator(_whole_number), Field(gt=0, le=4096)]
 # Fewer show nothing: what looks around a pixel has no room (vision/depth/depth_grid.py).
-Pixels = Annotated[int, BeforeValidator(_whole_number), Field(ge=32, le=4096)]
+ImageSide = Annotated[int, BeforeValidator(_whole_number), Field(ge=32, le=4096)]
 
 # How far a rotation matrix written with few digits may be from orthonormal.
 _ROTATION_TOLERANCE = 1e-3
@@ -59,8 +60,8 @@ class RecordingCamera(Section):
 
     model_config = ConfigDict(extra="allow")
 
-    width: Pixels
-    height: Pixels
+    width: ImageSide
+    height: ImageSide
     fx: Positive
     fy: Positive
     cx: Number
