@@ -55,14 +55,19 @@ def test_who_never_reads_again_does_not_keep_a_drive_from_ending(monkeypatch: py
     reader, writer = os.pipe()
     with os.fdopen(writer, "w") as unread:
         monkeypatch.setattr("sys.stdout", unread)
+        outlet = Outlet()
 
         def drive() -> None:
-            with Outlet() as outlet:
+            with outlet:
                 for number in range(3000):
                     outlet.write(Words(f"{number:>99}"))
 
         assert returns(drive)
+        # Its thread still waits to write: it is told that nobody reads any more, and what is left vanishes.
         os.close(reader)
+        outlet._waiting.put(None, timeout=5.0)
+        outlet._thread.join(5.0)
+        assert not outlet._thread.is_alive()
 
 
 def test_what_cannot_be_shown_is_spelled_out(monkeypatch: pytest.MonkeyPatch) -> None:
