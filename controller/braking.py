@@ -100,9 +100,8 @@ def speed_for_distance(
     v = -A b + sqrt(A^2 b^2 + 2 A d) with b = tau + A / 2J + V_o / A (4.7), else the root of a cubic in
     sqrt(v).
     """
-    return _speed_for(
-        distance_m - margin_m, a_mps2, closing_mps, latency_s, limits.decel_mps2, limits.jerk_mps3
-    )
+    free_m = distance_m - margin_m
+    return _speed_for(free_m, a_mps2, closing_mps, latency_s, limits.decel_mps2, limits.jerk_mps3)
 
 
 def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float:
@@ -113,8 +112,7 @@ def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float
 
 
 def speed_before_section(distance_m: float, section_mps: float, limits: BrakeLimits) -> float:
-    """The greatest steady speed from which section_mps is reached within distance_m. Raises ValueError for a
-    section_mps that is negative or not known."""
+    """The greatest steady speed from which section_mps (ValueError below 0) is met within distance_m."""
     if not section_mps >= 0.0:
         raise ValueError(f"a section's speed is 0 or more, got {section_mps} m/s")
     if distance_m <= 0.0:
