@@ -8,21 +8,27 @@ The first import takes a minute or two for all of them, and says so; later ones 
 and cannot be read any more is made anew; where nothing can be kept, every start compiles, and says so.
 
 Rules: a step takes numbers and arrays, does not change them, and returns new ones; parts that are inlined may
-fill the arrays they are given. What a step calls, and the constants that it uses, stand in its own file,
-above it: what is kept on the disk is made anew only when that file changes. No index is checked: what a step
-reads by has to be in range. With NUMBA_DISABLE_JIT=1 all of them run as plain Python, for a debugger; there
-1.0 / 0.0 is an error.
+fill the arrays they are given. No index is checked: what a step reads by has to be in range. With
+NUMBA_DISABLE_JIT=1 all of them run as plain Python, for a debugger; there 1.0 / 0.0 is an error.
+
+What is kept of a step is made anew when its file changes, or that of a part which it calls, or the value of a
+constant that it reads, wherever they stand (_rests_on): the compiler alone would look at the step's own file.
 """
 
 from __future__ import annotations
 
+import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from hashlib import sha256
+from pathlib import Path
 from pickle import PickleError
+from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
 from numba import njit, types
-from numba.core import sigutils
+from numba.core import caching, sigutils
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
@@ -35,6 +41,7 @@ _EVERY_TIME = (
     "NUMBA_CACHE_DIR may name a folder for it ({})\n"
 )
 _told: set[str] = set()
+_CONSTANTS = (bool, int, float, str, tuple, np.generic)
 # What reading or writing its files raises: a full disk, no place for them, half a file and what comes of it.
 _NOT_KEPT = (
     OSError,
@@ -68,7 +75,7 @@ def compiled(arguments: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """Part of compiled steps of the same file, for whatever types they give it."""
+    """Part of compiled steps, for whatever types they give it."""
     result: Callable[P, R] = njit(error_model="numpy")(function)
     return result
 
@@ -92,14 +99,61 @@ def _build(
     function: Callable[P, R], signature: tuple[types.Type, ...], *, kept: bool, anew: bool = False
 ) -> Callable[P, R]:
     """anew: whatever is kept of it counts for nothing."""
-    step: Any = njit(cache=kept, error_model="numpy")(function)
+    step: Any = njit(error_model="numpy")(function)
     if isinstance(step, Dispatcher):  # else plain Python, with NUMBA_DISABLE_JIT=1
+        if kept:
+            # As Dispatcher.enable_caching does, with a cache that stamps less.
+            setattr(step, "_cache", _Cache(function))  # noqa: B010
         if anew:
             step.recompile()  # nothing yet, but what is kept is forgotten with it
         step.compile(signature)
         step.disable_compile()
     result: Callable[P, R] = step
     return result
+
+
+def _rests_on(function: FunctionType, known: set[FunctionType]) -> Iterator[object]:
+    """What the compiled form of function holds besides the words of its own file: the files of the parts that
+    it calls, by what is in them, and the constants and records that it and they read. known: parts had."""
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        if isinstance(value, Dispatcher):
+            if value.py_func not in known:
+                known.add(value.py_func)
+                yield sha256(Path(inspect.getfile(value.py_func)).read_bytes()).hexdigest()
+                yield from _rests_on(value.py_func, known)
+        elif isinstance(value, np.ndarray):
+            yield name, value.tobytes()
+        elif isinstance(value, type) and issubclass(value, tuple):
+            yield name, getattr(value, "_fields", ())
+        elif isinstance(value, _CONSTANTS):
+            yield name, repr(value)
+
+
+def _stamped(place: Any) -> Any:
+    """A place where compiled forms are kept, whose stamp is of everything that they rest on."""
+
+    class Stamped(place):  # type: ignore[misc]
+        def __init__(self, function: FunctionType, file: str) -> None:
+            super().__init__(function, file)
+            self._function = function
+
+        def get_source_stamp(self) -> tuple[object, ...]:
+            return super().get_source_stamp(), *_rests_on(self._function, set())
+
+    return Stamped
+
+
+class _Forms(caching.CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = (
+        _stamped(caching.UserProvidedCacheLocator),
+        _stamped(caching.InTreeCacheLocator),
+        _stamped(caching.UserWideCacheLocator),
+    )
+
+
+class _Cache(caching.FunctionCache):  # type: ignore[misc]
+    _impl_class = _Forms
 
 
 def _say(sentence: str, *values: str) -> None:
