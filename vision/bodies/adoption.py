@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import FloatGrid
+from vision.depth.depth_grid import FloatGrid, nearest_cell
+from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.motion.candidates import long_static
 
@@ -82,12 +83,6 @@ def adopt(
     )
 
 
-@inlined
-def _cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
-    """Row or column of the grid, of so many."""
-    return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
-
-
 @compiled(
     "float32[:, :, :], float32[:, :], float32[:, ::1], int32[:, ::1], float64, float64, float64, float64,"
     "int64[::1], boolean[::1], boolean[:], int64[::1]"
@@ -113,11 +108,11 @@ def _adopted(
         own_m = float(np.fmin(near_m[k, 0], near_m[k, 1]))
         u, v = float(ends_px[k, 0, 0]), float(ends_px[k, 0, 1])
         across, down = float(ends_px[k, 1, 0]) - u, float(ends_px[k, 1, 1]) - v
-        sigma_m = floor_m + quadratic_per_m * own_m * own_m
+        sigma_m = depth_sigma_of(own_m, floor_m, quadratic_per_m)
         track, least, on_it = -1, np.inf, False
         for i in range(len(_ALONG)):
-            row = _cell(v + down * _ALONG[i] - _ABOVE_PX[i], offset_px, step_px, height)
-            column = _cell(u + across * _ALONG[i] + _BESIDE_PX[i], offset_px, step_px, width)
+            row = nearest_cell(v + down * _ALONG[i] - _ABOVE_PX[i], offset_px, step_px, height)
+            column = nearest_cell(u + across * _ALONG[i] + _BESIDE_PX[i], offset_px, step_px, width)
             there_m, gap_m = depth_m[row, column], abs(depth_m[row, column] - own_m)
             if labels[row, column] == 0 or not gap_m <= _LEAST_GATE_M + 2.0 * sigma_m:
                 continue

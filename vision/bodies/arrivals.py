@@ -20,6 +20,7 @@ from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.numerics.relative_pose import Row, coordinate_m, relative_row
 
 # Every second view at 30 frames a second: a look back takes whichever is close to it.
 _KEEP_EVERY_S = 0.06
@@ -35,8 +36,6 @@ _NEIGHBOURS = 5  # of a cell and its eight neighbours, this many must have arriv
 _UNKNOWN = np.float32(1e3)  # 1/m, of what was not measured: nothing is nearer, so that nothing has come there
 _NEAREST_M = np.float32(0.1)  # nearer, a point projects anywhere
 _BLOCK = np.ones((3, 3), np.uint8)
-
-Lead = tuple[np.float32, np.float32, np.float32, np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,30 +130,12 @@ class FreeMemory:
 
 
 @inlined
-def _lead(
-    outer_rotation: FloatArray, outer_m: FloatArray, rotation: FloatArray, origin_m: FloatArray, axis: int
-) -> Lead:
-    """What leads from the axes of a pose, rotation and origin_m, to one coordinate in those of another."""
-    x, y, z, shift_m = 0.0, 0.0, 0.0, 0.0
-    for i in range(3):
-        along = outer_rotation[i, axis]
-        x, y, z = x + along * rotation[i, 0], y + along * rotation[i, 1], z + along * rotation[i, 2]
-        shift_m += along * (origin_m[i] - outer_m[i])
-    return np.float32(x), np.float32(y), np.float32(z), np.float32(shift_m)
-
-
-@inlined
-def _led(lead: Lead, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
-    return lead[0] * x + lead[1] * y + lead[2] * z + lead[3]
-
-
-@inlined
 def _put_row(
     depth_m: FloatGrid,
     ray_x: FloatGrid,
     ray_y: FloatGrid,
     row: int,
-    leads: tuple[Lead, Lead, Lead],
+    rows: tuple[Row, Row, Row],
     cell: IntGrid,
     inverse: FloatGrid,
 ) -> None:
@@ -163,14 +144,14 @@ def _put_row(
     columns, width, height = np.int32(len(ray_x)), np.float32(len(ray_x)), np.float32(len(ray_y))
     left, top, zero = ray_x[0], ray_y[0], np.float32(0.0)
     per_column, per_row = np.float32(1.0) / (ray_x[1] - left), np.float32(1.0) / (ray_y[1] - top)
-    to_x, to_y, to_z = leads
+    to_x, to_y, to_z = rows
     for j in range(columns):
         z = depth_m[row, j]
         x, y = ray_x[j] * z, ray_y[row] * z
-        there_m = _led(to_z, x, y, z)
+        there_m = coordinate_m(to_z, x, y, z)
         inverse[j] = np.float32(1.0) / there_m
-        u = (_led(to_x, x, y, z) * inverse[j] - left) * per_column + np.float32(0.5)
-        v = (_led(to_y, x, y, z) * inverse[j] - top) * per_row + np.float32(0.5)
+        u = (coordinate_m(to_x, x, y, z) * inverse[j] - left) * per_column + np.float32(0.5)
+        v = (coordinate_m(to_y, x, y, z) * inverse[j] - top) * per_row + np.float32(0.5)
         inside = (there_m > _NEAREST_M) & (u >= zero) & (v >= zero) & (u < width) & (v < height)
         cell[j] = np.int32(v) * columns + np.int32(u) if inside else np.int32(-1)
 
@@ -195,15 +176,15 @@ def _compared(
     height, width = depth_m.shape
     nearer, same = np.zeros((height, width), np.bool_), np.zeros((height, width), np.bool_)
     cell, inverse, seen = np.empty(width, np.int32), np.empty(width, np.float32), seen_inverse.ravel()
-    leads = (
-        _lead(old_rotation, old_origin_m, rotation, origin_m, 0),
-        _lead(old_rotation, old_origin_m, rotation, origin_m, 1),
-        _lead(old_rotation, old_origin_m, rotation, origin_m, 2),
+    rows = (
+        relative_row(old_rotation, old_origin_m, rotation, origin_m, 0),
+        relative_row(old_rotation, old_origin_m, rotation, origin_m, 1),
+        relative_row(old_rotation, old_origin_m, rotation, origin_m, 2),
     )
     for i in range(height):
         if not mask[i].any():
             continue
-        _put_row(depth_m, ray_x, ray_y, i, leads, cell, inverse)
+        _put_row(depth_m, ray_x, ray_y, i, rows, cell, inverse)
         for j in range(width):
             if mask[i, j] and cell[j] >= 0:
                 ahead = inverse[j] - seen[cell[j]]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.division import LOW, WITHIN
-from vision.depth.depth_grid import DepthGrid
+from vision.depth.depth_grid import DepthGrid, nearest_cell
 from vision.depth.regions import Regions
 
 LOAD_M = 0.8  # by so much farther back a load may begin than what carries it
@@ -105,12 +105,6 @@ def cells_between(
     return _cells_between(regions.bbox_px, one, other, grid.offset_px, grid.step_px, height, width)
 
 
-@inlined
-def _cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
-    """Row or column of the grid, of so many."""
-    return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
-
-
 @compiled("float64[:, :], int64[:], int64[:], float64, float64, int64, int64")
 def _cells_between(
     bbox_px: FloatArray,
@@ -128,6 +122,6 @@ def _cells_between(
         across, down = 0.5 * (b[0] + b[2]) - u, 0.5 * (b[1] + b[3]) - v
         for i in range(_SAMPLES):
             share = i / (_SAMPLES - 1)
-            row = _cell(v + down * share, offset_px, step_px, height)
-            cells[i, k] = row * width + _cell(u + across * share, offset_px, step_px, width)
+            row = nearest_cell(v + down * share, offset_px, step_px, height)
+            cells[i, k] = row * width + nearest_cell(u + across * share, offset_px, step_px, width)
     return cells

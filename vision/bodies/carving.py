@@ -25,7 +25,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth import connected, regions
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid
-from vision.depth.depth_mask import depth_sigma_m
+from vision.depth.depth_noise import depth_sigma_m, depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.motion import candidates
@@ -116,7 +116,7 @@ def _in_question(
     searched, overgrown = np.zeros(len(mover), np.bool_), np.zeros(len(mover), np.bool_)
     for t in range(len(mover)):
         depth_m = position_m[t, 2]
-        deepest_m = _COMPACT_M + 2.0 * (floor_m + quadratic_per_m * depth_m * depth_m)
+        deepest_m = _COMPACT_M + 2.0 * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
         compact = extent_m[t, 0] <= _COMPACT_M and extent_m[t, 2] <= deepest_m
         # Where the lines of something wider than a body stand while a part of it arrives, somebody touches
         # it.

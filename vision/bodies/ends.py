@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.depth.connected import IntGrid
-from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
+from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid, nearest_cell
 
 _AROUND_M = 0.2  # cells so close to a moving fragment are of its body; a body is about twice as wide
 _AGREE_M = 0.3  # about a body's depth, and
@@ -44,12 +44,6 @@ def near_ends(
     )
 
 
-@inlined
-def _cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
-    """Row or column of the grid, of so many."""
-    return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
-
-
 @compiled("float32[:, :, :], float32[:, :], boolean[:, ::1], float64, float64, float64")
 def _seeds(
     ends_px: NDArray[np.float32],
@@ -68,8 +62,8 @@ def _seeds(
     for n in range(len(depth_m)):
         for k in range(2):
             if np.isfinite(depth_m[n, k]):
-                rows[count] = _cell(float(ends_px[n, k, 1]), offset_px, step_px, height)
-                columns[count] = _cell(float(ends_px[n, k, 0]), offset_px, step_px, width)
+                rows[count] = nearest_cell(float(ends_px[n, k, 1]), offset_px, step_px, height)
+                columns[count] = nearest_cell(float(ends_px[n, k, 0]), offset_px, step_px, width)
                 end_m[count] = depth_m[n, k]
                 count += 1
     rows, columns, end_m = rows[:count], columns[:count], end_m[:count]

@@ -13,16 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
+from vision.numerics.relative_pose import coordinate_m, relative_row
 
 _DEPTH_GATE_INVERSE = 0.03  # 1/m, as large as a jump in depth may be within one part, and
 _DEPTH_GATE_M = 0.25  # what may come nearer as a body turns or bends, beside its own velocity
 _NEAREST_M = np.float32(0.1)  # nearer, a point projects anywhere
-
-Lead = tuple[np.float32, np.float32, np.float32, np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,24 +90,6 @@ def predict(
     )
 
 
-@inlined
-def _lead(
-    outer_rotation: FloatArray, outer_m: FloatArray, rotation: FloatArray, origin_m: FloatArray, axis: int
-) -> Lead:
-    """What leads from the axes of a pose, rotation and origin_m, to one coordinate in those of another."""
-    x, y, z, shift_m = 0.0, 0.0, 0.0, 0.0
-    for i in range(3):
-        along = outer_rotation[i, axis]
-        x, y, z = x + along * rotation[i, 0], y + along * rotation[i, 1], z + along * rotation[i, 2]
-        shift_m += along * (origin_m[i] - outer_m[i])
-    return np.float32(x), np.float32(y), np.float32(z), np.float32(shift_m)
-
-
-@inlined
-def _led(lead: Lead, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
-    return lead[0] * x + lead[1] * y + lead[2] * z + lead[3]
-
-
 @compiled(
     "float32[:, ::1], int32[::1], int64[::1], float64[:, :], float64[:, :], float64[:], float64[:, :],"
     "float64[:], float32[:, ::1], float32[::1], float32[::1]"
@@ -131,9 +112,9 @@ def _predicted(
     result, nearest = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
     left, top = ray_x[0], ray_y[0]
     per_column, per_row = np.float32(1.0) / (ray_x[1] - left), np.float32(1.0) / (ray_y[1] - top)
-    to_x = _lead(rotation, origin_m, old_rotation, old_origin_m, 0)
-    to_y = _lead(rotation, origin_m, old_rotation, old_origin_m, 1)
-    to_z = _lead(rotation, origin_m, old_rotation, old_origin_m, 2)
+    to_x = relative_row(rotation, origin_m, old_rotation, old_origin_m, 0)
+    to_y = relative_row(rotation, origin_m, old_rotation, old_origin_m, 1)
+    to_z = relative_row(rotation, origin_m, old_rotation, old_origin_m, 2)
     way_m = np.zeros(shift_m.shape, np.float32)  # in the camera's axes now
     for track in range(len(shift_m)):
         for i in range(3):
@@ -147,11 +128,11 @@ def _predicted(
         if track < 0:
             continue
         x, y, z = points_m[0, k], points_m[1, k], points_m[2, k]
-        there_m = _led(to_z, x, y, z) + way_m[track, 2]
+        there_m = coordinate_m(to_z, x, y, z) + way_m[track, 2]
         if not there_m > _NEAREST_M:
             continue
         expected = np.float32(1.0) / there_m
-        x, y = _led(to_x, x, y, z) + way_m[track, 0], _led(to_y, x, y, z) + way_m[track, 1]
+        x, y = coordinate_m(to_x, x, y, z) + way_m[track, 0], coordinate_m(to_y, x, y, z) + way_m[track, 1]
         column = (x * expected - left) * per_column + np.float32(0.5)
         row = (y * expected - top) * per_row + np.float32(0.5)
         if not (0.0 <= column < width and 0.0 <= row < height):

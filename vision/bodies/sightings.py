@@ -23,6 +23,7 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
+from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
@@ -133,7 +134,7 @@ def _kinds(
             for k in range(3):
                 centre_m[t, i] += rotation[i, k] * position_m[t, k]
             squared += (centre_m[t, i] - state[t, i]) ** 2
-        expected_m = _JUMP_M + 2.0 * (floor_m + quadratic_per_m * depth_m * depth_m)
+        expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
         # Else the camera's own error would be theirs.
         steady = motion_known and math.sqrt(squared) <= expected_m
         if wide[t] and change[t] <= _SAME_AREA and steady:
@@ -168,7 +169,7 @@ def _centre_covariances(
         size_m, depth_m = max(extent_m[t, 0], extent_m[t, 1]), position_m[t, 2]
         across_m = _CENTRE_SIGMA_M + _CENTRE_SHARE * size_m
         along_m = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * extent_m[t, 2]
-        noise_m = _CENTRE_NOISE * (floor_m + quadratic_per_m * depth_m * depth_m)
+        noise_m = _CENTRE_NOISE * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
         variance[0] = across_m**2
         variance[1] = across_m**2 if tall[t] else _CUT_SIGMA_M**2
         variance[2] = along_m**2 + noise_m**2
@@ -230,7 +231,7 @@ def _expected(
             for k in range(3):
                 centre_m[t, i] += rotation[k, i] * (state[t, k] - translation_m[k])
         depth_m = max(centre_m[t, 2], 0.0)
-        sigma_m[t] = floor_m + quadratic_per_m * depth_m * depth_m
+        sigma_m[t] = depth_sigma_of(depth_m, floor_m, quadratic_per_m)
     return centre_m, sigma_m
 
 

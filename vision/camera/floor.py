@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.types import FloatArray
 from vision.depth.depth_grid import CELL_HEIGHT_NOISE, DepthGrid
-from vision.depth.depth_mask import depth_sigma_m
+from vision.depth.depth_noise import depth_sigma_m
 
 _EVERY = 3  # cells, in both directions
 _TRIES = 96  # where half of what is looked at is floor, one in eight hits it three times

@@ -14,6 +14,7 @@ from config.perception import PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import CameraMount, DepthImage, FloatArray, Intrinsics, RgbdFrame
 from vision.depth.depth_mask import measurable_m
+from vision.depth.depth_noise import depth_sigma_of
 
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
@@ -67,6 +68,12 @@ class DepthGrid:
         np.multiply(self.y.take(rows), depth, out=result[1])
         result[2] = depth
         return result
+
+
+@inlined
+def nearest_cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
+    """The row of a pixel's v, or the column of its u, in a grid of so many: the last one beyond the rim."""
+    return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
 
 
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
@@ -258,5 +265,5 @@ def _over_floor(
             depth = depth_m[i, j]
             forward_m[i, j] = depth * ahead[i]
             height_m[i, j] = camera_height_m - depth * drop[i]
-            height_sigma_m[i, j] = share * (floor_m + quadratic_per_m * depth * depth)
+            height_sigma_m[i, j] = share * depth_sigma_of(depth, floor_m, quadratic_per_m)
     return forward_m, height_m, height_sigma_m

@@ -8,7 +8,6 @@ surface and, at a silhouette, a far one.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,7 @@ from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from hal.types import DepthImage, FloatArray
 from vision.camera.lens import RealArray
-
-Depths = TypeVar("Depths", NDArray[np.float32], NDArray[np.float64])
+from vision.depth.depth_noise import depth_sigma_of
 
 # 5x5 samples over 13 px: beyond the rim of some pixels where depth is wrong.
 _REACH_PX, _EVERY_PX, _SAMPLES = 6, 3, 25
@@ -41,12 +39,6 @@ class SurfaceDepth:
     near_m: FloatArray
     far_m: FloatArray
     holes: FloatArray
-
-
-def depth_sigma_m(depth_m: Depths, noise: DepthNoise) -> Depths:
-    """One standard deviation of depth (Khoshelham's model, sigma_z ~ z^2, with a floor); float32 stays so."""
-    sigma_m: Depths = noise.floor_m + noise.quadratic_per_m * depth_m * depth_m
-    return sigma_m
 
 
 def measurable_m(max_m: float, scale_m: float) -> float:
@@ -138,7 +130,7 @@ def _surfaces(
         _note_nearest(sample_m, measured, nearest_m)
         # With holes around, the same share of what is valid decides.
         anchor_m = nearest_m[min(_NEAR_RANK, within // 3)]
-        gate_m = np.float32(0.06 + 3.0 * (floor_m + quadratic_per_m * anchor_m * anchor_m))
+        gate_m = np.float32(0.06 + 3.0 * depth_sigma_of(anchor_m, floor_m, quadratic_per_m))
         near_sum, near_count, far_sum, far_count = 0.0, 0, 0.0, 0
         for j in range(measured):
             behind_m = sample_m[j] - anchor_m

@@ -17,6 +17,7 @@ from hal.compiled import compiled
 from hal.types import FloatArray, RgbdFrame
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_mask import SurfaceDepth
+from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.fragments.candidates import (
     NOTHING_NEW,
@@ -118,7 +119,7 @@ def _told_of_by_too_few(
         if not x * x + y * y + z * z <= _REACH_M**2:
             continue
         depth = max(x * rotation[0, 2] + y * rotation[1, 2] + z * rotation[2, 2], 0.0)
-        gate = _GATE_M + _GATE_SIGMAS * (floor_m + quadratic_per_m * depth * depth)
+        gate = _GATE_M + _GATE_SIGMAS * depth_sigma_of(depth, floor_m, quadratic_per_m)
         gate += 0.5 * np.minimum(extent_m[n, 2], _DEEPEST_M)
         chosen[count], depth_m[count], gate_m[count] = n, depth, gate
         urgent[count] = evidence[n] > 0.0 or sightings[n] < _URGENT_SIGHTINGS

@@ -11,6 +11,7 @@ from config.perception import FragmentSettings, PerceptionConfig
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, RgbdFrame
 from vision.depth.depth_mask import SurfaceDepth, surface_depth
+from vision.depth.depth_noise import depth_sigma_of
 from vision.fragments.edges import GreyImage
 from vision.fragments.segments import snap_to_corners
 
@@ -164,7 +165,7 @@ def _on_one_surface(near_m: FloatArray, floor_m: float, quadratic_per_m: float) 
         missing, jumps = 0, np.isnan(begin) or np.isnan(end)
         for place in range(1, _PLACES - 1):
             expected_m = 1.0 / (begin + (end - begin) * (place / (_PLACES - 1)))
-            gate_m = 0.05 + 3.0 * (floor_m + quadratic_per_m * expected_m * expected_m)
+            gate_m = 0.05 + 3.0 * depth_sigma_of(expected_m, floor_m, quadratic_per_m)
             if np.isnan(near_m[n, place]):
                 missing += 1
             elif not abs(near_m[n, place] - expected_m) <= gate_m:

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.depth.depth_mask import UNSEEN_M
+from vision.depth.depth_noise import depth_sigma_of
 from vision.ego_motion.reprojection import Anchors
 from vision.fragments.store import AnchorEnds, FragmentStore
 
@@ -121,12 +122,6 @@ def depth_steps(
     )
 
 
-@inlined
-def _sigma_m(depth_m: float, floor_m: float, quadratic_per_m: float) -> float:
-    """As depth_sigma_m of vision/depth/depth_mask.py."""
-    return floor_m + quadratic_per_m * depth_m * depth_m
-
-
 @compiled("float64[::1], float64[::1], float64[::1], float64, float64, float64")
 def _appraised(
     depth_m: FloatArray,
@@ -143,7 +138,7 @@ def _appraised(
     for k in range(count):
         if known[k]:
             near[k], far[k] = depth_m[k], far_m[k]
-            single = _sigma_m(depth_m[k], floor_m, quadratic_per_m)
+            single = depth_sigma_of(depth_m[k], floor_m, quadratic_per_m)
             # What is left of the noise, which is alike in part, after so many frames.
             sigma[k] = single * max(1.0 / math.sqrt(max(looks[k], 1.0)), _COMMON_NOISE)
             mixed[k] = far[k] - near[k] > 0.1 + _MIXED_SIGMAS * single
@@ -201,7 +196,7 @@ def _averaged(
         fragment, end = k // 2, k % 2
         off_m = near_m[fragment, end] - carried_m
         # Not where either is missing.
-        if abs(off_m) <= 0.05 + 3.0 * _sigma_m(carried_m, floor_m, quadratic_per_m):
+        if abs(off_m) <= 0.05 + 3.0 * depth_sigma_of(carried_m, floor_m, quadratic_per_m):
             new_looks[fragment, end] = min(looks[fragment, end] + 1.0, _MOST_LOOKS)
             mean_m[fragment, end] = carried_m + off_m / new_looks[fragment, end]
     return mean_m, new_looks
@@ -227,7 +222,7 @@ def _steps(
         fragment = k // 2
         now_m = np.float64(near_m[fragment, k % 2])
         step_m[k] = now_m - static_m[k, 2]
-        sigma_now_m = _sigma_m(1.0 if math.isnan(now_m) else now_m, floor_m, quadratic_per_m)
+        sigma_now_m = depth_sigma_of(1.0 if math.isnan(now_m) else now_m, floor_m, quadratic_per_m)
         step_sigma_m[k] = math.sqrt(sigma_m[k] * sigma_m[k] + sigma_now_m * sigma_now_m)
         # The averaged depth of the anchor was measured before the anchor's time, on average.
         late_frames = 0.5 * (looks[k] - 1.0) if looks[k] < _MOST_LOOKS else _SETTLED_LATE_FRAMES

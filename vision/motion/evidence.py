@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Intrinsics
+from vision.depth.depth_noise import depth_sigma_of
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.rolling_shutter import straight_rays
 from vision.fragments.store import AnchorEnds, FragmentStore
@@ -209,7 +210,7 @@ def _missed(
         near_effect = turn_u * sigma_m[k], turn_v * sigma_m[k]
         near_miss = u * z - x, v * z - y
         near_chi2 = _squared_sigmas(near_miss, (xx, xy, yy), near_effect)
-        far_sigma_m = floor_m + quadratic_per_m * far_m[k] * far_m[k]
+        far_sigma_m = depth_sigma_of(far_m[k], floor_m, quadratic_per_m)
         more = (far_z / ahead) ** 2
         far_chi2 = _squared_sigmas(
             (u * far_z - far_x, v * far_z - far_y),

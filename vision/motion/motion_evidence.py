@@ -11,7 +11,7 @@ from config.perception import DepthNoise
 from hal.types import FloatArray
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
-from vision.depth.depth_mask import depth_sigma_m
+from vision.depth.depth_noise import depth_sigma_m
 from vision.detection import LEAST_AGREEMENT, Detection
 from vision.motion.least_squares import BodyVelocities
 from vision.motion.limbs import believable, restless

@@ -1,1 +1,1 @@
-"""Small arrays: filters, medians."""
+"""Small arrays: filters, medians, transforms."""

@@ -5,7 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from config.perception import DepthNoise
-from vision.depth.depth_mask import SurfaceDepth, depth_sigma_m, surface_depth
+from vision.depth.depth_mask import SurfaceDepth, surface_depth
+from vision.depth.depth_noise import depth_sigma_m, depth_sigma_of
 
 NOISE = DepthNoise()
 MIDDLE = np.array([[40.0, 30.0]])
@@ -22,6 +23,7 @@ def at_middle(depth: NDArray[np.uint16], pixels: NDArray[np.float64] = MIDDLE) -
 def test_sigma_grows_with_the_square_of_depth() -> None:
     noise = DepthNoise(floor_m=0.01, quadratic_per_m=0.005)
     np.testing.assert_allclose(depth_sigma_m(np.array([0.0, 2.0, 10.0]), noise), [0.01, 0.03, 0.51])
+    assert depth_sigma_of(10.0, noise.floor_m, noise.quadratic_per_m) == pytest.approx(0.51)
     # The default is a real RealSense: 19 cm at 5 m.
     assert depth_sigma_m(np.array([5.0]), NOISE)[0] == pytest.approx(0.19, abs=0.005)
 

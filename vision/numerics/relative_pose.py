@@ -1,0 +1,35 @@
+"""Points carried from the axes of one pose to those of another, in single precision, for compiled steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hal.compiled import inlined
+from hal.types import FloatArray
+
+# One row of the relative transform: three of its rotation's, and the translation in metres.
+Row = tuple[np.float32, np.float32, np.float32, np.float32]
+
+
+@inlined
+def relative_row(
+    to_rotation: FloatArray,
+    to_origin_m: FloatArray,
+    from_rotation: FloatArray,
+    from_origin_m: FloatArray,
+    axis: int,
+) -> Row:
+    """The row of the transform from one pose's axes to another's that gives the coordinate along axis."""
+    x, y, z, shift_m = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        along = to_rotation[i, axis]
+        x, y = x + along * from_rotation[i, 0], y + along * from_rotation[i, 1]
+        z += along * from_rotation[i, 2]
+        shift_m += along * (from_origin_m[i] - to_origin_m[i])
+    return np.float32(x), np.float32(y), np.float32(z), np.float32(shift_m)
+
+
+@inlined
+def coordinate_m(row: Row, x_m: np.float32, y_m: np.float32, z_m: np.float32) -> np.float32:
+    """That coordinate of a point."""
+    return row[0] * x_m + row[1] * y_m + row[2] * z_m + row[3]
