@@ -3,20 +3,19 @@
 controller/decision/decide.py calls Appraiser.limits and takes the least of these limits and its own (path,
 range, camera). The advisers, in the order in which they are called:
 
-1. Depth (controller/decision/sight.py): a blind corner, the nearest surface that no obstacle explains, and
-the end of
-   the floor that was seen to be free.
+1. Depth (controller/decision/sight.py, lens_cover.py): a blind corner, the nearest surface that no obstacle
+   explains, a covered lens, and the end of the floor that was seen free.
 2. standing.StandingLimits: bodies that stand in the swept corridor.
 3. moving.MovingLimits: bodies that cross, come or drive ahead (conflicts: controller/decision/crossing.py).
-4. worst_case.WorstCase: what the watched bodies could do at worst (geometry:
-controller/decision/contingency.py).
+4. worst_case.WorstCase: what the watched bodies could do at worst
+   (geometry: controller/decision/contingency.py).
 
 Words for the bodies that controller/decision/knowledge.py knows:
 
-* watched: those that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone.
+* watched: bodies that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone.
 * enters: watched bodies that are in the swept corridor or are likely to come into it (crossing.comes_in),
   debounced.
-* remembered: those out of the camera's view, kept by controller/decision/memory.py.
+* remembered: bodies out of the camera's view, kept by controller/decision/memory.py.
 """
 
 from __future__ import annotations
@@ -42,16 +41,17 @@ from controller.decision.standing import StandingLimits
 from controller.decision.worst_case import WorstCase
 from hal.types import CameraMount
 
-_COARSE_S = 0.5
+_COARSE_S = 0.5  # step of the times beyond those of the worst case
 _NONE = np.zeros(0, np.bool_)
+# A surface within this distance of a tracked obstacle, along the path, is named after it.
 _SAME_SURFACE_M = 0.8
-# So long somebody must head for the way until he counts as coming in, and head elsewhere until he does not;
-# meanwhile the worst case is what is reckoned with.
+# A body must head for the corridor for this long until it counts as coming in, and head elsewhere for as long
+# until it does not. Meanwhile the worst case covers it.
 _SETTLES_S = 0.3
 
 
 class Appraiser:
-    """Asks, in this order: depth, what stands, what moves, and what the moving ones could do at worst."""
+    """Asks the advisers, in this order: depth, standing bodies, moving bodies, and the worst case."""
 
     def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount) -> None:
         self._config, self._comfort = config, braking.comfort(limits)
@@ -70,8 +70,10 @@ class Appraiser:
     def limits(
         self, known: Knowledge, s_m: float, motion: Motion, base_mps: float, now_s: float
     ) -> list[Limit]:
-        """Every limit that obstacles and depth put on the speed of a robot at s_m; base_mps: what path
-        and camera allow."""
+        """Every limit that obstacles and depth put on the speed of a robot at s_m.
+
+        base_mps: what path and camera allow.
+        """
         if known.bodies is not self._of:
             self._take_in(known)
         found = self._depth(known, s_m, motion)
@@ -86,7 +88,8 @@ class Appraiser:
         course = course_of(watched, placed.heading_rad[:, 0])
         sigma_left = course.sigma_left_mps * self._config.prediction.sigmas
         comes = comes_in(placed, self._times_s, sigma_left)
-        # Who is in the way is; and of who is out of sight nothing is measured that could be noise.
+        # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
+        # there is no noise.
         at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
         enters = self._enters.update(watched.ids, comes, at_once, now_s)
         for limit in found:
@@ -96,7 +99,7 @@ class Appraiser:
         )
         found += in_the_way
         if self._remembered.any():
-            # Who is out of sight on a way towards the robot's may be nearer than where it is reckoned.
+            # A body out of view that approaches the path may be nearer to it than expected.
             unsure_mps = UNSEEN_SIGMAS * course.sigma_left_mps
             inwards = -np.sign(placed.d_m[:, 0]) * course.left_mps > unsure_mps
             nearer = comes_in(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
@@ -109,7 +112,7 @@ class Appraiser:
         return found
 
     def _take_in(self, known: Knowledge) -> None:
-        """Once a scene: whose future has to be looked at, and who is gone."""
+        """Once a scene: select the watched bodies, and forget those that are gone."""
         self._of = bodies = known.bodies
         watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
         self._watched = bodies.select(watched)
@@ -118,7 +121,7 @@ class Appraiser:
             self._inside.intersection_update(bodies.ids.tolist())
 
     def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
-        """The nearest unexplained surface, and the end of the floor that was seen to be free."""
+        """The limits from depth alone (adviser 1 of the module's list)."""
         sight = known.sight
         front_m = s_m + known.corridor.front_m
         found = self._corner(sight.corners.nearest(front_m), front_m, motion)
@@ -132,7 +135,10 @@ class Appraiser:
         return found
 
     def _surface(self, known: Knowledge, surface_s_m: float, s_m: float, motion: Motion) -> Limit:
-        """The nearest surface that no box explains. Whose it is matters to the words alone."""
+        """The limit for the nearest surface that no box explains.
+
+        Which obstacle it belongs to is looked up for the sentence only.
+        """
         margins, ahead_m = self._config.margins, surface_s_m - (s_m + known.corridor.front_m)
 
         def before(gap: Gap) -> Limit:
@@ -145,7 +151,7 @@ class Appraiser:
         return Limit(limit.speed_mps, why, limit.urgent)
 
     def _unseen(self, gap: Gap, motion: Motion) -> Limit:
-        """The end of the floor that was seen to be free."""
+        """The limit for the end of the floor that was seen free."""
         least_m = self._config.margins.least_m
         limit = stop_before(gap, motion, self._comfort, least_m, -math.inf, "unseen", "")
 
@@ -163,7 +169,7 @@ class Appraiser:
         return Limit(limit.speed_mps, why)
 
     def _corner(self, corner: BlindCorner | None, front_m: float, motion: Motion) -> list[Limit]:
-        """Past a blind corner, slow enough that whoever steps out has a chance."""
+        """The limit for passing a blind corner: slow enough for whoever steps out."""
         if corner is None:
             return []
         ahead_m = corner.s_m - front_m
@@ -184,7 +190,7 @@ def _covered() -> Reason:
 
 
 def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:
-    """The obstacle whose surface this is, if one is tracked there that is no box."""
+    """Id of the obstacle whose surface this is, if an unboxed one is tracked there."""
     unboxed = known.unboxed
     if not len(unboxed):
         return None

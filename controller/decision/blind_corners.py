@@ -1,8 +1,9 @@
-"""Blind corners: where a long face close beside the way ends, somebody may step out from behind it.
+"""Blind corners: where a long face (wall, rack) close beside the corridor ends, and somebody may step out.
 
-No camera sees round a corner and no braking beats somebody who is first seen half a metre beside the way.
-What a driver does is to pass such a place slower; so does the robot. The end of a face is taken from what
-depth sees; crates and posts are no faces, nobody walks up unseen behind them.
+No camera sees round a corner, and no braking is in time for somebody who is first seen half a metre beside
+the corridor. A driver passes such a place slower, and so does the robot. The ends of faces are found in the
+surfaces that depth sees. Crates and posts are no faces: nobody can walk up unseen behind them.
+controller/decision/sight.py calls BlindCorners once a scene.
 """
 
 from __future__ import annotations
@@ -19,15 +20,18 @@ from hal.types import FloatArray
 
 IntArray = NDArray[np.intp]
 
-_FACE_M = 1.0
-_LOOK_AHEAD_M = 5.0
-_STEP_ASIDE_M = 0.3
-# Between two bands a face that is seen at a flat angle goes on for so much, and a half.
+_FACE_M = 1.0  # least length of a face
+_LOOK_AHEAD_M = 5.0  # faces are looked for this far ahead of the robot's front
+_STEP_ASIDE_M = 0.3  # neighbouring points of one face differ by less than this
+# A face seen at a flat angle goes on by _flat_m from one band to the next; 1.5 times that still is the face.
 _SLACK = 1.5
-# Out of a narrower gap nobody steps: between the goods of a rack there are many.
+# Nobody steps out of a narrower gap; between the goods of a rack there are many.
 _PASSAGE_M = 0.8
-_SAME_M = 0.6
+_SAME_M = 0.6  # ends that are nearer to each other are the same corner
+# Nearer than this ahead of the front, too little of the face is in view to tell that there is no corner.
 _SURE_M = 3.2
+# A corner counts from this score on, and its score is not raised above the second: a scene that shows the
+# corner adds 2, and each scene takes 1 off.
 _SIGHTINGS, _MOST_SIGHTINGS = 3, 8
 
 
@@ -41,14 +45,14 @@ class _Corner:
 
 @record(frozen=True, slots=True)
 class BlindCorner:
-    """At s_m along the path, beside_m beside the swept width."""
+    """A corner at s_m along the path, beside_m beside the swept width."""
 
     s_m: float
     beside_m: float
 
 
 class BlindCorners:
-    """Remembers the corners along one path; look() once a scene."""
+    """Remembers the corners along one path; call look() once a scene."""
 
     def __init__(self, config: SightConfig) -> None:
         self._beside_m = config.blind_corner_m
@@ -65,11 +69,18 @@ class BlindCorners:
         front_s_m: float,
         stands: NDArray[np.bool_],
     ) -> None:
-        """Surfaces of one scene in the order of their bands (P,): forward distance, path coordinates, and
-        half of the swept width there. band_tan: width of a band. front_s_m: where the robot's front is.
-        stands (P,): no face is made of what moves, people who walk one behind the other least of all."""
+        """Take in the P surfaces of one scene, in the order of their bands.
+
+        bands, forward_m: (P,) band, and distance ahead of the camera.
+        s_m, d_m: (P,) path coordinates.
+        half_width_m: (P,) half of the swept width there.
+        band_tan: width of a band.
+        front_s_m: path coordinate of the robot's front.
+        stands: (P,) whether the surface belongs to no mover. Movers are no faces, least of all people who
+        walk one behind the other.
+        """
         for corner in self._corners:
-            # Nearer than this, too little of the face is in view to be sure.
+            # Nearer than _SURE_M, a corner is not given up for not being seen.
             corner.sightings -= 1 if corner.s_m - front_s_m > _SURE_M else 0
         ends = _faces_end(
             bands, forward_m, s_m, d_m, half_width_m, stands, band_tan, front_s_m, self._beside_m
@@ -99,13 +110,16 @@ class BlindCorners:
 
 @inlined
 def _flat_m(forward_m: float, d_m: float, band_tan: float) -> float:
-    """So much of a face that runs along the way lies between two bands."""
+    """Distance between two bands along a face that is parallel to the path, d_m beside it."""
     return forward_m**2 * band_tan / max(abs(d_m), 0.1)
 
 
 @inlined
 def _opens(end: int, beyond: int, bands: IntArray, forward_m: FloatArray, least_m: float) -> bool:
-    """Whether the view past the end of a face goes on for more than least_m: what is behind it is hidden."""
+    """Whether depth jumps by more than least_m past the end of a face, or the next band has no surface.
+
+    A passage may be hidden there.
+    """
     if not 0 <= beyond < len(bands) or abs(bands[beyond] - bands[end]) != 1:
         return True
     return bool(forward_m[beyond] - forward_m[end] > least_m)
@@ -123,11 +137,12 @@ def _faces_end(
     front_s_m: float,
     most_beside_m: float,
 ) -> IntArray:
-    """(E,) which of the surfaces (P,) are far ends of long faces."""
+    """(E,) which of the surfaces (P,) are far ends of long faces; the arguments are those of look()."""
     count, found = len(bands), 0
     ends = np.empty(count, np.intp)
     for inward in (-1, 1):
-        # On either side from the edge of the view inwards: on the right against the order of the bands.
+        # Each side is followed from the edge of the view inwards; on the right that is from the last band
+        # to the first.
         began = last = -1
         for n in range(count + 1):
             k = n if inward > 0 else count - 1 - n

@@ -1,4 +1,4 @@
-"""The obstacles of a scene as upright boxes on the floor, in the frame of the path."""
+"""The obstacles of a scene as upright boxes on the floor, in the frame of the path: Bodies."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import Scene
 
-# Nothing in a hall is further, larger or faster: such numbers are faults of perception.
+# Nothing in a hall is farther away, larger or faster: such numbers are faults of perception.
 _FARTHEST_M = 200.0
 _LARGEST_M = 50.0
 _FASTEST_MPS = 15.0
-# What is measured of an obstacle, in a row, and between which bounds it is possible.
+# Columns of what is measured of an obstacle, and the bounds of possible values.
 _POSITION, _EXTENT, _VELOCITY, _COVARIANCE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 18)
 _MOST = np.repeat([_FARTHEST_M, _LARGEST_M, _FASTEST_MPS, np.finfo(np.float64).max], (3, 3, 3, 9))
 _LEAST = -_MOST
@@ -26,20 +26,24 @@ _LEAST[_EXTENT] = _LEAST[[9, 13, 17]] = 0.0  # and the variances
 
 
 class SceneError(Exception):
-    """A scene says something impossible: which obstacle and what."""
+    """A scene contains impossible values: which obstacle, and which values."""
 
 
 @record(frozen=True, slots=True, eq=False)
 class Bodies:
     """N boxes at captured_ns.
 
-    ids (N,). xy_m (N, 2) centre. velocity_mps (N, 2) over ground, 0 for what stands; measured_mps (N, 2) as
-    perception says, whether it stands or moves. surprise_mps (N, 2) by how much the newest measurement
-    differs from velocity_mps. covariance (N, 2, 2) of the velocity. half_view_m, half_across_m (N,) half
-    sizes along and across view_rad (N,), the direction it was seen in. top_m, bottom_m (N,) over the
-    floor. moving (N,).
-    age_s, unseen_s (N,) since they were seen first and last, at captured_ns. tracked_s (N,) since they were
-    seen first under this number: for so long velocities were measured.
+    ids: (N,) of their tracks.
+    xy_m: (N, 2) centre.
+    velocity_mps: (N, 2) over ground; 0 for bodies judged standing.
+    measured_mps: (N, 2) as perception measured it, whether standing or moving.
+    surprise_mps: (N, 2) by how much the newest measurement differs from velocity_mps.
+    covariance: (N, 2, 2) of the velocity.
+    half_view_m, half_across_m: (N,) half sizes along and across view_rad, the direction of view.
+    top_m, bottom_m: (N,) heights over the floor.
+    moving: (N,) whether judged moving.
+    age_s, unseen_s: (N,) time since first and last seen, at captured_ns.
+    tracked_s: (N,) time since first seen under this id, for which velocities were measured.
     """
 
     captured_ns: int
@@ -70,13 +74,13 @@ class Bodies:
         if not len(rows):
             return no_bodies(self.captured_ns)
         first, end = int(rows[0]), int(rows[-1]) + 1
-        if end - first == len(rows):  # neighbours, as most of the time: no copy is needed
+        if end - first == len(rows):  # adjacent rows, the usual case: no copy is needed
             return Bodies(self.captured_ns, *[array[first:end] for array in _arrays_of(self)])
         # For a few rows, take() is ten times as fast as an index.
         return Bodies(self.captured_ns, *[array.take(rows, 0) for array in _arrays_of(self)])
 
     def gone_on(self, captured_ns: int, xy_m: FloatArray, unseen_s: FloatArray) -> Bodies:
-        """The same later on, at xy_m (N, 2)."""
+        """The same bodies at a later time, at xy_m (N, 2)."""
         return Bodies(
             captured_ns,
             self.ids,
@@ -97,7 +101,7 @@ class Bodies:
         )
 
     def joined(self, other: Bodies) -> Bodies:
-        """These and, behind them, others; the time is that of these."""
+        """These bodies followed by the other ones; the time is that of these."""
         if not len(other):
             return self
         if not len(self):
@@ -106,7 +110,7 @@ class Bodies:
         return Bodies(self.captured_ns, *map(np.concatenate, pairs))
 
     def covers(self, points_m: FloatArray, reach_m: FloatArray, side_m: float) -> NDArray[np.bool_]:
-        """(P, N) whether floor points (P, 2) lie on a body, within reach_m (P,) along the view and side_m."""
+        """(P, N) which floor points (P, 2) lie on which body; reach_m (P,) along the view, side_m across."""
         return _covers(
             points_m, reach_m, side_m, self.xy_m, self.view_rad, self.half_view_m, self.half_across_m
         )
@@ -135,14 +139,14 @@ _NO_ARRAYS = _arrays_of(_NOBODY)
 
 
 def no_bodies(captured_ns: int) -> Bodies:
-    """An empty scene's."""
+    """The bodies of an empty scene."""
     return Bodies(captured_ns, *_NO_ARRAYS)
 
 
 def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float) -> Bodies:
-    """The obstacles of a scene whose camera was carried by a body at pose.
+    """The obstacles of a scene; pose: of the robot that carries the camera.
 
-    depth_m: how deep a body is at least, counted from the surface that is seen: its back is hidden.
+    depth_m: least depth of a body, from the visible surface on, since its back is hidden.
     Raises SceneError for values that are unknown or impossible.
     """
     if not scene.obstacles:
@@ -158,7 +162,7 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     said = np.array([(one.age_s, one.unseen_s, one.moving) for one in scene.obstacles], np.float64)
     age_s, unseen_s, moving = said[:, 0], said[:, 1], said[:, 2] > 0.0
     camera = camera_in_body(mount)
-    # Taking rows by number is quicker than unpacking an array.
+    # Taking rows by index is quicker than unpacking an array.
     impossible, on_floor, covariance, sizes = _boxes(
         measured,
         age_s,
@@ -229,7 +233,7 @@ def _covers(
 
 @inlined
 def _dot(one: FloatArray, other: FloatArray) -> float:
-    """Of two vectors (3,)."""
+    """Scalar product of two vectors (3,)."""
     return float(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
@@ -249,9 +253,11 @@ def _boxes(
     y_m: float,
     heading_rad: float,
 ) -> tuple[int, FloatArray, FloatArray, FloatArray]:
-    """The first of N obstacles that is impossible, -1: none is; of Bodies, (4, N, 2) xy_m, measured_mps,
-    velocity_mps and surprise_mps, the covariance, and (5, N) half_view_m, half_across_m, view_rad, top_m and
-    bottom_m. in_body (3, 3), in_body_m (3,): the camera's pose in a body that stands at x_m, y_m."""
+    """Index of the first impossible one of N obstacles (-1: none), and fields of Bodies.
+
+    These are (4, N, 2) xy_m, measured_mps, velocity_mps, surprise_mps; the covariance; (5, N) half_view_m,
+    half_across_m, view_rad, top_m, bottom_m. in_body (3, 3), in_body_m (3,): pose of the camera in the robot.
+    """
     count, impossible = len(measured), -1
     on_floor, covariance, sizes = np.zeros((4, count, 2)), np.empty((count, 2, 2)), np.empty((5, count))
     xy, measured_mps, velocity, _ = on_floor

@@ -1,13 +1,14 @@
 """The geometry of the worst case: what bodies could reach, and whether an emergency stop ends short of that.
 
-Called by controller/decision/worst_case.py alone, which makes a speed limit of the answers. What is assumed:
+Called by controller/decision/worst_case.py alone, which makes a speed limit of the answers. The assumptions:
 
 * A body may stop dead anywhere on its way, so the stretch of the path that it could block only grows.
 * A body may change its velocity by a bounded acceleration, up to the greatest obstacle speed V_omax.
 * The velocity of a body is known only with a spread.
 
-A robot that cannot leave its path can promise no more than to stand when something touches it. So the
-emergency stop from each speed, latency included, is followed in time against all that each body could reach.
+A robot that cannot leave its path can guarantee no more than to stand when something touches it. So the
+emergency stop from each speed, latency included, is compared at each time with all that each body could
+reach by then.
 """
 
 from __future__ import annotations
@@ -28,7 +29,11 @@ _STANDING_MPS = 0.02
 
 @record(frozen=True, slots=True, eq=False)
 class Reach:
-    """What N obstacles could block at K times: inside (N, K) whether, lo_m, hi_m (N, K) which positions."""
+    """What N bodies could block at K times; each (N, K).
+
+    inside: whether the body could be in the corridor.
+    lo_m, hi_m: it could block the robot's positions between these.
+    """
 
     inside: NDArray[np.bool_]
     lo_m: FloatArray
@@ -47,13 +52,17 @@ def reach(
     unsure_m: tuple[FloatArray, FloatArray] | None = None,
     of: NDArray[np.bool_] | None = None,
 ) -> Reach:
-    """Grow the bodies by what they could do in times_s (K,) from now; they were placed since_s (N,) ago, at
-    these times and maybe later ones. Those that do not count, of (N,), block nothing; None: all do.
+    """Grow N bodies by what they could do until times_s (K,) from now.
 
-    unsure_m: how well that place was known, along the path and across it, (N,); None: exactly.
-    spread_mps: by how much their velocities may be other than thought, manoeuvre_mps2: by how much they may
-    change them; each along the path and across it, (N,). speed_mps (N,) measured speed, most_mps the top
-    speed of any obstacle.
+    placed: the bodies at these times, and maybe later ones, if they keep their velocity.
+    since_s: (N,) time before now for which their motion is uncertain, too.
+    spread_mps: uncertainty of their velocities, along the path and across it, (N,) each.
+    speed_mps: (N,) measured speed.
+    manoeuvre_mps2: greatest change of their velocities, along the path and across it, (N,) each.
+    most_mps: top speed of any obstacle.
+    margin_m: added before each body.
+    unsure_m: uncertainty of their positions, along the path and across it, (N,) each; None: none.
+    of: (N,) which bodies count, the others block nothing; None: all count.
     """
     unsure_along, unsure_across = unsure_m or (np.zeros(len(since_s)), np.zeros(len(since_s)))
     return Reach(
@@ -79,38 +88,39 @@ def reach(
 
 @record(frozen=True, slots=True, eq=False)
 class Stops:
-    """R emergency stops at K times: distance_m (R, K), moves (R, K) whether the robot does not stand yet."""
+    """R emergency stops at K times: distance_m (R, K); moves (R, K): whether the robot still moves."""
 
     distance_m: FloatArray
     moves: NDArray[np.bool_]
 
 
 def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
-    """Sampled at times_s (K,)."""
+    """The stops that ramps to 0 are, sampled at times_s (K,)."""
     distance, speed, _ = ramps.state(times_s[None, :])
     return Stops(distance, speed > _STANDING_MPS)
 
 
 def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
-    """(R,) for each stop of a robot at s_m: the least distance by which it stays short of everything while it
-    still moves; negative where something could be touched, inf where nothing is in the way."""
+    """(R,) for each stop of a robot at s_m: the least room left before any body while it still moves.
+
+    Negative where the robot could touch something; inf where nothing is in the way.
+    """
     return _least_room(stopping.distance_m, stopping.moves, s_m, reached.inside, reached.lo_m, reached.hi_m)
 
 
 def how_many_stand(stopping: Stops, s_m: float, reached: Reach, of: NDArray[np.bool_]) -> int:
-    """How many of the stops, from the first one on, stay short of all those obstacles that count: of (N,)."""
+    """How many of the stops, from the first one on, stay short of all bodies in the mask `of` (N,)."""
     moves = stopping.moves
     return _first_too_far(stopping.distance_m, moves, s_m, reached.inside, reached.lo_m, reached.hi_m, of)
 
 
 def last_in_time(stopping: Stops, reached: Reach) -> int:
-    """The last of the stops that are over before anything could be in the way at all, however near it is;
-    -1: none is."""
+    """Index of the last stop that ends before any body could be in the corridor at all; -1: none does."""
     return _last_in_time(stopping.moves, reached.inside)
 
 
 def gets_through(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:
-    """Whether a single ramp to a speed stays clear of everything at all times."""
+    """Whether the robot stays clear of all that could be blocked, at all times, along a single ramp."""
     way_m = ramp.distance(times_s[None, :])[0]
     return _gets_through(way_m, s_m, reached.inside, reached.lo_m, reached.hi_m)
 
@@ -140,7 +150,7 @@ def _grown(
     shape = len(since_s), len(times_s)
     inside, lo, hi = np.empty(shape, np.bool_), np.empty(shape), np.empty(shape)
     for k in range(shape[0]):
-        # Once in the way it may stay there: what it could block only grows.
+        # A body may stay in the way once it is there, so what it could block only grows.
         was_inside, lowest, highest = False, math.inf, -math.inf
         for j in range(shape[1]):
             t = times_s[j] + since_s[k]
@@ -160,7 +170,7 @@ def _grown(
 def _room(
     at_m: float, j: int, inside: NDArray[np.bool_], lo_m: FloatArray, hi_m: FloatArray, k: int
 ) -> float:
-    """From at_m to what obstacle k could block at time j."""
+    """Distance from at_m to what body k could block at time j; inf: it blocks nothing ahead of at_m."""
     return float(lo_m[k, j] - at_m) if inside[k, j] and at_m < hi_m[k, j] else math.inf
 
 
@@ -173,7 +183,7 @@ def _least_room(
     lo_m: FloatArray,
     hi_m: FloatArray,
 ) -> FloatArray:
-    """(R,) of R stops, K times and N obstacles."""
+    """room() in arrays: (R,) for R stops, K times and N bodies."""
     least = np.full(len(distance_m), math.inf)
     for i in range(len(distance_m)):
         for j in range(distance_m.shape[1]):
@@ -194,7 +204,7 @@ def _first_too_far(
     hi_m: FloatArray,
     of: NDArray[np.bool_],
 ) -> int:
-    """The first of R stops that has no room before those obstacles (N,) that count; R: none."""
+    """Index of the first of R stops that does not stay short of the bodies in the mask `of` (N,); R: none."""
     for i in range(len(distance_m)):
         for j in range(distance_m.shape[1]):
             if not moves[i, j]:
@@ -207,7 +217,7 @@ def _first_too_far(
 
 @compiled("boolean[:, :], boolean[:, :]")
 def _last_in_time(moves: NDArray[np.bool_], inside: NDArray[np.bool_]) -> int:
-    """last_in_time() of stops that move (R, K) and obstacles that could be inside (N, K)."""
+    """last_in_time() in arrays: moves (R, K) of the stops, inside (N, K) of the bodies."""
     first = 0
     for j in range(inside.shape[1] - 1, -1, -1):
         if inside[:, j].any():

@@ -1,4 +1,8 @@
-"""The floor that the robot's body will sweep along its path, and what stands where on it."""
+"""The floor that the robot's body sweeps along its path (the corridor), and where bodies are relative to it.
+
+Corridor holds the swept width along one path; place() puts bodies into path coordinates at future times;
+course_of() turns their velocities into speeds along the path and across it.
+"""
 
 from __future__ import annotations
 
@@ -14,20 +18,22 @@ from hal.records import record
 from hal.types import FloatArray
 
 _STEP_M = 0.1
-# Obstacles further behind or ahead than this are nobody's business.
+# The path is searched from this far behind the robot.
 _BEHIND_M = 2.0
 
 
 class Corridor:
-    """The swept width along one path. All s are of the turning centre. half_widths_m (W,): at places that are
-    _STEP_M apart, from overhang_m before the path's beginning on."""
+    """The swept width along one path. All s are of the robot's turning centre.
+
+    half_widths_m (W,): sampled every _STEP_M, from overhang_m before the beginning of the path on.
+    """
 
     def __init__(self, path: Path, body: Body) -> None:
         self.path = path
         self.front_m, self.rear_m, self.height_m = body.front_m, body.rear_m, body.height_m
         self.overhang_m = max(body.front_m, body.rear_m)
         s_m = np.arange(-self.overhang_m, path.length_m + self.overhang_m + _STEP_M, _STEP_M)
-        # A bend is felt from where the front enters it until the tail has left it.
+        # A bend widens the corridor from where the front enters it until the tail has left it.
         around = s_m[:, None] + np.linspace(-self.overhang_m, self.overhang_m, 11)
         bend = np.abs(path.curvatures(around)).max(axis=1)
         half_m = body.width_m / 2.0
@@ -37,7 +43,7 @@ class Corridor:
         self.straight = not (bend > 1e-6).any()
 
     def half_width(self, s_m: FloatArray) -> FloatArray:
-        """Half of the swept width at s_m, in metres; on bends the outer corner's, on both sides."""
+        """Half of the swept width at s_m, in metres; in bends that of the outer corner, on both sides."""
         return _half_widths(s_m.reshape(-1), self.half_widths_m, self.overhang_m).reshape(s_m.shape)
 
     def half_width_at(self, s_m: float) -> float:
@@ -49,9 +55,11 @@ class Corridor:
 class Placed:
     """N bodies at K times in path coordinates, each (N, K).
 
-    s_m, d_m: centre. heading_rad: of the path there. half_s_m: half size along the path. lo_m, hi_m: between
-    these positions of the robot's turning centre, the robot's length and the body's overlap along the path.
-    clear_m: free floor between the body's side and the swept corridor; negative: inside it.
+    s_m, d_m: centre.
+    heading_rad: heading of the path there.
+    half_s_m: half size along the path.
+    lo_m, hi_m: while the robot's turning centre is between these, robot and body overlap along the path.
+    clear_m: free floor between the body's side and the corridor; negative: inside it.
     """
 
     s_m: FloatArray
@@ -64,12 +72,12 @@ class Placed:
 
 
 def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: float, reach_m: float) -> Placed:
-    """Where the bodies are times_s (K,) after they were seen if they go on as they do.
+    """Where the bodies are times_s (K,) after they were seen if they keep their velocity.
 
-    The path is looked at from a little behind near_s_m to reach_m ahead of it.
+    The path is searched from _BEHIND_M behind near_s_m to reach_m ahead of it.
     """
     reach = near_s_m - _BEHIND_M, near_s_m + reach_m
-    # Taking rows by number is quicker than unpacking an array.
+    # Taking rows by index is quicker than unpacking an array.
     located = corridor.path.locate(bodies.xy_m, bodies.velocity_mps, times_s, *reach)
     extents = _extents(
         located,
@@ -86,8 +94,8 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
 
 @inlined
 def _half_width(s_m: float, half_widths_m: FloatArray, overhang_m: float) -> float:
-    """Between the places that are _STEP_M apart, from overhang_m before the path's beginning on."""
-    # The other way round, what is not a number would be no place at all.
+    """Half of the swept width at s_m, interpolated; half_widths_m and overhang_m as in Corridor."""
+    # max(0.0, ...) in this order gives 0.0 for NaN; max(..., 0.0) would give NaN.
     place = min(max(0.0, (s_m + overhang_m) / _STEP_M), len(half_widths_m) - 1.0)
     k = min(int(place), len(half_widths_m) - 2)
     return float(half_widths_m[k] + (place - k) * (half_widths_m[k + 1] - half_widths_m[k]))
@@ -117,8 +125,10 @@ def _extents(
     front_m: float,
     rear_m: float,
 ) -> FloatArray:
-    """(4, N, K) half_s_m, lo_m, hi_m and clear_m of Placed, for bodies (N,); located (3, N, K): its first
-    three."""
+    """(4, N, K) half_s_m, lo_m, hi_m and clear_m of Placed, for N bodies.
+
+    located (3, N, K): s_m, d_m and heading_rad of Placed.
+    """
     s_m, d_m, heading_rad = located
     extents = np.empty((4, *s_m.shape))
     half_s, lo, hi, clear = extents
@@ -139,8 +149,12 @@ def _extents(
 
 @record(frozen=True, slots=True, eq=False)
 class Course:
-    """How N bodies go, seen from the path where they are: speed along it and to its left, the standard
-    deviation of either, and by how much the newest measurement differs; each (N,)."""
+    """Velocities of N bodies relative to the path where they are; each (N,).
+
+    along_mps, left_mps: speed along the path and to its left.
+    sigma_along_mps, sigma_left_mps: their standard deviations.
+    surprise_along_mps, surprise_left_mps: by how much the newest measurement differs from them.
+    """
 
     along_mps: FloatArray
     left_mps: FloatArray
@@ -151,7 +165,7 @@ class Course:
 
 
 def course_of(bodies: Bodies, heading_rad: FloatArray) -> Course:
-    """heading_rad (N,): of the path where each body is."""
+    """The velocities relative to the path. heading_rad (N,): heading of the path where each body is."""
     of = _seen_along(bodies.velocity_mps, bodies.surprise_mps, bodies.covariance, heading_rad)
     return Course(of[0], of[1], of[2], of[3], of[4], of[5])
 

@@ -1,10 +1,10 @@
-"""Conflicts with bodies that cross the robot's path, and the speeds that solve them. Nothing is remembered.
+"""Conflicts with bodies that cross the robot's path, and the speeds that solve them. Keeps no state.
 
-A conflict is the time between a body's entering the swept corridor and its leaving it, with the stretch of
-the robot's way that the body blocks meanwhile. comes_in tells which bodies enter
-(controller/decision/appraise.py asks it), find_conflicts tells when and where. choices gives two speeds for a
-conflict: up to yield_mps the robot lets the body pass first, from first_mps on it passes before the body.
-controller/decision/moving.py makes limits of these choices and keeps them from step to step.
+A conflict lasts from the time when a body enters the swept corridor until it leaves it, and has the stretch
+of the path that the body blocks meanwhile. comes_in says which bodies enter (controller/decision/appraise.py
+calls it), find_conflicts says when and where. choices gives two speeds for a conflict: up to yield_mps the
+robot lets the body pass first, from first_mps on it passes before the body. controller/decision/moving.py
+turns these choices into limits and keeps them from step to step.
 """
 
 from __future__ import annotations
@@ -20,15 +20,20 @@ from hal.compiled import compiled, inlined
 from hal.records import record
 from hal.types import FloatArray
 
-# So unlikely that it will not come into the way, an obstacle that heads for it cannot become.
+# The spread of the sideways velocity makes an entry less likely, but by no more than this distance: a body
+# that heads for the corridor must not count as unlikely to enter only because it needs long to get there.
 _MOST_SPREAD_M = 0.5
 
 
 @record(frozen=True, slots=True)
 class Conflict:
-    """row: of the body. in_s, out_s: from now; out_s is inf where it does not leave within the horizon.
-    lo_in_m to hi_in_m: positions of the robot that it blocks when it enters; lo_out_m: from where on it does
-    when it leaves, or at the horizon."""
+    """When and where one body is in the way.
+
+    row: index of the body.
+    in_s, out_s: when it enters and leaves, from now; out_s is inf if it does not leave within the horizon.
+    lo_in_m, hi_in_m: it blocks the robot's positions between these when it enters.
+    lo_out_m: it blocks those from here on when it leaves, or at the horizon.
+    """
 
     row: int
     in_s: float
@@ -43,9 +48,9 @@ def comes_in(
 ) -> NDArray[np.bool_]:
     """(N,) which bodies are, or are likely to come, within the swept width. times_s (K,) begins at 0 = now.
 
-    Likely: with the spread of the sideways velocity taken off, so that nobody is braked for because of noise.
-    What an unlikely entry could do is watched by controller/decision/contingency.py. unsure_m (N,): so much
-    nearer to the way they may be than where they are placed.
+    Likely: even if the sideways velocity is less by its spread, so that noise does not make the robot brake.
+    Less likely entries are covered by controller/decision/worst_case.py. unsure_m (N,): the bodies may be
+    this much nearer to the corridor than where they are placed.
     """
     nearer_m = np.zeros(len(sigma_side_mps)) if unsure_m is None else unsure_m
     return _comes_in(placed.clear_m, times_s, sigma_side_mps, nearer_m)
@@ -58,9 +63,10 @@ def find_conflicts(
     margin_m: FloatArray,
     rows: NDArray[np.intp],
 ) -> list[Conflict]:
-    """For the bodies rows, which come in: when they are within margin_m (N,) of the corridor.
+    """The conflicts with the bodies rows (R,), which come in, within margin_m (N,) of the corridor.
 
-    Leaving must be certain, the spread added: hope is no reason to go.
+    A body has left only once it is clear of the margin despite the whole spread of its velocity: leaving must
+    be certain before the robot relies on it.
     """
     conflicts = _conflicts(placed.clear_m, placed.lo_m, placed.hi_m, times_s, sigma_side_mps, margin_m, rows)
     return [
@@ -88,9 +94,10 @@ def choices(
     leave_s: float,
     enter_s: float,
 ) -> Choice:
-    """Both bounds, for the robot at s_m whose ramps lead to speeds_mps (N,), growing, from 0 on.
+    """Both bounds, for the robot at s_m whose ramps lead to speeds_mps (N,), which grow from 0 on.
 
-    leave_s: how long after the obstacle has left, enter_s: how long before it enters, the robot may come.
+    margin_m: distance kept to the stretch that is blocked. leave_s: least time from the obstacle's leaving
+    until the robot arrives. enter_s: least time from the robot's having passed until the obstacle enters.
     """
     times = np.array([conflict.in_s, max(conflict.in_s - enter_s, 0.0), conflict.out_s + leave_s])
     leaves = math.isfinite(conflict.out_s)
@@ -112,19 +119,19 @@ def choices(
 
 @inlined
 def _likely(clear_m: float, t_s: float, sigma_mps: float) -> float:
-    """How far away somebody is, who is reckoned at clear_m, with the spread added."""
+    """The clearance clear_m at t_s, plus the bounded spread of the sideways velocity."""
     return clear_m + min(sigma_mps * t_s, _MOST_SPREAD_M)
 
 
 @inlined
 def _is_0_s(from_s: float, from_m: float, to_s: float, to_m: float) -> float:
-    """When what changes evenly from from_m to to_m is 0."""
+    """When a value that changes linearly from from_m at from_s to to_m at to_s is 0."""
     return from_s + from_m / (from_m - to_m) * (to_s - from_s)
 
 
 @inlined
 def _enters_s(clear_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_mps: float) -> float:
-    """When somebody likely comes within margin_m, between the samples; inf: never."""
+    """When a body likely comes within margin_m, interpolated between the samples; inf: never."""
     before_m = clear_m[0] - margin_m
     if before_m <= 0.0:
         return 0.0
@@ -140,7 +147,7 @@ def _enters_s(clear_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_m
 def _leaves_s(
     clear_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_mps: float, after_s: float
 ) -> float:
-    """When somebody is certainly farther away than margin_m, after after_s."""
+    """When, later than after_s, a body is certainly farther away than margin_m; inf: never."""
     before_m = math.inf
     for j in range(len(times_s)):
         here_m, t_s = clear_m[j] - margin_m - sigma_mps * times_s[j], float(times_s[j])
@@ -152,7 +159,7 @@ def _leaves_s(
 
 @inlined
 def _at(t_s: float, times_s: FloatArray, values: FloatArray) -> float:
-    """Between the samples; before and behind them as the first and last one."""
+    """The value at t_s, interpolated between the samples; the first or last value outside of them."""
     for j in range(1, len(times_s)):
         if t_s <= times_s[j]:
             share = max((t_s - times_s[j - 1]) / (times_s[j] - times_s[j - 1]), 0.0)
@@ -164,7 +171,7 @@ def _at(t_s: float, times_s: FloatArray, values: FloatArray) -> float:
 def _comes_in(
     clear_m: FloatArray, times_s: FloatArray, sigma_mps: FloatArray, nearer_m: FloatArray
 ) -> NDArray[np.bool_]:
-    """(N,) who is nearer than 0 at once, or likely to be at some time."""
+    """(N,) which bodies' clearance is 0 or less now, or is likely to be at some time."""
     found = np.zeros(len(clear_m), np.bool_)
     for k in range(len(clear_m)):
         found[k] = clear_m[k, 0] - nearer_m[k] <= 0.0
@@ -210,15 +217,17 @@ def _bounds(
     margin_m: float,
     leaves: bool,
 ) -> tuple[float, float]:
-    """The fields of Choice, for a conflict with somebody who leaves, or does not. distance_m (N, 3): how far
-    the robot at s_m comes until the other enters, until it should have passed, and until the other has left.
+    """The fields of Choice, for a conflict with a body that leaves, or does not.
+
+    distance_m (N, 3): how far the robot at s_m comes with each speed until the body enters, until the robot
+    should have passed, and until the body has left.
     """
     yield_mps = math.inf if leaves else 0.0
     before_m = 0.0
     for k in range(len(speeds_mps) if leaves else 0):
         room_m = min(lo_in_m - (distance_m[k, 0] + s_m), lo_out_m - (distance_m[k, 2] + s_m)) - margin_m
         if room_m < 0.0:
-            # Where the falling room becomes 0, between two speeds; 0 where even standing is too near.
+            # Interpolate the speed at which the room becomes 0; if even standing is too near, it is 0.
             yield_mps = 0.0
             if k > 0:
                 share = before_m / (before_m - room_m)

@@ -1,4 +1,4 @@
-"""A yes or no for each obstacle that does not change with every frame's noise."""
+"""A debounced flag for each obstacle: it does not change with every frame's noise."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class Debounced:
-    """A flag turns round when it has been seen otherwise for settle_s without a break."""
+    """A flag for each id changes once the opposite has been seen for settle_s without a break."""
 
     def __init__(self, settle_s: float) -> None:
         self._settle_s = settle_s
@@ -17,8 +17,10 @@ class Debounced:
         self._otherwise_since_s: dict[int, float] = {}
 
     def update(self, ids: NDArray[np.int64], seen: BoolArray, at_once: BoolArray, now_s: float) -> BoolArray:
-        """(N,) the flags of ids at now_s; who is not among them is forgotten. at_once: where what is seen
-        needs no time to settle. Somebody new begins with no."""
+        """(N,) the flags of ids at now_s; other ids are forgotten, and a new one begins with False.
+
+        seen (N,): what is seen now. at_once (N,): where the flag follows it without delay.
+        """
         flags, since = {}, {}
         for number, yes, now in zip(ids.tolist(), seen.tolist(), at_once.tolist(), strict=True):
             flag = self._flags.get(number, False)

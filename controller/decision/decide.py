@@ -1,8 +1,9 @@
 """Scene, path and state -> Decision: how fast to go now, and why.
 
-Each control step collects the limits that anything puts on the speed (controller/decision/appraise.py for
-obstacles and depth, here for path, range, camera and faults) and takes the least. Faster again comes later
-than slower (controller/decision/release.py); whatever cannot be relied on leads to a jerk-limited stop.
+Each control step collects all limits of the speed (from obstacles and depth in
+controller/decision/appraise.py; from path, range, camera and faults here) and takes the least. An increase is
+delayed, a decrease is not (controller/decision/release.py). Input that cannot be relied on leads to a
+jerk-limited stop.
 """
 
 from __future__ import annotations
@@ -36,15 +37,19 @@ from vision.scene import CameraCondition
 
 __all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
 
+# Emergency braking goes on until the speed exceeds what is allowed by no more than this.
 _OVER_COMFORT_MPS = 0.05
-# The target point is closed in on by the shaper; the limit that is reported for it must not do so earlier.
+# The shaper brakes for the target point exactly; this slack keeps the limit from braking earlier than it.
 _END_SLACK_M = 0.02
-_AT_END_M = 0.02
+_AT_END_M = 0.02  # the robot is at its target
 _speed_of = attrgetter("speed_mps")
 
 
 class DecisionMaker:
-    """One decision a control step. Keeps what hysteresis and memory need; calls no clock. noise: of depth."""
+    """Makes one decision a control step. Keeps what hysteresis and memory need; calls no clock.
+
+    mount: of the camera. period_s: control period. noise: of the camera's depth.
+    """
 
     def __init__(
         self,
@@ -69,11 +74,11 @@ class DecisionMaker:
         self._last: Reason | None = None
 
     def take_path(self, path: Path, known: Knowledge) -> None:
-        """Go on along another path, of which this is known already; what hysteresis needs is kept."""
+        """Continue along another path, of which known is known already; the hysteresis is kept."""
         self._path, self._known = path, known
 
     def knowledge(self, path: Path, start_s_m: float) -> Knowledge:
-        """Of a path of which nothing is known yet, for a robot that stands at start_s_m on it."""
+        """New Knowledge of a path about which nothing is known yet, for a robot that stands at start_s_m."""
         return Knowledge(path, self._robot, self._mount, self._config, start_s_m, self._noise)
 
     def step(self, at: Situation) -> Decision:
@@ -85,7 +90,7 @@ class DecisionMaker:
         known = self._knowledge(path, on_path)
         known.update(at.scene, at.pose, on_path, v_mps, now_ns)
         if not known.has_seen:
-            # Nothing was decided yet: the first scene that shows a free way lets the robot go at once.
+            # The release gate is not stepped: the first scene with a free way lets the robot go at once.
             reason = Reason("camera", f"{known.fault}: stop")
             return Decision(self._action(0.0, v_mps), 0.0, reason)
         motion = Motion(v_mps, at.a_mps2, self._latency_s)
@@ -111,7 +116,7 @@ class DecisionMaker:
         return ""
 
     def _halt(self, fault: str, v_mps: float, now_ns: int) -> Decision:
-        """A stop without looking at anything: the inputs cannot be relied on."""
+        """The decision to stop, whatever the scene: the inputs cannot be relied on."""
         v = v_mps if math.isfinite(v_mps) else 0.0
         self._gate.step(0.0, v, 0.0, now_ns)
         self._stuck_since_ns = None
@@ -127,12 +132,13 @@ class DecisionMaker:
         return self._known
 
     def _path_limit(self, path: Path, on_path: OnPath, motion: Motion) -> Limit:
-        """The least that robot, section, bend and end of the path allow."""
+        """The least of the limits by the robot, and by sections, bends and the end of the path."""
         left_m = path.length_m - on_path.s_m
         ahead_s = on_path.s_m + motion.v_mps * motion.latency_s
         section = path.speed_limit(ahead_s)
         if motion.a_mps2 > 0.0:
-            # Who accelerates brakes only once that has ended; but no section is left before it has been left.
+            # Braking begins only once a present acceleration has ended, so look that much farther ahead. But
+            # the limit of the present section holds until it is left, hence the minimum.
             steady_s = ahead_s + braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
             section = min(section, path.speed_limit(steady_s))
         end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
@@ -156,8 +162,8 @@ class DecisionMaker:
     def _camera_limits(self, known: Knowledge) -> list[Limit]:
         sight = self._config.sight
         if known.fault:
-            # Blind among people who were moving a moment ago, or for so long that somebody may have come
-            # since: comfort would be at their cost.
+            # Brake hard if bodies were moving when the camera failed, or if it failed so long ago that
+            # somebody may have come since.
             urgent = bool(known.bodies.moving.any()) or known.since_s > sight.blind_s
             reason = Reason("camera", f"{known.fault}: stop")
             return [Limit(0.0, lambda: reason, urgent=urgent)]
@@ -168,8 +174,10 @@ class DecisionMaker:
         return found
 
     def _range_limit(self, age_s: float) -> Limit:
-        """What may come from beyond the range at V_omax must still find the robot standing; age_s: since the
-        last look."""
+        """The limit by the camera's range: stand before an obstacle arrives from beyond it at V_omax.
+
+        age_s: age of the newest scene.
+        """
         sees_m = self._sees_m
         speed = braking.speed_for_distance(
             sees_m,
@@ -201,12 +209,15 @@ class DecisionMaker:
         action = self._action(target_mps, motion.v_mps)
         closing = motion.a_mps2 < 0.0 or reason.distance_m <= _AT_END_M
         if action is Action.INCREASE and reason.rule == "target" and closing:
-            # The shaper is closing in on the end: what the slack leaves over is no wish to go faster.
+            # The shaper is braking for the target: a speed that is higher only by the slack is no increase.
             action = Action.KEEP
         return Decision(action, target_mps, reason, self._emergency, self._stuck_since_ns)
 
     def _start_or_creep(self, limit: Limit, motion: Motion) -> float:
-        """No creeping up to what blocks the way, and no start for a way that is hardly free."""
+        """The limit's speed, or 0 if it is too low to go for and something blocks the way.
+
+        The robot does not creep up to an obstacle, and does not start for a short free distance.
+        """
         release, standing = self._config.release, motion.v_mps <= STANDING_MPS
         least = starts_at_mps(release, self._comfort) if standing else release.creep_mps
         if limit.speed_mps >= least:
@@ -215,12 +226,17 @@ class DecisionMaker:
         if rule not in BLOCKING_RULES:
             return limit.speed_mps
         if standing and rule == "worst case":
-            # No place that it would creep up to: who keeps clear is passed, and so may be started beside.
+            # Such a body is beside the way. One that keeps clear is passed at beside_mps, so that speed is
+            # enough to start, too.
             least = min(least, max(release.creep_mps, self._config.prediction.beside_mps))
         return limit.speed_mps if limit.speed_mps >= least else 0.0
 
     def _reason(self, watched: Reason, raw_mps: float, gated_mps: float) -> Reason:
-        """For less than what the path allows: what is watched now, or what was while that is held back."""
+        """The reason for a target below what the path allows.
+
+        watched: reason of the least limit. While the release gate holds the target back, the reason is the
+        last thing that limited it.
+        """
         if gated_mps >= raw_mps or self._last is None:
             return watched
         held = self._last
@@ -235,8 +251,10 @@ class DecisionMaker:
         )
 
     def _brakes_hard(self, limits: list[Limit], allowed_mps: float, motion: Motion) -> bool:
-        """From the moment when comfort would be too late until the speed is what is allowed now: not what is
-        held back for a while."""
+        """Whether to brake harder than comfort: from an urgent limit on until the speed is allowed again.
+
+        allowed_mps: what is allowed now, without the delay of the release gate.
+        """
         if motion.v_mps <= STANDING_MPS:
             return False
         if self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS:
@@ -261,7 +279,7 @@ class DecisionMaker:
 
 
 def _unknown(on_floor: float, along: float) -> str:
-    """What is no number: on_floor of the robot's pose, along of its place on the path, or else its speed."""
+    """Which input is not finite. on_floor: sum of the pose; along: sum of the path coordinates."""
     if not math.isfinite(on_floor):
         return "where the robot is is not known"
     if not math.isfinite(along):
@@ -270,7 +288,7 @@ def _unknown(on_floor: float, along: float) -> str:
 
 
 def _in_words(limit: Limit, speed_mps: float) -> Reason:
-    """Why only speed_mps is left of it."""
+    """The limit's reason, if speed_mps is what remains of the limit."""
     reason = limit.reason
     if speed_mps < limit.speed_mps:
         return replace(reason, sentence=f"{reason.sentence}: too little to go for")
@@ -278,5 +296,5 @@ def _in_words(limit: Limit, speed_mps: float) -> Reason:
 
 
 def _least(limits: list[Limit]) -> Limit:
-    """The first of those that allow the least."""
+    """The least limit; the first one of equal ones."""
     return min(limits, key=_speed_of)

@@ -1,4 +1,4 @@
-"""What is decided in one control step, and why."""
+"""The output of one control step: what is decided, and why."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Rule = Literal[
     "camera", "fault",
     "robot", "requested", "turn", "refused", "no command",
 ]  # fmt: skip
-# Of the policies that a campaign compares ours with.
+# Rules of the other policies with which a campaign compares this one.
 RivalRule = Literal["paper", "field", "zones"]
 
 
 class Action(Enum):
-    """The paper's three choices, by comparing the target with the present speed."""
+    """The three choices of the paper (Daeef 2020): the target speed compared with the present one."""
 
     INCREASE = "increase"
     KEEP = "keep"
@@ -33,13 +33,15 @@ class Action(Enum):
 
 @record(frozen=True, slots=True)
 class Reason:
-    """Why the target is what it is: the limit that won.
+    """Why the target is what it is: the limit that won. Numbers that have no meaning here are NaN.
 
-    rule: its short name. sentence: the same for people. obstacle_id: None where no tracked obstacle is the
-    reason. distance_m: free way of the front along the path; closing_mps: the obstacle's own speed towards
-    the robot; required_m: what a stop from the present speed and acceleration needs, latency and margin
-    included; margin_m: what of distance_m that leaves (negative: too late for a comfortable stop). NaN where
-    it has no meaning.
+    rule: short name of the limit.
+    sentence: the reason in words.
+    obstacle_id: None if no tracked obstacle is the reason.
+    distance_m: free distance from the robot's front along the path.
+    closing_mps: the obstacle's own speed towards the robot.
+    required_m: what a stop from the present speed and acceleration needs, latency and margin included.
+    margin_m: what required_m leaves of distance_m; negative: too late for a comfortable stop.
     """
 
     rule: Rule | RivalRule
@@ -53,8 +55,15 @@ class Reason:
 
 @record(frozen=True, slots=True)
 class Decision:
-    """emergency: brake harder than comfort. stuck_since_ns: since when the robot has been standing before
-    something that blocks its path; None while it is not."""
+    """What the shaper is to do.
+
+    action: increase, keep or decrease.
+    target_speed_mps: the speed to reach.
+    reason: why.
+    emergency: brake harder than comfort.
+    stuck_since_ns: since when the robot has been standing before something that blocks its path; None: it is
+    not.
+    """
 
     action: Action
     target_speed_mps: float

@@ -1,4 +1,7 @@
-"""Where those go who are out of sight, or about to be: what the velocities say that were measured of them."""
+"""Which bodies that are out of view, or about to leave it, move, and with which velocity they go on.
+
+controller/decision/memory.py asks these questions once a scene. Everything is in the frame of the path.
+"""
 
 from __future__ import annotations
 
@@ -15,24 +18,28 @@ from hal.types import FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
 
-# What was seen for less than this is not believed once it is gone.
+# Minimum time for which a body must have been seen before it is remembered out of view or its velocity used.
 SETTLED_S = 0.5
-# Noise makes whatever stands beside the view creep now and then, and each time the robot would slow down: so
-# much is no noise.
+# A body that is judged standing counts as approaching if it is faster than both thresholds. Noise makes
+# standing things beside the view seem to creep now and then; lower thresholds would slow the robot each time.
 _CLEAR_SIGMAS, _CLEAR_MPS = 3.3, 0.2
-# Nobody is as narrow as this, and ends of racks are: half of the greatest width that was seen.
+# No person or vehicle is as narrow as this, but ends of racks are. Half of the greatest width that was seen.
 NOBODY_HALF_M = 0.1
-# So certainly it goes that it will not be found where it was seen last. Who has been looked at for longer
-# stands by a verdict that had time: what sinks below the view may well seem to move.
+# A speed above this many standard deviations is certain: the body will not be found where it was last seen.
+# But perception also judges whether a track moves, which takes some frames. From this age on, its verdict
+# "standing" is trusted more than the velocity: a body that sinks below the view may well seem to move.
 _CERTAIN_SIGMAS, _NO_VERDICT_S = 5.0, 1.0
-# Two velocities that differ by so much are of two.
+# Velocities that differ by more standard deviations than this belong to two different bodies.
 _APART_SIGMAS = 2.0
 
 
 def out_or_coming(bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose) -> tuple[BoolArray, BoolArray]:
-    """(N,) of those that stand, who is out of view; and who is not, but was measured, beyond what noise
-    explains, on a way towards the axis of a robot at pose. widest_half_m (N,): half of the greatest width
-    that each was seen with."""
+    """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
+
+    Approaching: the measured velocity towards the axis of a robot at pose (the line straight ahead) exceeds
+    the noise. A body is in neither mask if it was tracked for SETTLED_S or less, or was never wider than
+    NOBODY_HALF_M. widest_half_m (N,): half of the greatest width that each was seen with.
+    """
     out, comes = _out_or_coming(
         bodies.moving,
         bodies.tracked_s,
@@ -49,13 +56,17 @@ def out_or_coming(bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose) -
 
 
 def known_part(velocity_mps: FloatArray, covariance: FloatArray, along: FloatArray) -> float:
-    """The velocity's part along a direction (2,), 0 if that is less than its spread."""
+    """The velocity's component along a unit vector (2,); 0 if it is within one standard deviation of 0."""
     part_mps = float(velocity_mps @ along)
     return part_mps if abs(part_mps) > math.sqrt(float(along @ covariance @ along)) else 0.0
 
 
 def may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:
-    """(N,) towards the robot's axis, from either side, or along with the robot: that is how one cuts in."""
+    """(N,) which bodies may come into the robot's way.
+
+    That is, they move towards the robot's axis from either side, or along with the robot (more than
+    LEAVES_ASLANT times as fast forward as sideways), from where one may cut in.
+    """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     left = (bodies.xy_m[:, 1] - pose.y_m) * cos - (bodies.xy_m[:, 0] - pose.x_m) * sin
     leftward = bodies.velocity_mps[:, 1] * cos - bodies.velocity_mps[:, 0] * sin
@@ -65,11 +76,15 @@ def may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:
 
 
 def as_measured(bodies: Bodies, mistaken_mps: float) -> Bodies:
-    """With the velocity that was measured for who stands by the verdict alone, which takes some frames.
-    Thought to stand where it is not seen, it would be waited for without end. Not with a velocity above
-    mistaken_mps: it is none."""
+    """The bodies, where those that are judged standing but certainly move get their measured velocity.
+
+    The verdict of perception takes some frames. A mover that leaves the view before its verdict would be
+    remembered as standing where it no longer is, and the robot would wait for it without end. So bodies
+    tracked for SETTLED_S to _NO_VERDICT_S count as moving if their measured speed is above _CERTAIN_SIGMAS
+    and _CLEAR_MPS. A speed above mistaken_mps is an error of measurement and is not used.
+    """
     squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
-    # Along its way: v' C v / v'v is the variance there.
+    # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
     variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
     goes = ~bodies.moving & (bodies.tracked_s >= SETTLED_S) & (bodies.tracked_s < _NO_VERDICT_S)
     goes &= (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
@@ -81,8 +96,11 @@ def as_measured(bodies: Bodies, mistaken_mps: float) -> Bodies:
 
 
 def alike(bodies: Bodies, seen: Bodies) -> BoolArray:
-    """(N, M) whether the velocities of M that are seen could be those of these N; not while they are young:
-    then they could be anybody's."""
+    """(N, M) whether the measured velocity of each of M seen bodies agrees with that of each of these N.
+
+    A seen body that was tracked for SETTLED_S or less agrees with none: its velocity is hardly known and
+    would fit any body.
+    """
     spread = np.diagonal(bodies.covariance, axis1=1, axis2=2)[:, None]
     seen_spread = np.diagonal(seen.covariance, axis1=1, axis2=2)
     differs = bodies.velocity_mps[:, None] - seen.measured_mps
@@ -110,7 +128,8 @@ def _out_or_coming(
     answers = np.zeros((2, len(moving)), np.bool_)
     out, comes = answers
     for k in range(len(moving)):
-        # However long something stood there: the velocity of what has a new number was hardly measured.
+        # tracked_s and not age_s: the velocity of a new track was hardly measured, however long something
+        # has stood there.
         if moving[k] or tracked_s[k] <= SETTLED_S or widest_half_m[k] <= NOBODY_HALF_M:
             continue
         out[k] = unseen_s[k] > 0.0

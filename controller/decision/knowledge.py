@@ -1,10 +1,10 @@
-"""What the decision knows of the way ahead: the last good scene, and the bodies out of sight since then.
+"""What the decision knows of the way ahead: the last good scene, and the bodies out of view since then.
 
-For each new scene, Knowledge makes boxes of the obstacles (controller/decision/bodies.py), averages their
+For each new scene, Knowledge turns the obstacles into boxes (controller/decision/bodies.py), averages their
 velocities (controller/decision/steadying.py), adds bodies that have left the view
 (controller/decision/memory.py), and notes free floor and unexplained surfaces along the path
-(controller/decision/sight.py). In each control step it says whether the camera can be relied on: the field
-fault. controller/decision/appraise.py makes speed limits of what is known.
+(controller/decision/sight.py). In each control step it says whether the camera can be relied on (the field
+fault). controller/decision/appraise.py turns what is known into speed limits.
 """
 
 from __future__ import annotations
@@ -35,32 +35,36 @@ from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import CameraCondition, CameraHealth, Scene
 
-# A wall or a rack is not a box: as a box it would reach into the corridor wherever the path bends. Its
-# surface in the corridor is what depth sees (controller/decision/sight.py).
+# Half size above which a standing body is no box. The box of a wall or a rack would reach into the corridor
+# wherever the path bends; what of its surface is in the corridor, depth sees (controller/decision/sight.py).
 _SPRAWLING_M = 0.8
-# Nor is a strip of a centimetre or two: a rack that is looked along has dozens of them, others in each frame.
-# Half of its width; poles are wider.
+# Half width up to which a standing body is no box but a strip: along a rack there are dozens of strips a
+# centimetre or two wide, different ones in each frame. Poles are wider.
 _STRIP_M = 0.015
+# A new track is no newcomer if something stood within this distance of its place, this long ago.
 _BEFORE_NS = 200_000_000
 _SAME_PLACE_M = 0.25
-_FUTURE_S = 0.005
+_FUTURE_S = 0.005  # tolerance of the scene's time stamp
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
 
 class Knowledge:
     """Takes in scenes along one path. Points are in metres, in the frame of the path.
 
-    bodies: N boxes to reckon with, those in view before those out of sight; remembered (N,) says which these
-    are, and controller/decision/bodies.py what arrays tell of them. unboxed: M more in view, as surfaces
-    only. surfaces: P points (P, 2) that depth saw, and how far it saw in each of B bands
-    (controller/decision/surfaces.py). corridor: what the robot sweeps along the path; sight: what was seen of
-    that; lens: whether somebody stands too near to be seen. edge_tan: how far the camera looks to either
-    side, as the tangent of the angle. near_m: nearer than this ahead of it the floor is below its view;
-    up_tan: so much a metre rises the upper edge of that.
-
-    age_s: since the newest scene was captured; since_s: since the one that bodies are of, which was taken in
-    while the camera could be trusted; inf: none yet. health: of the camera in the newest scene. fault: why
-    the camera cannot be relied on now, "" if it can.
+    bodies: N boxes that count, those in view before those out of view (controller/decision/bodies.py).
+    remembered: (N,) which of them are out of view.
+    unboxed: M more bodies in view that count as surfaces only.
+    surfaces: P points that depth saw, and how far it saw in each band (controller/decision/surfaces.py).
+    corridor: the floor that the robot sweeps along the path.
+    sight: how much of the corridor was seen free, and the nearest unexplained surface in it.
+    lens: whether something is too near to the lens to be seen.
+    edge_tan: tangent of the half angle of view.
+    near_m: distance ahead of the camera from which the floor is in view.
+    up_tan: slope of the upper edge of the view.
+    age_s: time since the newest scene was captured; inf: none yet.
+    since_s: time since the scene of bodies was captured, the last one of a trustworthy camera; inf: none yet.
+    health: of the camera in the newest scene.
+    fault: why the camera cannot be relied on now; "" if it can.
     """
 
     def __init__(
@@ -82,14 +86,14 @@ class Knowledge:
         self.age_s = self.since_s = float("inf")
         self._mount, self._config, self._noise = mount, config, noise
         self._poses = PoseHistory()
-        # Of the K bodies that were seen, which became boxes (K,), and those, steadied.
+        # Which of the K seen bodies became boxes (K,), and these boxes with averaged velocities.
         self._boxed = np.zeros(0, np.bool_)
         self._unboxed: Bodies | None = None
         self._boxes = no_bodies(0)
         self._steady = SteadyVelocities()
         self._memory = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
         self.edge_tan, self.near_m, self.up_tan = 0.5, config.sight.near_m, math.inf
-        # Of the last scenes: when they were captured, and floor points (K, 2) and (M, 2) where something was.
+        # Of the last scenes: capture time, surface points (K, 2) and centres of bodies (M, 2).
         self._places: deque[tuple[int, FloatArray, FloatArray]] = deque()
         self._captured_ns: int | None = None
         self._scene_fault = ""
@@ -100,12 +104,11 @@ class Knowledge:
         return self._captured_ns is not None
 
     def has_taken_in(self, scene: Scene) -> bool:
-        """Whether this scene, or one after it, was looked at already."""
+        """Whether this scene, or a later one, was already looked at."""
         return self._captured_ns is not None and scene.captured_ns <= self._captured_ns
 
     def go_on_from(self, before: Knowledge) -> None:
-        """Take over what does not hang on the path: who is seen, who was seen and may come back, how fast
-        they go, what hides them, and what the camera is worth."""
+        """Take over what does not depend on the path: bodies, velocities, surfaces, the camera's state."""
         self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
         self._steady, self._memory, self._places = before._steady, before._memory, before._places
@@ -116,12 +119,12 @@ class Knowledge:
 
     @property
     def remembered(self) -> NDArray[np.bool_]:
-        """(N,) which of the bodies are out of sight."""
+        """(N,) which of the bodies are out of view."""
         return np.arange(len(self.bodies)) >= len(self._boxes)
 
     @property
     def unboxed(self) -> Bodies:
-        """Seen, but as surfaces only."""
+        """The bodies in view that count as surfaces only."""
         if self._unboxed is None:
             self._unboxed = self._seen.select(~self._boxed)
         return self._unboxed
@@ -140,7 +143,7 @@ class Knowledge:
         self.age_s = max(self.age_s, 0.0)
 
     def _order_fault(self, scene: Scene) -> str:
-        """An older scene after a newer one is not taken in."""
+        """Why the scene is not taken in, if it is older than the last one; else ""."""
         if self._captured_ns is None or scene.captured_ns > self._captured_ns:
             return ""
         return f"the camera's time went back by {(self._captured_ns - scene.captured_ns) / NS_PER_S:.3f} s"
@@ -159,9 +162,9 @@ class Knowledge:
         return ""
 
     def _learn(self, scene: Scene, on_path: OnPath, v_mps: float) -> str:
-        """Returns what is wrong with the scene, "" if nothing is.
+        """Take in a new scene; return what is wrong with it, "" if nothing is.
 
-        Of a camera that cannot be trusted nothing but that is taken in: who was seen before goes on.
+        From an untrustworthy camera only its health is taken in: the bodies known before are kept.
         """
         if scene.health.condition is CameraCondition.UNTRUSTWORTHY:
             self.health, self._captured_ns = scene.health, scene.captured_ns
@@ -195,8 +198,10 @@ class Knowledge:
         return ""
 
     def _recognise(self, bodies: Bodies) -> Bodies:
-        """What stands where something stood before is no newcomer, whatever number it has now: its age_s is
-        that of what is settled, its tracked_s stays."""
+        """The bodies, where a new track in a place that was occupied before is not taken for a newcomer.
+
+        Its age_s is raised to SETTLED_S, whatever its new number; its tracked_s stays.
+        """
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
         if not self._places or not np.count_nonzero(bodies.age_s < SETTLED_S):
@@ -213,7 +218,7 @@ class Knowledge:
 def _boxed(
     half_view_m: FloatArray, half_across_m: FloatArray, moving: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """(N,) who is reckoned with as a box: who moves, and what neither sprawls nor is a strip."""
+    """(N,) which bodies count as boxes: movers, and standing ones that are neither large nor mere strips."""
     boxed = np.empty(len(moving), np.bool_)
     for k in range(len(moving)):
         sprawls = max(half_view_m[k], half_across_m[k]) > _SPRAWLING_M
@@ -223,5 +228,5 @@ def _boxed(
 
 @compiled("float64[:]")
 def _outermost(bearing_tan: FloatArray) -> float:
-    """How far to either side the bands (B,) lie at most."""
+    """The greatest bearing of the bands (B,), to either side."""
     return float(np.abs(bearing_tan).max())

@@ -1,8 +1,9 @@
-"""Whether somebody stands so near to the lens that depth fails: noticed by what is not seen.
+"""Whether something stands so near to the lens that depth fails; noticed by bands without data.
 
-Floor that was seen free stays free once it is too near to be seen again (controller/decision/sight.py). That
-says nothing of who has come since: within 0.3 m of the lens hardly any camera measures, and whoever is there
-leaves bands of the view without any data, from the lowest row to the uppermost one.
+Floor that was seen free stays free once it is too near to be seen again (controller/decision/sight.py), even
+if somebody has stepped onto it since. Within 0.3 m of the lens hardly any camera measures depth, so whoever
+is there leaves bands of the view without any data, from the lowest row to the uppermost one.
+controller/decision/knowledge.py calls LensCover once a scene.
 """
 
 from __future__ import annotations
@@ -20,25 +21,33 @@ BoolArray = NDArray[np.bool_]
 
 COVERED = "right before the camera nothing is seen, neither floor nor what stands on it"
 
+# Nearer than this hardly any camera measures depth.
 _LENS_M = 0.3
-# 0.1 m right before the lens: nobody hides less. Beside a way between panes of glass as much as 0.3 is blank.
+# Minimum width of the blank bands, as a tangent: 0.1 m at _LENS_M; a person hides more. Beside a way between
+# panes of glass up to 0.3 may be blank with nobody there.
 _HIDES_TAN = 0.33
-# One frame's outlier must not brake; three frames of five are a tenth of a second.
+# The majority of this many scenes decides: one outlier must not brake; three frames are a tenth of a second.
 _FRAMES = 5
 
 
 class LensCover:
-    """look() once a scene. covered: a part of the way right ahead that has been seen shows nothing any more,
-    or most of it has never shown anything."""
+    """Call look() once a scene.
+
+    covered: bands right ahead that have shown something before are blank now, or most bands right ahead have
+    never shown anything.
+    """
 
     def __init__(self) -> None:
         self.covered = False
         self._found: deque[bool] = deque(maxlen=_FRAMES)
-        # Where the colour image is wider than depth, the sides never show anything, and hide nobody.
+        # Bands that ever had data. Where the colour image is wider than depth, the sides never have any.
         self._shown = np.zeros(0, np.bool_)
 
     def look(self, free: FreeSpace, half_width_m: float, left_m: float) -> None:
-        """half_width_m: of what the robot sweeps; left_m: of the camera from its middle."""
+        """Take in one scene.
+
+        half_width_m: half of the swept width. left_m: offset of the camera to the left of the robot's middle.
+        """
         blank = _blank(free)
         if len(self._shown) != len(blank):
             self._shown = np.zeros(len(blank), np.bool_)
@@ -51,7 +60,7 @@ class LensCover:
 
 
 def _blank(free: FreeSpace) -> BoolArray:
-    """(B,) bands without any data; what perception does not tell of them is as what the scan shows."""
+    """(B,) bands without any data; taken from the scan itself if perception does not tell."""
     if free.blank is not None:
         return free.blank
     return ~(free.known_m > 0.0) & ~np.isfinite(free.nearest_m)
@@ -61,8 +70,12 @@ def _blank(free: FreeSpace) -> BoolArray:
 def _right_ahead(
     bearing_tan: FloatArray, blank: BoolArray, shown: BoolArray, half_width_m: float, left_m: float
 ) -> tuple[BoolArray, int, int, int]:
-    """Which bands (B,) have ever shown something, those before this scene being shown; how many right ahead
-    side by side do not any more; how many are ahead, and how many of these never have."""
+    """What the B bands show, of which blank (B,) show nothing now and shown (B,) showed something before.
+
+    Returns which bands have ever shown something (B,); the length of the longest run of bands right ahead
+    that are blank now but were not before; how many bands are right ahead; how many of these were always
+    blank.
+    """
     shown = shown | ~blank
     longest, run, ahead, never = 0, 0, 0, 0
     for b in range(len(bearing_tan)):

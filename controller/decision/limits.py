@@ -1,4 +1,8 @@
-"""Speed limits, each with its reason: what the decision takes the least of."""
+"""Speed limits, each with its reason, and what they are made of; the decision takes the least limit.
+
+The advisers (controller/decision/appraise.py) and controller/decision/decide.py make Limits; stop_before()
+makes the most frequent one.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +15,15 @@ from controller.braking import BrakeLimits
 from controller.decision.decision import Reason, Rule
 from hal.records import record
 
-# So far the front may be past the near side of something that still counts as ahead.
+# An obstacle still counts as ahead while the robot's front is past its near side by no more than this.
 ALONGSIDE_M = 0.1
 STANDING_MPS = 0.01
-BACKWARDS_MPS = -0.05  # slower is noise of the odometry
-# Who moves away from the path at more than one in so much leaves it: that is not going the robot's way.
+BACKWARDS_MPS = -0.05  # a smaller backward speed is noise of the odometry
+# A body that moves away from the path goes along with the robot only if its speed along the path is more than
+# this many times its sideways speed. Otherwise it is leaving the path.
 LEAVES_ASLANT = 2.0
-# Where somebody out of sight is reckoned to be, no further look corrects: so many standard deviations of its
-# velocity may add up.
+# Nothing corrects the expected place of a body out of view: while it is not seen, an error of this many
+# standard deviations of its velocity may add up.
 UNSEEN_SIGMAS = 2.0
 
 # Rules of a Reason that mean: something stands or moves in the way.
@@ -29,8 +34,11 @@ BLOCKING_RULES: frozenset[Rule] = frozenset(
 
 @record(frozen=True, slots=True)
 class Limit:
-    """A speed that must not be exceeded now. why: puts it into words, which only the least of all limits is
-    asked for. urgent: comfort braking no longer suffices."""
+    """A speed that must not be exceeded now.
+
+    why: makes the Reason; called only for the least of all limits.
+    urgent: comfort braking no longer suffices.
+    """
 
     speed_mps: float
     why: Callable[[], Reason]
@@ -38,7 +46,7 @@ class Limit:
 
     @property
     def reason(self) -> Reason:
-        """In words; made anew each time."""
+        """The reason; made anew each time."""
         return self.why()
 
 
@@ -53,10 +61,12 @@ class Motion:
 
 @record(frozen=True, slots=True)
 class Gap:
-    """Free way of the robot's front to something ahead.
+    """The free distance from the robot's front to something ahead.
 
-    closing_mps: its own speed towards the robot, below 0 when it drives away; runs_m: how far it still runs
-    ahead even if it brakes now. obstacle_id: None for what no tracked obstacle is.
+    distance_m: the free distance along the path.
+    closing_mps: its own speed towards the robot; negative if it drives away.
+    runs_m: how far it still goes ahead even if it brakes now.
+    obstacle_id: None if it is not a tracked obstacle.
     """
 
     distance_m: float
@@ -66,7 +76,7 @@ class Gap:
 
     @property
     def name(self) -> str:
-        """For sentences."""
+        """What it is called in sentences."""
         return "a surface" if self.obstacle_id is None else f"obstacle {self.obstacle_id}"
 
 
@@ -79,7 +89,11 @@ def stop_before(
     rule: Rule,
     what: str,
 ) -> Limit:
-    """Stand margin_m before it, comfortably; urgent when comfort would leave less than least_m."""
+    """The limit for a comfortable stop margin_m before the end of the gap.
+
+    It is urgent if that stop would leave less than least_m. rule, what: for the reason; what completes the
+    sentence "obstacle 3 ... 2.0 m ahead".
+    """
     room_m = gap.distance_m + gap.runs_m
     speed = braking.speed_for_distance(
         room_m,
@@ -87,7 +101,7 @@ def stop_before(
         latency_s=motion.latency_s,
         closing_mps=gap.closing_mps,
         margin_m=margin_m,
-        # A deceleration that is under way is no reason to go faster; an acceleration is one to stop it now.
+        # A present acceleration lowers the limit; a present deceleration must not raise it.
         a_mps2=max(motion.a_mps2, 0.0),
     )
     required = braking.required_distance(
@@ -103,9 +117,10 @@ def stop_before(
 
 
 def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:
-    """The greater of commanded and measured: rather brake for speed that is not there than miss some.
+    """The greater of commanded and measured speed: braking for speed that is not there does less harm.
 
-    Of a base that goes backwards the decision has to know that. measured_mps: not finite where not known.
+    If the base moves backwards, the measured speed, because the decision has to know. measured_mps: not
+    finite if not known.
     """
     if not math.isfinite(measured_mps):
         return commanded_mps
@@ -113,10 +128,10 @@ def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:
 
 
 def starts_at_mps(release: Release, comfort: BrakeLimits) -> float:
-    """No start from rest, where something blocks the way, for a way that allows less than this."""
+    """The least allowed speed at which the robot starts from rest while something blocks the way."""
     return max(release.creep_mps, braking.speed_for_distance(release.go_m, comfort))
 
 
 def allowed(speed_mps: float) -> str:
-    """The end of a sentence."""
+    """The end of a reason's sentence: what speed is allowed."""
     return "stop" if speed_mps <= 0.0 else f"at most {speed_mps:.2f} m/s"

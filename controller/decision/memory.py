@@ -1,21 +1,24 @@
-"""Bodies that have left the camera's view but are still there: under the robot's nose, beside or above it.
+"""Bodies that have left the camera's view but are still there: below, beside or above it.
 
-A body of the last scene that is missing in this one is kept while its place is outside the view:
+controller/decision/knowledge.py calls OutOfView.leaving, then OutOfView.update, once a scene. A body of the
+last scene that is missing in this one is kept while its place is outside the view:
 
-* Standing (seen for 0.5 s at least; the robot drives): kept where it was, until its place is in view again,
-  a seen body covers it, or it lies 2 m behind the camera. If the robot stood, the body went away: dropped.
-  Beside the edge, within the view: dropped once a robot that stands sees through its place.
-* Moving: goes on with its last velocity for 2 s, or for 6 s if that leads towards the robot's axis or along
-  with the robot. Dropped earlier where its place is well within the view or lies 2 m behind the camera.
-* Judged standing (a verdict takes some frames), but clearly measured as coming (or as going anywhere,
-  if seen for 0.5 to 1 s): counts as moving, with the velocity measured last, even if the robot stands.
-* Should have come in, but its place is seen to be free: moved sideways to the edge of the free space, and no
-  longer coming (the velocity towards the axis becomes 0, the variance grows). The same 2 s or 6 s apply. Who
-  was clearly coming may first be some decimetres late.
-* Another body is seen where a moving one was expected: the kept one is dropped only if the other has been
-  seen for more than 0.5 s, with the same velocity within 2 sigma. Else both count: they may be two people.
-* A strip that was seen to move for less than 0.5 s within 0.5 m of a mover that is kept for longer, with the
-  same velocity within 2 sigma, was the last of that one to be in view.
+* Standing (seen for at least 0.5 s; the robot drives): kept where it was, until its place is in view again,
+  a seen body covers it, or it lies 2 m behind the camera. If it goes missing while the robot stands, it has
+  moved away itself: dropped. If it is kept just inside the side edge of the view: dropped once a standing
+  robot sees through its place (controller/decision/seen_through.py).
+* Moving: extrapolated with its last velocity for 2 s, or for 6 s if that leads towards the robot's axis or
+  along with the robot. Dropped earlier if its place is well within the view or 2 m behind the camera.
+* Judged standing (a verdict takes some frames), but clearly measured as approaching (or as moving anywhere,
+  if seen for 0.5 to 1 s): counts as moving, with the velocity measured last, even if the robot stands
+  (controller/decision/going.py).
+* Moving, and expected in view where the scene shows free floor: moved sideways to the edge of the free space,
+  and no longer approaching (its velocity towards the axis becomes 0, its variance grows). The same 2 s or
+  6 s apply. A body that clearly approached may first be some decimetres late.
+* Moving, and another body is seen where it was expected: dropped only if the other one has been seen for more
+  than 0.5 s and its velocity agrees within 2 sigma. Else both count: they may be two people.
+* A narrow strip that was seen to move for less than 0.5 s, within 0.5 m of a mover that is kept and was seen
+  for longer, with the same velocity within 2 sigma: dropped, it was the last visible part of that mover.
 """
 
 from __future__ import annotations
@@ -47,21 +50,29 @@ from vision.scene import FreeSpace
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
+# A seen body covers the place of a kept one within this distance across the view.
 _SAME_PLACE_M = 0.25
+# How long a mover is kept: in general, and if it may come into the robot's way.
 _MOVING_KEPT_S, _MAY_COME_KEPT_S = 2.0, 6.0
+# A place this far inside the side edge of the view still counts as outside; of a mover, for each second since
+# it was last seen, this much more.
 _EDGE_M, _EDGE_MPS = 0.3, 0.15
-# So far from the middle of the view stays whoever has not been seen to come in.
+# An approaching mover that was not seen to come in stays at least this far from the camera's axis.
 _MIDDLE_M = 0.1
-# By so much in a second somebody unseen may have changed its velocity.
+# A body out of view may have changed its velocity by this much per second.
 _TURNS_MPS2 = 0.25
-_TOUCHING = 1e-6
+_TOUCHING = 1e-6  # rounding
+# A strip this near to a kept mover may be a part of it.
 _REST_M = 0.5
 
 
 class OutOfView:
-    """Call leaving, then update, once a scene. near_m: nearer than this ahead of the camera the floor is not
-    seen; up_tan: so much a metre rises the upper edge of its view. Both to be set before, where the scene
-    tells. max_obstacle_speed_mps: a velocity that was measured as much greater is a mistake."""
+    """The bodies out of view; call leaving, then update, once a scene.
+
+    near_m: distance ahead of the camera from which the floor is in view. up_tan: slope of the view's upper
+    edge. Set both before the calls if the scene tells them. max_obstacle_speed_mps: measured speeds that are
+    far above it (IMPLAUSIBLE times) are mistakes.
+    """
 
     def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
         self._mount, self.near_m, self.up_tan = mount, near_m, math.inf
@@ -69,17 +80,20 @@ class OutOfView:
         self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
-        # How those that stand by the verdict were measured when they were last seen, of whom clearly came.
+        # Of bodies that are judged standing but clearly approached: by id, the velocity measured last.
         self._coming: dict[int, FloatArray] = {}
         self._widest_of, self._widest_half_m = np.zeros(0, np.int64), np.zeros(0)
 
     def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
-        """The bodies seen; standing ones that perception no longer sees but still expects, out of view,
-        count as moving if they came towards the robot's axis: with the velocity measured last."""
+        """The seen bodies, of which some that are judged standing are made moving.
+
+        These are the ones that approached the robot's axis when last seen, which perception now only predicts
+        (unseen_s > 0), and whose place is out of view. They get the velocity measured last.
+        """
         if not len(seen):
             self._widest_of, self._coming = seen.ids, {}
             return seen
-        # At the edge of the view, everybody gets narrow.
+        # The edge of the view cuts bodies off, so the present width says little.
         self._widest_half_m = _widest(seen.ids, seen.half_across_m, self._widest_of, self._widest_half_m)
         self._widest_of = seen.ids
         out, comes = out_or_coming(seen, self._widest_half_m, pose)
@@ -105,11 +119,11 @@ class OutOfView:
         standing: bool,
         free: FreeSpace,
     ) -> Bodies:
-        """What is to be reckoned with besides seen. before: what was seen in the scene before. free: of this
-        scene.
+        """The bodies out of view that count in addition to seen.
 
-        What stood and vanishes while the robot stands has gone by itself, and so has what was part of
-        something that is still seen.
+        before: the bodies seen in the scene before this one. standing: the robot stands. free: free space of
+        this scene. A standing body that vanishes while the robot stands has moved away and is dropped; so is
+        one that was part of a body that is still seen.
         """
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
         bodies, since = self._bodies, self._since_s + dt_s
@@ -147,8 +161,11 @@ class OutOfView:
         return self._bodies
 
     def _gone_on(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:
-        """(N, 2) where they are dt_s later if they go on as they did. Nobody has passed ahead of the robot
-        unseen: who comes is still on the side where it was."""
+        """(N, 2) the positions dt_s later at constant velocity.
+
+        A mover ahead of the camera that approaches its axis (by more than one standard deviation of the
+        sideways velocity) stays at least _MIDDLE_M on its own side: had it crossed, it would have been seen.
+        """
         way = bodies.velocity_mps * dt_s
         forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
         leftward = np.array([-forward[1], forward[0]])
@@ -163,8 +180,12 @@ class OutOfView:
         return xy
 
     def _kept_out(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
-        """Who goes outwards and is not seen where it was expected is at least beside that place, where it
-        would not be seen; so is who was not clearly coming. Who was may still come, a little later."""
+        """The bodies, with movers whose expected place is seen to be free moved outwards, out of the view.
+
+        They are moved sideways to the edge of the free space, and a velocity towards the axis is replaced by
+        its forward component. A body that approaches (by more than one standard deviation) is not moved
+        until it is late by _EDGE_M plus _EDGE_MPS for each second since it was last seen.
+        """
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
         offset = bodies.xy_m - (pose.x_m, pose.y_m)
@@ -192,15 +213,19 @@ class OutOfView:
         return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
 
     def _hidden(self, bodies: Bodies, pose: PlanarPose, edge_tan: float) -> BoolArray:
-        """(N,) beside, below or above the view, and not behind the camera by more than a robot's length. At
-        the side edge it may be outside by what is not known of it: of who goes, more and more."""
+        """(N,) which are beside, below or above the view, and not far behind the camera (out_of_view).
+
+        The side edge has a tolerance for the uncertainty of the position, which grows for movers.
+        """
         edges = edge_tan, self.near_m, self.up_tan
         return out_of_view(bodies, pose, self._mount, *edges, _EDGE_M, _EDGE_MPS)
 
 
 def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: float) -> float:
-    """How far out from from_tan on, to the left (side 1) or right (-1), all bands are seen through as far as
-    far_m; -inf if the first one is not."""
+    """Tangent of the bearing, outwards, up to which all bands from from_tan on are seen free to far_m.
+
+    side: 1 to the left, -1 to the right. -inf if the first band is not seen that far.
+    """
     outwards = -side * free.bearing_tan
     order = np.argsort(outwards)
     order = order[outwards[order] + free.half_width_tan > from_tan - _TOUCHING]
@@ -210,7 +235,10 @@ def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: floa
 
 
 def _rests(bodies: Bodies, kept: BoolArray) -> BoolArray:
-    """(N,) strips hardly seen beside one that is kept, was seen for longer and may go just as they do."""
+    """(N,) narrow strips that were seen to move only briefly, beside a kept mover they may be a part of.
+
+    That mover was seen for longer, and the velocities agree.
+    """
     older = kept & bodies.moving & (bodies.tracked_s > SETTLED_S)
     rests = bodies.moving & (bodies.tracked_s <= SETTLED_S) & (bodies.half_across_m < NOBODY_HALF_M)
     if not (older.any() and rests.any()):
@@ -222,7 +250,7 @@ def _rests(bodies: Bodies, kept: BoolArray) -> BoolArray:
 
 @compiled("int64[:], int64[:]")
 def _missing(ids: IntArray, seen_ids: IntArray) -> BoolArray:
-    """(N,) which are not among the M that are seen."""
+    """(N,) which of ids (N,) are not among seen_ids (M,)."""
     missing = np.empty(len(ids), np.bool_)
     for k in range(len(ids)):
         missing[k] = not (seen_ids == ids[k]).any()
@@ -231,7 +259,7 @@ def _missing(ids: IntArray, seen_ids: IntArray) -> BoolArray:
 
 @compiled("boolean[:], boolean[:, :], int64[:], int64[:]")
 def _not_seen(hidden: BoolArray, part_of: BoolArray, ids: IntArray, seen_ids: IntArray) -> BoolArray:
-    """(N,) who is hidden, and neither among the M that are seen nor part of one of them (N, M)."""
+    """(N,) which bodies are hidden, not among seen_ids (M,), and not part of a seen body: part_of (N, M)."""
     kept = np.empty(len(ids), np.bool_)
     for k in range(len(ids)):
         kept[k] = hidden[k] and not (seen_ids == ids[k]).any() and not part_of[k].any()

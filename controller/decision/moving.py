@@ -1,8 +1,8 @@
 """Speed limits for bodies that cross, come towards the robot or drive ahead of it.
 
 controller/decision/crossing.py finds the conflicts and the speeds that solve each one. This file compares
-letting the body pass with stopping before it (or following it), settles all conflicts on one speed, and keeps
-each choice from step to step: hysteresis, so that noise does not change it.
+letting the body pass with stopping before it (or following it), finds one speed that solves all conflicts,
+and keeps each choice from step to step (hysteresis), so that noise does not change it.
 """
 
 from __future__ import annotations
@@ -24,22 +24,27 @@ from controller.decision.limits import ALONGSIDE_M, STANDING_MPS, Gap, Limit, Mo
 from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
 
-_SPEEDS = 31
+_SPEEDS = 31  # how many speeds are tried
+# Above this speed along the path a body drives ahead; above it in the other direction it is oncoming.
 _DRIVES_AHEAD_MPS = 0.1
-# Slower than this, arriving as it leaves is no better than waiting at the line.
+# Slowing down so as to arrive when the body leaves is worth it only above this speed; below it, stopping
+# before the body is as good.
 _WORTH_ARRIVING_MPS = 0.3
-# Nor is slowing down for who leaves later than this: most change their velocity before, and a stop remains.
+# Nor is it worth it if the body leaves later than this: most bodies change their velocity before, and the
+# robot can still stop.
 _FORESEEN_S = 4.0
-_AVERAGE = 0.2
-# Who is beside the robot, or will be so soon, is waited for before a start.
+_AVERAGE = 0.2  # weight of the newest estimate in the average of a time of leaving
+# A standing robot does not start until a body has passed that is beside it or will be within this time.
 _PASSES_S = 2.0
-# A choice that was made is kept unless this much time would be lost or gained.
+# Hysteresis: choosing to pass before a body needs this much more time than keeping that choice.
 _STICKY_S = 0.5
 
 
 class MovingLimits:
-    """Keeps what hysteresis needs. times_s (K,): from now, where bodies are placed; inside: see
-    controller/decision/standing.py."""
+    """Limits for moving bodies; keeps what hysteresis needs.
+
+    times_s (K,): times from now at which bodies are placed. inside: see controller/decision/standing.py.
+    """
 
     def __init__(self, config: DecisionConfig, limits: Limits, times_s: FloatArray, inside: set[int]) -> None:
         self._config, self._limits, self._times_s = config, limits, times_s
@@ -50,7 +55,7 @@ class MovingLimits:
         self._leaves_s: dict[int, float] = {}
 
     def nobody(self) -> None:
-        """Nothing moves: nothing to remember."""
+        """Forget all choices: nothing moves."""
         self._goes_first.clear()
         self._leaves_s.clear()
 
@@ -65,13 +70,13 @@ class MovingLimits:
         base_mps: float,
         now_s: float,
     ) -> tuple[list[Limit], float]:
-        """For the robot at s_m whose speed is otherwise base_mps; and the speed that remains.
+        """The limits for a robot at s_m whose speed is otherwise base_mps, and the speed that they leave.
 
-        enters (N,): who is or is likely to come within the swept width.
+        enters (N,): which bodies are, or are likely to come, within the swept width.
         """
         ahead = placed.s_m[:, 0] + placed.half_s_m[:, 0] > s_m
-        # Nobody starts while somebody is about to walk into his side, or on the way along it with hardly a
-        # hand's breadth between; who drives is past before that.
+        # A standing robot does not start while a body is about to walk into its side, or to pass along it
+        # within the lateral margin. A driving robot is past before that happens.
         standing = motion.v_mps <= STANDING_MPS
         behind_m = math.inf if standing else ALONGSIDE_M
         if standing:
@@ -120,7 +125,7 @@ class MovingLimits:
         return found
 
     def _steadied(self, conflict: Conflict, number: int, now_s: float) -> Conflict:
-        """With the time of leaving averaged over some frames: it is an extrapolation of a noisy speed."""
+        """The conflict with its time of leaving averaged: each estimate extrapolates a noisy speed."""
         if math.isinf(conflict.out_s):
             self._leaves_s.pop(number, None)
             return conflict
@@ -139,7 +144,7 @@ class MovingLimits:
         along_mps: float,
         leader_mps: float,
     ) -> Limit:
-        """Stop before it, or follow it: the limit by an obstacle that does not leave the corridor."""
+        """The limit if the body does not leave the corridor: stop before it, or follow it."""
         margins = self._config.margins
         runs_m = 0.0
         rule: Rule
@@ -185,7 +190,11 @@ class MovingLimits:
     def _settle(
         self, offers: list[tuple[Conflict, Choice, Limit]], bodies: Bodies, base_mps: float
     ) -> tuple[list[Limit], float]:
-        """The greatest speed up to base_mps that every conflict admits, before it or behind it."""
+        """The limits that apply, and the greatest speed up to base_mps that solves every conflict.
+
+        At that speed the robot passes each body either before it or after it. Which bodies it passes before
+        is remembered for the next step.
+        """
         speed, found = base_mps, []
         waiting = list(offers)
         while waiting:

@@ -1,7 +1,8 @@
-"""How far beside the corridor something stands, by the outline that depth shows of it.
+"""How far beside the corridor a body stands, by the outline that depth shows of it.
 
-An obstacle's box lies along the view. On a straight path that is as good as any, but in a bend the corners of
-the box of something seen corner-on reach into a corridor that it leaves free.
+A body's box is aligned with the direction of view. On a straight path that is as good as any other direction.
+But in a bend, the box of something seen corner-on may reach into the corridor although the body does not.
+controller/decision/standing.py asks for the outlines of bodies near a bend.
 """
 
 from __future__ import annotations
@@ -17,18 +18,22 @@ from controller.decision.surfaces import Surfaces
 from hal.records import record
 from hal.types import FloatArray
 
-# The outline may have no wider gap, in bands, or something of the body was not seen.
+# If the outline has a wider gap, in bands, some part of the body was not seen.
 _GAP_BANDS = 2.5
-# Beside whatever stands nearer, a stereo camera measures nothing for so many bands.
+# Beside a nearer object, a stereo camera measures nothing for up to this many bands.
 _SHADOW_BANDS = 2
-# Nor may it begin farther behind the near side of the box: then it is something else, behind what gives none.
+# If the outline begins farther than this behind the near side of the box, it belongs to something else behind
+# the body, and the body itself gives no depth.
 _BEHIND_M = 0.15
 
 
 @record(frozen=True, slots=True)
 class Outline:
-    """clear_m: free floor between what is in view of a body and the swept corridor; negative: inside it; inf:
-    nothing is in view. whole: it was seen from end to end, and all of it is in view."""
+    """What depth shows of one body.
+
+    clear_m: free floor between the visible part of the body and the corridor; negative: inside it; inf:
+    nothing of it is visible. whole: the body is visible from end to end.
+    """
 
     clear_m: float
     whole: bool
@@ -43,10 +48,11 @@ def outline_of(
     stretch_m: tuple[float, float],
     depth_m: float,
 ) -> Outline:
-    """The outline of body k, whose are the own (P,) of the surfaces, which are of the same scene.
+    """The outline of body k.
 
-    stretch_m: the path is looked at from there to there. depth_m: how deep a body is at least, from the
-    nearest point of it on; its back is hidden.
+    own: (P,) which of the surfaces of the same scene belong to it. stretch_m: the path is searched from the
+    first to the second of these. depth_m: least depth of a body, from its nearest point on, since its back is
+    hidden.
     """
     if not own.any():
         return Outline(math.inf, whole=False)
@@ -73,8 +79,11 @@ def _seen_throughout(across_m: FloatArray, half_band_m: FloatArray, half_m: floa
 
 
 def _ends_in_view(surfaces: Surfaces, own: NDArray[np.bool_]) -> bool:
-    """Whether farther things are seen beside both ends of the own ones of the points: at the edge of the
-    view, beside what was not measured, or behind something nearer, the body may go on."""
+    """Whether farther things are seen beside both ends of the surfaces own (P,).
+
+    Else the body may go on: beyond the edge of the view, where nothing was measured, or behind something
+    nearer.
+    """
     bands, forward_m = surfaces.bands[own], surfaces.forward_m[own]
     left = surfaces.seen_m[max(bands[0] - _SHADOW_BANDS, 0) : bands[0]][::-1]
     right = surfaces.seen_m[bands[-1] + 1 : bands[-1] + 1 + _SHADOW_BANDS]
@@ -82,6 +91,6 @@ def _ends_in_view(surfaces: Surfaces, own: NDArray[np.bool_]) -> bool:
 
 
 def _beyond(seen_m: FloatArray, end_m: float) -> bool:
-    """Whether the first band that was measured of those beside an end, seen_m (K,), was seen beyond end_m."""
+    """Whether the first measured band of those beside an end, seen_m (K,), is seen farther than end_m."""
     measured = seen_m[seen_m > 0.0]
     return bool(len(measured) and measured[0] > end_m)

@@ -1,4 +1,7 @@
-"""Slower at once, faster later: what keeps a noisy limit from making the robot twitch."""
+"""The release gate: slower at once, faster only after a delay, so that noisy limits cause no jerky drive.
+
+controller/decision/decide.py passes the least limit through it in each control step.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,15 @@ from hal.clocks import NS_PER_S
 
 
 class _Least:
-    """The least of what was seen during the last delay_s, or since the first look if that is less."""
+    """Running minimum over the last delay_s, or since the first value if that is less."""
 
     def __init__(self, delay_s: float) -> None:
         self._delay_ns = round(delay_s * NS_PER_S)
-        # (when, how much), growing, so the first is the least.
+        # (time, value) with growing values, so that the first one is the minimum.
         self._lately: deque[tuple[int, float]] = deque()
 
     def update(self, value: float, now_ns: int) -> float:
-        """With value seen at now_ns."""
+        """The minimum, with value at now_ns included."""
         lately, since_ns = self._lately, now_ns - self._delay_ns
         while lately and lately[-1][1] >= value:
             lately.pop()
@@ -30,13 +33,13 @@ class _Least:
 
 
 class ReleaseGate:
-    """Passes a falling target on at once and holds a rising one back.
+    """Passes a falling target on at once and delays a rising one.
 
-    The target rises to the least that was allowed during delay_s, so one free moment is no reason to go, nor
-    one good number a reason to go fast. Where that is far above the present speed, the least during
-    far_delay_s will do: before the difference is used up, there is time to look again. After it has turned
-    from faster to slower, it does not turn again within hold_s, and then only for a gain of worth_mps: in
-    hold_s it can turn round at most twice.
+    The target rises to the minimum of the last delay_s, so that one free moment does not make the robot go,
+    nor one high value make it fast. If the minimum of the shorter far_delay_s is far above the present speed
+    (far_mps), that one is used: before the difference is driven, there is time to look again. After a change
+    from faster to slower, the next increase comes no sooner than hold_s later, and then only for a gain of
+    worth_mps: within hold_s the speed changes its direction at most twice.
     """
 
     def __init__(self, config: Release) -> None:
@@ -50,10 +53,13 @@ class ReleaseGate:
     def step(
         self, raw_mps: float, v_mps: float, let_go_mps: float, now_ns: int, most_mps: float = math.inf
     ) -> float:
-        """The target to use.
+        """The target speed to use.
 
-        let_go_mps: the speed that remains when the present deceleration is let go of, which may be kept at
-        any time: that is no increase. most_mps: what the path allows, for which nothing is held back.
+        raw_mps: the least of the limits now.
+        v_mps: the present speed.
+        let_go_mps: the speed that is reached if the present deceleration ends now. Keeping that speed is no
+        increase, so it is allowed at any time.
+        most_mps: what the path allows; it bounds the gain, and is not delayed here.
         """
         band = self._config.dead_band_mps
         least_mps, far_mps = self._lately.update(raw_mps, now_ns), self._just_now.update(raw_mps, now_ns)

@@ -1,8 +1,8 @@
-"""What stood beside the edge of the view and has gone while the robot stands: its place is seen through.
+"""Remembered standing bodies just inside the edge of the view whose place a standing robot sees to be empty.
 
-Who walks or drives past leaves strips behind that were taken for standing things for a moment. Beside the
-edge of the view they are remembered, for what is there may be just outside of it; a robot that waits for one
-would wait without end.
+People and vehicles that pass leave narrow tracks behind that were judged standing for a moment. Just inside
+the edge of the view controller/decision/memory.py keeps them, since what is there may be just outside. A
+robot that waits for such a body would wait without end, so it is dropped once its place is seen through.
 """
 
 from __future__ import annotations
@@ -18,16 +18,18 @@ from hal.geometry import wrap_angle_rad
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
 
-# So far inside the side edges of the view the robot's way since then puts nothing outside of them.
+# Only bodies this far inside the side edges are judged: a smaller distance may be an error of the robot's
+# motion since the body was seen.
 _WELL_INSIDE_M = 0.05
-# In all scenes of so long: noise does not see through a body for a second part of that. It costs a robot that
-# would wait without end nothing.
+# The place must be seen empty in every scene for this long. Noise does not see through a body for half of
+# that, and a robot that would otherwise wait without end loses nothing.
 _FOR_NS = 500_000_000
-_STANDS_RAD = math.radians(0.25)  # who turns in place does not stand, and sweeps the edges of its view
+# A robot that turns by more than this does not stand: turning in place sweeps the edges of the view.
+_STANDS_RAD = math.radians(0.25)
 
 
 class SeenThrough:
-    """Keeps, by number, since when nothing was to be seen where something is remembered, and from where."""
+    """Keeps, by body id, since when its place has been seen empty, and the heading from which."""
 
     def __init__(self, mount: CameraMount) -> None:
         self._mount = mount
@@ -35,13 +37,13 @@ class SeenThrough:
         self._heading_rad = math.nan
 
     def forget(self) -> None:
-        """The robot drives, or nothing is remembered."""
+        """Start anew: the robot drives, or nothing is remembered."""
         self._since_ns.clear()
 
     def gone(
         self, bodies: Bodies, pose: PlanarPose, edge_tan: float, near_m: float, up_tan: float, free: FreeSpace
     ) -> NDArray[np.bool_]:
-        """(N,) which of bodies are no longer there, for a robot that stands at pose. Call once a scene.
+        """(N,) which of the bodies are no longer there, for a robot that stands at pose. Call once a scene.
 
         edge_tan, near_m, up_tan: the edges of the view (controller/decision/view_edges.py).
         """
@@ -67,8 +69,10 @@ class SeenThrough:
 
 
 def _is_free(free: FreeSpace, edges_m: FloatArray, near_m: float, far_m: float) -> bool:
-    """Whether all bands between two places edges_m (2,) to the right, from near_m to far_m ahead, are seen to
-    be free beyond far_m. What is not known is not free."""
+    """Whether all bands that a body covers are seen free beyond far_m; what is not known is not free.
+
+    edges_m (2,): its left and right edge, as distances to the right. near_m, far_m: its faces, ahead.
+    """
     tans = np.concatenate((edges_m / near_m, edges_m / far_m))
     bands = (free.bearing_tan >= tans.min() - free.half_width_tan) & (
         free.bearing_tan <= tans.max() + free.half_width_tan

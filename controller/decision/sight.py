@@ -1,7 +1,8 @@
-"""What depth alone says of the corridor: the nearest surface in it, and how far it was seen to be free.
+"""What depth alone says of the corridor: the nearest surface in it, and how far it was seen free.
 
-Edges are blind to a plain wall and no camera sees through glass: a surface that no obstacle explains counts
-as an obstacle, and floor that was not seen is not free.
+Obstacles are found by edges, which a plain wall does not have, and no depth camera measures glass. So a
+surface that no obstacle explains counts as an obstacle, and floor that was not seen is not free.
+controller/decision/knowledge.py calls Sight once a scene; controller/decision/appraise.py makes the limits.
 """
 
 from __future__ import annotations
@@ -26,22 +27,23 @@ from vision.scene import FreeSpace
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
-_CELL_M = 0.2
-_NEVER_NS = -(2**62)
-_LANES = 5
-# Where the view hardly rises, what flickers farther away than this was nothing.
+_CELL_M = 0.2  # length of a cell of the corridor
+_NEVER_NS = -(2**62)  # when a cell was seen that never was
+_LANES = 5  # points across the width of a cell
+# If the view's upper edge hardly rises, a surface that vanishes farther away than this has not gone out of
+# view upwards: it was flicker.
 _MOST_ABOVE_M = 3.0
-# One frame's outlier must not brake; three frames of five are a tenth of a second.
+# The median of this many scenes counts: one outlier must not brake; three frames are a tenth of a second.
 _FRAMES = 5
 
 
 class Sight:
-    """Remembers along one path what was seen of it; look() once a scene.
+    """Remembers what was seen of one path's corridor; call look() once a scene.
 
-    surface_s_m: where the nearest unexplained surface stands in the corridor (path coordinate of its nearest
-    point, inf: none), steady against single frames.
-    known_s_m: the corridor was seen free up to here. corners: where somebody could step out from behind
-    something.
+    surface_s_m: path coordinate of the nearest unexplained surface in the corridor, filtered over some
+    scenes; inf: none.
+    known_s_m: the corridor was seen free up to here.
+    corners: the blind corners, where somebody could step out (controller/decision/blind_corners.py).
     """
 
     def __init__(
@@ -53,7 +55,8 @@ class Sight:
         self._cells = np.arange(0.5 * _CELL_M, length, _CELL_M)
         self._lanes = self._lanes_of(self._cells)
         self._seen_ns = np.full(len(self._cells), _NEVER_NS, np.int64)
-        # Under the nose and beside it nothing can be seen: what the robot stands before is free by consent.
+        # The floor right before and beside the robot is below the view. At the start it counts as free by
+        # the consent of whoever starts the robot.
         self._near_m = self._floor_from_m = self._lost_m = self._sight.near_m
         self._edges = math.nan, math.nan
         self._consent_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
@@ -73,8 +76,12 @@ class Sight:
         explained_by: Bodies,
         standing: bool,
     ) -> None:
-        """Take in one scene. surfaces: those of free. pose, s_m: of the robot when it was captured. standing:
-        it was at rest then."""
+        """Take in one scene.
+
+        free, surfaces: the free space, and the surfaces made of it.
+        pose, s_m: of the robot when the scene was captured; standing: it was at rest then.
+        explained_by: bodies; a surface that belongs to one of them is no obstacle of its own.
+        """
         self._take_edges(free)
         bands, forward, points = surfaces.bands, surfaces.forward_m, surfaces.points_m
         surface_s, surface_d = self._corridor.path.project_points(
@@ -108,8 +115,11 @@ class Sight:
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
     def _take_edges(self, free: FreeSpace) -> None:
-        """What is below the view of a camera that is higher than usual cannot be seen before the start
-        either: by consent it is free, but for a stretch that is too long for that."""
+        """Take in where the view begins and ends, if that has changed.
+
+        The higher the camera, the longer the stretch of floor below its view, which cannot be seen before the
+        start. It counts as free by consent, unless it is too long (consented_m).
+        """
         edges = free.floor_from_m, free.up_tan
         if edges == self._edges:
             return
@@ -120,7 +130,7 @@ class Sight:
             self._consent_s_m += near_m - self._near_m
             self._near_m = near_m
         above_m = above_from_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
-        if free.up_tan < LEAST_TAN:  # the view hardly rises, and nobody knows where a thing leaves it
+        if free.up_tan < LEAST_TAN:  # the upper edge hardly rises: where things leave it is not known
             above_m = min(above_m, _MOST_ABOVE_M)
         self._lost_m = max(self._floor_from_m, above_m)
 
@@ -128,8 +138,8 @@ class Sight:
         self._nearest.append(nearest_s_m)
         before = self.surface_s_m
         steady = sorted(self._nearest)[len(self._nearest) // 2]
-        # What goes out of sight below or above the view because the robot drives on is still there; what goes
-        # while the robot stands has gone away.
+        # A surface that leaves the view below or above it because the robot drives on is still there, so it
+        # is held. One that vanishes while the robot stands has gone away.
         blind_s_m = s_m + self._mount.forward_m + self._lost_m
         if standing or self._held_s_m < s_m:
             self._held_s_m = math.inf
@@ -145,20 +155,24 @@ class Sight:
         captured_ns: int,
         in_corridor: BoolArray,
     ) -> None:
-        """Mark the cells whose width was seen; then find the first one ahead that is not known. in_corridor
-        (B,): in which bands a surface is, which limits the speed itself: behind it nothing has to be seen."""
+        """Mark the cells whose width was seen free, then find the first unknown cell ahead.
+
+        in_corridor (B,): in which bands a surface is in the corridor. It limits the speed itself, so behind
+        it nothing has to be seen.
+        """
         first, last = _between(self._cells, s_m, s_m + self._sight.range_m + self._mount.forward_m)
         if last > first and len(free.bearing_tan):
-            # What is too near to be measured was not seen, however far the scan goes beyond it. Nor was what
-            # is below the view, where that is more than could be consented to.
+            # Floor too near to be measured was not seen, however far the scan reaches beyond it. Nor was
+            # floor below the view, where that stretch is longer than what is free by consent.
             least_m = free.blind_m + 0.5 * _CELL_M if free.blind_m > 0.0 else 0.0
             if self._floor_from_m > self._near_m:
                 least_m = max(least_m, self._floor_from_m)
             lanes = self._lanes[:, first:last]
-            # The far edge of a cell, so that a cell is not known for the sake of its beginning.
+            # Ask for the far edge of a cell: it is not known if only its beginning was seen.
             seen = seen_of(free, pose, self._mount, lanes, 0.5 * _CELL_M, least_m, in_corridor)
             self._seen_ns = _marked(self._seen_ns, first, seen, self._sight.known_share, captured_ns)
-        # Too near to be seen again: what was once seen free stays so, others' bodies are watched elsewhere.
+        # Cells too near to be seen again stay free once they were seen free; bodies that may come there are
+        # covered by controller/decision/memory.py and worst_case.py.
         near_s_m = s_m + self._mount.forward_m + self._near_m + _CELL_M
         memory_ns = round(self._sight.memory_s * NS_PER_S)
         unknown = _first_unknown(
@@ -168,7 +182,7 @@ class Sight:
         self.known_s_m = math.inf if known else float(self._cells[unknown]) - 0.5 * _CELL_M
 
     def _lanes_of(self, cells: FloatArray) -> FloatArray:
-        """(2, C, L) points across the swept width at each cell: they depend on the path alone."""
+        """(2, C, L) x and y of L points across the swept width at each cell; depends on the path alone."""
         x, y, heading = (values[:, None] for values in self._corridor.path.poses(cells))
         half = self._corridor.half_width(cells)[:, None]
         lanes = np.linspace(-1.0, 1.0, _LANES)
@@ -191,9 +205,12 @@ def _beside_the_way(
     lateral_m: float,
     bands_count: int,
 ) -> tuple[BoolArray, float, BoolArray]:
-    """In which of the B bands a surface is in the corridor (B,); where the nearest of those is that no body
-    explains, inf: there is none; and which surfaces (P,) belong to nobody who moves. belongs (P, N): which
-    of them belong to which bodies; moving (N,): of these."""
+    """Which surfaces are in the corridor, and which of them bodies explain.
+
+    Returns in which of the B bands a surface is in the corridor (B,); the least s_m of such a surface that
+    belongs to no body, inf if there is none; which surfaces (P,) belong to no mover. belongs (P, N): which
+    surfaces belong to which bodies. moving (N,): which bodies move.
+    """
     in_corridor, stands = np.zeros(bands_count, np.bool_), np.ones(len(bands), np.bool_)
     nearest_s = math.inf
     for i in range(len(bands)):
@@ -212,13 +229,13 @@ def _beside_the_way(
 
 @compiled("float64[:], float64, float64")
 def _between(cells_m: FloatArray, from_s_m: float, to_s_m: float) -> tuple[int, int]:
-    """The first of the cells (C,) from from_s_m on, and the first one from to_s_m on."""
+    """Index of the first of the cells (C,) at or behind from_s_m, and of the first at or behind to_s_m."""
     return int(np.searchsorted(cells_m, from_s_m)), int(np.searchsorted(cells_m, to_s_m))
 
 
 @compiled("int64[:], int64, int64[:], float64, int64")
 def _marked(seen_ns: IntArray, first: int, lanes: IntArray, known_share: float, captured_ns: int) -> IntArray:
-    """The cells (C,); from first on, those are seen now of which enough lanes (K,) are."""
+    """When each cell (C,) was last seen: from first on, now, if enough of its points are seen: lanes (K,)."""
     marked = seen_ns.copy()
     for k in range(len(lanes)):
         if lanes[k] / _LANES >= known_share:
@@ -235,8 +252,11 @@ def _first_unknown(
     near_s_m: float,
     consent_s_m: float,
 ) -> int:
-    """The first of the cells (C,) from first on that was not seen since since_ns; up to near_s_m, not ever;
-    up to consent_s_m none is unknown. C: none is."""
+    """Index of the first unknown cell of the cells (C,) from first on; C if there is none.
+
+    A cell is unknown if it was not seen since since_ns; up to near_s_m, if it was never seen; up to
+    consent_s_m, never.
+    """
     for c in range(first, len(cells_m)):
         near, consent = cells_m[c] <= near_s_m, cells_m[c] <= consent_s_m
         if not (seen_ns[c] >= since_ns or (near and seen_ns[c] > _NEVER_NS) or consent):

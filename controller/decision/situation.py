@@ -1,4 +1,4 @@
-"""What one decision is asked about."""
+"""The input of one decision (controller/decision/decide.py)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from vision.scene import Scene
 class Situation:
     """All that is known when a control step decides. path, pose and scene.robot_pose are in one frame.
 
-    scene: the newest there is, in every step until a newer one comes; None before the first. on_path: where
-    the pose is along the path. v_mps, a_mps2: commanded (or measured, if more).
+    scene: the newest one, repeated until a newer one comes; None before the first.
+    path: the planned path.
+    pose, on_path: where the robot is, and the same in path coordinates.
+    v_mps, a_mps2: commanded speed (or the measured one, if greater) and commanded acceleration.
+    now_ns: time of this step.
     """
 
     scene: Scene | None

@@ -1,4 +1,8 @@
-"""What stands in the corridor -> speed limits: stop before it, where it can still be seen to leave."""
+"""Speed limits for bodies that stand in the corridor: stop before each, where it can still be seen to leave.
+
+controller/decision/appraise.py calls StandingLimits in each control step. Bodies are placed along the path
+once a scene; in bends controller/decision/outline.py tells how far beside the corridor they are.
+"""
 
 from __future__ import annotations
 
@@ -20,18 +24,25 @@ from hal.compiled import compiled
 from hal.records import record
 from hal.types import CameraMount, FloatArray
 
+# Beside the robot (its front is past the near side) only a body this far inside the corridor counts.
 _INSIDE_BODY_M = 0.05
-# What stands so near beside the way may come to graze it when only a part of it is in view.
+# Outlines are kept of bodies this far beside the lateral margin: later, when only a part is in view, the box
+# of such a body may reach into the corridor.
 _BESIDE_M = 0.5
-# What hangs and rises above the view is stood off so far at most.
+# Greatest distance at which the robot stands off something that hangs and would rise above the view.
 _MOST_OFF_M = 3.0
 _NOW = np.zeros(1)
 
 
 @record(frozen=True, slots=True)
 class _Near:
-    """What may stand in the corridor; lo_m, hi_m, clear_m: see corridor.Placed. stop_m: where to stand before
-    it."""
+    """A body that may stand in the corridor.
+
+    number: its id.
+    lo_m, hi_m, clear_m: see corridor.Placed.
+    age_s: since it was first seen.
+    stop_m: distance from it at which the robot stands.
+    """
 
     number: int
     lo_m: float
@@ -42,8 +53,11 @@ class _Near:
 
 
 class StandingLimits:
-    """inside: ids of who counts as in the corridor; shared with whoever watches the moving ones, because
-    bodies start and stop. Standing bodies are placed once a scene, not once a step."""
+    """Limits for standing bodies.
+
+    inside: ids of bodies that count as in the corridor (hysteresis); shared with MovingLimits, because bodies
+    start and stop. Standing bodies are placed once a scene, not once a step.
+    """
 
     def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount, inside: set[int]) -> None:
         self._config, self._limits, self._mount = config, limits, mount
@@ -55,7 +69,7 @@ class StandingLimits:
         self._outlines_m: dict[int, float] = {}
 
     def limits(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
-        """For the robot at s_m."""
+        """The limits for a robot at s_m."""
         if known.bodies is not self._of or known.corridor is not self._corridor:
             self._take_in(known, s_m)
         margins = self._config.margins
@@ -66,7 +80,7 @@ class StandingLimits:
             number, gap_m = near.number, near.lo_m - s_m
             beside_m = margins.lateral_m + (margins.graze_m if number in self._inside else 0.0)
             if gap_m < -ALONGSIDE_M:
-                # The front has passed it already: only what the body would really touch counts.
+                # The front has passed its near side: only a body that the robot would really touch counts.
                 beside_m = -_INSIDE_BODY_M
             if near.clear_m > beside_m:
                 self._inside.discard(number)
@@ -82,8 +96,10 @@ class StandingLimits:
         return found
 
     def _take_in(self, known: Knowledge, s_m: float) -> None:
-        """Place what stands in a new scene, or beside a new path, and leave out what is too far aside to
-        matter. Outlines that were seen along another path say nothing here."""
+        """Place the standing bodies of a new scene, or along a new path, and drop those too far aside.
+
+        Outlines that were measured along another path are not used.
+        """
         before = self._outlines_m if known.corridor is self._corridor else {}
         self._of, self._corridor = known.bodies, known.corridor
         self._near, self._outlines_m = [], {}
@@ -104,8 +120,11 @@ class StandingLimits:
             self._near = [_Near(number, *of) for number, of in zip(numbers, near_ones.tolist(), strict=True)]
 
     def _clear(self, known: Knowledge, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
-        """(N,) free floor beside the swept corridor; in bends, by the outlines when they were last seen
-        whole, by number before this scene, as long as nothing nearer is seen of them."""
+        """(N,) free floor between the bodies and the corridor.
+
+        In bends it comes from each body's outline when it was last seen whole, unless a part that is nearer
+        to the corridor is seen now. before: by id, these clearances up to the last scene.
+        """
         if known.corridor.straight:
             return placed.clear_m[:, 0]
         clear_m = placed.clear_m[:, 0].copy()
@@ -123,8 +142,10 @@ class StandingLimits:
         return clear_m
 
     def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:
-        """(N,) where to stand before a body: so that it is still seen, and seen to leave; never nearer than
-        stop_m, which a camera that looks down steeply would allow."""
+        """(N,) distance at which to stand before each body, so that it is still in view and seen to leave.
+
+        Never less than the configured stop_m, even if a camera that looks down steeply would see it nearer.
+        """
         visible_m = visible_from_m(
             bodies, placed.d_m[:, 0], known.edge_tan, known.near_m, self._mount.height_m, known.up_tan
         )
@@ -135,7 +156,11 @@ class StandingLimits:
         )
 
     def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:
-        """A young obstacle may be confirmed first while an emergency stop fits even if it came at V_o."""
+        """Whether a young obstacle may first be confirmed.
+
+        That is so while an emergency stop after confirm_s would still be in time, even if the obstacle came
+        at the greatest obstacle speed V_omax.
+        """
         if age_s >= self._config.prediction.confirm_s:
             return False
         needed = braking.required_distance(
@@ -158,7 +183,7 @@ def _columns(
     age_s: FloatArray,
     stop_m: FloatArray,
 ) -> FloatArray:
-    """(R, 5) what _Near says of rows (R,), but for the number."""
+    """(R, 5) the fields of _Near except number, for the bodies rows (R,)."""
     near = np.empty((len(rows), 5))
     for i in range(len(rows)):
         k = rows[i]
@@ -170,8 +195,10 @@ def _columns(
 def _standing_off(
     visible_m: FloatArray, bottom_m: FloatArray, height_m: float, front_m: float, stop_m: float, most_m: float
 ) -> FloatArray:
-    """(N,) so far before a body, at least stop_m, that it is visible_m (N,) before the camera, but no farther
-    than most_m, or what hangs is stood off at most."""
+    """(N,) distance of the robot's front from a body at which the body is visible_m (N,) ahead of the camera.
+
+    At least stop_m. At most most_m, or _MOST_OFF_M, if that is more, for a body that hangs above the camera.
+    """
     off = np.empty(len(visible_m))
     for k in range(len(visible_m)):
         hangs = bottom_m[k] > height_m

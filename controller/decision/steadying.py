@@ -1,9 +1,9 @@
-"""Measured velocities -> the motion that is extrapolated for seconds ahead: averaged as their spread demands.
+"""Measured velocities -> averaged velocities, which are extrapolated for seconds ahead.
 
-The newest velocity of something far away is mostly noise, and whatever is foreseen from it would change with
-every frame. So each axis has a filter of its own: it follows at once what is measured well and averages what
-is not. What the newest measurement says beyond that, and that it goes on, is kept as surprise, for the worst
-case.
+The newest velocity of something far away is mostly noise, and a prediction made from it would change with
+every frame. So a Kalman filter for each axis follows good measurements at once and averages poor ones. By how
+much the newest measurement differs beyond noise, and may go on to differ, is kept as surprise for the worst
+case. controller/decision/knowledge.py calls it once a scene.
 """
 
 from __future__ import annotations
@@ -19,17 +19,19 @@ from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import FloatArray
 
-# How people change their velocity: by so much in a second, growing with the root of time.
+# Process noise: people change their velocity by this standard deviation in one second, as a random walk (it
+# grows with the square root of time).
 _CHANGES_MPS = 0.3
-# Errors of velocities are alike for as long as perception measures them over.
+# Perception measures each velocity over this time, so the errors of successive measurements are correlated.
 _ALIKE_S = 0.25
-# Who has begun to change its velocity is still at it: before anything is done about it, it has changed once
-# more by what the average lags behind by. So little is taken for noise that who sets off is noticed at once.
+# Only this much of a difference is taken for noise, so that a body that sets off is noticed at once. The rest
+# counts twice: the body is still changing its velocity, and before the robot reacts it will have changed once
+# more by as much as the average lags behind.
 _NOISE_SIGMAS, _GOES_ON = 0.5, 2.0
 
 
 class SteadyVelocities:
-    """One update a scene."""
+    """The filters' state by body id; call update once a scene."""
 
     def __init__(self) -> None:
         self._ids = np.zeros(0, np.int64)
@@ -39,7 +41,7 @@ class SteadyVelocities:
         self._captured_ns = 0
 
     def update(self, seen: Bodies) -> Bodies:
-        """The bodies with averaged velocities; the rest of what was measured is their surprise_mps."""
+        """The bodies with averaged velocities, and with surprise_mps from the newest measurements."""
         dt_s = max((seen.captured_ns - self._captured_ns) / NS_PER_S, 1e-3)
         self._captured_ns = seen.captured_ns
         moving = seen.moving
@@ -76,7 +78,11 @@ def _averaged(
     before_variance: FloatArray,
     dt_s: float,
 ) -> FloatArray:
-    """(3, N, 2) velocity, its variance and the surprise of bodies of which M moved before, too."""
+    """(3, N, 2) velocity, its variance, and the surprise of N bodies.
+
+    before_ids, moved (M,), before_mps and before_variance (M, 2): the bodies of the last scene. A body that
+    did not move then starts with its measurement.
+    """
     result = np.zeros((3, *measured_mps.shape))
     velocity, variance, surprise = result
     alike = max(_ALIKE_S / dt_s, 1.0)

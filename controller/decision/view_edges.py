@@ -1,4 +1,9 @@
-"""What is below and above the camera's view, by how far ahead of it that is. Heights are over the floor."""
+"""The edges of the camera's view: which bodies are below, above or beside it at their distance.
+
+The lower edge falls from the camera's height to the floor at near_m ahead; the upper edge rises with the
+slope up_tan from the camera's height; the side edges are at the tangent edge_tan. Heights are over the floor,
+distances ahead of the camera. controller/decision/memory.py, seen_through.py, standing.py and sight.py ask.
+"""
 
 from __future__ import annotations
 
@@ -13,24 +18,32 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
 
-# The height of what is seen only in part is known no better.
+# Uncertainty of the height of a body that is seen only in part.
 UNCERTAIN_M = 0.1
-LEAST_TAN, _LEAST_M = 0.1, 1e-3
+LEAST_TAN, _LEAST_M = 0.1, 1e-3  # lower bounds of divisors
+# A body farther behind the camera than about a robot's length no longer counts as out of view.
 _BEHIND_M = 2.0
+# Floor below the view beyond this distance is too much to be taken as free without having been seen.
 _MOST_CONSENT_M = 2.5
 
 
 def consented_m(near_m: float, floor_from_m: float) -> float:
-    """How far ahead of the camera the floor is free by the consent of whoever starts the robot: near_m, or to
-    where it comes into view, from floor_from_m on, unless that is too far to be consented to."""
+    """How far ahead of the camera the floor is taken as free although it was never seen, in metres.
+
+    Whoever starts the robot consents to that: up to near_m, or to floor_from_m, where the floor comes into
+    view, but never more than _MOST_CONSENT_M (unless near_m is more).
+    """
     return max(near_m, min(floor_from_m, _MOST_CONSENT_M))
 
 
 def beyond_edges(
     bodies: Bodies, near_face_m: FloatArray, height_m: float, near_m: float, up_tan: float
 ) -> BoolArray:
-    """(N,) below the view or above it, where they begin near_face_m (N,) ahead of a camera at height_m that
-    sees the floor from near_m on, and the upper edge of whose view rises by up_tan a metre."""
+    """(N,) which bodies are entirely below the view or entirely above it.
+
+    near_face_m (N,): distance of their near faces ahead of the camera. height_m: of the camera. near_m:
+    distance from which it sees the floor. up_tan: slope of the upper edge of its view.
+    """
     return _beyond_edges(near_face_m, bodies.bottom_m, bodies.top_m, height_m, near_m, up_tan)
 
 
@@ -44,9 +57,11 @@ def out_of_view(
     edge_m: float,
     late_mps: float,
 ) -> BoolArray:
-    """(N,) beside, below or above the view of a camera that a body at pose carries, but not behind it by more
-    than a robot's length. So far as edge_m within its side edge counts as beside it; of who moves, late_mps
-    more for each second that it has not been seen."""
+    """(N,) which bodies are beside, below or above the view, and no farther than _BEHIND_M behind the camera.
+
+    pose: of the robot that carries the camera. A centre up to edge_m inside the side edge counts as beside
+    the view; of a mover, late_mps more for each second since it was last seen.
+    """
     return _out_of_view(
         bodies.xy_m,
         bodies.half_view_m,
@@ -69,7 +84,7 @@ def out_of_view(
 
 
 def above_from_m(top_m: float, height_m: float, up_tan: float) -> float:
-    """Nearer than this, something that is no higher than top_m may be above the view."""
+    """Distance ahead of the camera below which something with its top at top_m may rise above the view."""
     rise_m = top_m - height_m
     return max(rise_m, 0.0) / max(up_tan, LEAST_TAN)
 
@@ -77,9 +92,11 @@ def above_from_m(top_m: float, height_m: float, up_tan: float) -> float:
 def visible_from_m(
     bodies: Bodies, side_m: FloatArray, edge_tan: float, near_m: float, height_m: float, up_tan: float
 ) -> FloatArray:
-    """(N,) how far ahead of the camera a body has to be so that it is seen: its middle within the edges of
-    the view, its upper part above the lower one and its lower part below the upper one. side_m (N,): its
-    middle beside the camera's axis."""
+    """(N,) the least distance ahead of the camera at which a body is seen.
+
+    There its centre is within the side edges, its top is above the lower edge and its bottom is below the
+    upper edge. side_m (N,): sideways distance of its centre from the camera's axis.
+    """
     return _visible_from_m(bodies.top_m, bodies.bottom_m, side_m, edge_tan, near_m, height_m, up_tan)
 
 
@@ -91,7 +108,7 @@ def _lowest_seen_m(ahead_m: float, height_m: float, near_m: float) -> float:
 
 @inlined
 def _highest_seen_m(ahead_m: float, height_m: float, up_tan: float) -> float:
-    """Height of the upper edge, which rises by up_tan a metre; inf: nothing is known to be above it."""
+    """Height of the upper edge at ahead_m; inf if up_tan is not known (inf): then nothing is above it."""
     return math.inf if math.isinf(up_tan) else height_m + up_tan * max(ahead_m, 0.0)
 
 

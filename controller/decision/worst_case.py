@@ -1,9 +1,9 @@
 """The worst case as a speed limit: how fast may the robot go and still stand before a body could touch it?
 
 controller/decision/contingency.py has the geometry: what each body could reach, and how much room a stop
-leaves. This file decides by how much each body may change its velocity, tries emergency stops from many
-speeds, and makes a Limit of the greatest speed that suffices. controller/decision/appraise.py calls it last,
-after the other advisers.
+leaves. This file decides how much each body may change its velocity, tries emergency stops from many speeds,
+and makes a Limit of the greatest speed that is safe. controller/decision/appraise.py calls it last, after the
+other advisers.
 """
 
 from __future__ import annotations
@@ -34,22 +34,28 @@ from controller.profile import SpeedRamps, comfortable
 from hal.compiled import compiled
 from hal.types import FloatArray
 
-# Fine where stops from low speeds end, coarser for the long ones.
+# Times that are looked at: every 0.1 s up to 2 s, where stops from low speeds end, then every 0.2 s.
 _STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
-_SPEEDS = 31
-# Before a stop begins: beside what the configuration says no control period takes as long as this; and the
-# least that is looked at.
+_SPEEDS = 31  # how many speeds are tried
+# Longest wait before a stop begins: the delays of the configuration plus 0.5 s, which no control period
+# exceeds; at least 1 s.
 _PERIOD_S, _LEAST_WAIT_S = 0.5, 1.0
-# So much sooner than it would have to, the robot slows comfortably for the worst case.
+# The robot begins to slow for the worst case this much earlier than an emergency stop would have to, so that
+# comfortable braking suffices.
 _FORESIGHT_S = 0.1
+# Least sideways speed that is assumed when a body's direction of motion is judged.
 _GOES_MPS = 0.1
-# Who has been seen for so long and comes towards the robot has seen it too.
+# A body that comes towards the robot and was seen for this long has seen the robot, too.
 _SEES_S = 1.0
+# The robot does not slow yet if it is faster than the worst case allows by no more than this.
 _SOFT_MPS = 0.1
 
 
 class WorstCase:
-    """times_s (K,): from now, the times that are looked at; they cover any emergency stop."""
+    """Limits the speed by what bodies could do at worst.
+
+    times_s (K,): the times from now that are looked at; they cover any emergency stop.
+    """
 
     def __init__(self, config: DecisionConfig, limits: Limits) -> None:
         self._config, self._limits = config, limits
@@ -77,12 +83,15 @@ class WorstCase:
         since_s: float,
         chosen_mps: float,
     ) -> Limit | None:
-        """The greatest speed from which the robot at s_m could still stand in time; None: no need to slow.
+        """The greatest speed from which the robot at s_m could still stop in time; None: no need to slow.
 
-        placed: the bodies, since_s after their scene; its first times are times_s. enters (N,): whose motion
-        as it was measured leads into the way. chosen_mps: what is driven if nothing happens; where that gets
-        through whatever they do, the robot need not be able to stop. A robot that slows down to chosen_mps
-        anyway may still have to do so harder than it would: the limit is urgent then.
+        placed: the bodies, since_s after their scene; its first times are times_s.
+        enters (N,): which bodies' measured motion leads into the corridor.
+        chosen_mps: the speed that the other limits leave. If a comfortable ramp to it gets past all bodies,
+        whatever they do, the robot need not be able to stop.
+
+        The limit is urgent if even an emergency stop that begins now would be too late. That may hold for a
+        robot that is already slowing down to a safe chosen_mps: then it has to brake harder.
         """
         unsure_m = UNSEEN_SIGMAS * course.sigma_along_mps * bodies.unseen_s
         rows = placed.lo_m[:, 0] + unsure_m > s_m - ALONGSIDE_M
@@ -104,7 +113,7 @@ class WorstCase:
             now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
             urgent = bool(room(now, s_m, reached)[0] < 0.0)
             if not urgent and motion.v_mps <= speed + _SOFT_MPS:
-                # Foresight may wait a moment; braking for every breath of noise would only delay going on.
+                # An emergency stop is still in time. Braking for each small fluctuation would only cost time.
                 speed = motion.v_mps
         row = int(np.where(rows, placed.lo_m[:, 0], math.inf).argmin())
         number = int(bodies.ids[row])
@@ -119,10 +128,12 @@ class WorstCase:
     def _speed(
         self, reached: Reach, young: NDArray[np.bool_], enters: NDArray[np.bool_], s_m: float
     ) -> float:
-        """inf: no need to slow.
+        """The greatest safe speed; inf: no need to slow.
 
-        For confirmed ones with foresight, but not below what suffices right beside them. What is hardly seen
-        yet may be confirmed first while there is time for that. Who keeps clear is passed at beside_mps.
+        For confirmed bodies the stop begins _FORESIGHT_S later, but the limit is not lower than the greatest
+        speed whose immediate stop ends before any body could be in the way. For young bodies it begins
+        confirm_s later: they may be confirmed first while there is time. Bodies that do not enter the
+        corridor (not in enters) never limit the speed below beside_mps.
         """
         speed = self._greatest(self._foreseen, reached, ~young, s_m)
         if math.isfinite(speed):
@@ -137,7 +148,10 @@ class WorstCase:
         return max(speed, min(self._greatest(self._foreseen, reached, enters, s_m), beside_mps))
 
     def _greatest(self, stopping: Stops, reached: Reach, of: NDArray[np.bool_], s_m: float) -> float:
-        """The greatest speed whose stop stays short of all those that count, of (N,); inf: all of them do."""
+        """The greatest speed whose stop stays short of all bodies in the mask `of` (N,).
+
+        inf: every stop does; 0: none does.
+        """
         stand = how_many_stand(stopping, s_m, reached, of)
         return float(self._speeds[max(stand - 1, 0)]) if stand < len(self._speeds) else math.inf
 
@@ -149,7 +163,7 @@ class WorstCase:
         self._foreseen = self._stops(self._speeds, 0.0, latency_s + _FORESIGHT_S)
         self._confirming = self._stops(self._speeds, 0.0, latency_s + confirm_s)
         self._at_once = self._stops(self._speeds, 0.0, latency_s)
-        # Which of the two waits longer is the configuration's choice.
+        # Which of the two waits is longer depends on the configuration.
         self._furthest_m = float(max(self._foreseen.distance_m.max(), self._confirming.distance_m.max()))
 
     def _reach(
@@ -226,21 +240,24 @@ def _may_do(
     leaves_aslant: float,
     unseen_sigmas: float,
 ) -> FloatArray:
-    """(8, N) what reach() asks about bodies (N,): since_s, spread_mps along and to the left, speed_mps,
-    manoeuvre_mps2 along and sideways, unsure_m along and to the left."""
+    """(8, N) arguments of reach() for bodies (N,).
+
+    In this order: since_s, spread_mps along the path and to the left, speed_mps, manoeuvre_mps2 along and
+    sideways, unsure_m along and to the left.
+    """
     answers = np.zeros((8, len(along_mps)))
     since, spread_along, spread_left, speed, along, sideways, unsure_along, unsure_left = answers
     for k in range(len(along_mps)):
-        # Who goes the robot's way does not see it coming and is beside it for long; who comes towards it sees
-        # it after a while and keeps its lane; all others may have become faster or turned since they left the
-        # view.
+        # unaware: goes in the robot's direction, so it does not see the robot coming and is beside it for
+        # long. comes: comes towards the robot, sees it after a while and keeps its lane. leaves: moves away
+        # from the path. All but comes and leaves may have changed their velocity since they left the view.
         aslant_mps = max(abs(left_mps[k]), _GOES_MPS)
         outwards, beside = left_mps[k] * d_m[k] > 0.0, clear_m[k] > 0.0
         unaware = along_mps[k] > (leaves_aslant if outwards else 1.0) * aslant_mps
         comes = along_mps[k] < -aslant_mps
         leaves = outwards and beside and not unaware
         if moving[k]:
-            # Turning in, one also becomes slower along the path.
+            # A body that turns into the way also slows down along the path.
             along[k] = cut_in_mps2 if unaware and beside else manoeuvre_mps2
             sideways[k] = cut_in_mps2 if unaware else manoeuvre_mps2
             if comes and age_s[k] >= _SEES_S:
