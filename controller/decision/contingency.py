@@ -95,7 +95,7 @@ class Stops:
 
 
 def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
-    """The stops that ramps to 0 are, sampled at times_s (K,)."""
+    """Sample the R stops at times_s (K,); ramps: R ramps to speed 0."""
     distance, speed, _ = ramps.state(times_s[None, :])
     return Stops(distance, speed > _STANDING_MPS)
 

@@ -1,1 +1,10 @@
-"""The planned path: where it goes, how fast it may be driven, where it cannot be seen round."""
+"""The planned path: where it goes, how fast it may be driven, which bends the camera cannot see round.
+
+The files in the order in which they come into play:
+
+* path.py - Path: the interface to all the rest of the program
+* path_pieces.py - the path as a chain of pieces of constant curvature
+* projection.py - path coordinates of points
+* path_speeds.py - greatest speed along the path
+* blind_bends.py - before a drive: a warning about bends where the robot would wait without end
+"""

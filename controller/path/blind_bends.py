@@ -1,8 +1,8 @@
-"""Bends that the camera cannot see round: told before the drive, or the robot would wait there for ever.
+"""Bends that the camera cannot see round: a warning before the drive, or the robot may wait there for ever.
 
-Nothing here is a formula of its own. controller/decision/sight.py, which decides in the drive how far the
-floor is known, is led along each bend of the path with all that this camera could see of an empty hall, and
-where a robot that stands would not be let go again, the bend is named.
+There is no formula of its own here. controller/decision/sight.py, which decides during a drive how far the
+floor is known, is moved along each bend of the path with all that this camera could see of an empty hall. If
+there is a place where a standing robot would not be allowed to start again, the bend is reported.
 """
 
 from __future__ import annotations
@@ -31,19 +31,22 @@ from hal.types import CameraMount, FloatArray
 from vision.scene import FreeSpace
 
 _STEP_M = 0.1
-# So far before a bend the thought begins: what is free by consent has been left behind at its beginning.
+# The check begins this far before a bend, so that the floor that is free by consent lies behind at the bend.
 _RUN_IN_M = 3.0
-# Floor is known in cells of 0.2 m, and no drive is as straight, no scan as complete as in thought.
+# Reserve: floor is known in cells of 0.2 m, and real drives are less exact and real scans less complete.
 _SPARE_M = 0.2
 _BANDS = 80
-_WIDEST_BEND_M = 20.0
-_TO_THE_CM = 0.05
+_WIDEST_BEND_M = 20.0  # no larger radius is proposed
+_TO_THE_CM = 0.05  # precision of the proposed radius
 
 
 @dataclass(frozen=True, slots=True)
 class CameraView:
-    """Tangents of the bearing of the image's edges to the left and to the right of its axis, both positive,
-    and how far the floor is seen."""
+    """What the camera sees at most.
+
+    left_tan, right_tan: tangents of the angles from the optical axis to the left and right edge of the image,
+    both positive. range_m: how far the floor is seen.
+    """
 
     left_tan: float
     right_tan: float
@@ -51,14 +54,19 @@ class CameraView:
 
     @property
     def degrees(self) -> float:
-        """From edge to edge."""
+        """The angle of view, from edge to edge."""
         return math.degrees(math.atan(self.left_tan) + math.atan(self.right_tan))
 
 
 @dataclass(frozen=True, slots=True)
 class BlindBend:
-    """stand_s_m: where along the path the robot would stand. segment: which one of the path's it could not
-    see round, radius_m wide. enough_m: the radius from which on it could, None if none is."""
+    """A bend that the camera cannot see round.
+
+    stand_s_m: where along the path the robot would stand.
+    segment: index of the bend among the segments of the path.
+    radius_m: its radius.
+    enough_m: the least radius that the camera could see round; None if there is none.
+    """
 
     stand_s_m: float
     segment: int
@@ -67,7 +75,7 @@ class BlindBend:
 
 
 def view_of(config: AppConfig) -> CameraView | None:
-    """What the camera of this configuration sees at most; None: only its recording knows."""
+    """What the camera of this configuration sees at most; None if only its recording tells."""
     tangents = config.camera.edge_tangents
     if tangents is None:
         return None
@@ -77,10 +85,10 @@ def view_of(config: AppConfig) -> CameraView | None:
 
 
 def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
-    """One line about the first bend of the path that the camera cannot see round: what, where, why and what
-    to do. None where there is none, or where nobody knows how wide the camera looks.
+    """A warning about the first bend of the path that the camera cannot see round: where, why and what to do.
 
-    Raises ConfigError, PathError.
+    One line. None if there is no such bend, or if the angle of view is not known. Raises ConfigError,
+    PathError.
     """
     view = view_of(config)
     if view is None:
@@ -101,7 +109,7 @@ def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
 def first_blind_bend(
     spec: PathSpec, path: Path, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
 ) -> BlindBend | None:
-    """The first bend of path, which is spec's, in which a robot that has come to stand would not go on."""
+    """The first bend of path, which is made of spec, in which a robot that stands would not start again."""
     ends = np.cumsum([segment.length_m for segment in spec.segments])
     arcs = [k for k, segment in enumerate(spec.segments) if isinstance(segment, ArcSpec)]
     for begin_m, end_m in _around(ends, arcs, path.length_m):
@@ -109,7 +117,7 @@ def first_blind_bend(
         if found is None:
             continue
         stand_s_m, unseen_s_m = found
-        # What is hidden may lie behind the bend: the bend is the last one that begins before it.
+        # The hidden floor may lie behind the bend, so the bend is the last one that begins before it.
         segment = max((k for k in arcs if ends[k] - spec.segments[k].length_m <= unseen_s_m), default=arcs[0])
         bend = spec.segments[segment]
         assert isinstance(bend, ArcSpec)
@@ -119,7 +127,7 @@ def first_blind_bend(
 
 
 def _around(ends: FloatArray, arcs: list[int], length_m: float) -> Iterator[tuple[float, float]]:
-    """From where to where along the path bends are ahead; those that follow each other closely are one."""
+    """Stretches of the path (from, to) with a bend ahead or on them; bends that follow closely share one."""
     begin_m = end_m = -math.inf
     for k in arcs:
         starts_m = float(ends[k - 1]) if k > 0 else 0.0
@@ -141,7 +149,7 @@ def _stands_at(
     begin_m: float,
     end_m: float,
 ) -> tuple[float, float] | None:
-    """Where between begin_m and end_m it would stand for ever, and up to where the floor is known then."""
+    """Where from begin_m to end_m the robot would stand for ever, and how far the floor is known there."""
     corridor = Corridor(path, robot.body)
     sight = Sight(corridor, mount, decision, begin_m)
     half_width = 0.5 * (view.left_tan + view.right_tan) / _BANDS
@@ -152,7 +160,8 @@ def _stands_at(
         np.full(_BANDS, view.range_m),
     )
     go_mps = starts_at_mps(decision.release, braking.comfort(robot.limits))
-    # So slowly that of what has left the view only the floor right ahead is still known: as after a stop.
+    # Longer from step to step than floor is remembered, so that of the floor out of view only that right
+    # ahead is still known, as after a stop.
     step_ns = round((decision.sight.memory_s + 1.0) * NS_PER_S)
     for k, s_m in enumerate(np.arange(begin_m, end_m, _STEP_M).tolist()):
         sight.look(free, NO_SURFACES, path.pose(s_m), s_m, k * step_ns, no_bodies(0), True)
@@ -172,7 +181,7 @@ def _stands_at(
 def _enough_m(
     bend: ArcSpec, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
 ) -> float | None:
-    """The least radius that this camera sees round in a half turn, to 5 cm upwards; None above 20 m."""
+    """The least radius that this camera sees round in a half turn, rounded up to 0.1 m; None above 20."""
     low_m, high_m = bend.radius_m, _WIDEST_BEND_M
     if low_m >= high_m or _half_turn_blind(high_m, robot, mount, view, decision):
         return None

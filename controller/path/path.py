@@ -1,7 +1,7 @@
 """The planned path: where the robot is along it, how it bends, and how fast it may be driven.
 
-Every measure is closed-form on a piece of constant curvature (controller/path/path_pieces.py); where along it
-points are, controller/path/projection.py tells.
+Everything is computed in closed form on pieces of constant curvature (controller/path/path_pieces.py);
+controller/path/projection.py finds the path coordinates of points.
 
 Path coordinates: s_m along the path from its start, d_m to the left of it.
 """
@@ -27,10 +27,11 @@ from hal.types import FloatArray, PlanarPose
 IntArray = NDArray[np.intp]
 
 _NOW = np.zeros(1)
+# A pose is searched this far behind and ahead of where it was last.
 _LOOK_BACK_M = 0.25
 _LOOK_AHEAD_M = 2.0
-_SLOWEST_BEND_MPS = 0.1
-_OPPOSED_RAD = math.radians(120.0)
+_SLOWEST_BEND_MPS = 0.1  # a bend that cannot be driven at this speed is refused
+_OPPOSED_RAD = math.radians(120.0)  # headings that differ by more are opposed
 
 
 class PathError(ConfigError):
@@ -73,7 +74,7 @@ class Path:
         return self.pose(0.0)
 
     def pose(self, s_m: float) -> PlanarPose:
-        """The path's point and direction at s_m (straight on beyond the ends)."""
+        """Point and direction of the path at s_m; the path goes straight on beyond its ends."""
         x, y, heading = self.poses(np.array([s_m]))
         return PlanarPose(float(x[0]), float(y[0]), wrap_angle_rad(float(heading[0])))
 
@@ -93,16 +94,19 @@ class Path:
         )
 
     def curvature(self, s_m: float) -> float:
-        """1/m at s_m, positive to the left."""
+        """Curvature in 1/m at s_m, positive to the left."""
         return float(self._curvature[self._piece_at(np.array([s_m]))[0]])
 
     def curvatures(self, s_m: FloatArray) -> FloatArray:
-        """1/m at each s_m."""
+        """Curvatures in 1/m at each s_m."""
         return self._curvature[self._piece_at(s_m)]
 
     def project(self, pose: PlanarPose, hint_s_m: float) -> OnPath:
-        """The pose in path coordinates, searched near hint_s_m only, so that it cannot jump to another turn
-        of the path: at most 0.25 m behind the hint and 2 m ahead of it."""
+        """The pose in path coordinates.
+
+        It is searched from 0.25 m behind hint_s_m to 2 m ahead of it only, so that it cannot jump to another
+        part of the path that is near.
+        """
         s, d, heading = self._projection.project(
             pose.x_m, pose.y_m, hint_s_m - _LOOK_BACK_M, hint_s_m + _LOOK_AHEAD_M
         )
@@ -111,7 +115,7 @@ class Path:
     def project_points(
         self, points_m: FloatArray, from_s_m: float = -math.inf, to_s_m: float = math.inf
     ) -> tuple[FloatArray, FloatArray]:
-        """Path coordinates s_m (N,), d_m (N,) of points (N, 2), nearest to the part from_s_m..to_s_m."""
+        """Path coordinates s_m (N,), d_m (N,) of points (N, 2), on the part from_s_m..to_s_m of the path."""
         located = self._projection.locate(points_m, np.zeros(points_m.shape), _NOW, from_s_m, to_s_m)
         return located[0, :, 0], located[1, :, 0]
 
@@ -123,12 +127,14 @@ class Path:
         from_s_m: float,
         to_s_m: float,
     ) -> FloatArray:
-        """(3, N, K) the same, with the path's heading_rad there (not wrapped), of what goes on from points_m
-        with velocity_mps (N, 2), times_s (K,) from now."""
+        """(3, N, K) s_m, d_m, heading_rad of the path (not wrapped) of moving points, times_s (K,) from now.
+
+        They move from points_m (N, 2) with constant velocity_mps (N, 2). from_s_m, to_s_m: as before.
+        """
         return self._projection.locate(points_m, velocity_mps, times_s, from_s_m, to_s_m)
 
     def speed_limit(self, s_m: float) -> float:
-        """The greatest speed at s_m so that every section and bend ahead is entered slowly enough, m/s."""
+        """The greatest speed at s_m, in m/s, at which every slower section and bend ahead can be met."""
         return _between(self._speed, min(max(0.0, s_m), self.length_m) / self._speed_step_m)
 
     def _piece_at(self, s_m: FloatArray) -> IntArray:
@@ -150,8 +156,7 @@ class Path:
 def _swept_twice(
     x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray, width_m: float
 ) -> tuple[int, int]:
-    """The first two of poses (S,) that are nearer to each other than width_m and opposed; 0, 0: there are
-    none."""
+    """Indices of the first two poses (S,) nearer to each other than width_m and opposed; 0, 0: none."""
     for k in range(len(x_m)):
         for j in range(k, len(x_m)):
             if math.hypot(x_m[j] - x_m[k], y_m[j] - y_m[k]) < width_m:
@@ -163,13 +168,13 @@ def _swept_twice(
 
 @compiled("float64[::1], float64")
 def _between(values: FloatArray, place: float) -> float:
-    """At a place between two of values (S,), counted from the first one."""
+    """The value at a fractional index place, interpolated between values (S,)."""
     k = min(int(place), len(values) - 2)
     return float(values[k] + (place - k) * (values[k + 1] - values[k]))
 
 
 def _check_bends(spec: PathSpec, robot: Robot) -> None:
-    """The inner track must not run backwards, and the yaw rate must leave a speed to drive the bend with."""
+    """Refuse bends in which the inner track would run backwards, or the yaw rate leaves no speed to drive."""
     slow_m = _SLOWEST_BEND_MPS / (robot.limits.max_yaw_rate_radps * YAW_RATE_FOR_THE_BEND)
     tightest_m = max(robot.body.width_m / 2.0, slow_m)
     for number, segment in enumerate(spec.segments):

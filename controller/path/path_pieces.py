@@ -11,14 +11,14 @@ import numpy as np
 from config.path import ArcSpec, PathSpec
 from hal.types import FloatArray
 
-# The body overhangs both ends, so what stands beyond them is measured along straight extensions.
+# The body overhangs both ends of the path, so the path is extended straight on for what stands beyond them.
 EXTENSION_M = 20.0
 _BLEND_PIECES = 16
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Begins at s_m along the path, at a pose, and bends evenly."""
+    """A piece of constant curvature that begins at s_m along the path, at the pose x_m, y_m, heading_rad."""
 
     s_m: float
     length_m: float
@@ -29,7 +29,7 @@ class Piece:
 
 
 def pieces_of(spec: PathSpec) -> list[Piece]:
-    """End to end, with a straight extension at either end."""
+    """The pieces of a path, end to end, with a straight extension at either end."""
     chain = list(_chain(spec))
     return [_extension_back(chain[0]), *chain, _extension_ahead(chain[-1])]
 
@@ -44,7 +44,7 @@ def sinc(angle_rad: FloatArray) -> FloatArray:
 
 
 def _chain(spec: PathSpec) -> Iterator[Piece]:
-    """The pieces of constant curvature, end to end."""
+    """The pieces, end to end, without the extensions."""
     s = 0.0
     x, y = spec.start.x_m, spec.start.y_m
     heading = math.radians(spec.start.heading_deg)
@@ -61,10 +61,10 @@ def _chain(spec: PathSpec) -> Iterator[Piece]:
 
 
 def _arc_pieces(arc: ArcSpec) -> list[tuple[float, float]]:
-    """(length, curvature): the blend in, the circle, the blend out; a blend turns by half its length."""
+    """(length, curvature) of blend in, circle and blend out; a blend turns as an arc of half its length."""
     curvature = math.copysign(1.0 / arc.radius_m, arc.angle_deg)
     circle_m = arc.length_m - 2.0 * arc.blend_m
-    # No piece turns by more than 90 degrees: the angle of a point about its centre is never ambiguous.
+    # No piece turns by more than 90 degrees, so the angle of a point about its centre is never ambiguous.
     parts = max(1, math.ceil(circle_m * abs(curvature) / (math.pi / 2.0) - 1e-9))
     circle = [(circle_m / parts, curvature)] * parts if circle_m > 0.0 else []
     if arc.blend_m == 0.0:

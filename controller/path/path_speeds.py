@@ -12,15 +12,19 @@ from controller.braking import comfort, slowing_distance, speed_before_section
 from hal.types import FloatArray
 
 _SPEED_STEP_M = 0.05
-# The rest is kept for holding the path: tracks slip in yaw by 10 % and more.
+# Share of the robot's yaw rate that a bend may need. The rest is for the path controller: tracks slip in yaw
+# by 10 % and more.
 YAW_RATE_FOR_THE_BEND = 0.8
 
 
 def section_speeds(
     spec: PathSpec, robot: Robot, curvature: FloatArray, piece_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Speed over s: what section and bend allow, lowered ahead of each slower one as a comfortable
-    braking needs (controller/braking.py)."""
+    """Speeds over s: what sections and bends allow, and less ahead of slower ones.
+
+    The speed ahead of a slower part is what comfortable braking (controller/braking.py) needs. curvature and
+    piece_s: of the pieces, at their beginnings. Returns s in metres and the speeds in m/s, on a regular grid.
+    """
     top = robot.limits.max_speed_mps
     brake = comfort(robot.limits)
     yaw = robot.limits.max_yaw_rate_radps * YAW_RATE_FOR_THE_BEND
@@ -33,7 +37,7 @@ def section_speeds(
     speed = np.minimum(speed, yaw / np.maximum(bend, yaw / top))
     starts = np.flatnonzero(np.diff(speed) < 0.0) + 1
     for start in starts:
-        # One grid step early: the step itself may lie anywhere between two grid points.
+        # Slow down one grid step early: the change may lie anywhere between two grid points.
         distances = s[start - 1] - s[:start]
         slowed = np.flatnonzero(distances <= slowing_distance(top, float(speed[start]), brake))
         for k in slowed:

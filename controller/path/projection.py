@@ -1,6 +1,7 @@
-"""Where points are along a path, and how far beside it: on pieces of constant curvature, in closed form.
+"""Path coordinates of points: how far along a path they are, and how far beside it.
 
-Where all that is looked at is straight, without a search; else from the nearest of samples 0.25 m apart.
+They are computed in closed form on pieces of constant curvature. Where the part of the path in question is
+straight, no search is needed; else it starts from the nearest of samples 0.25 m apart.
 """
 
 from __future__ import annotations
@@ -15,19 +16,23 @@ from controller.path.path_pieces import EXTENSION_M, Piece
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
-# s_m, x_m, y_m, heading_rad and curvature_1pm of where the pieces begin, (P,) each.
+# s_m, x_m, y_m, heading_rad and curvature_1pm of the pieces at their beginnings, (P,) each.
 Chain = tuple[FloatArray, ...]
 
 _SAMPLE_M = 0.25
 _ROUNDS = 2
 _STRAIGHT_1PM = 1e-7
-# Near the centre of a bend "along the path" loses its sense; such a point is beside it, far inside.
+# Near the centre of a bend "along the path" has no meaning. Such a point counts as no nearer to the centre
+# than this share of the radius.
 _INNERMOST = 0.05
 
 
 class Projection:
-    """Of the path that consists of pieces, the first and last of which are straight extensions; poses tells
-    x_m, y_m and heading_rad (S,) of it at s_m (S,)."""
+    """Projects points onto a path.
+
+    pieces: of the path; the first and the last are straight extensions. poses: function that returns x_m, y_m
+    and heading_rad (S,) of the path at s_m (S,).
+    """
 
     def __init__(
         self,
@@ -43,14 +48,14 @@ class Projection:
         )
         samples = np.arange(-EXTENSION_M, pieces[-1].s_m + EXTENSION_M + _SAMPLE_M, _SAMPLE_M)
         self._sample_x, self._sample_y, _ = poses(samples)
-        # Straight on from a piece without a bend to the next one: how far that goes.
+        # For each straight piece: index of the last one of the unbroken row of straight pieces from it on.
         self._straight_to = np.arange(len(pieces))
         for k in range(len(pieces) - 2, -1, -1):
             if pieces[k].curvature_1pm == 0.0 == pieces[k + 1].curvature_1pm:
                 self._straight_to[k] = self._straight_to[k + 1]
 
     def project(self, x_m: float, y_m: float, low_m: float, high_m: float) -> tuple[float, float, float]:
-        """s_m, d_m and the path's heading_rad of a point that is looked for from low_m to high_m."""
+        """s_m, d_m and the path's heading_rad of a point, searched from low_m to high_m along the path."""
         return _project(self._chain, self._sample_x, self._sample_y, EXTENSION_M, x_m, y_m, low_m, high_m)
 
     def locate(
@@ -61,8 +66,10 @@ class Projection:
         from_s_m: float,
         to_s_m: float,
     ) -> FloatArray:
-        """(3, N, K) s_m, d_m and the path's heading_rad, times_s (K,) from now, of what is at points_m (N, 2)
-        and goes on with velocity_mps (N, 2), nearest to the part from_s_m..to_s_m."""
+        """(3, N, K) s_m, d_m and the path's heading_rad of moving points, times_s (K,) from now.
+
+        They move from points_m (N, 2) with constant velocity_mps (N, 2). Searched from from_s_m to to_s_m.
+        """
         return _locate(
             self._chain,
             self._straight_to,
@@ -79,14 +86,14 @@ class Projection:
 
 @inlined
 def _samples_from_to(low_m: float, high_m: float, extension_m: float) -> tuple[int, int]:
-    """The numbers of the first sample and behind the last one; at least one."""
+    """Range of sample indices from low_m to high_m: the first, and one past the last; at least one sample."""
     first = math.ceil((low_m + extension_m) / _SAMPLE_M)
     return first, max(int((high_m + extension_m) / _SAMPLE_M), first) + 1
 
 
 @inlined
 def _piece_at(s_m: float, starts: FloatArray) -> int:
-    """The last piece that begins at s_m or before; else the first one."""
+    """Index of the last piece that begins at s_m or before it; else of the first one."""
     k = len(starts) - 1
     while k > 0 and starts[k] > s_m:
         k -= 1
@@ -95,7 +102,7 @@ def _piece_at(s_m: float, starts: FloatArray) -> int:
 
 @inlined
 def _seen_from(chain: Chain, s_m: float, x_m: float, y_m: float) -> tuple[float, float, float, float]:
-    """A point ahead and to the left of the path's pose at s_m; the heading and curvature there."""
+    """Where a point is relative to the path's pose at s_m: ahead, left; and heading and curvature there."""
     starts, xs, ys, headings, bends = chain
     k = _piece_at(s_m, starts)
     along = s_m - starts[k]
@@ -121,10 +128,10 @@ def _nearest(
     low_m: float,
     high_m: float,
 ) -> tuple[float, float, float]:
-    """Path coordinates of a point between low_m and high_m along the path, and the path's heading there.
+    """Path coordinates of a point, with s_m from low_m to high_m, and the path's heading there.
 
-    From the nearest of the samples first..last, on the circle that the path is there: exact but for the steps
-    of a blend, and those take a second round.
+    Starts from the nearest sample of first..last (exclusive) and projects onto the circle that the path is
+    there. That is exact on one piece; across the short pieces of a blend a second round is needed.
     """
     nearest, least = first, math.inf
     for k in range(first, min(last, len(sample_x))):
@@ -159,7 +166,7 @@ def _project(
     low_m: float,
     high_m: float,
 ) -> tuple[float, float, float]:
-    """project() of a chain that is extended so far at either end."""
+    """project() on a chain that is extended by extension_m at either end."""
     first, last = _samples_from_to(low_m, high_m, extension_m)
     return _nearest(chain, sample_x, sample_y, max(first, 0), last, x_m, y_m, low_m, high_m)
 
@@ -168,8 +175,10 @@ def _project(
 def _on_line(
     line: tuple[float, float, float, float, float], x_m: float, y_m: float, low_m: float, high_m: float
 ) -> tuple[float, float]:
-    """s_m and d_m where all that is looked at lies on a line: s_m, x_m and y_m of where it begins, the cosine
-    and sine of where it leads."""
+    """s_m and d_m of a point where the path is a straight line from low_m to high_m.
+
+    line: s_m, x_m and y_m of its beginning, and cosine and sine of its direction.
+    """
     line_s_m, line_x_m, line_y_m, cos, sin = line
     dx, dy = x_m - line_x_m, y_m - line_y_m
     along, left = dx * cos + dy * sin + line_s_m, dy * cos - dx * sin
@@ -193,7 +202,7 @@ def _locate(
     from_s_m: float,
     to_s_m: float,
 ) -> FloatArray:
-    """locate() on a chain; straight_to (P,): up to which piece it is straight from the beginning of each."""
+    """locate() on a chain; straight_to (P,): up to which piece the path is straight from each piece on."""
     starts, xs, ys, headings, bends = chain
     end_m = starts[-1] + extension_m
     low_m = min(max(from_s_m, -extension_m), end_m - _SAMPLE_M)
