@@ -1,8 +1,8 @@
-"""Composition: YAML in, the parts of a program out.
+"""Composition: builds the parts of a program from its YAML configuration.
 
-This file and controller/build_chassis.py are the only ones of the program that name concrete devices (bench,
-campaign and evaluation apart). There are no mode flags behind them: simulation, hardware in the loop and
-robot differ only in which of these parts the YAML asks for.
+Only this file and controller/build_chassis.py name concrete devices (apart from bench, campaign and
+evaluation). There are no mode flags in the rest of the program: simulation, hardware in the loop and robot
+differ only in the parts that the YAML asks for.
 """
 
 from __future__ import annotations
@@ -53,19 +53,20 @@ from vision.perception import Perception
 
 BodyPose = Callable[[int], PlanarPose | None]
 
-# Recordings are shown at this rate, whatever theirs was.
+# Frame rate that is assumed for recordings: for the period of the decision, and for videos where the
+# recording's own rate is not known.
 REPLAY_FPS = 30.0
 _LEAST_FPS = 0.5
 _ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
 
 def limit_vision_threads() -> None:
-    """One core for OpenCV: the second one belongs to the control process."""
+    """Let OpenCV use one core: the second one is for the control process."""
     cv2.setNumThreads(1)
 
 
 def mount_of(config: AppConfig) -> CameraMount:
-    """Where the camera sits on this robot."""
+    """Where the camera is mounted on this robot."""
     mount = config.robot.camera_mount
     return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
 
@@ -78,7 +79,10 @@ def scenario_of(simulation: SimulationConfig, config_path: FilePath) -> Scenario
 
 
 def path_spec(config: AppConfig, config_path: FilePath) -> tuple[str, PathSpec]:
-    """Where the route is written, and what is: the program's YAML, or the scenario. Raises ConfigError."""
+    """Name of the file with the route (the program's YAML, or the scenario), and the route.
+
+    Raises ConfigError.
+    """
     if config.path is not None:
         return str(config_path), config.path
     assert config.simulation is not None, "AppConfig asks for a path or a simulation"
@@ -88,7 +92,7 @@ def path_spec(config: AppConfig, config_path: FilePath) -> tuple[str, PathSpec]:
 def build_path(config: AppConfig, config_path: FilePath) -> Path:
     """The route, from the program's YAML or from the scenario. Raises ConfigError, PathError.
 
-    A governed robot has none but in a simulation: straight on from where it stands.
+    A governed robot has a route in a simulation only; otherwise a straight one is returned.
     """
     if config.path is None and config.simulation is None:
         return straight_ahead(config.robot)
@@ -102,7 +106,7 @@ def build_path(config: AppConfig, config_path: FilePath) -> Path:
 def build_perceiver(
     config: AppConfig, odometry: OdometrySource, body_pose: BodyPose, stopwatch_ns: Callable[[], int]
 ) -> Perceiver:
-    """detect and track, timed by stopwatch_ns."""
+    """Perception: detect and track, timed by stopwatch_ns."""
     limit_vision_threads()
     perception = Perception(
         config.perception, mount_of(config), config.robot.body.height_m, config.robot.body.clearance_m
@@ -111,7 +115,7 @@ def build_perceiver(
 
 
 def build_control(config: AppConfig, config_path: FilePath, chassis: Chassis) -> ControlLoop:
-    """Decide, shape and follow around a chassis that is opened elsewhere. Raises ConfigError, PathError."""
+    """Decide, shape and follow, for a chassis that is opened elsewhere. Raises ConfigError, PathError."""
     robot, decision = config.robot, config.decision
     period_s = 1.0 / config.runner.control_rate_hz
     path = build_path(config, config_path)
@@ -142,7 +146,10 @@ def open_camera(
 
 
 def require_camera(config: AppConfig, config_path: FilePath) -> None:
-    """Before a robot is armed that another process sees for: a recording must be one. Raises HalError."""
+    """Check that a recording can be opened before a robot is armed; another process will read it.
+
+    Raises HalError.
+    """
     if isinstance(config.camera, ReplayCameraConfig):
         _recording(config.camera, config_path)
 
@@ -159,7 +166,7 @@ def _recording(camera: ReplayCameraConfig, config_path: FilePath) -> Recording:
 def open_simulated_camera(
     config: AppConfig, config_path: FilePath, clock: Clock, body_pose: BodyPose, start_ns: int
 ) -> SimulatedCamera:
-    """A camera in the scenario's world, at the path's start until body_pose knows better."""
+    """A camera in the scenario's world; the robot is at the path's start until body_pose tells its pose."""
     assert isinstance(config.camera, SimulatedCameraConfig)
     start = build_path(config, config_path).start
     return SimulatedCamera(
@@ -202,7 +209,7 @@ def _fps(config: AppConfig) -> float:
 
 
 def open_commands(config: InputConfig) -> DatagramLink:
-    """Where a governor's commands arrive, not yet entered."""
+    """The socket at which a governor's commands arrive, not yet entered."""
     match config:
         case UdpInputConfig():
             return UdpSocket(config.host, config.port)
@@ -215,7 +222,7 @@ def open_commands(config: InputConfig) -> DatagramLink:
 def open_replay(
     path: FilePath, odometry: OdometryChoice, wanted: WantedTopics | None = None
 ) -> tuple[Recording, PoseTrack | None]:
-    """A recording, not yet entered, and its odometry: a folder, or a ROS bag. wanted: of a bag's topics.
+    """A recording (a folder or a ROS bag), not yet entered, and its odometry. wanted: topics of a bag.
 
     Raises BadRecording, and DeviceNotFound for a bag without the package that reads it.
     """
@@ -241,7 +248,7 @@ def build_replay_perceiver(
     odometry: OdometrySource | None,
     stopwatch_ns: Callable[[], int],
 ) -> Perceiver:
-    """detect and track for a recording, whose body stands at the origin of every frame."""
+    """Perception for a recording; the robot is at the origin in every frame."""
     limit_vision_threads()
     body = config.robot.body
     perception = Perception(config.perception, mount, body.height_m, body.clearance_m)
@@ -249,7 +256,7 @@ def build_replay_perceiver(
 
 
 def build_replay_decision(config: ReplayConfig, mount: CameraMount | None) -> DecisionMaker:
-    """A decision for each frame; an unknown mounting is taken as level, at the robot's front."""
+    """The decision for each frame; an unknown mounting is assumed to be level, at the robot's front."""
     front_m = config.robot.body.front_m
     level = CameraMount(front_m, 0.0, config.robot.camera_mount.height_m, 0.0)
     noise = config.perception.depth_noise
@@ -257,12 +264,12 @@ def build_replay_decision(config: ReplayConfig, mount: CameraMount | None) -> De
 
 
 def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: float | None) -> Surroundings:
-    """What a replay's video shows around the observations. fps: of the recording, if it is known."""
+    """What a replay's video shows around the observations. fps: of the recording; None if not known."""
     return Surroundings(
         mount,
         config.robot.body if mount is not None else None,
         config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
-        # Two digits: containers count time in whole fractions of a second.
+        # Two decimal places: video containers count time in whole fractions of a second.
         REPLAY_FPS if fps is None else max(round(fps, 2), _LEAST_FPS),
         config.robot.limits.max_speed_mps,
         config.perception.max_depth_m,
@@ -270,5 +277,5 @@ def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: fl
 
 
 def straight_ahead(robot: Robot) -> Path:
-    """A path where there is none: straight on, longer than any camera sees."""
+    """The path where none is given: straight on, longer than any camera sees."""
     return Path(PathSpec(segments=(LineSpec(kind="line", length_m=1000.0),)), robot)

@@ -1,6 +1,6 @@
-"""Composition of the chassis: driver, link, output guard, and the emulator at the other end.
+"""Composition of the chassis: driver, link, output guard, and the emulator at the other end of the link.
 
-Like controller/build.py, and no other file of the program, it names concrete devices.
+Only this file and controller/build.py name concrete devices.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def build_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
 def build_base_in_memory(
     config: AppConfig, start: PlanarPose, start_ns: int
 ) -> tuple[Chassis, Emulator, ScriptedCanLink | ScriptedSerialLink]:
-    """Guarded driver and emulator on a wire in memory, and the driver's end of it, to be pulled out."""
+    """Guarded driver and emulator on a link in memory, and the driver's end of it, to disconnect it."""
     of_plant = PlantConfig() if config.simulation is None else config.simulation.plant
     driver, emulator, near = _in_memory(config.chassis, TrackedPlant(of_plant, start, start_ns))
     return _guarded(config, driver), emulator, near
@@ -71,7 +71,7 @@ def _bare_base(config: AppConfig, start: PlanarPose, start_ns: int) -> tuple[Cha
         return driver, None if plant is None else build_can_emulator(chassis, link, plant)
     if plant is None:
         return build_serial_driver(chassis, SerialPortLink(link)), None
-    # In one process and in memory: a pseudo-terminal's bytes arrive when the kernel likes.
+    # In one process, in memory: when the bytes of a pseudo-terminal arrive is up to the kernel.
     return _in_memory(chassis, plant)[:2]
 
 
@@ -86,7 +86,7 @@ def _in_memory(
 
 
 def build_can_driver(config: AnyChassisConfig, link: CanLink) -> Chassis:
-    """The driver on a CAN bus, behind the list of what may be sent there; without the output guard."""
+    """The driver on a CAN bus, which may send only the listed commands; without the output guard."""
     assert isinstance(config, AgilexChassisConfig), "the one kind that is reached over CAN"
     return AgilexChassis(GuardedCanLink(link, AGILEX_COMMANDS), config)
 
@@ -108,7 +108,7 @@ def build_serial_driver(config: AnyChassisConfig, link: SerialLink) -> Chassis:
 
 
 def build_can_emulator(config: AnyChassisConfig, link: CanLinkConfig, plant: TrackedPlant) -> Emulator:
-    """The base at the other end of a CAN bus. Raises DeviceNotFound, DeviceRefused when entered."""
+    """The emulated base at the other end of a CAN bus. Raises DeviceNotFound, DeviceRefused when entered."""
     return _can_emulator(config, CanBusLink(link), plant)
 
 
@@ -118,12 +118,12 @@ def _can_emulator(config: AnyChassisConfig, link: CanLink, plant: TrackedPlant) 
 
 
 def build_pseudo_terminal() -> PseudoTerminal:
-    """A serial port of which this process is the device."""
+    """A serial port at which this process acts as the device."""
     return PseudoTerminal()
 
 
 def build_serial_emulator(config: AnyChassisConfig, link: SerialLink, plant: TrackedPlant) -> Emulator:
-    """The base that this driver's configuration expects, at the other end of a serial line."""
+    """The emulated base that this configuration expects, at the other end of a serial line."""
     match config:
         case AgilexChassisConfig():
             bus = AgilexSerialBus(link)

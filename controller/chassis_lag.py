@@ -1,29 +1,31 @@
-"""How far a chassis lags behind its commands, learnt from commands and odometry while driving.
+"""Lag of a chassis behind its commands, learnt from commands and odometry while driving.
 
     commanded - travelled = lag * v + drift * distance
 
 commanded: distance commanded so far, in m; travelled: by odometry, in m; v: speed at which the chassis
 follows (commanded speed less lag * commanded acceleration), in m/s; distance: again the commanded one, in m.
-The part lag * v (lag in s) comes back when the robot stops. The part drift * distance (a wrong wheel radius,
-slipping tracks) does not. Both lag and drift are estimated by recursive least squares, because closing in on
-the target point needs the lag to a few hundredths of a second.
+The part lag * v (lag in s) is made up when the robot stops. The part drift * distance (a wrong wheel radius,
+slipping tracks) is not. Both lag and drift are estimated by recursive least squares, because the stop at the
+target point needs the lag to a few hundredths of a second. controller/shape.py uses it.
 """
 
 from __future__ import annotations
 
 from hal.compiled import compiled, inlined
 
+# Standard deviations before anything is learnt.
 _LAG_SIGMA_S = 0.1
 _DRIFT_SIGMA = 0.03
-# Errors of odometry are alike from step to step: this is far more than the noise of one reading.
+# Errors of odometry are correlated from step to step, so this is far more than the noise of one reading.
 _NOISE_M = 0.03
-_OUTLIER_M = 0.25
+_OUTLIER_M = 0.25  # a larger residual starts the measurement anew
+# Greatest lag and drift that are used.
 _LONGEST_S = 0.6
 _MOST_DRIFT = 0.1
 
 
 class ChassisLag:
-    """prior_s: what is configured, and believed until more is known."""
+    """Estimates lag and drift. prior_s: the configured lag, used until more is known."""
 
     def __init__(self, prior_s: float) -> None:
         self._lag_s, self._drift_share = prior_s, 0.0
@@ -38,15 +40,20 @@ class ChassisLag:
         return min(max(self._lag_s, 0.0), _LONGEST_S)
 
     def to_command_m(self, to_end_m: float, v_mps: float, a_mps2: float) -> float:
-        """What has still to be commanded so that the odometry says 0 at rest, for what it says now."""
+        """Distance still to be commanded so that to_end_m, by odometry, is 0 when the robot is at rest."""
         return _to_command_m(self._lag_s, self._drift_share, to_end_m, v_mps, a_mps2)
 
     def restart(self) -> None:
-        """Begin to measure anew (another path, motion that was not commanded here); keep what was learnt."""
+        """Measure anew after another path or motion that was not commanded here; keep what was learnt."""
         self._commanded_m, self._started_at_m = 0.0, None
 
     def update(self, commanded_m: float, v_mps: float, a_mps2: float, to_end_m: float) -> None:
-        """commanded_m: since the last update. v, a: commanded now. to_end_m: left, by odometry, now."""
+        """Learn from one step.
+
+        commanded_m: distance commanded since the last update.
+        v_mps, a_mps2: commanded now.
+        to_end_m: distance to the end of the path now, by odometry.
+        """
         if self._started_at_m is None:
             self._started_at_m = to_end_m + self.seconds * v_mps
             return
@@ -66,7 +73,7 @@ def _within(lag_s: float) -> float:
 
 @inlined
 def _following_mps(lag_s: float, v_mps: float, a_mps2: float) -> float:
-    """How fast the chassis goes while it follows v, a."""
+    """Speed of the chassis while it follows the commands v_mps, a_mps2."""
     return max(v_mps - _within(lag_s) * a_mps2, 0.0)
 
 
@@ -86,8 +93,11 @@ def _learnt(
     v_mps: float,
     a_mps2: float,
 ) -> tuple[bool, float, float, tuple[float, float, float]]:
-    """Lag, drift and their spread after one step more, in which the chassis is behind_m behind after way_m;
-    what they were, and True, for an outlier."""
+    """Whether this step is an outlier; lag, drift and their covariance after it (unchanged for an outlier).
+
+    spread: variance of the lag, covariance, variance of the drift. way_m: distance commanded so far.
+    behind_m: by how much the chassis is behind it.
+    """
     p_lag, p_both, p_drift = spread
     along = _following_mps(lag_s, v_mps, a_mps2)
     surprise_m = behind_m - along * lag_s - way_m * drift_share

@@ -1,4 +1,4 @@
-"""What a person sees of a run: a progress line on a terminal, a line per new decision, a summary."""
+"""What the user sees of a run: a progress line on a terminal, a line for each new decision, a summary."""
 
 from __future__ import annotations
 
@@ -10,17 +10,20 @@ from controller.decision.decision import Decision
 from controller.outlet import Outlet, Words, write
 
 BAR = 24
-# A reason that holds for less than this is not worth a line of its own.
+# A reason gets a line of its own only if it holds for this long.
 SETTLED_S = 0.5
-# Standing for longer is worth a word.
+# A standstill is reported from this duration on.
 STUCK_S = 10.0
-# The line is renewed this often in steps of progress, not at every control step.
+# The progress line is redrawn every this many calls, not at every control step.
 STEPS_SHOWN = 10
 
 
 class Console:
-    """Events and summary go to standard output; warnings to standard error, and progress if that is a
-    terminal. aside: all of it to standard error, since standard output is for the observations."""
+    """Writes events and summary to standard output; warnings, and progress on a terminal, to standard error.
+
+    quiet: no events and no progress. aside: everything to standard error, because standard output is for the
+    observations.
+    """
 
     def __init__(self, quiet: bool, aside: bool = False) -> None:
         self._quiet, self._aside = quiet, aside
@@ -35,7 +38,7 @@ class Console:
 
     @contextmanager
     def beside_a_drive(self) -> Iterator[None]:
-        """While the block runs, nobody who does not read holds up whoever speaks."""
+        """Write through an Outlet in the block, so that a reader that stops does not block the drive."""
         with Outlet() as outlet:
             self._write = outlet.write
             try:
@@ -44,7 +47,7 @@ class Console:
                 self._write = write
 
     def progress(self, share: float, text: str) -> None:
-        """share: 0..1 of the whole."""
+        """Redraw the progress line. share: 0..1 of the whole."""
         self._calls += 1
         if self._live and self._calls % STEPS_SHOWN == 1:
             done = round(BAR * min(max(share, 0.0), 1.0))
@@ -52,7 +55,7 @@ class Console:
             self._write(Words(f"\r\033[K[{bar}] {text[:90]}", to_stderr=True, whole=False))
 
     def decision(self, stamp_s: float, decision: Decision, speed_mps: float) -> None:
-        """One line whenever another rule or another obstacle has decided for half a second."""
+        """One line whenever a new rule or obstacle has determined the speed for half a second."""
         reason = decision.reason
         now = (reason.rule, reason.obstacle_id)
         if now != self._heard:
@@ -64,13 +67,13 @@ class Console:
             )
 
     def stopping(self, stamp_s: float, speed_mps: float, reason: str) -> None:
-        """Once: why the robot comes to rest now, whatever the way ahead would allow."""
+        """One line, once: why the robot stops although the way ahead may be free."""
         if not self._stop_told:
             self._stop_told = True
             self.event(f"{stamp_s:7.2f} s  {speed_mps:4.2f} m/s  stops     {reason}")
 
     def standing(self, stamp_s: float, lasted_s: float, decision: Decision) -> None:
-        """Why the robot still stands: after ten seconds, and whenever that has doubled."""
+        """One line on why the robot still stands: after ten seconds, and whenever the time has doubled."""
         if lasted_s < STUCK_S:
             self._stuck_told_s = 0.0
         elif lasted_s >= 2.0 * self._stuck_told_s:
@@ -82,23 +85,23 @@ class Console:
             )
 
     def complaints(self, stamp_s: float, new: Sequence[str]) -> None:
-        """What the base complains of without stopping for it."""
+        """One line for each new fault that the base reports without stopping."""
         for complaint in new:
             self.event(f"{stamp_s:7.2f} s  the base says: {complaint}")
 
     def event(self, line: str) -> None:
-        """A line that stays."""
+        """Write a line that stays, unless quiet."""
         if not self._quiet:
             self._clear()
             self._write(Words(line, self._aside))
 
     def warning(self, line: str) -> None:
-        """What a person should know before the drive: on standard error, and though the rest is quiet."""
+        """What the user should know before the drive: on standard error, even if quiet."""
         self._clear()
         self._write(Words(f"treadwatch: warning: {line}", to_stderr=True))
 
     def summary(self, rows: list[tuple[str, str]]) -> None:
-        """The result, one row a subject."""
+        """The result, one line for each (subject, text)."""
         self._clear()
         width = max(len(name) for name, _ in rows)
         for name, text in rows:

@@ -1,6 +1,6 @@
-"""`treadwatch emulate`: a chassis emulator as its own process, in real time, for whoever speaks its protocol.
+"""`treadwatch emulate`: a chassis emulator as its own process, in real time, for programs with its protocol.
 
-On its standard input it takes the faults of a real base, one word a line: see FAULTS.
+Faults of a real base can be given on its standard input, one word a line: see FAULTS.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 from sim.plant import TrackedPlant
 from sim.simulation import Emulator
 
-# How soon an answer leaves after the question came; a real controller takes a millisecond or two.
+# Period of a step, and so the delay of an answer; a real controller takes a millisecond or two.
 _TICK_NS = 2 * NS_PER_MS
 
-# A process that did not run for so long was frozen, and so is the base that it plays.
+# A process that did not run for this long was frozen, and so was the base that it emulates.
 _FROZEN_NS = 200 * NS_PER_MS
 
 _TOLD_EVERY_NS = 100 * NS_PER_MS
@@ -52,7 +52,13 @@ FAULTS: dict[str, Callable[[Emulator], None]] = {
 
 @dataclass(frozen=True, slots=True)
 class EmulateOptions:
-    """The command line. config_path None: the hil-*.yaml of that kind; channel None: as that file says."""
+    """The command line.
+
+    kind: of chassis.
+    channel, interface, port: replace what the configuration says.
+    config_path: None means hil-KIND.yaml.
+    telling: print how the base moves.
+    """
 
     kind: str
     channel: str | None = None
@@ -63,7 +69,7 @@ class EmulateOptions:
 
 
 def run_emulator(options: EmulateOptions, commands: TextIO | None) -> None:
-    """Until SIGTERM or SIGINT. Raises ConfigError, HalError, UserError before it begins."""
+    """Run until SIGTERM or SIGINT. Raises ConfigError, HalError, UserError before it begins."""
     config_path = options.config_path or CONFIG_DIR / f"hil-{options.kind}.yaml"
     config = load_app(config_path)
     if config.chassis.kind != options.kind:
@@ -101,7 +107,10 @@ def _emulator(config: AppConfig, options: EmulateOptions, now_ns: int) -> Iterat
 
 
 def with_wire(chassis: AnyChassisConfig, options: EmulateOptions) -> AnyChassisConfig:
-    """The chassis on the kind of wire that the channel names: a path is a serial port. Raises UserError."""
+    """The chassis with the kind of link that the channel implies: a path is a serial port.
+
+    Raises UserError.
+    """
     channel = options.channel
     if channel is None or "/" not in channel or options.interface is not None:
         return chassis
@@ -118,7 +127,7 @@ def can_link(link: CanLinkConfig, options: EmulateOptions) -> CanLinkConfig:
     """The file's link with what the command line changes. Raises UserError."""
     values = {key: getattr(link, key) for key in link.model_fields_set}
     if options.channel is not None and options.interface is None and options.channel != link.channel:
-        # can0, vcan0: the system's; a group address: multicast.
+        # can0, vcan0: socketcan; a group address: multicast.
         options_interface = "udp_multicast" if "." in options.channel else "socketcan"
         values = {"interface": options_interface} | ({"port": link.port} if "." in options.channel else {})
     elif options.interface is not None:
@@ -158,14 +167,14 @@ def _linked(path: str, target: str) -> Iterator[None]:
 def run_in_real_time(
     emulator: Emulator, clock: Clock, stop: StopRequest, read_commands: Callable[[], list[str]]
 ) -> Iterator[str]:
-    """Step the base until stop; yields what there is to tell, ten times a second how it moves."""
+    """Step the base until stop; yields lines to print, and how the base moves ten times a second."""
     told_ns = deadline_ns = last_ns = clock.now_ns()
     while not stop:
         clock.sleep_until_ns(deadline_ns)
         now_ns = clock.now_ns()
         deadline_ns = max(deadline_ns + _TICK_NS, now_ns)
         if now_ns - last_ns > _FROZEN_NS:
-            # What was due meanwhile is not sent now in one burst: nobody sent it.
+            # Messages that were due meanwhile must not be sent now in one burst: a frozen base sends none.
             emulator.freeze()
             emulator.advance_to(now_ns)
             emulator.thaw()
@@ -188,7 +197,7 @@ def run_in_real_time(
 
 
 class _Commands:
-    """Lines from a stream, without waiting for them."""
+    """Reads lines from a stream without blocking."""
 
     def __init__(self, stream: TextIO | None) -> None:
         self._selector = selectors.DefaultSelector()
@@ -207,7 +216,7 @@ class _Commands:
         self._selector.close()
 
     def read(self) -> list[str]:
-        """The whole lines that have come."""
+        """The complete lines that have arrived."""
         if self._stream is None or not self._selector.select(timeout=0):
             return []
         data = os.read(self._stream.fileno(), 4096)

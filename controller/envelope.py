@@ -1,4 +1,4 @@
-"""What this robot with this camera can promise, in numbers: `treadwatch envelope`."""
+"""`treadwatch envelope`: what this robot with this camera can guarantee, in numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from controller.braking import BrakeLimits
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """From light on the sensor until the tracks obey: age of the scene, one command period, chassis."""
+    """From light on the sensor until the tracks obey.
+
+    scene_s: age of the scene. period_s: one command period. chassis_s: delay of the chassis.
+    """
 
     scene_s: float
     period_s: float
@@ -21,13 +24,13 @@ class Latency:
 
     @property
     def total_s(self) -> float:
-        """tau."""
+        """The sum: tau in the formulas."""
         return self.scene_s + self.period_s + self.chassis_s
 
 
 @dataclass(frozen=True, slots=True)
 class Paper:
-    """Daeef 2020: eq. 2, T_t and S_n; infinite jerk, no latency."""
+    """Braking distance S_r (eq. 2), stopping time T_t and S_n of Daeef 2020: infinite jerk, no latency."""
 
     s_r_m: float
     t_t_s: float
@@ -38,8 +41,12 @@ class Paper:
 class StopTerms:
     """S_n with jerk and latency, split as in S_n = (V + V_o) tau + S + V_o T + margin.
 
-    jerk_m, jerk_s: what the jerk limit adds to S and T. admits_mps: the greatest speed for which S_n fits the
-    camera's range.
+    brake: the limits of the stop.
+    stop_m, stop_s: S and T.
+    jerk_m, jerk_s: what the jerk limit adds to S and T.
+    latency_m, approach_m, margin_m: (V + V_o) tau, V_o T and the margin.
+    s_n_m: the sum.
+    admits_mps, admits_static_mps: greatest speed for which S_n fits the camera's range, with V_o and with 0.
     """
 
     brake: BrakeLimits
@@ -57,7 +64,7 @@ class StopTerms:
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """Everything at top speed against an obstacle that comes at V_omax."""
+    """The stops at top speed before an obstacle that comes at V_omax; the report in numbers."""
 
     v_mps: float
     obstacle_mps: float
@@ -69,7 +76,7 @@ class Envelope:
 
 
 def envelope(limits: Limits, range_m: float, latency: Latency, margin_m: float) -> Envelope:
-    """range_m: from the robot's front to where the camera sees for certain."""
+    """Compute the report. range_m: from the robot's front to where the camera sees for certain."""
     v, v_o, a = limits.max_speed_mps, limits.max_obstacle_speed_mps, limits.max_accel_mps2
     paper = Paper(
         braking.paper_braking_distance(v, a),

@@ -1,8 +1,7 @@
-"""The lock-step runner: one thread, simulated time, the same bytes every time.
+"""The lock-step runner: one thread, simulated time, the same bytes in every run.
 
-Each instant has the same order: the outside moves on, then the camera exposes, then the control
-steps. A scene becomes known to the control perception_latency_s after its exposure, or later, as it would on
-a robot.
+At each time the order is the same: the outside advances, then the camera exposes, then the control steps. The
+control gets a scene perception_latency_s after its exposure, or later, as on a robot.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ from vision.scene import Scene
 
 
 class Outside(Protocol):
-    """Everything that goes on by itself while the program runs."""
+    """What advances by itself while the program runs: the simulated world and base."""
 
     def advance_to(self, now_ns: int) -> None: ...
 
 
 class ScheduledCamera(Protocol):
-    """A frame source that knows when it exposes next."""
+    """A frame source that tells when it exposes next."""
 
     @property
     def next_capture_ns(self) -> int: ...
@@ -37,14 +36,14 @@ class ScheduledCamera(Protocol):
 
 
 class Looking(Protocol):
-    """Frame to scene; controller.perceive.Perceiver is the real one."""
+    """What turns a frame into a scene; controller.perceive.Perceiver is the real one."""
 
     def look(self, frame: RgbdFrame) -> Look: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """One control step, with the looks that the camera took since the step before."""
+    """One control step, with the frames that were looked at since the step before."""
 
     looks: tuple[Look, ...]
     control: ControlStep
@@ -61,8 +60,8 @@ def run_lockstep(
 ) -> Iterator[Moment]:
     """Step until the loop has finished or max_duration_s is over; yields after each control step.
 
-    late_by: how many seconds later than it should what was exposed at this time, in seconds, becomes known;
-    none overtakes another.
+    late_by: for the exposure time of a scene, in seconds, by how many seconds it is late in addition to
+    perception_latency_s. Scenes do not overtake each other.
     """
     period_ns = round(NS_PER_S / config.control_rate_hz)
     latency_ns = round(config.perception_latency_s * NS_PER_S)

@@ -1,4 +1,4 @@
-"""`treadwatch run`: put the parts together, drive, and say how it went."""
+"""`treadwatch run`: put the parts together, drive the path, and print a summary."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from hal.clocks import SimulatedClock
 
 
 def run_mission(options: MissionOptions) -> int:
-    """Drive once; the exit code: 0, or 1 if anything was touched or the target was missed.
+    """Drive once; returns the exit code: 0 if it succeeded (MissionResult.succeeded), else 1.
 
     Raises ConfigError, HalError, UserError.
     """
@@ -72,14 +72,14 @@ def with_overrides(config: AppConfig, options: MissionOptions) -> AppConfig:
 
 
 def _as_typed(scenario: str) -> str:
-    """A file on a command line is looked for where the shell stands, one in a YAML beside that YAML."""
+    """A file on the command line is relative to the working directory (in a YAML, to that YAML)."""
     return str(FilePath.cwd() / scenario) if scenario.endswith((".yaml", ".yml")) else scenario
 
 
 def drive_lockstep(
     config: AppConfig, runner: LockstepRunner, options: MissionOptions, console: Console
 ) -> MissionResult:
-    """One thread, simulated time."""
+    """Drive in one thread, in simulated time."""
     clock = SimulatedClock()
     path = build_path(config, options.config_path)
     chassis, emulator = build_base(config, path.start, clock.now_ns())
@@ -88,7 +88,7 @@ def drive_lockstep(
     camera = open_simulated_camera(
         config, options.config_path, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
     )
-    # Time is simulated, so durations measured on this machine stay out of what must be repeatable.
+    # Recordings must be repeatable, so durations that were measured on this machine are left out of them.
     recording = RecordingOptions(options.observations, options.video, options.record, timed=False)
     with ExitStack() as devices:
         devices.enter_context(simulation)

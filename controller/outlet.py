@@ -1,4 +1,4 @@
-"""Words to the standard streams that hold nobody up and stop nobody."""
+"""Output to the standard streams that neither blocks the control loop nor stops the program."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import NamedTuple, Self, TextIO
 
 import click
 
-# So many are kept while nobody reads: minutes of a drive.
+# Lines that are queued while nobody reads: minutes of a drive.
 _MOST = 500
-_GOODBYE_S = 2.0
+_GOODBYE_S = 2.0  # how long the end waits for the queue to be written
 
 
 class Words(NamedTuple):
-    """For standard output, or for standard error; a whole line, or a part of one that is renewed."""
+    """A text for standard output or standard error. whole: a whole line, not a part to be redrawn."""
 
     text: str
     to_stderr: bool = False
@@ -25,8 +25,11 @@ class Words(NamedTuple):
 
 
 def write(words: Words) -> None:
-    """Write at once. A reader that goes, or a disk that is full, is no reason to stop a robot: the words are
-    lost, and said to be. What the terminal cannot show is spelled out."""
+    """Write at once, without failing.
+
+    A reader that has closed, or a full disk, must not stop a robot: the text is lost, and a warning says so.
+    Characters that the terminal cannot show are escaped.
+    """
     try:
         click.echo(words.text, nl=words.whole, err=words.to_stderr)
     except UnicodeError:
@@ -40,13 +43,16 @@ def write(words: Words) -> None:
 
 
 def say(line: str, *, to_stderr: bool = False) -> None:
-    """A whole line at once, for commands that measure: see write."""
+    """Write a whole line at once, for commands that measure: see write."""
     write(Words(line, to_stderr))
 
 
 class Outlet:
-    """Writes in a thread of its own while it is open: who stops reading (Ctrl-S, a pipe, a connection that
-    hangs) does not hold up the control loop. What becomes too much is left out, and said to be."""
+    """Writes in a thread of its own while it is open.
+
+    So a reader that stops (Ctrl-S, a pipe, a connection that hangs) does not block the control loop. Lines
+    that do not fit into the queue are left out, and a warning says how many.
+    """
 
     def __init__(self) -> None:
         self._waiting: queue.Queue[Words | None] = queue.Queue(_MOST)
@@ -60,7 +66,7 @@ class Outlet:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Waits for what was said, but not for somebody who does not read it."""
+        """Waits for the queue to be written, but for _GOODBYE_S at most."""
         try:
             self._waiting.put(None, timeout=_GOODBYE_S)
         except queue.Full:
@@ -68,7 +74,7 @@ class Outlet:
         self._thread.join(_GOODBYE_S)
 
     def write(self, words: Words) -> None:
-        """Returns at once."""
+        """Queue the text; returns at once."""
         try:
             self._waiting.put_nowait(words)
         except queue.Full:
@@ -83,7 +89,7 @@ class Outlet:
 
 
 def _write_to_nobody(stream: TextIO) -> None:
-    """Whatever is written to it from now on, what it still holds included, vanishes."""
+    """Redirect the stream to the null device: what it still holds and all that follows is discarded."""
     nobody = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nobody, stream.fileno())
     os.close(nobody)

@@ -1,4 +1,4 @@
-"""One look: a frame through detect and track, with the odometry of its time, each stage timed."""
+"""Perception of one frame: detect, then track, with the odometry of its time, each stage timed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from vision.scene import Fragments, Scene
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """A frame and what was seen in it. camera_pose: by the odometry of its time, if there was one."""
+    """A frame and what was seen in it.
+
+    timing_ms: how long each stage took. camera_pose: by odometry at the time of the frame; None if there is
+    none.
+    """
 
     frame: RgbdFrame
     scene: Scene
@@ -24,7 +28,10 @@ class Look:
 
 
 class Perceiver:
-    """Feeds perception. The stages know no clock, so the time they take is measured here."""
+    """Feeds perception; measures the time of the stages, since they have no clock.
+
+    body_pose: pose of the robot at a time, for the scene. stopwatch_ns: clock for the durations.
+    """
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""A simulated world that nobody could drive in is refused before anything begins."""
+"""A check before a simulated drive: a world in which the robot cannot drive is refused."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _LOOKED_AT_EVERY_M = 0.1
 
 
 def require_possible_world(config: AppConfig, config_path: FilePath) -> None:
-    """The robot must fit in where it starts, its path must stay in the room. Raises ConfigError, PathError.
+    """The robot must be free where it starts, and its path must stay in the room.
 
-    A governed robot drives no path, so only where it starts is looked at.
+    Raises ConfigError, PathError. A governed robot drives no path, so only its start is checked.
     """
     if config.simulation is None:
         return

@@ -1,7 +1,7 @@
-"""What the speed will be: jerk-limited ramps from the present state to many target speeds, in arrays.
+"""Future speed profiles: jerk-limited ramps from the present state to many target speeds, in arrays.
 
-The law is that of ruckig's velocity interface and of controller/braking.py (a ramp to 0 is the stop), so what
-the decision foresees is what the shaper will drive.
+The profile is that of ruckig's velocity interface and of controller/braking.py (a ramp to 0 is the stop), so
+the decision predicts what the shaper (controller/shape.py) will drive.
 """
 
 from __future__ import annotations
@@ -22,8 +22,11 @@ _STANDING_MPS = 1e-9
 class SpeedRamps:
     """N ramps: hold v for latency_s, then reach each target speed in the shortest time, then keep it.
 
-    targets_mps: (N,) >= 0. v_mps, a_mps2: scalars or (N,). accel_mps2 and decel_mps2 bound the ramps up and
-    down (a present acceleration outside them is held, not cut), jerk_mps3 both.
+    v_mps, a_mps2: present speed and acceleration, scalars or (N,).
+    targets_mps: (N,) >= 0.
+    accel_mps2, decel_mps2: bounds of the ramps up and down; a present acceleration outside them is held.
+    jerk_mps3: bound of the jerk.
+    latency_s: how long the present speed is held first.
     """
 
     def __init__(
@@ -44,21 +47,23 @@ class SpeedRamps:
 
     @property
     def duration_s(self) -> FloatArray:
-        """(N,) until the target speed is reached, latency included."""
+        """(N,) time until the target speed is reached, latency included."""
         return self._latency_s + _durations(self._v, self._a, self._targets, *self._bounds)
 
     def state(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Distance m, speed m/s and acceleration m/s^2 after t_s: (N, K), or (1, K) for the same times of
-        all ramps; all results are (N, K)."""
+        """Distance m, speed m/s and acceleration m/s^2 after t_s, (N, K) each.
+
+        t_s: (N, K), or (1, K) if the times are the same for all ramps.
+        """
         return _states(self._v, self._a, self._targets, *self._bounds, self._latency_s, t_s)
 
     def distance(self, t_s: FloatArray) -> FloatArray:
-        """(N, K) distance m after t_s: (N, K) or (1, K)."""
+        """(N, K) distance m after t_s, which is (N, K) or (1, K)."""
         return _distances(self._v, self._a, self._targets, *self._bounds, self._latency_s, t_s)
 
 
 def comfortable(limits: Limits, motion: Motion, targets_mps: FloatArray) -> SpeedRamps:
-    """From now on, within the everyday limits, to targets_mps (N,)."""
+    """Ramps from the present motion to targets_mps (N,) within the comfort limits."""
     return SpeedRamps(
         motion.v_mps,
         motion.a_mps2,
@@ -71,7 +76,7 @@ def comfortable(limits: Limits, motion: Motion, targets_mps: FloatArray) -> Spee
 
 
 def stop_step(v_mps: float, a_mps2: float, limits: BrakeLimits, dt_s: float) -> tuple[float, float]:
-    """Speed and acceleration dt_s into the stop of braking.stop; never below zero speed."""
+    """Speed and acceleration after the first dt_s of the stop of braking.stop; never a negative speed."""
     lets_go = a_mps2 < 0.0 and v_mps <= a_mps2 * a_mps2 / (2.0 * limits.jerk_mps3)
     if lets_go or a_mps2 < -limits.decel_mps2:
         a = min(a_mps2 + limits.jerk_mps3 * dt_s, 0.0 if lets_go else -limits.decel_mps2)
@@ -94,9 +99,9 @@ def stop_step(v_mps: float, a_mps2: float, limits: BrakeLimits, dt_s: float) -> 
 def _ramp(
     v: float, a: float, target: float, accel: float, decel: float, jerk: float
 ) -> tuple[float, float, float, float, float]:
-    """How long a ramp takes to bring the acceleration to its peak, at it and back to 0; the signed jerk of
-    the first part and the peak."""
-    # Up or down, judged by the speed that remains when a has been let go of.
+    """Durations of the three phases of a ramp (acceleration to its peak, at its peak, back to 0), the signed
+    jerk of the first phase, and the signed peak."""
+    # Up or down: compare the target with the speed that is reached if the acceleration goes to 0 now.
     sign = 1.0 if target >= v + a * abs(a) / (2.0 * jerk) else -1.0
     start = sign * a
     bound = max(accel if sign > 0.0 else decel, start)
@@ -120,7 +125,7 @@ def _state(
     t1, t2, t3, j, peak = ramp
     v1 = v + a * t1 + j * t1**2 / 2.0
     v2 = v1 + peak * t2
-    # How long each phase has lasted: latency, jerk, constant, jerk back, done.
+    # How long each phase has lasted by t: latency, jerk, constant acceleration, jerk back, target speed.
     held = min(t, latency_s)
     x1 = min(t - held, t1)
     after = t - held - t1
@@ -146,7 +151,7 @@ def _state(
 def _durations(
     v: FloatArray, a: FloatArray, target: FloatArray, accel: float, decel: float, jerk: float
 ) -> FloatArray:
-    """(N,) of ramps (N,)."""
+    """(N,) durations of N ramps, without latency."""
     durations = np.empty(len(target))
     for k in range(len(target)):
         t1, t2, t3, _, _ = _ramp(v[k], a[k], target[k], accel, decel, jerk)
@@ -165,7 +170,7 @@ def _states(
     latency_s: float,
     t_s: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Distance, speed and acceleration (N, K) of ramps (N,) after t_s (N, K) or (1, K)."""
+    """Distance, speed and acceleration (N, K) of N ramps after t_s (N, K) or (1, K)."""
     shape = len(target), t_s.shape[1]
     distance, speed, acceleration = np.empty(shape), np.empty(shape), np.empty(shape)
     for k in range(shape[0]):
@@ -189,7 +194,7 @@ def _distances(
     latency_s: float,
     t_s: FloatArray,
 ) -> FloatArray:
-    """The distance of _states() alone."""
+    """Only the distance of _states()."""
     distance = np.empty((len(target), t_s.shape[1]))
     for k in range(len(target)):
         ramp = _ramp(v[k], a[k], target[k], accel, decel, jerk)

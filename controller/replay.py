@@ -1,4 +1,4 @@
-"""`treadwatch replay`: look at a recording as the robot would, and say what was seen."""
+"""`treadwatch replay`: run perception and decision on a recording, and print a summary."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ from hal.geometry import camera_in_body
 from hal.types import CameraMount, PlanarPose
 from vision.scene import CameraCondition, EgoMotion
 
-# A recording is looked at frame by frame, so the decision is as fresh as the frame.
+# The robot is at the origin in every frame: there is one decision a frame, at the time of that frame.
 _STANDING = PlanarPose(0.0, 0.0, 0.0)
-_SPEED_FRAMES = 5
-# What a replay may have written into the recording's folder before.
+_SPEED_FRAMES = 5  # the speed is the median of this many frames
+# Outputs of an earlier replay in the recording's folder, which may be overwritten.
 _OUTPUTS = frozenset({".jsonl", ".json", ".webm", ".mp4", ".avi"})
 
 
@@ -61,7 +61,7 @@ class ReplayOptions:
 
 @dataclass
 class ReplayTally:
-    """What a replay adds up to. without_pose: frames of whose time odometry tells nothing."""
+    """What is counted in a replay. without_pose: frames for which there is no odometry."""
 
     timing: TimingTally = field(default_factory=TimingTally)
     frames: int = 0
@@ -93,14 +93,14 @@ class ReplayTally:
 
 
 class EgoSpeed:
-    """How fast the camera's carrier drives ahead: the median of the last frames' ego-motion."""
+    """Forward speed of the robot that carries the camera: the median over the last frames' ego-motion."""
 
     def __init__(self, mount: CameraMount | None) -> None:
         self._to_body = camera_in_body(mount or CameraMount(0.0, 0.0, 0.0, 0.0)).rotation
         self._recent_mps: list[float] = []
 
     def step(self, ego: EgoMotion) -> float:
-        """m/s, never negative; 0 until something was measured."""
+        """The speed in m/s, never negative; 0 until something was measured."""
         if ego.source != "none" and ego.dt_s > 0.0:
             ahead_m = float((self._to_body @ ego.motion.translation_m)[0])
             self._recent_mps = [*self._recent_mps[1 - _SPEED_FRAMES :], ahead_m / ego.dt_s]
@@ -108,7 +108,7 @@ class EgoSpeed:
 
 
 def run_replay(options: ReplayOptions) -> None:
-    """Every frame through detect, track and decide. Raises ConfigError, HalError, UserError."""
+    """Put every frame through detect, track and decide. Raises ConfigError, HalError, UserError."""
     config = load_replay(options.config_path)
     _refuse_overwriting(options)
     console = Console(options.quiet, aside=options.observations == STANDARD_OUTPUT)
@@ -148,7 +148,7 @@ def run_replay(options: ReplayOptions) -> None:
 
 
 def _refuse_overwriting(options: ReplayOptions) -> None:
-    """Raises UserError where an output is the recording, a file of it, or the other output."""
+    """Raise UserError if an output is the recording, a file of it, or the other output."""
     given = (options.observations, options.video)
     outputs = [path for path in given if path is not None and path != STANDARD_OUTPUT]
     require_two_files(options.observations, options.video)
@@ -161,7 +161,7 @@ def _refuse_overwriting(options: ReplayOptions) -> None:
 
 
 def recorded_mount(config: ReplayConfig, recorded: CameraMount | None) -> CameraMount | None:
-    """The recording's own mounting, or the robot's if that may be assumed, or unknown."""
+    """The recording's own mounting; else the robot's if that may be assumed; else None."""
     if recorded is not None or not config.assume_mount:
         return recorded
     mount = config.robot.camera_mount
@@ -172,13 +172,13 @@ _AHEAD_M = np.column_stack([np.linspace(0.0, 10.0, 41), np.zeros(41)])
 
 
 def _decide(decide: DecisionMaker, path: Path, look: Look, v_mps: float) -> Decision:
-    """As for a robot that stands at the start of a straight path and drives v_mps."""
+    """The decision for a robot at the start of a straight path that drives v_mps."""
     on_path = OnPath(0.0, 0.0, 0.0)
     return decide.step(Situation(look.scene, path, _STANDING, on_path, v_mps, 0.0, look.scene.captured_ns))
 
 
 def _camera(tally: ReplayTally) -> str:
-    """In how many frames the camera was worth how much, and the most frequent reason not to rely on it."""
+    """Number of frames in each condition of the camera, and the most frequent reason for a bad one."""
     worth = ", ".join(f"{count} {condition.value}" for condition, count in tally.conditions.items())
     return "; mostly: ".join([worth, *(reason for reason, _ in tally.reasons.most_common(1))])
 
@@ -188,7 +188,7 @@ def _counts(tally: ReplayTally) -> str:
 
 
 def _mount_notes(options: ReplayOptions, config: ReplayConfig, recorded: CameraMount | None) -> Iterator[str]:
-    """That a mounting which was given is not used."""
+    """A note if the recording's mounting is used and not the one that was configured."""
     given = config.robot.camera_mount
     if recorded is None or "camera_mount" not in config.robot.model_fields_set:
         return

@@ -1,4 +1,4 @@
-"""What a drive was asked to do and how it went."""
+"""The options of a drive, and its result: what is added up from step to step."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ class MissionOptions:
 
 @dataclass(kw_only=True)
 class DriveResult:
-    """What every drive adds up to, along a path or with another planner ahead. punctuality: in real time."""
+    """The result of any drive, along a path or behind another planner.
+
+    punctuality: None in lock-step. first, last: the first and last control step so far.
+    """
 
     setpoints: SetpointTally
     timing: TimingTally = field(default_factory=TimingTally)
@@ -51,21 +54,21 @@ class DriveResult:
 
     @property
     def duration_s(self) -> float:
-        """From the first control step to the last."""
+        """Time from the first control step to the last."""
         return 0.0 if self.last is None else self.seconds(self.last)
 
     @property
     def contacts(self) -> list[str]:
-        """What was touched, in a simulation."""
+        """What was touched; empty without a simulation."""
         return [] if self.simulation is None else self.simulation.referee.contacts
 
     @property
     def clean(self) -> bool:
-        """Nothing touched, limits kept."""
+        """Whether nothing was touched and all limits were kept."""
         return not self.contacts and self.setpoints.violations == 0
 
     def seconds(self, step: ControlStep) -> float:
-        """From the first control step to this one."""
+        """Time from the first control step to this one."""
         return 0.0 if self.first is None else (step.now_ns - self.first.now_ns) / NS_PER_S
 
     def take(self, step: ControlStep) -> None:
@@ -77,19 +80,19 @@ class DriveResult:
         self.shaper_faults.add(step.fault)
 
     def take_message(self, message: SceneMessage) -> None:
-        """Account for what the perception process has said of one frame."""
+        """Account for one frame, as the perception process reports it."""
         self.timing.add(message.timing_ms)
         self.frames.add(message.scene.sequence)
 
 
 @dataclass(kw_only=True)
 class MissionResult(DriveResult):
-    """Of a drive along a path. wall_s: how long it took on this machine, in lock-step."""
+    """The result of a drive along a path. wall_s: how long a lock-step run took on this machine."""
 
     loop: ControlLoop
     wall_s: float = math.nan
 
     @property
     def succeeded(self) -> bool:
-        """Reached or stopped as asked, nothing touched, limits kept."""
+        """Whether the robot reached the target or stopped as asked, and the drive was clean."""
         return self.loop.ending.outcome in (Outcome.REACHED, Outcome.STOPPED) and self.clean

@@ -1,12 +1,12 @@
 """Decision -> speed: jerk-limited by ruckig, always able to end at rest, never reversing.
 
-The only importer of ruckig. Its traps (verified with 0.19.4) and what is done about them here:
+The only importer of ruckig. Its pitfalls (verified with 0.19.4) and what is done about them here:
 
-* The velocity interface knows no speed limit: the target is capped, and the invariant v + a^2 / 2J <= v_max
+* The velocity interface has no speed limit. So the target is capped, and the invariant v + a^2 / 2J <= v_max
   for a > 0 is kept whenever the jerk limit is lowered.
-* It reverses to respect the jerk when v < a^2 / 2J: the jerk limit is never lowered while that would be so.
-* A position closer than the stopping distance makes it overshoot and come back: the position interface is
-  asked only for what braking.stop says can be reached.
+* It reverses to respect the jerk limit when v < a^2 / 2J. So the jerk limit is not lowered while that holds.
+* A target position closer than the stopping distance makes it overshoot and come back. So the position
+  interface is used only for positions that can be reached according to braking.stop.
 * An error leads to the stop profile of controller/profile.py, never to the unshaped input.
 """
 
@@ -30,14 +30,16 @@ from controller.chassis_lag import ChassisLag
 from controller.profile import stop_step
 from hal.records import record
 
-# The closing at the path's end is planned a little gentler than what is allowed, so that what the odometry
-# corrects on the way can still be followed.
+# The stop at the end of the path is planned a little gentler than allowed, so that corrections by odometry on
+# the way can still be followed.
 _PLAN_DECEL = 0.97
 _PLAN_JERK = 0.9
-_OVERRUN_M = 0.002
-_CORRECTION = 0.1
-_JUMP_M = 0.5
-_ARRIVED_M = 0.008
+_OVERRUN_M = 0.002  # if the stop ends this far beyond the end, it is no longer aimed at the end
+_CORRECTION = 0.1  # share of the odometry's correction that is applied in each step
+_JUMP_M = 0.5  # a larger correction is applied at once
+_ARRIVED_M = 0.008  # at rest this near to the end, the robot stays
+# This near to the end, and with less than this much speed left over once the deceleration has been eased out,
+# v and a go to zero together.
 _CLOSE_ENOUGH_M = 0.004
 _LAST_EASE_MPS = 0.005
 _TINY = 1e-9
@@ -46,7 +48,7 @@ _TOLERANCE = 1e-7
 
 @record(frozen=True, slots=True)
 class ShapedSpeed:
-    """One point of the profile. fault: why it is the stop profile instead of ruckig's, "" if it is not."""
+    """One point of the profile. fault: why it comes from the stop profile and not from ruckig; else ""."""
 
     v_mps: float
     a_mps2: float
@@ -56,9 +58,9 @@ class ShapedSpeed:
 class SpeedShaper:
     """Steps the commanded speed towards a target, one control period a step.
 
-    It feeds back its own state: measured speed is noise that would be differentiated twice. chassis_delay_s
-    is how long the chassis is thought to lag behind its command until that has been learnt; the distance
-    still in that lag is taken off the distance to the end.
+    It feeds back its own state, since the noise of the measured speed would be differentiated twice.
+    chassis_delay_s: assumed lag of the chassis behind its command until it has been learnt. The distance that
+    the chassis still travels because of the lag is subtracted from the distance to the end.
     """
 
     def __init__(self, limits: Limits, period_s: float, chassis_delay_s: float = 0.0) -> None:
@@ -100,8 +102,8 @@ class SpeedShaper:
     ) -> ShapedSpeed:
         """The speed and acceleration one period later.
 
-        A target that is not a number means stop; so does a distance that is not a number. distance_to_end_m
-        is measured by odometry along the path; the speed closes so that the robot stops on it.
+        If the target or the distance is NaN, the robot stops. distance_to_end_m: to the end of the path, by
+        odometry; the robot stops there.
         """
         if math.isnan(distance_to_end_m) or math.isnan(target_speed_mps):
             target_speed_mps = 0.0
@@ -121,7 +123,7 @@ class SpeedShaper:
         return ShapedSpeed(self._v, self._a, fault)
 
     def _choose_limits(self, emergency: bool) -> None:
-        """Harder at once; back to comfort in two steps, each only when it cannot lead to a reversal."""
+        """Harder limits at once; back to comfort in two steps, each only if it causes no reversal."""
         if emergency:
             self._active = self._emergency
             return
@@ -136,7 +138,7 @@ class SpeedShaper:
             self._active = BrakeLimits(self._comfort.decel_mps2, self._active.jerk_mps3)
 
     def _track_end(self, distance_to_end_m: float) -> None:
-        """The distance still to be commanded: own integral, slowly corrected by the odometry's."""
+        """Update the distance still to be commanded: the own integral, slowly corrected by odometry."""
         if math.isnan(distance_to_end_m):
             return
         if math.isfinite(distance_to_end_m):
@@ -149,7 +151,7 @@ class SpeedShaper:
             self._to_end_m = measured_m
 
     def _follow(self, target_mps: float) -> tuple[float, float]:
-        """Towards the target while a stop on the path's end still fits afterwards; else towards that stop."""
+        """Go to the target speed while a stop at the end still fits afterwards; else towards that stop."""
         if math.isinf(self._to_end_m):
             return self._ramp_to(target_mps, self._active)
         needed_m = braking.stop(self._v, self._a, self._plan).distance_m
@@ -170,7 +172,7 @@ class SpeedShaper:
         return self._solve(0.0, self._plan)
 
     def _ease_out(self) -> tuple[float, float]:
-        """With the jerk that brings v and a to zero together: more precision would only make it creep."""
+        """Stop with the jerk that brings v and a to zero together; more precision would make it creep."""
         exact = self._a * self._a / (2.0 * max(self._v, _TINY))
         jerk = min(max(exact, self._plan.jerk_mps3), self._active.jerk_mps3)
         return self._ramp_to(0.0, BrakeLimits(self._active.decel_mps2, jerk))
@@ -198,7 +200,7 @@ class SpeedShaper:
         return float(velocity[0]), float(acceleration[0])
 
     def _check(self, v: float, a: float) -> None:
-        """Refuse what no chassis may get; what is written so that NaN is refused too."""
+        """Raise ArithmeticError for what no chassis may get; written so that NaN is refused, too."""
         jerk = abs(a - self._a) / self._period_s
         hardest = max(self._active.decel_mps2, -self._a)
         if not (
@@ -210,7 +212,7 @@ class SpeedShaper:
 
 
 def _problem_within(limits: Limits) -> InputParameter:
-    """What does not change from step to step: it starts at position 0 and ends without acceleration."""
+    """What is the same in each step: it starts at position 0 and ends without acceleration."""
     problem = InputParameter(1)
     problem.current_position, problem.target_acceleration = [0.0], [0.0]
     problem.max_velocity, problem.max_acceleration = [limits.max_speed_mps], [limits.max_accel_mps2]

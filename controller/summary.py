@@ -1,4 +1,4 @@
-"""A drive in words: while it goes on, and at its end."""
+"""What is printed of a drive: reports while it goes on, and the summary at its end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sim.simulation import Simulation
 
 
 def report(console: Console, result: MissionResult, step: ControlStep) -> None:
-    """Progress, the decision if it is a new one, and that the robot does not get on."""
+    """Print one control step: progress, a new decision, a long standstill, new complaints of the base."""
     length_m, stops = result.loop.path.length_m, result.loop.ending.stop_reason
     does = (
         f"{step.decision.action.value}: {step.decision.reason.sentence}"
@@ -57,7 +57,7 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
 
 
 def drive_rows(config: AppConfig, result: DriveResult) -> list[tuple[str, str]]:
-    """What the summary of every drive has, as (subject, text)."""
+    """The part of the summary that every drive has, as (subject, text)."""
     rows = []
     if result.simulation is not None:
         rows.append(("contacts", _contact_text(result.simulation)))
@@ -112,14 +112,14 @@ def _target_text(result: MissionResult) -> str:
 
 
 def length_text(length_m: float, sign: str = "") -> str:
-    """In centimetres, where they matter, and in metres from one metre on. sign: "+" writes that, too."""
+    """A length in centimetres, or in metres from one metre on. sign: "+" writes a plus sign, too."""
     if round(abs(length_m), 3) < 1.0:
         return f"{100.0 * length_m:{sign}.1f} cm"
     return f"{length_m:{sign}.2f} m"
 
 
 def _contact_text(simulation: Simulation) -> str:
-    """What was touched, and what was passed nearest."""
+    """What was touched, and the nearest approach."""
     referee = simulation.referee
     count = len(referee.contacts)
     text = f"{count}" + (f" with {', '.join(referee.contacts)}" if count else "")
@@ -129,7 +129,7 @@ def _contact_text(simulation: Simulation) -> str:
 
 
 def _limits_text(config: AppConfig, tally: SetpointTally) -> str:
-    """Whether what was sent kept the limits."""
+    """Whether the setpoints that were sent kept the limits."""
     limits = config.robot.limits
     kept = "kept" if tally.violations == 0 else f"broken {tally.violations} times"
     return (

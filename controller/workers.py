@@ -1,4 +1,4 @@
-"""Processes beside this one: one core each, and deaf to what a terminal tells all of them."""
+"""Worker processes: one core each, and shielded from the signals that a terminal sends to all processes."""
 
 from __future__ import annotations
 
@@ -24,13 +24,12 @@ Result = TypeVar("Result")
 
 @contextmanager
 def held(*numbers: signal.Signals) -> Iterator[None]:
-    """Processes started in the block never hear these signals, not even while they import; this one hears
-    them after it.
+    """Processes started in the block never receive these signals, not even while they import.
 
-    A terminal sends SIGINT, and SIGHUP when it goes, to all of them, and only the one that the user started
-    knows what is to be done.
+    This process receives them after the block. A terminal sends SIGINT, and SIGHUP when it closes, to all
+    processes, but only the one that the user started knows how to react.
     """
-    # It is started with the first process, and leaves SIGINT unblocked for that one.
+    # The resource tracker would else start with the first process, and unblock SIGINT for that process.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
     try:
@@ -41,10 +40,10 @@ def held(*numbers: signal.Signals) -> Iterator[None]:
 
 @contextmanager
 def worker_processes(count: int) -> Iterator[Executor]:
-    """count processes for picklable tasks; left early, they are ended at once, whatever they are doing.
+    """A pool of count processes for picklable tasks; an error in the block ends them at once.
 
-    SIGTERM leaves it early, too: without their parent they would wait for tasks for ever. Raises UserError
-    if one of them dies by itself.
+    SIGTERM leaves the block, too, since without their parent they would wait for tasks for ever. Raises
+    UserError if one of them dies by itself.
     """
     with _one_core_each(), _sigterm_as_exit():
         pool = _Pool(count, multiprocessing.get_context("spawn"))
@@ -63,7 +62,7 @@ def worker_processes(count: int) -> Iterator[Executor]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Starts a process whenever a task finds none idle."""
+    """A pool that starts a process whenever a task finds none idle."""
 
     def submit(
         self, task: Callable[Given, Result], /, *args: Given.args, **kwargs: Given.kwargs
@@ -82,13 +81,13 @@ def _sigterm_as_exit() -> Iterator[None]:
 
 
 def _exit(number: int, _frame: FrameType | None) -> NoReturn:
-    # What shells report for a program that a signal has ended.
+    # The exit code that shells report for a program that a signal has ended.
     sys.exit(128 + number)
 
 
 @contextmanager
 def _one_core_each() -> Iterator[None]:
-    """NumPy's linear algebra reads these when it is imported, which a spawned worker has yet to do."""
+    """Set the thread counts of NumPy's linear algebra, which a spawned worker reads when it imports NumPy."""
     before = {name: os.environ.get(name) for name in _ONE_CORE}
     os.environ.update(dict.fromkeys(_ONE_CORE, "1"))
     try:
