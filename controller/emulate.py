@@ -208,7 +208,7 @@ class _Commands:
         if self._stream is not None:
             try:
                 self._selector.register(self._stream, selectors.EVENT_READ)
-            except (OSError, ValueError):  # a file or /dev/null, which nobody types into
+            except (OSError, ValueError):  # a file or /dev/null: no commands come
                 self._stream = None
         return self
 

@@ -114,9 +114,9 @@ def _terms(
 
 
 def envelope_of(config: AppConfig) -> Envelope:
-    """For the robot, camera and runner of a program's YAML."""
+    """The envelope of the robot, camera and runner in a configuration."""
     runner, decision, robot = config.runner, config.decision, config.robot
-    # In real time the age is measured; what counts here is the oldest scene that is still driven on.
+    # In real time the age is measured. The worst case is the oldest scene with which the robot still drives.
     scene_s = runner.perception_latency_s if isinstance(runner, LockstepRunner) else decision.sight.stale_s
     latency = Latency(scene_s, 1.0 / runner.control_rate_hz, decision.chassis_delay_s)
     sees_m = min(decision.sight.range_m, config.perception.max_depth_m)

@@ -67,7 +67,7 @@ class Bodies:
         return len(self.ids)
 
     def select(self, chosen: NDArray[np.bool_]) -> Bodies:
-        """Only the chosen ones."""
+        """Only the bodies in the mask chosen (N,)."""
         rows = chosen.nonzero()[0]
         if len(rows) == len(chosen):
             return self

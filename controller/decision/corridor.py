@@ -47,7 +47,7 @@ class Corridor:
         return _half_widths(s_m.reshape(-1), self.half_widths_m, self.overhang_m).reshape(s_m.shape)
 
     def half_width_at(self, s_m: float) -> float:
-        """The same at one place."""
+        """Half of the swept width at a single s_m."""
         return _one_half_width(s_m, self.half_widths_m, self.overhang_m)
 
 

@@ -78,8 +78,11 @@ def find_conflicts(
 
 @record(frozen=True, slots=True)
 class Choice:
-    """For one conflict: speeds up to yield_mps let it pass first, speeds from first_mps on pass before it
-    (inf: none does)."""
+    """The speeds that solve one conflict.
+
+    With speeds up to yield_mps the robot lets the body pass first; with speeds from first_mps on it passes
+    before the body (inf: with none).
+    """
 
     yield_mps: float
     first_mps: float
@@ -192,8 +195,10 @@ def _conflicts(
     margin_m: FloatArray,
     rows: NDArray[np.intp],
 ) -> FloatArray:
-    """(R, 5) in_s, out_s, lo_in_m, lo_out_m and hi_in_m of Conflict for each of rows (R,); in_s is inf where
-    there is none."""
+    """(R, 5) in_s, out_s, lo_in_m, lo_out_m and hi_in_m of Conflict for the bodies rows (R,).
+
+    in_s is inf where there is no conflict.
+    """
     found = np.empty((len(rows), 5))
     for i in range(len(rows)):
         k = rows[i]

@@ -100,7 +100,7 @@ class Knowledge:
 
     @property
     def has_seen(self) -> bool:
-        """Whether any scene was taken in yet."""
+        """Whether any scene has been taken in."""
         return self._captured_ns is not None
 
     def has_taken_in(self, scene: Scene) -> bool:

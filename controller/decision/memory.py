@@ -268,8 +268,10 @@ def _not_seen(hidden: BoolArray, part_of: BoolArray, ids: IntArray, seen_ids: In
 
 @compiled("int64[:], float64[:], int64[:], float64[:]")
 def _widest(ids: IntArray, half_m: FloatArray, before_ids: IntArray, before_half_m: FloatArray) -> FloatArray:
-    """(N,) half of the greatest width that each of ids (N,) was seen with: now, half_m (N,), or before,
-    before_half_m (M,) of before_ids (M,)."""
+    """(N,) half of the greatest width with which each of ids (N,) was ever seen.
+
+    half_m (N,): the half widths now. before_half_m (M,): the greatest ones before, of before_ids (M,).
+    """
     greatest = half_m.copy()
     for k in range(len(ids)):
         for m in range(len(before_ids)):
