@@ -35,7 +35,7 @@ class SimulationConfig(Section):
 
 
 class LockstepRunner(Section):
-    """One thread, simulated or recorded time, repeatable to the bit."""
+    """One thread, simulated time, repeatable to the bit. `treadwatch replay` has a loop of its own."""
 
     kind: Literal["lockstep"]
     control_rate_hz: float = Field(default=50.0, ge=10, le=500)
