@@ -80,7 +80,8 @@ class Prediction(Section):
         default=0.35,
         gt=0,
         le=10,
-        description="expected braking of an obstacle ahead; if it brakes harder, so does the robot",
+        description="expected deceleration of an obstacle that moves ahead of the robot in its direction; "
+        "if it brakes harder, so does the robot",
     )
     confirm_s: float = Field(
         default=0.15,

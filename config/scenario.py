@@ -93,7 +93,8 @@ class Shelf(_Placed):
     levels: int = Field(default=3, ge=1, le=8)
     bay_m: float = Field(default=2.7, ge=0.5, le=10)
     goods: Share = Field(
-        default=0.6, description="how many of the places hold a box that stands out from the painted goods"
+        default=0.6,
+        description="density of boxes that stand out of the painted goods; 1 fills half of the lowest level",
     )
 
 
