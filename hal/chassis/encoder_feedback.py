@@ -1,4 +1,4 @@
-"""Track speeds and pose from the two encoder counters of a motor controller. No input or output.
+"""Track speeds and pose from the two encoder counters of a motor controller.
 
 The base class of the feedback of RoboClaw and Roboteq.
 """
