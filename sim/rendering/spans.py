@@ -21,8 +21,7 @@ class Spans:
     """The columns first <= u < last that each of M faces covers in each of its rows, row after row.
 
     start, row, count: (M,). Face k has count[k] rows, which begin at row row[k] and at entry start[k] of
-    first
-        and last.
+        first and last.
     first, last: (R,), for all rows of all faces.
     bounds: (M, 4), first column and row, last column and row + 1 that the face covers; zeros if it covers no
         pixel.
