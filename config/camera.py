@@ -8,11 +8,12 @@ from pydantic import Field, model_validator
 
 from config.loader import Section
 
-# A D435i's colour camera, 1920x1080: its focal length in image heights, and no mode is wider than all of it.
+# A D435i's colour camera, 1920x1080: focal length in image heights, and the aspect ratio of the whole sensor.
+# No video mode is wider than the sensor.
 _D435I_FOCAL = 1.28
 _D435I_ASPECT = 16.0 / 9.0
 
-# Of a recording's poses; auto: odometry.txt if the recording has one.
+# Where a recording's odometry comes from; auto: odometry.txt if the recording has one.
 OdometryChoice = Literal["auto", "file", "none", "groundtruth"]
 
 
@@ -20,17 +21,29 @@ class ReplayCameraConfig(Section):
     """A recording, played in its own time: a TUM folder (rgb.txt, depth.txt, camera.yaml) or a ROS bag."""
 
     kind: Literal["replay"] = "replay"
-    folder: str = Field(min_length=1, description="the recording; relative to this file")
+    folder: str = Field(min_length=1, description="path of the recording, relative to this file")
     max_pair_gap_s: float = Field(
-        default=0.02, gt=0, le=1, description="colour and depth further apart than this are not one frame"
+        default=0.02,
+        gt=0,
+        le=1,
+        description="maximum time between the colour and the depth image of one frame",
     )
     read_ahead: int = Field(
-        default=2, ge=0, le=64, description="folders: frames decoded in advance; 0: when asked for"
+        default=2,
+        ge=0,
+        le=64,
+        description="folders: number of frames decoded in advance; 0: each when asked for",
     )
     colour_topic: str | None = Field(
-        default=None, min_length=1, description="bags: the colour images, if they are not found"
+        default=None,
+        min_length=1,
+        description="bags: topic of the colour images, if it is not found automatically",
     )
-    depth_topic: str | None = Field(default=None, min_length=1, description="bags: the same of depth")
+    depth_topic: str | None = Field(
+        default=None,
+        min_length=1,
+        description="bags: topic of the depth images, if it is not found automatically",
+    )
 
     @property
     def edge_tangents(self) -> None:
@@ -44,7 +57,7 @@ class RealsenseCameraConfig(Section):
     kind: Literal["realsense"] = "realsense"
     serial: str | None = Field(default=None, min_length=1, description="needed where several are connected")
     width: int = Field(
-        default=848, gt=0, le=1920, description="with 480 rows, 848 see 69 degrees, 640 see 55"
+        default=848, gt=0, le=1920, description="with 480 rows, 848 columns see 69 degrees, 640 see 55"
     )
     height: int = Field(default=480, gt=0, le=1080)
     fps: int = Field(default=30, gt=0, le=90)
@@ -53,7 +66,7 @@ class RealsenseCameraConfig(Section):
         default=0.03,
         ge=0,
         le=0.5,
-        description="from exposure to arrival of the promptest frame; taken off captured_ns",
+        description="minimum delay from exposure to arrival of a frame; it is subtracted from captured_ns",
     )
     start_timeout_s: float = Field(
         default=5.0, gt=0, le=60, description="how long to wait for the first frame"
@@ -61,7 +74,7 @@ class RealsenseCameraConfig(Section):
 
     @property
     def edge_tangents(self) -> tuple[float, float]:
-        """See SimulatedCameraConfig; nominal: the camera tells its own only once it runs."""
+        """See SimulatedCameraConfig. Nominal values: the camera tells its own only once it runs."""
         half = 0.5 * min(self.width / self.height, _D435I_ASPECT) / _D435I_FOCAL
         return half, half
 
@@ -92,10 +105,13 @@ class SimulatedCameraConfig(Section):
     depth_noise: Literal["realsense", "paper", "none"] = "realsense"
     hole_ratio: float = Field(default=0.01, ge=0, le=0.5, description="share of pixels lost at random")
     depth_edges: bool = Field(
-        default=True, description="lose what only one of the two infrared cameras sees, beside nearer things"
+        default=True,
+        description="no depth where only one of the two infrared cameras sees, beside nearer objects",
     )
     colour_noise: bool = True
-    vibration_deg: float = Field(default=0.0, ge=0, le=5, description="amplitude of a pitching to and fro")
+    vibration_deg: float = Field(
+        default=0.0, ge=0, le=5, description="amplitude of a sinusoidal pitch vibration"
+    )
     vibration_hz: float = Field(default=8.0, gt=0, le=100)
 
     @property
@@ -113,7 +129,7 @@ class SimulatedCameraConfig(Section):
 
 
 AnyCameraConfig = (
-    ReplayCameraConfig  # one a line: a kind more is a line more
+    ReplayCameraConfig  # one kind a line
     | RealsenseCameraConfig
     | SimulatedCameraConfig
 )

@@ -44,14 +44,20 @@ class GovernorConfig(Section):
 
     input: InputConfig = UdpInputConfig(kind="udp")
     timeout_s: float = Field(
-        default=0.25, ge=0.05, le=2, description="without a command for so long: a jerk-limited stop"
+        default=0.25,
+        ge=0.05,
+        le=2,
+        description="without a command for this long, the robot makes a jerk-limited stop",
     )
     resume_s: float = Field(
-        default=0.2, ge=0, le=5, description="after silence, commands must have come again for so long"
+        default=0.2, ge=0, le=5, description="after silence, commands must have arrived again for this long"
     )
     late_s: float = Field(
         default=0.2, gt=0, le=2, description="a message this much later than the fastest one is not obeyed"
     )
     turn_memory_s: float = Field(
-        default=60.0, ge=0, le=3600, description="a turn in place trusts floor that was seen free so long ago"
+        default=60.0,
+        ge=0,
+        le=3600,
+        description="for a turn in place, floor that was seen to be free counts as free for this long",
     )

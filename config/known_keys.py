@@ -1,4 +1,5 @@
-"""Which key was meant: pydantic's place of a mistake as its author wrote it, and the keys a section knows."""
+"""Help for mistakes in a YAML file: the place of a mistake as it stands in the file, and the keys that are
+known there. config/loader.py puts both into its messages."""
 
 from __future__ import annotations
 
@@ -18,9 +19,9 @@ def advice(model: type[BaseModel], place: Sequence[int | str]) -> str:
 
 
 def written(model: type[BaseModel], place: Sequence[int | str], *, last_is_key: bool) -> str:
-    """place as keys with dots between, as in the file: without the tags of unions, which pydantic puts in.
+    """place as keys joined by dots, as in the file: without the tags of unions, which pydantic inserts.
 
-    last_is_key: the last step is what somebody wrote, known or not.
+    last_is_key: the last step is a key from the file, known or not.
     """
     sections, keys = {model}, []
     for number, step in enumerate(place, start=1):
@@ -39,8 +40,8 @@ def _known_at(model: type[BaseModel], steps: Sequence[int | str]) -> set[str]:
 
 
 def _within(sections: set[type[BaseModel]], step: int | str) -> set[type[BaseModel]]:
-    """The sections that one step leads to. Neither the place in a list nor the tag of a union is a key; the
-    tag is what `kind` says."""
+    """The sections that one step leads to. An index in a list is not a key, nor is the tag of a union, which
+    is the value of `kind`."""
     inner = {
         found
         for section in sections

@@ -15,11 +15,11 @@ from pydantic_core import ErrorDetails
 from config.known_keys import advice, written
 
 CONFIG_DIR = Path(__file__).resolve().parent
-# A file with more mistakes than this is another kind of file, and one line is for reading.
+# How many mistakes are listed: a file with more is another kind of file, and the line must stay readable.
 _MOST_MISTAKES = 8
-# So many unknown sections, and fewer that are known: it is not a file with mistakes.
+# With at least this many unknown sections, and fewer known ones, the file is of another kind.
 _ANOTHER_KIND = 3
-# Where pydantic speaks of itself instead of the file.
+# Replacements for messages in which pydantic speaks of itself instead of the file.
 _IN_OTHER_WORDS = {
     "union_tag_not_found": "its key kind is missing",
     "tuple_type": "Input should be a list",
@@ -45,13 +45,13 @@ SectionT = TypeVar("SectionT", bound=Section)
 
 
 _MERGE = "tag:yaml.org,2002:merge"
-# What PyYAML lets out, without a place, where a scalar is none of what its tag says: day 32, 5000 digits.
+# What PyYAML raises, without naming the place, for a scalar that its tag does not allow: day 32, 5000 digits.
 _NOT_WHAT_IT_SAYS = (ValueError, LookupError, AttributeError, TypeError, OverflowError)
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
-    """SafeLoader that refuses a key given twice: the second would silently win. A merged key (<<) may be
-    given again, that is what merging is for."""
+    """SafeLoader that refuses a key given twice, of which the second would silently win. A merged key (<<)
+    may be given again: that is the purpose of merging."""
 
     def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[object, object]:
         if not isinstance(node, yaml.MappingNode):
@@ -132,7 +132,7 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     told: set[str] = set()
     for detail in error.errors(include_url=False):
         if detail["type"] == "default_factory_not_called":
-            continue  # a default that follows from a key that is wrong itself
+            continue  # a default that depends on a wrong key, which has its own error
         unknown = detail["type"] == "extra_forbidden"
         key = written(model, detail["loc"], last_is_key=unknown)
         reason = detail["msg"].removeprefix("Value error, ")
@@ -144,7 +144,7 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
             )
         if unknown:
             hint = advice(model, detail["loc"])
-            # Several keys of another kind of file: what is known is said once.
+            # Several unknown keys of one section: list the known ones only once.
             reason = "unknown key" if hint in told else f"unknown key; {hint}"
             told.add(hint)
         elif detail["type"] == "missing":
@@ -160,7 +160,10 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _what_to_write(detail: ErrorDetails) -> str:
-    """YAML 1.1 reads `15e-1` and '"1.5"' as text, a serial number as a number, and 2024-01-02 as a date."""
+    """What to write in place of a value of the wrong type, or "".
+
+    YAML 1.1 reads `15e-1` and '"1.5"' as text, a serial number as a number, and 2024-01-02 as a date.
+    """
     if detail["type"] == "string_type" and isinstance(detail["input"], int | float | date):
         return f", which is no text: put it in quotes, '{detail['input']}'"
     if detail["type"] not in ("float_type", "int_type") or not isinstance(detail["input"], str):
@@ -173,11 +176,11 @@ def _what_to_write(detail: ErrorDetails) -> str:
 
 
 def resolve(path: str, relative_to: Path) -> Path:
-    """A file named in a YAML: absolute, beside that YAML, or among the files that ship here."""
+    """The path of a file named in a YAML: absolute, beside that YAML, or among the files that ship here."""
     given = Path(path).expanduser()
     if given.is_absolute():
         return given
     beside = relative_to.parent / given
     shipped = CONFIG_DIR / given
-    # os.path, not Path.exists(): that one raises for a name too long and a folder that may not be read.
+    # os.path, not Path.exists(), which raises for a name that is too long or a folder without permission.
     return shipped if os.path.exists(shipped) and not os.path.exists(beside) else beside

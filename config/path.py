@@ -1,4 +1,4 @@
-"""The planned path as a person writes it: a start pose, then straight lines and arcs, end to end."""
+"""The planned path as written in YAML: a start pose, then straight lines and arcs, end to end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MaxSpeed = Annotated[float | None, Field(default=None, gt=0, le=5)]
 
 
 class StartSpec(Section):
-    """Where the turning centre stands at the beginning, on the floor; heading counts from x to y."""
+    """Where the turning centre stands at the beginning, on the floor; heading is positive from x to y."""
 
     x_m: float = Field(default=0.0, ge=-1e4, le=1e4)
     y_m: float = Field(default=0.0, ge=-1e4, le=1e4)
@@ -31,8 +31,8 @@ class LineSpec(Section):
 class ArcSpec(Section):
     """A turn by angle_deg (positive: to the left) on a circle of radius_m.
 
-    With blend_m, the curvature grows from zero and falls back to it linearly over that length at each end
-    (a clothoid), so that the yaw rate has no step; the angle stays what is asked.
+    With blend_m, the curvature rises linearly from zero, and falls back to it, over that length at each end
+    (a clothoid), so that the yaw rate has no step. angle_deg includes both blends.
     """
 
     kind: Literal["arc"]
@@ -43,7 +43,7 @@ class ArcSpec(Section):
 
     @property
     def length_m(self) -> float:
-        """Along the arc, both blends included."""
+        """Length along the arc, both blends included."""
         return self.radius_m * abs(math.radians(self.angle_deg)) + self.blend_m
 
     @model_validator(mode="after")
@@ -62,7 +62,7 @@ SegmentSpec = Annotated[LineSpec | ArcSpec, Field(discriminator="kind")]
 
 
 class PathSpec(Section):
-    """The whole path. controller.path.path.Path measures along it."""
+    """The whole path. controller.path.path.Path computes positions along it."""
 
     start: StartSpec = StartSpec()
     segments: Annotated[tuple[SegmentSpec, ...], Field(strict=False)]

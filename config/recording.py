@@ -1,4 +1,4 @@
-"""camera.yaml of a recording: the calibration and the geometry that the images were taken with."""
+"""camera.yaml of a recording: calibration of the camera that took the images, and where it was mounted."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from config.loader import Section
 
 
 def _number(value: object) -> object:
-    """Number as other programs write them: YAML 1.1 reads ``5e3`` and ``1e-3`` as text."""
+    """Convert a number as other programs write it: YAML 1.1 reads ``5e3`` and ``1e-3`` as text."""
     if not isinstance(value, str):
         return value
     try:
@@ -20,7 +20,7 @@ def _number(value: object) -> object:
 
 
 def _whole_number(value: object) -> object:
-    """Whole number as other programs write them: 640.0 is 640."""
+    """Convert a whole number as other programs write it: 640.0 is 640."""
     value = _number(value)
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
@@ -34,7 +34,7 @@ def _five_coefficients(value: tuple[float, ...]) -> tuple[float, ...]:
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[Number, Field(gt=0)]
 Pixels = Annotated[int, BeforeValidator(_whole_number), Field(gt=0, le=4096)]
-# Fewer show nothing: what looks around a pixel has no room (vision/depth/depth_grid.py).
+# Smaller images have no room for the neighbourhoods that are searched (vision/depth/depth_grid.py).
 ImageSide = Annotated[int, BeforeValidator(_whole_number), Field(ge=32, le=4096)]
 
 # How far a rotation matrix written with few digits may be from orthonormal.
@@ -44,18 +44,18 @@ _ROTATION_TOLERANCE = 1e-3
 class RecordingCamera(Section):
     """camera.yaml. Integer coordinates are pixel centres; lengths in metres.
 
-    A recording often comes from somebody else, so keys that are not known here are noted
-    (``ignored_keys``) and ignored, unlike those of treadwatch's own files.
+    A recording often comes from another program, so unknown keys are ignored, and listed in ``ignored_keys``.
+    In treadwatch's own files they are errors.
 
     depth_factor: depth image value / depth_factor = metres (5000 for TUM, 1000 for millimetres).
-    distortion: [k1, k2, p1, p2, k3] of the colour image, OpenCV's order. camera_pitch_deg: positive
-    looks down. camera_forward_m, camera_left_m: ahead and to the left of the turning centre. Depth
-    outside depth_min_m..depth_max_m counts as not measured.
+    distortion: [k1, k2, p1, p2, k3] of the colour image, in OpenCV's order.
+    camera_pitch_deg: positive looks down.
+    camera_forward_m, camera_left_m: ahead and to the left of the turning centre.
+    depth_min_m, depth_max_m: depth outside counts as not measured.
 
-    Where depth is not registered to colour, depth_fx, depth_fy, depth_cx, depth_cy (with depth_width
-    and depth_height where its size differs) and depth_to_colour_translation_m [x, y, z] and
-    depth_to_colour_rotation (nine numbers, row by row) let it be registered:
-    p_colour = rotation @ p_depth + translation.
+    Where depth is not registered to colour, these keys let it be registered: depth_fx, depth_fy, depth_cx,
+    depth_cy (with depth_width and depth_height if the size differs), depth_to_colour_translation_m [x, y, z]
+    and depth_to_colour_rotation (nine numbers, row by row): p_colour = rotation @ p_depth + translation.
     """
 
     model_config = ConfigDict(extra="allow")

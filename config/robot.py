@@ -18,7 +18,7 @@ class Body(Section):
     rear_m: float = Field(default=0.51, gt=0, le=10)
     height_m: float = Field(default=0.80, gt=0, le=5)
     clearance_m: float = Field(
-        default=0.05, ge=0, le=0.5, description="what is lower than this can be driven over"
+        default=0.05, ge=0, le=0.5, description="the robot can drive over what is lower than this"
     )
 
     @property
@@ -42,7 +42,9 @@ class Limits(Section):
     max_jerk_mps3: float = Field(default=0.6, ge=0.01, le=50)
     emergency_jerk_mps3: float = Field(default=2.0, gt=0, le=100)
     max_yaw_rate_radps: float = Field(default=0.8, gt=0, le=5)
-    max_obstacle_speed_mps: float = Field(default=1.5, ge=0, le=10, description="the paper's V_omax")
+    max_obstacle_speed_mps: float = Field(
+        default=1.5, ge=0, le=10, description="greatest speed of an obstacle, the paper's V_omax"
+    )
 
     @model_validator(mode="after")
     def _emergency_is_harder(self) -> Self:
@@ -60,7 +62,8 @@ class Limits(Section):
 
 
 class Mount(Section):
-    """The camera on the body: ahead of the turning centre, left of it, above the floor, looking down."""
+    """Where the camera sits: ahead of the turning centre, left of it, above the floor; positive pitch looks
+    down."""
 
     forward_m: float = Field(default=0.45, ge=-5, le=5)
     left_m: float = Field(default=0.0, ge=-5, le=5)

@@ -1,4 +1,4 @@
-"""A simulated world as a person writes it: the path, the building, the light, and the things in it."""
+"""A simulated world as written in YAML: the path, the building, the light, and the bodies in it."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class Go(Section):
-    """Walk or drive straight to a point. Below 60 degrees a corner is rounded in passing, above it the
-    mover stops, turns on the spot and goes on."""
+    """Walk or drive straight to a point. A corner of less than 60 degrees is rounded in passing; at a sharper
+    one the mover stops, turns on the spot and goes on."""
 
     kind: Literal["go"]
     x_m: Metres
@@ -41,7 +41,8 @@ Step = Annotated[Go | Wait, Field(discriminator="kind")]
 
 
 class MotionPlan(Section):
-    """A plan in time. start_jitter_s: the seed shifts the start by up to this much, either way."""
+    """What a body does, step after step. start_jitter_s: the seed shifts the start by at most this, either
+    way."""
 
     start_s: Seconds = 0.0
     start_jitter_s: Seconds = 0.0
@@ -91,7 +92,10 @@ class Shelf(_Placed):
     height_m: Size = 3.2
     levels: int = Field(default=3, ge=1, le=8)
     bay_m: float = Field(default=2.7, ge=0.5, le=10)
-    goods: Share = Field(default=0.6, description="share of the places with a box that stands out")
+    goods: Share = Field(
+        default=0.6,
+        description="density of boxes that stand out of the painted goods; 1 fills half of the lowest level",
+    )
 
 
 class Column(_Placed):

@@ -1,4 +1,7 @@
-"""The boundary to the outside, on one screen. Implementations: hal/cameras, hal/chassis, hal/links, sim."""
+"""The boundary to the outside: a protocol for each kind of device, and for the clock.
+
+Implementations: hal/cameras, hal/chassis, hal/links, sim.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from hal.types import CanFrame, ChassisState, Intrinsics, Pose, RgbdFrame, Sende
 
 
 class Closing(Protocol):
-    """A device is open between __enter__ and __exit__; leaving is safe in any state."""
+    """A device that is open between __enter__ and __exit__. __exit__ is safe in any state."""
 
     def __enter__(self) -> Self: ...
 
@@ -19,7 +22,7 @@ class Closing(Protocol):
 
 
 class Clock(Protocol):
-    """The only clock, monotonic. A simulated one advances when told."""
+    """The one clock of the program, monotonic. A simulated clock advances only in sleep_until_ns()."""
 
     def now_ns(self) -> int: ...
 
@@ -31,71 +34,76 @@ class FrameSource(Closing, Protocol):
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """Of every frame. A device that tells them itself raises DeviceRefused before it is open."""
+        """The intrinsics of every frame. Raises DeviceRefused if only the device knows them and it is not yet
+        open."""
         ...
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """The next frame, of a camera the newest, waited for at most timeout_s. Raises FrameTimeout,
-        EndOfStream, LinkLost, DeviceRefused once closed, BadRecording where a recording holds none."""
+        """Wait at most timeout_s for the next frame of a recording, or the newest one of a camera.
+
+        Raises FrameTimeout, EndOfStream, LinkLost, DeviceRefused once closed, and BadRecording if a recording
+        holds no frame.
+        """
         ...
 
 
 class OdometrySource(Protocol):
-    """Dead reckoning of the camera: a prior for ego-motion, never the truth."""
+    """Dead reckoning of the camera. It serves as a prior for the ego-motion, not as ground truth."""
 
     def camera_pose(self, stamp_ns: int) -> Pose | None:
-        """The camera (optical frame) in the odometry frame at stamp_ns; None where not known."""
+        """The pose of the camera (optical frame) in the odometry frame at stamp_ns; None if unknown."""
         ...
 
 
 class Chassis(Closing, Protocol):
-    """A tracked base. Stepped by the control loop; waits for nothing but a link's short bound to write."""
+    """A tracked base, stepped by the control loop. It never waits, except briefly for a link to write."""
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
-        """Send what is due, read what has arrived. None asks for no motion: an explicit zero."""
+        """Send what is due and read what has arrived. None asks for standstill: an explicit zero is sent."""
         ...
 
     def arm(self, now_ns: int) -> None:
-        """The operator's consent to move: from standby, or after a latched fault has gone."""
+        """Give the operator's consent to move, in standby or after the cause of a latched stop has gone."""
         ...
 
     def stop(self, now_ns: int) -> None:
-        """Explicit zero, then standby. Safe in any state, also on a lost link; idempotent."""
+        """Send an explicit zero, then go to standby. Safe in any state, also on a lost link; idempotent."""
         ...
 
 
 class CanLink(Closing, Protocol):
-    """Whole CAN frames. Knows nothing of chassis."""
+    """A link that carries whole CAN frames. It knows nothing about the chassis."""
 
     def send(self, frame: CanFrame) -> None:
-        """Queue one frame within a short bound. Raises LinkLost."""
+        """Queue one frame; blocks only for a short, bounded time. Raises LinkLost."""
         ...
 
     def receive(self) -> CanFrame | None:
-        """The oldest frame that has arrived; None is silence. Raises LinkLost."""
+        """The oldest frame that has arrived; None if there is none. Raises LinkLost."""
         ...
 
 
 class SerialLink(Closing, Protocol):
-    """Bytes over a port. Framing belongs to the protocol above."""
+    """A link that carries bytes. The protocol above does the framing."""
 
     def write(self, data: bytes) -> None:
-        """Write all of data within a short bound. Raises LinkLost."""
+        """Write all of data; blocks only for a short, bounded time. Raises LinkLost."""
         ...
 
     def read(self) -> bytes:
-        """All bytes that have arrived, without waiting; b"" is silence. Raises LinkLost."""
+        """All bytes that have arrived, without waiting; b"" if there are none. Raises LinkLost."""
         ...
 
 
 class DatagramLink(Closing, Protocol):
-    """Whole messages of other programs, in the order in which they arrive."""
+    """A link that carries whole messages of other programs, in the order of their arrival."""
 
     def receive(self) -> tuple[bytes, Sender | None] | None:
-        """The oldest message that has arrived and who sent it (None: has no address); None is silence.
-        Raises LinkLost."""
+        """The oldest message that has arrived, and its sender (None: it has no address); None if there is no
+        message. Raises LinkLost."""
         ...
 
     def send(self, data: bytes, receiver: Sender) -> bool:
-        """False if it cannot be delivered now: whoever does not listen must not make us wait."""
+        """Send without waiting. False if it cannot be delivered now: a receiver that does not listen must not
+        hold up the sender."""
         ...

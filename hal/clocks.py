@@ -1,4 +1,4 @@
-"""The machine's monotonic clock, and a clock for simulation and tests."""
+"""The machine's monotonic clock, and a simulated clock for simulation and tests."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ NS_PER_MS = 1_000_000
 
 
 class MonotonicClock:
-    """CLOCK_MONOTONIC: never steps, so deadlines and ages survive a change of the wall clock."""
+    """CLOCK_MONOTONIC. It never steps, so deadlines and ages survive a change of the wall clock."""
 
     def now_ns(self) -> int:
         return time.monotonic_ns()
@@ -21,7 +21,8 @@ class MonotonicClock:
 
 
 class SimulatedClock:
-    """Stands still until somebody sleeps: then it is that time. Two runs are alike to the bit."""
+    """A clock that stands still until somebody sleeps, and then jumps to the deadline. With it, two runs are
+    identical to the bit."""
 
     def __init__(self, start_ns: int = 0) -> None:
         self._now_ns = start_ns
@@ -30,5 +31,5 @@ class SimulatedClock:
         return self._now_ns
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Jump to the deadline; a deadline in the past leaves the clock where it is."""
+        """Jump to the deadline. A deadline in the past leaves the clock unchanged."""
         self._now_ns = max(self._now_ns, deadline_ns)

@@ -1,18 +1,20 @@
-"""Loops that are compiled for this processor: the one place that knows the compiler (Numba).
+"""Compiled functions ("steps"): the only module that uses the compiler (Numba).
 
-NumPy goes over an array once for each operation, and a frame has some hundred small ones: its calls took
-longer than what they computed. A compiled step goes over the cells, the pixels or the ends once, in the words
-of the algorithm. Every one is compiled when its module is imported, never in the middle of a drive, and kept
-on the disk: beside its file, or, where that may not be written, in the user's cache, or in NUMBA_CACHE_DIR.
-The first import takes a minute or two for all of them, and says so; later ones take a moment. What was kept
-and cannot be read any more is made anew; where nothing can be kept, every start compiles, and says so.
+NumPy passes over an array once per operation. A frame needs some hundred operations on small arrays, and the
+calls took longer than the arithmetic. A compiled step passes over the cells, pixels or end points once, in a
+plain loop that reads like the algorithm. Each step is compiled when its module is imported, never during a
+drive, and cached on disk: in NUMBA_CACHE_DIR if that is set, else beside its file, or in the user's cache if
+that folder is not writable. The first import compiles all steps, which takes a minute or two and prints a
+message; later imports take a moment. A cache that cannot be read is rebuilt. If nothing can be cached, every
+start compiles and prints a message.
 
-Rules: a step takes numbers and arrays, does not change them, and returns new ones; parts that are inlined may
-fill the arrays they are given. No index is checked: what a step reads by has to be in range. With
-NUMBA_DISABLE_JIT=1 all of them run as plain Python, for a debugger; there 1.0 / 0.0 is an error.
+Rules: a step takes numbers and arrays, does not change them, and returns new ones; inlined parts may write to
+the arrays they are given. Indices are not checked, so they must be in range. With NUMBA_DISABLE_JIT=1 all
+steps run as plain Python, for a debugger; there 1.0 / 0.0 is an error.
 
-What is kept of a step is made anew when its file changes, or that of a part which it calls, or the value of a
-constant that it reads, wherever they stand (_rests_on): the compiler alone would look at the step's own file.
+A cached step is rebuilt when its file changes, when the file of a part it calls changes, or when the value of
+a constant it reads changes, in whichever module these are (_rests_on). Numba alone would check only the
+step's own file.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ _EVERY_TIME = (
 )
 _told: set[str] = set()
 _CONSTANTS = (bool, int, float, str, tuple, np.generic)
-# What reading or writing its files raises: a full disk, no place for them, half a file and what comes of it.
+# What reading or writing the cache may raise: a full disk, no writable folder, a truncated file.
 _NOT_KEPT = (
     OSError,
     RuntimeError,
@@ -57,8 +59,11 @@ _NOT_KEPT = (
 
 
 def compiled(arguments: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A step that takes arguments, in Numba's words: "float32[:, ::1], int64"; [::1] is contiguous, [:] need
-    not be. Arrays that may not be written to are welcome. Division by zero is as in NumPy: inf or NaN."""
+    """Decorator that compiles a step for these argument types, in Numba's notation.
+
+    Example: "float32[:, ::1], int64". [::1] is contiguous, [:] need not be. Read-only arrays are accepted.
+    Division by zero gives inf or NaN, as in NumPy.
+    """
     parsed, _ = sigutils.normalize_signature(f"({arguments},)")
     signature = tuple(_read_only(argument) for argument in parsed)
 
@@ -75,20 +80,20 @@ def compiled(arguments: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """Part of compiled steps, for whatever types they give it."""
+    """Decorator for a function that compiled steps call, compiled for the types they pass."""
     result: Callable[P, R] = njit(error_model="numpy")(function)
     return result
 
 
 def _kept(function: Callable[P, R], signature: tuple[types.Type, ...]) -> Callable[P, R]:
-    """From the disk, or compiled and kept there. Raises what reading and writing its files may raise, and
-    NumbaError."""
+    """The step from the cache, or compiled and cached. Raises NumbaError, and what reading or writing the
+    cache may raise."""
     try:
         step = _build(function, signature, kept=True)
     except NumbaError:
         raise
     except _NOT_KEPT:
-        # Damaged: whoever cut the power while it was written left half a file.
+        # The cache is damaged, for example because power was cut while it was written.
         step = _build(function, signature, kept=True, anew=True)
     if isinstance(step, Dispatcher) and step.stats.cache_misses:
         _say(_FIRST_TIME)
@@ -98,14 +103,14 @@ def _kept(function: Callable[P, R], signature: tuple[types.Type, ...]) -> Callab
 def _build(
     function: Callable[P, R], signature: tuple[types.Type, ...], *, kept: bool, anew: bool = False
 ) -> Callable[P, R]:
-    """anew: whatever is kept of it counts for nothing."""
+    """Compile function for signature. kept: use the cache. anew: ignore what is cached and replace it."""
     step: Any = njit(error_model="numpy")(function)
     if isinstance(step, Dispatcher):  # else plain Python, with NUMBA_DISABLE_JIT=1
         if kept:
-            # As Dispatcher.enable_caching does, with a cache that stamps less.
+            # As Dispatcher.enable_caching does, but the cache's stamp covers all that the step rests on.
             setattr(step, "_cache", _Cache(function))  # noqa: B010
         if anew:
-            step.recompile()  # nothing yet, but what is kept is forgotten with it
+            step.recompile()  # nothing is compiled yet, but this drops the cached form
         step.compile(signature)
         step.disable_compile()
     result: Callable[P, R] = step
@@ -113,8 +118,11 @@ def _build(
 
 
 def _rests_on(function: FunctionType, known: set[FunctionType]) -> Iterator[object]:
-    """What the compiled form of function holds besides the words of its own file: the files of the parts that
-    it calls, by what is in them, and the constants and records that it and they read. known: parts had."""
+    """What the compiled form of function depends on besides its own file.
+
+    Yields the hashes of the files of the parts that it calls, and the constants and fields of records that
+    they and it read. known: the parts that were visited already.
+    """
     for name in function.__code__.co_names:
         value = function.__globals__.get(name)
         if isinstance(value, Dispatcher):
@@ -131,7 +139,7 @@ def _rests_on(function: FunctionType, known: set[FunctionType]) -> Iterator[obje
 
 
 def _stamped(place: Any) -> Any:
-    """A place where compiled forms are kept, whose stamp is of everything that they rest on."""
+    """A cache locator of Numba whose stamp covers everything that a compiled form rests on."""
 
     class Stamped(place):  # type: ignore[misc]
         def __init__(self, function: FunctionType, file: str) -> None:
@@ -157,7 +165,7 @@ class _Cache(caching.FunctionCache):  # type: ignore[misc]
 
 
 def _say(sentence: str, *values: str) -> None:
-    """On standard error, once."""
+    """Write to standard error, each sentence only once."""
     if sentence not in _told:
         _told.add(sentence)
         sys.stderr.write(sentence.format(*values))

@@ -1,4 +1,4 @@
-"""The part of every wrapper that is only opening and closing what it wraps."""
+"""Base class of wrappers: opens and closes the device that is wrapped."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from hal.api import Closing
 
 
 class Enclosing:
-    """Open while what it encloses is open."""
+    """A device that is open while the enclosed device is open."""
 
     def __init__(self, enclosed: Closing) -> None:
         self._enclosed = enclosed
 
     def __enter__(self) -> Self:
-        """Open what is enclosed. Raises DeviceNotFound, DeviceRefused."""
+        """Open the enclosed device. Raises DeviceNotFound, DeviceRefused."""
         self._enclosed.__enter__()
         return self
 

@@ -1,9 +1,9 @@
-"""The one error tree of the hardware boundary. The vendor's error is kept as ``__cause__``.
+"""The errors of the hardware boundary. The vendor's error is kept as ``__cause__``.
 
     HalError
     +-- DeviceNotFound     the port, bus, camera or recording named in the YAML is not there
-    +-- DeviceRefused      the device is there, but not what it should be or not permitted
-    +-- LinkLost           it was there and has gone: unplugged, bus-off, port closed
+    +-- DeviceRefused      the device is there, but it is the wrong one or access is denied
+    +-- LinkLost           the device was there and has gone: unplugged, bus-off, port closed
     +-- FrameTimeout       the camera is there, but no frame came in time
     +-- EndOfStream        a recording has no further frame; not a fault
     +-- BadRecording       a recording cannot be read at all: what, where, why

@@ -1,4 +1,4 @@
-"""Rigid motions between the floor, the body (x forward, y left, z up) and the camera (REP 103)."""
+"""Rigid transforms between the floor, the body (x forward, y left, z up) and the camera (REP 103)."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ _OPTICAL_IN_BODY: FloatArray = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0
 
 @lru_cache(maxsize=16)
 def camera_in_body(mount: CameraMount) -> Pose:
-    """The optical frame in the body frame; a positive pitch tips the view down. Not to be written to: it is
-    worked out once for each mount."""
+    """The pose of the optical frame in the body frame; a positive pitch looks down.
+
+    The result is cached per mount: do not write to it.
+    """
     c, s = math.cos(mount.pitch_rad), math.sin(mount.pitch_rad)
     tip_down = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     return Pose(
@@ -26,7 +28,7 @@ def camera_in_body(mount: CameraMount) -> Pose:
 
 
 def body_in_floor(pose: PlanarPose) -> Pose:
-    """The body frame in the frame that the planar pose is given in; z = 0 is the floor."""
+    """The pose of the body frame in the frame of the planar pose; z = 0 is the floor."""
     c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     return Pose(
         np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]),
@@ -35,13 +37,13 @@ def body_in_floor(pose: PlanarPose) -> Pose:
 
 
 def planar(pose: Pose) -> PlanarPose:
-    """The body that stands at pose on the floor; the inverse of body_in_floor."""
+    """The planar pose of a body at pose; the inverse of body_in_floor."""
     x_m, y_m, _ = pose.translation_m.tolist()
     return PlanarPose(x_m, y_m, math.atan2(pose.rotation[1, 0], pose.rotation[0, 0]))
 
 
 def camera_in_floor(pose: PlanarPose, mount: CameraMount) -> Pose:
-    """The optical frame in the floor's frame for a body standing at pose."""
+    """The pose of the optical frame in the floor's frame, for a body at pose."""
     return body_in_floor(pose) @ camera_in_body(mount)
 
 
@@ -51,7 +53,7 @@ def wrap_angle_rad(angle_rad: float) -> float:
 
 
 def advance_pose(pose: PlanarPose, v_mps: float, w_radps: float, dt_s: float) -> PlanarPose:
-    """The pose after dt_s on the arc that constant v and w make (exact, also for w = 0)."""
+    """The pose after dt_s of constant v and w, on the exact arc (also for w = 0)."""
     turn_rad = w_radps * dt_s
     half_rad = 0.5 * turn_rad
     chord_m = v_mps * dt_s * float(np.sinc(half_rad / math.pi))

@@ -18,7 +18,7 @@ from hal.records import record
 FloatArray = NDArray[np.float64]
 ColourImage = NDArray[np.uint8]
 DepthImage = NDArray[np.uint16]
-# Whom a datagram came from, as the socket module says it: (host, port, ...) or the path of a Unix socket.
+# Sender of a datagram as the socket module gives it: (host, port, ...), or the path of a Unix socket.
 Sender = tuple[Any, ...] | str | bytes
 
 
@@ -39,8 +39,11 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True)
 class GyroSamples:
-    """Gyro readings that arrived since the frame before, and no others: stamps_ns (N,), rates_radps (N, 3) in
-    optical axes. A frame arrives after its exposure, so some are of a later time than the frame is."""
+    """The gyro readings that arrived since the frame before.
+
+    stamps_ns: (N,). rates_radps: (N, 3), in optical axes. A frame arrives after its exposure, so some
+    readings may be later than the frame they come with.
+    """
 
     stamps_ns: NDArray[np.int64]
     rates_radps: FloatArray
@@ -48,11 +51,13 @@ class GyroSamples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RgbdFrame:
-    """One colour image and the depth aligned to it, taken at one time.
+    """One colour image and the depth aligned to it, taken at the same time.
 
-    colour: (H, W, 3) uint8, BGR. depth: (H, W) uint16, metres = depth * depth_scale_m, 0 = no data.
-    captured_ns: monotonic time of exposure. device_s: the camera's own clock. sequence counts the
-    frames of the device, so a gap shows a lost frame.
+    colour: (H, W, 3) uint8, BGR.
+    depth: (H, W) uint16, metres = depth * depth_scale_m, 0 = no data.
+    captured_ns: monotonic time of exposure.
+    device_s: the same by the camera's own clock.
+    sequence: counts the frames of the device, so a gap shows a lost frame.
     """
 
     colour: ColourImage
@@ -67,7 +72,7 @@ class RgbdFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Where a frame stands in another: p_outer = rotation @ p_inner + translation_m.
+    """Pose of an inner frame in an outer one: p_outer = rotation @ p_inner + translation_m.
 
     rotation: (3, 3); translation_m: (3,).
     """
@@ -76,7 +81,7 @@ class Pose:
     translation_m: FloatArray
 
     def inverse(self) -> Pose:
-        """The outer frame as seen from the inner one."""
+        """The pose of the outer frame in the inner one."""
         transposed = self.rotation.T
         return Pose(transposed, -transposed @ self.translation_m)
 
@@ -89,17 +94,17 @@ class Pose:
 
     @property
     def finite(self) -> bool:
-        """Every number is one."""
+        """Whether no number is NaN or infinite."""
         return bool(np.isfinite(self.rotation).all() and np.isfinite(self.translation_m).all())
 
     def apply(self, points_m: FloatArray) -> FloatArray:
-        """Points (N, 3) of the inner frame, in the outer one."""
+        """Transform points (N, 3) from the inner frame to the outer one."""
         return points_m @ self.rotation.T + self.translation_m
 
 
 @record(frozen=True, slots=True)
 class PlanarPose:
-    """The body on the floor of a fixed frame (odometry or world): metres, radians."""
+    """Pose of the body on the floor of a fixed frame (odometry or world)."""
 
     x_m: float
     y_m: float
@@ -108,8 +113,9 @@ class PlanarPose:
 
 @dataclass(frozen=True, slots=True)
 class CameraMount:
-    """Where the camera sits on the body. forward_m is ahead of the turning centre.
+    """Where the camera sits on the body.
 
+    forward_m, left_m: from the turning centre. height_m: above the floor.
     pitch_rad: positive looks down (as camera_pitch_deg of the recordings).
     """
 
@@ -121,7 +127,7 @@ class CameraMount:
 
 @record(frozen=True, slots=True)
 class Setpoint:
-    """What the chassis shall do from stamp_ns on: a point of the jerk-limited profile."""
+    """The motion asked of the chassis from stamp_ns on: one point of the jerk-limited profile."""
 
     stamp_ns: int
     v_mps: float
@@ -140,7 +146,7 @@ class ChassisMode(Enum):
     LOST = "lost"
 
 
-# Only a person's consent leads out of these.
+# Only arm(), a person's consent, leads out of these modes.
 LATCHED_MODES = frozenset({ChassisMode.ESTOP, ChassisMode.LOST})
 
 
@@ -148,10 +154,12 @@ LATCHED_MODES = frozenset({ChassisMode.ESTOP, ChassisMode.LOST})
 class ChassisState:
     """What is known of the chassis after one exchange.
 
-    feedback_ns: when the newest motion feedback arrived (None: never). v_mps, w_radps: as measured
-    (NaN: unknown). pose: dead reckoning from the chassis' own feedback since the driver was opened.
-    sent: the setpoint that really went out after clamping, None if none did. faults: plain
-    sentences. reason: why the mode is what it is.
+    reason: why the mode is what it is.
+    feedback_ns: when the newest motion feedback arrived (None: never).
+    v_mps, w_radps: as measured (NaN: unknown).
+    pose: dead reckoning from the chassis' own feedback since the driver was opened.
+    faults: sentences for the operator.
+    sent: the setpoint that was sent, after limiting; None if none was.
     """
 
     stamp_ns: int

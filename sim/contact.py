@@ -17,34 +17,34 @@ BUILDING = "building"
 
 @dataclass(frozen=True, slots=True)
 class Clearance:
-    """name of the body that is nearest; distance_m to it: 0 or less is contact, -depth of overlap."""
+    """The nearest body. distance_m: 0 or less is contact, then minus the depth of the overlap."""
 
     name: str
     distance_m: float
 
     @property
     def touches(self) -> bool:
-        """Whether anything was touched."""
+        """Whether the robot touches the body."""
         return self.distance_m <= 0.0
 
 
 def robot_footprint(body: Body, pose: PlanarPose) -> FloatArray:
-    """The robot's rectangle (4, 2) on the floor, counter-clockwise, when its turning centre is at pose."""
+    """The robot's rectangle (4, 2) on the floor, counter-clockwise, with its turning centre at pose."""
     front, rear, half = body.front_m, -body.rear_m, 0.5 * body.width_m
     corners = np.array([[front, -half, 0.0], [front, half, 0.0], [rear, half, 0.0], [rear, -half, 0.0]])
     return body_in_floor(pose).apply(corners)[:, :2]
 
 
 def nearest_body(world: World, body: Body, pose: PlanarPose, t_s: float) -> Clearance:
-    """What is closest to the robot at t_s, the building's walls included.
+    """The body that is closest to the robot at t_s, or the building's walls.
 
-    Bodies that hang above the robot or that it may drive over do not count.
+    Bodies that hang above the robot, or that it may drive over, do not count.
     """
     robot = robot_footprint(body, pose)
     best = Clearance(BUILDING, _room_clearance(world, robot))
     reach = math.hypot(max(body.front_m, body.rear_m), 0.5 * body.width_m)
     in_height = [state for state in world.bodies(t_s) if overlaps_height(body, state)]
-    # Between circles around both: no two points of theirs are nearer than that.
+    # Gaps between circles around the robot and each body: lower bounds of their distances.
     gaps = [
         math.hypot(state.pose.x_m - pose.x_m, state.pose.y_m - pose.y_m) - state.reach_m - reach
         for state in in_height
@@ -59,14 +59,14 @@ def nearest_body(world: World, body: Body, pose: PlanarPose, t_s: float) -> Clea
 
 
 def overlaps_height(body: Body, state: BodyState) -> bool:
-    """Whether a body stands in the robot's way: neither all above it nor low enough to be driven over."""
+    """Whether a body is at the robot's height: neither entirely above it nor low enough to be driven over."""
     return state.z_m[0] < body.height_m and state.z_m[1] > body.clearance_m
 
 
 def polygon_distance(a: FloatArray, b: FloatArray) -> float:
     """Distance between convex polygons (K, 2) and (L, 2), counter-clockwise.
 
-    Where they overlap: minus the shortest way that separates them (separating axis theorem).
+    If they overlap: minus the smallest translation that separates them (separating axis theorem).
     """
     separation = max(_separation(a, b), _separation(b, a))
     if separation <= 0.0:
@@ -84,7 +84,7 @@ def _separation(a: FloatArray, b: FloatArray) -> float:
 
 
 def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
-    """The shortest way from any corner (K, 2) to any edge of polygon (L, 2)."""
+    """The smallest distance from any corner (K, 2) to any edge of polygon (L, 2)."""
     edge = _sides(polygon)
     to_corner = corners[:, None] - polygon[None]
     share = np.clip((to_corner * edge).sum(axis=2) / (edge * edge).sum(axis=1), 0.0, 1.0)
@@ -93,7 +93,7 @@ def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
 
 
 def _sides(polygon: FloatArray) -> FloatArray:
-    """From each corner (K, 2) to the next."""
+    """Vectors (K, 2) from each corner to the next."""
     return np.concatenate([polygon[1:], polygon[:1]]) - polygon
 
 

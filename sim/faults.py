@@ -1,4 +1,4 @@
-"""What may go wrong in a mission, as data: the mission's mode decides how it brings it about."""
+"""What may go wrong in a mission, as data. Each mode of a mission decides how to make it happen."""
 
 from __future__ import annotations
 
@@ -13,16 +13,22 @@ class Window:
     end_s: float
 
     def holds(self, t_s: float) -> bool:
-        """Whether t_s lies in it."""
+        """Whether t_s lies in the window."""
         return self.start_s <= t_s < self.end_s
 
 
 @dataclass(frozen=True, slots=True)
 class Faults:
-    """silent: no frames. frozen: the same picture again and again, with new stamps. late, late_by_s: scenes
-    arrive that much later. yaw_slip: share of every turn that the tracks lose, distance_slip: share of the
-    way that the odometry counts too much. feedback_lost_s: from then on the chassis answers no more. glass:
-    names of bodies that depth does not see."""
+    """The faults of one mission.
+
+    silent: when there are no frames.
+    frozen: when the same image comes again and again, with new stamps.
+    late, late_by_s: when scenes arrive late, and by how much.
+    yaw_slip: share of every turn that the tracks lose.
+    distance_slip: share by which the odometry counts the distance too long.
+    feedback_lost_s: from this time on the chassis does not answer.
+    glass: names of bodies that depth does not see.
+    """
 
     silent: Window | None = None
     frozen: Window | None = None
@@ -34,19 +40,19 @@ class Faults:
     glass: tuple[str, ...] = ()
 
     def late_by(self, t_s: float) -> float:
-        """Seconds by which the scene of a frame exposed at t_s comes later."""
+        """Seconds by which the scene of a frame exposed at t_s is late."""
         return self.late_by_s if self.late is not None and self.late.holds(t_s) else 0.0
 
     def blind_since(self, t_s: float, after_s: float = 0.0) -> float | None:
-        """Since when no picture has been taken that shows anything new; None: at t_s, or for after_s before,
-        there are such pictures."""
+        """Since when the camera has shown nothing new at t_s, or within after_s before t_s; None if it does
+        show new images then."""
         for window in (self.silent, self.frozen):
             if window is not None and window.start_s <= t_s < window.end_s + after_s:
                 return window.start_s
         return None
 
     def strikes(self, t_s: float, after_s: float) -> bool:
-        """Whether something that must lead to a stop holds at t_s, or did within after_s before it."""
+        """Whether a fault that must lead to a stop holds at t_s, or did within after_s before t_s."""
         windows = [one for one in (self.silent, self.frozen, self.late) if one is not None]
         if any(one.start_s <= t_s < one.end_s + after_s for one in windows):
             return True

@@ -1,4 +1,4 @@
-"""Where a mover is at any time: a pure function, so that truth can be asked for any instant."""
+"""Where a mover is at any time: a pure function of time, so that ground truth exists for every instant."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from config.scenario import Go, MotionPlan
 from hal.geometry import wrap_angle_rad
 from hal.types import FloatArray, PlanarPose
 
+# Sharper corners are not rounded: the mover stops and turns on the spot.
 _ROUNDED_CORNER_RAD = math.radians(60.0)
+# How far before and after a rounded corner the heading changes.
 _CORNER_RADIUS_M = 0.3
 
 
@@ -38,20 +40,23 @@ class MotionState:
 
 @dataclass(frozen=True, slots=True)
 class _Leg:
-    """A straight run between two points, with the speeds it is entered and left at."""
+    """A straight run between two points.
+
+    turn_in_rad, turn_out_rad: half of the corner at its beginning and at its end, if that is rounded, else 0.
+    """
 
     x_m: float
     y_m: float
     heading_rad: float
     length_m: float
     cruise_mps: float
-    turn_in_rad: float  # half of the corner at its beginning, if that is rounded
+    turn_in_rad: float
     turn_out_rad: float
 
 
 @dataclass(frozen=True, slots=True)
 class _Phase:
-    """Constant acceleration along a leg, or constant yaw rate on the spot."""
+    """A phase of constant acceleration along a leg, or of constant yaw rate on the spot."""
 
     start_s: float
     leg: _Leg
@@ -64,7 +69,7 @@ class _Phase:
 
 
 class Trajectory:
-    """A motion plan from a start pose, solved once into phases of constant acceleration."""
+    """A motion plan from a start pose, divided once into phases of constant acceleration."""
 
     def __init__(self, start: PlanarPose, motion: MotionPlan | None, shift_s: float = 0.0) -> None:
         """shift_s moves the plan in time (the seed's jitter)."""
@@ -80,7 +85,8 @@ class Trajectory:
         self._numbers: tuple[FloatArray, NDArray[np.bool_]] | None = None
 
     def at(self, t_s: float) -> MotionState:
-        """The state at t_s; before the first step it stands at the start, after the last where it ended."""
+        """The state at t_s. Before the first step the mover stands at the start, after the last at the
+        end."""
         phase = self._phases[max(bisect_right(self._starts, t_s) - 1, 0)]
         leg = phase.leg
         dt_s = t_s - phase.start_s if math.isfinite(phase.start_s) else 0.0
@@ -103,7 +109,7 @@ class Trajectory:
         )
 
     def over(self, times_s: FloatArray) -> FloatArray:
-        """(T, 5) x, y, heading, vx, vy of at() at each of times_s (T,)."""
+        """The same as at() for times_s (T,), as (T, 5): x, y, heading, vx, vy."""
         phase = np.maximum(np.searchsorted(self._starts, times_s, side="right") - 1, 0)
         numbers, rounded = self._table()
         start, x, y, c, s, along, speed, accel, heading, yaw_rate = numbers[phase].T
@@ -117,7 +123,7 @@ class Trajectory:
         return np.stack((x + along * c, y + along * s, wrapped, speed * c, speed * s), axis=1)
 
     def _table(self) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """The phases as numbers, (P, 10), and (P,) on which of them the heading changes with the way."""
+        """The phases as numbers, (P, 10), and the phases (P,) in which the heading changes along the way."""
         if self._numbers is None:
             rows, rounded = [], []
             for one in self._phases:
@@ -145,7 +151,7 @@ class Trajectory:
 
     @property
     def end_s(self) -> float:
-        """When the last step is over; -inf for a body that never moves."""
+        """When the last step ends; -inf for a body that never moves."""
         return self._phases[-1].start_s
 
     def _plan(self, motion: MotionPlan) -> None:
@@ -181,7 +187,7 @@ class Trajectory:
             self._cover(leg, junctions[index], junctions[index + 1], motion.accel_mps2)
 
     def _legs(self, run: list[Go]) -> list[_Leg]:
-        """The runs between points that differ, with every corner below the limit rounded."""
+        """The runs between distinct points, with every corner up to the limit rounded."""
         corners = [(self._cursor.x_m, self._cursor.y_m)]
         speeds: list[float] = []
         for step in run:
@@ -229,12 +235,12 @@ class Trajectory:
 
 
 def _junction_speeds(legs: list[_Leg], accel: float) -> list[float]:
-    """Speed at each leg's ends that both neighbours allow and the acceleration can reach."""
+    """The speeds at the ends of the legs that both neighbours allow and the acceleration can reach."""
     speeds = [0.0]
     for before, after in itertools.pairwise(legs):
         speeds.append(min(before.cruise_mps, after.cruise_mps) if after.turn_in_rad != 0.0 else 0.0)
     speeds.append(0.0)
-    # Straight on (no turn at all) is a corner of zero, but not a stop.
+    # Going straight on is a corner of zero, which does not need a stop.
     for index, (before, after) in enumerate(itertools.pairwise(legs)):
         if abs(wrap_angle_rad(after.heading_rad - before.heading_rad)) < 1e-9:
             speeds[index + 1] = min(before.cruise_mps, after.cruise_mps)
@@ -248,7 +254,7 @@ def _junction_speeds(legs: list[_Leg], accel: float) -> list[float]:
 
 
 def _rounded_heading(leg: _Leg, along_m: float, speed: float) -> tuple[float, float]:
-    """Heading and yaw rate on a leg: half of a rounded corner is turned before it, half after it."""
+    """Heading and yaw rate on a leg. Half of a rounded corner is turned before the corner, half after it."""
     radius = min(_CORNER_RADIUS_M, 0.5 * leg.length_m)
     left_m = leg.length_m - along_m
     if leg.turn_in_rad != 0.0 and along_m < radius:

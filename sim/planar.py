@@ -1,7 +1,7 @@
-"""The simulated world seen from above: footprints and heights only, without a single face.
+"""The simulated world from above: only footprints and heights, without faces.
 
-A mission in the plane asks for where everything stands thousands of times a second; faces and textures would
-only cost time. The numbers are those of sim.world.World (a test holds them together).
+A mission in the plane needs the position of everything thousands of times a second; faces and textures would
+only cost time. The numbers are those of sim.world.World (a test compares them).
 """
 
 from __future__ import annotations
@@ -38,9 +38,12 @@ _POLE_SIDES = 8
 class PlanarWorld:
     """N bodies of a scenario on the floor.
 
-    names, z_m (N, 2) lowest and highest point, moves (N,) bool. end_s: when the last mover has finished its
-    plan, 0 if none moves. Footprints have the same number K of corners for all: shorter ones repeat their
-    last corner.
+    names: N names.
+    z_m: (N, 2), lowest and highest point.
+    moves: (N,), whether it has a motion plan.
+    end_s: when the last mover has finished its plan; 0 if none moves.
+
+    All footprints have the same number K of corners: those with fewer repeat their last corner.
     """
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
@@ -64,13 +67,14 @@ class PlanarWorld:
         return len(self.names)
 
     def foresee(self, times_s: FloatArray) -> None:
-        """Work out at once what look() will be asked for at times_s (T,): far cheaper than one by one."""
+        """Compute the results of look() at times_s (T,) all at once, which is much cheaper than one by
+        one."""
         times_s = np.append(times_s[times_s < self.end_s], self.end_s)
         self._foreseen_at = {t_s: k for k, t_s in enumerate(times_s.tolist())}
         self._foreseen = self._all_at(times_s)
 
     def look(self, t_s: float) -> tuple[FloatArray, FloatArray]:
-        """Polygons (N, K, 2) and velocities (N, 2) of all bodies at t_s. Not to be written to."""
+        """Polygons (N, K, 2) and velocities (N, 2) of all bodies at t_s. Do not write to them."""
         t_s = min(t_s, self.end_s)
         row, (polygons, velocity) = self._foreseen_at.get(t_s), self._foreseen
         if row is None:
@@ -107,7 +111,7 @@ class PlanarWorld:
         return np.stack((x, y), axis=2)
 
     def _outlines(self, body: int, states: FloatArray) -> FloatArray:
-        """(T, K, 2) in the body frame; only people change theirs with their speed."""
+        """Outlines (T, K, 2) in the body frame; only those of people change with the speed."""
         if not isinstance(self._specs[body], Person):
             return self._shape(body, 0.0)[None]
         speeds = [round(speed, 3) for speed in np.hypot(states[:, 3], states[:, 4]).tolist()]
@@ -116,7 +120,7 @@ class PlanarWorld:
         return shapes[[row[speed] for speed in speeds]]
 
     def _shape(self, body: int, speed_mps: float) -> FloatArray:
-        """The outline (K, 2) at a speed; most of the time that is the speed of the instant before."""
+        """The outline (K, 2) at a speed. It is cached, because the speed rarely changes."""
         known = self._shapes[body]
         if speed_mps not in known:
             known[speed_mps] = _padded(footprint(self._specs[body], speed_mps), self._corners)
@@ -137,7 +141,7 @@ def footprint(spec: BodySpec, speed_mps: float) -> FloatArray:
 
 
 def heights(spec: BodySpec) -> tuple[float, float]:
-    """Lowest and highest point over the floor."""
+    """The lowest and the highest point of a body above the floor."""
     on_top_m = 0.0
     if isinstance(spec, Pallet):
         on_top_m = spec.load_height_m
@@ -156,24 +160,25 @@ def _check_pairs(a: FloatArray, b: FloatArray) -> None:
 
 
 def separation(a: FloatArray, b: FloatArray) -> FloatArray:
-    """(P,) distance of convex polygons a (P, K, 2) and b (P, L, 2), counter-clockwise, pair by pair.
+    """Distances (P,) of pairs of convex polygons a (P, K, 2) and b (P, L, 2), counter-clockwise.
 
-    As sim.contact.polygon_distance, for many pairs at once: where they overlap, minus the shortest way that
-    separates them. A repeated corner does not matter. Raises ValueError if there are not as many of each.
+    As sim.contact.polygon_distance, for many pairs at once: if they overlap, minus the smallest translation
+    that separates them. A repeated corner does not matter. Raises ValueError if the numbers of polygons
+    differ.
     """
     _check_pairs(a, b)
     return _separation(a, b)
 
 
 def overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
-    """(P,) where separation() is 0 or less; raises ValueError as it does."""
+    """Whether separation() is 0 or less (P,). Raises ValueError as separation() does."""
     _check_pairs(a, b)
     return _overlap(a, b)
 
 
 @inlined
 def _widest_gap(a: FloatArray, b: FloatArray) -> float:
-    """The widest gap between a polygon (K, 2) and another one (L, 2) that any edge of the first one shows."""
+    """The widest gap between polygons (K, 2) and (L, 2) along the normals of the first one's edges."""
     widest = -math.inf
     for k in range(len(a)):
         following = (k + 1) % len(a)
@@ -191,7 +196,7 @@ def _widest_gap(a: FloatArray, b: FloatArray) -> float:
 
 @inlined
 def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
-    """The least distance of corners (K, 2) from the edges of a polygon (L, 2)."""
+    """The smallest distance of corners (K, 2) from the edges of a polygon (L, 2)."""
     nearest = math.inf
     for j in range(len(polygon)):
         following = (j + 1) % len(polygon)

@@ -1,4 +1,5 @@
-"""A tracked base as a body on the floor: two tracks with lag and limited force, scrubbing in turns."""
+"""The motion of a tracked base on the floor: two tracks with lag and limited acceleration, which scrub in
+turns."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from hal.chassis.tracks import TrackGeometry
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 
-# Substep: 1 mm of travel at 1 m/s. Within it speeds change along the exact exponential of the lag.
+# Substep: 1 mm of travel at 1 m/s. Within it, speeds follow the exact exponential of the lag.
 _STEP_NS = 1_000_000
 
 
@@ -21,7 +22,7 @@ class _Track:
     travel_m: float = 0.0
 
     def advance(self, dt_s: float, lag_s: float, max_accel_mps2: float) -> float:
-        """Move for dt_s; the distance made."""
+        """Move for dt_s; return the distance travelled."""
         change = (self.target_mps - self.speed_mps) * -math.expm1(-dt_s / lag_s)
         limit = max_accel_mps2 * dt_s
         change = min(max(change, -limit), limit)
@@ -32,10 +33,10 @@ class _Track:
 
 
 class TrackedPlant:
-    """The truth that only the simulation knows. Deterministic: same calls, same numbers.
+    """The true state of the base, which only the simulation knows. Deterministic: same calls, same numbers.
 
-    Tracks follow their targets with first-order lag, within max_accel_mps2. What the tracks say
-    (track_twist) turns faster than the body does (twist), by the slip factor.
+    The tracks follow their targets with first-order lag, within max_accel_mps2. The yaw rate from the tracks
+    (track_twist) is slip_factor times the true one (twist).
     """
 
     def __init__(self, config: PlantConfig, pose: PlanarPose | None = None, start_ns: int = 0) -> None:
@@ -57,39 +58,39 @@ class TrackedPlant:
 
     @property
     def pose(self) -> PlanarPose:
-        """Where the body truly is."""
+        """The true pose of the body."""
         return PlanarPose(self._x_m, self._y_m, math.remainder(self._heading_rad, math.tau))
 
     @property
     def twist(self) -> tuple[float, float]:
-        """(v m/s, w rad/s) of the body, truly."""
+        """The true (v m/s, w rad/s) of the body."""
         return self._true.to_twist(self._left.speed_mps, self._right.speed_mps)
 
     @property
     def track_twist(self) -> tuple[float, float]:
-        """(v m/s, w rad/s) as the base believes from its tracks."""
+        """(v m/s, w rad/s) as the base computes it from its tracks, without slip."""
         return self._nominal.to_twist(self._left.speed_mps, self._right.speed_mps)
 
     @property
     def track_speeds_mps(self) -> tuple[float, float]:
-        """(left, right)."""
+        """Speeds of the tracks (left, right)."""
         return self._left.speed_mps, self._right.speed_mps
 
     @property
     def track_travel_m(self) -> tuple[float, float]:
-        """(left, right) since the start, as encoders count it."""
+        """Travel of the tracks (left, right) since the start, as encoders count it."""
         return self._left.travel_m, self._right.travel_m
 
     def command(self, v_mps: float, w_radps: float) -> None:
-        """Aim for this twist of the tracks, as a base does that knows nothing of slip."""
+        """Set track speeds for this twist, as a base does that does not account for slip."""
         self._left.target_mps, self._right.target_mps = self._nominal.to_tracks(v_mps, w_radps)
 
     def command_tracks(self, left_mps: float, right_mps: float) -> None:
-        """Aim for these track speeds."""
+        """Set the target speeds of the tracks."""
         self._left.target_mps, self._right.target_mps = left_mps, right_mps
 
     def advance_to(self, now_ns: int) -> None:
-        """Move on to now_ns; a time that has passed changes nothing."""
+        """Move on to now_ns; a time in the past changes nothing."""
         while self._now_ns < now_ns:
             step_ns = min(_STEP_NS, now_ns - self._now_ns)
             self._advance(step_ns / NS_PER_S)
@@ -99,7 +100,7 @@ class TrackedPlant:
         left_m = self._left.advance(dt_s, self._lag_s, self._max_accel_mps2)
         right_m = self._right.advance(dt_s, self._lag_s, self._max_accel_mps2)
         distance_m, turn_rad = self._true.to_twist(left_m, right_m)
-        # The chord of so short an arc is its length to 1e-9; its direction is that of the middle.
+        # The chord of such a short arc equals its length to 1e-9, and has the direction of its middle.
         middle_rad = self._heading_rad + 0.5 * turn_rad
         self._x_m += distance_m * math.cos(middle_rad)
         self._y_m += distance_m * math.sin(middle_rad)

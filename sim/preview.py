@@ -1,4 +1,4 @@
-"""A look at a scenario: ``python -m sim.preview SCENARIO --time T --out file.png``."""
+"""Draws a scenario: ``python -m sim.preview SCENARIO --time T --out file.png``."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def main(scenario: str, t_s: float, along_m: float, seed: int, out: Path) -> Non
         robot.camera_mount.pitch_rad,
     )
     pose = pose_along(spec.path, along_m)
-    # The world began t_s ago: the camera gives its newest frame.
+    # The world began t_s ago, so the camera gives the frame of that time.
     clock = SimulatedClock(round(t_s * NS_PER_S))
     camera = SimulatedCamera(
         world, SimulatedCameraConfig(), mount, clock, body_pose=lambda _: pose, start_ns=0
@@ -61,7 +61,8 @@ def main(scenario: str, t_s: float, along_m: float, seed: int, out: Path) -> Non
 
 
 def pose_along(path: PathSpec, along_m: float) -> PlanarPose:
-    """The turning centre after along_m on the path; blended arcs as circles of the same length and angle."""
+    """The pose of the turning centre after along_m on the path. Blended arcs count as circles of the same
+    length and angle."""
     pose = PlanarPose(path.start.x_m, path.start.y_m, math.radians(path.start.heading_deg))
     for segment in path.segments:
         here_m = min(max(along_m, 0.0), segment.length_m)
@@ -74,7 +75,7 @@ def pose_along(path: PathSpec, along_m: float) -> PlanarPose:
 
 
 def sheet(frame: RgbdFrame, picture: Picture, world: World, robot: Robot, pose: PlanarPose) -> ColourImage:
-    """Four pictures in one: colour and depth above, instances and map below."""
+    """Four images in one: colour and depth above, instances and map below."""
     height, width = frame.depth.shape
     plan = cv2.resize(_map(world, robot, pose, picture.t_s), (width, height))
     upper = np.hstack([frame.colour, depth_colours(frame)])
@@ -83,7 +84,7 @@ def sheet(frame: RgbdFrame, picture: Picture, world: World, robot: Robot, pose: 
 
 
 def depth_colours(frame: RgbdFrame) -> ColourImage:
-    """Near is blue, far is red, no data is black."""
+    """Depth in colours: near is blue, far is red, no data is black."""
     metres = frame.depth * frame.depth_scale_m
     grey = np.clip(metres / _FAR_M * 255.0, 0, 255).astype(np.uint8)
     colours = np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_TURBO), dtype=np.uint8)
@@ -92,7 +93,7 @@ def depth_colours(frame: RgbdFrame) -> ColourImage:
 
 
 def mask_colours(mask: NDArray[np.uint16]) -> ColourImage:
-    """One colour for each body, dark for the building."""
+    """An instance mask in colours: one for each body, dark for the building."""
     hue = (mask.astype(np.uint32) * 47 % 180).astype(np.uint8)
     bright = np.where(mask == 0, 40, 220).astype(np.uint8)
     saturated = np.where(mask == 0, 0, 170).astype(np.uint8)
@@ -101,7 +102,8 @@ def mask_colours(mask: NDArray[np.uint16]) -> ColourImage:
 
 
 def _map(world: World, robot: Robot, pose: PlanarPose, t_s: float) -> ColourImage:
-    """From above: path, footprints, the robot and the bodies' velocities for the next second."""
+    """The scene from above: path, footprints, the robot, and each body's velocity as its way in one
+    second."""
     room = world.scenario.room
     width, height = _MAP_PX
     scale = min(width / (room.x_max_m - room.x_min_m), height / (room.y_max_m - room.y_min_m))

@@ -1,4 +1,4 @@
-"""A whole outside in one object: the emulated base on its plant, in a world that moves by itself."""
+"""The whole simulated outside in one object: the emulated base with its plant, and a referee for contacts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sim.contact import Clearance, nearest_body
 from sim.plant import TrackedPlant
 from sim.world import World
 
-# Contact is looked for this often: 1.5 cm of the fastest approach of two bodies at 1.5 m/s each.
+# Period of the check for contacts: two bodies that approach each other at 1.5 m/s each come 1.5 cm closer.
 CHECK_PERIOD_NS = NS_PER_S // 200
 
 
@@ -22,36 +22,39 @@ class Emulator(Closing, Protocol):
 
     @property
     def plant(self) -> TrackedPlant:
-        """The body that it moves."""
+        """The plant that the emulator moves."""
         ...
 
     def advance_to(self, now_ns: int) -> None:
-        """Obey, move and answer up to now_ns."""
+        """Follow commands, move and answer up to now_ns."""
         ...
 
     def press_estop(self) -> None:
-        """Whatever this base has for an emergency stop is triggered."""
+        """Trigger the emergency stop of this base."""
         ...
 
     def release_estop(self) -> None:
-        """It is no longer."""
+        """Release the emergency stop."""
         ...
 
     def restart(self) -> None:
-        """Power interrupted for a moment."""
+        """Interrupt its power for a moment."""
         ...
 
     def freeze(self) -> None:
-        """Hears and says nothing; its own time-out runs."""
+        """Let it hang: it neither receives nor sends, but its own time-out still runs."""
         ...
 
     def thaw(self) -> None:
-        """Goes on."""
+        """Let it go on."""
         ...
 
 
 class Referee:
-    """Watches the true clearance between the robot and everything at its height."""
+    """Watches the true clearance between the robot and everything at its height.
+
+    contacts: names of what was touched, in order. closest: the smallest clearance so far.
+    """
 
     def __init__(self, world: World, body: Body, start_ns: int) -> None:
         self._world = world
@@ -62,7 +65,7 @@ class Referee:
         self.closest: Clearance | None = None
 
     def watch(self, pose: PlanarPose, now_ns: int) -> None:
-        """Look once. A contact counts when it begins."""
+        """Check once. A contact counts once, when it begins."""
         now = nearest_body(self._world, self._body, pose, (now_ns - self._start_ns) / NS_PER_S)
         if self.closest is None or now.distance_m < self.closest.distance_m:
             self.closest = now
@@ -72,7 +75,8 @@ class Referee:
 
 
 class Simulation:
-    """Context manager; opens and closes the emulator's end of the link."""
+    """Emulator and referee together. A context manager that opens and closes the emulator's end of the
+    link."""
 
     def __init__(self, emulator: Emulator, referee: Referee) -> None:
         self._emulator = emulator
@@ -90,11 +94,11 @@ class Simulation:
 
     @property
     def body_pose(self) -> PlanarPose:
-        """Where the robot truly stands."""
+        """The true pose of the robot."""
         return self._emulator.plant.pose
 
     def advance_to(self, now_ns: int) -> None:
-        """Let everything outside go on until now_ns."""
+        """Advance everything outside to now_ns."""
         self._emulator.advance_to(now_ns)
         if now_ns >= self._next_check_ns:
             self.referee.watch(self.body_pose, now_ns)

@@ -1,4 +1,4 @@
-"""The simulated outside: where every face and every body is, as a pure function of time."""
+"""The simulated world: where every face and every body is, as a pure function of time."""
 
 from __future__ import annotations
 
@@ -22,10 +22,13 @@ BUILDING_ID = 0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """All faces at one time, on the floor's axes. Their order never changes within a world.
+    """N faces at one time, in the frame of the floor. Their order never changes within a world.
 
-    corners_m (N, 4, 3), normals (N, 3), windows (N, 4), texture (N,) index into World.textures,
-    body (N,): 0 is the building, k + 1 the scenario's k-th body.
+    corners_m: (N, 4, 3).
+    normals: (N, 3).
+    windows: (N, 4), see sim.models.mesh.Faces.
+    texture: (N,), index into World.textures.
+    body: (N,), 0 for the building, k + 1 for the scenario's k-th body.
     """
 
     corners_m: FloatArray
@@ -37,11 +40,14 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyState:
-    """One body at one time, on the floor's axes.
+    """One body at one time, in the frame of the floor.
 
-    id: its value in instance masks. velocity_mps (2,). footprint_m (K, 2): convex, counter-clockwise;
-    no part of it is further than reach_m from pose. z_m: lowest and highest point. moves: whether it has a
-    plan of motion at all.
+    id: its value in instance masks.
+    velocity_mps: (2,).
+    footprint_m: (K, 2), convex, counter-clockwise.
+    reach_m: greatest distance of the footprint from pose.
+    z_m: lowest and highest point.
+    moves: whether it has a motion plan.
     """
 
     id: int
@@ -65,7 +71,7 @@ class _Body:
 
 
 class World:
-    """A scenario brought to life. The seed picks textures and the jitter of the movers' start times."""
+    """A scenario over time. The seed picks textures and the jitter of the movers' start times."""
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
         self.scenario = scenario
@@ -125,7 +131,7 @@ class World:
         """Rotations (K, 3, 3) and translations (K, 3) of a mover's parts."""
         state = body.trajectory.at(t_s)
         last = self._last_poses.get(body.id)
-        if last is not None and last[0] == state:  # it stands
+        if last is not None and last[0] == state:  # it stands still
             return last[1:]
         outer = body_in_floor(PlanarPose(state.x_m, state.y_m, state.heading_rad))
         poses = [outer @ part for part in body.model.pose_parts(state)]
@@ -136,7 +142,7 @@ class World:
 
 
 def trajectory_of(spec: BodySpec, seed: int) -> Trajectory:
-    """How a body moves in a world of this seed, which shifts its start."""
+    """The trajectory of a body in a world of this seed, which shifts its start time."""
     start = PlanarPose(spec.x_m, spec.y_m, math.radians(spec.heading_deg))
     jitter_s = 0.0
     if spec.motion is not None and spec.motion.start_jitter_s > 0.0:

@@ -1,7 +1,7 @@
-"""A mission with everything real but the world: rendered frames, perception, driver, bus, emulated base.
+"""A mission in which only the world is simulated: rendered frames, perception, driver, bus and emulated base.
 
-The parts are those that `treadwatch run` drives in lock-step; what goes wrong is brought about where it would
-happen: frames are lost, repeated or blinded before perception sees them, the base stops to answer.
+The parts are those of `treadwatch run` in lockstep. Faults occur where they would occur in reality: frames
+are lost, repeated or without depth before perception gets them, or the base stops answering.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class _Freezes(Protocol):
 
 
 class SpoiledCamera:
-    """A simulated camera behind whatever goes wrong with it; a FrameSource for the lock-step runner."""
+    """A simulated camera with faults; a FrameSource for the lockstep runner."""
 
     def __init__(self, camera: SimulatedCamera, faults: Faults, glass_ids: tuple[int, ...]) -> None:
         self._camera, self._faults, self._glass_ids = camera, faults, glass_ids
@@ -66,14 +66,14 @@ class SpoiledCamera:
 
     @property
     def next_capture_ns(self) -> int:
-        """When the next frame will arrive that is not lost."""
+        """The time of the next frame that is not lost."""
         silent = self._faults.silent
         while silent is not None and silent.holds(self._camera.next_capture_ns / NS_PER_S):
             self._camera.lose_frame()
         return self._camera.next_capture_ns
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """The next frame, as it reaches perception. Raises FrameTimeout."""
+        """The next frame, with faults, as perception gets it. Raises FrameTimeout."""
         frame = self._camera.read(timeout_s)
         frozen = self._faults.frozen
         if frozen is not None and self._last is not None and frozen.holds(frame.captured_ns / NS_PER_S):
@@ -84,7 +84,7 @@ class SpoiledCamera:
         return frame
 
     def _blinded(self, frame: RgbdFrame) -> RgbdFrame:
-        """Depth returns nothing of glass."""
+        """The frame without depth on glass."""
         picture = self._camera.last_picture
         assert picture is not None, "a frame that was read has a picture behind it"
         glass = np.isin(picture.instance_mask(), self._glass_ids)
@@ -92,7 +92,7 @@ class SpoiledCamera:
 
 
 def drive_camera(stage: Stage, config: AppConfig, policy: str, keep: FilePath | None = None) -> DriveLog:
-    """One drive. keep: a folder for the recording, the observations and the video of it."""
+    """Drive once. keep: folder for the recording, the observations and the video; None: none are written."""
     with TemporaryDirectory(prefix="treadwatch-") as folder:
         scenario = FilePath(folder) / "scenario.yaml"
         scenario.write_text(scenario_yaml(stage), encoding="utf-8")
@@ -100,13 +100,13 @@ def drive_camera(stage: Stage, config: AppConfig, policy: str, keep: FilePath | 
 
 
 def scenario_yaml(stage: Stage) -> str:
-    """The mission's world as `treadwatch run --scenario` reads it."""
+    """The mission's world as YAML, as `treadwatch run --scenario` reads it."""
     content = stage.case.scenario.model_dump(mode="json", exclude_none=True)
     return yaml.safe_dump(content, sort_keys=False)
 
 
 def _with_world(config: AppConfig, stage: Stage, scenario: FilePath) -> AppConfig:
-    """The configuration in this world, with this mission's slip."""
+    """The configuration with this mission's world and slip."""
     assert isinstance(config.runner, LockstepRunner), "checked by controller/campaign/command.py"
     faults = stage.case.faults
     simulation = config.simulation or SimulationConfig(scenario=str(scenario))
@@ -167,7 +167,7 @@ def _drive(
 
 
 def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chassis: Chassis) -> ControlLoop:
-    """As controller.build has it, with this policy in place of the decision."""
+    """The control loop of controller.build, with this policy in place of the decision."""
     limits, delay_s = config.robot.limits, config.decision.chassis_delay_s
     return ControlLoop(
         path=path,
@@ -180,7 +180,8 @@ def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chas
 
 
 def recording_in(folder: FilePath, stage: Stage) -> RecordingOptions:
-    """Makes the folder, with the mission's world in it; what is seen goes there. Raises UserError."""
+    """Make the folder, write the mission's world into it, and return options to record there. Raises
+    UserError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "scenario.yaml").write_text(scenario_yaml(stage), encoding="utf-8")
@@ -192,13 +193,13 @@ def recording_in(folder: FilePath, stage: Stage) -> RecordingOptions:
 
 
 def _glass_ids(stage: Stage) -> tuple[int, ...]:
-    """Their values in instance masks: the scenario's k-th body is k + 1."""
+    """Values of glass bodies in instance masks: k + 1 for the scenario's k-th body."""
     names = stage.world.names
     return tuple(k + 1 for k, name in enumerate(names) if name in stage.case.faults.glass)
 
 
 class _Watch:
-    """Where the robot truly is along its path, and whether anything will still happen."""
+    """The true position and speed of the robot along its path, and whether anything will still happen."""
 
     def __init__(self, stage: Stage, simulation: Simulation, log: DriveLog) -> None:
         self._stage, self._simulation, self._log = stage, simulation, log
@@ -208,13 +209,13 @@ class _Watch:
 
     @property
     def given_up(self) -> bool:
-        """It has stood for long, and nothing else moves any more."""
+        """Whether the robot has stood for long, and nothing else moves any more."""
         if not self._log.times_s or self._log.times_s[-1] < self._stage.world.end_s + GIVE_UP_S:
             return False
         return self._standing_s >= GIVE_UP_S
 
     def step(self, t_s: float, armed: bool) -> None:
-        """Once a control step."""
+        """Update; called once a control step."""
         pose = self._simulation.body_pose
         self.s_m = self._stage.path.project(pose, self.s_m).s_m
         if armed and math.isnan(self.armed_s):

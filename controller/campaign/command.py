@@ -1,4 +1,4 @@
-"""`treadwatch campaign`: missions by the thousand, and one of them alone."""
+"""`treadwatch campaign`: thousands of missions, or one of them alone."""
 
 from __future__ import annotations
 
@@ -30,8 +30,11 @@ FAILING = "failing"
 
 @dataclass(frozen=True, slots=True)
 class CampaignOptions:
-    """The command line of `treadwatch campaign`. Empty families or policies mean all of them; only:
-    FAMILY:SEED, one mission alone."""
+    """The command line of `treadwatch campaign`.
+
+    families, policies: empty means all of them.
+    only: FAMILY:SEED, a single mission.
+    """
 
     config_path: Path
     missions: int
@@ -49,7 +52,8 @@ class CampaignOptions:
 
 
 def run_campaign(options: CampaignOptions) -> int:
-    """The exit code: 1 if ours failed in any mission. Raises ConfigError, UserError."""
+    """Run a campaign; return the exit code: 1 if our policy failed in any mission. Raises ConfigError,
+    UserError."""
     config = load_app(options.config_path)
     _check(options, config)
     if options.only is not None:
@@ -81,7 +85,7 @@ def run_campaign(options: CampaignOptions) -> int:
 def _run_all(options: CampaignOptions, tasks: list[Task], store: MissionStore) -> None:
     hidden = options.quiet or not sys.stderr.isatty()
     with (
-        # Closed here, so that workers end with whatever ends this, not when the garbage is collected.
+        # Closed here, so that the workers end whenever this block ends, not when the garbage is collected.
         closing(_execute(options, tasks)) as done,
         click.progressbar(length=len(tasks), label="missions", file=sys.stderr, hidden=hidden) as bar,
     ):
@@ -115,7 +119,8 @@ def _check(options: CampaignOptions, config: AppConfig) -> None:
 
 
 def _check_modes(options: CampaignOptions, store: MissionStore) -> None:
-    """A mission is known by family, seed and policy: one of another mode would pass for done."""
+    """Raise UserError if the store has rows of another mode: rows are identified by family, seed and policy
+    only, so those missions would count as done."""
     other = next((row.mode for row in store.rows.values() if row.mode != options.mode), None)
     if other is not None:
         raise UserError(
@@ -134,7 +139,7 @@ def _mission_of(text: str) -> Mission:
 
 
 def _run_one(options: CampaignOptions, config: AppConfig, mission: Mission) -> int:
-    """One mission in this process; a line for each policy."""
+    """Run one mission in this process; write a line for each policy."""
     policies = options.policies or (OURS,)
     keep = None
     if options.video:
@@ -149,7 +154,7 @@ def _run_one(options: CampaignOptions, config: AppConfig, mission: Mission) -> i
 
 
 def line_of(row: Row) -> str:
-    """A row for people."""
+    """A row as a line of text."""
     if row.time_s is None:
         took = "not reached" if row.expected else "not reached, as it should be"
     else:
@@ -162,7 +167,7 @@ def line_of(row: Row) -> str:
 
 
 def command_line(options: CampaignOptions) -> str:
-    """What repeats the campaign."""
+    """The command that repeats the campaign."""
     parts = [f"treadwatch campaign --missions {options.missions} --mode {options.mode} --seed {options.seed}"]
     if options.families:
         parts.append(f"--families {','.join(options.families)}")

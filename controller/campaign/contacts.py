@@ -1,4 +1,4 @@
-"""How near a drive came to everything, and what it touched."""
+"""The clearance of a drive, and its contacts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hal.compiled import compiled
 from hal.types import FloatArray
 from sim.planar import separation
 
-# Between two control steps two bodies come no closer to each other than this.
+# Two bodies approach each other by less than this between two control steps.
 _BETWEEN_STEPS_M = 0.15
 _SUBSTEPS = 4
 _STRIDE, _ROUNDING_M = 10, 1e-9
@@ -22,7 +22,7 @@ _STRIDE, _ROUNDING_M = 10, 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """When and with whom it began, and how fast the robot was."""
+    """When a contact began, with which body, and at which speed of the robot."""
 
     t_s: float
     body: int
@@ -31,7 +31,8 @@ class Contact:
 
 @compiled("float64[:, :, :], int64")
 def _moved_m(polygons: FloatArray, stride: int) -> FloatArray:
-    """(T,) how far any corner of polygons (T, K, 2) has moved at most since each stride-th of them."""
+    """The greatest distance (T,) that a corner of polygons (T, K, 2) has moved since the last stride-th
+    one."""
     moved = np.empty(len(polygons))
     for t in range(len(polygons)):
         since, square = t // stride * stride, 0.0
@@ -44,31 +45,34 @@ def _moved_m(polygons: FloatArray, stride: int) -> FloatArray:
 
 
 class DriveClearance:
-    """Distances between the robot and all bodies at its height, over the whole drive."""
+    """Distances between the robot and all bodies at its height over the whole drive. least_m: the
+    smallest."""
 
     def __init__(self, stage: Stage, log: DriveLog) -> None:
         self._stage, self._log = stage, log
         self._times = np.array(log.times_s)
         self._poses = log.pose_array()
-        # Between two steps a heading is interpolated: past half a turn it goes on, and not back through zero.
+        # Headings are interpolated between steps, so they must not jump from half a turn to minus half a
+        # turn.
         self._poses[:, 2] = np.unwrap(self._poses[:, 2])
         self.least_m = math.inf
         self._contacts: list[Contact] = []
         bodies = np.flatnonzero(stage.in_height).tolist()
         around = {body: self._around(body, self._times, self._poses) for body in bodies}
-        # The nearest first: of the others, only what could come nearer still is looked at closely.
+        # The nearest first. Of the others, only times at which they may come even nearer are computed
+        # exactly.
         for body in sorted(bodies, key=lambda body: float(around[body][1].min(initial=math.inf))):
             self._look_at(body, *around[body])
 
     def contacts(self) -> list[Contact]:
-        """In the order of time."""
+        """All contacts in the order of time."""
         return sorted(self._contacts, key=lambda one: (one.t_s, one.body))
 
     def _look_at(self, body: int, polygons: FloatArray, gap: FloatArray) -> None:
         gap = self._gap(polygons, gap, self._poses, _BETWEEN_STEPS_M)
         close = gap < _BETWEEN_STEPS_M
         if close.any():
-            # Look between the steps as well where something could happen there.
+            # Look between the steps, too, where a contact is possible.
             times, poses = self._between(close)
             between = self._gap(*self._around(body, times, poses), poses, math.inf)
             self._note(body, times, between)
@@ -76,7 +80,7 @@ class DriveClearance:
         self.least_m = min(self.least_m, float(gap.min(initial=math.inf)))
 
     def _around(self, body: int, times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The body's polygons (T, K, 2), and (T,) the distance of circles around it and the robot."""
+        """The body's polygons (T, K, 2), and the distances (T,) between circles around it and the robot."""
         polygons = self._stage.world.over(times, body)
         x, y, radius = circles_around(polygons).T
         reach = reach_of(self._stage.robot.body)
@@ -85,13 +89,13 @@ class DriveClearance:
     def _gap(
         self, polygons: FloatArray, gap: FloatArray, poses: FloatArray, exact_below_m: float
     ) -> FloatArray:
-        """(T,) distance; that of circles, gap, where they are further apart than what matters, and inf where
-        something else is certainly nearer."""
+        """Distances (T,). Where they are too large to matter, gap (the distance of the circles) is kept, or
+        inf if something else is certainly nearer."""
         near = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
         if not len(near):
             return gap
         robots, others = self._stage.robots(poses[near]), polygons[near]
-        # Every tenth step first: until the next ones, neither corner of both comes nearer than it has moved.
+        # Every tenth step first. Until the next of these, the distance shrinks at most as corners move.
         sampled = separation(robots[::_STRIDE], others[::_STRIDE])
         moved = _moved_m(robots, _STRIDE) + _moved_m(others, _STRIDE)
         at_least = sampled[np.arange(len(near)) // _STRIDE] - moved
@@ -116,7 +120,7 @@ class DriveClearance:
         return times, poses
 
     def _note(self, body: int, times: FloatArray, gap: FloatArray) -> None:
-        """A contact counts when it begins; it is another one after half a second apart."""
+        """Note each contact once, when it begins. After half a second without touching, it is another one."""
         speeds = np.interp(times, self._times, np.array(self._log.v_mps))
         touching = np.flatnonzero(gap <= 0.0)
         last_s = -math.inf

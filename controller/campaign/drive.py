@@ -1,4 +1,4 @@
-"""What every drive of a campaign leaves behind, whichever mode and policy it was: one row a control step."""
+"""The log of one drive of a campaign, the same for every mode and policy: one entry per control step."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from hal.types import FloatArray, PlanarPose
 
 @dataclass
 class DriveLog:
-    """Appended to once a control step. pose and speed: the truth. reached_s: when it came to rest on the
-    target, None: never. decisions: only where they are kept."""
+    """The log of a drive. Poses, s_m and v_mps are the true ones.
+
+    reached_s: when the robot came to rest on the target; None: never.
+    """
 
     setpoints: SetpointTally
     times_s: list[float] = field(default_factory=list)
@@ -27,7 +29,7 @@ class DriveLog:
     reached_s: float | None = None
 
     def add(self, t_s: float, pose: PlanarPose, s_m: float, v_mps: float, decision: Decision) -> None:
-        """One control step."""
+        """Append one control step."""
         self.times_s.append(t_s)
         self.poses.append((pose.x_m, pose.y_m, pose.heading_rad))
         self.s_m.append(s_m)
@@ -37,5 +39,5 @@ class DriveLog:
         self.sentences.append(decision.reason.sentence)
 
     def pose_array(self) -> FloatArray:
-        """(T, 3)."""
+        """The poses as (T, 3): x, y, heading."""
         return np.array(self.poses).reshape(-1, 3)

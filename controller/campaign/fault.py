@@ -1,4 +1,4 @@
-"""Whether a contact was the driver's fault: one with the same eyes and brakes avoids it."""
+"""Whether a contact was the driver's fault: a reference driver with the same view and brakes avoids it."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ AT_FAULT_MPS = 0.02
 _SIGHT_STEPS = 5
 _SEEN_MOVING_MPS = 0.1
 _AVOIDING_S = 15.0
-# Nobody drives on for longer without a new picture.
+# The reference driver brakes hard after this time without a new image.
 _PATIENCE_S = 0.6
 
 
 def at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reaction_s: float) -> bool:
-    """Whether the robot moved, and a driver who knows the whole motion of what it has once seen moving (or
-    standing, if it never moves) avoids it: with the same field of view, reaction_s and limits, by braking
-    hard, by braking comfortably, by going on, or by speeding up. Where the mission's faults take the robot's
-    eyes, or have it see everything later, they do the same to that driver, who brakes hard once that lasts.
+    """Whether the robot moved at the contact, and a reference driver avoids the contact.
+
+    The reference driver has the same field of view, reaction_s and limits. It knows the whole motion of a
+    body as soon as it has seen the body moving (or standing, if the body never moves). It brakes hard, brakes
+    comfortably, goes on, or speeds up. Faults of the mission that blind the robot or delay its scenes affect
+    the reference driver in the same way; it brakes hard once it has been blind for some time.
     """
     if contact.v_mps <= AT_FAULT_MPS:
         return False
@@ -50,10 +52,10 @@ def at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reac
 
 
 def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
-    """The step at which what was touched could first be seen as what it is; None: not before the contact.
+    """The step at which the motion of the touched body could first be seen; None: not before the contact.
 
-    It takes two looks, 0.1 s apart. Somebody who stood meanwhile is seen as what it is once it moves again:
-    nobody sees in who stands that it will go on.
+    Two looks are needed, 0.1 s apart. If a mover stands still in between, this starts anew once it moves
+    again, because its next motion cannot be seen while it stands.
     """
     body, first, before = contact.body, None, None
     moves = bool(stage.world.moves[body])
@@ -90,8 +92,8 @@ def _touches(
     accel_mps2: float,
     jerk_mps3: float,
 ) -> bool:
-    """Whether a robot that goes over to target_mps reaction_s after step start touches the body. It begins as
-    the robot was: who is becoming faster brakes later than who is not, whoever drives."""
+    """Whether a robot that changes its speed to target_mps, reaction_s after step start, touches the body. It
+    starts with the speed and acceleration of the real robot: an accelerating robot needs longer to brake."""
     earlier = max(start - _SIGHT_STEPS, 0)
     since_s = log.times_s[start] - log.times_s[earlier]
     gain_mps = log.v_mps[start] - log.v_mps[earlier]

@@ -20,7 +20,7 @@ _SHARES = tuple((value / 5, f"{value / 5:g}") for value in range(6))
 
 
 def ratio_figure(rows: list[Row]) -> Image:
-    """Which share of the missions took at most so many times the oracle's time, by policy."""
+    """Cumulative distribution of time over the oracle's time, by policy."""
     image = blank(_WIDTH, _HEIGHT)
     chart = Chart(
         image,
@@ -38,7 +38,7 @@ def ratio_figure(rows: list[Row]) -> Image:
 
 
 def clearance_figure(rows: list[Row]) -> Image:
-    """Which share of the missions came at most so near to anything, by policy; below 0 is contact."""
+    """Cumulative distribution of the smallest clearance, by policy; below 0 is contact."""
     image = blank(_WIDTH, _HEIGHT)
     chart = Chart(
         image,
@@ -57,7 +57,7 @@ def clearance_figure(rows: list[Row]) -> Image:
 def _distribution(
     chart: Chart, values: list[float], colour: Colour, label: str, low: float, high: float
 ) -> None:
-    """The empirical distribution as a line from low to high."""
+    """Draw the cumulative distribution of values as a line from low to high."""
     if not values:
         return
     ordered = np.sort(np.array(values))
@@ -66,7 +66,7 @@ def _distribution(
 
 
 def family_figure(summary: Summary) -> Image:
-    """Median time over the oracle's of each family, by policy; an arrow: longer than shown, or never."""
+    """Median time over the oracle's time of each family, by policy. An arrow: longer than shown, or never."""
     families = list(summary.families)
     width = max(_WIDTH, 60 + 46 * len(families))
     image = blank(width, _HEIGHT)

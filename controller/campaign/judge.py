@@ -1,4 +1,4 @@
-"""What a drive was like, measured against the truth."""
+"""The results of a drive, measured against the ground truth."""
 
 from __future__ import annotations
 
@@ -16,16 +16,24 @@ from controller.campaign.view import PlanarEye
 from controller.decision.decision import Action
 from hal.types import FloatArray
 
+# A flap: this many changes between faster and slower within this time.
 FLAP_REVERSALS, FLAP_S = 3, 2.0
 _STOPPED_MPS, _MOVING_AGAIN_MPS = 0.02, 0.1
+# An obstacle justifies a stop if it is in the way at any time from this long before to this long after it.
 _BEFORE_STOP_S, _AFTER_STOP_S = 4.0, 2.0
+# A fault justifies a stop for this long after its end.
 _AFTER_FAULT_S = 1.5
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of missions.jsonl. time_s: until rest on the target, None if it was not reached.
-    oracle_time_s: None if not even the oracle reaches it. expected: whether it should be reached at all."""
+    """One line of missions.jsonl.
+
+    expected: whether the target should be reached at all.
+    touched: names of the bodies of contacts at fault.
+    time_s: until rest on the target; None if it was not reached.
+    oracle_time_s: None if not even the oracle reaches the target.
+    """
 
     family: str
     seed: int
@@ -47,14 +55,14 @@ class Row:
     flaps: int
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON."""
+        """The row as a dictionary for JSON."""
         return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Yardstick:
-    """What a drive is measured by: the oracle's time, the field of view, and how long the fastest reaction to
-    something new takes (sightings, latency of perception, control period, lag of the chassis)."""
+    """What a drive is compared with: the oracle's time, the field of view, and the fastest possible reaction
+    to something new (sightings, latency of perception, control period, lag of the chassis)."""
 
     oracle: OracleTime
     eye: PlanarEye
@@ -62,7 +70,7 @@ class Yardstick:
 
 
 def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) -> Row:
-    """Everything that missions.jsonl says of a drive."""
+    """The row of a drive in missions.jsonl."""
     clearance = DriveClearance(stage, log)
     contacts = clearance.contacts()
     case, tally = stage.case, log.setpoints
@@ -90,7 +98,7 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) ->
 
 
 def flaps(log: DriveLog) -> int:
-    """How often the decision turned round between faster and slower three times within 2 s."""
+    """How often the decision changed between faster and slower three times within 2 s."""
     turns: list[float] = []
     last: Action | None = None
     for t_s, action in zip(log.times_s, log.actions, strict=True):
@@ -110,8 +118,9 @@ def flaps(log: DriveLog) -> int:
 
 
 def false_stops(stage: Stage, log: DriveLog) -> list[float]:
-    """When it came to rest before its target though nothing was on the floor that it was about to sweep,
-    from some seconds before until it went on; stops for a fault of camera or chassis are right."""
+    """The times of false stops: the robot came to rest before its target, although nothing was in the way
+    from some seconds before the stop until some seconds after it went on. Stops for a fault of camera or
+    chassis are not false."""
     v = np.array(log.v_mps)
     found = []
     for start, end in _stops(v):
@@ -131,7 +140,8 @@ def false_stops(stage: Stage, log: DriveLog) -> list[float]:
 
 
 def _stops(v: FloatArray) -> list[tuple[int, int]]:
-    """(from, to) steps of standing between driving, or at the end; standing at the start is none."""
+    """Stops as (first, last) control steps, between driving or at the end. Standing at the start is not a
+    stop."""
     stops, driving, start = [], False, 0
     for k, speed in enumerate(v.tolist()):
         if driving and speed < _STOPPED_MPS:

@@ -1,7 +1,7 @@
 """A mission without renderer and buses: noisy scenes, the real decision and shaper, a base with lag.
 
-The robot keeps its path to a centimetre or two (the path tracking is proven elsewhere); along it, the base
-follows the commanded speed with the lag of sim.plant, and odometry is a little wrong.
+The robot stays within a centimetre or two of its path (path tracking is tested elsewhere). Along the path,
+the base follows the commanded speed with the lag of sim.plant, and the odometry has a small error.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose, Setpoint
 from vision.scene import CameraCondition, CameraHealth, Scene
 
-# A robot that still stands so long after everything else has come to rest will stand for ever.
+# If the robot still stands this long after everything else has come to rest, it will stand for ever.
 GIVE_UP_S = 6.0
 _STANDING_MPS = 1e-3
 _OFF_PATH_SIGMA_M = 0.01
@@ -40,7 +40,7 @@ _FROZEN_FRAMES = 2
 
 @dataclass(slots=True)
 class _Base:
-    """The robot on its path: what the tracks do, and how far off the odometry is."""
+    """The base on its path: its true position and speed along the path."""
 
     lag_s: float
     max_accel_mps2: float
@@ -57,7 +57,7 @@ class _Base:
 
 @compiled("int64, float64, float64")
 def _exposures(steps: int, dt_s: float, fps: float) -> FloatArray:
-    """The times of those of so many control steps at which a frame is taken."""
+    """The times of the control steps, of steps in total, at which a frame is exposed."""
     times, count = np.empty(steps), 0
     for k in range(steps):
         if count / fps <= k * dt_s + 1e-9:
@@ -67,7 +67,7 @@ def _exposures(steps: int, dt_s: float, fps: float) -> FloatArray:
 
 
 class _Eyes:
-    """Frames at their times, with what goes wrong with them, and their way to the decision."""
+    """The camera with its faults, and the delay of its scenes until the decision."""
 
     def __init__(self, camera: NoisyCamera, stage: Stage, fps: float, latency_s: float) -> None:
         self._camera, self._faults = camera, stage.case.faults
@@ -83,7 +83,7 @@ class _Eyes:
         return self._frame / self._fps <= t_s + 1e-9
 
     def look(self, t_s: float, true_pose: PlanarPose, known_pose: PlanarPose) -> None:
-        """One frame from true_pose, where the robot believes to be at known_pose."""
+        """Expose one frame. known_pose: the pose by odometry."""
         faults = self._faults
         self._frame += 1
         if faults.silent is not None and faults.silent.holds(t_s):
@@ -97,7 +97,7 @@ class _Eyes:
         self._on_way.append((t_s + self._latency_s + faults.late_by(t_s), scene))
 
     def _frozen(self, last: Scene, t_s: float) -> Scene:
-        """The same picture with a new stamp, as vision/camera/health.py sees it."""
+        """The same image with a new stamp, judged as by vision/camera/health.py."""
         self._same += 1
         health = last.health
         if self._same >= _FROZEN_FRAMES:
@@ -112,12 +112,13 @@ class _Eyes:
 
 
 def drive_noise(stage: Stage, config: AppConfig, policy: Decides) -> DriveLog:
-    """One drive from rest at the start until rest at the target, or until nothing more will happen."""
+    """Drive from rest at the start until rest at the target, or until nothing more will happen."""
     return _NoiseDrive(stage, config, policy).run()
 
 
 class _NoiseDrive:
-    """One robot with its errors: odometry that is off by a share, a path kept to a centimetre or two."""
+    """One drive of a robot with a relative error of its odometry, and a lateral error of a centimetre or
+    two."""
 
     def __init__(self, stage: Stage, config: AppConfig, policy: Decides) -> None:
         assert isinstance(config.camera, SimulatedCameraConfig)
@@ -140,7 +141,7 @@ class _NoiseDrive:
         stage.world.foresee(_exposures(steps, self._dt_s, fps))
 
     def run(self) -> DriveLog:
-        """All control steps until the drive is over."""
+        """Run control steps until the drive is over."""
         for k, off_m in enumerate(self._off_m.tolist()):
             t_s = k * self._dt_s
             pose = self._stage.pose(self._base.s_m, off_m)
@@ -153,11 +154,11 @@ class _NoiseDrive:
 
     @property
     def _known_s_m(self) -> float:
-        """How far it believes to have come."""
+        """The position along the path by odometry."""
         return self._base.s_m * self._odometry
 
     def _decide(self, t_s: float, pose: PlanarPose, off_m: float) -> Decision:
-        """For the robot that truly is at pose, and believes to be elsewhere along the path."""
+        """The decision of one control step. pose: the true one; the policy gets the pose by odometry."""
         known_s_m = self._known_s_m
         known_pose = self._stage.pose(known_s_m, off_m)
         if self._eyes.due(t_s):
@@ -176,7 +177,7 @@ class _NoiseDrive:
 
     def _move(self, t_s: float, decision: Decision) -> None:
         if self._has_lost_feedback(t_s):
-            # The driver has stopped the base (hal/chassis/arming.py); only consent would lead on.
+            # The driver has stopped the base (hal/chassis/arming.py); only consent would end that.
             self._base.advance(0.0, self._dt_s)
             return
         shaped = self._shaper.step(
@@ -192,7 +193,7 @@ class _NoiseDrive:
         return lost_s is not None and t_s >= lost_s + _FEEDBACK_TIMEOUT_S
 
     def _is_over(self, t_s: float) -> bool:
-        """At rest, and on the target, stopped for good, or given up."""
+        """Whether the robot is at rest, and on the target, stopped for good, or given up."""
         if self._base.v_mps >= _STANDING_MPS:
             self._standing_s = 0.0
             return False
@@ -207,7 +208,8 @@ class _NoiseDrive:
 
 @compiled("float64[:], float64")
 def _off_path_m(white: FloatArray, dt_s: float) -> FloatArray:
-    """How far to the left of its path the robot is at each control step: white noise (N,), made slow."""
+    """The lateral offset of the robot from its path at each control step (N,): white noise, low-pass
+    filtered."""
     keep = math.exp(-dt_s / _OFF_PATH_S)
     shake_m = _OFF_PATH_SIGMA_M * math.sqrt(1.0 - keep * keep)
     off_m, all_m = 0.0, np.empty(len(white))

@@ -1,4 +1,4 @@
-"""How far off a real perception is: the numbers behind controller/campaign/noisy_camera.py."""
+"""The errors of a real perception, as numbers for controller/campaign/noisy_camera.py."""
 
 from __future__ import annotations
 

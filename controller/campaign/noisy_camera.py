@@ -1,15 +1,15 @@
-"""Scenes made from the truth, with the errors of a real perception: fast, in place of camera and vision.
+"""Scenes made from the ground truth with the errors of a real perception, which is faster than rendering.
 
-What is modelled, and from where the numbers are:
-* the field of view, the depth range, what stands before what (controller/campaign/view.py); of what is nearer
-  than the least depth nothing is measured;
-* depth noise sigma = 0.0075 z^2 per pixel (measured on a real RealSense), of which a tracked body keeps a
-  quarter as a wandering error, and of which the nearest surface of a band, being the third smallest of some
-  twenty cells, shows its near tail;
-* a body is reported from its third sighting on, is missed in some frames (more of them far away), is
-  predicted while it is not seen, and forgotten after half a second, as vision/tracker.py does;
-* velocity follows the truth with a lag of the measuring window, with an error that wanders, and with a
-  spread that is as wide as V_omax at first sight.
+What is modelled, and the source of the numbers:
+* the field of view, the depth range and occlusion (controller/campaign/view.py); bodies nearer than the
+  minimum depth are not measured;
+* depth noise with sigma = 0.0075 z^2 per pixel (measured on a real RealSense). A tracked body keeps a quarter
+  of it as a slowly varying error. The nearest surface of a band is the third smallest of some twenty cells,
+  so it is biased towards the camera;
+* a body is reported from its third sighting on, is missed in some frames (more often far away), is predicted
+  while it is not seen, and is forgotten after half a second, as in vision/tracker.py;
+* velocity follows the truth with the lag of the measuring window and a slowly varying error. Its standard
+  deviation is as large as V_omax at the first sighting.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _GOOD = CameraHealth(CameraCondition.GOOD, "", 0.95)
 
 
 class NoisyCamera:
-    """One camera's perception. look() once a frame; all randomness is the seed's."""
+    """The perception of one camera; call look() once a frame. All random numbers come from the seed."""
 
     def __init__(
         self, stage: Stage, camera: SimulatedCameraConfig, seed: int, noise: NoiseModel | None = None
@@ -51,7 +51,7 @@ class NoisyCamera:
         self._random = np.random.default_rng((seed, 0xCA))
         glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
         self._glass, self._scanned = glass, stage.in_height & ~glass
-        # What hangs above the robot is no obstacle.
+        # A body that hangs above the robot is not an obstacle.
         listed = ~glass & (stage.world.z_m[:, 0] < stage.robot.body.height_m)
         to_optical = camera_in_body(mount_of(stage.robot)).rotation.T
         self._tracks = NoisyTracks(
@@ -59,7 +59,7 @@ class NoisyCamera:
         )
 
     def look(self, t_s: float, sequence: int, true_pose: PlanarPose, known_pose: PlanarPose) -> Scene:
-        """The scene of an exposure at t_s. known_pose: where the robot believes to be."""
+        """The scene of an exposure at t_s. known_pose: the robot's pose by odometry."""
         polygons, velocity = self._stage.world.look(t_s)
         view = self.eye.look(polygons, true_pose)
         self._tracks.advance(velocity, t_s, self._random)
@@ -75,7 +75,8 @@ class NoisyCamera:
         )
 
     def _free_space(self, view: PlanarView) -> FreeSpace:
-        """What the bands show: the nearest thing in the robot's height, and how far the floor is free."""
+        """The free space: for each band, the nearest surface at the robot's height, and how far the floor is
+        free."""
         noise, eye = self._noise, self.eye
         distances, blind = _scanned(
             view.bodies,
@@ -102,7 +103,7 @@ class NoisyCamera:
 
 
 def mount_of(robot: Robot) -> CameraMount:
-    """Where the camera sits."""
+    """The mount of the robot's camera."""
     mount = robot.camera_mount
     return CameraMount(mount.forward_m, mount.left_m, mount.height_m, mount.pitch_rad)
 
@@ -124,8 +125,11 @@ def _scanned(
     range_m: float,
     least_m: float,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """(2, B) nearest_m and known_m, and (B,) blank of FreeSpace. scanned, glass (N,): which bodies depth is
-    measured of, and which are of glass; errors (B,): of depth, as normal as can be."""
+    """nearest_m and known_m (2, B), and blank (B,) of FreeSpace.
+
+    scanned, glass: (N,), which bodies have depth, and which are made of glass.
+    errors: (B,), standard normal errors of depth.
+    """
     bands = len(free_m)
     distances, blind = np.empty((2, bands)), np.zeros(bands, np.bool_)
     nearest, known = distances
@@ -138,7 +142,7 @@ def _scanned(
                 hidden = min(hidden, forward_m[row, b])
         if free_m[b] <= min(near, range_m) and hidden > free_m[b]:
             near = free_m[b]  # the building
-        # Through glass nothing is measured, neither it nor what is behind it.
+        # There is no depth of glass, nor of anything behind it.
         if hidden < near:
             near = math.inf
         if near < math.inf:

@@ -1,4 +1,4 @@
-"""What a perception with errors keeps of the bodies that it sees: controller/campaign/noisy_camera.py."""
+"""The tracks of a perception with errors; part of controller/campaign/noisy_camera.py."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from vision.scene import Obstacle
 BoolArray = NDArray[np.bool_]
 
 _BOX_PX = (0.0, 0.0, 1.0, 1.0)
-# How well it is known that nothing goes up or down.
+# Standard deviation of the vertical velocity.
 _UP_MPS = 0.1
-# What was in view in the frame before was so within this many of its periods.
+# A body was seen in the last frame if it was seen within this many frame periods.
 _SEEN_FRAMES = 1.5
-# What is kept of a body, in a row: the number that it has, when it was seen first and last, and how often, 0
-# if it is not known; its middle on the floor, velocity and size across, up and along the view, as they would
-# be measured without errors; for how long it has seemed to move, and whether it is judged to; the errors of
-# place and velocity, along the view and to its left, in sigmas.
+# Columns of a track: id; time of the first and of the last sighting; number of sightings (0: not tracked);
+# centre on the floor, velocity, and size across, up and along the view, all without errors; for how long the
+# body has seemed to move, and whether it is judged to move. From _ERRORS on: the errors of position and
+# velocity, along the view and to its left, in sigmas.
 _NUMBER, _FIRST_S, _SEEN_S, _SIGHTINGS, _X, _Y, _VX, _VY, _WIDE, _HIGH, _DEEP, _SEEMS_S, _MOVES = range(13)
 _ERRORS, _COLUMNS = 13, 17
 
 
 class NoisyTracks:
-    """Of N bodies. Once a frame: advance, sight, obstacles; all randomness is random's."""
+    """The tracks of N bodies. Once a frame: advance(), sight(), obstacles(). All random numbers: random's."""
 
     def __init__(
         self,
@@ -42,8 +42,8 @@ class NoisyTracks:
         camera: SimulatedCameraConfig,
         noise: NoiseModel,
     ) -> None:
-        """z_m (N, 2): lowest and highest point of the bodies; listed (N,): which of them are obstacles.
-        to_optical (3, 3): turns ahead, left and up of the camera, eye_m high, into its optical axes."""
+        """z_m (N, 2): lowest and highest point of the bodies. listed (N,): which bodies are obstacles.
+        to_optical (3, 3): rotates ahead, left, up of the camera, eye_m high, into its optical axes."""
         self._listed, self._to_optical = listed, np.ascontiguousarray(to_optical)
         self._eye, self._noise = eye, noise
         self._period_s, self._least_m = 1.0 / camera.fps, camera.depth_min_m
@@ -55,8 +55,8 @@ class NoisyTracks:
         self._keeps, self._follows = 0.0, -math.expm1(-self._period_s / noise.velocity_lag_s)
 
     def advance(self, velocity_mps: FloatArray, t_s: float, random: np.random.Generator) -> None:
-        """Errors wander, measured velocities follow the true ones (N, 2); what is not seen goes on as it did,
-        or as it was thought to."""
+        """Advance by one frame: errors change slowly, measured velocities follow the true ones (N, 2), and
+        bodies that are not seen keep their last measured velocity."""
         fresh = random.standard_normal((len(self._tracks), _COLUMNS - _ERRORS))
         since_s = t_s - _SEEN_FRAMES * self._period_s
         self._tracks = _gone_on(
@@ -65,7 +65,7 @@ class NoisyTracks:
         self._keeps = math.exp(-self._period_s / self._noise.wander_s)
 
     def sight(self, view: PlanarView, t_s: float, random: np.random.Generator) -> None:
-        """Take in what this frame shows."""
+        """Update the tracks with the bodies in this frame."""
         noise, eye = self._noise, self._eye
         chance = random.random(len(self._tracks))
         self._tracks = _sighted(
@@ -91,7 +91,7 @@ class NoisyTracks:
         )
 
     def obstacles(self, view: PlanarView, t_s: float) -> tuple[Obstacle, ...]:
-        """As perception lists them to who has this view."""
+        """The obstacles as perception reports them for this view."""
         noise = self._noise
         told, vectors, covariances = _measured(
             self._tracks,
@@ -139,8 +139,8 @@ def _gone_on(
     follows: float,
     dt_s: float,
 ) -> FloatArray:
-    """The tracks (N, C) dt_s later: of the errors is kept so much, and fresh ones (N, 4) are added; the
-    velocities of those seen since then follow the true ones (N, 2), by so much."""
+    """The tracks (N, C) dt_s later. keeps: share of the old errors that stays; fresh (N, 4): new errors.
+    follows: by which share velocities of bodies seen since seen_since_s approach the true ones (N, 2)."""
     tracks = tracks.copy()
     adds = math.sqrt(1.0 - keeps * keeps)
     for k in range(len(tracks)):
@@ -159,8 +159,8 @@ def _gone_on(
 def _shown(
     forward_m: FloatArray, bearing_tan: FloatArray, half_width_tan: float, least_m: float
 ) -> tuple[float, float, float, float]:
-    """From where to where a body reaches, forward and to the right, by what the bands (B,) show of it; inf:
-    nothing."""
+    """The extent (near, far, left, right) of a body by the bands (B,) that show it; near: inf if none
+    does."""
     near, far, left, right = math.inf, -math.inf, math.inf, -math.inf
     for b in range(len(bearing_tan)):
         z = forward_m[b]
@@ -172,7 +172,7 @@ def _shown(
 
 @inlined
 def _judge(track: FloatArray, fast: bool, dt_s: float, rise_s: float, fall_s: float) -> None:
-    """Whether it moves: with hysteresis, after one frame more, in which it was fast or not."""
+    """Update whether the body moves, with hysteresis. fast: whether it was fast in this frame."""
     if fast:
         track[_SEEMS_S] = min(track[_SEEMS_S] + dt_s, rise_s + dt_s)
         if track[_SEEMS_S] >= rise_s:
@@ -212,8 +212,8 @@ def _sighted(
     fall_s: float,
     forget_s: float,
 ) -> FloatArray:
-    """The tracks (N, C) after a frame in which bodies (M,) are forward_m (M, B) ahead. Missed are those
-    whose chance (N,) is less than their share."""
+    """The tracks (N, C) after a frame that shows bodies (M,) at distances forward_m (M, B). A body is missed
+    if its random chance (N,) in 0..1 is less than the missed share at its distance."""
     tracks = tracks.copy()
     newest = tracks[:, _NUMBER].max() if len(tracks) else 0.0
     for row in range(len(bodies)):
@@ -264,8 +264,8 @@ def _measured(
     first_mps: float,
     fades_s: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of the R bodies that are told of: number, whether it moves, how long ago it was seen first and last
-    (R, 4); position, extent and velocity (R, 3, 3) in optical axes; the covariance of this (R, 3, 3)."""
+    """The R bodies that are reported: id, whether it moves, times since its first and last sighting (R, 4);
+    position, extent and velocity in optical axes (R, 3, 3); covariance of the velocity (R, 3, 3)."""
     count, found = len(tracks), 0
     told, vectors, covariances = np.empty((count, 4)), np.empty((count, 3, 3)), np.empty((count, 3, 3))
     for k in range(count):

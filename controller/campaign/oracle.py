@@ -5,12 +5,12 @@ speeds are multiples of A dt and positions of A dt^2 / 2: a lattice on which eve
 
     v' = v + a dt,   s' = s + v dt + a dt^2 / 2    ->    k' = k + i,   n' = n + 2 k + i,   i in {-1, 0, 1}
 
-and all positions of one speed are the bits of one integer: a step is a few shifts. The top speed is a
-multiple of A dt by the choice of dt. A standing robot that something walks into is not at fault, so only
-moving states are taken out where something stands.
+and all positions of one speed are the bits of one integer, so that a step is a few shifts. dt is chosen so
+that the top speed is a multiple of A dt. A standing robot that something walks into is not at fault, so only
+moving states are removed where something stands.
 
-The time of the free way is computed exactly instead (s-curve, controller/braking.py); the lattice tells by
-how much what is in the way delays the arrival.
+The time without obstacles is computed exactly (s-curve, controller/braking.py). The lattice gives only the
+delay that obstacles cause.
 """
 
 from __future__ import annotations
@@ -33,33 +33,36 @@ _NEVER = -1
 
 @dataclass(frozen=True, slots=True)
 class OracleTime:
-    """total_s: the shortest time to the target (inf: it cannot be reached within the horizon), of which
-    delay_s are for the sake of what is in the way."""
+    """total_s: the shortest time to the target; inf if it cannot be reached within the horizon. delay_s: the
+    share of it that obstacles cause."""
 
     total_s: float
     delay_s: float
 
 
 class Lattice:
-    """Steps of one top speed and acceleration. length_m is rounded to the lattice (about 5 mm)."""
+    """The lattice for one top speed and acceleration. length_m is rounded to it (about 5 mm)."""
 
     def __init__(self, top_mps: float, accel_mps2: float, length_m: float) -> None:
         self.dt_s = top_mps / (_LEVELS * accel_mps2)
         self.speeds_mps = accel_mps2 * self.dt_s * np.arange(_LEVELS + 1)
         self.step_m = 0.5 * accel_mps2 * self.dt_s**2
-        # From rest to rest the lattice makes even numbers of steps only.
+        # From rest to rest, the lattice reaches only even numbers of position steps.
         self.end = 2 * round(0.5 * length_m / self.step_m)
         self._whole = (1 << (self.end + 1)) - 1
         self._allowed = [self._whole] * (_LEVELS + 1)
 
     def limit(self, s_m: FloatArray, speed_mps: FloatArray) -> None:
-        """Take out states faster than speed_mps (N,) at s_m (N,), ascending."""
+        """Remove states faster than speed_mps (N,) at s_m (N,), which must increase."""
         at = np.interp(np.arange(self.end + 1) * self.step_m, s_m, speed_mps)
         for k, speed in enumerate(self.speeds_mps.tolist()):
             self._allowed[k] = _bits(at >= speed - 1e-9)
 
     def steps_to_end(self, blocked: list[list[tuple[float, float]]]) -> int:
-        """How many steps until it stands on the end; blocked: for each step. -1: not within them."""
+        """The number of steps until the robot stands at the end; -1 if there are not enough steps.
+
+        blocked: for each step, the intervals of s that are blocked.
+        """
         states = [1] + [0] * _LEVELS
         for number, stretches in enumerate(blocked):
             if number:
@@ -93,10 +96,10 @@ def _bits(flags: NDArray[np.bool_]) -> int:
 
 
 def free_time_s(s_m: FloatArray, speed_mps: FloatArray, accel_mps2: float, jerk_mps3: float) -> float:
-    """From rest at the first s to rest at the last one, nowhere faster than speed_mps.
+    """The time from rest at the first s to rest at the last one, nowhere faster than speed_mps.
 
-    Exact for the acceleration limit; the jerk limit adds A / J wherever the profile has one start, one
-    stop and reaches A, and the s-curve's own time where it does not.
+    Exact for the acceleration limit. The jerk limit adds A / J if the profile has one start and one stop and
+    reaches A, and otherwise the additional time of the s-curve.
     """
     v2 = np.minimum(speed_mps, math.inf) ** 2
     v2[0] = v2[-1] = 0.0
@@ -109,7 +112,7 @@ def free_time_s(s_m: FloatArray, speed_mps: FloatArray, accel_mps2: float, jerk_
 
 @compiled("float64[:], float64[:]")
 def _reached(v2: FloatArray, rise: FloatArray) -> FloatArray:
-    """The squares of speeds (N,) that neither rise nor fall faster than by rise (N - 1,)."""
+    """Squares of speeds (N,), limited so that they neither rise nor fall by more than rise (N - 1,)."""
     v2 = v2.copy()
     for k in range(len(rise)):
         v2[k + 1] = min(v2[k + 1], v2[k] + rise[k])
@@ -119,7 +122,7 @@ def _reached(v2: FloatArray, rise: FloatArray) -> FloatArray:
 
 
 def solve(stage: Stage, top_mps: float, horizon_s: float) -> OracleTime:
-    """The oracle's time for a mission. top_mps: what the range of the camera admits."""
+    """The oracle's time for a mission. top_mps: the speed that the range of the camera allows."""
     limits = stage.robot.limits
     length = stage.path.length_m
     s_m = np.linspace(0.0, length, max(2, math.ceil(length / _GRID_M) + 1))

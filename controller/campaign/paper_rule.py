@@ -1,7 +1,7 @@
-"""The paper's rule on the same scenes: brake while anything is within S_n = S_r + V_o T_t of the way ahead.
+"""The paper's rule on the same scenes: brake while anything is within S_n = S_r + V_o T_t on the way ahead.
 
 Daeef 2020, problem statement: S_r = V^2 / 2A, T_t = V / A, V_o the speed of an obstacle that comes towards
-the robot (0 for what stands or goes away). No latency, no jerk, no prediction and no hysteresis.
+the robot (0 if it stands or moves away). No latency, no jerk, no prediction and no hysteresis.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class PaperRule:
         self._bodies: Bodies | None = None
 
     def step(self, at: Situation) -> Decision:
-        """Stop for the first thing that is within its S_n, or drive as the path allows."""
+        """Stop for any obstacle within its S_n, else drive as the path allows."""
         if at.scene is None:
             return decision("paper", "nothing seen yet", 0.0, at.v_mps)
         if self._corridor is None:
@@ -50,13 +50,13 @@ class PaperRule:
         return decision("paper", "nothing within S_n", free_mps, at.v_mps)
 
     def detection_distance(self, v_mps: float, closing_mps: float) -> float:
-        """S_n, and a hand's breadth without which a robot at rest would touch what it stands before."""
+        """S_n plus 0.1 m, without which the robot would come to rest in contact with the obstacle."""
         limits = self._robot.limits
         towards_mps = min(max(closing_mps, 0.0), limits.max_obstacle_speed_mps)
         return _STOP_SHORT_M + braking.paper_detection_distance(v_mps, towards_mps, limits.max_accel_mps2)
 
     def _inside(self, bodies: Bodies, corridor: Corridor, s_m: float) -> list[tuple[float, float]]:
-        """(free way of the front, closing speed) of everything in the swept corridor ahead."""
+        """(free way before the front, closing speed) of each obstacle in the swept corridor ahead."""
         if not len(bodies):
             return []
         placed = place(bodies, corridor, np.zeros(1), s_m, _LOOK_M)

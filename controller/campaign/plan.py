@@ -1,4 +1,4 @@
-"""Which missions a campaign is made of, and on what they run."""
+"""Which missions a campaign consists of, and on which processes they run."""
 
 from __future__ import annotations
 
@@ -11,25 +11,26 @@ from controller.campaign.task import Task, run_task
 from controller.errors import UserError
 from controller.workers import worker_processes
 
-# As many tasks are on their way as keep every worker busy; the rest waits here and can still be dropped.
+# Tasks submitted per worker, enough to keep every worker busy. The rest waits here and can still be dropped.
 _AHEAD = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """One of a campaign; a family and a seed say everything."""
+    """One mission of a campaign, defined by its family and seed."""
 
     family: str
     seed: int
 
 
 def missions(count: int, families: tuple[str, ...], seed: int) -> list[Mission]:
-    """count missions in turn over the families; each family counts its seeds up from seed."""
+    """count missions, alternating between the families; each family counts its seeds up from seed."""
     return [Mission(families[k % len(families)], seed + k // len(families)) for k in range(count)]
 
 
 def run_here(tasks: list[Task], workers: int) -> Generator[list[Row], None, None]:
-    """On this machine's processes; in this one if workers is 1. Rows come as they are done."""
+    """Run tasks in processes of this machine, or in this process if workers is 1. Rows come as they are
+    done."""
     if workers == 1:
         for task in tasks:
             yield run_task(task)
@@ -39,7 +40,7 @@ def run_here(tasks: list[Task], workers: int) -> Generator[list[Row], None, None
 
 
 def run_there(tasks: list[Task], scheduler: str) -> Generator[list[Row], None, None]:
-    """On a cluster, through Dask distributed's executor. Raises UserError."""
+    """Run tasks on a cluster, through the executor of Dask distributed. Raises UserError."""
     try:
         from distributed import Client
     except ImportError as error:
@@ -65,7 +66,7 @@ def run_there(tasks: list[Task], scheduler: str) -> Generator[list[Row], None, N
 def _run(
     pool: Executor, tasks: list[Task], workers: int, running: set[Future[list[Row]]]
 ) -> Iterator[list[Row]]:
-    """running: what is on its way at any time."""
+    """Run tasks on pool. running: the submitted tasks, kept up to date for the caller."""
     waiting = iter(tasks)
     for _, task in zip(range(workers * _AHEAD), waiting, strict=False):
         running.add(pool.submit(run_task, task))

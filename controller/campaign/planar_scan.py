@@ -1,4 +1,4 @@
-"""A perfect planar scanner at the robot's front: every point true, at a fixed height over the floor."""
+"""A perfect planar laser scanner at the robot's front: exact points, at a fixed height above the floor."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _NOTHING = np.full(_RAYS, np.inf)
 
 
 class PlanarScanner:
-    """Looks every 66 ms, as safety scanners do; what it says is exact. Points are in the body frame.
+    """Scans every 66 ms, as safety scanners do, without errors. Points are in the body frame.
 
-    It sees what is at its height only: a pallet on the floor and a beam are not there for it.
+    It sees only what is at its height: neither a pallet on the floor nor a beam.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -37,7 +37,8 @@ class PlanarScanner:
         self._taken_at: PlanarPose | None = None
 
     def points(self, pose: PlanarPose, t_s: float) -> FloatArray:
-        """(P, 2) points of the newest scan in the body frame now: shifted by the robot's own motion since."""
+        """Points (P, 2) of the newest scan, moved to the present body frame by the robot's motion since
+        then."""
         if t_s >= self._next_s:
             self._next_s = t_s + _PERIOD_S
             self._points = self._scan(pose, t_s)
@@ -67,8 +68,8 @@ def _nearest(
     heading_rad: float,
     front_m: float,
 ) -> FloatArray:
-    """(R,) how far rays reach until they meet the first edge of polygons (N, K, 2), or what they met so far.
-    They begin front_m ahead of a body at x_m, y_m, and their angles are to its heading."""
+    """The lengths (R,) of rays up to the first edge of polygons (N, K, 2), at most so_far_m. The rays begin
+    front_m ahead of a body at x_m, y_m; their angles are relative to its heading."""
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     nearest, corners = so_far_m.copy(), polygons.shape[1]
     forward, left = np.empty(corners), np.empty(corners)

@@ -33,5 +33,5 @@ POLICY_NAMES: tuple[str, ...] = tuple(_BUILDERS)
 
 
 def build_policy(name: str, config: AppConfig, stage: Stage) -> Decides:
-    """A policy for one drive. Those with a scanner of their own see the truth of the stage, unspoiled."""
+    """A policy for one drive. Those with their own scanner see the true stage, without errors or faults."""
     return _BUILDERS[name](config, stage)

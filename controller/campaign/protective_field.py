@@ -1,9 +1,9 @@
 """A speed-dependent protective field, as safety laser scanners monitor it (motion-formulas 4.3).
 
-S_L = S_A + TZ + Z_R + Z_F + Z_B with S_A = S_Br(v) + t_R v: the stopping distance at the present speed, what
-is driven in the response time, the scanner's tolerance, and what is added because a base lower than 120 mm
-could reach a foot (microScan3 8017784, p. 43). Anything in the field stops the robot with emergency braking;
-it goes on two seconds after the field for walking pace has become free.
+S_L = S_A + TZ + Z_R + Z_F + Z_B with S_A = S_Br(v) + t_R v: the stopping distance at the present speed, the
+distance driven in the response time, the scanner's tolerance, and a supplement because a base lower than 120
+mm could reach a foot (microScan3 8017784, p. 43). Anything in the field stops the robot with emergency
+braking. It goes on two seconds after the field for walking pace has become free.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class ProtectiveField:
         self._free_since_s: float | None = None
 
     def step(self, at: Situation) -> Decision:
-        """Stop while anything is in the field; go on some time after it has become free."""
+        """Stop while anything is in the field; go on some time after the field has become free."""
         t_s = at.now_ns / NS_PER_S
         field_mps = max(at.v_mps, _RESTART_MPS if self._stopped else 0.0)
         if self._intruded(self._scanner.points(at.pose, t_s), at, field_mps):
@@ -54,14 +54,16 @@ class ProtectiveField:
         return decision("field", "field free", free_mps, at.v_mps)
 
     def length(self, v_mps: float) -> float:
-        """S_L from the front, in metres."""
+        """S_L in metres, from the robot's front."""
         stop_m = braking.stop(v_mps, 0.0, self._brake).distance_m
         return stop_m + RESPONSE_S * v_mps + TOLERANCE_M + GROUND_CLEARANCE_M
 
     def _intruded(self, points: FloatArray, at: Situation, v_mps: float) -> bool:
-        """Whether anything is in the field for v_mps, which follows the path as the steering angle's would.
+        """Whether anything is in the field for v_mps. The field follows the path, as one that is selected by
+        the steering angle would.
 
-        points (P, 2): in the body frame."""
+        points: (P, 2), in the body frame.
+        """
         body, pose, s_m = self._robot.body, at.pose, at.on_path.s_m
         reach = body.front_m + self.length(v_mps)
         near = (points[:, 0] > -body.rear_m) & (np.hypot(points[:, 0], points[:, 1]) < reach + 1.0)

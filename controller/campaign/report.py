@@ -19,7 +19,7 @@ _WORST = 40
 
 
 def write_report(folder: Path, rows: Iterable[Row], command: str) -> Summary:
-    """Everything but missions.jsonl. command: what repeats it. Raises UserError."""
+    """Write everything except missions.jsonl. command: the command that repeats it. Raises UserError."""
     rows = list(rows)
     summary = summarise(rows)
     content = {"command": command, "missions": len({(row.family, row.seed) for row in rows})}

@@ -1,4 +1,4 @@
-"""What the policies that ours is compared with have in common."""
+"""Common parts of the policies that ours is compared with."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _DEAD_BAND_MPS = 0.03
 def decision(
     rule: RivalRule, sentence: str, target_mps: float, v_mps: float, *, hard: bool = False
 ) -> Decision:
-    """The target with the action that follows from it. hard: braking beyond comfort is allowed for it."""
+    """A decision for the target, with the action that follows. hard: emergency braking is allowed for it."""
     if target_mps > v_mps + _DEAD_BAND_MPS:
         action = Action.INCREASE
     elif target_mps < v_mps - _DEAD_BAND_MPS:
@@ -25,7 +25,7 @@ def decision(
 
 
 def free_speed(path: Path, on_path: OnPath, limits: Limits) -> float:
-    """What path and target allow, everything else away: the same for all policies."""
+    """The speed that the path and its end allow without obstacles: the same for all policies."""
     left_m = max(path.length_m - on_path.s_m, 0.0) + 0.02
     end_mps = braking.speed_for_distance(left_m, braking.comfort(limits))
     return min(path.speed_limit(on_path.s_m), limits.max_speed_mps, end_mps)

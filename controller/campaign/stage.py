@@ -1,4 +1,4 @@
-"""One mission's world in the plane, for everybody who needs the truth: camera model, judge, oracle."""
+"""The world of one mission in the plane: the ground truth for camera model, judge and oracle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SWEEP_STEP_M = 0.05
 
 
 class Stage:
-    """A case with its path and its robot. in_height (N,): bodies that the robot could touch."""
+    """A case with its path and its robot. in_height (N,): whether the robot could touch the body."""
 
     def __init__(self, case: Case, robot: Robot) -> None:
         self.case, self.robot = case, robot
@@ -33,7 +33,8 @@ class Stage:
         self._table = self.path_poses(s_m)
 
     def pose(self, s_m: float, d_m: float = 0.0) -> PlanarPose:
-        """The path's pose at s_m, d_m to its left; from a table, 1 mm exact on a radius of 0.1 m."""
+        """The path's pose at s_m, moved d_m to its left. From a table, accurate to 1 mm on a radius of 0.1
+        m."""
         return PlanarPose(*_beside(self._table, s_m / _TABLE_STEP_M, d_m))
 
     def robots(self, poses: FloatArray) -> FloatArray:
@@ -41,11 +42,11 @@ class Stage:
         return rectangles(self.robot.body, poses)
 
     def path_poses(self, s_m: FloatArray) -> FloatArray:
-        """(T, 3) poses of the path."""
+        """Poses (T, 3) of the path at s_m (T,)."""
         return np.stack(self.path.poses(s_m), axis=1)
 
     def blocked(self, times_s: FloatArray) -> list[list[tuple[float, float]]]:
-        """For each time, the stretches (from, to) of s at which the robot would touch something."""
+        """For each time, the intervals (from, to) of s in which the robot would touch something."""
         stretches: list[list[tuple[float, float]]] = [[] for _ in times_s]
         s_m = np.arange(0.0, self.path.length_m + _SWEEP_STEP_M, _SWEEP_STEP_M)
         poses = self.path_poses(s_m)
@@ -66,13 +67,13 @@ class Stage:
 
 
 def reach_of(body: Body) -> float:
-    """The radius of a circle around a robot's turning centre that holds all of it."""
+    """The radius of the circle around the turning centre that encloses the robot."""
     return math.hypot(max(body.front_m, body.rear_m), 0.5 * body.width_m)
 
 
 @compiled("float64[:, :, :]")
 def circles_around(polygons: FloatArray) -> FloatArray:
-    """(T, 3) middle and radius of circles that hold polygons (T, K, 2)."""
+    """Circles (T, 3), centre and radius, that enclose polygons (T, K, 2)."""
     circles = np.empty((len(polygons), 3))
     for t in range(len(polygons)):
         x = y = square = 0.0
@@ -89,7 +90,8 @@ def circles_around(polygons: FloatArray) -> FloatArray:
 def _near(
     circles: FloatArray, poses: FloatArray, reach_m: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Which of circles (T, 3) meet a circle of reach_m around which of poses (S, 3), in their order."""
+    """The pairs of circles (T, 3) and poses (S, 3) whose circle and circle of reach_m overlap: their indices,
+    sorted."""
     meets, count = np.empty((len(circles), len(poses)), np.bool_), 0
     for t in range(len(circles)):
         square = (reach_m + circles[t, 2]) ** 2
@@ -108,8 +110,8 @@ def _near(
 
 @compiled("float64[:, ::1], float64, float64")
 def _beside(poses: FloatArray, place: float, d_m: float) -> tuple[float, float, float]:
-    """The pose at a place between two of poses (S, 3), counted from the first one, and d_m to its left."""
-    # The other way round, what is not a number would be no place at all.
+    """The pose at place, a fractional index of poses (S, 3), moved d_m to its left."""
+    # In this order of the arguments of max, NaN becomes a valid place.
     place = min(max(0.0, place), len(poses) - 1.001)
     k = int(place)
     before, step, share = poses[k], poses[k + 1] - poses[k], place - k
@@ -122,7 +124,7 @@ def _beside(poses: FloatArray, place: float, d_m: float) -> tuple[float, float, 
 
 
 def _runs(when: NDArray[np.intp], where: NDArray[np.intp]) -> list[tuple[int, tuple[int, int]]]:
-    """Runs of consecutive places for each time; both sorted by time, then place."""
+    """Runs of consecutive places (first, last) for each time. when, where: sorted by time, then place."""
     if not len(when):
         return []
     breaks = np.flatnonzero((np.diff(when) != 0) | (np.diff(where) != 1)) + 1
@@ -131,7 +133,7 @@ def _runs(when: NDArray[np.intp], where: NDArray[np.intp]) -> list[tuple[int, tu
 
 
 def rectangles(body: Body, poses: FloatArray) -> FloatArray:
-    """(T, 4, 2) counter-clockwise corners of a robot whose turning centre is at poses (T, 3)."""
+    """Corners (T, 4, 2), counter-clockwise, of a robot with its turning centre at poses (T, 3)."""
     x = np.array([body.front_m, body.front_m, -body.rear_m, -body.rear_m])
     y = 0.5 * body.width_m * np.array([-1.0, 1.0, 1.0, -1.0])
     cos, sin = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
@@ -142,8 +144,8 @@ def rectangles(body: Body, poses: FloatArray) -> FloatArray:
 
 
 def envelope_speed_mps(config: AppConfig) -> float:
-    """The top speed that the camera's range admits: what comes from beyond it at V_omax must find the robot
-    standing, with the hardest braking and the least latency that there is."""
+    """The top speed that the camera's range allows: an obstacle that comes from beyond it at V_omax must find
+    the robot at rest, with the hardest braking and the minimum latency."""
     robot, decision = config.robot, config.decision
     sees_m = decision.sight.range_m + robot.camera_mount.forward_m - robot.body.front_m
     limits = (

@@ -1,10 +1,11 @@
-"""Nav2's bag metrics on drives of our own: does it stop in time, hold, go on soon, never stop for nothing?
+"""Nav2's bag metrics on simulated drives: time to stop, holding the stop, time to resume, false stops.
 
-Nav2's collision monitor is tested on recordings by four numbers (nav2_collision_monitor/test/
-collision_monitor_node_bag.cpp): time to stop, share of the time that the stop is held, time to resume, share
-of false stops, with 0.02 m/s as stopped, 0.10 m/s as driving and three samples in a row as certain. Here the
-window in which a stop is right comes from the truth of the simulated world, and the recording is what a drive
-leaves behind: one row a control step.
+Nav2's collision monitor is tested on recordings with four numbers (nav2_collision_monitor/test/
+collision_monitor_node_bag.cpp): time to stop, share of the time that the stop is held, time to resume, and
+share of false stops. There, 0.02 m/s counts as stopped, 0.10 m/s as driving, and three samples in a row as
+certain. Here, the window in which a stop is due comes from the ground truth of the simulated world, and the
+recording is
+the log of a drive: one row per control step.
 """
 
 from __future__ import annotations
@@ -33,8 +34,12 @@ _HEAD = ("t_s", "s_m", "v_mps", "action", "free_m")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveRecording:
-    """One drive, a row a control step (N,): time, way along the path and speed as they truly were, whether
-    the decision was to go faster, and free_m, the true free way of the front (inf: nothing ahead)."""
+    """One drive with N control steps; all values are the true ones.
+
+    s_m: position along the path.
+    faster: whether the decision was to go faster.
+    free_m: free way before the front; inf if nothing is ahead.
+    """
 
     times_s: FloatArray
     s_m: FloatArray
@@ -45,12 +50,16 @@ class DriveRecording:
 
 @dataclass(frozen=True, slots=True)
 class StopAndGo:
-    """Nav2's four numbers for one drive. NaN: the drive had no such moment; inf: it never did it.
+    """Nav2's four numbers for one drive. NaN: there was no such moment; inf: the robot never did it.
 
-    to_stop_s counts from when the free way is no longer than a comfortable stop needs (for the last time
-    before it stands); braking_s is what physics takes of that. to_resume_s counts from when the way is free
-    until 0.10 m/s, starting_s is what the jerk limit takes of that; to_decide_s: until the decision says
-    faster.
+    to_stop_s: from when the free way is no longer than a comfortable stop needs (the last such moment before
+        it stands) until it stands.
+    braking_s: the part of to_stop_s that the braking itself needs.
+    hold_share: share of the time for which the stop is held.
+    to_resume_s: from when the way is free until 0.10 m/s.
+    starting_s: the part of to_resume_s that the jerk limit needs.
+    to_decide_s: from when the way is free until the decision is to go faster.
+    false_stop_share: share of the time for which the robot stands without a reason.
     """
 
     to_stop_s: float
@@ -62,12 +71,12 @@ class StopAndGo:
     false_stop_share: float
 
     def as_dict(self) -> dict[str, float | None]:
-        """For JSON: null where there is no number."""
+        """The numbers for JSON, with null where there is none."""
         return {key: value if math.isfinite(value) else None for key, value in asdict(self).items()}
 
 
 def record(stage: Stage, log: DriveLog) -> DriveRecording:
-    """A drive beside the truth of its world."""
+    """The recording of a drive, with the true free way."""
     times, s = np.array(log.times_s), np.array(log.s_m)
     free = np.full(len(times), np.inf)
     for k, stretches in enumerate(stage.blocked(times)):
@@ -78,7 +87,7 @@ def record(stage: Stage, log: DriveLog) -> DriveRecording:
 
 
 def write(path: Path, recording: DriveRecording) -> None:
-    """As CSV. Raises UserError."""
+    """Write a recording as CSV. Raises UserError."""
     try:
         with path.open("w", encoding="utf-8", newline="") as file:
             rows = csv.writer(file)
@@ -93,7 +102,7 @@ def write(path: Path, recording: DriveRecording) -> None:
 
 
 def read(path: Path) -> DriveRecording:
-    """What write wrote. Raises UserError."""
+    """Read a recording that write() wrote. Raises UserError."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             head, *rows = csv.reader(file)
@@ -109,7 +118,7 @@ def read(path: Path) -> DriveRecording:
 
 
 def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -> StopAndGo:
-    """The four numbers of a drive in which at most one thing comes into the way and leaves it again."""
+    """The four numbers of a drive in which at most one obstacle comes into the way and leaves it again."""
     comfort = braking.comfort(robot.limits)
     recording = _until_at_rest_for_good(recording)
     times, v, free = recording.times_s, recording.v_mps, recording.free_m
@@ -151,8 +160,8 @@ def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -
 
 
 def _must_stop(free_m: FloatArray, needs_m: FloatArray, v_mps: FloatArray, driving: int) -> int:
-    """From where on the free way is no longer than a comfortable stop needs, for the last time before it
-    stands: who slows down in good time has room again, and need not stop yet."""
+    """The last step before the robot stands from which the free way is no longer than a comfortable stop
+    needs. A robot that slowed down in time has room again, and need not stop yet."""
     first = _first(free_m <= needs_m, driving, certain=1)
     until = min(_first(v_mps <= STOPPED_MPS, first), _first(~np.isfinite(free_m), first, certain=1))
     roomy = np.flatnonzero(free_m[first:until] > needs_m[first:until] + _ROOM_M)
@@ -160,7 +169,8 @@ def _must_stop(free_m: FloatArray, needs_m: FloatArray, v_mps: FloatArray, drivi
 
 
 def _until_at_rest_for_good(recording: DriveRecording) -> DriveRecording:
-    """Standing on the target is no stop. A drive that ends before something in its way is kept whole."""
+    """The recording without the time at rest on the target, which is not a stop. If the drive ends with
+    something in its way, all of it is kept."""
     moving = np.flatnonzero(recording.v_mps > STOPPED_MPS)
     if not len(moving) or np.isfinite(recording.free_m[-1]):
         return recording
@@ -169,7 +179,8 @@ def _until_at_rest_for_good(recording: DriveRecording) -> DriveRecording:
 
 
 def _first(holds: NDArray[np.bool_], start: int, certain: int = SAMPLES) -> int:
-    """Where it first holds from start on, certain samples in a row; len where it never does."""
+    """The first index from start on at which holds is true for certain samples in a row; the length if
+    none."""
     run = 0
     for k in range(start, len(holds)):
         run = run + 1 if holds[k] else 0

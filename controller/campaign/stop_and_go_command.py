@@ -1,4 +1,5 @@
-"""`treadwatch stop-and-go`: somebody steps into the way, stands, leaves; Nav2's bag metrics of what we do."""
+"""`treadwatch stop-and-go`: a person steps into the way, stands and leaves; the result is Nav2's bag
+metrics."""
 
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ TO_STOP_S, HOLD, TO_RESUME_S, FALSE_STOPS = 0.6, 0.95, 0.6, 0.01
 
 @dataclass(frozen=True, slots=True)
 class StopAndGoOptions:
-    """The command line."""
+    """The command line of `treadwatch stop-and-go`."""
 
     config_path: Path
     drives: int
@@ -43,7 +44,7 @@ class StopAndGoOptions:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """A number of Nav2's, physics taken off, and what it must reach."""
+    """One of Nav2's numbers, minus what physics needs, and the limit that it must keep."""
 
     name: str
     value: Callable[[StopAndGo], float]
@@ -83,7 +84,7 @@ def run_stop_and_go(options: StopAndGoOptions) -> int:
     with click.progressbar(seeds, label="drives", file=sys.stderr, hidden=hidden) as bar:
         for seed in bar:
             _drive(options, config, seed, folder / f"{seed}.csv")
-    # From the files, so that a recording says all there is to say.
+    # Measured from the files, which shows that a recording holds everything that is needed.
     found = {
         seed: stop_and_go.measure(stop_and_go.read(folder / f"{seed}.csv"), config.robot, config.decision)
         for seed in seeds

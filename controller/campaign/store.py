@@ -1,4 +1,5 @@
-"""missions.jsonl: one row a mission and policy, appended as they are done, so that it can be resumed."""
+"""missions.jsonl: one row for each mission and policy, appended when it is done, so that a campaign can be
+resumed."""
 
 from __future__ import annotations
 
@@ -16,12 +17,12 @@ Key = tuple[str, int, str]
 
 
 def key_of(row: Row) -> Key:
-    """What makes a row unique within a report."""
+    """The key that identifies a row within a report."""
     return row.family, row.seed, row.policy
 
 
 class MissionStore:
-    """The rows of a report folder, the file that keeps them, and beside it what they were driven with.
+    """The rows of a report folder and their file, and next to it the configuration of the drives.
 
     settings: the configuration as text.
     """
@@ -33,7 +34,7 @@ class MissionStore:
         self._settings_path = folder / SETTINGS
 
     def begin(self, resume: bool) -> None:
-        """Create the folder; rows of an earlier campaign are kept if it is resumed. Raises UserError."""
+        """Create the folder; if resumed, keep the rows of the earlier campaign. Raises UserError."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if self.path.exists() and not resume:
@@ -44,7 +45,7 @@ class MissionStore:
                 self._check_settings()
                 self._read()
                 self.rewrite()
-            # Found out now, and not when the first mission is over.
+            # Find out now whether files can be written, not when the first mission is over.
             part = self.path.with_suffix(".part")
             part.touch()
             part.unlink()
@@ -52,7 +53,7 @@ class MissionStore:
             raise UserError(f"{self.path}: {error.strerror}; choose a folder that can be written") from error
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Append; each line is whole or, if the machine stops in the middle of it, dropped on resuming.
+        """Append rows. A line that is incomplete, because the machine stopped, is dropped on resuming.
 
         Raises UserError.
         """
@@ -65,7 +66,7 @@ class MissionStore:
                     file.write(json.dumps(row.as_dict()) + "\n")
 
     def rewrite(self) -> None:
-        """All rows in one order, whichever worker was first. Raises UserError."""
+        """Write all rows in a fixed order, independent of the order of the workers. Raises UserError."""
         self.rows = dict(sorted(self.rows.items()))
         text = "".join(json.dumps(row.as_dict()) + "\n" for row in self.rows.values())
         part = self.path.with_suffix(".part")
@@ -75,7 +76,7 @@ class MissionStore:
 
     @contextmanager
     def _told(self) -> Iterator[None]:
-        """A disk that is full after hours is one line, and nothing is lost."""
+        """Turn an OSError, such as a full disk, into a UserError; the rows so far are not lost."""
         try:
             yield
         except OSError as error:
@@ -85,7 +86,7 @@ class MissionStore:
             ) from error
 
     def _check_settings(self) -> None:
-        """Rows of two configurations would make one table."""
+        """Raise UserError if the earlier rows were driven with another configuration."""
         if self._settings_path.exists() and _text_of(self._settings_path) != self._settings:
             raise UserError(
                 f"{self.path}: was driven with another --config (it is in {self._settings_path}); go on with "
@@ -119,7 +120,7 @@ def _text_of(path: Path) -> str:
 
 
 def row_of(values: dict[str, object]) -> Row:
-    """A row as it was written. Raises TypeError for what is none."""
+    """A row from its JSON object. Raises TypeError if it is not a row."""
     if not isinstance(values, dict):
         raise TypeError("no object")
     touched = values.get("touched", [])

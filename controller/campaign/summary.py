@@ -1,4 +1,4 @@
-"""All rows of a campaign in figures: by policy, and by family and policy."""
+"""Totals of all rows of a campaign: by policy, and by family and policy."""
 
 from __future__ import annotations
 
@@ -14,8 +14,12 @@ from controller.campaign.task import failed, time_ratio
 
 @dataclass(frozen=True, slots=True)
 class Totals:
-    """Of some missions of one policy. ratio_*: time over the oracle's, where there is something to reach; inf
-    if so many were not reached or had a contact at fault, None if there are none."""
+    """Totals of some missions of one policy.
+
+    ratio_median, ratio_p90: time over the oracle's time, of missions whose target should be reached. inf if
+        the percentile is a drive that did not arrive or had a contact at fault; None if there are no such
+        missions.
+    """
 
     missions: int
     expected: int
@@ -36,7 +40,7 @@ class Totals:
 
 
 def totals(rows: list[Row]) -> Totals:
-    """Add up; rows of one policy."""
+    """The totals of rows of one policy."""
     ratios = [ratio for ratio in map(time_ratio, rows) if not math.isnan(ratio)]
     times = [row.time_s for row in rows if row.time_s is not None]
     clearances = [row.min_clearance_m for row in rows if math.isfinite(row.min_clearance_m)]
@@ -61,7 +65,8 @@ def totals(rows: list[Row]) -> Totals:
 
 
 def _percentile(values: list[float], share: float) -> float | None:
-    """The smallest value that so many per cent do not exceed: no mean of a number and infinity."""
+    """The smallest value that share per cent of the values do not exceed. Not interpolated, because values
+    may be infinite."""
     return round(float(np.percentile(values, share, method="inverted_cdf")), 4) if values else None
 
 
@@ -74,7 +79,7 @@ class Summary:
     failing: list[tuple[str, int, str, str]]
 
     def as_dict(self) -> dict[str, object]:
-        """For summary.json."""
+        """The summary as a dictionary for summary.json."""
         return {
             "policies": {name: _plain(one) for name, one in self.policies.items()},
             "families": {
@@ -89,13 +94,13 @@ class Summary:
 
 
 def _plain(one: Totals) -> dict[str, object]:
-    """JSON knows no infinity: null."""
+    """The totals for JSON, with null for infinity."""
     values = asdict(one)
     return {key: None if value == math.inf else value for key, value in values.items()}
 
 
 def summarise(rows: Iterable[Row]) -> Summary:
-    """In the order in which policies and families first come."""
+    """Summarise rows, with policies and families in the order of their first appearance."""
     rows = list(rows)
     policies = list(dict.fromkeys(row.policy for row in rows))
     families = list(dict.fromkeys(row.family for row in rows))
@@ -113,7 +118,7 @@ def summarise(rows: Iterable[Row]) -> Summary:
 
 
 def why_failed(row: Row) -> str:
-    """In words."""
+    """Why a drive failed, in words; "" if it did not."""
     reasons = []
     if row.contacts_at_fault:
         reasons.append(f"touched {', '.join(row.touched)} while driving")

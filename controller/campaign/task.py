@@ -1,4 +1,4 @@
-"""One mission with all its policies: what a worker does."""
+"""One mission with all its policies, as a worker process runs it."""
 
 from __future__ import annotations
 
@@ -27,8 +27,11 @@ Mode = Literal["noise", "camera"]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A mission and who drives it. keep: where to write recording and video of drives in camera mode that
-    fail (keep_all: of all drives); None: nowhere."""
+    """A mission and the policies that drive it.
+
+    keep: folder for recording and video of failed drives in camera mode; None: none are written.
+    keep_all: write those of all drives.
+    """
 
     family: str
     seed: int
@@ -40,14 +43,14 @@ class Task:
 
 
 def run_task(task: Task) -> list[Row]:
-    """A row for each policy, in their order. The same for the same task, on whichever machine."""
+    """A row for each policy, in their order. The same task gives the same rows on every machine."""
     stage = Stage(generate(task.family, task.seed), task.config.robot)
     by = yardstick(stage, task.config)
     return [_run(task, stage, policy, by) for policy in task.policies]
 
 
 def yardstick(stage: Stage, config: AppConfig) -> Yardstick:
-    """What drives of this mission are measured by."""
+    """The yardstick for drives of this mission."""
     assert isinstance(config.camera, SimulatedCameraConfig), "checked by controller/campaign/command.py"
     assert isinstance(config.runner, LockstepRunner), "checked by controller/campaign/command.py"
     best = oracle.solve(stage, envelope_speed_mps(config), stage.case.scenario.duration_s)
@@ -72,14 +75,15 @@ def _run(task: Task, stage: Stage, policy: str, by: Yardstick) -> Row:
     log = drive_camera(stage, config, policy, keep if task.keep_all else None)
     row = judge(stage, log, policy, task.mode, by)
     if keep is not None and not task.keep_all and failed(row):
-        # The same drive again, this time filmed: writing every mission would cost more than this.
+        # Repeat the drive and record it. Recording every drive would cost more.
         drive_camera(stage, config, policy, keep)
     return row
 
 
 @contextmanager
 def _no_search_for_garbage() -> Iterator[None]:
-    """What a drive leaves behind goes by itself: to search for it would take a twentieth of the time."""
+    """Switch the garbage collector off: reference counting frees what a drive leaves behind, and the search
+    for reference cycles would take 5 % of the time."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -90,16 +94,17 @@ def _no_search_for_garbage() -> Iterator[None]:
 
 
 def failed(row: Row) -> bool:
-    """Whether a mission went otherwise than it should have."""
+    """Whether a drive failed: contact at fault, expected target missed, limits violated, or reversals."""
     missed = row.expected and not row.reached
     return bool(row.contacts_at_fault or missed or row.limit_violations or row.reversals)
 
 
 def time_ratio(row: Row) -> float:
-    """Time over the oracle's; NaN where not even the oracle arrives or nobody should.
+    """Time divided by the oracle's; NaN if not even the oracle arrives, or if the target should not be
+    reached.
 
-    Infinite where the drive did not arrive, and where it was at fault in a contact: whoever drives through
-    people is not fast.
+    Infinite if the drive did not arrive, and if it was at fault in a contact: driving through people must not
+    count as fast.
     """
     if row.oracle_time_s is None or not row.expected:
         return math.nan

@@ -1,4 +1,5 @@
-"""What a camera can see of the plane: rays through bands of columns against footprints."""
+"""What a camera can see of the world in the plane: rays through bands of columns, intersected with
+footprints."""
 
 from __future__ import annotations
 
@@ -25,9 +26,14 @@ _TOUCHING_M = 1e-6
 
 @record(frozen=True, slots=True, eq=False)
 class PlanarView:
-    """One look. bodies (M,): which ones were looked at. forward_m (M, B): where each band's ray meets each
-    body, inf where it does not or is covered by something nearer. free_m (B,): where the first thing that
-    hides what is behind it stands, the building included. place: PlanarEye.place() of the camera."""
+    """The view of M bodies in B bands.
+
+    bodies: (M,), indices of the bodies that may be in view.
+    forward_m: (M, B), forward distance at which each band's ray meets each body; inf if it misses or the body
+        is occluded there.
+    free_m: (B,), distance of the first body or wall that occludes what is behind it.
+    place: PlanarEye.place() of the camera.
+    """
 
     bodies: IntArray
     forward_m: FloatArray
@@ -36,8 +42,11 @@ class PlanarView:
 
 
 class PlanarEye:
-    """The pinhole of a camera, its height and pitch. bearing_tan (B,): right over forward of each band.
-    floor_from_m, up_tan: as in FreeSpace."""
+    """A pinhole camera with its height and pitch.
+
+    bearing_tan: (B,), right divided by forward, of the ray of each band.
+    floor_from_m, up_tan: as in FreeSpace.
+    """
 
     def __init__(
         self,
@@ -46,7 +55,7 @@ class PlanarEye:
         mount: Mount,
         hangs_m: float = math.inf,
     ) -> None:
-        """hangs_m: what begins so high hangs, and hides nothing of the floor behind it."""
+        """hangs_m: a body whose underside is at least this high does not occlude the floor behind it."""
         self._mount, self._z_m, self._room = mount, world.z_m, world.room_polygon()
         self.range_m = camera.depth_max_m
         left, right = (-0.5 - camera.cx) / camera.fx, (camera.width - 0.5 - camera.cx) / camera.fx
@@ -63,7 +72,7 @@ class PlanarEye:
         self._hides = (z_m[:, 0] < min(mount.height_m, hangs_m)) & (z_m[:, 1] > mount.height_m)
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> PlanarView:
-        """polygons (N, K, 2) of all bodies now; pose of the robot."""
+        """The view from the robot at pose. polygons: (N, K, 2), footprints of all bodies."""
         place = self.place(pose)
         bodies, forward_m, free_m = _look(
             polygons,
@@ -82,8 +91,8 @@ class PlanarEye:
         return PlanarView(bodies, forward_m, free_m, place)
 
     def place(self, pose: PlanarPose) -> tuple[float, float, float, float]:
-        """x_m and y_m of the camera on the floor, and the cosine and sine of where it looks; pose of the
-        robot."""
+        """x_m and y_m of the camera on the floor, and cosine and sine of its heading, for the robot at
+        pose."""
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         forward_m, left_m = self._mount.forward_m, self._mount.left_m
         return (
@@ -104,7 +113,8 @@ def _in_camera(
     forward: FloatArray,
     right: FloatArray,
 ) -> None:
-    """Corners (K, 2), and the first one again, forward and to the right (K + 1,) of the camera."""
+    """Transform the corners (K, 2) to distances forward and right of the camera, (K + 1,) each: the first
+    corner is repeated at the end."""
     count = len(polygon)
     for j in range(count + 1):
         dx, dy = polygon[j % count, 0] - eye_x, polygon[j % count, 1] - eye_y
@@ -113,7 +123,7 @@ def _in_camera(
 
 @inlined
 def _may_be_seen(forward: FloatArray, right: FloatArray, edge_tan: float, range_m: float) -> bool:
-    """Whether a polygon may reach into the view."""
+    """Whether a polygon may reach into the field of view."""
     nearest, farthest, leftmost, rightmost = math.inf, -math.inf, math.inf, -math.inf
     for j in range(len(forward)):
         nearest, farthest = min(nearest, forward[j]), max(farthest, forward[j])
@@ -124,7 +134,8 @@ def _may_be_seen(forward: FloatArray, right: FloatArray, edge_tan: float, range_
 
 @inlined
 def _meet(forward: FloatArray, right: FloatArray, bearing_tan: FloatArray, hits: FloatArray) -> bool:
-    """How far ahead each ray (B,) first meets an edge of a polygon; returns whether any does."""
+    """Fill hits (B,) with the forward distance at which each ray first meets an edge of a polygon, inf for
+    none. Return whether any ray does."""
     met = False
     hits[:] = math.inf
     for j in range(len(forward) - 1):
@@ -145,7 +156,7 @@ def _meet(forward: FloatArray, right: FloatArray, bearing_tan: FloatArray, hits:
 def _show_thin(
     forward: FloatArray, right: FloatArray, bearing_tan: FloatArray, half_width_tan: float, hits: FloatArray
 ) -> None:
-    """Of a body that no ray has met: a pole may stand between two, and is seen all the same."""
+    """Fill hits for a body that no ray has met: a pole between two rays is still visible in its band."""
     ahead, low, high = math.inf, math.inf, -math.inf
     for j in range(len(forward)):
         tangent = right[j] / max(forward[j], _NEAR_M)
@@ -178,7 +189,7 @@ def _look(
     cos: float,
     sin: float,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """The fields of PlanarView for a camera at eye_x, eye_y, eye_m over the floor."""
+    """The fields of PlanarView for a camera at eye_x, eye_y, at height eye_m above the floor."""
     count, corners, bands = len(polygons), polygons.shape[1], len(bearing_tan)
     bodies, hits = np.empty(count, np.intp), np.empty((count, bands))
     forward, right, free = np.empty(len(room) + 1), np.empty(len(room) + 1), np.empty(bands)
@@ -200,7 +211,7 @@ def _look(
         low_m, high_m = z_m[bodies[row], 0], z_m[bodies[row], 1]
         for b in range(bands):
             z = hits[row, b]
-            # In the frame is what has any of its height between the upper and the lower edge of the image.
+            # A body is in the frame if part of its height is between the upper and lower edge of the image.
             in_frame = z < range_m and high_m > eye_m - z * down_tan and low_m < eye_m + z * up_tan
             if z > free[b] + _TOUCHING_M or not in_frame:
                 hits[row, b] = math.inf

@@ -1,9 +1,9 @@
-"""A zone monitor in the manner of Nav2's collision monitor, with its shipped parameters.
+"""A zone monitor like Nav2's collision monitor, with its default parameters.
 
 nav2_collision_monitor/params/collision_monitor_params.yaml: a stop polygon that reaches 0.08 m beyond a robot
 of 0.22 m radius, a slowdown polygon (ratio 0.3) that reaches 0.18 m beyond it, both on 4 points, and
 "approach" with time_before_collision 2.0 s in steps of 0.1 s on 6 points: v = v_in t_c / T (motion-formulas
-4.4). The zones are laid around this robot's own footprint; it may brake as hard as an emergency does.
+4.4). The zones are laid around this robot's own footprint. Emergency braking is allowed.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class ZoneMonitor:
         self._scanner = PlanarScanner(stage)
 
     def step(self, at: Situation) -> Decision:
-        """The speed that the zones leave, braked for as hard as it takes."""
+        """The speed that the zones allow, with as much braking as necessary."""
         points = self._scanner.points(at.pose, at.now_ns / NS_PER_S)
         wanted = free_speed(at.path, at.on_path, self._robot.limits)
         curvature = at.path.curvature(at.on_path.s_m)
@@ -43,7 +43,7 @@ class ZoneMonitor:
         return decision("zones", rule, target, at.v_mps, hard=target < wanted)
 
     def limit(self, points: FloatArray, wanted_mps: float, curvature_1pm: float) -> tuple[float, str]:
-        """The speed that the three polygons leave of wanted_mps, and which of them it is."""
+        """The speed that the three zones allow of wanted_mps, and the name of the zone that limits it."""
         body = self._robot.body
         half = 0.5 * body.width_m
         if self._count(points, 0.0, body.front_m + _STOP_BEYOND_M, half + _STOP_BEYOND_M) >= _ZONE_POINTS:
@@ -57,7 +57,8 @@ class ZoneMonitor:
         return (approach, "approach") if approach < target else (target, rule)
 
     def collision_time(self, points: FloatArray, v_mps: float, curvature_1pm: float) -> float:
-        """Time until six points are in the footprint if it goes on at v_mps on its arc, at most 2.0 s."""
+        """The time until six points are in the footprint at constant v_mps on the present arc, at most 2.0
+        s."""
         body = self._robot.body
         half = 0.5 * body.width_m
         if self._count(points, -body.rear_m, body.front_m, half) >= _APPROACH_POINTS:
@@ -70,7 +71,7 @@ class ZoneMonitor:
             dx, dy = points[:, 0] - x, points[:, 1] - y
             ahead = np.stack((dx * cos + dy * sin, dy * cos - dx * sin), axis=1)
             if self._count(ahead, -body.rear_m, body.front_m, half) >= _APPROACH_POINTS:
-                # The pose that was tested is one step further on: that is how Nav2 counts.
+                # The tested pose is one step later than this time, as in Nav2.
                 return k * _STEP_S
         return _BEFORE_COLLISION_S
 

@@ -1,1 +1,7 @@
-"""What is kept of a run: observations, video frames, recordings, and what the setpoints add up to."""
+"""What is kept of a run.
+
+recorder.py - all outputs of a run together
+observations.py - one JSON line per frame
+frame_recorder.py - writes frames in a background thread
+tally.py - statistics of setpoints, durations and frames
+"""

@@ -1,4 +1,4 @@
-"""Frames on their way to the disk, while the next ones are looked at."""
+"""Writes frames to disk in the background, while the next ones are processed."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from hal.cameras.tum_writer import TumWriter
 from hal.errors import DeviceRefused
 from hal.types import Pose, RgbdFrame
 
-# Two thirds of a second: longer than a disk pauses now and then, some 30 MB.
+# Maximum number of frames that wait to be written: two thirds of a second, longer than the occasional pauses
+# of a disk; about 30 MB.
 _MOST_WAITING = 20
 
 
 class FrameRecorder:
-    """Compresses and writes in a thread of its own: OpenCV does so without the interpreter's lock.
+    """Compresses and writes frames in its own thread: OpenCV compresses without the interpreter's lock.
 
-    may_drop: where writing does not keep up, frames are left out, and counted; else whoever records waits.
+    may_drop: if writing does not keep up, frames are dropped and counted; otherwise write() waits.
     """
 
     def __init__(self, writer: TumWriter, folder: Path, may_drop: bool) -> None:
@@ -37,8 +38,8 @@ class FrameRecorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """What was taken in is written. Raises DeviceRefused if it cannot be, and where something else ends
-        the drive tells it."""
+        """Write the frames that are waiting. Raises DeviceRefused if that fails; if another error ends the
+        drive, the failure is only printed."""
         assert self._thread is not None
         self._thread.shutdown(wait=True)
         if self.dropped:
@@ -53,8 +54,8 @@ class FrameRecorder:
                 say(f"treadwatch: {refused}", to_stderr=True)
 
     def write(self, frame: RgbdFrame, odometry: Pose | None) -> None:
-        """Take in one frame; one that is not later than the last says nothing new. Raises DeviceRefused where
-        an earlier one could not be written."""
+        """Queue one frame, unless it is not later than the last one. Raises DeviceRefused if an earlier frame
+        could not be written."""
         assert self._thread is not None
         if self._last_ns is not None and frame.captured_ns <= self._last_ns:
             return
@@ -66,6 +67,6 @@ class FrameRecorder:
         self._waiting.append(self._thread.submit(self._writer.write, frame, odometry))
 
     def _collect(self, most: int) -> None:
-        """Raise what went wrong; wait until at most so many are left."""
+        """Wait until at most `most` frames are waiting. Raises DeviceRefused if one could not be written."""
         while self._waiting and (self._waiting[0].done() or len(self._waiting) > most):
             self._waiting.popleft().result()

@@ -1,4 +1,4 @@
-"""Observations: one JSON line a frame, for people and programs (the format is in docs/design.md)."""
+"""Observations: one JSON line per frame, for people and programs (the format is in docs/design.md)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _STDOUT_FD = 1
 def observation(scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> dict[str, Any]:
     """What was seen and decided at one frame, as plain JSON values; unknown numbers become null.
 
-    timing_ms is empty where time is simulated: a duration that was not measured is not reported.
+    timing_ms: empty if time is simulated, because durations are not measured then.
     """
     return {
         "stamp": round(scene.captured_ns / NS_PER_S, 6),
@@ -66,10 +66,12 @@ def _number(value: float, digits: int) -> float | None:
 
 
 class ObservationFile:
-    """Writes JSON lines to a file as they come. Context manager. What the file held goes with the first line,
-    not before: where nothing is seen, nothing is lost.
+    """Writes JSON lines to a file. A context manager.
 
-    path: STANDARD_OUTPUT writes there, each line at once, for the program at the other end of a pipe.
+    An existing file is emptied only before the first line is written, so that nothing is lost if there is
+    none.
+
+    path: the file, or STANDARD_OUTPUT, where each line is flushed for the program at the other end of a pipe.
     """
 
     def __init__(self, path: Path) -> None:
@@ -80,9 +82,10 @@ class ObservationFile:
         self._has_written = False
 
     def __enter__(self) -> Self:
-        """Open or create the file. Raises UserError where that is not possible."""
+        """Open or create the file. Raises UserError if that fails."""
         try:
-            # A file object of its own: what a reader who has gone leaves unwritten is nobody else's to write.
+            # A separate file object, so that data left over after the reader has gone is not written by
+            # sys.stdout.
             where = os.dup(_STDOUT_FD) if self._streams else self._path
             self._file = open(where, "a", encoding="utf-8")
         except OSError as error:
@@ -100,12 +103,12 @@ class ObservationFile:
         try:
             self._file.close()
         except OSError as failure:
-            # What ended the block says more than what its end could not write.
+            # The error that ended the block is more important than this one.
             if error is None:
                 raise self._failed(failure) from failure
 
     def write(self, scene: Scene, decision: Decision | None, timing_ms: dict[str, float]) -> None:
-        """Append one line. Raises UserError: the disk is full."""
+        """Append one line. Raises UserError, for example if the disk is full."""
         assert self._file is not None, "ObservationFile is used inside its with block"
         line = json.dumps(observation(scene, decision, timing_ms), separators=(", ", ": "), allow_nan=False)
         try:

@@ -1,4 +1,4 @@
-"""What a run adds up to: limits kept by the setpoints that were really sent, and how long stages took."""
+"""Statistics of a run: limits of the setpoints that were really sent, durations of stages, and frames."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from hal.clocks import NS_PER_S
 from hal.types import LATCHED_MODES, ChassisMode, Setpoint
 
 TOLERANCE = 1e-6
-# Of what is told of durations: an hour at 50 a second.
+# Maximum number of durations that are kept: one hour at 50 a second.
 MOST_SAMPLES = 180_000
 
 
 @dataclass
 class SetpointTally:
-    """Watches every setpoint that went out: speed, acceleration, jerk, direction.
+    """Checks every setpoint that was sent: speed, acceleration, jerk, direction.
 
-    Acceleration and jerk are the differences of consecutive sent speeds and accelerations over the control
-    steps between them, a period each, so they judge the commands themselves: neither what the profile claims
-    nor how late the clock let a step begin. Drivers do not send at every step. The emergency limits are the
-    outer bounds; how often braking went beyond comfort is counted on its own.
+    Acceleration and jerk are the differences of consecutive sent speeds and accelerations, divided by the
+    number of control steps between them times the period. So they judge the commands themselves, not what the
+    profile claims, nor how late a step began by the clock. Drivers do not send at every step. The emergency
+    limits are the bounds for violations; emergency_count counts how often braking exceeded comfort.
     """
 
     limits: Limits
@@ -41,9 +41,10 @@ class SetpointTally:
     _steps: int = 0
 
     def add(self, sent: Setpoint | None, mode: ChassisMode = ChassisMode.ARMED) -> None:
-        """What one control step sent, as the driver reports it; None and repeats of the last are nothing.
+        """Add what one control step sent, as the driver reports it. None, and repeats of the last, do not
+        count.
 
-        Nor is the zero of a driver that has latched: it stands for no profile, but for the base's own stop.
+        Nor does the zero of a latched driver, which is not part of a profile: the base stops by itself then.
         """
         self._steps += 1
         if mode in LATCHED_MODES and (sent is None or sent.v_mps == 0.0):
@@ -83,7 +84,7 @@ class ShaperFaults:
     first: str = ""
 
     def add(self, fault: str) -> None:
-        """Of one control step; "" is none."""
+        """Add the fault of one control step; "" for none."""
         if fault:
             self.count += 1
             self.first = self.first or fault
@@ -95,12 +96,12 @@ class ShaperFaults:
 
 @dataclass
 class Complaints:
-    """What the base has complained of, each once and in the order in which it came."""
+    """The faults that the base has reported, each once and in the order of their appearance."""
 
     told: list[str] = field(default_factory=list)
 
     def add(self, faults: Sequence[str]) -> list[str]:
-        """Of one exchange; those that are new."""
+        """Add the faults of one exchange; return those that are new."""
         new = [fault for fault in faults if fault not in self.told]
         self.told += new
         return new
@@ -112,19 +113,19 @@ class Complaints:
 
 @dataclass
 class Standstill:
-    """Since when the robot has been told to stand; None while it drives."""
+    """Since when the robot has been commanded to stand; None while it drives."""
 
     since_ns: int | None = None
 
     def add(self, setpoint: Setpoint) -> None:
-        """What one control step asked for."""
+        """Add the setpoint of one control step."""
         if setpoint.v_mps > 0.0:
             self.since_ns = None
         elif self.since_ns is None:
             self.since_ns = setpoint.stamp_ns
 
     def lasted_s(self, now_ns: int) -> float:
-        """0 while it drives."""
+        """How long the robot has been commanded to stand; 0 while it drives."""
         return 0.0 if self.since_ns is None else (now_ns - self.since_ns) / NS_PER_S
 
 
@@ -135,12 +136,12 @@ class TimingTally:
     samples_ms: dict[str, deque[float]] = field(default_factory=dict)
 
     def add(self, timing_ms: dict[str, float]) -> None:
-        """One frame's durations."""
+        """Add the durations of one frame."""
         for stage, duration_ms in timing_ms.items():
             self.samples_ms.setdefault(stage, deque(maxlen=MOST_SAMPLES)).append(duration_ms)
 
     def line(self) -> str:
-        """Median and 99th percentile of the sum, medians of the stages."""
+        """Median and 99th percentile of the sum, and medians of the stages, as a line."""
         if not self.samples_ms:
             return "not measured"
         total_ms = np.sum([self.samples_ms[stage] for stage in self.samples_ms], axis=0)
@@ -151,20 +152,20 @@ class TimingTally:
 
 @dataclass
 class FrameTally:
-    """How many of the frames that the camera counted were looked at."""
+    """How many of the frames that the camera counted were processed."""
 
     looked_at: int = 0
     counted: int = 0
     _last: int | None = None
 
     def add(self, sequence: int) -> None:
-        """The camera's number of a frame that was looked at. One that goes back: the camera began anew."""
+        """Add a processed frame by the camera's number. If the number goes back, the camera has restarted."""
         self.looked_at += 1
         self.counted += sequence - self._last if self._last is not None and sequence > self._last else 1
         self._last = sequence
 
     def line(self) -> str:
-        """For the summary; "" if none was left out."""
+        """A sentence for the summary; "" if no frame was left out."""
         if self.looked_at == self.counted:
             return ""
         return (
@@ -174,5 +175,5 @@ class FrameTally:
 
 
 def mean_speed_mps(distance_m: float, duration_s: float) -> float:
-    """NaN when no time has passed."""
+    """The mean speed; NaN if no time has passed."""
     return distance_m / duration_s if duration_s > 0.0 else math.nan

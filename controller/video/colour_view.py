@@ -27,26 +27,26 @@ from hal.geometry import camera_in_body
 from hal.types import CameraMount, FloatArray, Intrinsics
 from vision.scene import CameraCondition, Fragments
 
-# A little darker than it was taken, so that lines and labels stand out against bright floors.
+# The image is drawn a little darker, so that lines and labels stand out against bright floors.
 _BRIGHTNESS = 0.82
 _NEAREST_FLOOR_M = 0.25
 _BANNER_PX = 24
 
 
 class ColourView:
-    """Draws into one panel of the picture."""
+    """Draws the colour image into one panel."""
 
     def __init__(self, panel: Rect) -> None:
         self._panel = panel
 
     def draw_backdrop(self, canvas: Image) -> None:
-        """What never changes."""
+        """Draw what never changes."""
         text.caption(canvas, self._panel, "COLOUR")
 
     def draw(
         self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: DrawnCorridor | None
     ) -> None:
-        """The image first, then what lies on the floor, the fragments, the obstacles, their labels."""
+        """Draw the image, then what lies on the floor, the fragments, the obstacles and their labels."""
         view = self._panel.of(canvas)
         height, width = moment.frame.colour.shape[:2]
         placed = placement(width, height, self._panel)
@@ -114,7 +114,8 @@ def _draw_corridor(
 
 
 def _floor_to_image(points_m: FloatArray, mount: CameraMount, intrinsics: Intrinsics) -> FloatArray:
-    """(N, 2) of the floor in the body frame to pixels; NaN where too close to the camera or behind it."""
+    """Project floor points (N, 2) of the body frame to pixels; NaN if too close to the camera or behind
+    it."""
     on_floor_m = np.column_stack([points_m, np.zeros(len(points_m))])
     x, y, z = camera_in_body(mount).inverse().apply(on_floor_m).T
     z = np.where(z > _NEAREST_FLOOR_M, z, np.nan)
@@ -144,7 +145,7 @@ def _draw_box(inside: Image, one: Seen, corners: FloatArray) -> None:
 
 
 def _draw_health(inside: Image, moment: VideoMoment) -> list[Rect]:
-    """A banner where the camera is not good; what it covers."""
+    """Draw a banner if the camera is not good; return the area that it covers."""
     health = moment.scene.health
     if health.condition is CameraCondition.GOOD:
         return []

@@ -29,9 +29,10 @@ from controller.video.top_view import TopView
 
 
 class Composer:
-    """Draws moments in the order of time: the speed strip remembers the last history_s.
+    """Draws moments, in the order of time because the speed strip shows the last history_s.
 
-    top_speed_mps: the scale of the speed strip. range_m: of the top view and of the colours of depth.
+    top_speed_mps: the scale of the speed strip. range_m: the range of the top view and of the colours of
+    depth.
     """
 
     def __init__(self, top_speed_mps: float = 1.5, range_m: float = 10.0, history_s: float = 10.0) -> None:
@@ -44,7 +45,7 @@ class Composer:
         self._backdrop = self._draw_backdrop()
 
     def compose(self, moment: VideoMoment) -> Image:
-        """(720, 1280, 3) uint8, BGR; a new array each time."""
+        """The picture (720, 1280, 3) uint8, BGR; a new array each time."""
         canvas = self._backdrop.copy()
         seen = seen_obstacles(moment)
         corridor = corridor_ahead(moment, self._range_m + 1.0)  # to where it leaves the top view

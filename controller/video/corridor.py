@@ -14,9 +14,10 @@ _STEP_M = 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnCorridor:
-    """centre_m, left_m, right_m: (N, 2) in the body frame, nearest first.
+    """The path and the edges of the corridor.
 
-    normal: (N, 2) of unit length, to the left of the path.
+    centre_m, left_m, right_m: (N, 2) in the body frame, nearest first.
+    normal: (N, 2) unit vectors to the left of the path.
     """
 
     centre_m: FloatArray
@@ -26,17 +27,19 @@ class DrawnCorridor:
 
     @property
     def outline_m(self) -> FloatArray:
-        """(2 N, 2) once around."""
+        """The outline of the corridor, (2 N, 2)."""
         return np.concatenate([self.left_m, self.right_m[::-1]])
 
     def ribbon_m(self, half_width_m: float) -> FloatArray:
-        """(2 N, 2) once around the path itself: as an area it is smoother than a stroke in many pieces."""
+        """The outline of the path itself, (2 N, 2): filled, it looks smoother than a stroke of many
+        pieces."""
         offset_m = self.normal * half_width_m
         return np.concatenate([self.centre_m + offset_m, (self.centre_m - offset_m)[::-1]])
 
 
 def corridor_ahead(moment: VideoMoment, range_m: float) -> DrawnCorridor | None:
-    """Up to range_m along the path; None where no path is planned. A width not known is zero."""
+    """The corridor up to range_m along the path; None if no path is planned. An unknown width counts as
+    zero."""
     path_m = moment.path_ahead_m
     if path_m is None or len(path_m) < 2:
         return None

@@ -33,7 +33,7 @@ class DepthView:
         self._table = colour_table()
 
     def draw_backdrop(self, canvas: Image) -> None:
-        """What never changes: title and scale."""
+        """Draw what never changes: title and scale."""
         text.caption(canvas, self._panel, "DEPTH")
         view = self._scale.of(canvas)
         levels = np.linspace(1, 255, self._scale.width).astype(np.intp)
@@ -45,12 +45,12 @@ class DepthView:
             text.put(view, label, x, _BAR_PX + 13, FAINT_TEXT, 12)
 
     def draw(self, canvas: Image, moment: VideoMoment, seen: list[Seen]) -> None:
-        """The picture with the outlines of the obstacles."""
+        """Draw the depth image with the outlines of the obstacles."""
         view = self._panel.of(canvas)
         height, width = moment.frame.depth.shape
         placed = placement(width, height, self._panel)
         place = placed.place
-        # Nearest: a mean over an edge would be a distance at which there is nothing.
+        # Nearest neighbour, because a mean over an edge would be a distance in empty space.
         small = cv2.resize(moment.frame.depth, (place.width, place.height), interpolation=cv2.INTER_NEAREST)
         levels: NDArray[np.uint8] = np.asarray(
             cv2.convertScaleAbs(small, alpha=255.0 * moment.frame.depth_scale_m / self._range_m), np.uint8
@@ -60,7 +60,7 @@ class DepthView:
         np.take(self._table, levels, axis=0, out=(inside := place.of(view)))
         for one in reversed(seen):
             corners = placed.to_panel(one.box_px(moment.frame.intrinsics)) - (place.x, place.y)
-            # What is not seen now has no depth here.
+            # An obstacle that is not seen in this frame has no depth here.
             if np.isfinite(corners).all() and not one.predicted:
                 draw.line(inside, draw.box(corners), OWN, one.thickness - 1, closed=True)
         valid = moment.scene.health.valid_depth_ratio

@@ -1,4 +1,4 @@
-"""Strokes that OpenCV lacks or draws one by one: all of one colour at once, dashed, translucent.
+"""Drawing that OpenCV lacks or does one by one: many strokes at once, dashed lines, translucent areas.
 
 Points are (N, 2) pixels, x right and y down; whole numbers are pixel centres. Everything is anti-aliased.
 """
@@ -25,7 +25,7 @@ def fixed_point(points: Points) -> NDArray[np.int32]:
 
 
 def lines(image: Image, polylines: Points, colour: Colour, thickness: int = 1, closed: bool = False) -> None:
-    """(N, K, 2): N lines through K points each. Those with a point that is not finite are left out."""
+    """Draw N lines through K points each, (N, K, 2). Lines with a point that is not finite are left out."""
     finite = np.isfinite(polylines).all(axis=(1, 2))
     stack = list(fixed_point(polylines[finite]))
     if stack:
@@ -33,12 +33,12 @@ def lines(image: Image, polylines: Points, colour: Colour, thickness: int = 1, c
 
 
 def line(image: Image, points: Points, colour: Colour, thickness: int = 1, closed: bool = False) -> None:
-    """(K, 2): one line through all points."""
+    """Draw one line through all points (K, 2)."""
     lines(image, points[np.newaxis], colour, thickness, closed)
 
 
 def line_with_gaps(image: Image, points: Points, colour: Colour, thickness: int = 1) -> None:
-    """(K, 2): one line, interrupted where a point is not finite."""
+    """Draw one line through points (K, 2), interrupted where a point is not finite."""
     known = np.isfinite(points).all(axis=1)
     runs = np.split(points, np.flatnonzero(np.diff(known)) + 1)
     stack = [fixed_point(run) for run in runs if len(run) > 1 and np.isfinite(run).all()]
@@ -47,7 +47,7 @@ def line_with_gaps(image: Image, points: Points, colour: Colour, thickness: int 
 
 
 def dashed(image: Image, points: Points, colour: Colour, thickness: int = 1, dash_px: float = 6.0) -> None:
-    """(K, 2), finite: one dashed line through all points."""
+    """Draw one dashed line through all points (K, 2), which must be finite."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     starts = np.arange(0.0, along[-1], 2.0 * dash_px)
     ends = np.minimum(starts + dash_px, along[-1])
@@ -57,19 +57,19 @@ def dashed(image: Image, points: Points, colour: Colour, thickness: int = 1, das
 
 
 def area(image: Image, polygon: Points, colour: Colour) -> None:
-    """(K, 2), finite: filled."""
+    """Draw a filled polygon (K, 2), which must be finite."""
     cv2.fillPoly(image, [fixed_point(polygon)], colour, cv2.LINE_AA, _FRACTION_BITS)
 
 
 def disc(image: Image, centre: Points, radius_px: float, colour: Colour) -> None:
-    """Filled circle."""
+    """Draw a filled circle."""
     x, y = (int(value) for value in fixed_point(centre))
     radius = round(radius_px * (1 << _FRACTION_BITS))
     cv2.circle(image, (x, y), radius, colour, cv2.FILLED, cv2.LINE_AA, _FRACTION_BITS)
 
 
 def tint(image: Image, polygon: Points, colour: Colour, opacity: float) -> None:
-    """(K, 2), finite: filled so that what is beneath shines through."""
+    """Draw a filled, translucent polygon (K, 2), which must be finite."""
     height, width = image.shape[:2]
     x0, y0 = np.clip(np.floor(polygon.min(axis=0)), 0, (width, height)).astype(int)
     x1, y1 = np.clip(np.ceil(polygon.max(axis=0)) + 1, 0, (width, height)).astype(int)
@@ -88,7 +88,7 @@ def box(corners: ArrayLike) -> NDArray[np.float64]:
 
 
 def arrow(image: Image, tail: Points, tip: Points, colour: Colour) -> None:
-    """From tail to tip with a filled head; nothing where they are less than a pixel apart."""
+    """Draw an arrow from tail to tip with a filled head; nothing if they are less than a pixel apart."""
     along = tip - tail
     length_px = float(np.hypot(*along))
     if length_px < 1.0:
@@ -102,7 +102,7 @@ def arrow(image: Image, tail: Points, tip: Points, colour: Colour) -> None:
 
 
 def ellipse(image: Image, centre: Points, covariance: NDArray[np.float64], colour: Colour) -> None:
-    """One standard deviation of a (2, 2) covariance in square pixels, x right, y down."""
+    """Draw the one-sigma ellipse of a (2, 2) covariance in square pixels, x right, y down."""
     variances, axes = np.linalg.eigh(covariance)
     angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
     circle = np.stack([np.cos(angles), np.sin(angles)])

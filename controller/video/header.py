@@ -31,18 +31,18 @@ _CAMERA_X, _SPEED_RIGHT, _TIME_RIGHT, _FRAME_RIGHT = 836, 1088, 1180, 1270
 
 
 class Header:
-    """Draws into one panel; time counts from the first moment."""
+    """Draws the header into one panel. Time counts from the first moment."""
 
     def __init__(self, panel: Rect) -> None:
         self._panel = panel
         self._first_ns: int | None = None
 
     def draw_backdrop(self, canvas: Image) -> None:
-        """What never changes."""
+        """Draw what never changes."""
         self._panel.of(canvas)[:] = PANEL
 
     def draw(self, canvas: Image, moment: VideoMoment) -> None:
-        """Action, reason, camera, speed, time."""
+        """Draw action, reason, camera, speed and time."""
         view = self._panel.of(canvas)
         decision = moment.decision
         if decision is None:
@@ -72,7 +72,7 @@ class Header:
 
 
 def _draw_action(view: Image, decision: Decision) -> None:
-    """An emergency is framed as well as worded."""
+    """Draw the action. An emergency has a frame in addition to its word."""
     style = ACTIONS[decision.action]
     _CHIP.of(view)[:] = style.colour
     if decision.emergency:
@@ -85,7 +85,7 @@ def _draw_action(view: Image, decision: Decision) -> None:
 
 
 def _draw_reason(view: Image, sentence: str) -> None:
-    """In one line, or smaller in two."""
+    """Draw the reason in one line, or in two lines of smaller text."""
     x = _CHIP.right + 14
     room_px = _CAMERA_X - 24 - x
     for size in (16, 15, 14, 13):

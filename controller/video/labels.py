@@ -12,16 +12,18 @@ from controller.video.draw import Points
 from controller.video.style import DARK_TEXT, OWN, Colour, Image, Rect
 
 _PAD_PX = 4
-# Of one view, in order of weight: more cover what they name (a wall far away falls into a dozen pieces).
+# Maximum number of labels in one view, the most important first. More would cover the obstacles: a distant
+# wall falls into a dozen pieces.
 MOST_LABELS = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Label:
-    """text beside the box (2, 2) of opposite corners.
+    """A text beside a box.
 
-    Filled with the colour where it matters more, else only written in it; outlined where it names
-    what the decision rests on.
+    box: (2, 2), opposite corners.
+    filled: the background has the colour, for more important labels; else the text has it.
+    outlined: the label names the obstacle that the decision is based on.
     """
 
     text: str
@@ -32,7 +34,7 @@ class Label:
 
 
 def draw_labels(image: Image, labels: Iterable[Label], occupied: Iterable[Rect] = (), size: int = 13) -> None:
-    """Draw each label in the order given where it is free; one that finds no room is left out."""
+    """Draw the labels in the order given, each where there is room; labels without room are left out."""
     height, width = image.shape[:2]
     for label, place in arrange(labels, Rect(0, 0, width, height), occupied, size):
         _draw(image, label, place, size)
@@ -41,7 +43,7 @@ def draw_labels(image: Image, labels: Iterable[Label], occupied: Iterable[Rect] 
 def arrange(
     labels: Iterable[Label], bounds: Rect, occupied: Iterable[Rect] = (), size: int = 13
 ) -> list[tuple[Label, Rect]]:
-    """A place inside bounds for each label that finds one; no two places overlap."""
+    """A place inside bounds for each label for which there is room; no two places overlap."""
     taken = list(occupied)
     arranged = []
     for label in labels:
@@ -57,7 +59,8 @@ def arrange(
 
 
 def _candidates(label: Label, bounds: Rect, size: int) -> list[Rect]:
-    """Above the box, below it, inside it at top and bottom, to its right and left: all that fit."""
+    """Possible places: above the box, below it, inside it at top and bottom, to its right and left; those
+    that fit into bounds."""
     width = text.width(label.text, size, text.MEDIUM) + 2 * _PAD_PX
     height = size + 2 * _PAD_PX - 2
     x0, y0, x1, y1 = (round(float(edge)) for edge in label.box.ravel())

@@ -1,4 +1,4 @@
-"""What the colours and strokes mean, drawn with the very strokes that the views use."""
+"""The legend of colours and strokes, drawn with the same strokes as the views."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _PAD_PX = 10
 
 
 def draw_legend(canvas: Image, panel: Rect) -> None:
-    """Once: it never changes."""
+    """Draw the legend, which never changes."""
     text.caption(canvas, panel, "LEGEND")
     view = panel.of(canvas)
     view[:] = PANEL

@@ -14,10 +14,12 @@ from vision.scene import Fragments, Scene
 class VideoMoment:
     """A frame, what was seen in it, what was decided and how fast the robot went.
 
-    decision: None when nothing decides (a recording that is only looked at). commanded_mps: the speed of
-    the setpoint that was sent; measured_mps: the chassis' feedback; None or NaN: not known.
-    mount: None draws the top view from the camera, taken as level. body: None draws no robot.
-    path_ahead_m: (N, 2) points of the planned path in the body frame, nearest first;
+    decision: None if there is none (a recording that is only viewed).
+    commanded_mps: speed of the setpoint that was sent; None or NaN: unknown.
+    measured_mps: speed from the chassis' feedback; None or NaN: unknown.
+    mount: None draws the top view relative to the camera, which is taken as level.
+    body: None draws no robot.
+    path_ahead_m: (N, 2) points of the planned path in the body frame, nearest first.
     corridor_half_width_m: how far to either side of the path the robot sweeps.
     """
 

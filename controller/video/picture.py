@@ -1,4 +1,4 @@
-"""A camera image inside a panel: as large as fits, whole, centred."""
+"""Places a camera image in a panel: complete, centred, and as large as possible."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from controller.video.style import Rect
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where an image stands in its panel: place, in pixels of the panel, and the enlargement."""
+    """Position of an image in its panel: place, in pixels of the panel, and the scale."""
 
     place: Rect
     scale: float
 
     def to_panel(self, points_px: NDArray[np.floating]) -> NDArray[np.float64]:
-        """(..., 2) points of the image, whole numbers at pixel centres, in the panel."""
+        """Transform image points (..., 2) to the panel; integer coordinates are pixel centres."""
         return (np.asarray(points_px, np.float64) + 0.5) * self.scale - 0.5 + (self.place.x, self.place.y)
 
 
 def placement(image_width: int, image_height: int, panel: Rect) -> Placement:
-    """The largest that fits."""
+    """The largest placement that fits."""
     scale = min(panel.width / image_width, panel.height / image_height)
     width = min(panel.width, max(1, round(image_width * scale)))
     height = min(panel.height, max(1, round(image_height * scale)))

@@ -1,4 +1,4 @@
-"""Obstacles as all views name them, in the body frame: what decides first, then what moves, then the rest."""
+"""Obstacles in the body frame, as all views name them: the deciding one first, then movers, then the rest."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vision.scene import Obstacle
 LEVEL_CAMERA = CameraMount(0.0, 0.0, 0.0, 0.0)
 # A surface seen edge-on, or one whose size is not known, is still drawn.
 _SMALLEST_M = 0.12
-# Nearer than this a projection would fill the image and say nothing.
+# Nearer than this, a projection would fill the image and be useless.
 _NEAREST_PROJECTED_M = 0.1
 _CORNERS: FloatArray = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
@@ -27,8 +27,11 @@ _CORNERS: FloatArray = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1
 class Seen:
     """An obstacle on the floor of the body frame.
 
-    centre_m, velocity_mps: (2,) forward, left; velocity_cov: (2, 2). corners_m: (4, 2) its visible surface
-    from above. distance_m: from the camera over the floor. decides: the decision rests on it.
+    centre_m, velocity_mps: (2,), forward and left.
+    velocity_cov: (2, 2).
+    corners_m: (4, 2), its visible surface from above.
+    distance_m: from the camera, along the floor.
+    decides: the decision is based on it.
     """
 
     obstacle: Obstacle
@@ -41,23 +44,24 @@ class Seen:
 
     @property
     def colour(self) -> Colour:
-        """By static or moving."""
+        """The colour for static or moving."""
         return MOVING if self.obstacle.moving else STATIC
 
     @property
     def thickness(self) -> int:
-        """Of its box: moving is told by more than the hue."""
+        """Thickness of its box, so that moving is not shown by the hue alone."""
         return 3 if self.obstacle.moving else 2
 
     @property
     def predicted(self) -> bool:
-        """Not seen in this frame."""
+        """Whether it is not seen in this frame."""
         return self.obstacle.unseen_s > 0.0
 
     def box_px(self, camera: Intrinsics) -> FloatArray:
-        """(2, 2) opposite corners in the image, NaN where there is none.
+        """Opposite corners (2, 2) of its box in the image, NaN if there is none.
 
-        What is not seen now has moved on since its box was measured: its predicted surface is projected.
+        An obstacle that is not seen in this frame has moved on since its box was measured, so its predicted
+        surface is projected.
         """
         if not self.predicted:
             return np.reshape(self.obstacle.bbox_px, (2, 2))
@@ -77,12 +81,12 @@ class Seen:
         return words + (f"  {speed_mps:.1f} m/s" if math.isfinite(speed_mps) else "  speed unknown")
 
     def label(self, words: str, box: FloatArray) -> Label:
-        """words beside box, marked as this obstacle is everywhere."""
+        """A label with these words beside box, in the style of this obstacle."""
         return Label(words, self.colour, box, filled=self.obstacle.moving, outlined=self.decides)
 
 
 def seen_obstacles(moment: VideoMoment) -> list[Seen]:
-    """Those whose position is known, in the order in which their labels may claim room."""
+    """The obstacles with a known position, in the order in which their labels get room."""
     camera = camera_in_body(moment.mount or LEVEL_CAMERA)
     deciding_id = None if moment.decision is None else moment.decision.reason.obstacle_id
     seen = []
@@ -107,5 +111,5 @@ def seen_obstacles(moment: VideoMoment) -> list[Seen]:
 
 
 def _known(values: FloatArray) -> FloatArray:
-    """Infinite is as little known as NaN, which can be multiplied in silence."""
+    """The values with NaN for infinity, which is unknown, too. NaN can be multiplied without warnings."""
     return np.where(np.isfinite(values), values, np.nan)

@@ -1,4 +1,4 @@
-"""The last seconds of the speed: what was wanted, commanded and measured, and the action above each other."""
+"""The speed of the last seconds: wanted, commanded and measured, with the action on a band below."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _HEADROOM = 1.1
 
 
 class SpeedStrip:
-    """Draws into one panel. Remembers the last seconds; a time that goes back starts it anew."""
+    """Draws into one panel. It remembers the last seconds, and starts anew if the time goes back."""
 
     def __init__(self, panel: Rect, top_speed_mps: float, history_s: float) -> None:
         self._panel = panel
@@ -56,13 +56,13 @@ class SpeedStrip:
         self._actions: deque[Action | None] = deque()
 
     def to_pixels(self, age_s: FloatArray, speed_mps: FloatArray) -> FloatArray:
-        """Ages and speeds that broadcast, as (..., 2) pixels of the panel; now is at the right edge."""
+        """Pixels (..., 2) of the panel for ages and speeds, which are broadcast; now is at the right edge."""
         x = self._plot.right - 1 - age_s * (self._plot.width - 1) / self._history_s
         y = self._plot.bottom - 1 - speed_mps * (self._plot.height - 1) / self._top_mps
         return np.stack(np.broadcast_arrays(x, y), axis=-1)
 
     def draw_backdrop(self, canvas: Image) -> None:
-        """What never changes: title, grid and scales."""
+        """Draw what never changes: title, grid and scales."""
         text.caption(canvas, self._panel, "SPEED  m/s")
         view = self._panel.of(canvas)
         view[:] = PANEL
@@ -80,7 +80,7 @@ class SpeedStrip:
             text.put(view, label, left, self._panel.height - 5, FAINT_TEXT, 12)
 
     def draw(self, canvas: Image, moment: VideoMoment) -> None:
-        """Add this moment to the past and draw it."""
+        """Add this moment to the history and draw the history."""
         self._remember(moment)
         view = self._panel.of(canvas)
         ages_s = self._stamps_s[-1] - np.array(self._stamps_s)
@@ -110,7 +110,7 @@ class SpeedStrip:
             self._actions.popleft()
 
     def _draw_ribbon(self, view: Image, ages_s: FloatArray) -> None:
-        """A band for each stretch of time with one action, marked with its symbol and word where they fit."""
+        """Draw a band for each period with the same action, with its symbol and word if they fit."""
         actions = list(self._actions)
         begins = [0] + [i for i in range(1, len(actions)) if actions[i] != actions[i - 1]]
         x = np.rint(self.to_pixels(ages_s, np.zeros_like(ages_s))[:, 0]).astype(int)
@@ -128,7 +128,7 @@ class SpeedStrip:
                     break
 
     def _draw_values(self, canvas: Image, speeds_mps: tuple[float, float, float]) -> None:
-        """The newest values above the plot, which also tell which curve is which."""
+        """Draw the newest values above the plot, in the colours of their curves."""
         right = self._panel.right
         baseline = self._panel.y - 7
         for (name, colour), speed_mps in reversed(list(zip(_CURVES, speeds_mps, strict=True))):
@@ -140,7 +140,7 @@ class SpeedStrip:
 
 
 def _as_steps(points: FloatArray) -> FloatArray:
-    """A value holds until the next one: (N, 2) to (2 N - 1, 2)."""
+    """Convert points (N, 2) to steps (2 N - 1, 2): each value holds until the next one."""
     doubled = np.repeat(points, 2, axis=0)
     return np.column_stack([doubled[1:, 0], doubled[:-1, 1]])
 

@@ -1,8 +1,8 @@
-"""The look of the video: palette, and where each panel stands in the 1280x720 picture.
+"""The style of the video: the palette, and the position of each panel in the 1280x720 picture.
 
-Hues are those of Okabe and Ito (2008), some lightened: they stay apart for the common colour-vision
-deficiencies. No hue carries a meaning alone: moving obstacles also have thicker boxes and arrows, actions a
-symbol and a word.
+Hues are those of Okabe and Ito (2008), some of them lightened: they can be distinguished with the common
+colour-vision deficiencies. No meaning depends on the hue alone: moving obstacles also have thicker boxes and
+arrows, actions also have a symbol and a word.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Colour = tuple[int, int, int]
 
 
 def bgr(rgb_hex: str) -> Colour:
-    """OpenCV's order from the usual notation, "56B4E9"."""
+    """A colour in OpenCV's order (BGR) from the usual notation, such as "56B4E9"."""
     red, green, blue = bytes.fromhex(rgb_hex)
     return blue, green, red
 
@@ -35,7 +35,7 @@ DARK_TEXT = bgr("0B0D10")
 STATIC = bgr("56B4E9")
 MOVING = bgr("E69F00")
 UNMEASURED = bgr("9AA2AB")
-OWN = bgr("F4F6F8")  # the robot, its path, what it was told
+OWN = bgr("F4F6F8")  # the robot, its path and its commands
 FREE_SPACE = bgr("24333C")
 SURFACE = bgr("C3CCD6")
 NO_DEPTH = bgr("08090B")
@@ -56,7 +56,7 @@ HEALTH = {
 
 @dataclass(frozen=True, slots=True)
 class ActionStyle:
-    """How an action is marked, everywhere alike."""
+    """How an action is marked in all panels."""
 
     symbol: str
     colour: Colour
@@ -80,12 +80,12 @@ class Rect:
 
     @property
     def right(self) -> int:
-        """The first column beyond it."""
+        """The first column to the right of the rectangle."""
         return self.x + self.width
 
     @property
     def bottom(self) -> int:
-        """The first row beyond it."""
+        """The first row below the rectangle."""
         return self.y + self.height
 
     def of(self, image: Image) -> Image:
@@ -93,13 +93,13 @@ class Rect:
         return image[self.y : self.bottom, self.x : self.right]
 
     def overlaps(self, other: Rect) -> bool:
-        """Whether they share a pixel."""
+        """Whether both rectangles share a pixel."""
         return (
             self.x < other.right and other.x < self.right and self.y < other.bottom and other.y < self.bottom
         )
 
     def contains(self, other: Rect) -> bool:
-        """Whether other lies wholly inside."""
+        """Whether other lies entirely inside."""
         return (
             self.x <= other.x
             and self.y <= other.y

@@ -14,7 +14,7 @@ _FACE = cv2.FontFace("sans")
 def put(
     image: Image, text: str, x: int, baseline: int, colour: Colour, size: int, weight: int = REGULAR
 ) -> int:
-    """Write text from x on; returns the x at which it could go on."""
+    """Write text that begins at x; return the x at which it ends."""
     end, _ = cv2.putText(image, text, (x, baseline), colour, _FACE, size, weight)
     return int(end[0])
 
@@ -22,19 +22,19 @@ def put(
 def put_right(
     image: Image, text: str, right: int, baseline: int, colour: Colour, size: int, weight: int = REGULAR
 ) -> int:
-    """Write text so that it ends at right; returns the x at which it begins."""
+    """Write text that ends at right; return the x at which it begins."""
     x = right - width(text, size, weight)
     put(image, text, x, baseline, colour, size, weight)
     return x
 
 
 def width(text: str, size: int, weight: int = REGULAR) -> int:
-    """How far the text advances, in pixels."""
+    """The width of the text in pixels."""
     return int(cv2.getTextSize((0, 0), text, (0, 0), _FACE, size, weight)[2])
 
 
 def fit(text: str, room_px: int, size: int, weight: int = REGULAR) -> str:
-    """The text, cut at the end and marked with an ellipsis where it is longer than the room."""
+    """The text, shortened with an ellipsis if it does not fit."""
     if width(text, size, weight) <= room_px:
         return text
     shortest, longest = 0, len(text)
@@ -48,7 +48,8 @@ def fit(text: str, room_px: int, size: int, weight: int = REGULAR) -> str:
 
 
 def wrap(text: str, room_px: int, most_lines: int, size: int, weight: int = REGULAR) -> list[str]:
-    """The text broken between words into lines that fit the room; what is too much is cut from the last."""
+    """The text, broken between words into lines that fit. The last line is shortened if there is too much
+    text."""
     lines: list[str] = []
     words = text.split()
     while words and len(lines) < most_lines - 1:
@@ -61,10 +62,10 @@ def wrap(text: str, room_px: int, most_lines: int, size: int, weight: int = REGU
 
 
 def caption(image: Image, panel: Rect, title: str) -> int:
-    """The title above a panel; returns the x at which it ends."""
+    """Write the title above a panel; return the x at which it ends."""
     return put(image, title, panel.x, panel.y - 6, FAINT_TEXT, 12, BOLD)
 
 
 def caption_note(image: Image, panel: Rect, note: str) -> None:
-    """A changing note above a panel, at its right end."""
+    """Write a changing note above a panel, at its right end."""
     put_right(image, note, panel.right, panel.y - 6, FAINT_TEXT, 12)

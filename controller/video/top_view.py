@@ -1,4 +1,4 @@
-"""The floor from above: robot below, what lies ahead of it above; true to scale."""
+"""The floor from above, true to scale: the robot at the bottom, what is ahead of it above."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from vision.scene import FreeSpace
 _BEHIND_M = 0.85
 _BEYOND_M = 0.35
 _RING_M = 2.0
-# Ring labels stand to the right: clear of the corridor, and inside the panel also on the far rings.
+# Labels of the rings are on the right: clear of the corridor, and inside the panel also on the far rings.
 _RING_LABEL_SIN, _RING_LABEL_RIGHT_M = 0.5, 2.7
-_PATH_PX = 1.0  # to either side
+_PATH_PX = 1.0  # half of the width of the path
 _ARROW_S = 1.0
 _WIDEST_SIGMA_M = 2.5
 _TRACK_SHARE = 0.24
 
 
 class TopView:
-    """Draws into one panel. The origin of the body frame stands at the middle of its foot."""
+    """Draws into one panel. The origin of the body frame is at the middle of the lower edge."""
 
     def __init__(self, panel: Rect, range_m: float) -> None:
         self._panel = panel
@@ -48,7 +48,8 @@ class TopView:
         self._origin_px = (0.5 * (panel.width - 1), panel.height - 1 - _BEHIND_M * self._px_per_m)
 
     def to_pixels(self, points_m: FloatArray) -> FloatArray:
-        """(..., 2) of the body frame (forward, left) to pixels of the panel (right, down)."""
+        """Transform points (..., 2) of the body frame (forward, left) to pixels of the panel (right,
+        down)."""
         return np.stack(
             [
                 self._origin_px[0] - points_m[..., 1] * self._px_per_m,
@@ -58,7 +59,7 @@ class TopView:
         )
 
     def draw_backdrop(self, canvas: Image) -> None:
-        """What never changes."""
+        """Draw what never changes."""
         self._panel.of(canvas)[:] = PANEL
         text.caption(canvas, self._panel, "TOP VIEW")
         text.caption_note(canvas, self._panel, "distance from the camera")
@@ -89,7 +90,7 @@ class TopView:
         draw_labels(view, labels, self._draw_ring_labels(view, mount), size=12)
 
     def _draw_rings(self, view: Image, mount: CameraMount) -> None:
-        """Around the camera's foot."""
+        """Draw the rings around the point of the floor below the camera."""
         foot_m = np.array([mount.forward_m, mount.left_m])
         radii_m = self._radii_m()
         angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 61)
@@ -97,7 +98,7 @@ class TopView:
         draw.lines(view, self.to_pixels(foot_m + radii_m[:, np.newaxis, np.newaxis] * circle), GRID)
 
     def _draw_ring_labels(self, view: Image, mount: CameraMount) -> list[Rect]:
-        """Last, so that nothing covers them; where they stand."""
+        """Draw the labels of the rings, last so that nothing covers them; return their places."""
         foot_m = np.array([mount.forward_m, mount.left_m])
         radii_m = self._radii_m()
         right_m = np.minimum(_RING_LABEL_SIN * radii_m, _RING_LABEL_RIGHT_M)
@@ -147,7 +148,8 @@ class TopView:
         draw.arrow(view, centre, tip, one.colour)
         spread_m2 = _ARROW_S**2 * one.velocity_cov
         if np.isfinite(spread_m2).all() and np.trace(spread_m2) < _WIDEST_SIGMA_M**2:
-            # Forward, left to right, down: both axes swap and turn, so only their order changes.
+            # From (forward, left) to (right, down): both axes are swapped and negated, so only their order
+            # changes.
             draw.ellipse(view, tip, spread_m2[::-1, ::-1] * self._px_per_m**2, one.colour)
 
     def _label_box(self, one: Seen) -> FloatArray:
@@ -158,8 +160,8 @@ class TopView:
 class _Scan:
     """The free-space scan as shapes on the floor of the body frame.
 
-    free_m: (K, 2) polygon of what was seen to be free, (0, 2) if nothing. surfaces_m: (S, 2, 2), one
-    stroke for each band that ends at a surface within range.
+    free_m: (K, 2), polygon of the floor that was seen to be free; (0, 2) if there is none.
+    surfaces_m: (S, 2, 2), one stroke for each band that ends at a surface within range.
     """
 
     def __init__(self, free: FreeSpace, mount: CameraMount, range_m: float) -> None:
@@ -175,6 +177,7 @@ class _Scan:
 
 
 def _forward_left(forward_m: FloatArray, bearings_tan: FloatArray) -> FloatArray:
-    """(N,) distances ahead and (N, 2) bearings, positive to the right, as (N, 2, 2) points forward, left."""
+    """Points (N, 2, 2), forward and left, for forward distances (N,) and bearings (N, 2), positive to the
+    right."""
     forward = np.broadcast_to(forward_m[:, np.newaxis], bearings_tan.shape)
     return np.stack([forward, -forward * bearings_tan], axis=-1)

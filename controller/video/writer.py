@@ -1,4 +1,4 @@
-"""Pictures into a video file. The file's suffix chooses container and codec."""
+"""Writes pictures into a video file. The suffix of the file determines container and codec."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ import cv2
 from controller.errors import UserError
 from controller.video.style import Image
 
-# What OpenCV's wheel really encodes (it has no H.264 encoder). VP8 in WebM is what browsers play, at some ten
-# times the time of MPEG-4; VP9, which it also has, takes half a second a picture.
+# Codecs that OpenCV's wheel really encodes (it has no H.264 encoder). Browsers play VP8 in WebM, which takes
+# about ten times as long as MPEG-4. VP9 is available, too, but takes half a second per picture.
 CODECS = {
     ".mp4": "mp4v",
     ".m4v": "mp4v",
@@ -31,14 +31,14 @@ _STDERR_FD = 2
 
 
 class VideoError(UserError):
-    """The video cannot be written there or so."""
+    """The video cannot be written there, or not in this form."""
 
 
 class VideoWriter:
-    """Context manager; the file is created by the first picture, whose size all others must have.
+    """A video file, as a context manager. The first picture creates the file; all others must have its size.
 
-    Raises VideoError: at once where the suffix is unknown or the file cannot be written, so that no long run
-    fails at its end; from write where no encoder opens or a picture has another size than the first.
+    Raises VideoError: at once if the suffix is unknown or the file cannot be written, so that a long run does
+    not fail at its end; from write() if no encoder opens, or if a picture has another size than the first.
     """
 
     def __init__(self, path: Path, fps: float) -> None:
@@ -46,7 +46,7 @@ class VideoWriter:
             raise VideoError(f"{path}: {fps:g} pictures a second make no video; give a rate above 0")
         self._codec = _codec_for(path)
         _check_writable(path)
-        # Absolute: FFmpeg takes a relative name such as "pipe:1.mp4" for a protocol.
+        # Absolute, because FFmpeg takes a relative name such as "pipe:1.mp4" for a protocol.
         self._path = path.absolute()
         self._fps = fps
         self._size: tuple[int, int] | None = None
@@ -74,7 +74,7 @@ class VideoWriter:
         self._writer.write(picture)
 
     def close(self) -> None:
-        """Finish the file. Idempotent; without a picture there is no file."""
+        """Finish the file. Idempotent. If there was no picture, there is no file."""
         if self._writer is not None:
             with _native_stderr_silenced():
                 self._writer.release()
@@ -101,7 +101,7 @@ def _codec_for(path: Path) -> str:
 
 
 def _check_writable(path: Path) -> None:
-    """By trying: permissions alone do not tell of a read-only disk. An existing file is left as it is."""
+    """Check by trying, because permissions do not show a read-only disk. An existing file is not changed."""
     existed = os.path.exists(path)
     try:
         path.open("ab").close()
@@ -116,11 +116,12 @@ def _check_writable(path: Path) -> None:
 
 @contextmanager
 def _native_stderr_silenced() -> Iterator[None]:
-    """FFmpeg prints remarks for developers straight to the process' standard error; no setting stops all."""
+    """Silence standard error: FFmpeg prints messages for developers there, and no setting stops all of
+    them."""
     sys.stderr.flush()
     try:
         kept = os.dup(_STDERR_FD)
-    except OSError:  # a service may run with standard error closed: nothing to silence
+    except OSError:  # standard error is closed, as in some services: nothing to silence
         yield
         return
     nowhere = os.open(os.devnull, os.O_WRONLY)

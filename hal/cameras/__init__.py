@@ -1,7 +1,19 @@
-"""Cameras behind hal.api.FrameSource: folders of images (tum_*), ROS bags (bag_*), a RealSense.
+"""Cameras behind hal.api.FrameSource: a RealSense, folders of images (TUM format) and ROS bags.
 
-What recordings share: calibration, registration and undistort make colour, depth and lens agree; image_file,
-stamp_pairing, pose_file and pose_track read what they hold. A folder goes tum_index -> tum_replay (--record
-writes one: tum_writer), a bag bag_file -> bag_topics -> bag_calibration -> bag_replay. paced_recording lets a
-recording stand in for a camera; device_clock brings realsense's time onto the machine's.
+realsense.py - an Intel RealSense D435i
+device_clock.py - maps the camera's clock to the monotonic clock
+recording.py - what every recording offers besides frames
+calibration.py - camera.yaml: intrinsics, scale, mount; rectifies raw images
+registration.py - registers depth to colour
+undistort.py - removes lens distortion
+image_file.py - reads one image file
+pose_track.py, pose_file.py - camera poses over time, and from a text file
+tum_index.py, tum_replay.py - the index files of a folder, and the folder as a camera
+tum_writer.py - writes such a folder (--record)
+bag_file.py, bag_realsense.py - messages of a ROS bag, and the peculiarities of RealSense bags
+bag_topics.py - chooses the topics
+bag_transforms.py, bag_calibration.py, bag_odometry.py, bag_images.py - read the messages
+stamp_pairing.py - pairs colour and depth images that arrive one by one
+bag_replay.py - a ROS bag as a camera
+paced_recording.py - plays a recording in real time, in place of a camera
 """

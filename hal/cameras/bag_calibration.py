@@ -1,4 +1,4 @@
-"""camera_info and transforms of a bag -> the calibration that camera.yaml would give."""
+"""Turns camera_info and transforms of a bag into the calibration that camera.yaml gives for a folder."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _COEFFICIENTS = 5
 
 
 def read_transforms(bag: BagFile) -> StaticTransforms:
-    """All of /tf_static, and those of RealSense streams. Raises BadRecording."""
+    """The transforms of /tf_static and of RealSense streams. Raises BadRecording."""
     transforms = StaticTransforms()
     own = [topic.name for topic in bag.topics if topic.kind == TRANSFORM and reference_of(topic.name)]
     for topic, message in bag.messages((_TF_STATIC, *own)):
@@ -40,7 +40,7 @@ def read_transforms(bag: BagFile) -> StaticTransforms:
 def read_calibration(
     bag: BagFile, topics: BagTopics, transforms: StaticTransforms
 ) -> tuple[RecordingCamera, str, tuple[str, ...]]:
-    """(calibration, frame of the colour camera, notes). Raises BadRecording."""
+    """(calibration, name of the colour camera's frame, notes). Raises BadRecording."""
     if topics.colour_info is None:
         raise BadRecording(
             f"{bag.path}: no camera_info was recorded beside {topics.colour.name}, so its focal length is "
@@ -67,25 +67,25 @@ def read_calibration(
 
 
 def _frame_of(info: Any, images: Topic) -> str:
-    """The frame that a camera_info names; RealSense streams of a .bag are frames themselves."""
+    """The name of the frame in camera_info; for RealSense streams of a .bag, the stream's own name."""
     return frame_name(info.header.frame_id) or stream_of(images.name) or images.name
 
 
 def _depth_factor(bag: BagFile, topics: BagTopics) -> float:
-    """Units a metre: millimetres (REP 118), unless a RealSense says otherwise."""
+    """Depth units per metre: millimetres (REP 118), unless a RealSense says otherwise."""
     stream = stream_of(topics.depth.name)
     option = None if stream is None else bag.first(depth_unit_topic(stream))
     if option is None:
         return _PER_METRE
     try:
-        # A float of 32 bits: a thousandth comes as 0.0010000000475.
+        # Rounded, because a float32 of 0.001 reads as 0.0010000000475.
         return round(1.0 / float(option.data), 3)
     except (ValueError, ZeroDivisionError) as error:
         raise BadRecording(f"{bag.path}: {topics.depth.name}: its depth unit is {option.data!r}") from error
 
 
 def _pinhole(info: Any, rectified: bool) -> tuple[float, float, float, float]:
-    """fx, fy, cx, cy: of K, or of P where the images are rectified."""
+    """fx, fy, cx, cy: from K, or from P if the images are rectified."""
     if rectified:
         p = _matrix(info, "p")
         return float(p[0]), float(p[5]), float(p[2]), float(p[6])
@@ -94,7 +94,7 @@ def _pinhole(info: Any, rectified: bool) -> tuple[float, float, float, float]:
 
 
 def _matrix(info: Any, name: str) -> Any:
-    """ROS 1 writes the names of matrices in capitals."""
+    """A matrix of camera_info; ROS 1 writes its name in capitals."""
     return getattr(info, name) if hasattr(info, name) else getattr(info, name.upper())
 
 
@@ -113,7 +113,8 @@ def _distortion(bag: BagFile, topic: str, info: Any) -> tuple[float, ...]:
 def _depth_camera(
     bag: BagFile, topics: BagTopics, transforms: StaticTransforms, colour: Any
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """(values of camera.yaml, notes) of depth that is not registered to colour; colour: its camera_info."""
+    """(values as in camera.yaml, notes) for depth that is not registered to colour. colour: its
+    camera_info."""
     depth = None if topics.depth_info is None else bag.first(topics.depth_info)
     if depth is None:
         if topics.says_registered:
@@ -122,7 +123,7 @@ def _depth_camera(
         return {}, (f"no camera_info was recorded beside {name}: depth is taken as registered to colour",)
     frame, depth_frame = _frame_of(colour, topics.colour), _frame_of(depth, topics.depth)
     if topics.says_registered or depth_frame == frame:
-        # From one place; but perhaps through another lens, or with fewer pixels.
+        # Same viewpoint; but the lens or the number of pixels may differ.
         of_one_size = (depth.width, depth.height) == (colour.width, colour.height)
         if of_one_size and (topics.says_registered or _of_one_lens(depth, colour)):
             return {}, ()

@@ -1,6 +1,6 @@
-"""A ROS bag as a file: its topics and its messages, of ROS 1 (.bag) and ROS 2 (.db3, .mcap) alike.
+"""The topics and messages of a ROS bag: ROS 1 (.bag) or ROS 2 (.db3, .mcap).
 
-The one module that imports rosbags (Apache-2.0, extra "ros"), and only when a bag is opened.
+The only module that imports rosbags (Apache-2.0, extra "ros"), and only when a bag is opened.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ _METADATA = "metadata.yaml"
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path names a bag: a file with one of its suffixes, or a folder that ROS 2 has written, if not
-    to its end: only then it writes metadata.yaml."""
-    # os.path and not Path: what may not be looked at is simply none.
+    """Whether a path is a bag: a file with a suffix of bags, or a folder that ROS 2 has written, even if
+    incomplete (ROS 2 writes metadata.yaml last)."""
+    # os.path, not Path: a path without permission is not a bag, and must not raise.
     if os.path.isdir(path):
         written = os.path.isfile(path / _METADATA) or any(one.suffix in _ROS_2 for one in path.glob("*"))
         return written and not os.path.exists(path / "rgb.txt")
@@ -31,7 +31,8 @@ def is_bag(path: Path) -> bool:
 
 
 class Topic(NamedTuple):
-    """kind: the message type as ROS 2 spells it, such as sensor_msgs/msg/Image."""
+    """A topic with its number of messages. kind: the message type as in ROS 2, such as
+    sensor_msgs/msg/Image."""
 
     name: str
     kind: str
@@ -39,7 +40,7 @@ class Topic(NamedTuple):
 
 
 class BagFile:
-    """Open between __enter__ and __exit__. Messages are the records that rosbags makes of them."""
+    """A bag that is open between __enter__ and __exit__. Messages are the objects that rosbags makes."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -47,13 +48,13 @@ class BagFile:
         self._closing = ExitStack()
 
     def __enter__(self) -> Self:
-        """Raises BadRecording, and DeviceNotFound where rosbags is not installed."""
+        """Open the bag. Raises BadRecording, and DeviceNotFound if rosbags is not installed."""
         any_reader, known_types = _load_vendor()
         if not os.path.exists(self.path):
             raise BadRecording(f"{self.path}: there is no such file, or it may not be read")
         try:
-            # Bags of RealSense viewers do not say what their messages are made of. Of a damaged bag, each
-            # storage has errors of its own.
+            # Bags of RealSense viewers do not contain the definitions of their message types. Each storage
+            # format raises its own errors for a damaged bag, hence Exception.
             reader = any_reader([self.path], default_typestore=known_types)
             self._reader = self._closing.enter_context(reader)
         except Exception as error:
@@ -70,7 +71,7 @@ class BagFile:
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """Those with messages, by name."""
+        """The topics that have messages, sorted by name."""
         counts: dict[tuple[str, str], int] = {}
         for one in self._reader.connections:
             key = (one.topic, one.msgtype)
@@ -78,8 +79,8 @@ class BagFile:
         return tuple(Topic(*key, count) for key, count in sorted(counts.items()) if count)
 
     def messages(self, names: Collection[str]) -> Iterator[tuple[str, Any]]:
-        """(topic, message) of these topics in the order of the recording. Raises BadRecording where the bag
-        is damaged: what came before was whole."""
+        """(topic, message) of these topics, in the order of the recording. Raises BadRecording where the bag
+        is damaged; all messages before that are valid."""
         wanted = [one for one in self._reader.connections if one.topic in names]
         if not wanted:
             return
@@ -102,12 +103,12 @@ class BagFile:
 
 
 def _told(error: Exception) -> str:
-    """In one line."""
+    """The error's message in one line."""
     return " ".join(str(error).split()) or type(error).__name__
 
 
 def _load_vendor() -> tuple[Any, Any]:
-    """(AnyReader, the types of ROS 2)."""
+    """(AnyReader, the message types of ROS 2). Raises DeviceNotFound."""
     try:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore

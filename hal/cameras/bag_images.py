@@ -1,4 +1,4 @@
-"""sensor_msgs Image and CompressedImage -> the arrays of an RgbdFrame.
+"""Decodes sensor_msgs Image and CompressedImage into the arrays of an RgbdFrame.
 
 Encodings as in sensor_msgs/image_encodings.hpp; compressed depth as image_transport's compressed_depth
 writes it (REP 118: 16UC1 in millimetres, 32FC1 in metres, 0 or NaN = no data).
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hal.cameras.image_file import ImageError, decode_colour, decode_depth, require_size
 from hal.types import ColourImage, DepthImage
 
-# To BGR; None: it is.
+# Encoding -> (number of channels, conversion to BGR; None: it is BGR already).
 _COLOURS: dict[str, tuple[int, int | None]] = {
     "bgr8": (3, None),
     "8UC3": (3, None),
@@ -31,17 +31,17 @@ _COLOURS: dict[str, tuple[int, int | None]] = {
     "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
     "yuyv": (2, cv2.COLOR_YUV2BGR_YUY2),
 }
-# So many bytes a pixel: two neighbours share one colour.
+# With this many bytes per pixel, two neighbouring pixels share their chrominance.
 _SHARED_COLOUR = 2
 _MILLIMETRES, _METRES = ("16UC1", "mono16"), "32FC1"
 _MM_PER_M = 1000.0
 _PNG_START = b"\x89PNG"
-# compressed_depth writes before its PNG: an enumeration, and the quantisation of 32FC1 (A, B).
+# compressed_depth writes this before its PNG: an enumeration, and the quantisation of 32FC1 (A, B).
 _QUANTISATION = struct.Struct("<iff")
 
 
 def colour_image(message: Any, width: int, height: int) -> ColourImage:
-    """(height, width, 3) uint8, BGR, its own memory. Raises ImageError."""
+    """Decode colour: (height, width, 3) uint8, BGR, in its own memory. Raises ImageError."""
     if not hasattr(message, "encoding"):
         return decode_colour(bytes(message.data), width, height)
     require_size(message.width, message.height, width, height)
@@ -57,8 +57,8 @@ def colour_image(message: Any, width: int, height: int) -> ColourImage:
 
 
 def depth_image(message: Any, width: int, height: int) -> DepthImage:
-    """(height, width) uint16, millimetres as REP 118 says (or the camera's own unit), its own memory.
-    Raises ImageError."""
+    """Decode depth: (height, width) uint16, in millimetres (REP 118) or the camera's own unit, in its own
+    memory. Raises ImageError."""
     if not hasattr(message, "encoding"):
         return _compressed_depth(message, width, height)
     require_size(message.width, message.height, width, height)
@@ -71,7 +71,7 @@ def depth_image(message: Any, width: int, height: int) -> DepthImage:
 
 
 def _pixels(message: Any, of: np.dtype[Any], channels: int) -> NDArray[Any]:
-    """(height, width, channels) on the message's memory: its rows may be longer than its pixels."""
+    """The pixels (height, width, channels) of a message, whose rows may be padded. May share its memory."""
     data = np.asarray(message.data, np.uint8)
     row = message.width * channels * of.itemsize
     if message.step < row or data.size < message.step * message.height:
@@ -83,7 +83,7 @@ def _pixels(message: Any, of: np.dtype[Any], channels: int) -> NDArray[Any]:
 
 
 def _in_millimetres(metres: NDArray[Any]) -> DepthImage:
-    """Not finite, negative or too far for 16 bits: no data."""
+    """Convert metres to millimetres. Not finite, negative or too far for 16 bits: no data."""
     with np.errstate(invalid="ignore"):
         mm = np.rint(metres.astype(np.float32) * np.float32(_MM_PER_M))
         known = (mm > 0.0) & (mm <= np.iinfo(np.uint16).max)

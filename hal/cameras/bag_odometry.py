@@ -1,4 +1,4 @@
-"""nav_msgs Odometry of a base, with where its camera sits -> poses of the camera."""
+"""Turns the nav_msgs Odometry of a base, and the mount of its camera, into poses of the camera."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def stamp_ns(message: Any) -> int:
 
 
 def read_odometry(bag: BagFile, topic: str, camera: str, transforms: StaticTransforms) -> PoseTrack:
-    """Of the frame camera. Raises BadRecording: no transform to it, or a pose that is none."""
+    """The poses of the frame camera. Raises BadRecording if a pose is invalid or no transform leads to the
+    frame."""
     rows: dict[int, FloatArray] = {}
     base = None
     for _, message in bag.messages((topic,)):
@@ -45,13 +46,14 @@ def read_odometry(bag: BagFile, topic: str, camera: str, transforms: StaticTrans
         )
     stamps_ns = sorted(rows)
     poses = np.stack([rows[one] for one in stamps_ns])
-    # A camera that is bolted on turns as its base does: the constant turn between them is on the right.
+    # The camera is fixed to the base, so its rotation is that of the base times a constant rotation on the
+    # right.
     positions = np.stack([rotation_matrix(pose[3:]) @ mount.translation_m + pose[:3] for pose in poses])
     return PoseTrack(topic, stamps_ns, positions, _turned(poses[:, 3:], quaternion_of(mount.rotation)))
 
 
 def _turned(first: FloatArray, then: FloatArray) -> FloatArray:
-    """(N, 4) Hamilton's product of quaternions (N, 4) and (4,), qx qy qz qw."""
+    """The Hamilton products (N, 4) of quaternions (N, 4) and (4,), each qx qy qz qw."""
     x, y, z, w = first.T
     a, b, c, d = then
     return np.stack(

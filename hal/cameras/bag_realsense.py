@@ -1,9 +1,9 @@
-"""What is special in bags that librealsense writes, of ROS 1 (.bag, until 2.55) and ROS 2 (.db3, 2.59).
+"""The peculiarities of bags that librealsense writes: ROS 1 (.bag, until 2.55) and ROS 2 (.db3, 2.59).
 
-Streams are named /device_0/sensor_1/Color_0, with images below /image/data. In a .bag, four bytes follow each
-image (its depth unit, a float; not in an old one), the calibration is in /info/camera_info of the stream, and
-/tf/1 of a stream holds where the reference stream stands in it. In both, the sensor has its depth unit among
-its options.
+Streams are named like /device_0/sensor_1/Color_0; their images are in the topic /image/data below that. The
+depth unit is an option of the sensor. In a .bag, four more bytes follow each image (its depth unit, a float;
+not in old bags), the calibration is in /info/camera_info of the stream, and /tf/1 of a stream holds the pose
+of the reference stream in it.
 """
 
 from __future__ import annotations
@@ -13,19 +13,21 @@ import struct
 _DEVICE, _IMAGES = "/device_", "/image/data"
 _IMAGE = "sensor_msgs/msg/Image"
 _LENGTH = struct.Struct("<I")
-# Before the name of the frame, between it and that of the encoding, and from there to the length of the data.
+# Bytes of a serialised Image before the name of the frame, between that and the name of the encoding, and
+# from there to the length of the data.
 _NUMBER_AND_STAMP, _SIZE, _ORDER_AND_STEP = 12, 8, 5
 TRANSFORM = "geometry_msgs/msg/Transform"
 
 
 def stream_of(topic: str) -> str | None:
-    """The stream that an image topic belongs to; None where librealsense did not write it."""
+    """The stream that an image topic belongs to; None if librealsense did not write it."""
     stream, found, _ = topic.partition(_IMAGES)
     return stream if found and topic.startswith(_DEVICE) else None
 
 
 def message_of(topic: str, kind: str, data: bytes) -> bytes:
-    """The part of a ROS 1 record that is the message. Raises struct.error for one that is too short."""
+    """The message in a ROS 1 record, without the bytes that follow an image. Raises struct.error if the
+    record is too short."""
     if kind != _IMAGE or not stream_of(topic):
         return data
     end = _NUMBER_AND_STAMP
@@ -35,16 +37,16 @@ def message_of(topic: str, kind: str, data: bytes) -> bytes:
 
 
 def info_topic(stream: str) -> str:
-    """The calibration of a .bag's stream."""
+    """The topic with the calibration of a stream in a .bag."""
     return f"{stream}/info/camera_info"
 
 
 def depth_unit_topic(stream: str) -> str:
-    """The option of a stream's sensor: metres a unit, as a number or as text."""
+    """The topic with the depth unit of a stream's sensor: metres per unit, as a number or as text."""
     return f"{stream.rsplit('/', 1)[0]}/option/Depth_Units/value"
 
 
 def reference_of(topic: str) -> tuple[str, str] | None:
-    """(stream, reference) of a .bag's transform; None for another topic."""
+    """(stream, reference) of a topic with a transform in a .bag; None for another topic."""
     stream, found, reference = topic.partition("/tf/")
     return (stream, f"reference {reference}") if found and topic.startswith(_DEVICE) else None

@@ -36,9 +36,10 @@ _THE_REST = "the rest"
 class BagReplay:
     """Recording over the images of a bag of ROS 1 or ROS 2, or of a RealSense viewer (.db3).
 
-    Topics, calibration and odometry are read at once (raises BadRecording; DeviceNotFound where rosbags is
-    not installed), images when entered. captured_ns is the time in the header of the colour image. odometry:
-    what was asked for, and recorded. Entering again starts from the beginning.
+    The constructor reads topics, calibration and odometry (raises BadRecording, and DeviceNotFound if rosbags
+    is not installed); images are read after entering. captured_ns is the time in the header of the colour
+    image.
+    odometry: the chosen poses, None if there are none. Entering again starts from the beginning.
     """
 
     def __init__(
@@ -63,17 +64,17 @@ class BagReplay:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """Of the undistorted images that read() gives."""
+        """The intrinsics of the undistorted images that read() gives."""
         return self._calibration.intrinsics
 
     @property
     def mount(self) -> CameraMount | None:
-        """A bag does not say how high over the floor its camera was."""
+        """None: a bag does not give the height of its camera above the floor."""
         return None
 
     @property
     def frame_count(self) -> int:
-        """As many as there are of the rarer of colour and depth."""
+        """Number of colour or of depth images, whichever is smaller."""
         return min(self._topics.colour.messages, self._topics.depth.messages)
 
     @property
@@ -83,7 +84,7 @@ class BagReplay:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Plain sentences for the summary: what was chosen, assumed or left out."""
+        """Sentences for the summary: what was chosen, assumed or left out."""
         colour, depth = self._pairing.colour, self._pairing.depth
         counted = {
             "colour images without depth of the same time": colour.unpaired,
@@ -95,7 +96,7 @@ class BagReplay:
         return (chosen, *self._notes, *found)
 
     def __enter__(self) -> Self:
-        """Raises BadRecording."""
+        """Open the bag. Raises BadRecording."""
         self._rewind()
         bag = self._closing.enter_context(BagFile(self._path))
         self._messages = bag.messages((self._topics.colour.name, self._topics.depth.name))
@@ -108,7 +109,7 @@ class BagReplay:
         self._closing.close()
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """The next usable frame. A recording is never late: timeout_s plays no part.
+        """The next usable frame. timeout_s has no effect, because a recording is never late.
 
         Raises EndOfStream after the last frame, BadRecording instead if not one frame was usable,
         DeviceRefused outside of a with block.
@@ -135,7 +136,7 @@ class BagReplay:
         return first.reason if first.file == _THE_REST else f"the first: {first}"
 
     def pass_over(self, until_ns: int) -> None:
-        """Leave out what another frame follows until then, without decoding it."""
+        """Skip, without decoding, every frame that is followed by another one not later than until_ns."""
         while self._messages is not None:
             while len(self._pairs) < 2 and not self._ended:
                 self._take_in(self._messages)
@@ -155,7 +156,7 @@ class BagReplay:
         except StopIteration:
             self._end()
         except BadRecording as error:
-            # What came before the damage was whole, and is not lost for it.
+            # Everything before the damage is valid and stays usable.
             self._skipped.append(SkippedFrame(_THE_REST, str(error)))
             self._ended = True
         else:
@@ -166,7 +167,8 @@ class BagReplay:
         self._pairs.extend(self._pairing.pairs(self._ended))
 
     def _end(self) -> None:
-        """The bag's index says how many there are: a storage may pass over what is damaged in silence."""
+        """Compare with the number of messages in the bag's index: a storage format may skip damage
+        silently."""
         self._ended = True
         promised = self._topics.colour.messages + self._topics.depth.messages
         if self._taken < promised:
@@ -195,9 +197,10 @@ class BagReplay:
 
 
 def _usual_fps(bag: BagFile, topic: str) -> float | None:
-    """By the first images: other topics of the bag may begin earlier and end later."""
+    """The rate of the first images. The duration of the bag cannot be used, because other topics may begin
+    earlier and end later."""
     stamps_ns = []
-    # Damage is told when the frames are read.
+    # Damage is reported when the frames are read.
     with suppress(BadRecording):
         for _, message in islice(bag.messages((topic,)), _FIRST_IMAGES):
             stamps_ns.append(stamp_ns(message))
@@ -208,7 +211,7 @@ def _usual_fps(bag: BagFile, topic: str) -> float | None:
 def _odometry(
     bag: BagFile, topics: BagTopics, choice: OdometryChoice, camera: str, transforms: StaticTransforms
 ) -> tuple[PoseTrack | None, tuple[str, ...]]:
-    """The poses that were chosen, and what is to be said of it. Raises BadRecording."""
+    """The chosen poses, and notes for the summary. Raises BadRecording."""
     if choice == "groundtruth":
         raise BadRecording(f"{bag.path}: a bag has no groundtruth.txt; choose another odometry, or none")
     if choice == "none" or (choice == "auto" and topics.odometry is None):

@@ -1,4 +1,4 @@
-"""Which topics of a bag are colour, depth, their calibration and the odometry."""
+"""Chooses the topics of a bag for colour, depth, their calibration and the odometry."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _RECTIFIED = "rect"
 
 @dataclass(frozen=True, slots=True)
 class WantedTopics:
-    """What the user asks for; None: to be found."""
+    """The topics that the user chose; None: to be found."""
 
     colour: str | None = None
     depth: str | None = None
@@ -31,7 +31,7 @@ class WantedTopics:
 
 @dataclass(frozen=True, slots=True)
 class BagTopics:
-    """The chosen ones; an info or the odometry is None where there is none."""
+    """The chosen topics. colour_info, depth_info and odometry are None if there are none."""
 
     colour: Topic
     depth: Topic
@@ -41,24 +41,25 @@ class BagTopics:
 
     @property
     def says_registered(self) -> bool:
-        """Whether depth calls itself registered to colour."""
+        """Whether the name of the depth topic says that it is registered to colour."""
         return is_registered(self.depth.name)
 
     @property
     def rectified(self) -> bool:
-        """Whether the colour images have no lens distortion any more."""
+        """Whether the colour images are rectified, so that they have no lens distortion."""
         return _is_rectified(self.colour.name)
 
     @property
     def depth_rectified(self) -> bool:
-        """The same of depth."""
+        """Whether the depth images are rectified."""
         return _is_rectified(self.depth.name)
 
 
 def choose_topics(
     path: Path, topics: Sequence[Topic], wanted: WantedTopics, with_odometry: bool = True
 ) -> BagTopics:
-    """Raises BadRecording where there is none, or several that are equally good, naming them."""
+    """Choose the topics. Raises BadRecording if there is none, or if several are equally good, with their
+    names."""
     images = [one for one in topics if one.kind in _IMAGES]
     colour = _choose(path, images, wanted.colour, "colour", _colour_rank)
     depth = _choose(path, images, wanted.depth, "depth", _depth_rank)
@@ -73,14 +74,14 @@ def choose_topics(
 
 
 def base_name(topic: str) -> str:
-    """Without the image transport."""
+    """The name of a topic without its image transport."""
     for transport in _TRANSPORTS:
         topic = topic.removesuffix(transport)
     return topic
 
 
 def is_registered(topic: str) -> bool:
-    """Whether a depth topic is named as registered to colour."""
+    """Whether the name of a depth topic says that it is registered to colour."""
     return any(word in topic.lower() for word in _REGISTERED_WORDS)
 
 
@@ -91,7 +92,7 @@ def _is_rectified(topic: str) -> bool:
 def _choose(
     path: Path, topics: Sequence[Topic], wanted: str | None, what: str, rank: Callable[[Topic], int | None]
 ) -> Topic:
-    """The topic that is wanted, or the one that ranks least; None is no candidate."""
+    """The wanted topic, or the one with the lowest rank. A rank of None excludes a topic."""
     if wanted is not None:
         named = [one for one in topics if one.name == wanted]
         if named:
@@ -122,14 +123,14 @@ def _colour_rank(topic: Topic) -> int | None:
 
 def _depth_rank(topic: Topic) -> int | None:
     name = topic.name.lower()
-    # Depth through a codec for pictures is no depth any more.
+    # A codec for pictures destroys depth.
     if "depth" not in name or topic.name.endswith("/compressed"):
         return None
     return 0 if is_registered(topic.name) else 1
 
 
 def _info_of(topic: Topic, infos: set[str]) -> str | None:
-    """As image_transport finds it: beside the images."""
+    """The topic with the camera_info of images, where image_transport looks for it: beside the images."""
     beside = base_name(topic.name).rsplit("/", 1)[0] + "/camera_info"
     stream = stream_of(topic.name)
     places = [beside] if stream is None else [beside, info_topic(stream)]
@@ -137,7 +138,7 @@ def _info_of(topic: Topic, infos: set[str]) -> str | None:
 
 
 def _option(what: str) -> str:
-    """Where the user chooses: on the command line, or for a recording in place of the camera in YAML."""
+    """The option with which the user chooses a topic, on the command line or in YAML."""
     in_yaml = "" if what == "odometry" else f" (or camera.{what}_topic)"
     return f"--{what}-topic{in_yaml}"
 

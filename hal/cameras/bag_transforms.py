@@ -1,4 +1,4 @@
-"""The tree of frames that a bag's transforms span."""
+"""The tree of frames in a bag's static transforms."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from hal.types import Pose
 
 
 class StaticTransforms:
-    """Where frames stand in each other."""
+    """The poses of frames relative to each other."""
 
     def __init__(self) -> None:
         self._seen_from: dict[str, dict[str, Pose]] = {}
 
     def add(self, parent: str, child: str, transform: Any) -> None:
-        """transform: a geometry_msgs Transform, child in parent. Raises ValueError for one that is none."""
+        """Add a transform: a geometry_msgs Transform, child in parent. Raises ValueError if it is invalid."""
         t, q = transform.translation, transform.rotation
         quaternion, origin_m = np.array([q.x, q.y, q.z, q.w]), np.array([t.x, t.y, t.z])
         length = float(np.linalg.norm(quaternion))
@@ -29,7 +29,7 @@ class StaticTransforms:
         self._seen_from.setdefault(child, {})[parent] = pose.inverse()
 
     def find(self, outer: str, inner: str) -> Pose | None:
-        """The inner frame as the outer one sees it, over whatever lies between; None: they are not linked."""
+        """The pose of the inner frame in the outer one, over any frames in between; None if not connected."""
         poses = {outer: Pose(np.eye(3), np.zeros(3))}
         waiting = deque([outer])
         while waiting and inner not in poses:
@@ -42,5 +42,5 @@ class StaticTransforms:
 
 
 def frame_name(name: str) -> str:
-    """ROS 1 began names of frames with a slash."""
+    """The name of a frame without the leading slash of ROS 1."""
     return name.lstrip("/")

@@ -1,4 +1,4 @@
-"""What camera.yaml of a recording means for its images."""
+"""The calibration of a recording (camera.yaml), applied to its images."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hal.errors import BadRecording
 from hal.types import CameraMount, ColourImage, DepthImage, Intrinsics, Pose
 
 _DEPTH_LIMIT = 65535
-# So that 0.3 m at a factor of 1000, computed as 299.99999999999994, means the value 300.
+# So that 0.3 m with a factor of 1000, computed as 299.99999999999994, gives the value 300.
 _ROUNDING = 1e-6
 _UNREGISTERED_NOTE = (
     "depth is not registered to colour and camera.yaml does not give the depth camera: used as it is, so "
@@ -29,8 +29,8 @@ _UNREGISTERED_NOTE = (
 class RecordingCalibration:
     """Intrinsics, scale and mount of a recording; turns its raw images into those of an RgbdFrame.
 
-    mount: None where camera.yaml does not say how high the camera was. notes: plain sentences on
-    what had to be assumed.
+    mount: None if camera.yaml does not give the height of the camera. notes: sentences about what had to be
+    assumed.
     """
 
     def __init__(self, camera: RecordingCamera) -> None:
@@ -55,16 +55,16 @@ class RecordingCalibration:
             raise BadRecording(str(error)) from error
 
     def rectify(self, colour: ColourImage, depth: DepthImage) -> tuple[ColourImage, DepthImage]:
-        """Undistorted colour and the depth that belongs to it, without values out of range.
+        """Undistorted colour and the depth registered to it, without values out of range.
 
-        May work in place: the images passed in are used up.
+        May work in place: do not use the images passed in afterwards.
         """
         if self._registration is not None:
             depth = self._registration(depth)
         if self._undistorter is not None:
             colour = self._undistorter.colour(colour)
-            # Registered depth shares the lens of its colour image; what was drawn into the pinhole
-            # image above is straight already.
+            # Depth that was recorded as registered has the lens distortion of its colour image. Depth that
+            # was registered above is undistorted already.
             if self._registration is None:
                 depth = self._undistorter.depth(depth)
         if self._depth_range is not None:
@@ -100,7 +100,7 @@ def _mount(camera: RecordingCamera) -> CameraMount | None:
 
 
 def _depth_range(camera: RecordingCamera) -> tuple[int, int] | None:
-    """Nearest and farthest depth value that counts; None where camera.yaml sets no limit."""
+    """The nearest and the farthest valid depth value; None if camera.yaml sets no limit."""
     if camera.depth_min_m is None and camera.depth_max_m is None:
         return None
     nearest = math.ceil((camera.depth_min_m or 0.0) * camera.depth_factor - _ROUNDING)

@@ -1,4 +1,4 @@
-"""A recording that plays as if it were a camera: in its own time, on the clock of the run."""
+"""A recording that plays in real time, as if it were a camera."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from hal.types import Intrinsics, RgbdFrame
 
 
 class PacedRecording:
-    """FrameSource: each frame comes when its time has come, counted from the first read, and bears that time.
+    """FrameSource that gives each frame when it is due, counted from the first read, with that time as
+    captured_ns.
 
-    For a base on the bench before recorded images: what the decision sees must be fresh. Whoever does not
-    keep up gets the newest frame that is due, as from a camera; those before it are left out.
+    For tests of a real base with recorded images: the decision needs fresh frames. A reader that does not
+    keep up gets the newest frame that is due, as from a camera; the frames before it are skipped.
     """
 
     def __init__(self, recording: Recording, clock: Clock) -> None:
@@ -40,7 +41,8 @@ class PacedRecording:
         self._recording.__exit__(kind, error, trace)
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """Raises FrameTimeout where the next frame is not due by then, and what the recording raises."""
+        """Wait for the next frame. Raises FrameTimeout if it is not due within timeout_s, and what the
+        recording raises."""
         now_ns = self._clock.now_ns()
         frame = self._waiting or self._newest(now_ns)
         if self._later_ns is None:
@@ -56,7 +58,7 @@ class PacedRecording:
         return replace(frame, captured_ns=due_ns)
 
     def _newest(self, now_ns: int) -> RgbdFrame:
-        """Of what is due, or the first that will be."""
+        """The newest frame that is due, or the next one if none is."""
         if self._later_ns is not None:
             self._recording.pass_over(now_ns - self._later_ns)
         return self._recording.read(0.0)

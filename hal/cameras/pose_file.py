@@ -21,8 +21,8 @@ _FILE_OF: dict[OdometryChoice, str] = {
     "groundtruth": "groundtruth.txt",
 }
 _COLUMNS = 8
-# Files carry four digits and more: a quaternion that is further from unit length than this is
-# something else, such as Euler angles or a shifted column.
+# Files have at least four digits. A quaternion that is further than this from unit length is something else,
+# such as Euler angles or a shifted column.
 _UNIT_TOLERANCE = 0.01
 
 
@@ -30,7 +30,8 @@ class PoseFile(PoseTrack):
     """Poses from lines ``t tx ty tz qx qy qz qw``: the camera optical frame in the world."""
 
     def __init__(self, path: Path, max_gap_s: float = 0.2) -> None:
-        """Raises BadRecording with file and line: not finite, not a unit quaternion, a time twice."""
+        """Read the file. Raises BadRecording with file and line if a value is not finite, a quaternion is not
+        of unit length, or a time stands there twice."""
         rows: dict[int, FloatArray] = {}
         for number, line in content_lines(path):
             try:
@@ -49,10 +50,10 @@ class PoseFile(PoseTrack):
 
 
 def open_odometry(folder: Path, choice: OdometryChoice) -> PoseFile | None:
-    """The poses of a recording that shall serve as odometry; None for none.
+    """The poses of a recording that are used as odometry; None for none.
 
-    "auto" takes odometry.txt where the recording has one; "file" asks for it, as "groundtruth" does for
-    groundtruth.txt, and raises BadRecording where it is not there.
+    "auto" uses odometry.txt if the recording has one. "file" requires odometry.txt and "groundtruth" requires
+    groundtruth.txt; they raise BadRecording if the file is missing.
     """
     if choice == "none":
         return None

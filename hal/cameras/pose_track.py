@@ -1,4 +1,4 @@
-"""Camera poses at times, and between them."""
+"""Camera poses over time, with interpolation."""
 
 from __future__ import annotations
 
@@ -11,15 +11,18 @@ import numpy as np
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray, Pose
 
-# Below this angle sin(angle) / angle is 1 to the last digit but divides by nearly nothing.
+# Below this angle sin(angle) / angle is 1 to the last digit, but the division would be by nearly zero.
 _SMALL_ANGLE_RAD = 1e-6
 
 
 class PoseTrack:
-    """OdometrySource: the camera's optical frame in a frame that does not move.
+    """OdometrySource: poses of the camera's optical frame in a fixed frame.
 
-    name: where the poses are from. stamps_ns: N, growing. positions_m (N, 3). quaternions (N, 4) as
-    qx qy qz qw, of unit length.
+    name: where the poses come from.
+    stamps_ns: N increasing times.
+    positions_m: (N, 3).
+    quaternions: (N, 4), qx qy qz qw, of unit length.
+    max_gap_s: greatest time between two poses that are interpolated.
     """
 
     def __init__(
@@ -39,9 +42,10 @@ class PoseTrack:
         return len(self._stamps_ns)
 
     def camera_pose(self, stamp_ns: int) -> Pose | None:
-        """Interpolated between the neighbours: position linearly, attitude along the shortest turn.
+        """The pose at stamp_ns, interpolated between its neighbours: position linearly, rotation by slerp.
 
-        None before the first pose, after the last, and between two that are further apart than max_gap_s.
+        None before the first pose, after the last, and between two poses that are further apart than
+        max_gap_s.
         """
         after = bisect_right(self._stamps_ns, stamp_ns)
         if after == 0:
@@ -62,7 +66,7 @@ class PoseTrack:
 
 
 def rotation_matrix(quaternion: FloatArray) -> FloatArray:
-    """(qx, qy, qz, qw) of unit length -> (3, 3)."""
+    """The rotation matrix (3, 3) of a unit quaternion (qx, qy, qz, qw)."""
     x, y, z, w = quaternion
     return np.array(
         [
@@ -74,7 +78,10 @@ def rotation_matrix(quaternion: FloatArray) -> FloatArray:
 
 
 def quaternion_of(rotation: FloatArray) -> FloatArray:
-    """(3, 3) -> (qx, qy, qz, qw): the greatest eigenvector of Bar-Itzhack's matrix, good at every angle."""
+    """The quaternion (qx, qy, qz, qw) of a rotation matrix (3, 3).
+
+    It is the eigenvector of the largest eigenvalue of Bar-Itzhack's matrix, which is accurate at every angle.
+    """
     r = rotation
     k = np.array(
         [
@@ -89,9 +96,9 @@ def quaternion_of(rotation: FloatArray) -> FloatArray:
 
 
 def _slerp(start: FloatArray, end: FloatArray, share: float) -> FloatArray:
-    """Shoemake's spherical interpolation of unit quaternions, the short way round."""
+    """Spherical linear interpolation of unit quaternions (Shoemake), along the shorter arc."""
     cosine = float(start @ end)
-    if cosine < 0.0:  # q and -q are the same attitude
+    if cosine < 0.0:  # q and -q are the same rotation
         end, cosine = -end, -cosine
     angle_rad = math.acos(min(cosine, 1.0))
     if angle_rad < _SMALL_ANGLE_RAD:

@@ -1,6 +1,6 @@
 """Intel RealSense D435i through pyrealsense2: colour with depth aligned to it, and optionally its gyro.
 
-The one module that imports pyrealsense2 (Apache-2.0, extra "realsense"), and only when a camera is opened.
+The only module that imports pyrealsense2 (Apache-2.0, extra "realsense"), and only when a camera is opened.
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ from hal.errors import DeviceNotFound, DeviceRefused, FrameTimeout, LinkLost
 from hal.types import GyroSamples, Intrinsics, RgbdFrame
 
 _GYRO_RATE_HZ = 200
-_GYRO_QUEUE = 256  # more than a second: what a stalled reader leaves behind beyond that is lost
+_GYRO_QUEUE = 256  # more than a second of samples; a reader that stalls for longer loses the rest
 _USB_HINT = "use the USB 3 cable in a USB 3 port, and close other programs that hold the camera"
 
 
 class RealsenseCamera:
-    """FrameSource over one camera. Verifies what the device gave instead of trusting what was asked for."""
+    """FrameSource over one camera. It verifies the mode that the device gave, and does not trust the
+    request."""
 
     def __init__(self, config: RealsenseCameraConfig, clock: Clock, vendor: Any = None) -> None:
-        """vendor: stands in for the module pyrealsense2, for tests."""
+        """vendor: replaces the module pyrealsense2, for tests."""
         self._config = config
         self._clock = clock
         self._vendor = vendor
@@ -41,7 +42,8 @@ class RealsenseCamera:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """Of the colour stream, to which depth is aligned. Raises DeviceRefused before opening."""
+        """The intrinsics of the colour stream, to which depth is aligned. Raises DeviceRefused before
+        opening."""
         if self._intrinsics is None:
             raise DeviceRefused(f"{self._name}: its intrinsics are known only once it has been opened")
         return self._intrinsics
@@ -65,7 +67,7 @@ class RealsenseCamera:
         self._closing.close()
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """The next whole frame. Raises FrameTimeout; LinkLost once the camera has gone."""
+        """The next complete frame. Raises FrameTimeout, and LinkLost once the camera has gone."""
         if self._pipeline is None:
             raise DeviceRefused(f"{self._name}: is not open; read it inside a with block")
         try:
@@ -135,7 +137,8 @@ class RealsenseCamera:
         self._pipeline = None
 
     def _start_gyro(self, context: Any, serial: str, colour: Any, opening: contextlib.ExitStack) -> Any:
-        """A pipeline of its own: inside the video's framesets only the newest of its samples would come."""
+        """Start the gyro in a separate pipeline: the framesets of the video would hold only its newest
+        sample."""
         rs = self._rs
         settings = rs.config()
         settings.enable_device(serial)
@@ -177,14 +180,14 @@ class RealsenseCamera:
         scale_m = float(self._device.first_depth_sensor().get_depth_scale())
         if not 0.0 < scale_m < 0.1:
             raise DeviceRefused(f"{self._name}: its depth unit of {scale_m} m is impossible; reconnect it")
-        # The device's float32 0.001 is meant as 0.001, not as 0.0010000000475.
+        # The device's float32 0.001 means 0.001, not 0.0010000000475.
         return float(str(np.float32(scale_m)))
 
     def _is_whole(self, frames: Any) -> bool:
-        """Both streams, both new, of one time.
+        """Whether a frameset holds both streams, both new and of the same time.
 
-        The first frameset after a start holds one stream; while one stream stalls, librealsense may
-        send its last frame again beside new ones of the other.
+        The first frameset after a start holds only one stream. While one stream stalls, librealsense may
+        repeat its last frame next to new ones of the other.
         """
         colour, depth = frames.get_color_frame(), frames.get_depth_frame()
         if not colour or not depth:
@@ -204,7 +207,7 @@ class RealsenseCamera:
         device_ms = colour.get_timestamp()
         captured_ns = self._device_clock.captured_ns(round(device_ms * NS_PER_MS), arrival_ns)
         return RgbdFrame(
-            # Copies: librealsense lends its buffers, and stops when too many are kept.
+            # Copies, because librealsense owns the buffers and stops when too many are kept.
             colour=np.array(colour.get_data(), np.uint8),
             depth=np.array(depth.get_data(), np.uint16),
             depth_scale_m=self._depth_scale_m,
@@ -216,7 +219,7 @@ class RealsenseCamera:
         )
 
     def _gyro_samples(self) -> GyroSamples | None:
-        """All samples that have arrived since the frame before; None without gyro."""
+        """All samples that have arrived since the last frame; None without a gyro."""
         if self._gyro_queue is None:
             return None
         stamps_ns: list[int] = []
@@ -259,7 +262,7 @@ def _find_device(rs: Any, context: Any, serial: str | None) -> Any:
 
 def _set_up_sensors(rs: Any, device: Any) -> None:
     for sensor in device.query_sensors():
-        # Auto exposure would otherwise halve the colour rate in dim light.
+        # Otherwise auto exposure would halve the rate of the colour images in dim light.
         if sensor.supports(rs.option.auto_exposure_priority):
             sensor.set_option(rs.option.auto_exposure_priority, 0)
         # Global time follows the wall clock, which steps; the device's own clock does not.

@@ -1,4 +1,4 @@
-"""What every kind of recording tells besides its frames."""
+"""What every kind of recording offers besides its frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hal.types import CameraMount
 
 @dataclass(frozen=True, slots=True)
 class SkippedFrame:
-    """What could not be used, and why. file: an image of the recording, ``index.txt:line``, or a topic."""
+    """Something that could not be used, and why. file: an image, ``index.txt:line``, or a topic."""
 
     file: str
     reason: str
@@ -21,25 +21,25 @@ class SkippedFrame:
 
 
 class Recording(FrameSource, Protocol):
-    """A FrameSource that ends, and knows what it is."""
+    """A FrameSource that ends, with a description of the recording."""
 
     def pass_over(self, until_ns: int) -> None:
-        """Leave out what another frame follows until then, without decoding it."""
+        """Skip, without decoding, every frame that is followed by another one not later than until_ns."""
         ...
 
     @property
     def mount(self) -> CameraMount | None:
-        """Where the camera sat on the robot; None where the recording does not say."""
+        """Where the camera sat on the robot; None if the recording does not say."""
         ...
 
     @property
     def frame_count(self) -> int:
-        """How many frames there are at most; some may prove unusable."""
+        """Maximum number of frames; some may turn out to be unusable."""
         ...
 
     @property
     def fps(self) -> float | None:
-        """Frames a second; None where that is not known."""
+        """Frames per second; None if unknown."""
         ...
 
     @property
@@ -49,5 +49,5 @@ class Recording(FrameSource, Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Plain sentences for the summary: what was assumed, left out or put in order."""
+        """Sentences for the summary: what was assumed, left out or put in order."""
         ...

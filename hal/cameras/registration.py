@@ -1,4 +1,5 @@
-"""Depth seen by its own camera, drawn again as the colour camera would have seen it."""
+"""Registers depth to colour: turns the depth camera's image into one from the viewpoint of the colour
+camera."""
 
 from __future__ import annotations
 
@@ -7,29 +8,31 @@ from numpy.typing import NDArray
 
 from hal.types import DepthImage, FloatArray, Intrinsics, Pose
 
-_FARTHEST = np.uint16(65535)  # so far or farther: where 16 bits end
+_FARTHEST = np.uint16(65535)  # the greatest value of 16 bits: this far or further
 _UNSEEN = np.int32(65536)
 _FAR_OUTSIDE_PX = 1e6
-# A little more than half: noise moves neighbours apart, and a surface must not get pinholes from it.
+# Half of the width of a depth pixel. A little more than 0.5, because noise moves neighbours apart, which must
+# not leave pinholes in a surface.
 _HALF_PIXEL = 0.65
 
 
 class DepthRegistration:
-    """Projects each depth pixel into the colour image; where several meet, the nearest wins.
+    """Projects each depth pixel into the colour image; where several overlap, the nearest wins.
 
-    A depth pixel covers the colour pixels whose centres lie between the projections of its corners,
-    so a colour image with a longer focal length gets no holes (as in librealsense's rs2::align).
+    A depth pixel covers the colour pixels whose centres lie between the projections of its corners, so there
+    are no holes if the colour image has a longer focal length (as in librealsense's rs2::align).
     """
 
     def __init__(
         self, depth: Intrinsics, colour: Intrinsics, depth_in_colour: Pose, depth_scale_m: float
     ) -> None:
-        """depth_in_colour: the depth camera as the colour camera sees it."""
+        """depth_in_colour: the pose of the depth camera in the frame of the colour camera."""
         self._colour = colour
         self._offset = (depth_in_colour.translation_m / depth_scale_m).astype(np.float32)
         self._first_corner = _corner_rays(depth, depth_in_colour.rotation, -_HALF_PIXEL)
         self._last_corner = _corner_rays(depth, depth_in_colour.rotation, _HALF_PIXEL)
-        # How many colour pixels one may cover; one more, because tilt and parallax stretch it a little.
+        # How many colour pixels in a row a depth pixel may cover, plus one for stretching by tilt and
+        # parallax.
         self._reach = int(np.ceil(2 * _HALF_PIXEL * max(colour.fx / depth.fx, colour.fy / depth.fy))) + 1
 
     def __call__(self, depth: DepthImage) -> DepthImage:
@@ -39,9 +42,10 @@ class DepthRegistration:
         units = depth.reshape(-1)[measured].astype(np.float32)
         u0, v0, distance = self._project(self._first_corner[:, measured] * units)
         u1, v1, _ = self._project(self._last_corner[:, measured] * units)
-        # What is cut off stays so: moved by the offset, it would be a wall just before there.
+        # Depth that is saturated stays saturated: moved by the offset, it would be a wall just before the
+        # limit.
         distance[units >= _FARTHEST] = _FARTHEST
-        # A depth camera that is built in turned swaps the corners.
+        # If the depth camera is mounted rotated, the corners are swapped.
         first_u, first_v = np.minimum(u0, u1), np.minimum(v0, v1)
         end_u, end_v = np.maximum(u0, u1), np.maximum(v0, v1)
         image = np.full(width * height, _UNSEEN)
@@ -57,7 +61,8 @@ class DepthRegistration:
     def _project(
         self, points: NDArray[np.float32]
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-        """Points (3, N) in depth units -> first pixel centre right of and below each, distance (0: none)."""
+        """Project points (3, N) in depth units: first pixel centre right of and below each, distance (0:
+        behind the camera)."""
         x, y, z = points + self._offset[:, None]
         ahead = z >= 1.0
         z = np.where(ahead, z, np.float32(1.0))
@@ -71,7 +76,7 @@ class DepthRegistration:
 
 
 def _corner_rays(camera: Intrinsics, rotation: FloatArray, shift_px: float) -> NDArray[np.float32]:
-    """Per pixel the point at unit depth behind its corner, turned by rotation: (3, H * W)."""
+    """For each pixel the point at unit depth on the ray through its corner, rotated: (3, H * W)."""
     u, v = np.meshgrid(np.arange(camera.width) + shift_px, np.arange(camera.height) + shift_px)
     ahead = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones_like(u)])
     return np.asarray(rotation @ ahead.reshape(3, -1), np.float32)

@@ -1,4 +1,4 @@
-"""Colour and depth that arrive one after the other -> pairs of the same time."""
+"""Pairs colour and depth images of the same time while they arrive one after the other."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from hal.clocks import NS_PER_S
 Item = TypeVar("Item")
 
 _PATIENCE_NS = 2 * NS_PER_S
-# An image has a rival, the rival another choice with a rival of its own: after three, all is settled.
+# How far to look ahead, in multiples of the maximum gap. A depth image may fit a rival colour image better,
+# and that rival may fit another depth image with a rival of its own; three gaps are enough to settle this.
 _LOOK_AHEAD_GAPS = 3
 
 
 class Stamped(NamedTuple, Generic[Item]):
-    """number: counted from 0 in its stream."""
+    """An item with its time. number: counted from 0 in its stream."""
 
     stamp_ns: int
     number: int
@@ -25,7 +26,11 @@ class Stamped(NamedTuple, Generic[Item]):
 
 
 class Stream(Generic[Item]):
-    """One of the two, in the order of its times. out_of_order: what came with a time that was not later."""
+    """Colour or depth, in the order of time.
+
+    waiting: items without a partner so far. unpaired: number of items dropped without a partner.
+    out_of_order: number of items with a time that was not later than that of the item before.
+    """
 
     def __init__(self) -> None:
         self.waiting: deque[Stamped[Item]] = deque()
@@ -33,7 +38,7 @@ class Stream(Generic[Item]):
         self._last_ns: int | None = None
 
     def add(self, stamp_ns: int, item: Item) -> None:
-        """Take in the next one."""
+        """Take in the next item."""
         number, self._count = self._count, self._count + 1
         if self._last_ns is not None and stamp_ns <= self._last_ns:
             self.out_of_order += 1
@@ -42,16 +47,16 @@ class Stream(Generic[Item]):
         self.waiting.append(Stamped(stamp_ns, number, item))
 
     def drop(self) -> None:
-        """The oldest one finds no partner."""
+        """Drop the oldest item, which has no partner."""
         self.waiting.popleft()
         self.unpaired += 1
 
 
 class StampPairing(Generic[Item]):
-    """Each colour image with the depth image nearest to it in time, each of them once.
+    """Pairs each colour image with the nearest depth image in time, each of them once.
 
-    By hal/cameras/tum_index.associate, but while they arrive: a colour image waits until whatever comes later
-    is too late to be of its time, or of that of an image which would rather have the same depth.
+    The pairs are those of hal/cameras/tum_index.associate, but found while the images arrive. A colour image
+    waits until all later images are too late to be its partner, or the partner of a rival for the same depth.
     """
 
     def __init__(self, max_gap_ns: int) -> None:
@@ -60,10 +65,10 @@ class StampPairing(Generic[Item]):
         self.depth: Stream[Item] = Stream()
 
     def pairs(self, ended: bool) -> Iterator[tuple[Stamped[Item], Stamped[Item]]]:
-        """Those that are certain by now. ended: nothing more will come."""
+        """The pairs that are certain by now. ended: no more images will come."""
         colours, depths = self.colour.waiting, self.depth.waiting
         while colours:
-            # Of what is earlier than the first colour image, the last alone may be of its time.
+            # Of the depth images earlier than the first colour image, only the last can be its partner.
             while len(depths) > 1 and depths[1].stamp_ns <= colours[0].stamp_ns:
                 self.depth.drop()
             if not (ended or self._certain()):
@@ -79,18 +84,20 @@ class StampPairing(Generic[Item]):
             self.depth.drop()
 
     def _certain(self) -> bool:
-        """Whether enough is known of both for the first colour image, or the other stream may have ended."""
+        """Whether the partner of the first colour image is certain: both streams reach far enough ahead, or
+        one of them seems to have ended."""
         colours, depths = self.colour.waiting, self.depth.waiting
         late_ns = colours[0].stamp_ns + self._ahead_ns
         known = bool(depths) and min(colours[-1].stamp_ns, depths[-1].stamp_ns) >= late_ns
         return known or self._waited(colours) or self._waited(depths)
 
     def _waited(self, stream: deque[Stamped[Item]]) -> bool:
-        """Whether the oldest one need not be waited with any longer: the other stream may have ended."""
+        """Whether the oldest item has waited long enough: the other stream seems to have ended."""
         return bool(stream) and stream[-1].stamp_ns - stream[0].stamp_ns > _PATIENCE_NS + self._ahead_ns
 
     def _first_partner(self) -> int | None:
-        """Which of depth goes with the first colour image, if any does."""
+        """Index of the waiting depth image that is paired with the first colour image; None if there is
+        none."""
         colour_ns = [one.stamp_ns for one in self.colour.waiting]
         depth_ns = [one.stamp_ns for one in self.depth.waiting]
         return dict(associate(colour_ns, depth_ns, self._max_gap_ns)).get(0)

@@ -1,4 +1,4 @@
-"""The text files of a TUM RGB-D folder: exact times, index lines, pairs of colour and depth."""
+"""The index files of a TUM RGB-D folder: exact times, index lines, pairs of colour and depth."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_STAMP_S = Decimal(2**63 - 1).scaleb(-9)
 
 @dataclass(frozen=True, slots=True)
 class IndexEntry:
-    """One image: its time, and its path relative to the recording."""
+    """One image: its time, and its path relative to the folder."""
 
     stamp_ns: int
     file: str
@@ -28,9 +28,10 @@ class IndexEntry:
 class ImageIndex:
     """rgb.txt or depth.txt: entries with strictly increasing times.
 
-    bad_lines: those that say nothing usable. duplicates: further images with the time of an earlier
-    one; they are left out, because nothing moves in no time. unsorted: lines that stood before an
-    earlier time.
+    bad_lines: lines that cannot be used.
+    duplicates: number of images with the time of an earlier one, which are left out: two frames of the same
+        time cannot be compared.
+    unsorted: number of lines with an earlier time than the line before.
     """
 
     entries: tuple[IndexEntry, ...]
@@ -40,9 +41,9 @@ class ImageIndex:
 
 
 def parse_stamp_ns(text: str) -> int:
-    """Decimal seconds to whole nanoseconds, exactly.
+    """Convert decimal seconds to whole nanoseconds, exactly.
 
-    Through a float, 1305031236.733922 would lose what lies below 0.2 microseconds. Raises ValueError.
+    A float would round 1305031236.733922 to 0.2 microseconds. Raises ValueError.
     """
     try:
         seconds = Decimal(text)
@@ -93,9 +94,9 @@ def read_index(path: Path) -> ImageIndex:
 def associate(colour_ns: Sequence[int], depth_ns: Sequence[int], max_gap_ns: int) -> list[tuple[int, int]]:
     """Pairs (index of colour, index of depth) in time order; both inputs strictly increase.
 
-    As the benchmark's own associate.py does: of all couples not further apart than max_gap_ns the
-    closest is taken first, and each image serves once. A couple that would take depth back in time
-    beside a closer one is none.
+    As in the benchmark's own associate.py: of all couples not further apart than max_gap_ns, the closest is
+    taken first, and each image is used once. A couple that would reverse the order of depth next to a closer
+    couple is not used.
     """
     couples: list[tuple[int, int, int]] = []
     for i, stamp_ns in enumerate(colour_ns):

@@ -31,7 +31,7 @@ _FORMAT_HINT = (
 
 @dataclass(frozen=True, slots=True)
 class _Pair:
-    """One frame to be read. sequence counts the colour images, so a gap shows an unpaired one."""
+    """One frame to be read. sequence counts the colour images, so a gap shows an image without depth."""
 
     sequence: int
     colour: IndexEntry
@@ -41,8 +41,8 @@ class _Pair:
 class TumReplay:
     """FrameSource over a folder with rgb.txt, depth.txt and camera.yaml; see config/recording.py.
 
-    Index and calibration are read at once (raises BadRecording), images when entered. captured_ns
-    is the time of the colour image as recorded. A frame that cannot be used is left out and told
+    The constructor reads index and calibration (raises BadRecording); images are read after entering.
+    captured_ns is the recorded time of the colour image. A frame that cannot be used is left out and listed
     in ``skipped``. Entering again starts from the beginning.
     """
 
@@ -64,22 +64,22 @@ class TumReplay:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """Of the undistorted images that read() gives."""
+        """The intrinsics of the undistorted images that read() gives."""
         return self._calibration.intrinsics
 
     @property
     def mount(self) -> CameraMount | None:
-        """Where the camera sat on the robot; None where the recording does not say."""
+        """Where the camera sat on the robot; None if the recording does not say."""
         return self._calibration.mount
 
     @property
     def frame_count(self) -> int:
-        """Pairs of colour and depth, of which some may prove unusable."""
+        """Number of pairs of colour and depth; some may turn out to be unusable."""
         return len(self._pairs)
 
     @property
     def fps(self) -> float | None:
-        """As camera.yaml says, else the usual rate of the colour images; None for a single frame."""
+        """The rate in camera.yaml, else the median rate of the colour images; None for a single frame."""
         if self._calibration.camera.fps is not None or len(self._pairs) < 2:
             return self._calibration.camera.fps
         return NS_PER_S / median(b.colour.stamp_ns - a.colour.stamp_ns for a, b in pairwise(self._pairs))
@@ -91,7 +91,7 @@ class TumReplay:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Plain sentences for the summary: what was assumed, left out or put in order."""
+        """Sentences for the summary: what was assumed, left out or put in order."""
         counted = {
             "colour images without depth of the same time": self.unpaired_colour,
             "depth images without colour of the same time": self.unpaired_depth,
@@ -102,8 +102,8 @@ class TumReplay:
 
     def __enter__(self) -> Self:
         self._rewind()
-        # One thread: OpenCV decodes without the interpreter's lock, so the images of the next
-        # frames get ready while this one is being looked at, and the order stays as recorded.
+        # OpenCV decodes without the interpreter's lock, so the images of the next frames are decoded while
+        # this one is processed. A single thread keeps the recorded order.
         self._reader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="tum-replay")
         return self
 
@@ -116,7 +116,7 @@ class TumReplay:
         self._ahead.clear()
 
     def read(self, timeout_s: float) -> RgbdFrame:
-        """The next usable frame. A recording is never late: timeout_s plays no part.
+        """The next usable frame. timeout_s has no effect, because a recording is never late.
 
         Raises EndOfStream after the last frame, BadRecording instead if not one frame was usable,
         DeviceRefused outside of a with block.
@@ -136,7 +136,7 @@ class TumReplay:
         raise EndOfStream(f"{self._folder}: no further frame")
 
     def pass_over(self, until_ns: int) -> None:
-        """Leave out what another frame follows until then, without decoding it."""
+        """Skip, without decoding, every frame that is followed by another one not later than until_ns."""
         while (second := self._second()) < len(self._pairs):
             if self._pairs[second].colour.stamp_ns > until_ns:
                 return
@@ -146,7 +146,7 @@ class TumReplay:
                 self._next += 1
 
     def _second(self) -> int:
-        """Which pair follows the one that read() gives next."""
+        """Index of the pair after the one that read() gives next."""
         return self._next - len(self._ahead) + 1
 
     def _rewind(self) -> None:
@@ -156,7 +156,7 @@ class TumReplay:
         self._ahead: deque[Future[RgbdFrame | SkippedFrame]] = deque()
 
     def _next_outcome(self, reader: ThreadPoolExecutor) -> RgbdFrame | SkippedFrame | None:
-        """The next frame or why there is none; None after the last."""
+        """The next frame, or why it is unusable; None after the last."""
         while self._next < len(self._pairs) and len(self._ahead) <= self._read_ahead:
             self._ahead.append(reader.submit(self._load, self._pairs[self._next]))
             self._next += 1
@@ -195,7 +195,7 @@ def _require_recording(folder: Path) -> None:
 
 
 def _pairs(folder: Path, colour: ImageIndex, depth: ImageIndex, max_pair_gap_s: float) -> list[_Pair]:
-    """Raises BadRecording when an index is empty or not one pair can be made."""
+    """Pair colour and depth. Raises BadRecording if an index is empty or there is not a single pair."""
     for name, index in (("rgb.txt", colour), ("depth.txt", depth)):
         if not index.entries:
             why = f"; the first bad line: {index.bad_lines[0]}" if index.bad_lines else ""
@@ -212,7 +212,7 @@ def _pairs(folder: Path, colour: ImageIndex, depth: ImageIndex, max_pair_gap_s: 
 
 
 def _closest_s(colour_ns: Sequence[int], depth_ns: Sequence[int]) -> float:
-    """Least distance between any two times; both inputs are sorted."""
+    """The smallest time between any colour and any depth image; both inputs are sorted."""
     gaps_ns: list[int] = []
     for stamp_ns in colour_ns:
         after = bisect_left(depth_ns, stamp_ns)

@@ -1,4 +1,4 @@
-"""Writes frames into a TUM RGB-D folder that TumReplay, and any TUM tool, reads back."""
+"""Writes frames into a TUM RGB-D folder, which TumReplay and any tool for TUM folders can read."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from hal.cameras.tum_index import format_stamp
 from hal.errors import DeviceRefused
 from hal.types import CameraMount, Pose, RgbdFrame
 
-# Zlib's fastest: a third of the time of the default for a tenth more bytes.
+# zlib's fastest level: a third of the time of the default level, for 10 % more bytes.
 _PNG_FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 
 
 class TumWriter:
-    """One open recording. Frames must share size, intrinsics and depth scale, and go forward in time."""
+    """One open recording. Its frames must have the same intrinsics and depth scale, and increasing times."""
 
     def __init__(self, folder: Path, mount: CameraMount | None = None) -> None:
         self._folder = folder
@@ -33,7 +33,7 @@ class TumWriter:
         self._odometry: TextIO | None = None
 
     def prepare(self) -> None:
-        """Make the folders. Raises DeviceRefused if there is a recording already or they cannot be made."""
+        """Make the folders. Raises DeviceRefused if that fails or if there is a recording already."""
         if os.path.exists(self._folder / "rgb.txt"):
             raise DeviceRefused(f"{self._folder}: holds a recording already; choose another folder")
         for name in ("rgb", "depth"):
@@ -41,7 +41,7 @@ class TumWriter:
                 (self._folder / name).mkdir(parents=True, exist_ok=True)
 
     def __enter__(self) -> Self:
-        """Raises DeviceRefused as prepare() does, and if the files cannot be made."""
+        """Open the files. Raises DeviceRefused as prepare() does, and if the files cannot be made."""
         self.prepare()
         with self._told("rgb.txt"):
             self._colour_index = self._index("rgb.txt", "# time of the colour image in seconds, file")
@@ -58,9 +58,9 @@ class TumWriter:
             self._odometry.close()
 
     def write(self, frame: RgbdFrame, odometry: Pose | None = None) -> None:
-        """Add one frame under its captured_ns. odometry: the camera by dead reckoning then, for odometry.txt.
+        """Add one frame. odometry: the camera's pose by dead reckoning at captured_ns, for odometry.txt.
 
-        Raises ValueError if it does not fit those before, DeviceRefused if it cannot be written.
+        Raises ValueError if the frame does not fit the earlier ones, DeviceRefused if it cannot be written.
         """
         if self._first is None:
             self._first = frame
@@ -79,7 +79,7 @@ class TumWriter:
                 self._pose(odometry, stamp)
 
     def _image(self, index: TextIO, file: str, image: cv2.typing.MatLike, stamp: str) -> None:
-        # Not by OpenCV: for it an image whose last bytes no longer fit on the disk is written.
+        # Not written by OpenCV, which reports success even if the last bytes did not fit on the disk.
         data = cv2.imencode(".png", image, _PNG_FAST)[1]
         with self._told(file):
             (self._folder / file).write_bytes(data.tobytes())
@@ -87,7 +87,7 @@ class TumWriter:
 
     @contextmanager
     def _told(self, file: str) -> Iterator[None]:
-        """A disk that is full is a device that refuses."""
+        """Turn an OSError, such as a full disk, into DeviceRefused."""
         try:
             yield
         except OSError as error:
@@ -100,7 +100,7 @@ class TumWriter:
         self._odometry.write(f"{stamp} {' '.join(f'{value:.12f}' for value in values)}\n")
 
     def _index(self, name: str, heading: str) -> TextIO:
-        # A line at a time reaches the disk, so a recording that ends abruptly can still be read.
+        # Written to disk line by line, so that a recording that ends abruptly can still be read.
         index = (self._folder / name).open("w", encoding="utf-8", buffering=1)
         index.write(f"{heading}\n")
         return index

@@ -1,4 +1,4 @@
-"""Lens distortion taken out of colour and depth, with look-up tables made once."""
+"""Removes lens distortion from colour and depth, with look-up tables that are made once."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NO_FRACTIONS = np.empty(0, np.uint16)
 
 
 class Undistorter:
-    """Maps distorted images onto the pinhole camera of the same intrinsics (Brown's model, as OpenCV)."""
+    """Maps distorted images to the pinhole camera with the same intrinsics (Brown's model, as in OpenCV)."""
 
     def __init__(self, intrinsics: Intrinsics, coefficients: Sequence[float]) -> None:
         """coefficients: k1, k2, p1, p2 and optionally k3."""
@@ -27,12 +27,14 @@ class Undistorter:
         self._nearest, _ = cv2.convertMaps(map_u, map_v, cv2.CV_16SC2, nninterpolation=True)
 
     def colour(self, image: ColourImage) -> ColourImage:
-        """Linear. What lies outside the sensor repeats its rim: black would be an edge that is not there."""
+        """Undistort with linear interpolation. Pixels outside the sensor repeat its border: black ones would
+        make a false edge."""
         straight = cv2.remap(image, *self._linear, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return straight.astype(np.uint8, copy=False)
 
     def depth(self, image: DepthImage) -> DepthImage:
-        """Nearest: a mean of two surfaces is a place where nothing is. Outside the sensor: no data."""
+        """Undistort with the nearest pixel, because the mean of two surfaces would be a point in empty space.
+        Outside the sensor: no data."""
         straight = cv2.remap(
             image,
             self._nearest,

@@ -1,7 +1,7 @@
-"""AgileX tracked and skid-steer bases, protocol V2, over CAN or RS-232, stepped by the control loop.
+"""Driver for AgileX tracked and skid-steer bases: protocol V2 over CAN or RS-232.
 
-Every command period one motion command 0x111 goes out: zero in every mode but armed. 0x421 takes the
-base out of standby while arming and puts it back afterwards.
+One motion command 0x111 is sent every command period: zero in every mode except armed. 0x421 takes the base
+out of standby while arming, and puts it back afterwards.
 """
 
 from __future__ import annotations
@@ -27,35 +27,37 @@ from hal.chassis.driver import ChassisDriver
 from hal.clocks import NS_PER_MS
 from hal.types import ChassisMode, Setpoint
 
-# All that this driver ever sends: identifiers, and how many bytes at most.
+# All that this driver ever sends: identifier -> maximum number of bytes.
 COMMANDS: Mapping[int, int] = MappingProxyType({0x111: 8, 0x421: 1})
 
-# A bus at 500 kbit/s carries about 90 frames in 20 ms; more than this in one exchange is a flood.
+# Maximum for one exchange. A bus at 500 kbit/s carries about 90 frames in 20 ms; more than this is a flood.
 _MAX_FRAMES = 256
 
-# Motor speeds and currents, 100 frames a second: nothing here depends on them.
+# Motor speeds and currents, 100 frames a second, which are not used.
 _FIRST_ACTUATOR = 0x251
 _NOT_NEEDED = frozenset(range(_FIRST_ACTUATOR, _FIRST_ACTUATOR + ACTUATORS))
 
-# How often 0x421 is repeated while the base has not followed it.
+# Period of 0x421 while the base has not followed it.
 _MODE_RETRY_NS = 40 * NS_PER_MS
 
 
 def no_can_frames() -> str:
-    """What to check on a silent bus."""
+    """What to check if the bus is silent."""
     return "not one frame came; check power, wiring, termination and 500 kbit/s"
 
 
 class AgilexChassis(ChassisDriver):
-    """hal.api.Chassis for AgileX V2. Over RS-232 link is a hal.chassis.agilex_serial.AgilexSerialBus, and
-    no_frames its silence."""
+    """hal.api.Chassis for AgileX V2.
+
+    link: over RS-232, a hal.chassis.agilex_serial.AgilexSerialBus. no_frames: over RS-232, its silence().
+    """
 
     def __init__(
         self, link: CanLink, config: AgilexChassisConfig, no_frames: Callable[[], str] = no_can_frames
     ) -> None:
         model = model_of(config)
         feedback = AgilexFeedback(config, model, no_frames)
-        # The model's limit is of what it is told, which is slip_factor times what it makes.
+        # The model's limit applies to the commanded yaw rate, which is slip_factor times the real one.
         commands = CommandLimits(
             max_speed_mps=model.max_speed_mps,
             max_yaw_rate_radps=model.max_yaw_rate_radps / config.slip_factor,
@@ -96,7 +98,7 @@ class AgilexChassis(ChassisDriver):
                 else:
                     messages.append(message)
         finally:
-            # What came before the link went is still true.
+            # What arrived before the link was lost is still valid.
             self._feedback.update(messages, now_ns)
         return heard
 
@@ -114,7 +116,8 @@ class AgilexChassis(ChassisDriver):
         self._send_mode(self._model.mode_standby, now_ns)
 
     def _begin_arming(self) -> None:
-        # Arming counts only a 0x211 that arrives from now on, so no mode need be forgotten. Speak at once.
+        # Arming counts only a 0x211 that arrives from now on, so the old mode need not be forgotten. Send
+        # 0x421 at once.
         self._feedback.await_setup()
         self._mode_sent_ns = None
 
@@ -122,7 +125,11 @@ class AgilexChassis(ChassisDriver):
         return self._feedback.no_feedback
 
     def _mode_to_send(self, now_ns: int) -> int | None:
-        """The 0x421 that is due: while arming, command mode; else standby, until the base is there."""
+        """The mode of the 0x421 that is due, or None.
+
+        Command mode while arming, and repeatedly while armed if the model needs that; else standby, until the
+        base is in it.
+        """
         mode = self._arming.mode
         if mode is ChassisMode.ARMED:
             period_ms = self._model.mode_period_ms
@@ -136,7 +143,7 @@ class AgilexChassis(ChassisDriver):
         return self._model.mode_standby if self._feedback.in_command_mode else None
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> None:
-        # The base turns slip_factor times less than its tracks say, so ask for that much more.
+        # The base turns by 1 / slip_factor of what its tracks say, so ask for slip_factor times as much.
         w_radps = command.w_radps * self._slip_factor
         self._link.send(encode(MotionCommand(command.v_mps, w_radps)))
         self._motion_sent_ns = now_ns

@@ -1,4 +1,4 @@
-"""What an AgileX base has told: speeds, dead-reckoned pose, mode, faults, battery. Pure bookkeeping."""
+"""What an AgileX base has reported: speeds, dead-reckoned pose, mode, faults, battery."""
 
 from __future__ import annotations
 
@@ -26,39 +26,43 @@ from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.types import PlanarPose
 
-# Below this the tracks stand still: two steps of the wire.
+# Below these the tracks stand still: two steps of the protocol's resolution.
 _STANDING_MPS = 0.002
 _STANDING_RADPS = 0.002
 
-# How the vendor's SDK tells a base of protocol V1.
+# By this identifier the vendor's SDK recognises a base of protocol V1.
 _V1_STATE_ID = 0x151
 
-# How often 0x211 may come at the most: the shortest period in any manual is 20 ms (TRACER v1.2).
+# Minimum period of 0x211, and how many may arrive at once on top of that: the shortest period in any manual
+# is 20 ms (TRACER v1.2).
 _LEAST_STATE_NS = 10 * NS_PER_MS
 _STATES_AT_ONCE = 2
 
-# Travel that two feedbacks cannot be apart, even where frames were lost or came late.
+# Travel beyond what the top speed allows that two odometer frames cannot be apart, even where frames were
+# lost or came late.
 _JUMP_SLACK_M = 0.2
 
-# How far a track may go otherwise than it just went, between two odometers, by stopping or rolling back.
+# How far a track may deviate from its last speed between two odometer frames, by stopping or rolling back.
 _COURSE_SLACK_M = 0.01
+# Period of the odometer.
 _ODOMETER_S = 0.02
 
-# 0x221 and 0x311 tell of the same tracks. Past this difference since the last comparison, one of them lies.
+# 0x221 and 0x311 describe the same tracks. If they differ by more than this plus this share in one second,
+# one of them is wrong.
 _DISAGREEMENT_M = 0.15
 _DISAGREEMENT_RATIO = 0.3
 
 
 class AgilexFeedback:
-    """The newest of everything the base says.
+    """The newest value of everything the base reports.
 
-    Dead reckoning: with the track width known, the odometer 0x311 is counted: it loses nothing
-    when frames are lost or late, and its 1 mm steps do not add up. Without it the speeds 0x221 are
-    integrated over the time of their arrival: they need no geometry.
+    Dead reckoning: if the track width is known, the odometer 0x311 is used. It loses nothing when frames are
+    lost or late, and its rounding to 1 mm does not accumulate. Otherwise the speeds 0x221, which need no
+    geometry, are integrated over their times of arrival.
 
-    A restart shows in the control mode, which is standby again. Where 0x421 is repeated that may put the base
-    back before it tells: then in an odometer that no track can have driven, or in the count of 0x211 (byte 7,
-    0..255), where it begins anew.
+    After a restart the control mode is standby again. Where 0x421 is repeated, it may put the base back into
+    command mode before the base reports standby. Then the restart shows in a jump of the odometer that no
+    track can make, or in the count of 0x211 (byte 7, 0..255), which begins anew.
 
     no_frames: what came and what to check, for the case that not one frame was understood.
     """
@@ -98,20 +102,20 @@ class AgilexFeedback:
 
     @property
     def pose_ns(self) -> int | None:
-        """When the newest of what dead reckoning rests on arrived."""
+        """When the newest message that dead reckoning uses arrived."""
         return self.motion_ns if self._geometry is None else self._odometer_ns
 
     @property
     def feedback_ns(self) -> int | None:
-        """When the older of all that dead reckoning needs arrived; None while something is missing."""
+        """When the older of the messages that dead reckoning needs arrived; None while one is missing."""
         if self._geometry is None or self.motion_ns is None or self._odometer_ns is None:
             return self.motion_ns if self._geometry is None else None
         return min(self.motion_ns, self._odometer_ns)
 
     @property
     def disobeys(self) -> str:
-        """Why the base does not take commands, as its newest system state tells, or is not the one any more
-        that was armed; "" when it obeys."""
+        """Why the base does not take commands, by its newest system state, or that it restarted since it was
+        armed; "" when it obeys."""
         if self._state is None:
             return "no system state heard"
         if self._restart:
@@ -122,7 +126,7 @@ class AgilexFeedback:
 
     @property
     def in_command_mode(self) -> bool:
-        """The newest system state says that commands of this wire are followed."""
+        """Whether the newest system state says that commands of this wire are followed."""
         return self._state is not None and self._state.control_mode == self._obeying
 
     @property
@@ -138,7 +142,7 @@ class AgilexFeedback:
 
     @property
     def no_feedback(self) -> str:
-        """What came instead of all that dead reckoning needs, and what to do; "" if nothing is missing."""
+        """Which message for dead reckoning is missing, and what to do; "" if none is."""
         if self.motion_ns is None:
             return "0x211 came, but no 0x221"
         if self.feedback_ns is None:
@@ -146,38 +150,38 @@ class AgilexFeedback:
         return ""
 
     def await_setup(self) -> None:
-        """Arming begins: whatever restarted before, it is this base that is to be armed, and its odometer is
-        counted anew: it does not follow on what waited in buffers."""
+        """Arming begins: an earlier restart no longer matters, because this base is the one to be armed. The
+        odometer is counted anew, because it need not continue what waited in buffers."""
         self._restart = ""
         self._counter = TrackCounter()
 
     def note_foreign(self, arbitration_id: int) -> None:
-        """A frame came that is none of protocol V2. The first of V1 is remembered, else the newest."""
+        """A frame came that is not of protocol V2. Remember the first of V1, else the newest."""
         if self._foreign_id != _V1_STATE_ID:
             self._foreign_id = arbitration_id
 
     def note_actuator(self, index: int) -> None:
-        """Motor index, counted from 0, has reported."""
+        """The motor with this index (from 0) has reported."""
         self._highest_actuator = max(self._highest_actuator, index)
 
     @property
     def standing(self) -> bool:
-        """Measured speed is zero; False while unknown."""
+        """Whether the measured speed is zero; False while unknown."""
         return abs(self.v_mps) <= _STANDING_MPS and abs(self.w_radps) <= _STANDING_RADPS
 
     @property
     def battery_v(self) -> float:
-        """Of 0x211, else of 0x361; NaN while unknown."""
+        """Voltage from 0x211, else from 0x361; NaN while unknown."""
         if self._state is not None:
             return self._state.battery_v
         return math.nan if self._battery is None else self._battery.voltage_v
 
     @property
     def stop_cause(self) -> str:
-        """Why the base must not be driven now; "" for no cause.
+        """Why the base must not be driven now; "" if it may be.
 
-        Fault bits alone are no cause: several models set "remote control lost" whenever the remote
-        control is switched off. What stops the base shows in its vehicle state.
+        Fault bits alone are not a cause: several models set "remote control lost" whenever the remote control
+        is switched off. Faults that stop the base show in its vehicle state.
         """
         if self._highest_actuator >= self._actuators:
             return (
@@ -220,7 +224,8 @@ class AgilexFeedback:
             self._integrate(motions, now_ns)
 
     def _follow_count(self, state: SystemState, now_ns: int) -> None:
-        # Other models stay in standby after a restart, and not every manual says what their byte 7 counts.
+        # Only where 0x421 is repeated. Other models stay in standby after a restart, and not every manual
+        # says what their byte 7 counts.
         if self._model.mode_period_ms is None or self._state is None or self.status_ns is None:
             return
         most = _STATES_AT_ONCE + (now_ns - self.status_ns) // _LEAST_STATE_NS
@@ -228,8 +233,9 @@ class AgilexFeedback:
             self._restart = "the count of its 0x211 began anew: restarted"
 
     def _integrate(self, motions: Sequence[MotionFeedback], now_ns: int) -> None:
-        # Several at once waited somewhere: each stands for an equal part of the time since the last.
-        # After a longer silence nobody knows what happened; the newest speed does not stand for all of it.
+        # Several at once have waited in a buffer: each covers an equal share of the time since the last
+        # update. After a longer silence the motion is unknown: the newest speeds do not cover all of that
+        # time.
         elapsed_ns = 0 if self.motion_ns is None else min(now_ns - self.motion_ns, self._silence_ns)
         share_s = elapsed_ns / NS_PER_S / len(motions)
         for motion in motions:
@@ -249,7 +255,7 @@ class AgilexFeedback:
             self._model.max_speed_mps + self._geometry.to_tracks(0.0, self._model.max_yaw_rate_radps)[1]
         )
         limit_mm = 1000.0 * (fastest_mps * elapsed_s + _JUMP_SLACK_M)
-        # Of several at once the later ones have a period each, too.
+        # Of several odometer frames that arrive at once, each of the later ones still covers one period.
         left_mps, right_mps = self._geometry.to_tracks(self.v_mps, self.w_radps)
         ms = 1000.0 * max(elapsed_s, _ODOMETER_S)
         steps = self._counter.increments(

@@ -1,7 +1,7 @@
-"""AgileX protocol V2 messages, and their CAN frames as config/dbc/agilex_v2.dbc lays them out.
+"""AgileX protocol V2 messages, and their CAN frames as laid out in config/dbc/agilex_v2.dbc.
 
-Source: SCOUT user manual v1.3.0 3.3.1 and BUNKER MINI manual pp. 7-9; 11-bit identifiers,
-500 kbit/s, big-endian fields. The frames that matter carry no checksum: the bus has its own.
+Source: SCOUT user manual v1.3.0 3.3.1 and BUNKER MINI manual pp. 7-9; 11-bit identifiers, 500 kbit/s,
+big-endian fields. The frames used here carry no checksum: CAN has its own.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class ClearError:
 
 @dataclass(frozen=True, slots=True)
 class SystemState:
-    """0x211, base to host. control_mode and fault_bits mean what agilex_models says for the model."""
+    """0x211, base to host. For control_mode and fault_bits see the model in agilex_models."""
 
     vehicle_state: int
     control_mode: int
@@ -55,7 +55,7 @@ class SystemState:
 
 @dataclass(frozen=True, slots=True)
 class MotionFeedback:
-    """0x221, base to host, every 20 ms: the speeds that the tracks make."""
+    """0x221, base to host, every 20 ms: the twist from the track speeds."""
 
     v_mps: float
     w_radps: float
@@ -73,7 +73,7 @@ class ActuatorFast:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorSlow:
-    """0x261 + index, base to host. state_bits: see agilex_models.DRIVER_FAULTS."""
+    """0x261 + index, base to host. state_bits: see AgilexModel.driver_faults."""
 
     index: int
     driver_v: float
@@ -84,7 +84,7 @@ class ActuatorSlow:
 
 @dataclass(frozen=True, slots=True)
 class Odometer:
-    """0x311, base to host, every 20 ms: travel of each track; int32, wraps around."""
+    """0x311, base to host, every 20 ms: distance travelled by each track; int32, wraps around."""
 
     left_mm: int
     right_mm: int
@@ -127,7 +127,10 @@ class _Signal:
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """How one frame identifier and one dataclass belong together."""
+    """Mapping between one frame identifier and one dataclass.
+
+    prefix: leading arguments of make (the actuator's index). unused: signals without a field, sent as 0.
+    """
 
     message: Message
     make: Callable[..., AgilexMessage]
@@ -215,9 +218,9 @@ _BY_ID, _BY_TYPE = _load()
 
 
 def encode(message: AgilexMessage) -> CanFrame:
-    """The frame that says this.
+    """The CAN frame of a message.
 
-    Values are rounded to the nearest step and held at the field's range: they never wrap around.
+    Values are rounded to the nearest step and clamped to the field's range, so they never wrap around.
     Raises ValueError for NaN or infinity, KeyError for an actuator index that does not exist.
     """
     layout = _BY_TYPE[type(message), getattr(message, "index", 0)]
@@ -232,9 +235,9 @@ def encode(message: AgilexMessage) -> CanFrame:
 
 
 def decode(frame: CanFrame) -> AgilexMessage | None:
-    """What the frame says; None for an identifier that is not ours or too few bytes.
+    """The message of a CAN frame; None for an unknown identifier or too few bytes.
 
-    More bytes than needed are accepted: some senders pad 0x421 to eight.
+    More bytes than needed are accepted: some senders pad 0x421 to eight bytes.
     """
     layout = _BY_ID.get(frame.arbitration_id)
     if layout is None:

@@ -1,5 +1,5 @@
-"""What differs from one AgileX model to the next, as data. The manuals contradict each other, so
-nothing here is shared between models unless a source says so.
+"""The differences between AgileX models, as data. The manuals contradict each other, so models share a value
+only where a source says so.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from config.chassis import AGILEX_TOP_SPEED_MPS, AgilexChassisConfig, SerialLink
 VEHICLE_NORMAL = 0
 VEHICLE_ESTOP = 1
 
-# 0x261+n byte 5 as in the vendor's SDK, where 0x40 (enabled) and 0x80 (reset) are no faults.
+# 0x261+n byte 5 as in the vendor's SDK, where 0x40 (enabled) and 0x80 (reset) are not faults.
 _SDK_DRIVER_FAULTS: Mapping[int, str] = MappingProxyType(
     {
         0x01: "supply voltage low",
@@ -34,13 +34,16 @@ _SDK_MODES: Mapping[int, str] = MappingProxyType({0: "standby", 1: "CAN", 2: "se
 class AgilexModel:
     """Limits, geometry, mode bytes and fault bits of one model.
 
-    actuators: how many motors report (0x251+n, 0x261+n). mode_names: 0x211 byte 1. mode_can, mode_serial: the
-    value that means "obeys this wire" (None: has no serial port of this protocol); modes_remote: a person
-    drives. system_faults: bits of 0x211 bytes 4-5, byte 4 the higher one; driver_faults: bits of 0x261+n
-    byte 5; a set bit without an entry is reported too. base_timeout_ms: after so long without 0x111 the base
-    stops by itself. mode_period_ms: how often 0x421 must be repeated while driving; None: once is enough, and
-    repeating it would take a base that restarted out of standby without anybody's consent. track_width_m:
-    between the centres of the tracks or wheels, None where no manual says it.
+    actuators: how many motors report (0x251+n, 0x261+n).
+    mode_names: names of the values of 0x211 byte 1.
+    mode_can, mode_serial: the value that means "obeys this wire" (None: no serial port of this protocol).
+    modes_remote: the values that mean that a person drives.
+    system_faults: bits of 0x211 bytes 4-5, byte 4 the higher one.
+    driver_faults: bits of 0x261+n byte 5. A set bit without an entry is reported, too.
+    base_timeout_ms: the base stops by itself after this time without 0x111.
+    mode_period_ms: how often 0x421 must be repeated while driving. None: once is enough, and repeating it
+        would take a base that restarted out of standby without anybody's consent.
+    track_width_m: between the centres of the tracks or wheels; None where no manual gives it.
     """
 
     name: str
@@ -59,22 +62,23 @@ class AgilexModel:
     track_width_m: float | None = None
 
     def obeying_mode(self, over_serial: bool) -> int:
-        """0x211 byte 1 while the base takes commands from this wire. Raises ValueError if it has none."""
+        """The value of 0x211 byte 1 while the base takes commands from this wire. Raises ValueError if the
+        base has no such wire."""
         mode = self.mode_serial if over_serial else self.mode_can
         if mode is None:
             raise ValueError(f"{self.name} has no serial port of this protocol")
         return mode
 
     def describe_system_faults(self, bits: int) -> tuple[str, ...]:
-        """One sentence for each set bit of 0x211 bytes 4-5."""
+        """One message for each set bit of 0x211 bytes 4-5."""
         return _describe(bits, self.system_faults, "system fault")
 
     def describe_driver_state(self, index: int, bits: int) -> tuple[str, ...]:
-        """One sentence for each fault bit of 0x261 + index byte 5."""
+        """One message for each fault bit of byte 5 of 0x261 + index."""
         return _describe(bits & ~_DRIVER_NO_FAULTS, self.driver_faults, f"driver {index}")
 
     def describe_mode(self, mode: int) -> str:
-        """The name of 0x211 byte 1."""
+        """The name of a value of 0x211 byte 1."""
         return self.mode_names.get(mode, f"unknown mode {mode}")
 
 
@@ -87,12 +91,12 @@ def _describe(bits: int, names: Mapping[int, str], what: str) -> tuple[str, ...]
     return tuple(found)
 
 
-# Limits: the vendor's SDK for BUNKER (robot_limits). Its fault table was published as pictures only,
-# so every bit is reported by number until it has been checked on a robot.
+# Limits: the vendor's SDK for BUNKER (robot_limits). The fault table was published only as pictures, so every
+# bit is reported by its number until it has been checked on a robot.
 BUNKER = AgilexModel(name="bunker", max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker"], max_yaw_rate_radps=2.5235)
 
-# BUNKER MINI manual pp. 7-9: CAN only, and 0x421 every 20 ms, taken back by the base after 500 ms without it.
-# No limits were found: held at what the paper's task needs.
+# BUNKER MINI manual pp. 7-9: CAN only; 0x421 every 20 ms, or the base leaves command mode after 500 ms. No
+# limits were found: these are what the paper's task needs.
 BUNKER_MINI = AgilexModel(
     name="bunker_mini",
     max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker_mini"],
@@ -166,7 +170,7 @@ MODELS: Mapping[str, AgilexModel] = MappingProxyType(
 
 
 def model_of(config: AgilexChassisConfig) -> AgilexModel:
-    """The data of the model that the configuration names."""
+    """The data of the configured model."""
     return MODELS[config.model]
 
 
@@ -176,7 +180,7 @@ def over_serial(config: AgilexChassisConfig) -> bool:
 
 
 def track_width_of(config: AgilexChassisConfig) -> float | None:
-    """The configured width; the model's where the key is absent; None where neither is known."""
+    """The configured width, or the model's if the key is absent; None if unknown, or configured as null."""
     return (
         config.track_width_m if "track_width_m" in config.model_fields_set else model_of(config).track_width_m
     )

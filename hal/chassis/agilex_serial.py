@@ -1,10 +1,11 @@
-"""AgileX protocol V2 over RS-232: what the CAN frames carry, in an envelope with a checksum.
+"""AgileX protocol V2 over RS-232: the contents of the CAN frames in an envelope with a checksum.
 
 Source: SCOUT user manual v1.3.0 3.4.2 (firmware 1.5.0 or newer); 115200 baud 8N1. A frame is 5A A5, length,
-type, id, data, count, sum. The length counts all but the two start bytes and the sum; the sum is that of all
-bytes before it, modulo 256. The data are those of the CAN frame; of 0x111 the last two bytes are not sent.
+type, id, data, count, sum. The length counts all bytes except the two start bytes and the sum. The sum is
+that of all bytes before it, modulo 256. The data are those of the CAN frame, without the last two bytes of
+0x111.
 
-TRACER's manual v1.2 has the same envelope around other data (percentages): it is no base for this.
+TRACER (manual v1.2) uses the same envelope around other data (percentages), so it cannot be driven this way.
 """
 
 from __future__ import annotations
@@ -22,14 +23,15 @@ from hal.types import CanFrame
 _START = b"\x5a\xa5"
 _COMMAND, _FEEDBACK = 0x55, 0xAA
 
-# The length byte itself, type, id and count; the longest data are a CAN frame's.
+# Bytes that the length counts besides the data: the length itself, type, id and count. The data have at most
+# the 8 bytes of a CAN frame.
 _AROUND_DATA = 4
 _LENGTHS = range(_AROUND_DATA, _AROUND_DATA + 9)
 
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """How one CAN identifier is called on the serial line, and how many of its bytes are sent there."""
+    """Type and id of one CAN identifier on the serial line, and how many of its bytes are sent there."""
 
     arbitration_id: int
     frame_type: int
@@ -54,7 +56,7 @@ _BY_SERIAL: Mapping[tuple[int, int], _Kind] = MappingProxyType(
 
 
 def wrap(frame: CanFrame, count: int) -> bytes | None:
-    """The bytes that say what this CAN frame says; None where the serial line has no word for it."""
+    """The serial frame for a CAN frame; None if the serial line has no equivalent."""
     kind = _BY_CAN.get(frame.arbitration_id)
     if kind is None:
         return None
@@ -67,8 +69,8 @@ def wrap(frame: CanFrame, count: int) -> bytes | None:
 class FrameReader:
     """Finds frames in a stream of bytes.
 
-    rejected counts start bytes behind which no frame was; strangers counts frames whose checksum is right but
-    whose type, id and length are none of this protocol.
+    rejected: number of start bytes that no frame followed.
+    strangers: number of frames with a right checksum, but with a type, id and length of another protocol.
     """
 
     def __init__(self) -> None:
@@ -93,10 +95,10 @@ class FrameReader:
                     self._take(bytes(buffer[3 : end - 1]), frames)
                     del buffer[: end + 1]
                     continue
-            # It only looked like a start: a true one may begin right behind it.
+            # This was not the start of a frame; the next byte may be.
             self.rejected += 1
             del buffer[:1]
-        # The first start byte may be the end of what has come.
+        # Keep a last byte that may be the first byte of a start.
         del buffer[: len(buffer) - (buffer[-1:] == _START[:1])]
         return frames
 
@@ -111,7 +113,7 @@ class FrameReader:
 
 
 class AgilexSerialBus(Enclosing):
-    """hal.api.CanLink over a serial line, for either end of it."""
+    """hal.api.CanLink over a serial line, for either end of the line."""
 
     def __init__(self, link: SerialLink) -> None:
         super().__init__(link)
@@ -122,7 +124,7 @@ class AgilexSerialBus(Enclosing):
         self._bytes_heard = 0
 
     def send(self, frame: CanFrame) -> None:
-        """See hal.api.CanLink. A frame that the serial line has no word for is not sent, as on the base."""
+        """See hal.api.CanLink. A frame without a serial equivalent is not sent; the base does the same."""
         data = wrap(frame, self._count)
         if data is not None:
             self._count += 1
@@ -137,7 +139,7 @@ class AgilexSerialBus(Enclosing):
         return self._arrived.popleft() if self._arrived else None
 
     def silence(self) -> str:
-        """Not one frame was understood: what came instead, and what to check."""
+        """What came instead of any frame that was understood, and what to check."""
         if self._bytes_heard == 0:
             return "not one byte came; check port, power and that RX and TX are crossed"
         if self._reader.strangers:

@@ -1,12 +1,12 @@
-"""The one arming state machine of all chassis drivers: pure steps from evidence to a mode.
+"""The arming state machine of all chassis drivers: pure functions from the evidence to the next mode.
 
     standby --arm()--> arming --the base obeys, command zero--> armed --stop()--> stopping --> standby
        any --emergency stop, exception, somebody else drives, mode lost--> e-stop   (latched)
        any --link gone, feedback or status silent--> lost                          (latched)
        e-stop, lost --arm(), cause gone, command zero--> arming
 
-A latched chassis never moves again by itself: only arm(), a person's consent, leads out (ISO 3691-4
-4.1.14). stop() does not unlatch.
+A latched chassis never moves again by itself: only arm(), a person's consent, ends a latched mode (ISO 3691-4
+4.1.14). stop() does not.
 """
 
 from __future__ import annotations
@@ -19,8 +19,13 @@ from hal.types import LATCHED_MODES, ChassisMode
 
 @dataclass(frozen=True, slots=True)
 class ArmingLimits:
-    """After how long silence counts as loss. stall_ns: the longest gap between two steps while
-    armed; past it the base may have stopped by its own time-out, and the old speed would be a jump."""
+    """Time limits of the machine.
+
+    feedback_timeout_ns, status_timeout_ns: how long silence may last before the chassis counts as lost.
+    arming_timeout_ns: how long arming may take.
+    stall_ns: the longest gap between two steps while armed. After a longer one the base may have stopped by
+    its own time-out, and resuming the old speed would be a jump.
+    """
 
     feedback_timeout_ns: int
     status_timeout_ns: int
@@ -32,13 +37,15 @@ class ArmingLimits:
 class Evidence:
     """All that a driver knows when it steps the machine.
 
-    link_error: "" while the link works. feedback_ns, status_ns: when the newest motion feedback and the
-    newest status arrived (None: never). disobeys: why the base does not take our commands, as that
-    status tells ("" when it takes them). stop_cause: why the robot must not move ("" for none).
-    standing: measured speed is zero; False when unknown. command_is_zero: what is asked at this step.
+    link_error: "" while the link works.
+    feedback_ns, status_ns: when the newest motion feedback and the newest status arrived (None: never).
+    disobeys: why the base does not take commands, by the newest status ("" when it takes them).
+    stop_cause: why the robot must not move ("" for none).
+    standing: measured speed is zero; False when unknown.
+    command_is_zero: the setpoint of this step asks for no motion.
     silence: while no status or no motion feedback was ever heard, what came instead and what to check.
-    resettable: stop_cause is one that the base keeps until arming resets it, so it stands in the way of being
-    armed, not of arming. unread: more waits than could be read, so what is known may be long over.
+    resettable: the base keeps stop_cause until arming resets it, so it prevents armed, but not arming.
+    unread: more was waiting than could be read, so what is known may be out of date.
     """
 
     now_ns: int
@@ -56,10 +63,10 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Arming:
-    """Where the machine stands: the mode, its cause, since when, and when it was stepped last.
+    """State of the machine: the mode, its cause, since when, and the time of the last step.
 
-    cleared: the cause of a latch has gone, only consent is missing. refusal: why the last arm() was
-    not followed.
+    cleared: the cause of a latched mode has gone, only consent is missing.
+    refusal: why the last arm() was refused.
     """
 
     mode: ChassisMode = ChassisMode.STANDBY
@@ -71,7 +78,7 @@ class Arming:
 
     @property
     def reason(self) -> str:
-        """All of it in one line."""
+        """The cause, whether it has gone, and the refusal, in one line."""
         cleared = "; gone now, arm again to go on" if self.cleared else ""
         refusal = f"; arming refused: {self.refusal}" if self.refusal else ""
         return self.cause + cleared + refusal
@@ -83,7 +90,7 @@ class Arming:
 
     @property
     def latched(self) -> bool:
-        """True where only arm() leads out."""
+        """True in the modes that only arm() ends."""
         return self.mode in LATCHED_MODES
 
 
@@ -93,7 +100,8 @@ def step(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
 
 
 def consent(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
-    """arm(): begins arming, or says in the reason why not. Armed and arming stay as they are."""
+    """The state after arm(): arming, or the old state with the refusal in its reason. Armed and arming stay
+    as they are."""
     if state.mode in (ChassisMode.ARMED, ChassisMode.ARMING):
         return state
     if refusal := _refusal(state, seen, limits):
@@ -102,7 +110,7 @@ def consent(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
 
 
 def release(state: Arming, now_ns: int) -> Arming:
-    """stop(): towards standby. A latched state stays latched."""
+    """The state after stop(): stopping, which leads to standby. A latched state stays latched."""
     if state.mode in (ChassisMode.ARMED, ChassisMode.ARMING):
         return Arming(ChassisMode.STOPPING, "stop was asked for", now_ns, now_ns)
     return state
@@ -111,7 +119,7 @@ def release(state: Arming, now_ns: int) -> Arming:
 def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     loss = _loss(seen, limits)
     if state.latched:
-        # A link that works again is not yet a base that answers.
+        # The link may work again while the base does not answer yet.
         heard = seen.status_ns is not None and seen.feedback_ns is not None
         return replace(state, cleared=heard and not loss and not seen.stop_cause)
     if loss:
@@ -172,7 +180,8 @@ def _refusal(state: Arming, seen: Evidence, limits: ArmingLimits) -> str:
 
 
 def _loss(seen: Evidence, limits: ArmingLimits) -> str:
-    """Why the chassis counts as lost. What was never heard is not lost; arming waits for it."""
+    """Why the chassis counts as lost; "" if it does not. Feedback or status that never came is not a loss:
+    arming waits for it."""
     if seen.link_error:
         return seen.link_error
     for what, stamp_ns, limit_ns in (

@@ -1,4 +1,4 @@
-"""Two sensors of one motion, compared second by second: past a difference, one of them lies."""
+"""Compares two sensors of the same motion once a second. Beyond a threshold, one of them must be wrong."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ _COMPARED_NS = 1_000_000_000
 class Disagreement:
     """sentence: "" while both agree, and until the first second is full.
 
-    what: the sentence's beginning. unit: of both sums. slack, ratio: the difference that may be, and the
-    share of the expected sum that may come on top.
+    what: the beginning of the sentence. unit: of both sums.
+    slack, ratio: the threshold is slack + ratio * |expected sum|.
     """
 
     def __init__(self, what: str, unit: str, slack: float, ratio: float) -> None:
@@ -23,11 +23,11 @@ class Disagreement:
         self._since_ns: int | None = None
 
     def expect(self, amount: float) -> None:
-        """What one sensor says happened."""
+        """Add a motion that the reference sensor reported."""
         self._expected += amount
 
     def compare(self, amount: float, now_ns: int) -> None:
-        """What the other one says, up to now_ns."""
+        """Add a motion that the other sensor reported up to now_ns; once a second, compare the sums."""
         if self._since_ns is None:
             self.restart(now_ns)
         self._measured += amount
@@ -42,6 +42,6 @@ class Disagreement:
         self.restart(now_ns)
 
     def restart(self, now_ns: int) -> None:
-        """One of them began anew: compare from here."""
+        """Restart the comparison from here, because one of the sensors restarted."""
         self._measured = self._expected = 0.0
         self._since_ns = now_ns

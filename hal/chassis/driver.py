@@ -1,7 +1,7 @@
-"""What all chassis drivers share: arming, a link that may go, the last look at the command.
+"""What all chassis drivers share: arming, a link that may be lost, and the final check of the command.
 
-A driver adds its protocol in three methods: _listen, _speak, _speak_stop. They may raise LinkLost; nobody
-else needs to know. exchange(), arm() and stop() never raise.
+A driver adds its protocol in four methods: _listen, _speak, _speak_stop and _begin_arming. The first three
+may raise LinkLost, which is handled here: exchange(), arm() and stop() never raise.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from hal.errors import LinkLost
 from hal.geometry import advance_pose
 from hal.types import ChassisState, PlanarPose, Setpoint
 
-# How long a lost link is left alone before it is tried again, from the exchange after the last try: opening a
-# port can take milliseconds, or more.
+# How long a lost link is left alone before the next try, counted from the exchange after the last try:
+# opening a port can take milliseconds, or more.
 _RETRY_NS = 500 * NS_PER_MS
 
-# How often arm() reads on while anything comes, each time as much as one exchange does at the most.
+# How often arm() reads while bytes keep coming. Each read takes at most as much as one exchange does.
 _MOST_READS = 32
 
 
 class Told(Protocol):
-    """What the base has told; hal.types.ChassisState and arming.Evidence say what each means.
+    """What the base has reported. hal.types.ChassisState and arming.Evidence describe the fields.
 
-    pose holds for pose_ns; None where there is none yet. silence: what came instead of a status, and
-    what to check.
+    pose_ns: the time for which pose holds; None while there is no pose.
+    silence: what came instead of a status, and what to check.
     """
 
     @property
@@ -65,7 +65,7 @@ class Told(Protocol):
 
 
 class ChassisDriver(ABC):
-    """hal.api.Chassis, but for the protocol."""
+    """hal.api.Chassis without the protocol."""
 
     def __init__(self, link: Closing, told: Told, commands: CommandLimits, limits: ArmingLimits) -> None:
         self._closing = link
@@ -96,8 +96,8 @@ class ChassisDriver(ABC):
             self._closing.__exit__(kind, error, trace)
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
-        """See hal.api.Chassis. sent is the setpoint slowed to the base's limits, before rounding to
-        the steps of the wire."""
+        """See hal.api.Chassis. sent is the setpoint limited to what the base can do, before it is rounded to
+        the resolution of the protocol."""
         self._now_ns = now_ns
         self._asked = setpoint
         self._objection = self._commands.objection(setpoint, now_ns)
@@ -107,14 +107,14 @@ class ChassisDriver(ABC):
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
         command = self._commands.fit(setpoint, now_ns) if self._arming.may_move else zero(now_ns)
         self._following.ordered(command)
-        # Not armed it may be pushed, or driven by somebody else.
+        # While not armed, the base may be pushed, or driven by somebody else.
         self._may_go_back = command.v_mps < 0.0 or not self._arming.may_move
         return self._state(now_ns, self._say(command, now_ns))
 
     def arm(self, now_ns: int) -> None:
-        """See hal.api.Chassis. A refusal is told in the state's reason."""
+        """See hal.api.Chassis. The reason of a refusal is in the state's reason."""
         self._now_ns = now_ns
-        # What has waited in the port since who knows when must not count as an answer to this consent.
+        # Read everything first: bytes of unknown age in the port must not count as an answer to this consent.
         unread = all(self._hear(now_ns) for _ in range(_MOST_READS))
         before = self._arming.mode
         seen = replace(self._evidence(now_ns), unread=unread)
@@ -126,21 +126,24 @@ class ChassisDriver(ABC):
         """See hal.api.Chassis."""
         self._now_ns = now_ns
         self._arming = arming.release(self._arming, now_ns)
-        try:  # Also on a link that was lost: it may be back.
+        try:  # Also on a lost link: it may work again.
             self._speak_stop(now_ns)
         except LinkLost as error:
             self._lose(error, now_ns)
 
     @abstractmethod
     def _listen(self, now_ns: int) -> bool:
-        """Read what has arrived, without waiting and up to a bound, and keep it; whether anything had. Must
-        touch the link, so that a link that works again is noticed. May raise LinkLost."""
+        """Read and keep what has arrived, without waiting and up to a maximum; return whether anything had.
+
+        Must use the link every time, so that a link that works again is noticed. May raise LinkLost.
+        """
 
     @abstractmethod
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
-        """Send what is due; the motion command that went out, None if none was due. May raise LinkLost.
+        """Send what is due; return the motion command that was sent, None if none was due. May raise
+        LinkLost.
 
-        command is already zero in every mode but armed. A zero that replaces motion is due at once.
+        command is already zero in every mode except armed. A zero that replaces motion is due at once.
         """
 
     @abstractmethod
@@ -149,14 +152,15 @@ class ChassisDriver(ABC):
 
     @abstractmethod
     def _begin_arming(self) -> None:
-        """arm() was followed: forget what the base said about obeying before."""
+        """Arming begins: forget what the base said before about obeying commands."""
 
     def _resettable(self) -> bool:
-        """The base keeps its stop cause until arming resets it."""
+        """Whether the base keeps its stop cause until arming resets it."""
         return False
 
     def _no_feedback(self) -> str:
-        """A status was heard, but never motion feedback: what came instead, and what to do; "": not known."""
+        """For a base that sent a status but no motion feedback: what came instead, and what to do; "" if that
+        is unknown."""
         return ""
 
     def _silence(self) -> str:
@@ -165,7 +169,8 @@ class ChassisDriver(ABC):
         return self._no_feedback() if self._told.feedback_ns is None else ""
 
     def _hear(self, now_ns: int) -> bool:
-        """Whether anything came."""
+        """Read from the link, unless it is lost and not yet due to be tried again; return whether anything
+        came."""
         if self._link_error and not self._tries_again(now_ns):
             return False
         try:
@@ -177,7 +182,8 @@ class ChassisDriver(ABC):
         return heard
 
     def _tries_again(self, now_ns: int) -> bool:
-        """A lost link is due to be tried. The first exchange after a try tells when that ended."""
+        """Whether a lost link is due to be tried again. The waiting time begins with the first exchange after
+        the last try, because only then the end of that try is known."""
         if self._retry_ns is None:
             self._retry_ns = now_ns + _RETRY_NS
         return now_ns >= self._retry_ns
@@ -192,7 +198,7 @@ class ChassisDriver(ABC):
             return None
 
     def _lose(self, error: LinkLost, now_ns: int) -> None:
-        """Told to the machine at once: the state of this very exchange says lost."""
+        """Step the arming machine at once, so that the state of this same exchange says lost."""
         self._link_error = str(error)
         self._retry_ns = None
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
@@ -231,9 +237,11 @@ class ChassisDriver(ABC):
         )
 
     def _pose_now(self, now_ns: int) -> PlanarPose:
-        """The told pose brought forward with the told speeds: feedback may come at a fraction of the rate
-        of the exchanges, and whoever compares poses must not see them stand and jump. Past the
-        feedback's time limit nobody knows, and the pose stays where it is."""
+        """The reported pose, extrapolated to now with the reported speeds.
+
+        Feedback may come less often than exchanges, and consecutive poses must not stand still and then jump.
+        Beyond the feedback's time limit the motion is unknown, and the pose is not extrapolated further.
+        """
         told = self._told
         if told.pose_ns is None or math.isnan(told.v_mps):
             return told.pose

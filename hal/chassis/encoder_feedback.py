@@ -1,4 +1,7 @@
-"""What controllers that count two encoders have told: track speeds and pose. Pure bookkeeping."""
+"""Track speeds and pose from the two encoder counters of a motor controller.
+
+The base class of the feedback of RoboClaw and Roboteq.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +11,23 @@ from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 
-# A counter step larger than this times what the motors can do is a restart or noise, not travel.
+# A larger counter step than this ratio of what the motors can do, plus the slack, is a restart or noise.
 _JUMP_RATIO = 1.5
 _JUMP_SLACK_M = 0.05
 
-# How far a track may go otherwise than it just went, between two answers, by stopping or rolling back.
+# How far a track may deviate from its last speed between two answers, by stopping or rolling back.
 _COURSE_SLACK_M = 0.01
 
+# Below these the base stands still.
 _STANDING_MPS = 0.005
 _STANDING_RADPS = 0.01
 
 
 class EncoderFeedback:
-    """The part of hal.chassis.driver.Told that rests on the counters. Speed is counter steps over the time
-    between two answers.
+    """The part of hal.chassis.driver.Told that comes from the counters. Speed is the counter step divided by
+    the time between two answers.
 
-    signs: counts of (left, right) that mean ahead. fastest_mps: what a track can do.
+    signs: +1 or -1 for (left, right), the sign of counts that mean ahead. fastest_mps: maximum track speed.
     """
 
     def __init__(
@@ -53,20 +57,20 @@ class EncoderFeedback:
 
     @property
     def standing(self) -> bool:
-        """Measured speed is zero but for a count or two of jitter; False while unknown."""
+        """Whether the measured speed is zero, except for a count or two of jitter; False while unknown."""
         return abs(self.v_mps) <= _STANDING_MPS and abs(self.w_radps) <= _STANDING_RADPS
 
     def await_setup(self) -> None:
-        """Arming begins: what was set before is no longer trusted, it must be set and read back."""
+        """Arming begins: earlier settings are no longer trusted; they must be set and read back."""
         self._wanted = True
         self._restarted = False
 
     def forget_setup(self) -> None:
-        """The controller is no longer asked to obey."""
+        """The controller is no longer asked to take commands."""
         self._wanted = False
 
     def _count(self, left: int, right: int, asked_ns: int, now_ns: int) -> None:
-        """Both counters, as answered at now_ns to what was asked at asked_ns."""
+        """Take in both counters: asked for at asked_ns, answered at now_ns."""
         last_ns, self.pose_ns = self.pose_ns, asked_ns
         elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / NS_PER_S
         limit_m = _JUMP_RATIO * self._fastest_mps * elapsed_s + _JUMP_SLACK_M
@@ -91,7 +95,7 @@ class EncoderFeedback:
         self.feedback_ns = now_ns
 
     def _expected(self, elapsed_s: float) -> tuple[float, float]:
-        """Counts (left, right) in this time at the speed measured last; NaN while unknown."""
+        """Counts (left, right) in this time at the last measured speed; NaN while unknown."""
         left_mps, right_mps = self._geometry.to_tracks(self.v_mps, self.w_radps)
         counts = self._counts_per_m * elapsed_s
         return self._signs[0] * left_mps * counts, self._signs[1] * right_mps * counts

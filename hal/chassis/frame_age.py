@@ -1,15 +1,16 @@
-"""How long a frame has waited on its way, by the sender's clock and ours."""
+"""How long a frame was delayed on its way, from the sender's clock and the clock of this machine."""
 
 from __future__ import annotations
 
 from hal.clocks import NS_PER_MS
 
-# How far the two clocks may drift apart: one part in a hundred. A line that falls behind by more shows.
+# The two clocks may drift apart by one part in this number. A line that falls behind faster is noticed.
 _DRIFT = 100
 
 
 class FrameAge:
-    """Neither knows when the other began, so the frame that was fastest so far is taken to have no age."""
+    """The age of frames relative to the fastest frame so far, which is taken to have no age: the offset
+    between the two clocks is unknown."""
 
     def __init__(self) -> None:
         self._sender_ns = 0
@@ -17,11 +18,11 @@ class FrameAge:
         self._now_ns = 0
 
     def restart(self) -> None:
-        """The sender's clock began anew, or what waited has been thrown away: the next frame has no age."""
+        """The sender's clock restarted, or the waiting frames were discarded: the next frame has no age."""
         self._least_ns = None
 
     def step(self, elapsed_ms: int, now_ns: int) -> int:
-        """The age, ns, of a frame that arrived at now_ns and was made elapsed_ms after the one before."""
+        """The age in ns of a frame that arrived at now_ns and was made elapsed_ms after the frame before."""
         self._sender_ns += elapsed_ms * NS_PER_MS
         apart_ns = now_ns - self._sender_ns
         since_ns, self._now_ns = now_ns - self._now_ns, now_ns

@@ -1,7 +1,7 @@
-"""A Kobuki (the base of Turtlebot 2) over its serial line, stepped by the control loop.
+"""Driver for a Kobuki (the base of Turtlebot 2) on a serial line, stepped by the control loop.
 
-The vendor's driver answers each feedback frame with one command, so that it says nothing when the frames
-stop. Here a command goes out every period whatever comes back: a zero above all.
+The vendor's driver answers each feedback frame with one command, so it goes silent when the frames stop. This
+driver sends a command every period, whatever comes back, above all a zero.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class KobukiChassis(ChassisDriver):
         if not (stops or due(self._motion_sent_ns, self._period_ns, now_ns)):
             return None
         fitted = self._fitted(command)
-        # The base turns slip_factor times less than its wheels say, so ask for that much more.
+        # The base turns by 1 / slip_factor of what its wheels say, so ask for slip_factor times as much.
         self._link.write(base_control(fitted.v_mps, fitted.w_radps * self._geometry.slip_factor))
         self._motion_sent_ns = now_ns
         self._moving = not is_zero(command)
@@ -74,7 +74,7 @@ class KobukiChassis(ChassisDriver):
         self._feedback.await_setup()
 
     def _fitted(self, command: Setpoint) -> Setpoint:
-        """The command slowed until no wheel is too fast."""
+        """The command, scaled down so that no wheel is too fast."""
         wanted = self._geometry.to_tracks(command.v_mps, command.w_radps)
         fitted = scale_to_fit(*wanted, KOBUKI_TOP_SPEED_MPS, KOBUKI_TOP_SPEED_MPS)
         if fitted == wanted:

@@ -1,4 +1,4 @@
-"""What a Kobuki has told: wheel speeds, pose, its bumper, cliff and wheel-drop switches. Pure bookkeeping."""
+"""What a Kobuki has reported: wheel speeds, pose, bumper, cliff and wheel-drop switches."""
 
 from __future__ import annotations
 
@@ -26,29 +26,34 @@ _SIDES = ("right", "centre", "left")
 _WHEELS = ("right", "left")
 _MOTORS = ("left", "right")
 
+# Below these the base stands still.
 _STANDING_MPS = 0.01
 _STANDING_RADPS = 0.03
 
-# A step larger than this times what the wheels can do is a restart, not travel.
+# A larger step of the ticks than this ratio of what the wheels can do, plus the slack, is a restart.
 _JUMP_RATIO = 1.5
 _JUMP_SLACK_M = 0.02
 
-# In a second: the wheels slip a little, and the gyro drifts. Past this a wheel is held, or one of them lies.
+# Tolerated difference of the yaw by gyro and by wheels in one second: the wheels slip a little, and the gyro
+# drifts. Beyond it, a wheel is blocked or one of the sensors is wrong.
 _DISAGREEMENT_RAD = 0.3
 _DISAGREEMENT_RATIO = 0.4
 
-# A frame waits in buffers, so less time may have passed for the base than for us, if not less than none; more
-# only by what the frame before had waited, which is never this.
+# How much more time may have passed between two frames by the base's clock than by ours. Frames wait in
+# buffers: less may have passed for the base (but not less than none), and more only by the time that the
+# earlier frame had waited, which is always less than this.
 _CLOCKS_APART_MS = 500
 
 
 class KobukiFeedback:
-    """The newest of everything the base says.
+    """The newest value of everything the base reports.
 
-    Distance is wheel ticks; yaw is the gyro's, which no slip fools, where a frame has one; the wheels' yaw is
-    compared with it, and past a difference the base stops. Time between
-    two frames is the base's own clock: frames wait in buffers, ticks do not. What is told holds for when its
-    frame was made, as far as the two clocks tell: ever older frames are no feedback.
+    Distance comes from the wheel ticks. Yaw comes from the gyro, which slip does not affect, where a frame
+    has it. The yaw from the wheels is compared with it, and a large difference stops the base.
+
+    The time between two frames is that of the base's own clock: frames wait in buffers, ticks do not. A
+    report holds for the time at which its frame was made, as far as the two clocks show that. If frames
+    arrive later and later, the feedback therefore grows old.
     """
 
     def __init__(self, config: KobukiChassisConfig) -> None:
@@ -57,7 +62,7 @@ class KobukiFeedback:
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter(ENCODER_BITS)
         self._core: Core | None = None
-        self._counted: Core | None = None  # what the next one follows on
+        self._counted: Core | None = None  # the frame that the next one continues
         self._angle_rad: float | None = None
         self._disagreement = Disagreement(
             "gyro and wheels disagree", "rad", _DISAGREEMENT_RAD, _DISAGREEMENT_RATIO
@@ -80,22 +85,22 @@ class KobukiFeedback:
 
     @property
     def status_ns(self) -> int | None:
-        """Ticks and switches come in the same frame."""
+        """The time of the pose: ticks and switches come in the same frame."""
         return self.pose_ns
 
     @property
     def standing(self) -> bool:
-        """Measured speed is zero but for a tick or two of jitter; False while unknown."""
+        """Whether the measured speed is zero, except for a tick or two of jitter; False while unknown."""
         return abs(self.v_mps) <= _STANDING_MPS and abs(self.w_radps) <= _STANDING_RADPS
 
     @property
     def battery_v(self) -> float:
-        """NaN while unknown."""
+        """Battery voltage; NaN while unknown."""
         return math.nan if self._core is None else self._core.battery_v
 
     @property
     def disobeys(self) -> str:
-        """A Kobuki always takes commands, so this is about whether it is the one that was armed."""
+        """A Kobuki always takes commands, so this tells only whether it restarted since it was armed."""
         if not self._wanted:
             return "nobody asked it to"
         return "its clock or its ticks jumped: restarted" if self._restarted else ""
@@ -109,7 +114,7 @@ class KobukiFeedback:
 
     @property
     def stop_cause(self) -> str:
-        """The base's own sensors; "" for none. Bits that are not known count too."""
+        """Which of the base's own sensors require a stop; "" for none. Unknown bits count, too."""
         core = self._core
         if core is None:
             return ""
@@ -126,12 +131,12 @@ class KobukiFeedback:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What the base complains about without being a reason to stop at once."""
+        """Faults that are not a reason to stop at once."""
         over_current = 0 if self._core is None else self._core.over_current
         return _named("error: motor over-current", over_current, _MOTORS)
 
     def await_setup(self) -> None:
-        """Arming begins: what is told from now on does not follow on what waited in buffers before."""
+        """Arming begins: what is reported from now on need not continue what waited in buffers before."""
         self._wanted = True
         self._restarted = False
         self._counted = None
@@ -139,7 +144,7 @@ class KobukiFeedback:
         self._age.restart()
 
     def forget_setup(self) -> None:
-        """The base is no longer asked to obey."""
+        """The base is no longer asked to take commands."""
         self._wanted = False
 
     def take(self, told: Feedback, now_ns: int) -> None:
@@ -182,7 +187,7 @@ class KobukiFeedback:
         self.feedback_ns = self.pose_ns
 
     def _jumped(self, core: Core, now_ns: int) -> None:
-        """What happened meanwhile is not known; counting begins anew."""
+        """The base restarted: the motion since the last frame is unknown, and counting starts anew."""
         self._restarted = True
         self.pose_ns = now_ns
         self._age.restart()

@@ -1,7 +1,7 @@
-"""Kobuki's serial protocol: commands to bytes, bytes to feedback. Pure.
+"""Kobuki's serial protocol: commands to bytes, bytes to feedback.
 
 Source: kobuki_core (src/driver/kobuki.cpp, diff_drive.cpp; its protocol page has errors). A frame is AA 55,
-length, sub-payloads, xor of length and payload; little-endian. A sub-payload is id, length, data.
+length, sub-payloads, and the xor of length and payload; little-endian. A sub-payload is id, length, data.
 """
 
 from __future__ import annotations
@@ -24,20 +24,23 @@ _HEADER = b"\xaa\x55"
 _BASE_CONTROL = 1
 _CORE, _INERTIA, _CURRENTS = 1, 4, 6
 
-# What each known sub-payload must be long; another length means that the frame is not what it seems.
+# Length of each known sub-payload. Another length means that this is not a valid frame.
 _LENGTHS: Mapping[int, int] = MappingProxyType({_CORE: 15, 3: 3, _INERTIA: 7, 5: 6, _CURRENTS: 2, 16: 16})
 
 _STRAIGHT_RADPS = 1e-4
+# With a radius up to this the base turns on the spot.
 _SPIN_M = 1e-3
 _INT16 = 32_767
 
+# Values of Core.charger while the charging cable is plugged in.
 STANDING_ON_CABLE = (18, 22)
 
 
 def base_control(v_mps: float, w_radps: float) -> bytes:
-    """The frame for this twist, as speed of the outer wheel (mm/s) and radius of the middle (mm).
+    """The frame for this twist, as the speed of the outer wheel (mm/s) and the radius of the centre (mm).
 
-    Rounded, at a half to the slower step, and held at int16: a bend too wide for the wire is straight.
+    Rounded to the nearest integer, a half towards zero, and clamped to int16. A bend with a larger radius
+    than int16 can hold is sent as straight.
     """
     speed, radius = _speed_and_radius(v_mps, w_radps)
     return frame(bytes((_BASE_CONTROL, 4)) + struct.pack("<hh", speed, radius))
@@ -61,7 +64,7 @@ def _speed_and_radius(v_mps: float, w_radps: float) -> tuple[int, int]:
 
 
 def _int16(value: float) -> int:
-    """Rounded, a half towards zero, and held."""
+    """value, rounded (a half towards zero) and clamped to int16."""
     held = min(max(value, -_INT16), _INT16)
     return int(math.copysign(math.ceil(abs(held) - 0.5), held))
 
@@ -91,7 +94,7 @@ class Inertia:
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """One frame. What it did not hold is None."""
+    """The contents of one frame; None for what it did not hold."""
 
     core: Core | None = None
     inertia: Inertia | None = None
@@ -99,7 +102,7 @@ class Feedback:
 
 
 def parse(payload: bytes) -> Feedback | None:
-    """A payload whose checksum is right; None where its sub-payloads do not fit together."""
+    """The feedback in a payload whose checksum is right; None if its sub-payloads are not valid."""
     parts: dict[int, bytes] = {}
     position = 0
     while position + 2 <= len(payload):
@@ -131,7 +134,7 @@ def _inertia(data: bytes) -> Inertia:
 
 
 class FrameReader:
-    """Finds frames in a stream of bytes. rejected counts headers behind which none was."""
+    """Finds frames in a stream of bytes. rejected: number of headers that no frame followed."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -151,9 +154,9 @@ class FrameReader:
                 payloads.append(bytes(buffer[3:end]))
                 del buffer[: end + 1]
             else:
-                # It only looked like a header: a true one may begin right behind it.
+                # This was not the header of a frame; the next byte may be.
                 self.rejected += 1
                 del buffer[:1]
-        # The first half of a header may be the end of what has come.
+        # Keep a last byte that may be the first half of a header.
         del buffer[: len(buffer) - (buffer[-1:] == _HEADER[:1])]
         return payloads

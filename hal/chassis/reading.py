@@ -1,18 +1,21 @@
-"""Reading a serial link empty: one read may give a few bytes, and what stays is older every time."""
+"""Reading all that has arrived on a serial link. One read may return only a few bytes, and what stays behind
+grows older with every exchange."""
 
 from __future__ import annotations
 
 from hal.api import SerialLink
 
-# A line at 115200 baud carries 230 bytes in 20 ms. Much more in one exchange is a flood, and must not hold
-# the control loop.
+# Maximum for one exchange. A line at 115200 baud carries 230 bytes in 20 ms; much more is a flood, which must
+# not hold up the control loop.
 _MOST_BYTES = 16_384
 _MOST_READS = 256
 
 
 def read_all(link: SerialLink) -> bytes:
-    """All that has arrived, in as many reads as that takes, within bounds; b"" is silence. Raises LinkLost:
-    then what was read before is lost, too."""
+    """All bytes that have arrived, in as many reads as necessary, up to the maximum; b"" if there are none.
+
+    Raises LinkLost; then the bytes that were read before are lost, too.
+    """
     arrived = bytearray()
     for _ in range(_MOST_READS):
         data = link.read()

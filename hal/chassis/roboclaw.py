@@ -1,10 +1,10 @@
-"""A tracked base on one RoboClaw, packet serial, stepped by the control loop.
+"""Driver for a tracked base with one RoboClaw in packet serial mode, stepped by the control loop.
 
-The controller answers one request at a time, so motion commands and queries take turns: with a 50 Hz
-loop a motion command goes out every 40 ms. A motion command whose answer is lost is never sent again: the
-next one is newer, and goes out before any query: queries carry no checksum and feed the controller's own
-time-out, so one that takes no commands would keep its speed for as long as it is asked. Only settings are
-repeated.
+The controller answers one request at a time, so motion commands and queries alternate: with a 50 Hz loop, a
+motion command is sent every 40 ms. A motion command whose answer is lost is not repeated; only settings are.
+The next motion command is newer, and is sent before any query. Queries have no checksum, and they reset the
+controller's own time-out: a controller that takes queries but no commands would keep its speed while it is
+being queried.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from hal.chassis.tracks import TrackGeometry, scale_to_fit
 from hal.clocks import NS_PER_MS
 from hal.types import ChassisMode, Setpoint
 
-# Encoders every other turn, the status (emergency stop) every fourth, the rest in between. The time-out is
-# asked for again and again because a restart forgets it.
+# The encoders take every second turn, the status (emergency stop) every fourth, the others share the rest.
+# The time-out is queried regularly because a restart clears it.
 _QUERIES = (
     packets.ENCODERS_REQUEST,
     packets.STATUS_REQUEST,
@@ -45,8 +45,8 @@ _QUERIES = (
 
 _SETTINGS = frozenset({packets.SET_TIMEOUT, packets.GET_TIMEOUT})
 
-# So many turns of zeros and queries before a setting that was not answered is said again: encoders and status
-# must not grow old meanwhile.
+# Turns of zeros and queries before a setting without an answer is repeated: encoders and status must not grow
+# old in the meantime.
 _TURNS_BETWEEN = 4
 
 
@@ -105,7 +105,7 @@ class RoboclawChassis(ChassisDriver):
             return None
         stops = self._moving and is_zero(command)
         if self._arming.mode is not ChassisMode.ARMING:
-            # Of an arming that a lost link or a fault ended: nobody consents to it any more.
+            # Left over from an arming that a lost link or a fault ended; the consent ended with it.
             self._setup.clear()
         if self._setup and self._turns_before_setup == 0:
             self._port.start(self._setup.popleft(), now_ns)
@@ -118,7 +118,7 @@ class RoboclawChassis(ChassisDriver):
         return self._send_motion(command, now_ns)
 
     def _speak_stop(self, now_ns: int) -> None:
-        # Zero does not wait for the answer that is under way; the controller takes packets in order.
+        # The zero does not wait for an answer that is under way; the controller takes packets in order.
         self._port.abandon(now_ns)
         self._feedback.forget_setup()
         self._port.start(packets.speeds(0, 0), now_ns)

@@ -1,4 +1,4 @@
-"""What a RoboClaw has told: track speeds and pose from its encoders, status, voltage. Pure bookkeeping."""
+"""What a RoboClaw has reported: speeds and pose from its encoders, status, voltage."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _UNANSWERED: Mapping[int, str] = MappingProxyType(
 
 
 class RoboclawFeedback(EncoderFeedback):
-    """The newest of everything the controller says.
+    """The newest value of everything the controller reports.
 
-    Speed is encoder steps over the time between two replies: the controller's own speeds come in
-    steps of 300 counts/s (one count in its 1/300 s window).
+    Speed is the encoder step divided by the time between two replies: the controller's own speeds have a
+    resolution of 300 counts/s (one count in its 1/300 s window).
     """
 
     def __init__(self, config: RoboclawChassisConfig, geometry: TrackGeometry) -> None:
@@ -36,7 +36,8 @@ class RoboclawFeedback(EncoderFeedback):
 
     @property
     def disobeys(self) -> str:
-        """Why the controller must not be driven: its own time-out is not what was set, or it restarted."""
+        """Why the controller must not be driven: its time-out is not what was set, or it restarted; "" if it
+        may be."""
         if not self._wanted:
             return "nobody asked it to"
         if self._restarted:
@@ -82,7 +83,7 @@ class RoboclawFeedback(EncoderFeedback):
         self._unanswered = None
 
     def note_setting(self, command: int, answered: bool) -> None:
-        """Its time-out was set or asked for, with an answer or without."""
+        """The time-out was set or queried, with or without an answer."""
         if not answered:
             self._unanswered = command
         elif self._unanswered == command:

@@ -1,4 +1,4 @@
-"""One RoboClaw request at a time over a serial link, without ever waiting for the answer."""
+"""Sends one RoboClaw request at a time over a serial link, without blocking until the answer comes."""
 
 from __future__ import annotations
 
@@ -9,18 +9,22 @@ from hal.chassis.reading import read_all
 from hal.chassis.roboclaw_packets import Request
 from hal.clocks import NS_PER_MS
 
-# The controller drops a packet after 10 ms of silence inside it, so both sides agree again after that.
+# The controller drops a packet after 10 ms of silence inside it, so after that both sides are in step again.
 _SILENCE_NS = 10 * NS_PER_MS
 
-# USB adapters keep bytes back for up to 16 ms; the longest answer takes 3 ms at 38400 baud. An answer must
-# not come after this, or it would be taken for the answer to the next request.
+# USB adapters hold bytes back for up to 16 ms; the longest answer takes 3 ms at 38400 baud. An answer must
+# not come later than this, or it would be taken for the answer to the next request.
 _REPLY_TIMEOUT_NS = 30 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of a request. data: None when no valid answer came. asked_ns: when it was written;
-    the controller looks at its encoders a few milliseconds later, long before the answer is read."""
+    """The result of a request.
+
+    data: None if no valid answer came.
+    asked_ns: when the request was written. The controller reads its encoders a few milliseconds later, long
+    before the answer is read here.
+    """
 
     request: Request
     data: bytes | None
@@ -28,7 +32,7 @@ class Answer:
 
 
 class RoboclawPort:
-    """Stepped by poll(); start() is allowed while idle. bytes_heard counts all that ever arrived."""
+    """A port that poll() steps; start() is allowed while idle. bytes_heard: all bytes that ever arrived."""
 
     def __init__(self, link: SerialLink, address: int) -> None:
         self._link = link
@@ -41,7 +45,7 @@ class RoboclawPort:
         self.bytes_heard = 0
 
     def idle(self, now_ns: int) -> bool:
-        """No answer is awaited and the line is not being left quiet."""
+        """Whether no answer is awaited, and no period of silence is being kept."""
         return self._request is None and now_ns >= self._quiet_until_ns
 
     def start(self, request: Request, now_ns: int) -> None:
@@ -51,13 +55,13 @@ class RoboclawPort:
         self._received.clear()
 
     def abandon(self, now_ns: int) -> None:
-        """Forget the request under way; its answer, should it come, falls into the silence."""
+        """Forget the current request. If its answer still comes, it falls into a period of silence."""
         if self._request is not None:
             self._request = None
             self._quiet_until_ns = now_ns + _REPLY_TIMEOUT_NS
 
     def poll(self, now_ns: int) -> Answer | None:
-        """Read what has arrived; the answer if the request under way has ended, well or not.
+        """Read what has arrived; return the answer if the current request has ended, successfully or not.
 
         Raises LinkLost.
         """
@@ -65,7 +69,7 @@ class RoboclawPort:
         self.bytes_heard += len(arrived)
         request = self._request
         if request is None:
-            if arrived:  # Nobody asked: noise, or an answer that came too late.
+            if arrived:  # Not asked for: noise, or an answer that came too late.
                 self._quiet_until_ns = max(self._quiet_until_ns, now_ns + _SILENCE_NS)
             return None
         if arrived:
@@ -82,9 +86,11 @@ class RoboclawPort:
         return Answer(request, data, self._sent_ns)
 
     def _complete(self, request: Request, now_ns: int, last_chance: bool) -> bytes | None:
-        """The data once the answer is whole. A shorter variant is whole when silence follows it:
-        until then it may be the beginning of the longer one. Polled for the last time, its checksum decides:
-        what came since the poll before has not had its silence yet."""
+        """The data once the answer is complete, else None.
+
+        A shorter variant is complete when silence follows it: until then it may be the beginning of the
+        longer one. At the last poll its checksum decides, because there is no time left to wait for silence.
+        """
         received = bytes(self._received)
         silent = now_ns - self._heard_ns >= _SILENCE_NS
         if len(received) < request.longest_reply and not silent and not last_chance:

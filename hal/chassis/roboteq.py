@@ -1,8 +1,8 @@
-"""A tracked base on one Roboteq controller, ASCII over a serial line, stepped by the control loop.
+"""Driver for a tracked base with one Roboteq controller, over a serial line (ASCII commands).
 
-Every command period one motion command !M goes out, with one query behind it. The controller's watchdog
-has a trap (manual V1.8 p. 286): after it has stopped the motors, any valid command makes them run on at the
-speed from before. So the first thing said after any gap is !M 0 0.
+One motion command !M is sent every command period, followed by one query. The controller's watchdog has a
+trap (manual V1.8 p. 286): after it has stopped the motors, any valid command makes them run again at the
+speed from before. So the first command after any gap is !M 0 0.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from hal.clocks import NS_PER_MS
 from hal.errors import LinkLost
 from hal.types import ChassisMode, Setpoint
 
-# The counters every other turn, ?FF and ?FM every sixth each: the status is as old as the older of the two.
-# The watchdog is asked for again and again because a restart forgets it.
+# Queries in between those of the counters, which take every second turn. ?FF and ?FM take every sixth each:
+# the status is as old as the older of the two. The watchdog is queried regularly because a restart clears it.
 _BETWEEN = (
     lines.FAULT_FLAGS,
     lines.MOTOR_FLAGS,
@@ -38,13 +38,13 @@ _BETWEEN = (
     lines.CURRENTS,
 )
 
-# USB adapters keep bytes back for up to 16 ms; the controller answers within some milliseconds.
+# USB adapters hold bytes back for up to 16 ms; the controller answers within a few milliseconds.
 _REPLY_TIMEOUT_NS = 40 * NS_PER_MS
 
-# After a lost answer this much silence, so that it is not taken for the answer to the next question.
+# Silence after a lost answer, so that it is not taken for the answer to the next query if it comes late.
 _SILENCE_NS = 10 * NS_PER_MS
 
-# A base that still moves after so long of zero commands does not follow them: !EX cuts the motors.
+# A base that still moves after this time of zero commands does not follow them: !EX cuts the motors.
 _DEFIANCE_NS = 3_000 * NS_PER_MS
 
 
@@ -71,7 +71,7 @@ class RoboteqChassis(ChassisDriver):
         self._geometry = geometry
         self._feedback = feedback
         self._period_ns = config.command_period_ms * NS_PER_MS
-        # Half of it: how long the line takes is not known, and a zero too many costs nothing.
+        # Half of the watchdog's time: the delay of the line is unknown, and an extra zero costs nothing.
         self._gap_ns = config.watchdog_ms * NS_PER_MS // 2
         self._reader = LineReader()
         counters = lines.ENCODERS if config.encoder == "quadrature" else lines.HALL_COUNTERS
@@ -94,7 +94,7 @@ class RoboteqChassis(ChassisDriver):
             elif self._asked_query is not None and line.name == self._asked_query.name:
                 self._asked_query = None
                 self._feedback.take(line.name, line.values, self._asked_ns, now_ns)
-            else:  # An answer that comes too late, or that nobody asked for.
+            else:  # An answer that came too late, or that was not asked for.
                 self._quiet_until_ns = max(self._quiet_until_ns, now_ns + _SILENCE_NS)
         if self._asked_query is not None and now_ns - self._asked_ns >= _REPLY_TIMEOUT_NS:
             self._asked_query = None
@@ -104,7 +104,7 @@ class RoboteqChassis(ChassisDriver):
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         stops = self._moving and is_zero(command)
-        # It ends with !MG: said after a lost link, it would end an emergency stop nobody consented to end.
+        # The setup ends with !MG. Sent after a lost link, it would end an emergency stop without consent.
         setup = self._setup if self._arming.mode is ChassisMode.ARMING else b""
         if not (stops or setup or due(self._motion_sent_ns, self._period_ns, now_ns)):
             return None
@@ -130,13 +130,14 @@ class RoboteqChassis(ChassisDriver):
         self._moving = False
 
     def _begin_arming(self) -> None:
-        # !MG here and nowhere else: only a person's consent may end the controller's own emergency stop.
+        # !MG is sent here and nowhere else: only a person's consent may end the controller's own emergency
+        # stop.
         self._feedback.await_setup()
         watchdog = lines.set_watchdog(self._config.watchdog_ms)
         self._setup = lines.STOP + lines.ECHO_OFF + watchdog + lines.RELEASE
 
     def _resettable(self) -> bool:
-        # An emergency stop alone; a fault beside it has to go by itself.
+        # Only an emergency stop can be reset. A fault beside it must disappear by itself.
         return self._feedback.estop and not self._feedback.errors
 
     def _first_after_a_gap(self, now_ns: int) -> bytes:
@@ -147,18 +148,18 @@ class RoboteqChassis(ChassisDriver):
         try:
             self._link.write(said)
         except LinkLost:
-            # Who knows what of it arrived: the next thing said must be zero.
+            # It is unknown how much of it arrived, so the next command must be zero.
             self._motion_sent_ns = None
             raise
         self._motion_sent_ns = now_ns
 
     def _defies(self, now_ns: int) -> bool:
-        """Latched long ago, zero commanded ever since, and it moves."""
+        """Whether the base still moves although it was latched, and commanded zero, long ago."""
         latched = self._arming.mode is ChassisMode.ESTOP
         return latched and now_ns - self._arming.since_ns > _DEFIANCE_NS and not self._feedback.standing
 
     def _motion(self, command: Setpoint) -> tuple[bytes, Setpoint]:
-        """The line for this command, and the command slowed until no track is too fast."""
+        """The line for this command, and the command scaled down so that no track is too fast."""
         config, limit = self._config, self._config.full_speed_mps
         wanted = self._geometry.to_tracks(command.v_mps, command.w_radps)
         left_mps, right_mps = fitted = scale_to_fit(*wanted, limit, limit)

@@ -1,4 +1,4 @@
-"""What a Roboteq has told: track speeds and pose from its counters, flags, voltage. Pure bookkeeping."""
+"""What a Roboteq has reported: speeds and pose from its counters, flags, voltage."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from hal.chassis.encoder_feedback import EncoderFeedback
 from hal.chassis.roboteq_lines import MotorFlags
 from hal.chassis.tracks import TrackGeometry
 
-# Single refusals are noise on the line; so many in a row are a controller that takes no commands.
+# Single refusals are noise on the line. This many in a row mean that the controller takes no commands.
 _MOST_REFUSALS = 5
 
-# A controller that echoes says two lines back between two answers, a command and a query; one may be noise.
+# A controller that echoes returns two lines between two answers: a command and a query. A single one may be
+# noise.
 _ECHOING = 2
 
 
 class RoboteqFeedback(EncoderFeedback):
-    """The newest of everything the controller says. Speed is counter steps over the time between answers."""
+    """The newest value of everything the controller reports. Speed is the counter step divided by the time
+    between two answers."""
 
     def __init__(self, config: RoboteqChassisConfig, geometry: TrackGeometry) -> None:
         signs = (config.left_sign, config.right_sign)
@@ -34,7 +36,8 @@ class RoboteqFeedback(EncoderFeedback):
 
     @property
     def disobeys(self) -> str:
-        """Why the controller must not be driven: its own watchdog is not what was set, or it restarted."""
+        """Why the controller must not be driven: its watchdog is not what was set, it restarted, or it
+        refuses commands; "" if it may be."""
         if not self._wanted:
             return "nobody asked it to"
         if self._restarted:
@@ -63,12 +66,13 @@ class RoboteqFeedback(EncoderFeedback):
 
     @property
     def estop(self) -> bool:
-        """The controller's own latch: it stays after the button is out, until !MG."""
+        """The controller's own emergency stop, which stays latched after the button is released, until
+        !MG."""
         return bool(self._flags & lines.ESTOP_FLAG)
 
     @property
     def errors(self) -> tuple[str, ...]:
-        """What stops the motors, but for the emergency stop."""
+        """What stops the motors, except the emergency stop."""
         return lines.describe_faults(self._flags) + self._motors.faults
 
     @property
@@ -91,7 +95,7 @@ class RoboteqFeedback(EncoderFeedback):
         self._echoes_again = False
 
     def note_echo(self) -> None:
-        """A written line came back: what ^ECHOF 1 has switched off is on again after a restart."""
+        """A written line came back. ^ECHOF 1 switched the echo off; a restart switches it on again."""
         self._echoes += 1
         self._echoes_again = self._echoes_again or (self._quiet and self._echoes >= _ECHOING)
 
@@ -101,7 +105,8 @@ class RoboteqFeedback(EncoderFeedback):
 
     def take(self, name: str, values: tuple[int, ...], asked_ns: int, now_ns: int) -> None:
         """Take in the answer to a query that was written at asked_ns."""
-        # The first answer about the watchdog comes behind ^ECHOF 1; only what is quiet after that is quiet.
+        # The first answer about the watchdog follows ^ECHOF 1. Only silence after that shows that the echo is
+        # off.
         self._quiet = self._quiet or (self._watchdog_ms is not None and self._echoes == 0)
         self._echoes = 0
         match name:
@@ -117,6 +122,6 @@ class RoboteqFeedback(EncoderFeedback):
                 self.battery_v = values[1] / 10.0
             case lines.CURRENTS:
                 self.currents_a = (values[0] / 10.0, values[1] / 10.0)
-        # Either may tell of a stop, so the status is as old as the older of the two.
+        # Either may report a stop, so the status is as old as the older of the two.
         if self._flags_ns is not None and self._motors_ns is not None:
             self.status_ns = min(self._flags_ns, self._motors_ns)

@@ -1,9 +1,9 @@
-"""Roboteq's ASCII protocol: commands to bytes, bytes to lines, lines to values. Pure.
+"""Roboteq's ASCII protocol: commands to bytes, bytes to lines, lines to values.
 
 Source: Roboteq user manual V2.0 p. 172 (grammar), V1.8 pp. 253, 254, 286 (fault flags, motor flags, RWD).
-Every line ends with a carriage return. "+" accepts a command, "-" refuses one, a query is answered by
-NAME=value:value. There is no checksum: a line counts only if all of it fits the grammar, so what noise can
-still do is change a digit; the driver therefore believes no encoder step that no track can make.
+Every line ends with a carriage return. "+" accepts a command, "-" refuses one, and a query is answered by
+NAME=value:value. There is no checksum. A line counts only if all of it fits the grammar, so noise can still
+change a digit; the driver therefore rejects an encoder step that no track can make.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ EMERGENCY_STOP = b"!EX\r"
 RELEASE = b"!MG\r"
 ECHO_OFF = b"^ECHOF 1\r"
 
-# The longest answer in use has some 30 characters. What is longer is no line of this protocol.
+# The longest answer in use has about 30 characters. A longer line is not of this protocol.
 _MAX_LINE = 80
 
 _VALUE_LINE = re.compile(rb"([A-Z]{1,6})=(-?[0-9]{1,10}(?::-?[0-9]{1,10}){0,7})")
@@ -38,18 +38,19 @@ _INT32 = range(-(1 << 31), 1 << 31)
 
 
 def motors(left: float, right: float) -> bytes:
-    """Both channels at once, in thousandths of full speed; rounded and held at +-1000."""
+    """The command for both channels, in thousandths of full speed; rounded and clamped to +-1000."""
     return f"!M {_thousandths(left)} {_thousandths(right)}\r".encode("ascii")
 
 
 def set_watchdog(timeout_ms: int) -> bytes:
-    """Stop the motors by yourself after so long without a command (^RWD); never 0, which is off."""
+    """The setting after which time without a command the controller stops the motors (^RWD); never 0, which
+    means off."""
     return f"^RWD {min(max(timeout_ms, 1), 65_000)}\r".encode("ascii")
 
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A question and how many values its answer has."""
+    """A query, and how many values its answer may have."""
 
     name: str
     values: range
@@ -97,7 +98,7 @@ Line = Reply | Value
 
 
 def parse(line: bytes) -> Line | None:
-    """One line without its end; None where it is nothing of this protocol."""
+    """Parse one line without its carriage return; None if it is not of this protocol."""
     if line == b"+":
         return Reply.ACCEPTED
     if line == b"-":
@@ -116,7 +117,7 @@ def parse(line: bytes) -> Line | None:
 
 
 class LineReader:
-    """Puts lines together from however the bytes arrive. strangers counts the lines that were none."""
+    """Assembles lines from bytes that arrive in pieces. strangers: number of lines of another protocol."""
 
     def __init__(self) -> None:
         self._partial = bytearray()
@@ -140,7 +141,7 @@ class LineReader:
         return lines
 
     def forget(self) -> None:
-        """Drop the beginning of a line."""
+        """Drop a line that has begun."""
         self._partial.clear()
         self._too_long = False
 
@@ -176,7 +177,8 @@ _MOTOR_FAULTS: Mapping[int, str] = MappingProxyType(
 
 
 def describe_faults(flags: int) -> tuple[str, ...]:
-    """?FF but for the emergency stop. Each of these stops the motors, or may; unknown bits are faults."""
+    """The faults of ?FF, without the emergency stop. Each stops the motors, or may; unknown bits are
+    faults."""
     bits = [bit for bit in range(32) if flags >> bit & 1 and 1 << bit != ESTOP_FLAG]
     return tuple(
         f"error: {_FAULTS[bit] if bit < len(_FAULTS) else f'unknown fault bit {bit}'}" for bit in bits
@@ -185,14 +187,14 @@ def describe_faults(flags: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class MotorFlags:
-    """?FM. faults stop a motor, warnings do not."""
+    """The contents of ?FM. faults stop a motor, warnings do not."""
 
     faults: tuple[str, ...]
     warnings: tuple[str, ...]
 
 
 def describe_motors(flags: tuple[int, ...]) -> MotorFlags:
-    """Of both channels; unknown bits are faults."""
+    """The flags of all channels; unknown bits are faults."""
     faults, warnings = [], []
     for channel, value in enumerate(flags, start=1):
         for bit in (bit for bit in range(32) if value >> bit & 1):

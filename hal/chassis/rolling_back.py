@@ -1,5 +1,5 @@
-"""Does the base roll back though it is not told to? A slope is too much for it then, or a motor turns
-the wrong way; and behind the robot nobody looks."""
+"""Detects a base that rolls backwards without being told to: a slope is too steep for it, or a motor turns
+the wrong way. No camera looks behind the robot."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import math
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 
-# Over so long, twice in a row, at so much at least: tracks spring back when a stop ends, but by less.
+# Length of one measurement; two in a row must show rolling back.
 _GLANCE_NS = NS_PER_S // 2
+# Minimum mean speed that counts as rolling back: tracks spring back when a stop ends, but more slowly.
 _LEAST_MPS = 0.05
 
 
 class RollingBack:
-    """sentence: "" until a base that is to stand or go forward has rolled back for a second."""
+    """sentence: "" until a base that should stand or go forward has rolled back for a second."""
 
     def __init__(self) -> None:
         self.sentence = ""
@@ -22,7 +23,7 @@ class RollingBack:
         self._since_ns, self._back_m, self._before = 0, 0.0, False
 
     def step(self, pose: PlanarPose, now_ns: int, *, expected: bool) -> None:
-        """What the base tells of where it is. expected: it may go back, as it is told to or taken there."""
+        """Take in the reported pose. expected: the base may go back, because it is commanded or pushed."""
         last, self._pose = self._pose, pose
         if last is None or expected:
             self.sentence = ""

@@ -1,8 +1,8 @@
 """Skid-steer kinematics of a tracked base, and dead reckoning from what it reports.
 
-Tracks scrub sideways in a turn, so the base turns less than its track speeds say: as if the tracks
-stood wider apart. effective width = real width * slip factor (Mandow et al. 2007 call the tracks'
-virtual contact points the ICRs; this is the symmetric case).
+Tracks scrub sideways in a turn, so the base turns less than its track speeds say, as if the tracks were
+further apart: effective width = real width * slip factor. (Mandow et al. 2007 call the tracks' virtual
+contact points the ICRs; this is the symmetric case.)
 """
 
 from __future__ import annotations
@@ -18,28 +18,32 @@ ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class TrackGeometry:
-    """width_m: between the track centres. slip_factor >= 1, measured on the floor that matters."""
+    """Geometry of a pair of tracks.
+
+    width_m: between the track centres. slip_factor: >= 1, to be measured on the floor the robot drives on.
+    """
 
     width_m: float
     slip_factor: float = 1.0
 
     @property
     def effective_width_m(self) -> float:
-        """The width that makes w = (right - left) / width true on this floor."""
+        """The width for which w = (right - left) / width holds on this floor."""
         return self.width_m * self.slip_factor
 
     def to_tracks(self, v_mps: float, w_radps: float) -> tuple[float, float]:
-        """Track speeds (left, right), m/s, that make this motion."""
+        """Track speeds (left, right) in m/s for this motion."""
         half_mps = 0.5 * w_radps * self.effective_width_m
         return v_mps - half_mps, v_mps + half_mps
 
     def to_twist(self, left: float, right: float) -> tuple[float, float]:
-        """(v, w) of two track speeds; of two track distances: (metres ahead, radians turned)."""
+        """(v, w) from two track speeds, or (metres ahead, radians turned) from two track distances."""
         return 0.5 * (left + right), (right - left) / self.effective_width_m
 
 
 def scale_to_fit(value: float, other: float, limit: float, other_limit: float) -> tuple[float, float]:
-    """Both values times the one ratio <= 1 that brings each within its limit: the curve stays the same."""
+    """Both values scaled by one ratio <= 1 so that each is within its limit: the curvature does not
+    change."""
     ratio = 1.0
     if abs(value) > limit:
         ratio = limit / abs(value)
@@ -49,27 +53,27 @@ def scale_to_fit(value: float, other: float, limit: float, other_limit: float) -
 
 
 def wrapped_difference(newer: int, older: int, bits: int = 32) -> int:
-    """newer - older of a counter that wraps at 2**bits: the shorter way round, signed."""
+    """newer - older for a counter that wraps at 2**bits: the shorter way round, signed."""
     half = 1 << (bits - 1)
     return (newer - older + half) % (1 << bits) - half
 
 
 class DeadReckoning:
-    """The pose since the start, advanced by what the base says it did."""
+    """The pose relative to the start, integrated from the motion that the base reports."""
 
     def __init__(self) -> None:
         self.pose = ORIGIN
 
     def advance(self, distance_m: float, turn_rad: float) -> None:
-        """Move along the arc of this length and turn."""
+        """Move along an arc of this length and turn angle."""
         self.pose = advance_pose(self.pose, distance_m, turn_rad, 1.0)
 
 
 class TrackCounter:
-    """Increments of two wrapping counters; a jump that no track can make is a restart of the base.
+    """Increments of two wrapping counters, with detection of a restart of the base.
 
-    So is a return to 0 that the motion before does not explain: a base that restarts soon after it set off
-    has not far to jump.
+    A jump that no track can make counts as a restart. So does a return to 0 that the motion before does not
+    explain: if the base restarts soon after it set off, the jump is short.
     """
 
     def __init__(self, bits: int = 32) -> None:
@@ -84,11 +88,12 @@ class TrackCounter:
         expected: tuple[float, float] = (0.0, 0.0),
         slack: float = math.inf,
     ) -> tuple[int, int] | None:
-        """Counts since the last call; (0, 0) at the first; None after an unbelievable jump, from
-        which counting starts anew.
+        """Counts since the last call; (0, 0) at the first call; None after a restart, from which counting
+        starts anew.
 
-        limit: the largest believable increment. expected: counts (left, right) at the speed measured before,
-        NaN where unknown. slack: counts that a track may go otherwise; inf: whoever knows restarts otherwise.
+        limit: the largest plausible increment.
+        expected: counts (left, right) at the speed measured before, NaN where unknown.
+        slack: how many counts a track may deviate from that; inf turns the detection of a return to 0 off.
         """
         last, self._last = self._last, (left, right)
         if last is None:
@@ -104,13 +109,16 @@ class TrackCounter:
     def _begins_anew(
         self, last: tuple[int, int], new: tuple[int, int], expected: tuple[float, float], slack: float
     ) -> bool:
-        """Both are near 0, at least one came back there by more than its motion explains, and neither was
-        elsewhere without that."""
+        """Whether the counters restarted from 0.
+
+        Both must be near 0 now. At least one must have returned there by more than its motion explains, and
+        the other must have done so, too, or have been near 0 before.
+        """
         back = False
         for before, after, ahead in zip(last, new, expected, strict=True):
             was, now = (wrapped_difference(count, 0, self._bits) for count in (before, after))
             known = ahead if math.isfinite(ahead) else 0.0
-            near = slack + abs(known)  # since it restarted it has gone no farther than that
+            near = slack + abs(known)  # the most that a track can have moved since the restart
             homewards = max(0.0, -known if was > 0 else known)
             returned = abs(was) - abs(now) > slack + 2.0 * homewards
             if abs(now) > near or (not returned and abs(was) > near):

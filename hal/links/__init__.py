@@ -1,6 +1,9 @@
-"""Links behind hal.api.Link: whole messages, and nothing of what they mean.
+"""Links that carry bytes, frames or messages, and know nothing of their meaning. See hal/api.py.
 
-can_bus (python-can), serial_port (pyserial), datagrams (other programs). reopening comes around the first two
-and opens them again once they are lost; pseudo_terminal is a serial line without hardware; scripted is for
-tests, and fails on demand.
+reopening.py - base class of CAN and serial links: opens a lost device again
+can_bus.py - CAN buses through python-can
+serial_port.py - serial ports through pyserial
+datagrams.py - messages of other programs, over UDP or a Unix socket
+pseudo_terminal.py - a serial line without hardware, for emulators
+scripted.py - links in memory that fail on demand, for tests
 """

@@ -1,7 +1,7 @@
-"""Any CAN bus that python-can can open. The only module that imports it.
+"""Any CAN bus that python-can can open. The only module that imports python-can.
 
-No python-can Notifier (it spins after an unplug) and no send_periodic (it would go on sending the last
-command while the program hangs): the control loop sends and receives by itself.
+The control loop sends and receives by itself. It does not use python-can's Notifier, which spins after an
+unplug, nor send_periodic, which would go on sending the last command while the program hangs.
 """
 
 from __future__ import annotations
@@ -20,20 +20,23 @@ from hal.errors import DeviceNotFound, DeviceRefused
 from hal.links.reopening import ReopeningLink, reason
 from hal.types import CanFrame
 
-# How long a send waits for room. Positive, because with 0 pyserial (below slcan) spins for ever on a full
-# port. There it asks for room for more even after it has written all, so with 2 ms a process that is held up
-# by others takes its port for lost. Hence as long as hal.links.serial_port: a tenth of a CAN base's time.
+# How long a send waits for room in the queue. It must be positive: with 0, pyserial (below slcan) spins for
+# ever on a full port.
 _SEND_TIMEOUT_S = 0.002
+# The same over slcan. pyserial waits for room once more even after it has written everything, so with 2 ms a
+# process that others hold up would take its port for lost. Therefore the same as in hal.links.serial_port: a
+# tenth of the time-out of a CAN base.
 _SERIAL_SEND_TIMEOUT_S = 0.05
 
-# So many messages in a row that are none of ours end one receive(): a flood must not hold the control loop.
+# One receive() gives up after this many messages in a row that are not for us: a flood must not hold up the
+# control loop.
 _MAX_FOREIGN = 256
 
 # linux/can/error.h: the controller has left the bus.
 _ERROR_BUS_OFF = 0x40
 _BUS_OFF = "bus-off"
 
-# What python-can says when nobody on the bus acknowledges.
+# python-can's error when nobody on the bus acknowledges.
 _FULL = "Transmit buffer full"
 
 _OPEN_ERRORS = (can.CanError, OSError, ValueError, ImportError, NotImplementedError)
@@ -43,18 +46,18 @@ class CanBusLink(ReopeningLink[can.BusABC]):
     """hal.api.CanLink over python-can."""
 
     def __init__(self, config: CanLinkConfig) -> None:
-        # slcan sleeps for 0.1 s in between, and writes to the adapter without a time-out.
+        # Opening and closing slcan sleeps for 0.1 s, and writes to the adapter without a time-out.
         slow = config.interface == "slcan"
         super().__init__(f"CAN {config.interface} {config.channel!r}", (can.CanError, OSError), slow)
         self._config = config
-        # python-can's udp_multicast hears what it sends itself, and cannot be told not to.
+        # python-can's udp_multicast also receives what it sends itself, which cannot be switched off.
         self._echoes: deque[CanFrame] | None = (
             deque(maxlen=_MAX_FOREIGN) if config.interface == "udp_multicast" else None
         )
         self._send_timeout_s = _SERIAL_SEND_TIMEOUT_S if config.interface == "slcan" else _SEND_TIMEOUT_S
 
     def send(self, frame: CanFrame) -> None:
-        """Queue one frame; waits for room at most 2 ms, 50 ms over slcan. Raises LinkLost."""
+        """Queue one frame; wait for room at most 2 ms, or 50 ms over slcan. Raises LinkLost."""
         message = can.Message(
             arbitration_id=frame.arbitration_id, data=frame.data, is_extended_id=False, check=True
         )
@@ -66,7 +69,8 @@ class CanBusLink(ReopeningLink[can.BusABC]):
             self._echoes.append(frame)
 
     def receive(self) -> CanFrame | None:
-        """The oldest classic frame with an 11-bit identifier, without waiting. Raises LinkLost."""
+        """The oldest classic frame with an 11-bit identifier, without waiting; None if there is none. Raises
+        LinkLost."""
         bus = self._opened()
         for _ in range(_MAX_FOREIGN):
             try:
@@ -78,7 +82,7 @@ class CanBusLink(ReopeningLink[can.BusABC]):
                     self._drop_partial(bus)
                     continue
                 raise self._lost("receiving", error) from error
-            except (ValueError, IndexError):  # slcan: noise on the line that is no frame
+            except (ValueError, IndexError):  # slcan: noise on the line
                 continue
             if message is None:
                 return None
@@ -96,8 +100,8 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         return None
 
     def _drop_partial(self, bus: can.BusABC) -> None:
-        """python-can 4.6.1's slcan decodes a line before it clears it: noise that is no ASCII would stay and
-        spoil every line to come. Raises LinkLost."""
+        """Drop a damaged line of slcan. python-can 4.6.1 decodes a line before it clears it, so noise that is
+        not ASCII would stay and spoil every later line. Raises LinkLost."""
         if not isinstance(bus, slcanBus):
             return
         try:
@@ -113,7 +117,7 @@ class CanBusLink(ReopeningLink[can.BusABC]):
 
     def _close_lost(self, device: can.BusABC) -> None:
         if isinstance(device, slcanBus):
-            # An adapter that hung must not send old commands when it wakes.
+            # An adapter that hung must not send old commands when it works again.
             with suppress(OSError, termios.error):
                 device.serialPortOrig.reset_output_buffer()
         super()._close_lost(device)
@@ -141,7 +145,7 @@ def _open(config: CanLinkConfig, where: str) -> can.BusABC:
     elif config.interface not in ("virtual", "socketcan"):
         options = {"bitrate": config.bitrate}
     try:
-        # ignore_config: else files and environment variables of the machine would add options unseen.
+        # ignore_config: otherwise configuration files and environment variables would add options unnoticed.
         bus = can.Bus(
             channel=config.channel,
             interface=config.interface,
@@ -150,7 +154,7 @@ def _open(config: CanLinkConfig, where: str) -> can.BusABC:
             **options,
         )
         if isinstance(bus, slcanBus):
-            # It would wait behind every frame until the adapter has taken it: for ever, from one that hangs.
+            # It would wait after every frame until the adapter has taken it: for ever if the adapter hangs.
             bus.serialPortOrig.flush = _wait_for_nothing  # type: ignore[method-assign]
         return bus
     except _OPEN_ERRORS as error:
@@ -185,11 +189,12 @@ def _advice(config: CanLinkConfig, number: int | None) -> str:
 
 
 def _wait_for_nothing() -> None:
-    """In place of pyserial's flush(), which has no time-out."""
+    """Replacement for pyserial's flush(), which has no time-out."""
 
 
 def _has_more(bus: can.BusABC) -> bool:
-    """slcan: what acknowledges a sent frame reads as silence, and behind it others may wait."""
+    """Whether more lines of slcan are waiting: the acknowledgement of a sent frame reads as None, but frames
+    may follow it."""
     return isinstance(bus, slcanBus) and bus.serialPortOrig.in_waiting > 0
 
 
@@ -202,7 +207,7 @@ def _errno(error: BaseException | None) -> int | None:
 
 
 def _is_foreign_datagram(error: Exception) -> bool:
-    """What arrived does not unpack: anybody may send to a group of udp_multicast, and slcan's line has noise.
-    It is no fault of the bus."""
+    """Whether the error only means that what arrived could not be decoded. Anybody may send to a group of
+    udp_multicast, and the line of slcan has noise; neither is a fault of the bus."""
     cause = error.__cause__
     return cause is not None and not isinstance(cause, OSError)

@@ -1,4 +1,4 @@
-"""Whole messages of other programs, over UDP or a Unix datagram socket, without ever waiting."""
+"""Messages of other programs, over UDP or a Unix datagram socket, without ever waiting."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from typing import Self
 from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
 from hal.types import Sender
 
-# Longer datagrams are cut here by the kernel; whoever reads them refuses that length.
+# The kernel cuts longer datagrams at this length; the parser refuses messages of this length.
 _READ_BYTES = 4096
 _BACKLOG_BYTES = 16_384
-# What a peer that went away makes the kernel report on our next call; the socket itself is fine.
+# Errors that the kernel reports on the next call after a peer went away; the socket itself is fine.
 _PEER_GONE = frozenset(
     {errno.ECONNREFUSED, errno.ENOENT, errno.ECONNRESET, errno.EHOSTUNREACH, errno.ENETUNREACH}
 )
 
 
 class DatagramSocket(ABC):
-    """hal.api.DatagramLink over one bound socket; what it is bound to is the subclass's."""
+    """hal.api.DatagramLink over one bound socket. The subclass decides what the socket is bound to."""
 
     def __init__(self) -> None:
         self._socket: socket.socket | None = None
@@ -34,7 +34,7 @@ class DatagramSocket(ABC):
         """Bind. Raises DeviceNotFound, DeviceRefused."""
         self._socket = self._bind()
         self._socket.setblocking(False)
-        # A short queue: commands that waited long are not worth obeying.
+        # A short queue: commands that waited for long should not be obeyed.
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BACKLOG_BYTES)
         return self
 
@@ -69,11 +69,11 @@ class DatagramSocket(ABC):
 
     @abstractmethod
     def _bind(self) -> socket.socket:
-        """A new socket that listens. Raises DeviceNotFound, DeviceRefused."""
+        """A new, bound socket. Raises DeviceNotFound, DeviceRefused."""
 
 
 class UdpSocket(DatagramSocket):
-    """Bound to host:port; port 0 takes any free one, which `port` then tells."""
+    """A UDP socket bound to host:port. Port 0 takes any free port, which the property port gives."""
 
     def __init__(self, host: str, port: int) -> None:
         super().__init__()
@@ -81,7 +81,7 @@ class UdpSocket(DatagramSocket):
 
     @property
     def port(self) -> int:
-        """The port that is listened on."""
+        """The port that the socket is bound to."""
         assert self._socket is not None, "used before it was opened"
         return int(self._socket.getsockname()[1])
 
@@ -107,7 +107,8 @@ class UdpSocket(DatagramSocket):
 
 
 class UnixSocket(DatagramSocket):
-    """Bound to a path, which is removed at the end. for_group: processes of the group may send too."""
+    """A Unix socket bound to a path, which is removed at the end. for_group: processes of the group may send,
+    too."""
 
     def __init__(self, path: Path, for_group: bool = False) -> None:
         super().__init__()
@@ -119,7 +120,7 @@ class UnixSocket(DatagramSocket):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         super().__exit__(kind, error, trace)
-        # Only our own: another program may have taken the name meanwhile.
+        # Remove only our own socket: another program may have taken the name in the meantime.
         with suppress(OSError):
             if self._path.lstat().st_ino == self._bound_inode:
                 self._path.unlink()
@@ -127,7 +128,7 @@ class UnixSocket(DatagramSocket):
     def _bind(self) -> socket.socket:
         self._clear_away()
         bound = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        # The permissions must hold from the first moment on, so they cannot be set after bind.
+        # The permissions must hold from the first moment, so they cannot be set after bind.
         before = os.umask(0o777 & ~self._mode)
         try:
             bound.bind(str(self._path))
@@ -142,7 +143,7 @@ class UnixSocket(DatagramSocket):
         return bound
 
     def _clear_away(self) -> None:
-        """A socket that a killed program has left behind; nothing else is ever removed."""
+        """Remove a socket that a killed program left behind, and nothing else. Raises DeviceRefused."""
         try:
             mode = self._path.lstat().st_mode
         except OSError:

@@ -1,6 +1,6 @@
-"""The device's end of a pseudo-terminal: an emulator here, an ordinary serial driver at ``path``.
+"""The device's end of a pseudo-terminal: an emulator uses it here, an ordinary serial driver opens ``path``.
 
-A pseudo-terminal does not pace: bytes arrive at once, whatever the baud rate says.
+A pseudo-terminal ignores the baud rate: bytes arrive at once.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ class PseudoTerminal:
         return self._path
 
     def unplug(self) -> None:
-        """The device vanishes: whoever has the port open gets an error. There is no way back."""
+        """Make the device vanish for good: every program that has the port open gets an error."""
         if self._open:
             self._open = False
             os.close(self._slave)
             os.close(self._master)
 
     def write(self, data: bytes) -> None:
-        """See hal.api.SerialLink. Raises LinkLost when unplugged or nobody reads for 4 kB."""
+        """See hal.api.SerialLink. Raises LinkLost when unplugged, or when nobody has read the last 4 kB."""
         self._check()
         try:
             written = os.write(self._master, data)

@@ -1,7 +1,7 @@
-"""Links in memory that misbehave on demand, for tests and for emulators in the same process.
+"""Links in memory that fail on demand, for tests and for emulators in the same process.
 
-``can_pair()`` and ``serial_pair()`` make two ends of one wire. Each end can be unplugged, can refuse to
-write, and can be made to hear noise, wrong bytes, little at a time or nothing.
+``can_pair()`` and ``serial_pair()`` make the two ends of one wire. Each end can be unplugged, can refuse to
+write, and can be made to receive noise, wrong bytes, a few bytes at a time or nothing.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from hal.types import CanFrame
 
 
 class _ScriptedLink:
-    """What both kinds of end share: being plugged in, and the next writes failing."""
+    """What both kinds of link share: unplugging, and writes that fail."""
 
     def __init__(self) -> None:
         self._plugged = True
@@ -31,15 +31,15 @@ class _ScriptedLink:
         return None
 
     def unplug(self) -> None:
-        """Every use raises LinkLost until plug()."""
+        """Make every use raise LinkLost until plug()."""
         self._plugged = False
 
     def plug(self) -> None:
-        """The adapter is back."""
+        """Plug the adapter in again."""
         self._plugged = True
 
     def fail_writes(self, count: int) -> None:
-        """The next count writes raise LinkLost, though reading goes on."""
+        """Make the next count writes raise LinkLost, while reading still works."""
         self._failing_writes = count
 
     def _check(self) -> None:
@@ -54,7 +54,7 @@ class _ScriptedLink:
 
 
 class ScriptedCanLink(_ScriptedLink):
-    """One end of a CAN wire. sent lists what went out, in order."""
+    """One end of a CAN wire. sent: the frames that were sent, in order."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -76,7 +76,7 @@ class ScriptedCanLink(_ScriptedLink):
         return self._arrived.popleft() if self._arrived else None
 
     def deliver(self, *frames: CanFrame) -> None:
-        """Let these frames arrive here, through the filter; nothing arrives at an unplugged end."""
+        """Make these frames arrive here, through the filter. Nothing arrives at an unplugged end."""
         for frame in frames:
             passed = self._filter(frame) if self._plugged else None
             if passed is not None:
@@ -96,7 +96,7 @@ class ScriptedCanLink(_ScriptedLink):
 
 
 class ScriptedSerialLink(_ScriptedLink):
-    """One end of a serial wire. sent holds every byte that went out, written each write by itself."""
+    """One end of a serial wire. sent: all bytes that were sent. written: the same, one item per write."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -124,12 +124,12 @@ class ScriptedSerialLink(_ScriptedLink):
         return data
 
     def deliver(self, data: bytes) -> None:
-        """Let these bytes arrive here, through the filter; nothing arrives at an unplugged end."""
+        """Make these bytes arrive here, through the filter. Nothing arrives at an unplugged end."""
         if self._plugged:
             self._arrived += self._filter(data)
 
     def read_at_most(self, count: int | None) -> None:
-        """Short reads of count bytes; None gives all that is there (several messages merged)."""
+        """Let each read give at most count bytes; None: all that is there (several messages merged)."""
         self._at_most = count
 
     def hear_through(self, change: Callable[[bytes], bytes]) -> None:

@@ -1,4 +1,4 @@
-"""Any serial port that pyserial can open, by path or URL. The only module that imports it."""
+"""Any serial port that pyserial can open, by path or URL. The only module that imports pyserial."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from config.chassis import SerialLinkConfig
 from hal.errors import DeviceNotFound, DeviceRefused, HalError
 from hal.links.reopening import ReopeningLink, reason
 
-# Short, because the control loop waits for it; positive, because with 0 pyserial spins for ever when the
-# peer stops reading. A process that is held up by others for this long takes its port for lost, too.
+# Short, because the control loop waits for it. Positive, because with 0 pyserial spins for ever when the peer
+# stops reading. A process that others hold up for this long takes its port for lost, too.
 _WRITE_TIMEOUT_S = 0.05
 
 _MAX_READ = 4096
@@ -34,7 +34,8 @@ class SerialPortLink(ReopeningLink[serial.SerialBase]):
         self._config = config
 
     def write(self, data: bytes) -> None:
-        """Hand all of data to the system within 50 ms. Raises LinkLost; part of data may then be out."""
+        """Hand all of data to the system within 50 ms. Raises LinkLost; part of data may have been sent
+        then."""
         try:
             written = self._opened().write(data)
         except _ERRORS as error:
@@ -83,7 +84,7 @@ def _translated(error: Exception, config: SerialLinkConfig) -> HalError:
     # pyserial drops the number when the file is there but does not take a port's settings.
     if isinstance(error.__context__, termios.error) or number not in (None, errno.ENOENT):
         return DeviceRefused(f"{where}: is not a serial port that takes {config.baud} baud ({reason(error)})")
-    # pyserial's own text names the port again, and a number's meaning twice.
+    # pyserial's own text repeats the name of the port, and the meaning of the error number.
     why = reason(error).rpartition(f"{config.url}: ")[2] if number is None else os.strerror(number)
     there = f"that the adapter is plugged in ({_ports_here(_DEVICES)})"
     if not config.url.startswith(f"{_DEVICES}/"):
@@ -92,7 +93,7 @@ def _translated(error: Exception, config: SerialLinkConfig) -> HalError:
 
 
 def _group_of(path: str) -> str:
-    """The group that may use the port; dialout where that cannot be found out or is nobody's to join."""
+    """The group that may use the port; dialout if that is unknown, or if it is root, which no user joins."""
     try:
         group = grp.getgrgid(os.stat(path).st_gid).gr_name
     except (OSError, KeyError):
@@ -101,7 +102,8 @@ def _group_of(path: str) -> str:
 
 
 def _ports_here(devices: Path) -> str:
-    """The names that stay the same when adapters are plugged in another order, or else any."""
+    """A sentence with the serial ports of this machine: by names that do not depend on the order in which
+    adapters were plugged in, if there are such names."""
     stable = sorted(str(path) for path in devices.glob("serial/by-id/*"))
     ports = stable or sorted(
         str(path) for pattern in ("ttyUSB*", "ttyACM*") for path in devices.glob(pattern)

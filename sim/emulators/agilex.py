@@ -1,7 +1,7 @@
-"""An AgileX base at the other end of its wire: protocol V2, stepped by a time that is passed in.
+"""An emulated AgileX base: protocol V2, over CAN or RS-232.
 
-Like the real base it starts in standby, obeys 0x421 before anything else, and stops by itself when 0x111
-stays away. What it reports are its tracks: slip in a turn is not visible to it.
+Like the real base it starts in standby, follows motion commands only after 0x421, and stops by itself without
+0x111. It reports the motion of its tracks, which does not include slip.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class _Broadcast:
 
 
 class AgilexEmulator(ChassisEmulator):
-    """Motors are alternately left and right. Commands count in the control mode of this wire (1 CAN, 2
-    serial). A model that wants 0x421 again and again, as BUNKER MINI, is back in standby when it stays away.
+    """Motors are alternately left and right. Commands are followed in the control mode of this wire (1 CAN, 2
+    serial). A model that needs 0x421 repeatedly, such as BUNKER MINI, returns to standby without it.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class AgilexEmulator(ChassisEmulator):
         self._actuators = model.actuators
         self._obeying_mode = model.obeying_mode(over_serial)
         self._command_timeout_ns = model.base_timeout_ms * NS_PER_MS
-        # What must be repeated is forgotten as soon as the motion command.
+        # A mode that must be repeated times out as fast as the motion command.
         self._mode_timeout_ns = None if model.mode_period_ms is None else self._command_timeout_ns
         self._mode_heard_ns = plant.now_ns
         start_ns = plant.now_ns
@@ -87,7 +87,7 @@ class AgilexEmulator(ChassisEmulator):
         self._muted: frozenset[int] = frozenset()
 
     def advance_to(self, now_ns: int) -> None:
-        """Obey what has arrived, move, and send what falls due up to and including now_ns."""
+        """Follow what has arrived, move, and send what is due up to and including now_ns."""
         self._listen()
         while (event_ns := self._next_event_ns()) <= now_ns:
             self._move_to(event_ns)
@@ -100,38 +100,38 @@ class AgilexEmulator(ChassisEmulator):
     # Faults, for tests and scenarios.
 
     def press_estop(self) -> None:
-        """Somebody presses the red button."""
+        """Press the red button."""
         self.vehicle_state = _ESTOP
         self._plant.command(0.0, 0.0)
 
     def release_estop(self) -> None:
-        """The red button is out again. The mode is as before: whatever is sent now is obeyed."""
+        """Release the red button. The mode is as before, so commands are followed again."""
         self.vehicle_state = _NORMAL
 
     def raise_exception(self, fault_bits: int) -> None:
-        """The base finds a fault of its own and stops."""
+        """Make the base report a fault of its own and stop."""
         self.vehicle_state = _EXCEPTION
         self.fault_bits = fault_bits
         self._plant.command(0.0, 0.0)
 
     def clear_exception(self) -> None:
-        """The fault has gone."""
+        """Clear the fault."""
         self.vehicle_state = _NORMAL
         self.fault_bits = 0
 
     def take_over(self, v_mps: float = 0.0, w_radps: float = 0.0) -> None:
-        """Somebody drives with the remote control, which outranks everything."""
+        """Drive with the remote control, which outranks everything."""
         self.mode = _REMOTE
         self._command_ns = None
         self._plant.command(v_mps, w_radps)
 
     def hand_back(self) -> None:
-        """The remote control is switched to command mode; the host must still send 0x421."""
+        """Switch the remote control to command mode; the host must still send 0x421."""
         self.mode = _STANDBY
         self._plant.command(0.0, 0.0)
 
     def mute(self, *arbitration_ids: int) -> None:
-        """These frames are no longer sent; without arguments all are sent again."""
+        """Stop sending these frames; without arguments, send all frames again."""
         self._muted = frozenset(arbitration_ids)
 
     # The base's own work.
@@ -150,7 +150,7 @@ class AgilexEmulator(ChassisEmulator):
                 if message is not None and not self._silent:
                     self._obey(message)
         except LinkLost:
-            # The base does not know that its cable is out; its own time-out stops it.
+            # The base does not know that its cable is unplugged; its own time-out stops it.
             return
 
     def _obey(self, message: AgilexMessage) -> None:
@@ -198,7 +198,7 @@ class AgilexEmulator(ChassisEmulator):
                 if frame.arbitration_id not in self._muted:
                     self._link.send(frame)
         except LinkLost:
-            # As in _listen: a base goes on talking to a cable that is out.
+            # As in _listen: the base keeps sending into an unplugged cable.
             return
 
     def _motion(self) -> tuple[AgilexMessage, ...]:

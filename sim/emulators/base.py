@@ -1,4 +1,5 @@
-"""What all chassis emulators share: an end of a link, a body that moves, and the accidents of a real base."""
+"""What all chassis emulators share: one end of a link, a plant that moves, and the failures of a real
+base."""
 
 from __future__ import annotations
 
@@ -14,10 +15,10 @@ _STEP_NS = NS_PER_MS
 
 
 class ChassisEmulator(Enclosing, ABC):
-    """Stepped by a time that is passed in. What has arrived counts as of the time of the last step, so in
-    lock-step the order "advance the emulator, then exchange with the driver" has no hidden delay.
+    """An emulator that is stepped with the time. What has arrived counts as of the time of the last step, so
+    the order "advance the emulator, then exchange with the driver" has no hidden delay in lockstep.
 
-    boot_ms: how long it is silent after a restart.
+    boot_ms: how long the base is silent after a restart.
     """
 
     def __init__(self, link: Closing, plant: TrackedPlant, boot_ms: int) -> None:
@@ -32,30 +33,31 @@ class ChassisEmulator(Enclosing, ABC):
 
     @property
     def plant(self) -> TrackedPlant:
-        """The body that this base moves."""
+        """The plant that this base moves."""
         return self._plant
 
     @abstractmethod
     def advance_to(self, now_ns: int) -> None:
-        """Obey what has arrived, move, and say what falls due up to and including now_ns."""
+        """Follow what has arrived, move, and send what is due up to and including now_ns."""
 
     def restart(self) -> None:
-        """Power interrupted: silent while booting, travel counted from zero, what was set forgotten."""
+        """Interrupt the power: the base is silent while booting, counts travel from zero and loses its
+        settings."""
         self._silent_until_ns = self._now_ns + self._boot_ns
         self._travel_zero_m = self._plant.track_travel_m
         self._power_up()
 
     def freeze(self) -> None:
-        """Its processor hangs: nothing is said or obeyed, but the motors' own time-out still runs."""
+        """Make its processor hang: it neither sends nor obeys, but the motors' own time-out still runs."""
         self._frozen = True
 
     def thaw(self) -> None:
-        """It goes on."""
+        """Let it go on."""
         self._frozen = False
 
     @abstractmethod
     def _power_up(self) -> None:
-        """The state after power has come: motors off."""
+        """Enter the state after power-up: motors off."""
 
     @property
     def _silent(self) -> bool:
@@ -63,20 +65,21 @@ class ChassisEmulator(Enclosing, ABC):
 
     @property
     def _travel_m(self) -> tuple[float, float]:
-        """(left, right) since power came."""
+        """Travel of the tracks (left, right) since power-up."""
         left_m, right_m = self._plant.track_travel_m
         return left_m - self._travel_zero_m[0], right_m - self._travel_zero_m[1]
 
 
 class SerialEmulator(ChassisEmulator):
-    """At the end of a serial line. That the cable is out it does not know: it hears nothing and talks on."""
+    """An emulator at the end of a serial line. If the cable is unplugged, it receives nothing and keeps
+    sending."""
 
     def __init__(self, link: SerialLink, plant: TrackedPlant, boot_ms: int) -> None:
         super().__init__(link, plant, boot_ms)
         self._link = link
 
     def _hear(self) -> bytes:
-        """What has arrived; nothing while it is silent."""
+        """What has arrived; nothing while the base is silent."""
         try:
             arrived = self._link.read()
         except LinkLost:
@@ -91,9 +94,9 @@ class SerialEmulator(ChassisEmulator):
 
 
 class MotorController(SerialEmulator):
-    """Answers only when asked, and moves two tracks along ramps, in steps of a millisecond.
+    """A controller that answers only when asked, and moves two tracks along ramps, in steps of a millisecond.
 
-    signs: the directions of the motors (left, right) that move their tracks ahead; -1 where one is mirrored.
+    signs: the directions of the motors (left, right) that move their tracks ahead; -1 for a mirrored motor.
     """
 
     def __init__(
@@ -116,12 +119,12 @@ class MotorController(SerialEmulator):
 
     @property
     def _turned_m(self) -> tuple[float, float]:
-        """How far the motors have turned their tracks since power came."""
+        """Travel of the tracks since power-up, with the signs of the motors."""
         return self._signed(*self._travel_m)
 
     @property
     def _turning_mps(self) -> tuple[float, float]:
-        """How fast they do."""
+        """Speeds of the tracks, with the signs of the motors."""
         return self._signed(*self._plant.track_speeds_mps)
 
     def _signed(self, left: float, right: float) -> tuple[float, float]:
@@ -147,5 +150,5 @@ class MotorController(SerialEmulator):
 
 
 def as_int32(value: int) -> int:
-    """A counter that wraps."""
+    """The value of a counter that wraps at 32 bits, signed."""
     return (value + (1 << 31)) % (1 << 32) - (1 << 31)

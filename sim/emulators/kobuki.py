@@ -1,6 +1,6 @@
-"""A Kobuki at the other end of a serial line: streams its sensors, follows base control, stops if left alone.
+"""An emulated Kobuki on a serial line: it streams its sensors, follows commands, and stops without them.
 
-As on the real base its bumper, cliff and wheel-drop switches only report: stopping is the host's work.
+As on the real base, the bumper, cliff and wheel-drop switches only report; the host has to stop.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ _CENTRE = 0x2
 
 
 class KobukiEmulator(SerialEmulator):
-    """command_timeout_ms: after so long without base control the wheels stop. The real firmware's time is not
-    documented; 0.6 s is what the vendor's own node waits.
+    """The Kobuki for the driver hal.chassis.kobuki.
+
+    command_timeout_ms: the wheels stop after this time without a base control command. The time of the real
+    firmware is not documented; the vendor's own node waits for 0.6 s.
     """
 
     def __init__(
@@ -54,7 +56,7 @@ class KobukiEmulator(SerialEmulator):
         self.rejected = 0
 
     def advance_to(self, now_ns: int) -> None:
-        """Obey what has arrived, move, and stream what falls due up to and including now_ns."""
+        """Follow what has arrived, move, and stream what is due up to and including now_ns."""
         self._listen()
         while (event_ns := self._next_event_ns()) <= now_ns:
             self._move_to(event_ns)
@@ -66,17 +68,17 @@ class KobukiEmulator(SerialEmulator):
     # Faults, for tests and scenarios.
 
     def press_estop(self) -> None:
-        """It has no button: something stands against the middle of its bumper."""
+        """Press the middle of its bumper, because a Kobuki has no emergency stop button."""
         self.bumper = _CENTRE
 
     def release_estop(self) -> None:
-        """It no longer does."""
+        """Release the bumper."""
         self.bumper = 0
 
     # The base's own work.
 
     def _power_up(self) -> None:
-        """Clock, ticks and gyro at zero."""
+        """Set clock, ticks and gyro to zero."""
         self._received.clear()
         self._command_ns = None
         self._start_ns = self._now_ns
@@ -89,7 +91,7 @@ class KobukiEmulator(SerialEmulator):
             pass
 
     def _take_frame(self) -> bool:
-        """Handle the frame at the start of what was received; False when there is no whole one."""
+        """Handle the frame at the start of what was received; False if there is no complete one."""
         received = self._received
         start = received.find(_HEADER)
         if start < 0:
@@ -117,7 +119,8 @@ class KobukiEmulator(SerialEmulator):
                 self._extra += self._about(int.from_bytes(data, "little"))
 
     def _drive(self, speed: int, radius: int) -> None:
-        """Wheel speeds from the speed of the outer wheel (mm/s) and the radius (mm); 0 straight, 1 spin."""
+        """Drive with this speed of the outer wheel (mm/s) and radius (mm; 0: straight on, 1: turn on the
+        spot)."""
         self._command_ns = self._now_ns
         self.commands_obeyed += 1
         if radius == 0:
@@ -133,7 +136,8 @@ class KobukiEmulator(SerialEmulator):
         self._plant.command_tracks(left / 1000.0, right / 1000.0)
 
     def _about(self, flags: int) -> bytes:
-        """Hardware version, firmware version, unique id."""
+        """Sub-payloads with hardware version, firmware version and unique id, as far as flags ask for
+        them."""
         hardware = bytes((10, 4, 4, 0, 1, 0)) if flags & 1 else b""
         firmware = bytes((11, 4, 0, 2, 1, 0)) if flags & 2 else b""
         unique = bytes((19, 12)) + bytes(range(12)) if flags & 8 else b""

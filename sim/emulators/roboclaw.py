@@ -1,7 +1,8 @@
-"""A RoboClaw with two tracks behind it, at the other end of a serial line, stepped by a time passed in.
+"""An emulated RoboClaw with two tracks, on a serial line.
 
-It knows the packets that the manual documents for speed control. What is wrong on the line is met with
-silence, as by the device: no acknowledgement for a bad CRC, and a packet with a gap of 10 ms is dropped.
+It knows the packets that the manual documents for speed control. Like the device, it answers errors on the
+line
+with silence: it does not acknowledge a packet with a bad CRC, and drops a packet with a gap of 10 ms.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from sim.plant import TrackedPlant
 _GAP_NS = 10 * NS_PER_MS
 _ACK = b"\xff"
 
-# Bytes of data that a write carries. Everything else that is known is a read, which carries none.
+# Bytes of data in each write. All other known commands are reads, which carry none.
 _WRITES: Mapping[int, int] = MappingProxyType(
     {14: 1, 32: 2, 33: 2, 34: 4, 35: 4, 36: 4, 37: 8, 38: 8, 39: 8, 40: 12}
 )
@@ -29,10 +30,10 @@ _ESTOP_BIT = {2: 0x4, 4: 0x1}
 
 
 class RoboclawEmulator(MotorController):
-    """Motor 1 is the left track, motor 2 the right one.
+    """Motor 1 drives the left track, motor 2 the right one. The serial time-out is off after power-up, which
+    a host must expect.
 
-    status_bytes: 4 as of firmware
-    4.1.29, 2 before. The serial time-out is off at power-up, as a host must expect it to be.
+    status_bytes: 4 as of firmware 4.1.29, 2 before.
     """
 
     def __init__(
@@ -64,12 +65,12 @@ class RoboclawEmulator(MotorController):
     # Faults, for tests and scenarios.
 
     def press_estop(self) -> None:
-        """The emergency stop input opens: motors off, commands are acknowledged but not followed."""
+        """Open the emergency stop input: motors off; commands are acknowledged but not followed."""
         self._estop = True
         self._stop_motors()
 
     def release_estop(self) -> None:
-        """The input closes (automatic reset): the next command is followed."""
+        """Close the input (automatic reset): the next command is followed."""
         self._estop = False
 
     # The controller's own work.
@@ -92,7 +93,7 @@ class RoboclawEmulator(MotorController):
             pass
 
     def _take_packet(self) -> bool:
-        """Handle the packet at the start of the buffer; False when there is no whole one."""
+        """Handle the packet at the start of the buffer; False if there is no complete one."""
         buffer = self._buffer
         while buffer and buffer[0] != self._address:
             del buffer[0]
@@ -115,7 +116,7 @@ class RoboclawEmulator(MotorController):
         packet = bytes(buffer[:length])
         del buffer[:length]
         if self._crc(packet[:-2]) != packet[-2:]:
-            # No acknowledgement; the rest of the burst is not trusted either.
+            # No acknowledgement, and the rest of the buffer is not trusted either.
             buffer.clear()
             self.rejected += 1
             return False
@@ -166,7 +167,7 @@ class RoboclawEmulator(MotorController):
             return
         self.commands_obeyed += not self._estop
         if command in (32, 33, 34):
-            # Duty: here as a share of 1.5 m/s of track.
+            # Duty cycle, emulated as a share of a track speed of 1.5 m/s.
             speeds = [duty / 32767 * 1.5 for duty in struct.unpack(f">{len(data) // 2}h", data)]
             ramp_mps2 = float("inf")
         elif command in (35, 36, 37):

@@ -1,8 +1,8 @@
-"""A Roboteq two-channel controller with two tracks behind it, at the other end of a serial line.
+"""An emulated Roboteq two-channel controller with two tracks, on a serial line.
 
-It knows the ASCII commands that the manual documents for closed-loop speed control, echoes every character
-until told not to, and has the real watchdog's trap: motors that it stopped run on at their old speed as soon
-as any valid command comes.
+It knows the ASCII commands that the manual documents for closed-loop speed control, and echoes every
+character until told not to. It has the trap of the real watchdog: motors that the watchdog stopped run again
+at their old speed as soon as any valid command comes.
 """
 
 from __future__ import annotations
@@ -20,15 +20,14 @@ _ACCEPTED, _REFUSED = "+", "-"
 
 
 class _Refused(Exception):
-    """The command is unknown or wrong: answered by "-"."""
+    """Raised for a command that is unknown or wrong; it is answered by "-"."""
 
 
 class RoboteqEmulator(MotorController):
-    """Channel 1 is the left track, channel 2 the right one.
+    """Channel 1 drives the left track, channel 2 the right one.
 
-    full_speed_mps: what a track makes at
-    command 1000, max_rpm the motor speed there. ramp_mps2: both ramps as the device was set up; !AC and !DC
-    change them, in 0.1 rpm/s.
+    full_speed_mps: track speed at command 1000. max_rpm: motor speed at command 1000.
+    ramp_mps2: both ramps as the device was set up; !AC and !DC change them, in 0.1 rpm/s.
     """
 
     def __init__(
@@ -60,18 +59,18 @@ class RoboteqEmulator(MotorController):
     # Faults, for tests and scenarios.
 
     def press_estop(self) -> None:
-        """The emergency stop input opens: motors off at once, and latched."""
+        """Open the emergency stop input: motors off at once, latched."""
         self._button_pressed = True
         self._shut_down()
 
     def release_estop(self) -> None:
-        """The input closes. The controller stays in emergency stop until !MG."""
+        """Close the input. The controller stays in emergency stop until !MG."""
         self._button_pressed = False
 
     # The controller's own work.
 
     def _power_up(self) -> None:
-        """Counters at zero, echo on, watchdog at its default; pressed, the button stops it again."""
+        """Counters at zero, echo on, watchdog at its default. If the button is still pressed, stop again."""
         self._line = ""
         self.echo = True
         self.watchdog_ms = _DEFAULT_WATCHDOG_MS
@@ -91,7 +90,7 @@ class RoboteqEmulator(MotorController):
             if self.echo:
                 self._tell(character)
             if character not in "\r_":
-                # As the device: a line without an end does not grow for ever.
+                # As in the device, a line without an end does not grow for ever.
                 self._line = (self._line + character)[-128:]
                 continue
             line, self._line = self._line, ""
@@ -152,7 +151,7 @@ class RoboteqEmulator(MotorController):
                 raise _Refused
 
     def _feed(self) -> None:
-        """Any valid command feeds the watchdog, and lets motors that it stopped run on."""
+        """Feed the watchdog, as any valid command does. Motors that the watchdog stopped run again."""
         self._fed_ns = self._now_ns
         self._timed_out = False
 
@@ -220,11 +219,11 @@ class RoboteqEmulator(MotorController):
         raise _Refused
 
     def _ramp(self, step_s: float) -> None:
-        """Move the targets along their ramps, to rest once the watchdog has expired."""
+        """Move the targets along their ramps; to zero once the watchdog has expired."""
         if self.watchdog_ms and self._now_ns - self._fed_ns >= self.watchdog_ms * NS_PER_MS:
             self._timed_out = True
         if self.fault_flags:
-            # The motors are off for good: a fault that goes does not bring the old speed back.
+            # The motors stay off: the end of a fault does not bring the old speed back.
             self._goal_mps = [0.0, 0.0]
         for track in (0, 1):
             goal_mps = 0.0 if self._timed_out else self._goal_mps[track]

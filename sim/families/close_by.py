@@ -1,4 +1,4 @@
-"""What stands close beside the way and leaves it free: a crate beside a bend, racks on both sides."""
+"""Obstacles close beside a path that stays free: a crate beside a bend, racks on both sides."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _OUTLINE = np.array([(x, y) for x in (-0.5, 0.0, 0.5) for y in (-0.5, 0.0, 0.5) 
 
 
 def crate_beside_bend(random: Random) -> Scenario:
-    """A crate turned anyhow, inside or outside of a bend: it must not stop for that."""
+    """A crate at any angle, inside or outside of a bend: the robot must not stop for it."""
     radius, turn = float(random.uniform(2.5, 7.0)), side_of(random) * float(random.uniform(40.0, 90.0))
     before, after = float(random.uniform(3.0, 5.0)), float(random.uniform(4.0, 6.0))
     crate = _crate_at(random, before, radius, turn, outside=bool(random.integers(2)))
@@ -32,7 +32,8 @@ def crate_beside_bend(random: Random) -> Scenario:
 
 
 def _crate_at(random: Random, before_m: float, radius_m: float, turn_deg: float, outside: bool) -> Crate:
-    """0.3 to 0.7 m from what the robot sweeps on the circle of the bend, which its blends hardly leave."""
+    """A crate 0.3 to 0.7 m from what the robot sweeps on the circle of the bend. The blends hardly deviate
+    from that circle."""
     length, width = float(random.uniform(0.4, 0.9)), float(random.uniform(0.4, 0.8))
     heading = float(random.uniform(0.0, 180.0))
     left = math.copysign(1.0, turn_deg)
@@ -41,7 +42,8 @@ def _crate_at(random: Random, before_m: float, radius_m: float, turn_deg: float,
     cos, sin = math.cos(math.radians(heading)), math.sin(math.radians(heading))
     outline = _OUTLINE * (length, width) @ np.array([[cos, sin], [-sin, cos]])
     swept = math.hypot(radius_m + HALF_WIDTH_M, FRONT_M) - radius_m + float(random.uniform(0.3, 0.7))
-    # How far its middle is from its outermost or innermost place, seen from the centre of the bend.
+    # Distance of the crate's centre from the centre of the bend, from the crate's innermost or outermost
+    # point.
     if outside:
         from_centre = radius_m + swept - float((outline @ outwards).min())
     else:

@@ -1,4 +1,4 @@
-"""Who crosses the path: from either side at every angle, from behind a shelf, in crowds, in bends."""
+"""Obstacles that cross the path: from either side at any angle, from behind a shelf, in crowds, in bends."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _OUT_M = 3.6
 
 
 def crossing_left(random: Random) -> Scenario:
-    """From the left, at 30 to 150 degrees to the path."""
+    """Somebody crosses from the left, at 30 to 150 degrees to the path."""
     return _crossing(random, "crossing_left", 1.0)
 
 
 def crossing_right(random: Random) -> Scenario:
-    """From the right, at 30 to 150 degrees to the path."""
+    """Somebody crosses from the right, at 30 to 150 degrees to the path."""
     return _crossing(random, "crossing_right", -1.0)
 
 
@@ -44,8 +44,9 @@ def _crossing(random: Random, name: str, side: float) -> Scenario:
 def _crosser(
     random: Random, name: str, x_m: float, side: float, angle_rad: float, late_s: float
 ) -> tuple[BodySpec, tuple[float, float]]:
-    """Somebody who is on the path at x_m late_s after the robot could be there at the soonest; and from where
-    to where along the aisle the way there must be free of racks. angle_rad: of the way to the path."""
+    """A body that is on the path at x_m, late_s after the earliest time at which the robot could be there;
+    and the interval along the aisle that must be free of racks. angle_rad: between the body's way and the
+    path."""
     by_robot = bool(random.integers(3) == 0)
     speed = float(random.uniform(0.5, 1.0) if by_robot else random.uniform(0.6, 1.5))
     shift = _OUT_M / math.tan(angle_rad)
@@ -53,7 +54,7 @@ def _crosser(
     way_s = _OUT_M / math.sin(angle_rad) / speed
     start_s = earliest_s(x_m) + late_s - way_s
     if start_s < 0.0:
-        # It would have to start before time: begin on the way.
+        # It would have to start before time zero, so it begins part of the way in.
         share = min(-start_s / way_s, 0.45)
         start = (x_m - shift * (1.0 - share), side * _OUT_M * (1.0 - share))
     margin = 1.3
@@ -89,7 +90,7 @@ def behind_shelf(random: Random) -> Scenario:
 
 
 def crowd_junction(random: Random) -> Scenario:
-    """Four to seven who cross a junction of two aisles, from both sides, one after the other."""
+    """Four to seven bodies cross a junction of two aisles, from both sides, one after the other."""
     length = float(random.uniform(13.0, 16.0))
     bodies: list[BodySpec] = []
     for number in range(int(random.integers(4, 8))):
@@ -102,13 +103,13 @@ def crowd_junction(random: Random) -> Scenario:
 
 
 def curved_path(random: Random) -> Scenario:
-    """A bend, crates on both its sides, and for most seeds somebody who crosses behind it."""
+    """A bend with crates on both sides, and for most seeds somebody who crosses after the bend."""
     radius, turn = float(random.uniform(3.0, 7.0)), side_of(random) * float(random.uniform(40.0, 90.0))
     before, after = float(random.uniform(3.0, 5.0)), float(random.uniform(4.0, 6.0))
     path, room = round_a_bend(before, radius, turn, after)
     left = math.copysign(1.0, turn)
     bend = math.radians(abs(turn))
-    # The circle's own geometry, without the blends: near enough to put things beside it.
+    # The geometry of the circle without the blends, which is accurate enough to place bodies beside it.
     exit_x, exit_y = before + 0.5 * BLEND_M + radius * math.sin(bend), left * radius * (1.0 - math.cos(bend))
     out_x, out_y = math.cos(bend), left * math.sin(bend)
     bodies: list[BodySpec] = [

@@ -1,7 +1,6 @@
-"""What all families are furnished with: an aisle along x, racks on both sides, people and robots.
+"""Common parts of all families: an aisle along x, racks on both sides, people and robots.
 
-The robot starts at the origin and drives along x; sizes and speeds of it that matter here are those of
-config/robot.py.
+The robot starts at the origin and drives along x. Its size and speed are the defaults of config/robot.py.
 """
 
 from __future__ import annotations
@@ -29,21 +28,21 @@ Random = np.random.Generator
 
 FRONT_M = 0.51
 HALF_WIDTH_M = 0.39
-# The fastest that the robot gets anywhere: no delay, no jerk limit, the speed that the camera's range admits.
+# Upper bounds of the robot's speed and acceleration, without delay and jerk limit.
 _TOP_MPS, _ACCEL_MPS2 = 1.5, 0.3
 RACK_DEPTH_M = 1.1
-BLEND_M = 0.8  # of bends, on either side
+BLEND_M = 0.8  # length of the blend at either end of a bend
 _BAY_M = 2.7
 
 
 def furthest_m(t_s: float) -> float:
-    """No robot has come further than this by t_s."""
+    """The furthest that the robot can have come at t_s."""
     rising_s = min(max(t_s, 0.0), _TOP_MPS / _ACCEL_MPS2)
     return 0.5 * _ACCEL_MPS2 * rising_s**2 + _TOP_MPS * max(t_s - _TOP_MPS / _ACCEL_MPS2, 0.0)
 
 
 def earliest_s(x_m: float) -> float:
-    """No robot's turning centre is at x_m sooner than this."""
+    """The earliest time at which the robot's turning centre can be at x_m."""
     rising_m = 0.5 * _TOP_MPS**2 / _ACCEL_MPS2
     if x_m <= rising_m:
         return math.sqrt(2.0 * max(x_m, 0.0) / _ACCEL_MPS2)
@@ -51,12 +50,12 @@ def earliest_s(x_m: float) -> float:
 
 
 def straight(length_m: float) -> PathSpec:
-    """Along x from the origin."""
+    """A straight path along x from the origin."""
     return PathSpec(segments=(LineSpec(kind="line", length_m=length_m),))
 
 
 def round_a_bend(before_m: float, radius_m: float, turn_deg: float, after_m: float) -> tuple[PathSpec, Room]:
-    """From the origin along x, round a bend and on; and a building around that."""
+    """A path from the origin along x, round a bend and on; and a building around it."""
     path = PathSpec(
         segments=(
             LineSpec(kind="line", length_m=before_m),
@@ -74,7 +73,7 @@ def hall(length_m: float, half_width_m: float = 5.0) -> Room:
 
 
 def racks(random: Random, length_m: float, gaps_m: tuple[tuple[float, float], ...] = ()) -> tuple[Shelf, ...]:
-    """Racks along both sides of the aisle except where gaps_m (from, to) leave room for who crosses."""
+    """Racks along both sides of the aisle, except in gaps_m (from, to), which leave room to cross."""
     shelves = []
     for side in (1.0, -1.0):
         inner_m = float(random.uniform(1.75, 2.4))
@@ -102,7 +101,7 @@ def racks(random: Random, length_m: float, gaps_m: tuple[tuple[float, float], ..
 
 
 def person(random: Random, name: str, start: tuple[float, float], motion: MotionPlan | None) -> Person:
-    """Somebody of some height who stands at start and looks where he will go."""
+    """A person of random height who stands at start and faces the direction of the first step."""
     return Person(
         kind="person",
         name=name,
@@ -115,7 +114,7 @@ def person(random: Random, name: str, start: tuple[float, float], motion: Motion
 
 
 def robot(random: Random, name: str, start: tuple[float, float], motion: MotionPlan | None) -> RobotBody:
-    """Another transport robot, half of them loaded."""
+    """Another transport robot, with a load for half of the seeds."""
     return RobotBody(
         kind="robot",
         name=name,
@@ -135,32 +134,32 @@ def _first_heading_deg(start: tuple[float, float], motion: MotionPlan | None) ->
 
 
 def walk(start_s: float, *steps: Step) -> MotionPlan:
-    """As people start and turn."""
+    """A motion plan with the acceleration and turn rate of people."""
     return MotionPlan(start_s=max(start_s, 0.0), steps=steps)
 
 
 def drive(start_s: float, *steps: Step, accel_mps2: float = 0.8) -> MotionPlan:
-    """As transport robots start and turn."""
+    """A motion plan with the acceleration and turn rate of transport robots."""
     return MotionPlan(start_s=max(start_s, 0.0), accel_mps2=accel_mps2, turn_rate_degps=60.0, steps=steps)
 
 
 def go(x_m: float, y_m: float, speed_mps: float) -> Go:
-    """Straight to a point."""
+    """A step straight to a point."""
     return Go(kind="go", x_m=x_m, y_m=y_m, speed_mps=speed_mps)
 
 
 def wait(duration_s: float) -> Wait:
-    """Stand still."""
+    """A step of standing still."""
     return Wait(kind="wait", duration_s=duration_s)
 
 
 def side_of(random: Random) -> float:
-    """1 for the left, -1 for the right."""
+    """A random side: 1 for the left, -1 for the right."""
     return float(random.choice([1.0, -1.0]))
 
 
 def texture_of(random: Random, *among: Texture) -> Texture:
-    """One of them."""
+    """One of these textures, at random."""
     return among[int(random.integers(len(among)))]
 
 
@@ -174,7 +173,7 @@ def scenario(
     path: PathSpec | None = None,
     room: Room | None = None,
 ) -> Scenario:
-    """A world; blocked: something never leaves the path."""
+    """A world. blocked: something never leaves the path."""
     return Scenario(
         name=name,
         duration_s=duration_s,

@@ -1,4 +1,4 @@
-"""Who comes towards the robot, along its path or close beside it."""
+"""Obstacles that come towards the robot, along its path or close beside it."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ def head_on_person(random: Random) -> Scenario:
 
 
 def head_on_robot(random: Random) -> Scenario:
-    """Another robot comes on the same path and turns off into a gap between the racks."""
+    """Another robot comes towards the robot on the same path and turns off into a gap between the racks."""
     length = float(random.uniform(13.0, 16.0))
     speed = float(random.uniform(0.5, 1.0))
-    # Turning on the spot takes its time: 90 degrees at 60 degrees a second, and stopping before.
+    # Turning on the spot takes time: 90 degrees at 60 degrees a second, and stopping before that.
     turn_x, start_s = _where_to_step_aside(random, length + 1.0, speed, 4.5)
     way = drive(start_s, go(turn_x, 0.0, speed), go(turn_x, side_of(random) * 4.0, speed))
     other = robot(random, "robot", (length + 1.0, 0.0), way)
@@ -50,13 +50,15 @@ def head_on_robot(random: Random) -> Scenario:
 def _where_to_step_aside(
     random: Random, from_x_m: float, speed_mps: float, clears_s: float
 ) -> tuple[float, float]:
-    """(x, start time) so that the way is left clears_s after x is reached, and no robot was there before."""
+    """(x, start time) for a body that has left the path clears_s after it reached x, and that no robot can
+    have met before."""
     start_s = float(random.uniform(0.0, 2.0))
     x = from_x_m - 2.0
     while x > 4.5 and furthest_m(start_s + (from_x_m - (x - 0.5)) / speed_mps + 0.5) + 1.6 < x - 0.5:
         x -= 0.5
     x += float(random.uniform(0.0, 1.0))
-    # Not slower than the robot at this place: else it would have to stand long, which is another family.
+    # The start is a little earlier if leaving the path takes long, so that the robot need not stand for long:
+    # that would be another family.
     return x, max(start_s - 0.2 * clears_s, 0.0)
 
 
@@ -89,7 +91,7 @@ def group(random: Random) -> Scenario:
 
 
 def turns_back(random: Random) -> Scenario:
-    """Somebody walks into the way, stops, turns back, and for half of the seeds comes a second time."""
+    """Somebody walks into the path, stops and turns back; for half of the seeds a second time."""
     length = float(random.uniform(12.0, 15.0))
     x = float(random.uniform(6.0, 9.0))
     speed = float(random.uniform(0.6, 1.3))
@@ -113,11 +115,11 @@ def turns_back(random: Random) -> Scenario:
 
 
 def grazing(random: Random) -> Scenario:
-    """Somebody comes along the robot's side, so close that only a hand's breadth stays between them."""
+    """Somebody passes the robot in the opposite direction, with a gap of 3 to 35 cm."""
     length = float(random.uniform(12.0, 15.0))
     side = side_of(random)
     speed = float(random.uniform(0.5, 1.4))
-    # Half the robot's width, half a walking person's (0.33 m at most), and what stays between.
+    # Half the robot's width, half of a walking person's (0.33 m at most), and the gap.
     y = side * (0.39 + 0.33 + float(random.uniform(0.03, 0.35)))
     way = walk(float(random.uniform(0.0, 3.0)), go(-5.0, y, speed))
     who = person(random, "person", (length + 1.5, y), way)

@@ -1,4 +1,4 @@
-"""Every scenario family by name: a seeded generator of worlds, and of what goes wrong in them."""
+"""All scenario families by name. Each is a seeded generator of worlds and of the faults in them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from sim.faults import NO_FAULTS, Faults, Window
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One mission's world. faults: what goes wrong in it. halts: the robot must give up before its target."""
+    """The world of one mission. faults: what goes wrong in it. halts: the robot must stop before its
+    target."""
 
     family: str
     seed: int
@@ -95,7 +96,7 @@ FAMILY_NAMES: tuple[str, ...] = tuple(_FAMILIES)
 
 
 def generate(family: str, seed: int) -> Case:
-    """The mission of a family for a seed; the same one every time. Raises KeyError for an unknown family."""
+    """The mission of a family for a seed, always the same. Raises KeyError for an unknown family."""
     made = _FAMILIES[family]
     random = np.random.default_rng((zlib.crc32(family.encode()), seed))
     world = made.world(random).model_copy(update={"name": f"{family}-{seed}"})

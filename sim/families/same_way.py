@@ -1,4 +1,4 @@
-"""Who goes the same way as the robot: ahead of it, past it, or into its way."""
+"""Obstacles that go the same way as the robot: ahead of it, past it, or into its path."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _BESIDE_M = 1.2
 
 
 def cut_in(random: Random) -> Scenario:
-    """Somebody who goes beside the path turns into it just ahead of the robot, and leaves it again."""
+    """Somebody beside the path turns into it just ahead of the robot, and leaves it again."""
     length = float(random.uniform(14.0, 18.0))
     side = side_of(random)
     speed = float(random.uniform(0.5, 1.1))
@@ -44,13 +44,14 @@ def cut_in(random: Random) -> Scenario:
 
 
 def overtaking(random: Random) -> Scenario:
-    """Somebody faster passes on the side and, for half of the seeds, goes on ahead in the robot's lane."""
+    """Somebody faster passes the robot and, for some of the seeds, goes on ahead in its lane."""
     length = float(random.uniform(14.0, 18.0))
     side = side_of(random)
     speed = float(random.uniform(1.6, 2.0))
     from_x, start_s = -2.5, float(random.uniform(0.0, 3.0))
     merge_x = float(random.uniform(4.0, 10.0))
-    # Nobody turns into a lane right before whoever they have just passed.
+    # Merge only if the robot cannot be close behind: nobody merges right in front of somebody they just
+    # passed.
     passed = furthest_m(start_s + (merge_x - from_x) / speed + 0.6) + FRONT_M + 1.5 < merge_x
     lane = 0.0 if passed and random.integers(4) else side * _BESIDE_M
     way = walk(

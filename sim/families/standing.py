@@ -1,4 +1,4 @@
-"""What stands on the path, beside it, over it or at its end."""
+"""Obstacles that stand on the path, beside it, above it or at its end."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ GLASS = "glass front"
 
 
 def empty_aisle(random: Random) -> Scenario:
-    """Nothing but racks: it must not slow."""
+    """Nothing but racks: the robot must not slow down."""
     length = float(random.uniform(36.0, 44.0))
     return scenario("empty_aisle", length, racks(random, length))
 
 
 def static_crate(random: Random) -> Scenario:
-    """A crate that stands in the way for ever."""
+    """A crate that blocks the path for ever."""
     length = float(random.uniform(11.0, 15.0))
     crate = Crate(
         kind="crate",
@@ -41,7 +41,7 @@ def static_crate(random: Random) -> Scenario:
 
 
 def crate_beside(random: Random) -> Scenario:
-    """Crates that stand close to the path without reaching into what the body sweeps: it must not stop."""
+    """Crates close to the path, but outside of what the body sweeps: the robot must not stop."""
     length = float(random.uniform(30.0, 36.0))
     crates = []
     for number, x in enumerate((7.0, 15.0, 23.0), start=1):
@@ -62,7 +62,7 @@ def crate_beside(random: Random) -> Scenario:
 
 
 def low_pallet(random: Random) -> Scenario:
-    """An empty pallet on the floor, lower than most scanners look."""
+    """An empty pallet on the floor, below the plane of most laser scanners."""
     length = float(random.uniform(11.0, 15.0))
     pallet = Pallet(
         kind="pallet",
@@ -91,7 +91,7 @@ def thin_pole(random: Random) -> Scenario:
 
 
 def plain_wall(random: Random) -> Scenario:
-    """A wall without any texture: beyond the target, or, for half of the seeds, before it."""
+    """A wall without any texture, beyond the target or, for half of the seeds, before it."""
     length = float(random.uniform(11.0, 15.0))
     blocked = bool(random.integers(2))
     gap = -float(random.uniform(0.5, 3.0)) if blocked else float(random.uniform(0.75, 2.0))
@@ -120,7 +120,7 @@ def hanging_beam(random: Random) -> Scenario:
 
 
 def glass_front(random: Random) -> Scenario:
-    """A glass front across the path, of which depth returns nothing."""
+    """A glass front across the path, for which there is no depth."""
     length = float(random.uniform(12.0, 15.0))
     front: BodySpec = Wall(
         kind="wall",

@@ -1,4 +1,4 @@
-"""Somebody steps into the robot's way, stands there, and leaves it again: a bag test as a seeded world."""
+"""A person steps into the robot's path, stands there, and leaves it again: a bag test as a seeded world."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ _LENGTH_M = 16.0
 
 
 def step_in(seed: int) -> Case:
-    """The same one for the same seed. They come when the robot is 3.5 to 7 m away at the soonest."""
+    """The mission for a seed, always the same. The person comes when the fastest possible robot would be 3.5
+    to 7 m away."""
     random = np.random.default_rng((zlib.crc32(b"step_in"), seed))
     x = float(random.uniform(8.0, 11.0))
     side, speed = side_of(random), float(random.uniform(1.0, 1.4))

@@ -1,1 +1,10 @@
-"""What the simulated world is made of: shapes, bodies, and the materials they are painted with."""
+"""Shapes, bodies and textures of the simulated world.
+
+mesh.py - faces, boxes and prisms
+building.py - the hall
+rack.py, person.py, vehicle.py - racks, people and other robots
+bodies.py - the model of each kind of body of a scenario
+paint.py - colours and noise for textures
+paint_building.py, paint_goods.py, paint_movers.py, paint_rack.py - draw the textures
+textures.py - textures by key, and their smaller versions
+"""

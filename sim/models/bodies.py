@@ -1,4 +1,4 @@
-"""How each kind of body of a scenario is built, and what of it can be touched."""
+"""The model of each kind of body of a scenario: its faces, and the footprint that counts for contact."""
 
 from __future__ import annotations
 
@@ -36,10 +36,13 @@ Outline = Callable[[MotionState], FloatArray]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyModel:
-    """parts: faces, each in the part's own frame. z_m: lowest and highest point.
+    """The model of one body. pose_parts and footprint depend on the state of motion.
 
-    pose_parts: every part's place in the body frame. footprint: what can be touched, a convex polygon
-    (K, 2), counter-clockwise, in the body frame. Both follow the state of motion.
+    parts: faces, each in the part's own frame.
+    z_m: lowest and highest point.
+    pose_parts: the pose of every part in the body frame.
+    footprint: the outline that counts for contact, a convex polygon (K, 2), counter-clockwise, in the body
+        frame.
     """
 
     parts: tuple[Faces, ...]
@@ -49,20 +52,19 @@ class BodyModel:
 
 
 def rectangle(length_m: float, width_m: float) -> FloatArray:
-    """Corners (4, 2) around the origin, counter-clockwise, length along x."""
+    """The corners (4, 2) of a rectangle around the origin, counter-clockwise, length along x."""
     x, y = 0.5 * length_m, 0.5 * width_m
     return np.array([[x, -y], [x, y], [-x, y], [-x, -y]])
 
 
 def regular_polygon(sides: int, radius_m: float) -> FloatArray:
-    """Corners (sides, 2) on a circle around the origin, counter-clockwise, as sim.models.mesh.prism has
-    them."""
+    """Corners (sides, 2) on a circle around the origin, counter-clockwise, as in sim.models.mesh.prism."""
     angles = (np.arange(sides) + 0.5) * (2.0 * math.pi / sides)
     return np.stack([radius_m * np.cos(angles), radius_m * np.sin(angles)], axis=1)
 
 
 def build_body(spec: BodySpec, seed: int) -> BodyModel:
-    """The model of one body; the seed and its name pick among the variants of its textures."""
+    """The model of one body. The seed and the body's name pick the variants of its textures."""
     generator = np.random.default_rng((seed, zlib.crc32(spec.name.encode())))
     pick = int(generator.integers(6))
     match spec:

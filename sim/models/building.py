@@ -1,4 +1,4 @@
-"""The hall: floor with its markings, walls, ceiling, all seen from the inside."""
+"""The hall from the inside: floor with markings, walls and ceiling."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from config.scenario import Room, TapeLine
 from sim.models.mesh import Faces, join, quad
 
-_TILE_M = 4.096  # the floor's and the ceiling's texture covers this much
-_TAPE_LIFT_M = 0.0008  # keeps a marking in front of the floor without being felt
+_TILE_M = 4.096  # side of the square that one texture of the floor or the ceiling covers
+_TAPE_LIFT_M = 0.0008  # height of markings above the floor, so that they hide it; too small to matter
 
 
 def build_room(room: Room) -> Faces:
-    """All faces of the hall, on the floor's axes."""
+    """All faces of the hall, in the frame of the floor."""
     x0, x1, y0, y1, z1 = room.x_min_m, room.x_max_m, room.y_min_m, room.y_max_m, room.height_m
     across, along = (y1 - y0) / _TILE_M, (x1 - x0) / _TILE_M
     floor = {"fine": "concrete", "coarse": "patchy-floor", "plain": "smooth-floor"}[room.floor]

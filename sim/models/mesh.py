@@ -1,4 +1,4 @@
-"""Flat four-cornered faces, and the few shapes that everything is built from."""
+"""Flat four-cornered faces, and the few shapes from which everything is built."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from hal.types import FloatArray
 class Faces:
     """N planar convex quadrilaterals.
 
-    corners_m (N, 4, 3): top left, top right, bottom right, bottom left as seen from the outside.
-    windows (N, 4): texture coordinates (u0, v0) of the first and (u1, v1) of the third corner, in
-    textures; beyond 0..1 the texture repeats. textures: N keys of sim.models.textures.
+    corners_m: (N, 4, 3), top left, top right, bottom right, bottom left as seen from the outside.
+    windows: (N, 4), texture coordinates (u0, v0) of the first and (u1, v1) of the third corner, in units of
+        textures; beyond 0..1 the texture repeats.
+    textures: N keys of sim.models.textures.
     """
 
     corners_m: FloatArray
@@ -67,11 +68,12 @@ def box(
     centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
     skip: str = "",
 ) -> Faces:
-    """A box of size (x, y, z) whose underside's middle is at centre_m.
+    """A box of size (x, y, z). centre_m: the centre of its underside.
 
-    textures: one key, or keys for "front" (+x), "back" (-x), "left" (+y), "right" (-y), "top",
-    "bottom" with "side" and "all" as fall-backs. skip: first letters of faces to leave out ("b" for
-    back, "u" for the underside, "f", "l", "r", "t").
+    textures: one key, or keys for "front" (+x), "back" (-x), "left" (+y), "right" (-y), "top" and
+    "underside",
+        with "side" (the first four) and "all" as fall-backs.
+    skip: first letters of faces to leave out ("b" for back, "u" for underside, "f", "l", "r", "t").
     """
     hx, hy = 0.5 * size_m[0], 0.5 * size_m[1]
     cx, cy, z0 = centre_m
@@ -108,10 +110,13 @@ def prism(
     taper: float = 1.0,
     cap: str | None = None,
 ) -> Faces:
-    """An upright many-sided cylinder (elliptic; the top is taper times the bottom).
+    """An upright elliptic cylinder with flat sides. The texture goes once around it.
 
-    radii_m: half axes along x and y at the bottom. z_m: bottom and top. The texture goes once around.
-    cap: texture of the top and the underside; None leaves both open. sides must be even with a cap.
+    sides: number of sides; must be even with a cap.
+    radii_m: half axes along x and y at the bottom.
+    z_m: bottom and top.
+    taper: size of the top divided by that of the bottom.
+    cap: texture of the top and the underside; None leaves both open.
     """
     angles = (np.arange(sides) + 0.5) * (2.0 * math.pi / sides)
     ring = np.stack([radii_m[0] * np.cos(angles), radii_m[1] * np.sin(angles)], axis=1)
@@ -129,7 +134,7 @@ def prism(
 
 
 def _cap(ring: FloatArray, texture: str, upward: bool) -> Faces:
-    """A polygon of an even number of corners, cut into strips."""
+    """A polygon with an even number of corners, divided into strips."""
     count = len(ring)
     strips: list[NDArray[np.float64]] = []
     for k in range(count // 2 - 1):

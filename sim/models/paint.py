@@ -1,4 +1,4 @@
-"""What all materials are made of: colours, smooth noise, and rounding to bytes."""
+"""Common parts of all textures: colours, smooth noise, and rounding to bytes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PAINTS: dict[str, Bgr] = {
 
 
 def noise(generator: np.random.Generator, height: int, width: int, cell_px: float) -> NDArray[np.float32]:
-    """Smooth noise of unit standard deviation whose blobs are about cell_px wide; it repeats seamlessly."""
+    """Smooth noise of unit standard deviation with blobs of about cell_px; it tiles seamlessly."""
     rows, columns = max(2, round(height / cell_px)), max(2, round(width / cell_px))
     grid = generator.standard_normal((rows, columns)).astype(np.float32)
     pad = 2
@@ -54,5 +54,5 @@ def surface(
 
 
 def finish(image: NDArray[np.float32]) -> ColourImage:
-    """Rounded to bytes."""
+    """The image, rounded to bytes."""
     return np.asarray(np.clip(image + 0.5, 0, 255), dtype=np.uint8)

@@ -1,4 +1,4 @@
-"""Floors, walls, the roof, pillars, racks, markings."""
+"""Textures of floors, walls, the roof, pillars, racks and markings."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _marks(generator: np.random.Generator, size: int) -> NDArray[np.float32]:
 
 
 def smooth_floor(generator: np.random.Generator, variant: Variant) -> ColourImage:
-    """Coated floor with hardly anything to hold on to."""
+    """A coated floor with hardly any texture to track."""
     return finish(surface(generator, 512, 512, (132, 134, 134), (200, 3.0), (60, 1.5)))
 
 

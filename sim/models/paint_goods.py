@@ -1,4 +1,4 @@
-"""Crates, cartons, pallets, and paint."""
+"""Textures of crates, cartons, pallets and paint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clothes, faces, machines and their wheels."""
+"""Textures of clothes, faces, machines and their wheels."""
 
 from __future__ import annotations
 

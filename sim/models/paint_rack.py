@@ -1,4 +1,4 @@
-"""Goods standing in a rack, painted on one plane."""
+"""The texture of a rack with goods in it, painted on one plane."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ Draw = Callable[[str], ColourImage]
 
 
 def facade(generator: np.random.Generator, variant: Variant, draw: Draw) -> ColourImage:
-    """A rack from the aisle: variant (number, LxH in m, bay in m, levels). draw: other textures by key."""
+    """A rack seen from the aisle. variant: (number, LxH in m, bay in m, levels). draw: gives other textures
+    by key."""
     length_m, height_m = (float(part) for part in variant[1].split("x"))
     bay_m, levels = float(variant[2]), int(variant[3])
     height, width = round(height_m * _PX_PER_M), round(length_m * _PX_PER_M)
@@ -28,7 +29,7 @@ def facade(generator: np.random.Generator, variant: Variant, draw: Draw) -> Colo
         ground = round((level + 1) * level_px) - _BOARD_PX
         _fill_level(generator, image, ground, level_px, draw)
         image[ground : ground + _BOARD_PX] = np.array(PAINTS["dark"], np.float32)
-        # The level above keeps the light off the goods' upper parts.
+        # The level above shades the upper part of the goods.
         top = max(ground - round(level_px) + _BOARD_PX, 0)
         fade = np.linspace(0.5, 1.0, round(0.5 * level_px), dtype=np.float32)[:, None, None]
         shaded = image[top : top + len(fade)]
@@ -41,7 +42,7 @@ def facade(generator: np.random.Generator, variant: Variant, draw: Draw) -> Colo
 def _fill_level(
     generator: np.random.Generator, image: NDArray[np.float32], ground: int, level_px: float, draw: Draw
 ) -> None:
-    """Goods side by side, most places taken."""
+    """Goods side by side on one level, with most places taken."""
     end, u = image.shape[1] - 12.0, 12.0
     while u < end - 48:
         wide = round(min(float(generator.uniform(0.35, 1.1)) * _PX_PER_M, end - u))
@@ -53,7 +54,7 @@ def _fill_level(
 
 
 def _pile(generator: np.random.Generator, wide: int, tall: int, draw: Draw) -> NDArray[np.float32]:
-    """Equal boxes beside and on each other, at most wide and tall."""
+    """Equal boxes side by side and stacked, at most wide x tall pixels together."""
     kind, stacked, shade = generator.random(), generator.random(), generator.uniform(0.72, 0.95)
     key = f"cardboard/{generator.integers(9)}"
     if kind > 0.85:

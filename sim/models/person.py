@@ -1,4 +1,4 @@
-"""A person of several parts whose limbs swing with the distance walked."""
+"""The model of a person, with limbs that swing with the distance walked."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ from sim.motion import MotionState
 _SIDES = 8
 # Shares of the body height, after common anthropometric tables.
 _HIP, _KNEE, _ANKLE, _SHOULDER, _CHIN, _ELBOW = 0.52, 0.27, 0.03, 0.81, 0.86, 0.63
-_STEP_M = 0.42  # share of the height
-# Heel and toe seen from the ankle, shares of the height; a foot tips by this share of its shank's angle.
+_STEP_M = 0.42  # length of a step as a share of the height
+# Heel and toe relative to the ankle, as shares of the height.
 _SOLE: FloatArray = np.array([[-0.035, 0.0, -_ANKLE], [0.104, 0.0, -_ANKLE]])
+# A foot pitches by this share of its shank's angle.
 _FOOT_TIPS = 0.4
 _ARM_SWING_RAD, _KNEE_BEND_RAD = 0.38, 0.85
 
 
 def build_person(spec: Person, generator: np.random.Generator) -> tuple[Faces, ...]:
-    """Trunk; thigh, shank and foot, left then right; the arms' two parts. Joints at the origins."""
+    """The parts: trunk; thigh, shank and foot, left then right; upper arm and forearm, left then right. Each
+    limb's joint is at the origin of its frame."""
     h = spec.height_m
     clothes = _clothes(spec, generator)
     thigh = _limb(0.047 * h, 0.72, (_HIP - _KNEE) * h, clothes["legs"])
@@ -34,7 +36,7 @@ def build_person(spec: Person, generator: np.random.Generator) -> tuple[Faces, .
 
 
 def person_footprint(spec: Person, state: MotionState) -> FloatArray:
-    """An octagon (8, 2) in the body frame around feet and arms, as wide as they swing at this speed."""
+    """An octagon (8, 2) in the body frame around feet and arms, whose swing depends on the speed."""
     h, swing = spec.height_m, _swing(state.speed_mps)
     front, rear, side = (0.11 + 0.23 * swing) * h, (0.075 + 0.20 * swing) * h, 0.166 * h
     return np.array(
@@ -46,7 +48,7 @@ def person_footprint(spec: Person, state: MotionState) -> FloatArray:
 
 
 def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
-    """Where the parts are in the body frame; the lower foot stands on the floor."""
+    """The poses of the parts in the body frame. The lower foot stands on the floor."""
     h, swing = spec.height_m, _swing(state.speed_mps)
     cycle = state.distance_m / (2.0 * _STEP_M * h)
     legs: list[Pose] = []
@@ -55,7 +57,7 @@ def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
         hip = np.array([0.0, side * 0.052 * h, _HIP * h])
         reach, lifted = _stride((cycle + offset) % 1.0)
         knee_rad = _KNEE_BEND_RAD * swing * lifted
-        # Bending the knee would draw the foot back: the thigh makes up for it.
+        # Bending the knee would pull the foot back; the thigh compensates for that.
         thigh_rad = -math.asin(swing * reach * _STEP_M / (_HIP - _ANKLE)) - 0.5 * knee_rad
         legs.extend(_chain(hip, thigh_rad, (_HIP - _KNEE) * h, knee_rad))
         ankle = legs[-1].apply(np.array([[0.0, 0.0, (_ANKLE - _KNEE) * h]]))[0]
@@ -71,20 +73,21 @@ def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
 
 
 def _stride(cycle: float) -> tuple[float, float]:
-    """Where a foot is ahead of the hip, in steps, and how far it is lifted (0..1), over two steps (0..1).
+    """How far a foot is ahead of the hip, in steps, and how far it is lifted (0..1). cycle: 0..1 over two
+    steps.
 
-    It stands still on the floor for the first half; for the second it swings forward without a jerk.
+    In the first half the foot stands still on the floor; in the second it swings forward smoothly.
     """
     if cycle < 0.5:
         return 0.5 - 2.0 * cycle, 0.0
     q = 2.0 * cycle - 1.0
-    # Hermite cubic from -1/2 to 1/2 that begins and ends as fast as standing: -1.
+    # Hermite cubic from -1/2 to 1/2 that begins and ends with the speed of the standing foot, -1.
     forward = -0.5 + q * (-1.0 + q * (6.0 - 4.0 * q))
     return forward, math.sin(math.pi * q) ** 2
 
 
 def _swing(speed_mps: float) -> float:
-    """0..1: slow or standing, the limbs come to rest."""
+    """The amplitude of the swing of the limbs, 0..1: zero at rest, less when walking slowly."""
     return min(1.0, speed_mps / 0.5)
 
 
@@ -99,13 +102,13 @@ def _clothes(spec: Person, generator: np.random.Generator) -> dict[str, str]:
 
 
 def _limb(radius_m: float, taper: float, length_m: float, texture: str) -> Faces:
-    """A tapered tube that hangs down from its joint at the origin, and reaches into its neighbours."""
+    """A tapered tube that hangs down from its joint at the origin and overlaps with its neighbours."""
     low, overlap = radius_m * taper, 0.6 * radius_m
     return prism(_SIDES, (low, low), (-length_m - overlap, overlap), texture, taper=1.0 / taper)
 
 
 def _shoe(h: float) -> Faces:
-    """Its ankle at the origin."""
+    """A shoe, with the ankle at the origin."""
     sole = prism(6, (0.08 * h, 0.03 * h), (-_ANKLE * h, 0.02 * h), "plain/black", 0.75, "plain/black")
     return sole.moved(np.eye(3), np.array([0.035 * h, 0.0, 0.0]))
 
@@ -115,7 +118,7 @@ def _hand(h: float) -> Faces:
 
 
 def _trunk(h: float, clothes: dict[str, str]) -> Faces:
-    """Hips, torso, shoulders, neck and head; its frame stands on the floor."""
+    """Hips, torso, shoulders, neck and head, in a frame on the floor."""
     return join(
         [
             prism(
@@ -133,7 +136,7 @@ def _trunk(h: float, clothes: dict[str, str]) -> Faces:
 
 
 def _chain(joint: FloatArray, upper_rad: float, length_m: float, lower_rad: float) -> list[Pose]:
-    """An upper limb swung about y at its joint, and the lower one bent against it."""
+    """The poses of an upper limb rotated about y at its joint, and of the lower limb bent relative to it."""
     upper = axis_rotation("y", upper_rad)
     middle = joint + upper @ np.array([0.0, 0.0, -length_m])
     return [Pose(upper, joint), Pose(axis_rotation("y", upper_rad + lower_rad), middle)]

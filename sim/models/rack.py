@@ -1,4 +1,5 @@
-"""A pallet rack: posts, beams, goods painted on a plane inside, and some boxes that stand out."""
+"""The model of a pallet rack: posts, beams, goods painted on planes inside, and some boxes in front of
+these."""
 
 from __future__ import annotations
 
@@ -42,7 +43,7 @@ def _goods_planes(spec: Shelf, generator: np.random.Generator) -> Faces:
 
 
 def _beams(spec: Shelf, level_m: float) -> Faces:
-    """One pair of beams under each level but the lowest, and one at the top."""
+    """One pair of beams under each level except the lowest, and one at the top."""
     beams = []
     for level in range(1, spec.levels + 1):
         z = spec.z_m + level * level_m - _BEAM_M
@@ -63,7 +64,7 @@ def _posts(spec: Shelf) -> Faces:
 
 
 def _boxes(spec: Shelf, generator: np.random.Generator, level_m: float) -> list[Faces]:
-    """Boxes on both sides whose fronts stand ahead of the painted goods."""
+    """Boxes on both sides, whose fronts are in front of the painted goods."""
     places = max(1, math.floor(spec.length_m / 0.9))
     boxes = []
     for level in range(min(spec.levels, 2)):

@@ -1,7 +1,7 @@
-"""Procedural textures, the same for the same key and seed, and their smaller versions.
+"""Procedural textures, always the same for the same key and seed, and their smaller versions.
 
-A key is ``kind`` or ``kind/variant``; what a variant means is up to the kind (a number that picks another
-drawing, or sizes such as ``facade/1/5.40x3.20/2.70/3``).
+A key is ``kind`` or ``kind/variant``. The meaning of the variant depends on the kind: a number that picks
+another drawing, or sizes such as ``facade/1/5.40x3.20/2.70/3``.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sim.models import paint_building, paint_goods, paint_movers
 from sim.models.paint import Painter
 from sim.models.paint_rack import facade
 
-# Two steps of the pyramid halve a side: fine enough that a change of step is not seen.
+# Two steps of the pyramid halve a side, which is fine enough that a change of the step is not visible.
 STEPS_PER_OCTAVE = 2
 
 
@@ -45,9 +45,10 @@ def draw(seed: int, key: str) -> ColourImage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sheet:
-    """A texture ready for warping: (H, W, 4) uint8 with a rim of one texel around whole tiles.
+    """A texture ready for warping.
 
-    from_tiles (3, 3): from texture coordinates (a tile is 1 wide and 1 high) to the image's pixels.
+    image: (H, W, 4) uint8, whole tiles with a rim of one texel around them.
+    from_tiles: (3, 3), from texture coordinates (a tile is 1 wide and 1 high) to pixels of image.
     """
 
     image: NDArray[np.uint8]
@@ -55,9 +56,10 @@ class Sheet:
 
 
 class TextureStore:
-    """Textures by key, each drawn once; shrunk by any pair of steps along u and v, and tiled, when asked for.
+    """Textures by key, each drawn once; shrunk by any pair of steps along u and v, and tiled, on demand.
 
-    Shrinking each axis by itself keeps a floor seen at a shallow angle sharp across and calm along.
+    Each axis is shrunk by itself, so that a floor seen at a shallow angle stays sharp across the view and
+    does not alias along it.
     """
 
     def __init__(self, seed: int) -> None:
@@ -65,11 +67,11 @@ class TextureStore:
         self._sheets: dict[tuple[str, int, int, int, int], Sheet] = {}
 
     def base(self, key: str) -> ColourImage:
-        """The texture itself, (H, W, 3) uint8, BGR, read-only. Raises KeyError for an unknown kind."""
+        """The texture at full size, (H, W, 3) uint8, BGR, read-only. Raises KeyError for an unknown kind."""
         return draw(self._seed, key)
 
     def size(self, key: str) -> tuple[int, int]:
-        """Width and height of the texture itself."""
+        """Width and height of the texture at full size."""
         height, width = self.base(key).shape[:2]
         return width, height
 
@@ -84,7 +86,7 @@ class TextureStore:
     def _make(self, key: str, step_u: int, step_v: int, tiles_u: int, tiles_v: int) -> Sheet:
         if tiles_u > 1 or tiles_v > 1:
             tile = self.sheet(key, step_u, step_v, 1, 1).image[1:-1, 1:-1]
-            # Several tiles are a cut-out of a pattern that goes on; a single one ends at its face's edge.
+            # Several tiles are part of a pattern that continues; a single tile ends at the edge of its face.
             return _sheet(np.tile(tile, (tiles_v, tiles_u, 1)), cv2.BORDER_WRAP, tile.shape)
         if step_u == step_v == 0:
             tile = np.asarray(cv2.cvtColor(self.base(key), cv2.COLOR_BGR2BGRA), dtype=np.uint8)
@@ -93,7 +95,7 @@ class TextureStore:
         return _sheet(tile, cv2.BORDER_REPLICATE, tile.shape)
 
     def _shrunk(self, key: str, step_u: int, step_v: int) -> NDArray[np.uint8]:
-        """From the nearest larger sheet of whole octaves: what is to be shrunk is small already."""
+        """Shrink the nearest larger sheet at whole octaves, which is small already."""
         octave = STEPS_PER_OCTAVE
         whole_u, whole_v = step_u - step_u % octave, step_v - step_v % octave
         if (whole_u, whole_v) == (step_u, step_v):
@@ -106,7 +108,7 @@ class TextureStore:
             max(1, round(width / 2.0 ** (step_u / octave))),
             max(1, round(height / 2.0 ** (step_v / octave))),
         )
-        # An area mean needs no anti-aliasing filter in front of it.
+        # A mean over the area needs no anti-aliasing filter before it.
         larger = self.sheet(key, whole_u, whole_v, 1, 1).image[1:-1, 1:-1]
         return np.asarray(cv2.resize(larger, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
@@ -118,13 +120,13 @@ def _sheet(image: NDArray[np.uint8], border: int, tile_shape: tuple[int, ...]) -
 
 
 class TexelPool:
-    """Sheets of one tile laid end to end in one array of texels, so that many can be read at once."""
+    """Sheets of one tile each, concatenated in one array of texels, so that many can be sampled at once."""
 
     def __init__(self, textures: TextureStore) -> None:
         self._textures = textures
         self._places: dict[tuple[str, int, int], tuple[int, int, int]] = {}
         self._used = 0
-        # Four channels in one number: gathering those is many times faster than gathering rows of four.
+        # Four channels in one number: indexing these is many times faster than indexing rows of four.
         self.texels: NDArray[np.uint32] = np.zeros(1 << 16, np.uint32)
 
     def place(self, key: str, step_u: int, step_v: int) -> tuple[int, int, int]:

@@ -1,4 +1,4 @@
-"""Another transport robot: a body on four turning wheels, a sensor, and what it carries."""
+"""The model of another transport robot: a hull on four turning wheels, a sensor and a load."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from hal.types import Pose
 from sim.models.mesh import Faces, axis_rotation, box, join, prism
 from sim.motion import MotionState
 
-SENSOR_HEIGHT_M = 0.08  # its lidar stands on the hull
+SENSOR_HEIGHT_M = 0.08  # height of the lidar above the hull
 _WHEEL_SIDES = 12
 
 
 def build_robot(
     spec: RobotBody, pick: int
 ) -> tuple[tuple[Faces, ...], Callable[[MotionState], tuple[Pose, ...]]]:
-    """Parts (hull, then four wheels) and how they stand for a state of motion."""
+    """The parts (hull, then four wheels), and a function for their poses in a state of motion."""
     radius = min(0.13, 0.35 * spec.height_m)
     wheel = _wheel(radius, 0.07)
     x, y = 0.5 * spec.length_m - 1.3 * radius, 0.5 * spec.width_m - 0.035
@@ -66,7 +66,7 @@ def _hull(spec: RobotBody, radius: float, pick: int) -> Faces:
 
 
 def _wheel(radius: float, width: float) -> Faces:
-    """Its axis along y, its hub at the origin."""
+    """A wheel with its axis along y and its hub at the origin."""
     lying = axis_rotation("x", np.pi / 2.0)
     drum = prism(_WHEEL_SIDES, (radius, radius), (-0.5 * width, 0.5 * width), "wheel", cap="hub")
     return drum.moved(lying, np.zeros(3))

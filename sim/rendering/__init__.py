@@ -1,1 +1,11 @@
-"""A world -> what an RGB-D camera in it reports, and the truth of it."""
+"""What an RGB-D camera in a simulated world reports, and the ground truth of it.
+
+camera.py - the camera: exposes frames at fixed times
+render.py - one noiseless picture: colour, inverse depth and labels
+spans.py, raster.py - which face is seen at each pixel
+shade.py - the colour of each pixel
+shadow.py - soft shadows on the floor
+antialias.py - smooth edges
+depth_noise.py, colour_noise.py - what the sensors add
+truth.py - ground truth of a picture, for evaluation
+"""

@@ -1,7 +1,7 @@
-"""Smooth edges between faces: each pixel that an edge crosses gets both colours, by the share it covers.
+"""Smooth edges between faces: a pixel that an edge crosses gets both colours, by the shares they cover.
 
-The label image says between which neighbours an edge passes; the nearer face's edge function says where,
-to a fraction of a pixel (geometric post-process anti-aliasing). Only those pixels are touched.
+The label image shows between which neighbours an edge passes. The edge function of the nearer face gives its
+position to a fraction of a pixel (geometric post-process anti-aliasing). Only those pixels are changed.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.rendering.raster import Drawn, Float32Image, LabelImage
 
-# The bits of a difference of 16 or more grey levels in one of three channels.
+# Bits that are set for a difference of 16 or more grey levels in one of three channels.
 _VISIBLE_STEP = np.uint32(0x00F0F0F0)
 _ON_EDGE = np.float32(1e-9)
 _NOT_APPROACHED = np.float32(1e-12)
@@ -20,10 +20,11 @@ _NOT_APPROACHED = np.float32(1e-12)
 def smooth_edges(
     colour: NDArray[np.uint8], labels: LabelImage, inverse_depth: Float32Image, drawn: Drawn
 ) -> None:
-    """Blend colour (H, W, 4) in place, along upright edges between columns and level ones between rows."""
+    """Blend colour (H, W, 4) in place: across upright edges between columns, across level edges between
+    rows."""
     lines = np.zeros((3, 4, len(drawn) + 1), np.float32)
     lines[:, :, 1:] = drawn.edges.transpose(2, 1, 0)
-    # Each edge is blended in one direction only: across it, as nearly as rows and columns go.
+    # Each edge is blended in one direction only: along the row or the column that crosses it more steeply.
     upright = np.abs(lines[0]) >= np.abs(lines[1])
     width = labels.shape[1]
     pixels = colour.reshape(-1, 4).view(np.uint32)[:, 0]
@@ -31,7 +32,7 @@ def smooth_edges(
     across = np.flatnonzero(flat[1:] != flat[:-1])
     across = _contrasting(pixels, across[(across + 1) % width != 0], 1)
     down = _contrasting(pixels, np.flatnonzero(flat[width:] != flat[:-width]), width)
-    # An edge of the other direction never cuts: its slope is taken away.
+    # With a slope of zero, an edge of the other direction never cuts.
     columns = _blend(pixels, labels, inverse_depth, lines, np.where(upright, lines[0], 0.0), across, 1)
     rows = _blend(pixels, labels, inverse_depth, lines, np.where(upright, 0.0, lines[1]), down, width)
     for where, values in (columns, rows):
@@ -39,7 +40,7 @@ def smooth_edges(
 
 
 def _contrasting(pixels: NDArray[np.uint32], here: NDArray[np.intp], stride: int) -> NDArray[np.intp]:
-    """Only where some channel differs by enough for a jagged edge to be seen."""
+    """The pixels here where some channel differs enough for a jagged edge to be visible."""
     one, other = pixels[here].view(np.uint8), pixels[here + stride].view(np.uint8)
     difference = np.maximum(one, other) - np.minimum(one, other)
     kept: NDArray[np.intp] = here[(difference.view(np.uint32) & _VISIBLE_STEP) != 0]
@@ -65,8 +66,8 @@ def _blend(
     at_inside = np.take(lines[0], label, axis=1) * column.astype(np.float32)
     at_inside += np.take(lines[1], label, axis=1) * row.astype(np.float32)
     at_inside += np.take(lines[2], label, axis=1)
-    # In float32 a centre right on an edge may come out a little outside: it is kept inside. An edge that is
-    # not approached at all is met infinitely far away.
+    # With float32, a centre exactly on an edge may come out slightly outside: it is kept inside. The distance
+    # to an edge that is not approached becomes nearly infinite.
     reaches = np.maximum(at_inside, _ON_EDGE) / np.maximum(-towards, _NOT_APPROACHED)
     reach = np.minimum(np.minimum(reaches[0], reaches[1]), np.minimum(reaches[2], reaches[3]))
     found = np.flatnonzero(reach <= 1.0)

@@ -1,4 +1,4 @@
-"""The simulated RGB-D camera: frames of a world, due at fixed times of whichever clock it is given."""
+"""The simulated RGB-D camera: frames of a world, due at fixed times of the clock that it is given."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BodyPoseAt = Callable[[int], PlanarPose]
 
 
 class SimulatedCamera:
-    """A FrameSource. World time zero is start_ns of the clock, and frame k is due k / fps after it."""
+    """A FrameSource. World time zero is start_ns of the clock; frame k is due k / fps later."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class SimulatedCamera:
         body_pose: BodyPoseAt,
         start_ns: int | None = None,
     ) -> None:
-        """body_pose: where the robot really stands on the floor at a time of the clock."""
+        """body_pose: the true pose of the robot on the floor at a time of the clock."""
         self._config = config
         self._mount = mount
         self._clock = clock
@@ -58,7 +58,7 @@ class SimulatedCamera:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The pinhole that both images are drawn through."""
+        """The pinhole camera of both images."""
         return self._intrinsics
 
     @property
@@ -68,14 +68,15 @@ class SimulatedCamera:
 
     @property
     def last_picture(self) -> Picture | None:
-        """The noiseless picture behind the last frame: for evaluation. Valid until the next read."""
+        """The noiseless picture of the last frame, for evaluation. Valid until the next read."""
         return self._picture
 
     def read(self, timeout_s: float) -> RgbdFrame:
         """Wait for the next exposure and draw it. Raises FrameTimeout if it is not due in time, DeviceRefused
-        once it was closed.
+        once closed.
 
-        Exposures that were missed meanwhile are lost, as with a real camera; sequence shows the gap.
+        Exposures that were missed since the last read are lost, as with a real camera; sequence shows the
+        gap.
         """
         if self._is_closed:
             raise DeviceRefused("simulated camera: is closed; read it inside a with block")
@@ -93,11 +94,11 @@ class SimulatedCamera:
         return frame
 
     def lose_frame(self) -> None:
-        """The next frame gets lost on its way; its sequence number shows it."""
+        """Lose the next frame; the gap in the sequence numbers shows it."""
         self._index += 1
 
     def camera_pose(self, stamp_ns: int) -> Pose:
-        """The true optical frame in the floor's frame, with vibration."""
+        """The true pose of the optical frame in the floor's frame, with vibration."""
         amplitude = math.radians(self._config.vibration_deg)
         phase = 2.0 * math.pi * self._config.vibration_hz * (stamp_ns - self._start_ns) / NS_PER_S
         mount = CameraMount(
@@ -128,5 +129,5 @@ class SimulatedCamera:
 
 
 def intrinsics_of(config: SimulatedCameraConfig) -> Intrinsics:
-    """The camera of a configuration."""
+    """The intrinsics of a configured camera."""
     return Intrinsics(config.width, config.height, config.fx, config.fy, config.cx, config.cy)

@@ -1,4 +1,4 @@
-"""What a small colour sensor adds to a clean picture: read noise everywhere, shot noise with the light."""
+"""The noise of a small colour sensor: constant read noise, and shot noise that grows with the light."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hal.types import ColourImage, Intrinsics
 _READ_GREY = 1.0  # standard deviation in the dark, grey levels
 _SHOT_GREY = 0.02  # variance per grey level of light
 _MARGIN_PX = 96  # room to shift the noise field for every frame
-_BLUR_PX = 0.45  # demosaicing spreads a pixel's noise a little
-_BAND_ROWS = 64  # worked on at a time: what so many rows need stays in the processor's cache
+_BLUR_PX = 0.45  # demosaicing spreads the noise of a pixel a little
+_BAND_ROWS = 64  # rows processed at a time: their data stay in the processor's cache
 
 # Fixed point: sigma and noise are kept in these fractions, so that the sum stays within 16 bits.
 _SIGMA_STEPS = 16
@@ -20,7 +20,7 @@ _NOISE_STEPS = 32
 
 
 class ColourSensor:
-    """The same seed and frame number give the same bytes."""
+    """Adds noise to images. The same seed and frame number give the same bytes."""
 
     def __init__(self, intrinsics: Intrinsics, seed: int) -> None:
         self._seed = seed
@@ -45,7 +45,7 @@ class ColourSensor:
             light = clean[rows]
             value = self._value[: len(light)]
             np.multiply(cv2.LUT(light, self._sigma), field[rows], out=value)
-            # Half a step first: shifting rounds down, and the mean must stay.
+            # Add half a step first, because shifting rounds down and the mean must not change.
             value += _SIGMA_STEPS * _NOISE_STEPS // 2
             value >>= (_SIGMA_STEPS * _NOISE_STEPS).bit_length() - 1
             value += light

@@ -1,7 +1,7 @@
-"""From exact inverse depth to what a D435i-like stereo camera reports.
+"""Turns exact inverse depth into what a D435i-like stereo camera reports.
 
-Stereo measures disparity, which is inverse depth times a constant: noise that is even in disparity
-gives a standard deviation that grows with the square of the distance, as real ones do.
+Stereo measures disparity, which is inverse depth times a constant. Constant noise of the disparity gives a
+standard deviation of depth that grows with the square of the distance, as in real cameras.
 """
 
 from __future__ import annotations
@@ -24,19 +24,20 @@ SIGMA_PER_M: dict[str, float] = {"realsense": 0.0075, "paper": 0.0005, "none": 0
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 _BASELINE_M = 0.050
-# Spread of the noise along u and v, measured on a real RealSense (plane residuals at 0.8 to 1.4 m: the
-# correlation falls to 0.9 after one pixel, 0.65 and 0.35 after five), as a broad and a fine part.
+# Size of the noise blobs along u and v, as a broad and a fine part. Measured on a real RealSense (plane
+# residuals at 0.8 to 1.4 m: the correlation falls to 0.9 after one pixel, 0.65 and 0.35 after five).
 _BLOB_PX = (3.5, 2.8)
 _FINE_PX = (0.6, 0.6)
 _FINE_SHARE = 0.08  # of the variance
 _HOLE_BLOB_PX = (2.5, 2.0)
-_MARGIN_PX = 96  # the noise field is larger than the image by this much: room to shift it
-_TOLERATED_SHIFT_PX = 1.0  # disparity steps below this are slanted surfaces, not edges
-BAND_ROWS = 96  # worked on at a time: what so many rows need stays in the processor's cache
+_MARGIN_PX = 96  # the noise field is larger than the image by this much, so that it can be shifted
+_TOLERATED_SHIFT_PX = 1.0  # smaller steps of disparity are slanted surfaces, not edges
+BAND_ROWS = 96  # rows processed at a time: their data stay in the processor's cache
 
 
 class DepthSensor:
-    """Noise, holes, occlusion shadows, range limits. The same seed and frame number give the same bytes."""
+    """Adds noise, holes, occlusion shadows and range limits. The same seed and frame number give the same
+    bytes."""
 
     def __init__(self, config: SimulatedCameraConfig, intrinsics: Intrinsics, seed: int) -> None:
         self._config = config
@@ -48,7 +49,8 @@ class DepthSensor:
         self._widest_px = min(self._disparity_px_m / config.depth_min_m, shape[1] - 1)
         generator = np.random.default_rng((seed, 101))
         padded = (shape[0] + _MARGIN_PX, shape[1] + _MARGIN_PX)
-        # Two independent halves per frame, one shared with the next: neighbours in time correlate by 1/2.
+        # A frame adds two independent noise fields, one of which it shares with the next frame: the
+        # correlation of consecutive frames is 1/2.
         broad, fine = _field(generator, padded, _BLOB_PX), _field(generator, padded, _FINE_PX)
         unit = np.sqrt(1.0 - _FINE_SHARE) * broad + np.sqrt(_FINE_SHARE) * fine
         self._noise = (unit * (self._sigma / np.sqrt(2.0))).astype(np.float32)
@@ -82,20 +84,21 @@ class DepthSensor:
                 lost |= holes[rows]
             if config.depth_edges:
                 lost |= self.shadows(exact)
-            # What leaves the range becomes infinitely far and then zero.
+            # Pixels without depth become infinitely far, and then zero by the division.
             noisy[lost] = np.inf
             np.divide(1.0 / DEPTH_SCALE_M, noisy, out=noisy)
             np.copyto(depth[rows], np.rint(noisy, out=noisy), casting="unsafe")
         return depth
 
     def shadows(self, inverse_depth: Float32Image) -> NDArray[np.bool_]:
-        """What the left infrared camera sees and the right one does not, in whole rows (R, W), at most
-        BAND_ROWS of them: the strip of background to the left of every nearer thing, as wide as the
-        difference of their disparities."""
+        """The pixels (R, W) that the left infrared camera sees and the right one does not, for at most
+        BAND_ROWS
+        whole rows: the strip of background to the left of every nearer object, as wide as the difference of
+        their disparities."""
         count = len(inverse_depth)
         seen_at = np.multiply(inverse_depth, np.float32(self._disparity_px_m), out=self._seen_at[:count])
         np.subtract(self._columns, seen_at, out=seen_at)
-        # The smallest of all to the right, as far as a shadow can reach: windows that double.
+        # Minimum over all pixels to the right, as far as a shadow can reach, with windows of doubling width.
         nearest, reach = seen_at, 1
         wider, spare = (window[:count] for window in self._windows)
         while reach <= self._widest_px:
@@ -105,7 +108,7 @@ class DepthSensor:
         return seen_at > np.add(nearest, np.float32(_TOLERATED_SHIFT_PX), out=wider)
 
     def _cut(self, field: NDArray[ScalarT], frame: int, stream: int) -> NDArray[ScalarT]:
-        """The field at a shift drawn for this frame."""
+        """The part of a noise field at a shift that is drawn for this frame."""
         generator = np.random.default_rng((self._seed, 102 + stream, frame))
         top, left = (int(shift) for shift in generator.integers(_MARGIN_PX, size=2))
         return field[top : top + self._shape[0], left : left + self._shape[1]]
@@ -121,6 +124,6 @@ def _field(
 
 
 def _hole_field(generator: np.random.Generator, shape: tuple[int, int], ratio: float) -> NDArray[np.bool_]:
-    """Blobs that cover ratio of the area."""
+    """A mask of random blobs that cover this ratio of the area."""
     field = _field(generator, shape, _HOLE_BLOB_PX)
     return np.asarray(field > np.quantile(field, 1.0 - ratio), dtype=np.bool_)

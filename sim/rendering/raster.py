@@ -1,8 +1,8 @@
-"""Which face is seen at each pixel, and how far away it is: exactly, at the pixels' centres.
+"""Which face is seen at each pixel, and its depth: exact at the centres of the pixels.
 
-A face's inverse depth is affine in image coordinates, so depth has no interpolation error. Large faces are
-drawn one after the other, each in its rectangle; the many small ones (far goods, hands) all at once, pixel
-by pixel, because for them the calls would cost more than the pixels.
+The inverse depth of a face is affine in image coordinates, so depth has no interpolation error. Large faces
+are drawn one after the other, each within its bounding rectangle. The many small ones (far goods, hands) are
+drawn all at once, pixel by pixel, because one call per face would cost more than the pixels.
 """
 
 from __future__ import annotations
@@ -28,11 +28,13 @@ LabelImage = NDArray[np.uint16]
 class Drawn:
     """M faces that reach the image, numbered 1..M in label images (0: nothing there).
 
-    face (M,): index into the geometry. edges (M, 4, 3): e = edges @ (u, v, 1) is >= 0 inside.
-    to_plane (M, 3, 3): takes (u, v, 1) to (s, t, 1) / z, with s, t in 0..1 along the upper and the left side
-    of the face (see texture_frames); its last row is therefore the inverse depth. bounds (M, 4): first column
-    and row, last column and row + 1. small (M,): bool. small_pixels (P,): flat indices of the pixels that
-    show a small face.
+    face: (M,), index into the geometry.
+    edges: (M, 4, 3), edges @ (u, v, 1) is >= 0 inside the face.
+    to_plane: (M, 3, 3), maps (u, v, 1) to (s, t, 1) / z, with s, t in 0..1 along the upper and the left side
+        of the face (see texture_frames); its last row is therefore the inverse depth.
+    bounds: (M, 4), first column and row, last column and row + 1.
+    small: (M,), whether the face is drawn as a small one.
+    small_pixels: (P,), flat indices of the pixels that show a small face.
     """
 
     face: NDArray[np.intp]
@@ -47,7 +49,7 @@ class Drawn:
 
 
 class Rasteriser:
-    """Draws geometry into buffers that it owns: inverse depth (H, W) float32 in 1/m and labels (H, W)."""
+    """Draws geometry into its own buffers: inverse_depth (H, W) float32 in 1/m, and labels (H, W) uint16."""
 
     def __init__(self, intrinsics: Intrinsics) -> None:
         self.intrinsics = intrinsics
@@ -82,7 +84,8 @@ class Rasteriser:
         return Drawn(face, edges, to_plane, spans.bounds, small, small_pixels)
 
     def _facing(self, geometry: Geometry, camera: Pose) -> tuple[NDArray[np.intp], FloatArray]:
-        """Faces turned to the camera that may reach into the view, and their corners in its frame."""
+        """The faces that face the camera and may reach into the image, and their corners in the optical
+        frame."""
         to_eye = camera.translation_m - geometry.corners_m[:, 0]
         facing = np.flatnonzero(np.einsum("nd,nd->n", geometry.normals, to_eye) > 1e-6)
         corners = (geometry.corners_m[facing] - camera.translation_m) @ camera.rotation
@@ -98,7 +101,7 @@ class Rasteriser:
         return facing[~outside], corners[~outside]
 
     def _draw_large(self, numbers: NDArray[np.intp], planes: FloatArray, spans: Spans) -> None:
-        """Draw face after face where it is nearer than what is there already."""
+        """Draw one face after the other, where it is nearer than what is there already."""
         columns, steps = self._columns, self._steps
         chosen = spans.chosen(numbers)
         slopes = planes[numbers, 0].astype(np.float32)
@@ -129,7 +132,7 @@ class Rasteriser:
             cv2.copyTo(label, mask, self.labels[window])
 
     def _draw_small(self, numbers: NDArray[np.intp], planes: FloatArray, spans: Spans) -> NDArray[np.intp]:
-        """Draw many faces at once; returns the pixels (flat indices) that show one of them."""
+        """Draw many faces at once; return the pixels (flat indices) that show one of them."""
         depth, labels = self.inverse_depth.reshape(-1), self.labels.reshape(-1)
         chosen = spans.chosen(numbers)
         face, row, entry = chosen.entries()
@@ -146,7 +149,8 @@ class Rasteriser:
         pixel, inverse, label = pixel[nearer], inverse[nearer], label[nearer]
         candidates, wanted = pixel, inverse
         while len(pixel):
-            # Of several faces at one pixel the last is stored: repeat with those that are nearer still.
+            # If several faces share a pixel, the last one is stored: repeat with those that are nearer than
+            # it.
             depth[pixel], labels[pixel] = inverse, label
             nearer = np.flatnonzero(inverse > depth[pixel])
             pixel, inverse, label = pixel[nearer], inverse[nearer], label[nearer]
@@ -155,7 +159,7 @@ class Rasteriser:
 
 
 def _inverse_depth_at_left(planes: FloatArray, spans: Spans) -> NDArray[np.float32]:
-    """Each face's inverse depth in each of its rows, in the first column of its bounds: (R,).
+    """The inverse depth (R,) of each face in each of its rows, at the first column of its bounds.
 
     Counting columns from there keeps the numbers that are added in float32 small.
     """
@@ -166,9 +170,9 @@ def _inverse_depth_at_left(planes: FloatArray, spans: Spans) -> NDArray[np.float
 
 
 def texture_frames(corners: FloatArray) -> FloatArray:
-    """Columns: the texture's u axis, its v axis, its origin (M, 3, 3).
+    """Matrices (M, 3, 3) whose columns are the texture's u axis, its v axis and its origin.
 
-    Of a trapezium, the longer of the upper and lower edge spans the texture.
+    On a trapezium, the longer of the upper and the lower edge spans the texture.
     """
     upper, lower = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 3]
     longer = (upper * upper).sum(axis=1) >= (lower * lower).sum(axis=1)

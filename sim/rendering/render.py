@@ -1,4 +1,5 @@
-"""The simulated camera's picture of a world: colour, exact inverse depth, and which face is where."""
+"""The simulated camera's noiseless picture of a world: colour, exact inverse depth, and the face at each
+pixel."""
 
 from __future__ import annotations
 
@@ -20,9 +21,13 @@ from sim.world import Geometry, World
 class Picture:
     """What one exposure sees. The arrays belong to the renderer: the next render overwrites them.
 
-    t_s: time of the world. camera: the optical frame in the floor's frame.
-    colour (H, W, 3) uint8 BGR, without noise. inverse_depth (H, W) float32 in 1/m, exact; 0: nothing.
-    labels (H, W) uint16: 0 is nothing, k + 1 the k-th face of drawn.
+    t_s: time of the world.
+    camera: pose of the optical frame in the floor's frame.
+    colour: (H, W, 3) uint8 BGR, without noise.
+    inverse_depth: (H, W) float32 in 1/m, exact; 0 where there is nothing.
+    labels: (H, W) uint16, 0 for nothing, k + 1 for the k-th face of drawn.
+    drawn: the faces that reach the image.
+    geometry: all faces at t_s.
     """
 
     t_s: float
@@ -57,7 +62,7 @@ class Renderer:
         self._colour: ColourImage = np.zeros((*shape, 3), np.uint8)
 
     def render(self, t_s: float, camera: Pose) -> Picture:
-        """The world at t_s from camera (optical frame in the floor's frame)."""
+        """Draw the world at t_s as seen from camera (pose of the optical frame in the floor's frame)."""
         geometry = self.world.geometry(t_s)
         drawn = self._raster.draw(geometry, camera)
         labels, inverse_depth = self._raster.labels, self._raster.inverse_depth

@@ -1,4 +1,5 @@
-"""Colour for what the rasteriser found: each visible face's texture, seen in perspective, in its light."""
+"""Colours what the rasteriser drew: the texture of each visible face, in perspective and with its
+lighting."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from sim.models.textures import STEPS_PER_OCTAVE, TexelPool, TextureStore
 from sim.rendering.raster import Drawn, LabelImage
 from sim.world import Geometry
 
-# One pyramid step serves a part of a face over which the distance changes by this factor at most.
+# Maximum ratio of distances within a part of a face that uses one step of the pyramid.
 _DEPTH_RATIO = 1.4
 _FARTHEST_M = 60.0
 
@@ -27,8 +28,12 @@ Rectangle = tuple[int, int, int, int]  # first column and row, last column and r
 class _Parts:
     """P rectangles of the image to fill, each from one texture at one scale.
 
-    number (P,): face. rectangle: P. to_sheet (P, 3, 3): from pixels of the rectangle to textures, after
-    whole tiles were taken off; steps (P, 2) of the pyramid; tiles (P, 2) of texture needed side by side.
+    number: P indices of faces in Drawn.
+    rectangle: P rectangles.
+    to_sheet: (P, 3, 3), from pixels of the rectangle to texture coordinates, relative to the first whole
+    tile.
+    steps: (P, 2), steps of the pyramid along u and v.
+    tiles: (P, 2), number of copies of the texture side by side along u and v.
     """
 
     number: list[int]
@@ -39,7 +44,7 @@ class _Parts:
 
 
 class Painter:
-    """Fills an image (H, W, 4). The fourth channel is idle: OpenCV warps four twice as fast as three."""
+    """Fills an image (H, W, 4). The fourth channel is unused: OpenCV warps four twice as fast as three."""
 
     def __init__(self, shape: tuple[int, int], textures: TextureStore, keys: tuple[str, ...]) -> None:
         self.colour: NDArray[np.uint8] = np.zeros((*shape, 4), np.uint8)
@@ -51,14 +56,14 @@ class Painter:
         self._pool = TexelPool(textures)
 
     def paint(self, labels: LabelImage, drawn: Drawn, geometry: Geometry, light: Light) -> None:
-        """Colour every labelled pixel; what nothing covers becomes black."""
+        """Colour every labelled pixel; the others become black."""
         self.colour.fill(0)
         gains = _gains(geometry.normals[drawn.face], light)
         self._paint_large(labels, drawn, geometry, gains.tolist())
         self._paint_small(labels, drawn, geometry, gains)
 
     def _paint_large(self, labels: LabelImage, drawn: Drawn, geometry: Geometry, gains: list[float]) -> None:
-        """Rectangle by rectangle, by OpenCV."""
+        """Paint large faces rectangle by rectangle, with OpenCV."""
         parts = self._parts(*self._visible(labels, drawn), drawn, geometry)
         texture = geometry.texture[drawn.face].tolist()
         for index, (left, top, right, bottom) in enumerate(parts.rectangle):
@@ -78,7 +83,7 @@ class Painter:
             cv2.copyTo(patch, mask.view(np.uint8), self.colour[top:bottom, left:right])
 
     def _paint_small(self, labels: LabelImage, drawn: Drawn, geometry: Geometry, gains: FloatArray) -> None:
-        """All pixels of small faces at once, each from the four texels around it."""
+        """Paint all pixels of small faces at once, each from the four texels around it."""
         pixel = drawn.small_pixels
         label = labels.reshape(-1)[pixel]
         shown = np.zeros(len(drawn) + 1, np.bool_)
@@ -106,7 +111,7 @@ class Painter:
         self.colour.reshape(-1).view(np.uint32)[pixel] = values.astype(np.uint8).view(np.uint32)[:, 0]
 
     def _visible(self, labels: LabelImage, drawn: Drawn) -> tuple[list[int], list[Rectangle]]:
-        """The faces that show, and rectangles around what shows of them."""
+        """The large faces that are visible, and rectangles around their visible pixels."""
         numbers, rectangles = [], []
         large = np.flatnonzero(~drawn.small)
         for number, (u0, v0, u1, v1) in zip(large.tolist(), drawn.bounds[large].tolist(), strict=True):
@@ -135,18 +140,18 @@ class Painter:
 
 
 def _gains(normals: FloatArray, light: Light) -> FloatArray:
-    """How bright faces are: an ambient share, and one that depends on their direction."""
+    """The brightness of faces: an ambient share, and one that depends on their direction."""
     azimuth = math.radians(light.azimuth_deg)
     towards_light = np.array([0.62 * math.cos(azimuth), 0.62 * math.sin(azimuth), 0.78])
     towards = normals @ (towards_light / np.linalg.norm(towards_light))
-    # What is turned away from the lamps still gets light back from the floor and the goods.
+    # Faces turned away from the lamps still get light that the floor and the goods reflect.
     direct = np.maximum(towards, 0.0) + 0.25 * np.maximum(-towards, 0.0)
     gains: FloatArray = light.exposure * (light.ambient + (1.0 - light.ambient) * direct)
     return gains
 
 
 def _window_matrices(windows: FloatArray) -> FloatArray:
-    """From (s, t) on faces to (u, v) in textures: (P, 3, 3)."""
+    """Matrices (P, 3, 3) from (s, t) on faces to (u, v) in textures."""
     matrices = np.zeros((len(windows), 3, 3))
     matrices[:, 0, 0] = windows[:, 2] - windows[:, 0]
     matrices[:, 1, 1] = windows[:, 3] - windows[:, 1]
@@ -158,8 +163,8 @@ def _window_matrices(windows: FloatArray) -> FloatArray:
 def _place_at(
     to_uv: FloatArray, bounds: FloatArray, pixel: NDArray[np.intp], index: NDArray[np.intp], width: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Texture coordinates (P,), (P,) in 0..1 at pixels, each with the matrix that index says."""
-    # Counted from each face's own corner, float32 is plenty.
+    """Texture coordinates (P,), (P,) in 0..1 at pixels (P,). index (P,): which matrix to use for each."""
+    # Relative to each face's own corner, float32 is accurate enough.
     origin = to_uv @ np.concatenate([bounds[:, :2], np.ones((len(bounds), 1))], axis=1)[:, :, None]
     table = np.concatenate([to_uv[:, :, :2], origin], axis=2).astype(np.float32).reshape(-1, 9).T
     row, column = np.divmod(pixel.astype(np.int32), np.int32(width))
@@ -180,7 +185,7 @@ def _interpolate(
     u: NDArray[np.float32],
     v: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Bilinear samples (P, 4) of the sheets at places (begin, width, height with the rim of one texel)."""
+    """Bilinear samples (P, 4) of sheets. places: their (begin, width, height), with the rim of one texel."""
     begin, width, height = places.T
     inner_width, inner_height = (width - 2).astype(np.float32), (height - 2).astype(np.float32)
     x, y = u * inner_width[index] + np.float32(0.5), v * inner_height[index] + np.float32(0.5)
@@ -195,7 +200,7 @@ def _interpolate(
 
 
 def _mix(texels: NDArray[np.uint32], at: NDArray[np.intp], share: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Between the texels at and at + 1, channel by channel (P, 4)."""
+    """Linear interpolation (P, 4) between the texels at and at + 1, for each channel."""
     here = texels[at].view(np.uint8).reshape(-1, 4).astype(np.float32)
     after = texels[at + 1].view(np.uint8).reshape(-1, 4).astype(np.float32)
     mixed: NDArray[np.float32] = here + (after - here) * share
@@ -205,7 +210,7 @@ def _mix(texels: NDArray[np.uint32], at: NDArray[np.intp], share: NDArray[np.flo
 def _split(
     numbers: list[int], rectangles: list[Rectangle], drawn: Drawn
 ) -> tuple[list[int], list[Rectangle]]:
-    """Cut rectangles along the direction in which the distance changes most, where it changes much."""
+    """Divide rectangles over which the distance changes much, along the axis in which it changes most."""
     planes = drawn.to_plane[numbers, 2]
     bounds = np.array(rectangles, dtype=np.float64).reshape(-1, 4)
     extent = bounds[:, 2:] - bounds[:, :2]
@@ -232,7 +237,7 @@ def _split(
 
 
 def _cut(rectangle: Rectangle, axis: int, cuts: FloatArray) -> list[Rectangle]:
-    """A rectangle cut at columns (axis 0) or rows (axis 1)."""
+    """A rectangle divided at columns (axis 0) or rows (axis 1)."""
     first, last = rectangle[axis], rectangle[axis + 2]
     stops = sorted({first, last, *np.rint(cuts).clip(first, last).astype(int).tolist()})
     pieces = []
@@ -244,7 +249,8 @@ def _cut(rectangle: Rectangle, axis: int, cuts: FloatArray) -> list[Rectangle]:
 
 
 def _pyramid_steps(to_uv: FloatArray, bounds: FloatArray, sizes: FloatArray) -> NDArray[np.intp]:
-    """Steps (P, 2) at which a pixel in the middle covers about one texel along each of the texture's axes."""
+    """The steps (P, 2) of the pyramid at which the pixel in the middle of a part covers about one texel along
+    each axis of the texture."""
     u, v = 0.5 * (bounds[:, 0] + bounds[:, 2] - 1.0), 0.5 * (bounds[:, 1] + bounds[:, 3] - 1.0)
     at_centre = to_uv[:, :, 0] * u[:, None] + to_uv[:, :, 1] * v[:, None] + to_uv[:, :, 2]
     z = 1.0 / np.maximum(at_centre[:, 2], 1.0 / _FARTHEST_M)
@@ -258,7 +264,7 @@ def _pyramid_steps(to_uv: FloatArray, bounds: FloatArray, sizes: FloatArray) -> 
 
 
 def _tiles(to_uv: FloatArray, bounds: FloatArray, windows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """The first whole tile (P, 2) that each part touches, and how many it spans (P, 2)."""
+    """The first whole tile (P, 2) that each part touches, and the number of tiles it spans (P, 2)."""
     low, high = np.minimum(windows[:, :2], windows[:, 2:]), np.maximum(windows[:, :2], windows[:, 2:])
     first, tiles = np.zeros_like(low), np.ones(low.shape, dtype=np.intp)
     wraps = np.flatnonzero((low < 0.0).any(axis=1) | (high > 1.0).any(axis=1))

@@ -1,4 +1,4 @@
-"""Soft shadows on the floor under whatever stands on it: without them everything seems to float."""
+"""Soft shadows on the floor under everything that stands on it; without them, bodies seem to float."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from sim.rendering.raster import Drawn, LabelImage, texture_frames
 from sim.rendering.spans import convert
 from sim.world import BUILDING_ID, BodyState, Geometry
 
-_MARGIN_M = 0.6  # a large lamp lights the floor this far under an edge, and misses it this far beside
-_DARKEST = 0.6  # share of the light that is lost right below
-_HIGH_M = 0.5  # what hangs higher casts no shadow that could be told from the rest
-_FAR_M = 12.0
+_MARGIN_M = 0.6  # half width of the penumbra of a large lamp: to either side of the footprint's edge
+_DARKEST = 0.6  # share of the light that is lost right below a body
+_HIGH_M = 0.5  # bodies that hang higher than this cast no distinct shadow
+_FAR_M = 12.0  # shadows further away than this are left out
 _SIDE_PX = 64
-_RIM = 0.3  # share of the shadow's picture that lies outside the footprint, at each side
+_RIM = 0.3  # share of the shadow's image that lies outside the footprint, on each side
 
 
 class ShadowCaster:
-    """Darkens the floor in a picture (H, W, 4) before its edges are smoothed."""
+    """Darkens the floor in an image (H, W, 4), before its edges are smoothed."""
 
     def __init__(self, intrinsics: Intrinsics, light: Light) -> None:
         self._intrinsics = intrinsics
@@ -42,7 +42,7 @@ class ShadowCaster:
         bodies: tuple[BodyState, ...],
         camera: Pose,
     ) -> None:
-        """Multiply the shadows of bodies into colour, where labels show the floor."""
+        """Multiply colour by the shadows of bodies, where labels show the floor."""
         near = self._near(bodies, camera)
         if not near:
             return
@@ -66,7 +66,7 @@ class ShadowCaster:
             cv2.copyTo(cv2.multiply(lit, shade, scale=1.0 / 255.0), floor, lit)
 
     def _near(self, bodies: tuple[BodyState, ...], camera: Pose) -> list[BodyState]:
-        """Those whose shadow may be seen."""
+        """The bodies whose shadow may be visible."""
         low = [state for state in bodies if state.z_m[0] < _HIGH_M]
         places = np.array([(state.pose.x_m, state.pose.y_m) for state in low]).reshape(-1, 2)
         reaches = np.array([state.reach_m for state in low]) + _MARGIN_M
@@ -74,7 +74,7 @@ class ShadowCaster:
         return [low[k] for k in np.flatnonzero((ahead > -reaches) & (ahead < _FAR_M + reaches)).tolist()]
 
     def _patch_of(self, state: BodyState) -> FloatArray:
-        """As _patch; what never moves is asked once."""
+        """As _patch, but cached for bodies that never move."""
         if state.moves:
             return self._patch(state)
         patch = self._still.get(state.id)
@@ -83,12 +83,13 @@ class ShadowCaster:
         return patch
 
     def _patch(self, state: BodyState) -> FloatArray:
-        """The shadow's rectangle (4, 3) on the floor, clockwise from above as the first corner says."""
+        """The shadow's rectangle (4, 3) on the floor: rear left, front left, front right, rear right corner
+        of the body."""
         c, s = math.cos(state.pose.heading_rad), math.sin(state.pose.heading_rad)
         turn = np.array([[c, -s], [s, c]])
         outline = (state.footprint_m - np.array([state.pose.x_m, state.pose.y_m])) @ turn
         low, high = outline.min(axis=0), outline.max(axis=0)
-        # The blurred rim is _MARGIN_M wide at each side, whatever the size of the body.
+        # The blurred rim is at most _MARGIN_M wide on each side, whatever the size of the body.
         grow = np.minimum(_MARGIN_M, _RIM / (1.0 - 2.0 * _RIM) * (high - low))
         low, high = low - grow, high + grow
         corners = np.array([[low[0], high[1]], [high[0], high[1]], [high[0], low[1]], [low[0], low[1]]])
@@ -97,14 +98,14 @@ class ShadowCaster:
 
 
 def _floor_faces(drawn: Drawn, geometry: Geometry) -> NDArray[np.uint8]:
-    """For each label: 255 if it is the floor or a marking on it."""
+    """For each label: 255 if it is the floor or a marking on it, else 0."""
     face = drawn.face
     floor = (geometry.body[face] == BUILDING_ID) & (geometry.normals[face, 2] > 0.99)
     return np.concatenate([[False], floor]).astype(np.uint8) * np.uint8(255)
 
 
 def _soft_blot() -> NDArray[np.uint8]:
-    """How much light is left (H, W, 4): dark in the middle, all of it at the border."""
+    """The share of light that remains (H, W, 4), 255 for all: dark in the middle, all of it at the border."""
     dark = np.zeros((_SIDE_PX, _SIDE_PX), np.float32)
     rim = round(_RIM * _SIDE_PX)
     dark[rim:-rim, rim:-rim] = 1.0

@@ -1,7 +1,7 @@
 """Scan conversion: which columns of which rows each face covers, for all faces at once.
 
-A pixel belongs to a face if its centre lies inside. Where an edge cuts a row is computed from the edge alone,
-so two faces that share it agree: there is neither gap nor overlap between them.
+A pixel belongs to a face if its centre lies inside. The column where an edge cuts a row is computed from the
+edge alone, so there is neither a gap nor an overlap between two faces that share the edge.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ NEAR_M = 0.05
 class Spans:
     """The columns first <= u < last that each of M faces covers in each of its rows, row after row.
 
-    Face k's rows begin at entry start[k] and at row row[k]; there are count[k] of them. bounds (M, 4):
-    first column and row, last column and row + 1 that the face covers; zeros where it covers no pixel.
+    start, row, count: (M,). Face k has count[k] rows, which begin at row row[k] and at entry start[k] of
+        first and last.
+    first, last: (R,), for all rows of all faces.
+    bounds: (M, 4), first column and row, last column and row + 1 that the face covers; zeros if it covers no
+        pixel.
     """
 
     start: NDArray[np.intp]
@@ -32,7 +35,7 @@ class Spans:
     bounds: NDArray[np.intp]
 
     def chosen(self, faces: NDArray[np.intp]) -> Spans:
-        """Of these faces only; first and last stay as they are."""
+        """The spans of these faces only; first and last do not change."""
         return Spans(
             self.start[faces], self.row[faces], self.count[faces], self.first, self.last, self.bounds[faces]
         )
@@ -58,7 +61,7 @@ def convert(corners: FloatArray, intrinsics: Intrinsics) -> Spans:
     last = np.zeros(len(first), np.int16)
     below, after = np.roll(top, -1, axis=1), np.roll(u, -1, axis=1)
     lines = edge_planes(polygons)
-    # Clockwise on a screen whose v points down: edges that go down bound on the right.
+    # Faces are clockwise in an image whose v points down, so edges that go down bound them on the right.
     for side, from_row, to_row in ((last, top, below), (first, below, top)):
         owner, edge = np.nonzero(to_row > from_row)
         begin_row = from_row[owner, edge]
@@ -68,7 +71,7 @@ def convert(corners: FloatArray, intrinsics: Intrinsics) -> Spans:
         slope, offset = _columns_of(lines[owner, edge], k)
         cut = np.repeat(slope, length) * (step + np.repeat(begin_row - begin, length))
         cut += np.repeat(offset, length)
-        # A nearly level edge may cut its row anywhere by rounding, but not outside its own ends.
+        # With rounding, a nearly level edge might cut its row anywhere: keep the cut between its ends.
         ends = u[owner, edge], after[owner, edge]
         low, high = np.minimum(*ends).clip(-1.0, k.width), np.maximum(*ends).clip(-1.0, k.width)
         np.clip(cut, np.repeat(low, length), np.repeat(high, length), out=cut)
@@ -88,7 +91,7 @@ def edge_planes(polygons: FloatArray) -> FloatArray:
 
 
 def _columns_of(lines: FloatArray, k: Intrinsics) -> tuple[FloatArray, FloatArray]:
-    """The column at which planes through the eye cut a row: slope * v + offset, for each plane (N, 3)."""
+    """(slope, offset) of the column slope * v + offset at which planes (N, 3) through the eye cut row v."""
     x, y, z = lines.T
     across = np.where(x == 0.0, 1.0, x) / k.fx
     slope = -y / k.fy / across
@@ -96,7 +99,7 @@ def _columns_of(lines: FloatArray, k: Intrinsics) -> tuple[FloatArray, FloatArra
 
 
 def _clip_near(corners: FloatArray) -> FloatArray:
-    """Cut four-cornered faces at NEAR_M: polygons (M, 5, 3), a corner repeated where fewer will do."""
+    """Clip four-cornered faces at NEAR_M: polygons (M, 5, 3), with a corner repeated if there are fewer."""
     polygons = np.concatenate([corners, corners[:, 3:]], axis=1)
     crossing = np.flatnonzero(corners[:, :, 2].min(axis=1) < NEAR_M)
     if len(crossing) == 0:

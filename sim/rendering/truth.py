@@ -1,4 +1,4 @@
-"""Exact ground truth of a picture: who is where in it, how fast, and where each pixel goes next."""
+"""Exact ground truth of a picture: bodies with their positions and velocities, and the optical flow."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from sim.world import BodyState, Geometry, World
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyTruth:
-    """A body in the image. Camera axes: optical frame (x right, y down, z forward).
+    """A body in the image, in the optical frame (x right, y down, z forward).
 
-    bbox_px: (u0, v0, u1, v1) around its visible pixels, u1 and v1 exclusive. visible_px of them;
-    visible_ratio: of those that it would have in this image if nothing stood before it. position_m (3,):
-    mean of its visible surface points; velocity_mps (3,): over ground.
+    bbox_px: (u0, v0, u1, v1) around its visible pixels, u1 and v1 exclusive.
+    visible_px: number of its visible pixels.
+    visible_ratio: visible_px, divided by the number if nothing occluded the body.
+    position_m: (3,), mean of its visible surface points.
+    velocity_mps: (3,), relative to the floor.
     """
 
     state: BodyState
@@ -33,7 +35,8 @@ class BodyTruth:
 
 
 class GroundTruth:
-    """Answers questions about pictures of one world through one camera. For evaluation, not for speed."""
+    """The ground truth of pictures of one world through one camera. For evaluation; not optimised for
+    speed."""
 
     def __init__(self, world: World, intrinsics: Intrinsics) -> None:
         self._world = world
@@ -43,7 +46,7 @@ class GroundTruth:
     def bodies(self, picture: Picture, only: Collection[int] | None = None) -> tuple[BodyTruth, ...]:
         """Every body with at least one visible pixel, in the order of their ids.
 
-        only: look at the bodies with these ids alone, which takes a fraction of the time.
+        only: restrict the result to the bodies with these ids, which takes a fraction of the time.
         """
         mask = picture.instance_mask()
         points = self._points(picture)
@@ -69,10 +72,11 @@ class GroundTruth:
         return tuple(found)
 
     def flow(self, picture: Picture, t_s: float, camera: Pose) -> NDArray[np.float32]:
-        """Where the surface point of each pixel is in another exposure: (H, W, 2) float32, (du, dv).
+        """The optical flow to another exposure: (H, W, 2) float32, (du, dv).
 
-        Robot, bodies and limbs move; what covers the point then is not asked. NaN where there is no
-        surface or the point is behind the other camera.
+        It follows the surface point of each pixel, with the motion of the robot, of bodies and of limbs, even
+        if the point is occluded in the other exposure. NaN where there is no surface, or where the point is
+        behind the other camera.
         """
         k = self._intrinsics
         project = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
@@ -84,7 +88,7 @@ class GroundTruth:
             v, u = np.nonzero(picture.labels[v0:v1, u0:u1] == number + 1)
             here = np.stack([u + u0, v + v0, np.ones(len(u))])
             there = homographies[number] @ here
-            # The plane's own inverse depth divides out: what is left of the scale is z then over z now.
+            # there[2] is z in the other camera, divided by z in this one.
             ratio = np.where(there[2] / (picture.drawn.to_plane[number, 2] @ here) > NEAR_M, there[2], np.nan)
             flow[v + v0, u + u0] = (there[:2] / ratio - here[:2]).T
         return flow
