@@ -101,24 +101,28 @@ class RoboteqEmulator(MotorController):
         self._say(text.encode("latin-1"))
 
     def _answer(self, line: str) -> str:
-        mark, (name, *arguments) = line[0], line[1:].upper().split() or [""]
         try:
-            values = [int(argument) for argument in arguments]
-            match mark:
-                case "!":
-                    self._command(name, values)
-                    return _ACCEPTED
-                case "?":
-                    return self._query(name, values)
-                case "^":
-                    self._configure(name, values)
-                    return _ACCEPTED
-                case "~":
-                    return self._configuration(name)
+            return self._obeyed(line)
         except (_Refused, ValueError):
-            """Refused below, as whatever begins with another mark."""
-        self.refused += 1
-        return _REFUSED
+            self.refused += 1
+            return _REFUSED
+
+    def _obeyed(self, line: str) -> str:
+        """The answer to a line that is carried out. Raises _Refused or ValueError."""
+        mark, (name, *arguments) = line[0], line[1:].upper().split() or [""]
+        values = [int(argument) for argument in arguments]
+        match mark:
+            case "!":
+                self._command(name, values)
+                return _ACCEPTED
+            case "?":
+                return self._query(name, values)
+            case "^":
+                self._configure(name, values)
+                return _ACCEPTED
+            case "~":
+                return self._configuration(name)
+        raise _Refused
 
     def _command(self, name: str, values: list[int]) -> None:
         match name, values:
