@@ -180,10 +180,10 @@ def attach(
     alive: NDArray[np.bool_],
     expected: NDArray[np.bool_],
 ) -> NDArray[np.int32]:
-    """winner (P,) with each small new part given to the track of the closest large part.
+    """winner (P,) with each new part given to the track of the closest part that is twice as large or more.
 
-    A part that is expected (P, T) at a track counts as touching it. new_parts: indices. alive (T,): the tracks
-    that may get parts: those that move or have moved.
+    A part that is expected (P, T) at a track counts as touching it. new_parts: indices. alive (T,): tracks
+    that may get parts, which are those that move or have moved.
     """
     if len(new_parts) == 0 or not alive.any():
         return winner

@@ -48,7 +48,7 @@ _UNSEEN, _SMOOTH, _ROUGH, _CUT, _SLIVER = range(5)
 
 
 def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
-    """Update tracks with the surfaces measured, entry k for track k. A track without cells stays predicted."""
+    """Update tracks with the surfaces measured, entry k for track k; one without cells stays predicted."""
     dt_s, rotation = detection.dt_s, detection.pose.rotation
     kind, centre_m, change, tracks.area_m2 = _kinds(
         measured.cells,

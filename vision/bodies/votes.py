@@ -37,7 +37,7 @@ _SHARE_OF_TRACK = 0.30
 _CAME_CELLS = 20
 _CAME_SHARE = 0.3
 _LEAVING_SHARE = 0.75  # of a static track's cells: a larger part is the static thing itself and cannot leave
-_STAYED_SHARE = 0.7  # of a mover's votes must be for cells that have stayed; the rest lies at the rims of both
+_STAYED_SHARE = 0.7  # of a mover's votes must be for cells that have stayed; the others lie at the rims
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +164,7 @@ def withdraw(
     overdue: NDArray[np.bool_],
     mover: NDArray[np.bool_],
 ) -> tuple[Ballot, NDArray[np.bool_]]:
-    """ballot without overdue movers in parts of static surfaces; and (T,) tracks that lost all parts this way.
+    """ballot without overdue movers in parts of static surfaces; and (T,) tracks that so lost all parts.
 
     A mover loses a part that a static track claims as well if most of its votes there are for cells that have
     stayed: it has gone behind the static surface, at about its depth.
@@ -185,7 +185,7 @@ def withdraw(
 
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:
-    """(h, w) track index + 1: whole parts go to their winner (P,), cells of shared ones to the nearest vote."""
+    """(h, w) track index + 1: whole parts go to their winner (P,), cells of shared ones to the nearest."""
     present, filled = ballot.present, predicted
     shared = _shared(present, winner)
     if shared.any():
@@ -196,7 +196,7 @@ def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[n
 
 @compiled("boolean[:, ::1], int32[::1]")
 def _shared(present: NDArray[np.bool_], winner: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(P,) parts that several tracks claim. The part of a track that is born in this frame is never shared."""
+    """(P,) parts that several tracks claim. A part whose winner is born in this frame is never shared."""
     parts, tracks = present.shape
     result = np.zeros(parts, np.bool_)
     for p in range(parts):
@@ -208,7 +208,7 @@ def _shared(present: NDArray[np.bool_], winner: NDArray[np.int32]) -> NDArray[np
 def _seeds(
     parts: IntGrid, predicted: IntGrid, present: NDArray[np.bool_], shared: NDArray[np.bool_]
 ) -> tuple[IntGrid, BoolGrid]:
-    """(h, w) the votes in shared parts (P,) of the tracks that claim them; and (h, w) cells of these parts."""
+    """(h, w) votes in shared parts (P,) of the tracks that claim them; and (h, w) cells of these parts."""
     height, width = parts.shape
     seeds, inside = np.zeros((height, width), np.int32), np.zeros((height, width), np.bool_)
     for i in range(height):
@@ -229,7 +229,7 @@ def _divided(
     shared: NDArray[np.bool_],
     winner: NDArray[np.int32],
 ) -> IntGrid:
-    """(h, w) the winner of each part; in shared parts (P,) the label in filled if its track claims the part."""
+    """(h, w) the winner of each part; in shared parts (P,) the label in filled, if it claims the part."""
     height, width = parts.shape
     labels = np.zeros((height, width), np.int32)
     for i in range(height):
