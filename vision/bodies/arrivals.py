@@ -121,7 +121,7 @@ class FreeMemory:
     def _compare(
         self, grid: DepthGrid, mask: BoolGrid, pose: Pose, memory: _Memory
     ) -> tuple[BoolGrid, BoolGrid]:
-        """(h, w) cells of mask nearer than the surface in memory; and (h, w) those at it, within the noise."""
+        """(h, w) cells of mask nearer than the surface in memory; and (h, w) those at it, within noise."""
         sigma_1pm = math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
         return _compared(
             grid.depth_m,
