@@ -79,7 +79,7 @@ def smaller_eigenvalue(uu: Reals, uv: Reals, vv: Reals) -> Reals:
 def _gradient_products(
     grey: GreyImage, u: int, v: int, uu: NDArray[np.int32], uv: NDArray[np.int32], vv: NDArray[np.int32]
 ) -> None:
-    """Put the products of twice the gradient, at the pixels within 7 px of u, v, into uu, uv, vv (15 * 16,)."""
+    """Put products of twice the gradient, at the pixels within 7 px of u, v, into uu, uv, vv (15 * 16,)."""
     patch = grey[v - _REACH_PX - 1 : v + _REACH_PX + 2, u - _REACH_PX - 1 : u + _REACH_PX + 3]
     for i in range(_ROWS):
         for j in range(_ROW):
