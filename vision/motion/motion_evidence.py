@@ -130,4 +130,4 @@ def borne_out(detection: Detection) -> float:
     if detection.reckoned:
         return 1.0
     spare = (detection.ego_motion.inlier_ratio - LEAST_AGREEMENT) / (_AGREED - LEAST_AGREEMENT)
-    return min(spare, 1.0) if spare > _LEAST_BORNE_OUT else _LEAST_BORNE_OUT  # not where NaN
+    return min(spare, 1.0) if spare > _LEAST_BORNE_OUT else _LEAST_BORNE_OUT  # NaN gives the minimum
