@@ -1,4 +1,4 @@
-"""What detect yields and track reads: fragments, the residuals of their ends, and what these are worth."""
+"""Detection, the result of detect and the input of track: fragments, residuals of their ends, ego-motion."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
 LEAST_AGREEMENT = 0.45
-# Of a frame that was not compared with the one before.
+# The ego-motion of a frame that was not compared with the one before.
 MOTION_NOT_KNOWN = EgoMotion(
     motion=Pose(np.eye(3), np.zeros(3)),
     dt_s=0.0,
@@ -29,12 +29,23 @@ MOTION_NOT_KNOWN = EgoMotion(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection:
-    """What one frame yields before anything is called an obstacle.
+    """What detect finds in one frame, with N fragments, before anything is called an obstacle.
 
-    N fragments: ids (N,), ends_px (N, 2, 2), near_m (N, 2), age_frames (N,). motion: residuals of the
-    2N ends, both ends of a fragment next to each other. pose: the camera in the fixed frame; restarted:
-    the fixed frame has begun anew, what was tracked before cannot be compared. motion_known: the camera's
-    own motion is known well enough to call anything else moving. reckoned: odometry says it, too.
+    captured_ns, sequence: of the frame.
+    dt_s: since the frame before; 0.0 where the two were not compared.
+    camera: intrinsics of the colour image.
+    grid: coarse grid of depth.
+    ids: of the fragments, (N,).
+    ends_px: their end points (u, v), (N, 2, 2).
+    near_m: depth of the near surface at the ends, NaN where there is none, (N, 2).
+    age_frames: frames since they were found, (N,).
+    motion: residuals of the 2N ends; the two ends of a fragment are adjacent.
+    pose: the camera in the fixed frame.
+    ego_motion: motion of the camera since the frame before.
+    health: condition of the camera.
+    restarted: the fixed frame has begun anew, so earlier positions cannot be compared.
+    motion_known: the camera's own motion is known well enough to call anything else moving.
+    reckoned: odometry supports that motion.
     """
 
     captured_ns: int
@@ -56,7 +67,10 @@ class Detection:
 
 
 def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> CameraHealth:
-    """What the ego-motion tells of the camera. blurred: without odometry, most fragments fit no motion."""
+    """health, worsened by what the ego-motion shows.
+
+    blurred: without odometry, too few fragments fit one motion of the camera.
+    """
     if blurred:
         reason = (
             f"only {ego.inlier_ratio:.0%} of the fragments fit one motion of the camera:"
@@ -79,7 +93,7 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> Camera
 
 
 def no_motion(count: int) -> PointMotion:
-    """Residuals of count ends of which nothing is known."""
+    """Residuals of count ends of which nothing is known: none is usable."""
     return PointMotion(
         static_m=np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
         ray=np.zeros((count, 2)),

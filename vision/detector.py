@@ -1,4 +1,9 @@
-"""detect: an RGB-D frame and the odometry of its time -> tracked fragments, their residuals, ego-motion."""
+"""detect: an RGB-D frame and the odometry at its time become a Detection.
+
+The steps of a frame (_follow): the prior of the camera's motion, optical flow of the fragments, their depth,
+the camera's motion, the residuals of the ends, and new fragments. Before that the depth grid is made and the
+camera's health is checked. track (vision/tracker.py) takes the Detection.
+"""
 
 from __future__ import annotations
 
@@ -61,10 +66,10 @@ class Detector:
         self._variance_scale = 1.0
 
     def step(self, frame: RgbdFrame, odometry: Pose | None, previous: Percept | None = None) -> Detection:
-        """One frame. odometry: the camera by dead reckoning at captured_ns, None where not known.
+        """Detect in one frame. odometry: the camera by dead reckoning at captured_ns, None where not known.
 
-        previous: what tracking made of the frame before, so that fragments on moving things are kept out of
-        the ego-motion and searched for where their obstacle goes, and more are looked for where wanted.
+        previous: result of tracking for the frame before. By it, fragments on moving obstacles are left out
+        of the ego-motion and searched for where the obstacle moves, and wanted bodies get more fragments.
         """
         if frame.gyro is not None:
             self._gyro.add(frame.gyro)
@@ -78,14 +83,14 @@ class Detector:
             health = self._mount_check.judge(grid, frame.captured_ns, health)
         known = len(self._images) > 0 and self._images[0].shape == grey.shape
         if check.continuity is Continuity.REPEATED and health.condition is CameraCondition.GOOD:
-            # An image that was told of before is worth no more than it was then.
+            # A repeated image cannot have a better health than it was reported with before.
             health = replace(self._told, valid_depth_ratio=health.valid_depth_ratio)
         if not usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
             return self._blind(frame, grid, health)
         if check.continuity is not Continuity.NEXT or not known:
             return self._restart(frame, grey, grid, odometry, health)
         dt_s = (frame.captured_ns - self._last_ns) * 1e-9
-        # Not after it: time stepped back at a frame that was of no use.
+        # dt_s is negative if time stepped back at a frame that was not usable.
         if not 0.0 < dt_s <= self._config.max_gap_s:
             return self._restart(frame, grey, grid, odometry, health)
         return self._follow(frame, grey, grid, odometry, previous, dt_s, health)
@@ -193,7 +198,7 @@ class Detector:
         odometry: Pose | None,
         health: CameraHealth,
     ) -> Detection:
-        """Begin anew: after the first frame, a gap, a step back of time, or a change of the image's size."""
+        """Begin anew: at the first frame, after a gap or a step back of time, or with another image size."""
         self._store.clear()
         self._read_out.lose()
         self._motion, self._motion_dt_s = _IDENTITY, 0.0
@@ -204,7 +209,7 @@ class Detector:
         return detection
 
     def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
-        """Nothing can be followed through this frame; the fragments wait for the next good one."""
+        """A frame in which nothing can be tracked; the fragments wait for the next usable frame."""
         self._read_out.lose()
         return self._detection(frame, grid, health, no_motion(2 * len(self._store)))
 

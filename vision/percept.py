@@ -1,4 +1,4 @@
-"""What perception says of one frame, to others and to itself in the next one."""
+"""The result of perception for one frame: for the decision, and for perception itself in the next frame."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vision.scene import Fragments, Scene
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Percept:
-    """scene and fragments of one frame; wanted: where more fragments would tell more."""
+    """scene, fragments: of one frame. wanted: bodies on which more fragments are to be searched for."""
 
     scene: Scene
     fragments: Fragments

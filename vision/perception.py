@@ -1,4 +1,4 @@
-"""detect and track, composed: what the runners drive."""
+"""The entry point of perception: detect and track, composed. The runners call it for each frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vision.tracker import Tracker
 
 
 class Perception:
-    """One camera's eyes. detect and track stay apart so that a runner can time each."""
+    """Perception for one camera. detect and track are separate, so that a runner can time each of them."""
 
     def __init__(
         self,
@@ -25,12 +25,15 @@ class Perception:
         self._before: Percept | None = None
 
     def detect(self, frame: RgbdFrame, odometry: Pose | None) -> Detection:
-        """RGB-D frame to fragments with their residuals. odometry: the camera (optical frame) in the
-        odometry frame at frame.captured_ns by dead reckoning, None where not known."""
+        """RGB-D frame to fragments with their residuals.
+
+        odometry: pose of the camera (optical frame) in the odometry frame at frame.captured_ns, by dead
+        reckoning; None where not known.
+        """
         return self._detector.step(frame, odometry, self._before)
 
     def track(self, detection: Detection, robot_pose: PlanarPose | None) -> Percept:
-        """Fragments and depth to the scene. robot_pose is handed on to it."""
+        """Fragments and depth to the scene. robot_pose is passed on to it."""
         percept = self._tracker.step(detection, robot_pose)
         self._before = percept
         return percept

@@ -1,4 +1,4 @@
-"""What perception tells the decision about one frame: obstacles, free space, health.
+"""The Scene: what perception tells the decision about one frame. Obstacles, free space, camera health.
 
 Positions and velocities are in the camera optical frame (x right, y down, z forward) at captured_ns.
 """
@@ -19,14 +19,18 @@ from hal.types import FloatArray, PlanarPose, Pose
 class Obstacle:
     """A thing that the robot could touch, seen by its fragments or by depth alone.
 
-    bbox_px: (u0, v0, u1, v1) in the colour image; of a mover out of sight where it is expected.
-    position_m: (3,) centre of the visible surface. extent_m: (3,) full size of the visible surface
-    along x, y, z. velocity_mps: (3,) over ground
-    (the robot's own motion removed), along the camera axes. velocity_cov: (3, 3) (m/s)^2; wide
-    while the obstacle is young, so that a first sight bounds the closing speed instead of
-    calling it zero. moving: decided with hysteresis; score: 0..1, confidence in that it is a
-    moving object if moving, else in that it is an object. age_s: since the obstacle was first seen.
-    unseen_s: since it was last seen (it is predicted meanwhile).
+    id: of the track; never used again.
+    bbox_px: (u0, v0, u1, v1) in the colour image; for a mover out of sight, where it is expected.
+    position_m: (3,) centre of the visible surface.
+    extent_m: (3,) full size of the visible surface along x, y, z.
+    velocity_mps: (3,) over ground (the robot's own motion removed), along the camera axes.
+    velocity_cov: (3, 3) covariance in (m/s)^2. It is large while the obstacle is young, so that the closing
+        speed of a new obstacle is bounded instead of being taken for zero.
+    moving: the verdict, decided with hysteresis.
+    score: 0..1, confidence that it is a moving object if moving, else that it is an object.
+    fragments: number of fragments on it.
+    age_s: since the obstacle was first seen.
+    unseen_s: since it was last seen; it is predicted meanwhile.
     """
 
     id: int
@@ -42,24 +46,28 @@ class Obstacle:
     unseen_s: float
 
 
-# No camera sees the floor from farther away on.
+# floor_from_m of a camera that never has the floor in view; also its upper bound.
 NEVER_M = 100.0
 
 
 @record(frozen=True, slots=True, eq=False)
 class FreeSpace:
-    """A scan made of the depth image: what stands between the floor and the robot's height.
+    """A scan made of the depth image: obstacle surfaces between the floor and the robot's height.
 
-    For each of N upright bands, left to right: bearing_tan (N,) is x/z of its centre in the
-    optical frame levelled to the floor; nearest_m (N,) the forward distance z to the nearest
-    obstacle surface (inf: none seen); known_m (N,) how far the space was really seen, so that
-    whatever lies beyond is unknown and therefore not free. half_width_tan: half a band's width.
-    blind_m: floor in the view nearer than this forward distance was too near to be measured, and is no part
-    of what is known; 0.0: all of it can be measured. floor_from_m: nearer than this forward distance the
-    floor is below the view, however far known_m reaches; 0.0: not known, NEVER_M: it never comes into view.
-    up_tan: by so much a metre of forward distance the upper edge of the view rises from the camera's height;
-    inf: not known. blank (N,): bands in which hardly anything was measured at all, near or far; None: not
-    told.
+    It has N upright bands, left to right, in the optical frame levelled to the floor.
+
+    bearing_tan: (N,) x/z of the centre of each band.
+    half_width_tan: half the width of a band, in the same unit.
+    nearest_m: (N,) forward distance z to the nearest obstacle surface; inf: none seen.
+    known_m: (N,) forward distance up to which the space was really seen. Space beyond is unknown and
+        therefore not free.
+    blind_m: floor in view nearer than this forward distance is too near to be measured, and is not part of
+        what is known; 0.0: all of it can be measured.
+    floor_from_m: nearer than this forward distance the floor is below the view, however far known_m reaches;
+        0.0: not known; NEVER_M: the floor never comes into view.
+    up_tan: rise of the upper edge of the view above the camera's height per metre of forward distance; inf:
+        not known.
+    blank: (N,) bands in which hardly anything was measured at all, near or far; None: not reported.
     """
 
     bearing_tan: FloatArray
@@ -82,8 +90,12 @@ class CameraCondition(Enum):
 
 @record(frozen=True, slots=True)
 class CameraHealth:
-    """condition, and why in a plain sentence ("" when good). valid_depth_ratio: share of the depth
-    image that was measured, also beyond the depth mask, 0..1."""
+    """Health of the camera in one frame.
+
+    condition: how far it can be trusted.
+    reason: why, in a plain sentence; "" when good.
+    valid_depth_ratio: share of the depth image that was measured, also beyond the depth mask, 0..1.
+    """
 
     condition: CameraCondition
     reason: str
@@ -94,10 +106,13 @@ class CameraHealth:
 class EgoMotion:
     """The camera's own motion between the frame before and this one.
 
-    motion: the camera now, in the camera before (p_before = motion.apply(p_now)). dt_s: between the
-    two exposures. source: which of "visual", "odometry", "none" it rests on; "disputed": on the images, which
-    the odometry contradicts. inlier_ratio: share of the fragments that agree with it as static, NaN where not
-    estimated. sigma_translation_m and sigma_rotation_rad: one standard deviation over the whole interval.
+    motion: the camera now, in the camera frame before (p_before = motion.apply(p_now)).
+    dt_s: between the two exposures.
+    source: what it rests on: "visual", "odometry", "none", or "disputed" (the images, which the odometry
+        contradicts).
+    inlier_ratio: share of the fragments that agree with it as static; NaN where not estimated.
+    sigma_translation_m: one standard deviation over the whole interval.
+    sigma_rotation_rad: one standard deviation over the whole interval.
     """
 
     motion: Pose
@@ -112,9 +127,14 @@ class EgoMotion:
 class Fragments:
     """The featured fragments of the paper: N line segments, tracked from frame to frame.
 
-    ids (N,) int64. ends_px (N, 2, 2) float32: two end points (u, v). depth_m (N,), NaN: not known.
-    position_m (N, 3): middle, optical frame. velocity_mps (N, 3): over ground, NaN until measured.
-    velocity_sigma_mps (N, 3). moving (N,) bool. obstacle_id (N,) int64, -1: none.
+    ids: (N,) int64.
+    ends_px: (N, 2, 2) float32, two end points (u, v).
+    depth_m: (N,) of the middle; NaN: not known.
+    position_m: (N, 3) of the middle, optical frame.
+    velocity_mps: (N, 3) over ground; NaN until measured.
+    velocity_sigma_mps: (N, 3) standard deviation per axis; NaN until measured.
+    moving: (N,) bool, its obstacle moves.
+    obstacle_id: (N,) int64; -1: none.
     """
 
     ids: NDArray[np.int64]
@@ -129,8 +149,17 @@ class Fragments:
 
 @record(frozen=True, slots=True, eq=False)
 class Scene:
-    """All that one frame says to the decision. robot_pose: the body in the odometry frame at
-    captured_ns as perception used it; None without odometry."""
+    """All that perception tells the decision about one frame.
+
+    captured_ns: time of the exposure.
+    sequence: number of the frame.
+    obstacles: listed tracks.
+    free_space: what depth shows of the space ahead.
+    ego_motion: the camera's own motion since the frame before.
+    health: of the camera.
+    robot_pose: the robot's body in the odometry frame at captured_ns, as perception used it; None without
+        odometry.
+    """
 
     captured_ns: int
     sequence: int

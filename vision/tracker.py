@@ -1,9 +1,9 @@
-"""track: what was detected -> the Scene. Bodies with stable ids and filtered velocity, moving or static.
+"""track: a Detection becomes the Scene, with bodies of stable id and filtered velocity, moving or static.
 
-Terms (cell, part, track, body, surface, region): vision/__init__.py. Order of the steps: obstacles (velocity
-of fragments), arrivals, regions, masks, votes, grouping (cells to tracks), births, carving, grounding,
-merging, division (cut out, reach down, join, split), sightings (filters), adoption (fragments to tracks),
-obstacles (velocity of bodies), judgement, report.
+Steps, with their modules: velocities of fragments (least_squares); arrived and stayed surfaces (arrivals);
+cells to tracks (masks, connected, votes, grouping, births); suspects cut out (carving); movers extended to
+the floor (grounding); bodies joined and divided (merging, division); filters (sightings); fragments to tracks
+(adoption); velocities of bodies (least_squares); verdict (judgement); report. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ from vision.numerics import kalman
 from vision.percept import Percept
 from vision.scene import CameraCondition, FreeSpace, Scene
 
-_ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: 0.28 m/s in the first second
-_FORGET_S = 0.5  # who goes behind a post is out again by then; for longer the decision remembers
-_FORGET_YOUNG_S = 0.15  # some frames: what was hardly seen is taken for a speckle
-_LONG_AGO_NS = 10**9  # as seen last, of what is to be forgotten now: more than the former
+_ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: a sigma of 0.28 m/s after 1 s
+_FORGET_S = 0.5  # a mover behind a post is visible again by then; the decision remembers for longer
+_FORGET_YOUNG_S = 0.15  # a few frames, for a track that was hardly seen: it is taken for a speckle
+_LONG_AGO_NS = 10**9  # age of the last sighting of a track that is to be forgotten now: above _FORGET_S
 
 
 @compiled("float64[:, :], float64[:, :, :], float64[:], int64[::1], float64, float64[:, :]")
@@ -60,8 +60,8 @@ def _measured(
     share: float,
     rotation: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Velocities (K, 3) of those to use (K,), in the fixed frame that rotation leads to, and their covariance
-    (K, 3, 3): share times as much as given, and swing, the variance of limbs, in any direction."""
+    """Velocities (K, 3) of the tracks use (K,) in the fixed frame, to which rotation leads, and covariances
+    (K, 3, 3): share times the given ones, plus swing, the variance by limbs, in each direction."""
     velocity, noise = np.zeros((len(use), 3)), np.zeros((len(use), 3, 3))
     for k in range(len(use)):
         t = use[k]
@@ -77,7 +77,7 @@ def _measured(
 
 
 class Tracker:
-    """Keeps the tracks, which cells and which fragments are theirs, and where space was free."""
+    """Keeps the tracks, their cells and fragments of the last frame, and the memory of free space."""
 
     def __init__(self, config: PerceptionConfig, body_height_m: float, clearance_m: float) -> None:
         self._config = config
@@ -92,7 +92,7 @@ class Tracker:
         self._last_ns: int | None = None
 
     def step(self, detection: Detection, robot_pose: PlanarPose | None) -> Percept:
-        """One detection, in the order of time."""
+        """Track through one detection; call in the order of time."""
         tracks = self._tracks
         if detection.restarted:
             tracks.clear()
@@ -124,7 +124,7 @@ class Tracker:
         velocities: FragmentVelocities,
         elapsed_s: float,
     ) -> NDArray[np.int64]:
-        """Surfaces first, then velocities, then the verdict. Returns the owners of the fragments."""
+        """Update surfaces first, then velocities, then the verdict. Returns the track id of each fragment."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         changes = self._free.changes(grid, standing, pose, detection.captured_ns)
         if detection.motion_known or detection.restarted:
@@ -148,8 +148,8 @@ class Tracker:
         velocities: FragmentVelocities,
         elapsed_s: float,
     ) -> tuple[IntGrid, IntGrid, Regions]:
-        """(h, w) track index + 1 of each cell, after births; the same with what stands below movers given to
-        them, which is no vote in the next frame; and what the tracks' surfaces measure with that."""
+        """Assign cells to tracks: labels (h, w), track index + 1; the same with movers extended to the floor;
+        and the regions of the tracks with that. The cells of the extension do not vote in the next frame."""
         tracks, grid = self._tracks, detection.grid
         labels = self._claim(detection, standing, changes, elapsed_s)
         measured = regions.measure(grid, labels, len(tracks))
@@ -166,7 +166,7 @@ class Tracker:
         return labels, whole, upright
 
     def _claim(self, detection: Detection, standing: BoolGrid, changes: Changes, elapsed_s: float) -> IntGrid:
-        """(h, w) track index + 1 of each cell, by what each track covered in the frame before; births."""
+        """(h, w) track index + 1 of each cell, by the cells of all tracks in the frame before; births."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         mover = tracks.mover
         shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
@@ -194,7 +194,7 @@ class Tracker:
         return votes.divide(parts, predicted, ballot, winner)
 
     def _regroup(self, detection: Detection, labels: IntGrid, measured: Regions, changes: Changes) -> IntGrid:
-        """Merge what is one body and split what is two; the same labels where there is nothing to do."""
+        """Join tracks that are one body and divide those that are two; the same labels if there are none."""
         tracks, grid = self._tracks, detection.grid
         if not tracks.moving.any():
             return labels
@@ -221,7 +221,7 @@ class Tracker:
         arrivals: NDArray[np.intp],
         cells: NDArray[np.intp],
     ) -> None:
-        """One weighted least squares per body, fused into its filter; then moving or not."""
+        """One weighted least squares per body, fused into its filter; then the verdict."""
         tracks, settings = self._tracks, self._config.motion
         rotation = detection.pose.rotation
         index = tracks.index_of(owner)
@@ -236,7 +236,7 @@ class Tracker:
         )
         use = limbs.believable(body).nonzero()[0]
         if len(use):
-            # Windows overlap: each frame brings dt / window of a new measurement.
+            # The time windows of successive frames overlap: a frame adds dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
             going = tracks.speed_mps * tracks.moving
             velocity, noise = _measured(

@@ -1,1 +1,22 @@
-"""Obstacles: parts of the view become bodies with an id, a velocity and a verdict."""
+"""Obstacles: connected parts of the view become tracks with id, velocity and verdict (moving or static).
+
+Files, in the order in which they come into play within one frame (vision/tracker.py calls them):
+
+* tracks - the state of all tracks that is kept from frame to frame.
+* arrivals - which surfaces have arrived in space that was seen free, and which have stayed.
+* masks - where the cells of each track are predicted in this frame.
+* votes - the predicted cells vote to which track each connected part belongs.
+* grouping - parts are attached to tracks or detached from them where connected depth says too little.
+* births - new tracks for large parts that no track claims.
+* carving - suspects: possible movers, cut out of a larger track.
+* ends - the cells close to the end points of fragments; used by carving.
+* grounding - a mover is extended down to the floor.
+* merging - two tracks that are one body are joined.
+* division - one track that holds two bodies is divided.
+* boxes - geometry of boxes; used by grouping, merging and report.
+* sightings - the Kalman filters are updated by the centroids of the visible surfaces.
+* adoption - each fragment is assigned to a track.
+* proof - what one frame proves of each track: moving, standing still or neither.
+* judgement - the proofs are added up over frames to a verdict with hysteresis.
+* report - tracks and fragments are written into the Scene.
+"""

@@ -1,6 +1,6 @@
-"""Which fragment belongs to which track: the one on whose visible surface, and at whose depth, it lies.
+"""Assignment of fragments to tracks: each to the track on whose visible surface, at whose depth, it lies.
 
-Terms (fragment, surface, track): vision/__init__.py.
+It runs after the cells have been assigned to tracks. Terms (fragment, surface, track): vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -18,24 +18,25 @@ from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.motion.candidates import long_static
 
-# Where along a fragment its body is looked for, and how much above: a lower edge lies on the floor. Last,
-# beside it: an outline lies on the rim, where the cells may be those of the body behind.
+# Places where the label of a fragment's body is looked up: at these shares of its length; three of them above
+# it, since the cells of a lower edge are those of the floor; the last two beside it, since an outline lies on
+# the rim, where the cells may be those of the body behind.
 _ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85, 0.5, 0.5])
 _ABOVE_PX = np.array([0.0, 0.0, 0.0, 8.0, 8.0, 8.0, 0.0, 0.0])
 _BESIDE_PX = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -8.0, 8.0])
-_ON_IT = 6  # places that are on the fragment: one of these at least has to agree, not only one beside it
-_LEAST_GATE_M = 0.3  # about a body's depth: an outline may be as far back as its side
-_SAME_DEPTH_M = 0.05  # closer than this, beside the noise, is at the same depth: no surface is even
-_NEARER = 0.1  # per metre, against the depth by which a fragment is off
+_ON_IT = 6  # the first 6 places are on or above the fragment: at least one of these has to agree in depth
+_LEAST_GATE_M = 0.3  # gate on depth, plus two sigmas: an outline may be as far back as the side of the body
+_SAME_DEPTH_M = 0.05  # plus one sigma: smaller differences in depth do not count, since no surface is even
+_NEARER = 0.1  # cost per metre of distance, in metres of difference in depth: prefers nearer bodies
 
 
 def inherited(
     known: NDArray[np.int64], owner: NDArray[np.int64], ids: NDArray[np.int64], tracks: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """(N,) id of the track that each fragment of ids (N,) belonged to a frame before, -1 for none.
+    """(N,) id of the track that each fragment of ids (N,) belonged to in the frame before, -1 for none.
 
-    known (M,), owner (M,): the fragments then, and their tracks. tracks (T,): those there still are. All ids
-    grow.
+    known (M,), owner (M,): ids of the fragments then, and of their tracks. tracks (T,): ids of the present
+    tracks. ids, known and tracks are in ascending order.
     """
     return _inherited(known, owner, ids, tracks)
 
@@ -60,8 +61,8 @@ def adopt(
 ) -> NDArray[np.int64]:
     """(N,) id of the track that each fragment of detection belongs to, -1 for none.
 
-    labels (h, w): track index + 1 of each cell. owner (N,): as of the frame before. A line that has long
-    lain still, on the floor or a wall, does not go to a mover that passes by.
+    labels (h, w): track index + 1 of each cell. owner (N,): ids of the tracks in the frame before. A fragment
+    that has been static for a while, on the floor or a wall, is not given to a mover that passes by.
     """
     grid = detection.grid
     if len(tracks) == 0 or len(owner) == 0:
@@ -101,7 +102,7 @@ def _adopted(
     still: NDArray[np.bool_],
     owner: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """As adopt; still (N,): fragments that have long been."""
+    """As adopt. still (N,): fragments that have been static for a while."""
     height, width = labels.shape
     result = np.full(len(ends_px), -1, np.int64)
     for k in range(len(ends_px)):
@@ -117,8 +118,8 @@ def _adopted(
             if labels[row, column] == 0 or not gap_m <= _LEAST_GATE_M + 2.0 * sigma_m:
                 continue
             on_it = on_it or i < _ON_IT
-            # Of two bodies in one place of the image, the one at whose depth the fragment is; where noise
-            # hides the difference, the nearer one: an outline belongs to what is in front.
+            # Of two bodies at one place in the image, take the one at the depth of the fragment. Where noise
+            # hides the difference take the nearer one, since an outline belongs to the body in front.
             off = max(gap_m - _SAME_DEPTH_M - sigma_m, 0.0) + np.float32(_NEARER) * there_m
             if off < least:
                 track, least = labels[row, column] - 1, off

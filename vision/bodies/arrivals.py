@@ -1,9 +1,11 @@
-"""Surfaces where there was free space a moment ago: in a world that stands still there are none.
+"""Surfaces that have arrived in space that was seen free a moment ago. In a static world there are none.
 
-Whatever the camera saw through, from wherever it stood, was empty. A surface that is there now has
-come. The test needs no texture and no segmentation, and neither a new viewpoint nor what it uncovers
-can mislead it: what was hidden or not measured then proves nothing. By the same memory a surface is known
-that was there before, as far as the noise of depth tells: somebody close to a wall seems to be.
+All space that the camera saw through, from any position, was empty. A surface that is there now has arrived.
+The test needs neither texture nor segmentation. A new viewpoint and the surfaces that it uncovers cannot
+mislead it, since space that was hidden or not measured proves nothing. The same memory shows which surfaces
+have stayed, as far as the noise of depth allows; a person close to a wall may count as stayed.
+
+It takes the depth grid and the camera's pose. vision/tracker.py calls it first in each frame.
 """
 
 from __future__ import annotations
@@ -22,19 +24,20 @@ from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 from vision.numerics.relative_pose import Row, coordinate_m, relative_row
 
-# Every second view at 30 frames a second: a look back takes whichever is close to it.
+# Every second view at 30 frames a second is kept. A look back takes the view closest to the wanted time.
 _KEEP_EVERY_S = 0.06
-# Who walks has left his own width behind in the longer one; the shorter one forgets sooner what the camera's
-# own motion was off by.
+# In the longer time a walking person moves by more than his own width. In the shorter time less error of the
+# camera's own motion has added up.
 _LOOK_BACK_S = (0.2, 0.6)
-_MARGIN_M = 0.10  # beside the noise: what the camera's motion may be off by over the longer look back
-_SIGMAS = 3.5  # of what is compared, two in ten thousand cells by chance; neighbours have to agree, too
-# Noise of a cell between two looks over that of a pixel, measured over time: a median over 25 cells of four
-# samples each, whose noise neighbours share. Within one look, over the floor, it is CELL_HEIGHT_NOISE.
+_MARGIN_M = 0.10  # besides the noise: error of the camera's motion over the longer look back
+_SIGMAS = 3.5  # of the difference compared: exceeded by chance in 2 of 10000 cells; neighbours must agree too
+# Noise of a cell between two frames relative to that of a pixel, as measured over time. A cell is a median
+# over 25 cells of four samples each, and neighbours share their noise. Within one frame, for heights over the
+# floor, the factor is CELL_HEIGHT_NOISE (vision/depth/depth_grid.py).
 _CELL_NOISE_OVER_TIME = 0.55
-_NEIGHBOURS = 5  # of a cell and its eight neighbours, this many must have arrived
-_UNKNOWN = np.float32(1e3)  # 1/m, of what was not measured: nothing is nearer, so that nothing has come there
-_NEAREST_M = np.float32(0.1)  # nearer, a point projects anywhere
+_NEIGHBOURS = 5  # at least this many of a cell and its eight neighbours must have arrived
+_UNKNOWN = np.float32(1e3)  # 1/m, where nothing was measured: no surface is nearer, so none can arrive there
+_NEAREST_M = np.float32(0.1)  # the projection of a nearer point is meaningless
 _BLOCK = np.ones((3, 3), np.uint8)
 
 
@@ -42,14 +45,20 @@ _BLOCK = np.ones((3, 3), np.uint8)
 class _Memory:
     stamp_ns: int
     pose: Pose
-    nearest_inverse: FloatGrid  # per cell the nearest surface of its 3x3 neighbourhood; large: not known
+    nearest_inverse: FloatGrid  # 1/m, of the nearest surface in 3x3 cells; _UNKNOWN where not measured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Changes:
-    """arrived (h, w): surfaces in space that was seen free, and as flat cells (K,). stayed (h, w): surfaces
-    that were seen there before, stayed_s ago (0.0: no such look); what was hidden or not measured then is
-    neither."""
+    """Cells whose surface has arrived, and cells whose surface has stayed.
+
+    arrived: cells of surfaces in space that was seen free, (h, w).
+    arrived_cells: the same as flat indices, (K,).
+    stayed: cells of surfaces that were seen at the same place stayed_s ago, (h, w).
+    stayed_s: 0.0 if there was no view of that time.
+
+    Cells that were hidden or not measured then are in neither.
+    """
 
     arrived: BoolGrid
     arrived_cells: NDArray[np.intp]
@@ -58,18 +67,18 @@ class Changes:
 
 
 class FreeMemory:
-    """Remembers what was seen through during the last moments."""
+    """Remembers the views of the last moments, and so the space that was seen free."""
 
     def __init__(self, noise: DepthNoise) -> None:
         self._noise = noise
         self._memories: list[_Memory] = []
 
     def clear(self) -> None:
-        """Forget: the poses before cannot be compared with those to come."""
+        """Forget all views: their poses cannot be compared with those to come."""
         self._memories.clear()
 
     def changes(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> Changes:
-        """What has come and what has stayed, of the cells of mask (h, w)."""
+        """Which of the cells of mask (h, w) have arrived and which have stayed."""
         came, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
         for wanted_s in _LOOK_BACK_S:
             memory = self._memory_of(now_ns, wanted_s)
@@ -82,18 +91,18 @@ class FreeMemory:
         return Changes(*_in_company(came, np.flatnonzero(came)), stayed, stayed_s)
 
     def resolves_m(self, distance_m: FloatArray) -> FloatArray:
-        """(N,) how much nearer or farther a surface at distance_m (N,) has to be to be told from another."""
+        """(N,) minimum difference in depth at which two surfaces at distance_m (N,) can be distinguished."""
         noise_1pm = _SIGMAS * math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
         result: FloatArray = _MARGIN_M + noise_1pm * np.square(distance_m)
         return result
 
     def remember(self, grid: DepthGrid, pose: Pose, now_ns: int) -> None:
-        """Keep this view, unless the last one kept is very young."""
+        """Keep this view, unless the last one was kept less than _KEEP_EVERY_S ago."""
         if self._memories and (now_ns - self._memories[-1].stamp_ns) * 1e-9 < _KEEP_EVERY_S:
             return
         nearest = np.full(grid.inverse_depth.shape, _UNKNOWN)
         cv2.copyTo(grid.inverse_depth, grid.valid.view(np.uint8), nearest)
-        # What was measured beyond was seen through up to where depth ends, no farther.
+        # Where the measured depth is beyond the range, space was seen free up to the range, no farther.
         nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
         cv2.dilate(nearest, _BLOCK, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest))
@@ -101,7 +110,7 @@ class FreeMemory:
         self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
 
     def _memory_of(self, now_ns: int, wanted_s: float) -> _Memory | None:
-        """The view closest to wanted_s ago, if there is one between half and one and a half of it."""
+        """The view closest to wanted_s ago, if there is one within 0.5 to 1.5 times of it."""
         best, gap = None, 0.5 * wanted_s
         for memory in self._memories:
             off = abs((now_ns - memory.stamp_ns) * 1e-9 - wanted_s)
@@ -112,8 +121,7 @@ class FreeMemory:
     def _compare(
         self, grid: DepthGrid, mask: BoolGrid, pose: Pose, memory: _Memory
     ) -> tuple[BoolGrid, BoolGrid]:
-        """(h, w) which cells of mask are nearer than what memory saw there, and which are as near, as far as
-        noise tells."""
+        """(h, w) cells of mask nearer than the surface in memory; and (h, w) those at it, within noise."""
         sigma_1pm = math.sqrt(2.0) * _CELL_NOISE_OVER_TIME * self._noise.quadratic_per_m
         return _compared(
             grid.depth_m,
@@ -139,8 +147,11 @@ def _put_row(
     cell: IntGrid,
     inverse: FloatGrid,
 ) -> None:
-    """Put into cell (w,) which flat one each cell of a row is in the other view, -1: outside of it; and its
-    inverse depth there into inverse (w,). Without a branch, so that the processor does several at once."""
+    """Project the cells of one row into the other view.
+
+    Puts the flat cell of that view, -1 outside of it, into cell (w,) and the inverse depth there into inverse
+    (w,). There is no branch, so that the processor can do several at once.
+    """
     columns, width, height = np.int32(len(ray_x)), np.float32(len(ray_x)), np.float32(len(ray_y))
     left, top, zero = ray_x[0], ray_y[0], np.float32(0.0)
     per_column, per_row = np.float32(1.0) / (ray_x[1] - left), np.float32(1.0) / (ray_y[1] - top)
@@ -172,7 +183,7 @@ def _compared(
     seen_inverse: FloatGrid,
     noise_1pm: np.float32,
 ) -> tuple[BoolGrid, BoolGrid]:
-    """As _compare; rotation and origin_m of the camera, now and when seen_inverse (h, w) was seen."""
+    """As _compare. rotation, origin_m: pose of the camera now; old_...: when seen_inverse (h, w) was seen."""
     height, width = depth_m.shape
     nearer, same = np.zeros((height, width), np.bool_), np.zeros((height, width), np.bool_)
     cell, inverse, seen = np.empty(width, np.int32), np.empty(width, np.float32), seen_inverse.ravel()
@@ -195,8 +206,10 @@ def _compared(
 
 @compiled("boolean[:, ::1], int64[::1]")
 def _in_company(mask: BoolGrid, cells: NDArray[np.intp]) -> tuple[BoolGrid, NDArray[np.intp]]:
-    """(h, w) those of cells (K,), the flat ones of mask (h, w), of whose 3x3 neighbourhood enough are in it;
-    and these as flat ones."""
+    """The cells with enough cells of mask (h, w) in their 3x3 neighbourhood, as (h, w) and as flat indices.
+
+    cells (K,): flat indices of all cells of mask.
+    """
     height, width = mask.shape
     result, kept, number = np.zeros((height, width), np.bool_), np.empty(len(cells), np.intp), 0
     for cell in cells:

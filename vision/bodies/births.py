@@ -1,4 +1,4 @@
-"""New tracks, for parts of the view that no track claims. Terms: vision/__init__.py."""
+"""New tracks for large parts of the view that no track claims. Terms: vision/__init__.py."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
-# About 0.1 x 0.1 m 4 m away, as sim.yaml's camera sees it: what is smaller comes and goes with noise.
+# About 0.1 x 0.1 m at 4 m with the camera of sim.yaml. Smaller parts come and go with noise.
 _MIN_CELLS = 12
-_SIGMA_M = 0.2  # one sigma of a first sight: the middle of what is seen, from the middle of the body
-# Of what is above the robot, at the side of the image: so much has come, and it hangs no higher than people.
+_SIGMA_M = 0.2  # standard deviation of a first sighting: centre of the visible surface from that of the body
+# A part above the robot's height at the side of the image begins a track if at least this many of its cells,
+# and this share of them, have arrived, and it reaches down below the height of a person.
 _CAME_CELLS, _CAME_SHARE, _PERSON_M = 24, 0.5, 2.0
 
 
@@ -30,10 +31,12 @@ def begin(
     body_height_m: float,
     max_speed_mps: float,
 ) -> NDArray[np.int32]:
-    """winner (P,), track index + 1 of each part or 0, with new tracks: large parts nobody claims, if they
-    reach down to the robot or may, or are an arm that swings into the view ahead of its body.
+    """winner (P,), track index + 1 of each part or 0, with new tracks for large parts without a winner.
 
-    parts (h, w), measured, came (P,): of them, cells where free space was seen.
+    A part begins a track if it reaches down below the robot's height, if its lower end is hidden so that it
+    may reach down, or if it is an arm that swings into the view ahead of its body.
+
+    parts (h, w): labels of the parts. measured: their regions. came (P,): their cells that have arrived.
     """
     grid = detection.grid
     large = (winner == 0) & (measured.cells >= _MIN_CELLS)
@@ -56,7 +59,7 @@ def begin(
 
 
 def reaching_down(grid: DepthGrid, labels: IntGrid, count: int, body_height_m: float) -> NDArray[np.bool_]:
-    """(count,) parts 1..count of labels (h, w) seen below body_height_m; all where heights are not known."""
+    """(count,) parts 1..count of labels (h, w) with cells below body_height_m; all without a known floor."""
     if grid.height_m is None:
         return np.ones(count, np.bool_)
     return _low(labels, grid.height_m, np.float32(body_height_m), count)
@@ -64,7 +67,7 @@ def reaching_down(grid: DepthGrid, labels: IntGrid, count: int, body_height_m: f
 
 @compiled("int32[:, ::1], float32[:, ::1], float32, int64")
 def _low(labels: IntGrid, height_m: FloatGrid, body_height_m: np.float32, count: int) -> NDArray[np.bool_]:
-    """As reaching_down, where heights (h, w) are known."""
+    """As reaching_down, with known heights (h, w)."""
     rows, columns = labels.shape
     cells = np.zeros(count, np.intp)
     for i in range(rows):

@@ -1,6 +1,6 @@
-"""Boxes around parts and surfaces, in space and in the image: which are close, above or within which.
+"""Boxes around regions, in space and in the image: gaps, overlaps, and which lies above or within which.
 
-Terms: vision/__init__.py.
+Used by vision/bodies/grouping.py, merging.py and report.py. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from vision.bodies.division import LOW, WITHIN
 from vision.depth.depth_grid import DepthGrid, nearest_cell
 from vision.depth.regions import Regions
 
-LOAD_M = 0.8  # by so much farther back a load may begin than what carries it
-THROUGH_M = 1.5  # by so much farther back a vehicle may be seen through itself
-LEAST_SAMPLES = 3  # of the cells between two: something is there
-_SAMPLES = 24  # from one to another
-_MOSTLY = 0.7  # of its width: a load juts out beyond its carrier by no more
-_TOUCHING_PX = 16.0  # four cells: the rims between two depths are of neither
+LOAD_M = 0.8  # maximum gap between a load and its carrier: the load may begin farther back
+THROUGH_M = 1.5  # maximum gap between a vehicle and its own far side, seen through it
+LEAST_SAMPLES = 3  # of the cells sampled between two regions: from so many on, something is there
+_SAMPLES = 24  # cells sampled on the way from one region to another
+_MOSTLY = 0.7  # of a load's width is above its carrier at least; the rest may jut out
+_TOUCHING_PX = 16.0  # two edges in the image touch: 4 cells, since the rims at a jump in depth are of neither
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,10 +41,14 @@ def boxes(regions: Regions) -> Boxes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Relations:
-    """How K boxes lie to K others, (K,) each. gap_m: between them in space, 0 where they touch. overlap:
-    share of the one that the other covers in the image. stacked: there the lower end of the one is the upper
-    end of the other, for most of its width. within: there it lies within the other and is at most half as
-    tall, as nobody behind somebody else is."""
+    """How each of K boxes lies relative to one other box, (K,) each.
+
+    gap_m: distance between the two in space, 0 where they touch.
+    overlap: share of the first box that the other covers in the image.
+    stacked: in the image the lower edge of the first is the upper edge of the other, for most of its width.
+    within: in the image the first lies within the other and is at most half as tall. A person behind another
+        one is taller.
+    """
 
     gap_m: FloatArray
     overlap: FloatArray
@@ -53,7 +57,7 @@ class Relations:
 
 
 def relations(regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]) -> Relations:
-    """How regions one (K,) lie to regions other (K,)."""
+    """How regions one (K,) lie relative to regions other (K,), both as indices."""
     return Relations(
         *_relations(regions.position_m, regions.extent_m, regions.bbox_px, one, other, LOW, WITHIN)
     )
@@ -89,8 +93,10 @@ def _relations(
 
 
 def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
-    """(K,) share of box a[k] that box b[k] covers in the image; (K, 4) each: u0, v0, u1, v1; or of any
-    shape (..., 4) that a and b are broadcast to."""
+    """(...) share of box a that box b covers in the image.
+
+    a, b (..., 4): u0, v0, u1, v1; they are broadcast to each other.
+    """
     size = np.minimum(a[..., 2:], b[..., 2:]) - np.maximum(a[..., :2], b[..., :2])
     shared = np.maximum(size, 0.0).prod(axis=-1)
     result: FloatArray = shared / np.maximum((a[..., 2:] - a[..., :2]).prod(axis=-1), 1.0)
@@ -100,7 +106,7 @@ def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
 def cells_between(
     grid: DepthGrid, regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """(24, K) cells in the image on the way from the middle of region one[k] to that of other[k]."""
+    """(24, K) flat cells on the straight line in the image from the middle of region one[k] to other[k]'s."""
     height, width = grid.depth_m.shape
     return _cells_between(regions.bbox_px, one, other, grid.offset_px, grid.step_px, height, width)
 

@@ -1,11 +1,15 @@
-"""Movers that connected depth hides in something larger: a person close to a wall is one part with it.
+"""Suspects: possible movers, cut out of a larger static track with which connected depth merges them.
 
-Two kinds of cells are cut out of a large static track and become tracks of their own: cells that have arrived
-(vision/bodies/arrivals.py), and cells around fragments that no static surface explains, two that move alike
-or one that has gone one way for a while. Such a track is only a suspect, which is then looked at more closely
-(vision/fragments/attention.py): without further evidence it ends, and its cells go back to the track around
-them. Likewise a mover that has grown over something it walks along is cut back to these cells. Terms:
-vision/__init__.py.
+A person close to a wall is one part with it. Two kinds of cells are cut out of a large static track and begin
+a track of their own:
+
+* cells that have arrived (vision/bodies/arrivals.py);
+* cells around fragments that no static surface explains: two or more that move alike, or one that has moved
+  clearly for a while.
+
+Such a track is a suspect. It is looked at more closely (vision/fragments/attention.py). Without further
+evidence it ends, and its cells go back to the track around them. Likewise a mover that has grown over
+something it moves along is cut back to these cells. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -31,16 +35,20 @@ from vision.detection import Detection
 from vision.motion import candidates
 from vision.motion.least_squares import FragmentVelocities
 
-SUSPECT_EVIDENCE = 0.3  # gone in 0.09 s where nothing speaks for motion, in 0.6 s where hints do
-_COMPACT_M = 1.6  # wider or deeper than any one body with what it carries: it may hide one
-_BODY_M = 0.85  # nobody is wider (SINGLE_WIDTH_M of vision/bodies/division.py)
-_CALM_S = 0.9  # for so long, what has come to rest is where free space was seen
+# Score at the start. It is used up in 0.09 s where nothing speaks for motion, in 0.6 s where something does.
+SUSPECT_EVIDENCE = 0.3
+_COMPACT_M = 1.6  # a track wider or deeper than one body with its load may hide another body
+_BODY_M = 0.85  # no person is wider (SINGLE_WIDTH_M of vision/bodies/division.py)
+# For 0.9 s after something has come to rest its surface may still count as arrived (1.5 times the longer look
+# back of vision/bodies/arrivals.py).
+_CALM_S = 0.9
 _MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py)
-_MIN_FRAGMENTS = 2  # one alone may be an end that slides
-# One alone, on somebody who walks along a wall: seen for so long, level, and surely so fast.
+_MIN_FRAGMENTS = 2  # that move alike; one alone may be an end that slides
+# One fragment alone, on a person who walks along a wall, is believed if it has been seen for this long, moves
+# at this speed (a slow walk) with a certainty of this many sigmas (as a verdict needs), and moves level.
 _LONE_S = 0.25
-_LONE_MPS, _LONE_SIGMAS = 0.4, 4.0  # a slow walk, as surely as a verdict asks for
-_LEVEL = 0.3  # of its speed may go up or down: an end that slides along an upright edge does
+_LONE_MPS, _LONE_SIGMAS = 0.4, 4.0
+_LEVEL = 0.3  # maximum vertical share of its speed: an end that slides along an upright edge has more
 _BLOCK = np.ones((3, 3), np.uint8)
 
 
@@ -53,10 +61,10 @@ def carve(
     velocities: FragmentVelocities,
     config: PerceptionConfig,
 ) -> IntGrid:
-    """labels (h, w), track index + 1, with suspects cut out; they are started in tracks.
+    """labels (h, w), track index + 1, with suspects cut out; these are started in tracks.
 
-    measured: of labels. velocities: of the fragments detected. The same labels come back where there is
-    nothing to cut out.
+    measured: regions of labels. arrived (h, w): cells that have arrived. velocities: of the fragments of
+    detection. The same labels object is returned where there is nothing to cut out.
     """
     if len(tracks) == 0:
         return labels
@@ -112,14 +120,14 @@ def _in_question(
     floor_m: float,
     quadratic_per_m: float,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(T,) tracks that may hide a mover; and movers that have grown larger than any body."""
+    """(T,) static tracks that may hide a mover; and (T,) movers that have grown larger than any body."""
     searched, overgrown = np.zeros(len(mover), np.bool_), np.zeros(len(mover), np.bool_)
     for t in range(len(mover)):
         depth_m = position_m[t, 2]
         deepest_m = _COMPACT_M + 2.0 * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
         compact = extent_m[t, 0] <= _COMPACT_M and extent_m[t, 2] <= deepest_m
-        # Where the lines of something wider than a body stand while a part of it arrives, somebody touches
-        # it.
+        # If the fragments of something wider than a body stand still while part of it arrives, somebody
+        # touches it.
         touched = calm[t] and extent_m[t, 0] > _BODY_M
         searched[t] = not mover[t] and (not compact or touched)
         overgrown[t] = moving[t] and not compact
@@ -146,8 +154,10 @@ def _cut_back(
     shown: BoolGrid,
     config: PerceptionConfig,
 ) -> IntGrid:
-    """labels (h, w) where movers that have grown larger than any body, over furniture they walk along, keep
-    only what is shown (h, w) to move. The rest of each begins as a track that stands."""
+    """labels (h, w) with overgrown movers (T,) reduced to the cells that are shown (h, w) to move.
+
+    They have grown over furniture they move along. The rest of each begins as a static track.
+    """
     for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
         widened = np.asarray(cv2.dilate((shown & own).view(np.uint8), _BLOCK), np.uint8)
@@ -175,8 +185,10 @@ def _around_moving_fragments(
     looked_at: BoolGrid,
     config: PerceptionConfig,
 ) -> BoolGrid:
-    """(h, w) those cells of looked_at (h, w) that are close to the ones of fragments chosen (K,) that move in
-    company, or clearly, at their depth."""
+    """(h, w) cells of looked_at (h, w) close to moving fragments of chosen (K,), at their depth.
+
+    A fragment counts as moving if others move alike, or if its own motion is clear enough (_alone).
+    """
     result = np.zeros(detection.grid.depth_m.shape, np.bool_)
     motion = detection.motion
     if len(chosen) == 0:
@@ -200,8 +212,10 @@ def _around_moving_fragments(
 def _of_chosen(
     static_m: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, chosen: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of fragments chosen (K,): (K, 3) the middle of their ends, of static_m (2N, 3); velocity (K, 3) and
-    covariance (K, 3, 3)."""
+    """Position (K, 3), velocity (K, 3) and its covariance (K, 3, 3) of fragments chosen (K,).
+
+    The position is the middle of the two ends in static_m (2N, 3).
+    """
     position, velocity = np.empty((len(chosen), 3)), np.empty((len(chosen), 3))
     spread = np.empty((len(chosen), 3, 3))
     for k in range(len(chosen)):
@@ -215,8 +229,11 @@ def _of_chosen(
 def _alone(
     seen_s: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, most_mps: float
 ) -> NDArray[np.bool_]:
-    """(K,) fragments, seen for seen_s (K,), whose velocity (K, 3), in the camera's axes, with covariance
-    (K, 3, 3) needs no other one beside it to be believed. most_mps: faster ones are mistakes."""
+    """(K,) fragments whose velocity is believed without another fragment that moves alike.
+
+    seen_s (K,): time since they were first seen. velocity_mps (K, 3), covariance (K, 3, 3): in the camera's
+    axes. most_mps: faster ones are mistakes.
+    """
     result = np.zeros(len(seen_s), np.bool_)
     for k in range(len(seen_s)):
         v, along = velocity_mps[k], 0.0
@@ -224,7 +241,7 @@ def _alone(
         for i in range(3):
             for j in range(3):
                 along += v[i] * covariance[k, i, j] * v[j]
-        # v' C v / v'v is the variance along its way.
+        # v' C v / v'v is the variance of the speed, along the direction of motion.
         sure = speed >= _LONE_MPS and speed**2 > _LONE_SIGMAS * math.sqrt(along)
         level = abs(v[1]) <= _LEVEL * speed
         result[k] = seen_s[k] >= _LONE_S and sure and level and speed <= most_mps

@@ -1,6 +1,7 @@
-"""Two bodies in one part of connected depth, such as two people who walk side by side: where to divide it.
+"""Division of one track that holds two bodies, such as two people who walk side by side.
 
-Terms (cell, part, body): vision/__init__.py.
+It takes the cells of one track and returns those of a second body, if there is one. vision/tracker.py calls
+it for each moving track, after merging (vision/bodies/merging.py). Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -13,41 +14,52 @@ from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.numerics.order import median, quantile, quantiles
 
-SINGLE_WIDTH_M = 0.85  # nobody is wider
-NEARER_INVERSE = 0.02  # 1/m, of what stands before a body
-_PAIR_DISTANCE_M = 0.5  # shoulder to shoulder, middle to middle: bodies cannot be closer side by side
-_VALLEY = 0.35  # of the lower hill: so little is left between two bodies; arms touch
-WITHIN = 0.9  # of a group of cells: it is seen through another one
-LOW_BESIDE = 0.6  # of the height of a body in the image: a trolley is, a child beside an adult is not
-_STANDING = 0.5  # of the share that would not have stayed
-LOW = 0.5  # of the height of that in the image; somebody behind somebody else is taller
-_DIP_M = 0.15  # between two heads; a shoulder is lower still
-# Of a head, so much from its top down: a load is wider, a post narrower and has no shoulders.
+SINGLE_WIDTH_M = 0.85  # no single person is wider
+NEARER_INVERSE = 0.02  # 1/m: something is in front of a body if its inverse depth is larger by this
+_PAIR_DISTANCE_M = 0.5  # minimum distance of the middles of two people side by side, shoulder to shoulder
+# A valley between two bodies holds at most this share of the surface of the lower hill beside it. It is not
+# empty, since arms touch.
+_VALLEY = 0.35
+WITHIN = 0.9  # a group of cells is seen through another one if this share of it is within the other's box
+# A group is low beside a body if it is at most this share as tall in the image: a trolley is, a child beside
+# an adult is not.
+LOW_BESIDE = 0.6
+# A group is static if fewer of its cells have left than this share of those that would have left, had it
+# moved along.
+_STANDING = 0.5
+LOW = 0.5  # a group seen through another one is at most this share as tall; a person behind it is taller
+_DIP_M = 0.15  # minimum depth of the dip between two heads; a shoulder is lower still
+# Shape of a head: its width is measured _HEAD_M below its top and lies between the next two values. The
+# shoulders are measured _SHOULDERS_M below the top. A load is wider; a post is narrower and has no shoulders.
 _HEAD_M, _LEAST_HEAD_M, _HEAD_WIDTH_M, _SHOULDERS_M = 0.15, 0.13, 0.30, 0.36
-_LEAST_APART_M, _MOST_APART_M = 0.35, 0.8  # two heads; who walks farther apart leaves a valley
-_HARDLY = 0.2  # of the image between two groups of cells
-_MIN_CELLS = 24  # of either of two: twice what a track begins with, for each half is to be judged by itself
-_BINS = 12  # along the line: a tenth of a metre each where two people walk side by side
+_LEAST_APART_M, _MOST_APART_M = 0.35, 0.8  # distance of two heads; people farther apart leave a valley
+_HARDLY = 0.2  # share of the image between two groups: if less shows something farther, nothing is seen there
+_MIN_CELLS = 24  # in each of two groups: twice what a track begins with, since each is judged by itself
+_BINS = 12  # along the line: 0.1 m each where two people walk side by side
 
 
 def split(
     grid: DepthGrid, labels: IntGrid, track: int, stayed: BoolGrid, way_m: float
 ) -> NDArray[np.intp] | None:
-    """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one.
+    """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one body.
 
-    The cells are laid along the line on which they spread most (seen from above). Two people leave a
-    valley in between; a crate, however wide, does not, and where something nearer fills it, it is none. Nor
-    is it one beside a piece that is too wide for anybody, where nothing is seen in it, unless there are two
-    heads: then it is two, with or without a valley. What is seen through the larger group is no second body
-    either. Nor is what is low beside it, a trolley before who pushes it, unless it stands: more of it has
-    stayed (h, w) where it was than if it had gone way_m with the track.
+    The cells are projected onto the line along which they spread most, seen from above. Two people leave a
+    valley in between; a crate, however wide, does not. Where there is no valley, two heads with a dip
+    between them show two people as well. The smaller group is not a second body if
+
+    * it is seen through the larger group, as the far wheels of a cart are;
+    * it is low beside the larger group and moves with it, as a trolley in front of the person who pushes it.
+      It does not move with it if more of its cells are in stayed (h, w) than if it had moved by way_m;
+    * something nearer fills the valley, since that hides the middle of one body;
+    * the groups were found by a valley, one of them is too wide for a person, and hardly anything farther is
+      seen in the valley.
     """
     cells = (labels.ravel() == track + 1).nonzero()[0]
     if len(cells) < 2 * _MIN_CELLS:
         return None
     points = grid.points(cells)[::2].T.astype(float)
     if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < SINGLE_WIDTH_M:
-        return None  # as is most, whichever line they are laid along
+        return None  # a quick test that most tracks end at: no line can be longer than this diagonal
     centred = points - median(points.T)
     _, axes = np.linalg.eigh(centred.T @ centred)
     along = centred @ axes[:, 1]
@@ -64,7 +76,7 @@ def split(
     stands = stays >= 1.0 - _STANDING * min(way_m / max(float(np.ptp(along[second])), 0.1), 1.0)
     if not stands and _low_beside(cells[second], cells[~second], grid.depth_m.shape[1]):
         return None
-    # Two heads are two bodies, however little is seen between these.
+    # Two heads are two bodies even if nothing farther is seen between them.
     wide = beyond is not None and _reach(along, second) > SINGLE_WIDTH_M
     if _hidden_between(grid, cells[second], cells[~second], wide):
         return None
@@ -73,15 +85,17 @@ def split(
 
 
 def _reach(along: FloatArray, second: NDArray[np.bool_]) -> float:
-    """How far the longer of two groups reaches."""
+    """Length of the longer of the two groups along the line."""
     return max(float(np.ptp(along[second])), float(np.ptp(along[~second])))
 
 
 def _beyond_valley(
     points: FloatArray, along: FloatArray, low: float, high: float
 ) -> NDArray[np.bool_] | None:
-    """(K,) which of points (K, 2), seen from above, along (K,) their line, are beyond a valley, the fewer;
-    None: there is none."""
+    """(K,) the smaller group of points on one side of a valley; None: there is no valley.
+
+    points (K, 2): seen from above. along (K,): their coordinates on the line, which low and high bound.
+    """
     # A far cell stands for more surface than a near one.
     weight = np.square(points[:, 1])
     counts, edges = np.histogram(along, _BINS, (low, high), weights=weight)
@@ -99,23 +113,25 @@ def _beyond_valley(
 
 
 def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] | None:
-    """(K,) which of flat cells (K,), in rising order, are beside a dip between two heads, the fewer; None:
-    there are no two. People who walk so close that their arms touch are still two at the top."""
+    """(K,) the smaller group of cells on one side of the dip between two heads; None: there are no two heads.
+
+    cells (K,): flat, in ascending order. People so close that their arms touch are still separate at the top.
+    """
     row, column = np.divmod(cells, grid.depth_m.shape[1])
     column -= column.min()
     top = np.full(int(column.max()) + 1, len(grid.y) - 1, np.intp)
-    top[column[::-1]] = row[::-1]  # what is written last stays
+    top[column[::-1]] = row[::-1]  # the uppermost row of each column is written last and stays
     depth_m = median(grid.depth_m.ravel().take(cells))
     cell_m = float(grid.x[1] - grid.x[0]) * depth_m
     height_m: FloatArray = -grid.y.take(top).astype(float) * depth_m
-    # One stray cell is no head.
+    # A median over three columns, since one stray cell is no head.
     height_m[1:-1] = np.median((height_m[:-2], height_m[1:-1], height_m[2:]), axis=0)
     from_left, from_right = np.maximum.accumulate(height_m), np.maximum.accumulate(height_m[::-1])[::-1]
     dip_m = np.minimum(from_left, from_right) - height_m
     deepest_m = dip_m.max()
     if deepest_m < _DIP_M + cell_m:
         return None
-    # In the middle of what is about as low.
+    # The middle of all columns that are about as low.
     low = (dip_m >= deepest_m - cell_m).nonzero()[0]
     valley = int(low[len(low) // 2])
     one, other = int(height_m[:valley].argmax()), valley + int(height_m[valley:].argmax())
@@ -133,7 +149,7 @@ def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] 
 
 
 def _width_below(height_m: FloatArray, head: int, drop_m: float) -> int:
-    """How many columns around head are at most drop_m lower."""
+    """Number of adjacent columns around column head that are at most drop_m lower than it."""
     high = height_m >= height_m[head] - drop_m
     right = len(high) if high[head:].all() else head + int(high[head:].argmin())
     left = 0 if high[: head + 1].all() else head + 1 - int(high[head::-1].argmin())
@@ -141,18 +157,20 @@ def _width_below(height_m: FloatArray, head: int, drop_m: float) -> int:
 
 
 def _fewer(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(K,) chosen, or the others, whichever are fewer."""
+    """(K,) chosen or its complement, whichever has fewer entries."""
     return ~chosen if np.count_nonzero(chosen) * 2 > len(chosen) else chosen
 
 
 def _low_beside(small: NDArray[np.intp], large: NDArray[np.intp], width: int) -> bool:
-    """Whether a small group of flat cells is much lower in the image than the large one."""
+    """Whether a small group of flat cells is much less tall in the image than the large one."""
     return bool(np.ptp(small // width) + 1 <= LOW_BESIDE * (np.ptp(large // width) + 1))
 
 
 def _seen_through(small: NDArray[np.intp], large: NDArray[np.intp], width: int) -> bool:
-    """Whether a small group of flat cells is low and mostly within the image box of the large one, as the far
-    wheels of a cart are that are seen under it."""
+    """Whether a small group of flat cells is low and mostly within the image box of the large one.
+
+    So are the far wheels of a cart that are seen under it.
+    """
     (top, left), (bottom, right) = (edge(np.divmod(large, width), axis=1) for edge in (np.min, np.max))
     row, column = np.divmod(small, width)
     if np.ptp(row) + 1 > LOW * (bottom - top + 1):
@@ -162,8 +180,11 @@ def _seen_through(small: NDArray[np.intp], large: NDArray[np.intp], width: int) 
 
 
 def _hidden_between(grid: DepthGrid, one: NDArray[np.intp], other: NDArray[np.intp], wide: bool) -> bool:
-    """Whether something nearer fills most of the image between two groups of flat cells: then the valley
-    there is what hides the middle of one body. wide: so it is, too, if hardly anything is seen there."""
+    """Whether something nearer fills most of the image between two groups of flat cells.
+
+    Then the valley is what hides the middle of one body. wide: the same holds if hardly anything farther is
+    seen there.
+    """
     width = grid.depth_m.shape[1]
     left, right = (one, other) if median(one % width) < median(other % width) else (other, one)
     first, last = int(quantile(left % width, 0.9)) + 1, int(quantile(right % width, 0.1))

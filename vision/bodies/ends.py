@@ -1,4 +1,7 @@
-"""Which cells are close to ends of fragments, at their depth. Terms: vision/__init__.py."""
+"""The cells close to the ends of fragments, at their depth; vision/bodies/carving.py cuts them out.
+
+Terms: vision/__init__.py.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,11 @@ from hal.types import FloatArray
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid, nearest_cell
 
-_AROUND_M = 0.2  # cells so close to a moving fragment are of its body; a body is about twice as wide
-_AGREE_M = 0.3  # about a body's depth, and
-_AGREE_PER_M2 = 0.015  # two sigmas of depth by the default noise
+_AROUND_M = 0.2  # cells within this distance belong to the fragment's body, which is about twice as wide
+# Gate on depth: the depth of a body, plus two sigmas of depth with the default noise, which grow with the
+# square of the depth.
+_AGREE_M = 0.3
+_AGREE_PER_M2 = 0.015
 
 
 def near_ends(
@@ -23,7 +28,10 @@ def near_ends(
     depth_m: NDArray[np.float32],
     focal_px: float,
 ) -> BoolGrid:
-    """(h, w) those cells of looked_at (h, w) that are close to the ends (N, 2, 2), at their depth (N, 2)."""
+    """(h, w) cells of looked_at (h, w) that are close to the ends (N, 2, 2) of fragments, at their depth.
+
+    depth_m (N, 2): of the ends, NaN where it is not known.
+    """
     seeds, top, left, rows, columns, end_m = _seeds(
         ends_px, depth_m, looked_at, _AROUND_M * focal_px / grid.step_px, grid.offset_px, grid.step_px
     )
@@ -53,9 +61,12 @@ def _seeds(
     offset_px: float,
     step_px: float,
 ) -> tuple[NDArray[np.uint8], int, int, NDArray[np.intp], NDArray[np.intp], FloatArray]:
-    """The part of the grid with all cells that can be close to an end, 0 where ends are; its top and left;
-    row and column of the ends in it, and their depth: no ends if none of the cells there is looked_at.
-    reach_at_1m: in cells, less farther away."""
+    """The window of the grid that holds all cells which can be close to an end.
+
+    Returns an image of the window, 0 at the ends and 1 elsewhere; its top row and left column; row and column
+    of the ends within it, and their depths. No ends are returned if no cell of the window is looked_at.
+    reach_at_1m: _AROUND_M in cells at a distance of 1 m; it is less farther away.
+    """
     height, width = looked_at.shape
     rows, columns = np.empty(depth_m.size, np.intp), np.empty(depth_m.size, np.intp)
     end_m, count = np.empty(depth_m.size), 0
@@ -98,8 +109,10 @@ def _within_reach(
     looked_at: BoolGrid,
     per_cell: np.float32,
 ) -> BoolGrid:
-    """As near_ends. distance in cells to the nearest end, and its label: of the part of the grid of _seeds.
-    per_cell: of the reach, 1 m away."""
+    """As near_ends. distance (in cells) to the nearest end, and label of that end: in the window of _seeds.
+
+    per_cell: width of a cell at 1 m, as a share of _AROUND_M.
+    """
     result = np.zeros(looked_at.shape, np.bool_)
     nearest_m = np.zeros(label.max() + 1)
     for k in range(len(end_m)):

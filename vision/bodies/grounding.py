@@ -1,8 +1,8 @@
-"""What moves stands on the floor: a mover cut out of something larger reaches down as far as that does.
+"""Extension of movers down to the floor: a mover that was cut out of a larger surface stands on the floor.
 
-Depth tells a person close to a wall from it at the head or at the hands first, and fragments are where there
-are edges. What is connected below, at the same depth, is the rest of the body: nothing that goes hovers.
-Terms: vision/__init__.py.
+For a person close to a wall, depth and fragments show motion at the head or the hands first. But a moving
+body does not hover: the cells below it, connected and at the same depth, are the rest of it. This step gives
+them to the mover. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -15,21 +15,25 @@ from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import Regions, exchanged, measure
 
-_SAME_M = 0.3  # about a body's depth, and
-_SAME_PER_M2 = 0.015  # two sigmas of depth by the default noise
-_HOVERS_M = 0.2  # what reaches no farther down is the rim of what was found already
-_LOWEST = 4  # one in so many of its rows, the lowest: what reaches down does so at their depth
+# Gate on depth: the depth of a body, plus two sigmas of depth with the default noise, which grow with the
+# square of the depth.
+_SAME_M = 0.3
+_SAME_PER_M2 = 0.015
+_HOVERS_M = 0.2  # minimum gain in height: less is only the rim of the cells that were found already
+_LOWEST = 4  # the lowest quarter of a mover's rows gives the depth at which it reaches down
 
 
 def ground(
     grid: DepthGrid, labels: IntGrid, measured: Regions, chosen: NDArray[np.bool_], mover: NDArray[np.bool_]
 ) -> tuple[IntGrid, Regions]:
-    """labels (h, w), track index + 1, with what stands below the tracks chosen (T,), at their depth and not
-    parted from them, given to them, and what they measure with that. mover (T,): keep what is theirs.
+    """Give the static cells below the tracks chosen (T,) to them, at their depth and without a gap.
 
-    measured: of labels. What stands there measures what it did: these cells may be its own, after all. The
-    same labels and measures come back where there is nothing to give, as where the floor is not known: then
-    all of it would be below.
+    Returns labels (h, w), track index + 1, with these cells, and the regions with the chosen tracks measured
+    anew. measured: regions of labels. mover (T,): tracks that lose no cells. The static tracks keep their
+    measures, since the cells may be theirs after all.
+
+    The same objects are returned where there is nothing to give, and where the floor is not known: then the
+    floor itself would count as cells below.
     """
     if grid.height_m is None:
         return labels, measured
@@ -48,7 +52,7 @@ def ground(
 
 @inlined
 def _median_depth_m(depth_m: FloatGrid, labels: IntGrid, label: int, first: int, last: int) -> np.float32:
-    """Of the cells with that label in rows first to last, of which there is one at least."""
+    """Median depth of the cells with label in rows first to last; there has to be at least one."""
     found_m = np.sort(depth_m[first : last + 1].ravel()[labels[first : last + 1].ravel() == label])
     middle = len(found_m) // 2
     odd = len(found_m) % 2 == 1
@@ -60,10 +64,12 @@ def _median_depth_m(depth_m: FloatGrid, labels: IntGrid, label: int, first: int,
 def _below(
     depth_m: FloatGrid, ray_y: FloatGrid, labels: IntGrid, label: int, standing: NDArray[np.bool_]
 ) -> NDArray[np.intp]:
-    """Flat cells below those with that label that belong to them, column by column. standing: of the labels,
-    whether cells may be taken from them."""
+    """Flat cells below those with label that belong to it, column by column.
+
+    standing: for each label, whether cells may be taken from it.
+    """
     height, width = labels.shape
-    # The rows it is in; in each of its columns the lowest row of its own.
+    # Its first and last row, and its lowest row in each column.
     top, bottom, foot = height, -1, np.full(width, height, np.intp)
     for i in range(height):
         for j in range(width):
@@ -79,13 +85,13 @@ def _below(
         for i in range(foot[j] + 1, height):
             found_m, there = depth_m[i, j], labels[i, j]
             if abs(found_m - own_m) > same_m:
-                # Without data, or on the rim of a jump in depth, nothing parts them.
+                # Another depth separates the two; a cell without data, or at the rim of a jump, does not.
                 if found_m > 0.0:
                     break
             elif there > 0 and standing[there]:
                 taken[count] = i * width + j
                 count, lowest = count + 1, max(lowest, i)
-    # It may stand with one foot, and has no more feet than it shows.
+    # The lowest cell of all columns counts: it may stand on one foot only.
     if (ray_y[lowest] - ray_y[bottom]) * own_m < np.float32(_HOVERS_M):
         return taken[:0]
     return taken[:count]

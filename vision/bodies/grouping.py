@@ -1,13 +1,14 @@
-"""Parts to bodies, where connected depth says too little. Terms: vision/__init__.py.
+"""Correction of which whole parts belong to which track, where connected depth says too little.
 
-* attach: a hole in the depth image may part a shoe, an arm or a load from its body. A small new part close to
-  somebody who moves, or has moved before, becomes part of it.
 * expected_in: something nearer, a post for example, may divide a mover in the image. The piece on the other
   side of it is still part of the mover.
 * detach: a part far from the main part of its track leaves the track, unless it is expected there or is a
   load that stands on the main part.
+* attach: a hole in the depth image may separate a shoe, an arm or a load from its body. A small new part
+  close to a track that moves, or has moved before, becomes part of that track.
 
-Two tracks that are one body: vision/bodies/merging.py.
+It takes the winners of vision/bodies/votes.py and returns them corrected. Two tracks that are one body are
+joined later, by vision/bodies/merging.py. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -24,18 +25,22 @@ from vision.bodies.division import NEARER_INVERSE
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
 
-_APART_M = 0.40  # parts further from the main one are of something else
-_CLOSE_M = 0.25  # a hand's length of depth is lost at a shoe or under an arm
-_SAME_DEPTH_M = 0.30  # about a body's depth, beside the noise
-_SMALL_SHARE = 0.5  # of the larger part: what is more is a body of its own
-_MOSTLY = 0.7  # of its cells were the track's before: then it stays, as a load does
+_APART_M = 0.40  # parts farther than this from the main part belong to something else
+_CLOSE_M = 0.25  # gap that missing depth at a shoe or under an arm leaves: about the length of a hand
+_SAME_DEPTH_M = 0.30  # besides the noise, the visible surface may lie this far from the centre in depth
+_SMALL_SHARE = 0.5  # of the larger part's cells: a new part with more is a body of its own
+_MOSTLY = 0.7  # share of a part's cells that voted for the track: from here on it stays, as a load does
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExpectedBodies:
-    """Where T bodies are expected, in the camera frame. centre_m (T, 3), extent_m (T, 3): of what was seen of
-    them last; box_m (T, 4): edges of the whole ones from their centres, left, upper, right, lower; sigma_m
-    (T,): of depth there."""
+    """Where T bodies are expected, in the camera frame.
+
+    centre_m: predicted centre, (T, 3).
+    extent_m: size of the surface that was seen last, (T, 3).
+    box_m: left, upper, right, lower edge of the whole body from its centre, (T, 4).
+    sigma_m: standard deviation of measured depth there, (T,).
+    """
 
     centre_m: FloatArray
     extent_m: FloatArray
@@ -51,11 +56,11 @@ def expected_in(
     bodies: ExpectedBodies,
     mover: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """(P, T) which parts are what is seen of a mover on the other side of something nearer that divides it.
+    """(P, T) which parts belong to a mover that something nearer divides in the image.
 
-    winner (P,), votes (P,): as in a Ballot; the part with the most votes is what is surely the body's. The
-    rest of it is no farther away than the whole makes room for, and it is at its depth. mover (T,): of the
-    others nothing is expected.
+    The part of the track with the most votes surely belongs to the body. Another part is expected if it lies
+    within the whole body's box around the predicted centre, at about its depth, and something nearer stands
+    between the two. winner (P,), votes (P,): as in a Ballot. mover (T,): only for these parts are expected.
     """
     result = np.zeros((len(parts.cells), len(mover)), np.bool_)
     if not mover.any():
@@ -92,8 +97,10 @@ def _with_room(
     sigma_m: FloatArray,
     mover: NDArray[np.bool_],
 ) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
-    """(P, T) which parts a mover makes room for, at its depth; and (T,) which part is surely its own: without
-    one it makes no room."""
+    """(P, T) parts within the box and depth of a mover; and (T,) its main part, the one with the most votes.
+
+    A mover without a main part (-1) gets no others.
+    """
     result, main = np.zeros((len(cells), len(mover)), np.bool_), np.full(len(mover), -1, np.intp)
     for p in range(len(winner)):
         t = winner[p] - 1
@@ -119,7 +126,7 @@ def _with_room(
 def something_nearer_between(
     grid: DepthGrid, parts: Regions, one: NDArray[np.intp], other: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """(K,) whether something nearer stands between the middles of parts one[k] and other[k] in the image."""
+    """(K,) whether something nearer lies between the middles of parts one[k] and other[k] in the image."""
     inverse = grid.inverse_depth.ravel().take(cells_between(grid, parts, one, other))
     depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
     nearer = inverse > 1.0 / np.maximum(depth, 0.1) + NEARER_INVERSE
@@ -130,10 +137,10 @@ def something_nearer_between(
 def detach(
     winner: NDArray[np.int32], parts: Regions, votes: NDArray[np.intp], expected: NDArray[np.bool_]
 ) -> NDArray[np.int32]:
-    """winner (P,), track index + 1 of each part or 0, without the parts far from the track's main one.
+    """winner (P,), track index + 1 of each part or 0, without the parts far from their track's main part.
 
-    votes (P,): how many cells spoke for the winner. expected (P, T): parts that stay with it all the same, as
-    those do that stand on the main one in the image, or are seen through it, and were its own before.
+    A part stays all the same if it is expected (P, T), or if it stands on the main part in the image, or is
+    seen through it, and most of its cells voted for the track. votes (P,): of the winner.
     """
     main = _main_parts(winner, votes)
     beside = (main != np.arange(len(main))).nonzero()[0]
@@ -150,8 +157,10 @@ def detach(
 
 @compiled("int32[::1], int64[:]")
 def _main_parts(winner: NDArray[np.int32], votes: NDArray[np.intp]) -> NDArray[np.intp]:
-    """(P,) the part with the most votes, the first of these, of those with the same winner; of nobody's part
-    itself."""
+    """(P,) main part of each part's winner: of the parts with that winner the first with the most votes.
+
+    A part without a winner is its own main part.
+    """
     parts = len(winner)
     main = np.arange(parts)
     for p in range(parts):
@@ -171,8 +180,11 @@ def attach(
     alive: NDArray[np.bool_],
     expected: NDArray[np.bool_],
 ) -> NDArray[np.int32]:
-    """winner (P,) with new parts (indices) given to the track that they are small beside and close to, or to
-    the one that is expected there (P, T). alive (T,): the tracks that may get them, which move or moved."""
+    """winner (P,) with each new part given to the track of the closest part that is twice as large or more.
+
+    A part that is expected (P, T) at a track counts as touching it. new_parts: indices. alive (T,): tracks
+    that may get parts, which are those that move or have moved.
+    """
     if len(new_parts) == 0 or not alive.any():
         return winner
     of_mover = ((winner > 0) & np.concatenate(([False], alive))[winner]).nonzero()[0]

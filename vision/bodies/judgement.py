@@ -1,27 +1,33 @@
-"""Moving or static, for each track: a verdict with hysteresis, from several kinds of proof.
+"""The verdict moving or static for each track, with hysteresis, from several kinds of proof.
 
 Kinds of proof in one frame, each of them a rule of vision/bodies/proof.py (threshold: settings.sigmas
 squared; ends: end points of the track's fragments):
 
-* Fragments (_by_fragments): the velocity over ground, as filtered and by this frame's fragments alone,
-  differs clearly from zero. If it is level and across the line of sight, 4 agreeing ends suffice. Along the
-  line of sight 8 are needed: a few sliding ends look like a change of length. The surface must not contradict
-  (across, 8 ends outvote it); where the surface confirms the velocity, less will do.
-* Unrest (_by_unrest): of 8 ends or more, at least 70 % contradict standing still, though, as limbs do, they
-  may agree on no velocity. The filtered velocity needs half of the threshold only, after 0.4 s a quarter.
-* Arrival (_by_arrival): part of the surface stands where free space was seen. Half of the threshold suffices.
+* Fragments (_by_fragments): the velocity over ground, both filtered and by this frame's fragments alone,
+  clearly differs from zero. For level motion across the line of sight, 4 agreeing ends suffice. Along the
+  line of sight 8 are needed, since a few sliding ends look like a change of length. The surface must not
+  contradict (across the line of sight, 8 ends overrule it). Where the surface confirms the velocity, 0.55 of
+  the threshold suffices.
+* Unrest (_by_unrest): of 8 ends or more, at least 70 % contradict standing still, though they may agree on
+  no common velocity, as the ends on limbs. The filtered velocity needs to exceed half of the threshold only,
+  after 0.4 s a quarter.
+* Arrival (_by_arrival): part of the surface is where free space was seen. Half of the threshold suffices.
   Where much of the surface has arrived, that alone is proof, except for a mover that has just stopped.
-* Surface (_by_surface): the centre of a whole, compact surface moves for longer and more clearly than a new
-  viewpoint or a growing surface explains.
+* Surface (_by_surface): the centre of a whole, compact surface moves for longer and more clearly than a
+  change of viewpoint or a growing surface explains.
 
-All kinds need a known motion of the camera and, except for much arrival, more than the least speed. Bodies
-too fast or too wide to be true prove nothing.
+All kinds need a known motion of the camera and, except for much arrival, more than the minimum speed. Bodies
+that are implausibly fast or wide prove nothing.
 
-Hysteresis: evidence is a track's score from 0 to 1.5. A frame with proof raises it by dt / 0.06 s (0.07 s
-without odometry) or more, by 0.5 at most, and by less where the camera's own motion is in doubt. Without
-proof it falls by dt / 0.30 s, by dt / 2 s while the motion seems to go on, and by dt / 0.12 s where
-fragments, or of a mover the filter, prove that it stands still, or where nothing tells a mover from what
-stands around it. A track becomes moving at 1.0 and static again at 0.
+Hysteresis: evidence is a track's score from 0 to 1.5.
+
+* A frame with proof raises it by dt / 0.06 s (0.07 s without odometry) for the weakest proof, by up to 2.5
+  times that for a stronger one, but by 0.5 at most, and by less where the camera's own motion is in doubt.
+* Without proof it falls by dt / 0.30 s, or by dt / 2 s while the motion seems to go on.
+* It falls by dt / 0.12 s where the motion is over: where this frame's fragments, or for a mover the filter,
+  prove that it stands still, or where nothing distinguishes a mover from the static surface around it.
+
+A track becomes moving at 1.0 and static again at 0.
 """
 
 from __future__ import annotations
@@ -38,24 +44,32 @@ from hal.types import FloatArray
 from vision.bodies.proof import prove
 from vision.motion.motion_evidence import MotionEvidence
 
-# Two frames at 30 a second: with three of them the first detection came 0.07 s later.
+# Time in which the weakest proof raises the score by 1: two frames at 30 a second. With three frames the
+# first detection came 0.07 s later.
 _RISE_S = 0.06
-# Without odometry an error of the camera's motion stays for some frames: one more of them is asked for.
+# Without odometry an error of the camera's motion lasts for some frames, so one more frame is required.
 _RISE_ALONE_S = 0.07
-_FASTEST = 2.5  # times, with overwhelming proof
-_MOST_A_FRAME = 0.5  # no single frame proves motion, however long ago the one before was
-_FALL_S = 0.30  # without proof: in some frames there is none of what moves
-_HOLD_S = 2.0  # without new proof
-_STOP_S = 0.12  # with proof of standing still
-_MAX_EVIDENCE = 1.5  # half as much again as a verdict takes: no mover is held for much longer
-IMPLAUSIBLE = 1.6  # times the greatest speed: faster things are mistakes
-_SURE_SQUARED_SIGMAS = 30.0  # five and a half sigmas: a confidence of 0.63, and 0.4 at the least proof
+_FASTEST = 2.5  # maximum factor on the rise, with overwhelming proof
+_MOST_A_FRAME = 0.5  # maximum rise per frame: no single frame proves motion, however long the interval was
+# Times in which the score falls by 1.
+_FALL_S = 0.30  # without proof: in some frames a moving body gives none
+_HOLD_S = 2.0  # without new proof, while the motion seems to go on
+_STOP_S = 0.12  # with proof that the motion is over
+_MAX_EVIDENCE = 1.5  # 1.5 times what a verdict needs, so that no mover is held for much longer
+IMPLAUSIBLE = 1.6  # times the maximum speed: faster things are mistakes
+_SURE_SQUARED_SIGMAS = 30.0  # 5.5 sigmas give a confidence of 0.63; the weakest proof gives 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdict:
-    """evidence, moving, confidence 0..1, whether its fragments are sure that it stands, and whether this
-    frame proved that it moves: (T,) each."""
+    """Of T tracks, (T,) each.
+
+    evidence: the score.
+    moving: the verdict.
+    confidence: in that it moves, 0..1.
+    stands: this frame's fragments are sure that it stands still.
+    proven: this frame proved that it moves.
+    """
 
     evidence: FloatArray
     moving: NDArray[np.bool_]
@@ -71,7 +85,10 @@ def judge(
     dt_s: float,
     settings: MotionSettings,
 ) -> Verdict:
-    """Raise or lower the evidence of each track, and decide."""
+    """Raise or lower the evidence of each track, and decide whether it moves.
+
+    seen: evidence of this frame. evidence, moving (T,): score and verdict of the frame before, dt_s ago.
+    """
     proof = prove(seen, moving, IMPLAUSIBLE * settings.max_speed_mps, dt_s, settings)
     new_evidence, new_moving, confidence = _added_up(
         evidence,
@@ -112,12 +129,14 @@ def _added_up(
     rise: float,
     dt_s: float,
 ) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
-    """evidence, moving and confidence of Verdict, after a frame with that Proof. rise: by so much the least
-    proof raises the evidence, as far as it is borne_out."""
+    """evidence, moving and confidence of Verdict after a frame with the fields of Proof.
+
+    rise: how much the weakest proof raises the score, before it is multiplied by borne_out (0..1).
+    """
     score, goes, confidence = np.empty(len(moving)), np.empty(len(moving), np.bool_), np.empty(len(moving))
     for t in range(len(moving)):
         if proven[t] and not stands[t]:
-            # The faster, the stronger the proof is.
+            # A stronger proof raises the score faster.
             pace = np.minimum(np.maximum(strength[t], 1.0), _FASTEST)
             change = borne_out * np.minimum(pace * rise, _MOST_A_FRAME)
         else:

@@ -1,9 +1,9 @@
-"""Where the cells of each track are expected in the next frame, and found. Terms: vision/__init__.py.
+"""Prediction of the cells of each track in the next frame. Terms: vision/__init__.py.
 
-Connected depth alone would merge a person with the wall that the person passes. So each track remembers the
-cells that it covered. These move with the camera and, for movers, with the track's velocity. A cell where
-they arrive belongs to the prediction if the depth measured there agrees. To which track it goes, the
-prediction does not decide alone: vision/bodies/votes.py.
+Connected depth alone would merge a person with a wall that the person passes. So the cells that each track
+covered are kept as 3D points. They are moved by the camera's motion and, for movers, by the track's velocity,
+and projected into the new grid. A cell is predicted for a track if the depth measured there agrees with the
+projected point. The predicted cells then vote to which track each part belongs (vision/bodies/votes.py).
 """
 
 from __future__ import annotations
@@ -19,15 +19,22 @@ from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.numerics.relative_pose import coordinate_m, relative_row
 
-_DEPTH_GATE_INVERSE = 0.03  # 1/m, as large as a jump in depth may be within one part, and
-_DEPTH_GATE_M = 0.25  # what may come nearer as a body turns or bends, beside its own velocity
-_NEAREST_M = np.float32(0.1)  # nearer, a point projects anywhere
+# The gate on depth is the sum of both: as large as a jump in depth within one part may be (in 1/m), and how
+# much nearer or farther a surface may get (in m), besides the track's velocity, as a body turns or bends.
+_DEPTH_GATE_INVERSE = 0.03
+_DEPTH_GATE_M = 0.25
+_NEAREST_M = np.float32(0.1)  # the projection of a nearer point is meaningless
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackSurfaces:
-    """What T tracks covered in one frame: points_m (3, K) in the camera axes of pose, owner (K,): which of
-    the tracks, track_id (T,)."""
+    """The surfaces of T tracks in one frame, as K points.
+
+    points_m: in the camera axes of pose, (3, K).
+    owner: index of each point's track, (K,).
+    track_id: (T,).
+    pose: the camera in the fixed frame.
+    """
 
     points_m: FloatGrid
     owner: NDArray[np.int32]
@@ -44,7 +51,7 @@ NO_TRACK_SURFACES = TrackSurfaces(
 
 
 def surfaces(grid: DepthGrid, labels: IntGrid, ids: NDArray[np.int64], pose: Pose) -> TrackSurfaces:
-    """The surfaces of tracks with ids (T,), where labels (h, w) holds index + 1, 0 for none."""
+    """The surfaces of tracks with ids (T,). labels (h, w): track index + 1 of each cell, 0 for none."""
     return TrackSurfaces(*_points_of(grid.depth_m, grid.x, grid.y, labels), ids, pose)
 
 
@@ -70,10 +77,10 @@ def _points_of(
 def predict(
     before: TrackSurfaces, index: NDArray[np.intp], shift_m: FloatArray, grid: DepthGrid, pose: Pose
 ) -> IntGrid:
-    """(h, w) track index + 1 that is expected, and found at the depth expected, in each cell; 0: none.
+    """(h, w) track index + 1 predicted for each cell where the measured depth agrees; 0: none.
 
-    index (T,): what track each one of before is now, -1: gone. shift_m (now's tracks, 3): way of each since
-    then, in the fixed frame that before.pose and pose are given in.
+    index (T,): present index of each track in before, -1 if it has ended. shift_m (present tracks, 3):
+    displacement of each track since then, in the fixed frame, as before.pose and pose are.
     """
     return _predicted(
         before.points_m,
@@ -107,7 +114,7 @@ def _predicted(
     ray_x: FloatGrid,
     ray_y: FloatGrid,
 ) -> IntGrid:
-    """As predict; rotation and origin_m of the camera, when the points were seen and now."""
+    """As predict. rotation, origin_m: pose of the camera now; old_...: when the points were seen."""
     height, width = inverse_depth.shape
     result, nearest = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
     left, top = ray_x[0], ray_y[0]
@@ -142,14 +149,14 @@ def _predicted(
         gate = np.float32(_DEPTH_GATE_INVERSE) + np.float32(_DEPTH_GATE_M) * expected * expected
         if not (measured > 0 and abs(measured - expected) <= gate):
             continue
-        # Of those that want the same cell the nearest has it, the last of those that are as near.
+        # Where several points project into one cell, the nearest one gets it; of equally near ones the last.
         if expected >= nearest[i, j]:
             nearest[i, j], result[i, j] = expected, track + 1
     return result
 
 
 def count_cells(labels: IntGrid, cells: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """(count,) how many of the flat cells (K,) are of each of the parts 1..count of labels (h, w)."""
+    """(count,) how many of the flat cells (K,) lie in each of the parts 1..count of labels (h, w)."""
     return _counted(labels, cells, count)
 
 

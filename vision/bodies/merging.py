@@ -1,6 +1,7 @@
-"""Two tracks that may be one body: which ones, and made one.
+"""Merging of two tracks that are one body: merges finds the pairs, join relabels their cells.
 
-Each rule looks at all pairs of a suspect or mover and a larger mover at once. Terms: vision/__init__.py.
+Each rule looks at all pairs of a suspect or mover and a larger moving track at once. vision/tracker.py calls
+this after grounding and before division. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -20,31 +21,40 @@ from vision.depth.regions import Regions
 
 BoolArray = NDArray[np.bool_]
 
-# Depth is lost beside a body for so far; more where one is seen before the other; noise parts what touches;
-# and the edges of a plain side, between which depth sees nothing, are so far apart.
+# Maximum gaps between two tracks, in space: where depth is missing beside a body; more where one is seen in
+# front of the other; where only noise separates the two; and between the edges of a vehicle's plain side, on
+# which depth sees nothing.
 _CLOSE_M, _CLOSE_OVERLAPPING_M, _TOUCHING_M, _PIECES_M = 0.25, 0.40, 0.1, 0.8
-_PARTED_M, _SAME_DEPTH_M = 1.0, 0.4  # of pieces one above the other: what parts them hides no more
-_HIDDEN_M = 1.3  # of a vehicle's halves: what parts them hides no more
-# And by so much, or so much of the slower one's, their velocities differ.
+# Maximum gap and difference in depth of pieces one above the other: what hides the middle is not larger.
+_PARTED_M, _SAME_DEPTH_M = 1.0, 0.4
+_HIDDEN_M = 1.3  # maximum gap between the halves of a vehicle: what hides its middle is not larger
+# Maximum difference of the halves' velocities: this, and this share of the slower one's speed.
 _HALVES_MPS, _HALVES_SHARE = 0.6, 0.6
-_OVER = 0.5  # of the narrower one's width: so much of it is above or below the other; of height, beside it
-_SMALL_SHARE = 0.5  # of the larger one's cells: what is more is a body of its own
-_TINY_SHARE = 0.1  # a dog beside its owner is more
-_OVERLAP = 0.5  # of the smaller box: side by side people overlap less
-_EXACTLY_MPS, _MUCH_MPS = 0.25, 0.4  # parts of one rigid thing may differ by this; its surfaces by this
-_KNOWN_SIGMA_MPS = 0.35  # a velocity known less well surely goes like nothing
-_ALIKE_SIGMAS = 2.0  # a shank that stands, or swings, on a body that goes
-_GOES_MPS = 0.3  # what goes more slowly goes like whatever stands
+# Of two pieces above each other this share of the narrower width has to overlap; of two halves side by side,
+# this share of the lower height.
+_OVER = 0.5
+_SMALL_SHARE = 0.5  # of the larger track's cells: with more, the smaller one is a body of its own
+_TINY_SHARE = 0.1  # of the larger track's cells: a dog beside its owner has more
+_OVERLAP = 0.5  # of the smaller box: people side by side overlap less
+_EXACTLY_MPS, _MUCH_MPS = 0.25, 0.4  # maximum difference in velocity of parts, of surfaces, of a rigid thing
+_KNOWN_SIGMA_MPS = 0.35  # with a larger standard deviation no two velocities are surely alike
+_ALIKE_SIGMAS = 2.0  # more difference for noise: a shank that stands, or swings, on a body that moves
+_GOES_MPS = 0.3  # a slower track moves like anything static
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pairs:
-    """K pairs of tracks, as indices small (K,) and large (K,).
+    """K pairs of a smaller and a larger track, (K,) each.
 
-    small_px, large_px (K, 4): their boxes in the image, u0, v0, u1, v1. gap_m, stacked, within (K,): see
-    Relations. overlapping (K,): half of the small one's box in the image is within the other. fits (K,): by
-    their size they could be one; slim (K,): together they are no wider than anybody. perhaps_alike (K,):
-    their velocities do not contradict; much_alike, exactly_alike (K,): they surely go so.
+    small, large: their indices.
+    small_px, large_px: their boxes in the image, u0, v0, u1, v1, (K, 4).
+    gap_m, stacked, within: see Relations.
+    overlapping: at least half of the small box is within the large one in the image.
+    fits: by their sizes they could be one body.
+    slim: together they are no wider than a single person.
+    perhaps_alike: their velocities do not contradict each other.
+    much_alike, exactly_alike: their velocities are well known, and differ by _MUCH_MPS or _EXACTLY_MPS at
+        most.
     """
 
     small: NDArray[np.intp]
@@ -70,10 +80,10 @@ def merges(
     mover: BoolArray,
     moving: BoolArray,
 ) -> list[tuple[int, int]]:
-    """Pairs (small, large) of tracks that may be one body: a suspect or mover (mover (T,)) and a larger one
-    that moves (moving (T,)), the closest pairs first. A track may be in several.
+    """Pairs (small, large) of tracks that may be one body, the closest pairs first.
 
-    velocity_mps (T, 3) and sigma_mps (T,) of the tracks.
+    The small one is a suspect or mover (mover (T,)); the large one moves by the verdict (moving (T,)). One
+    track may be in several pairs. velocity_mps (T, 3), sigma_mps (T,): of the tracks.
     """
     small, large = _candidates(regions.cells, mover, moving)
     if len(small) == 0:
@@ -96,9 +106,9 @@ def merges(
 def _candidates(
     cells: NDArray[np.intp], mover: BoolArray, moving: BoolArray
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Each mover (T,) with each larger one that is moving (T,), if both are seen, as indices (K,), (K,)."""
+    """All pairs of a mover (T,) and a larger moving track (T,), both seen, as indices (K,) and (K,)."""
     seen = cells > 0
-    # Of two that are as large, the later one counts as the smaller.
+    # Of two equally large tracks, the later one counts as the smaller.
     smaller = (cells[:, None] < cells) | (
         (cells[:, None] == cells) & np.tri(len(cells), k=-1, dtype=np.bool_)
     )
@@ -141,29 +151,29 @@ def _paired(
 
 
 def _beside(pairs: _Pairs) -> BoolArray:
-    """(K,) small beside a mover, with a velocity that does not contradict."""
+    """(K,) a small track close to a mover, with a velocity that does not contradict."""
     reach_m = np.where(pairs.overlapping, _CLOSE_OVERLAPPING_M, _CLOSE_M)
     return pairs.perhaps_alike & pairs.fits & (pairs.gap_m <= reach_m)
 
 
 def _carried(pairs: _Pairs) -> BoolArray:
-    """(K,) a load on its carrier, even if it is farther back: the mast of a cart."""
+    """(K,) a load on its carrier, even if it is farther back, as the mast of a cart is."""
     return pairs.stacked & pairs.exactly_alike & pairs.fits & (pairs.gap_m <= LOAD_M)
 
 
 def _seen_through(pairs: _Pairs) -> BoolArray:
-    """(K,) what is seen through a vehicle and surely goes much as it does: its own far side."""
+    """(K,) the far side of a vehicle, seen through it, with much the same velocity."""
     return pairs.within & pairs.much_alike & (pairs.gap_m <= THROUGH_M)
 
 
 def _pushed(pairs: _Pairs) -> BoolArray:
-    """(K,) what is low beside somebody, touches him and surely goes much as he does: a trolley."""
+    """(K,) a trolley: low beside a mover, touching it, with much the same velocity."""
     rows, rows_beside = (px[:, 3] - px[:, 1] for px in (pairs.small_px, pairs.large_px))
     return pairs.much_alike & (rows <= LOW_BESIDE * rows_beside) & (pairs.gap_m <= _TOUCHING_M)
 
 
 def _tiny(pairs: _Pairs, cells: NDArray[np.intp], velocity_mps: FloatArray) -> BoolArray:
-    """(K,) what is tiny beside something close and surely goes exactly as that does: a wheel of a cart."""
+    """(K,) a wheel of a cart: tiny compared with the mover, close to it, with exactly the same velocity."""
     goes = np.square(velocity_mps[pairs.large]).sum(axis=1) > _GOES_MPS**2
     tiny = cells[pairs.small] <= _TINY_SHARE * cells[pairs.large]
     result: BoolArray = tiny & goes & pairs.exactly_alike & (pairs.gap_m <= _PIECES_M)
@@ -171,16 +181,21 @@ def _tiny(pairs: _Pairs, cells: NDArray[np.intp], velocity_mps: FloatArray) -> B
 
 
 def _pieces(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
-    """(K,) pieces of something wider than anybody that go exactly alike; one if nothing is seen between them:
-    of the plain sides of a vehicle a depth camera sees only the edges."""
+    """(K,) pieces of a vehicle: wider than a person, with exactly the same velocity.
+
+    They are one body if nothing farther is seen between them: of the plain side of a vehicle a depth camera
+    sees only the edges.
+    """
     goes = np.square(velocity_mps[pairs.large]).sum(axis=1) > _GOES_MPS**2
     result: BoolArray = pairs.exactly_alike & goes & _wide(pairs, regions) & (pairs.gap_m <= _PIECES_M)
     return result
 
 
 def _halves(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolArray:
-    """(K,) of something wider than anybody, side by side at one depth, with velocities that do not
-    contradict; one if something nearer, and nothing farther, is seen between them: a vehicle behind a pillar.
+    """(K,) halves of a vehicle behind a pillar: wider than a person, side by side at one depth.
+
+    Their velocities do not contradict each other. They are one body if something nearer, and nothing farther,
+    is seen between them.
     """
     small_px, large_px = pairs.small_px, pairs.large_px
     shared_px = np.minimum(small_px[:, 3], large_px[:, 3]) - np.maximum(small_px[:, 1], large_px[:, 1])
@@ -196,15 +211,17 @@ def _halves(pairs: _Pairs, regions: Regions, velocity_mps: FloatArray) -> BoolAr
 
 
 def _wide(pairs: _Pairs, regions: Regions) -> BoolArray:
-    """(K,) whether one of them is wider than anybody."""
+    """(K,) whether one of the two is wider than a person."""
     widest_m = np.maximum(regions.extent_m[pairs.small, 0], regions.extent_m[pairs.large, 0])
     result: BoolArray = widest_m > SINGLE_WIDTH_M
     return result
 
 
 def _above(pairs: _Pairs, regions: Regions) -> BoolArray:
-    """(K,) pieces of somebody, one above the other, that together are no wider than anybody, with velocities
-    that do not contradict; one if nothing farther is seen between them."""
+    """(K,) pieces of a person, one above the other, together no wider than a person.
+
+    Their velocities do not contradict each other. They are one body if nothing farther is seen between them.
+    """
     small_px, large_px = pairs.small_px, pairs.large_px
     shared_px = np.minimum(small_px[:, 2], large_px[:, 2]) - np.maximum(small_px[:, 0], large_px[:, 0])
     narrower_px = np.minimum(small_px[:, 2] - small_px[:, 0], large_px[:, 2] - large_px[:, 0])
@@ -229,9 +246,11 @@ def _seen_between(
 def join(
     grid: DepthGrid, labels: IntGrid, pairs: list[tuple[int, int]], stayed: BoolGrid, way_m: FloatArray
 ) -> tuple[IntGrid, list[int]]:
-    """labels (h, w), track index + 1, with the small track of a pair given to the large one, and which small
-    ones have gone so. Two that would be divided again, for which see split, stay two, and the small one may
-    be part of another. way_m (T,) of the tracks since stayed (h, w)."""
+    """labels (h, w), track index + 1, with the small track of each pair joined to the large one.
+
+    Also returns the indices of the small tracks that are gone. Two tracks that split would divide again stay
+    two; the small one may still be joined to another track. stayed (h, w), way_m (T,): see split.
+    """
     gone: list[int] = []
     for small, large in pairs:
         if small in gone or large in gone:

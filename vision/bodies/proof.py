@@ -1,7 +1,5 @@
-"""What one frame proves of each track: that it moves, that it stands, or neither.
-
-The kinds of proof are those of vision/bodies/judgement.py, which adds them up: one rule each, for one track.
-"""
+"""What one frame proves of each track: that it moves, that it stands still, or neither. There is one rule for
+each kind of proof; vision/bodies/judgement.py lists them and adds them up over frames."""
 
 from __future__ import annotations
 
@@ -20,40 +18,45 @@ from vision.motion.motion_evidence import MotionEvidence
 
 BoolArray = NDArray[np.bool_]
 
-_HOLDING_SQUARED_SIGMAS = 4.0  # two sigmas: it still seems to go
-_ENDS_ACROSS = 4  # two fragments: across, where an end is seen tells by itself
-_ENDS_ALONG = 8  # four fragments: along, only how far ends are apart tells, and that slides
-_LEVEL_SHARE = 0.5  # of the threshold: with less than that, what goes up or down needs as many ends as along
-_MIN_AGREEMENT = 0.18  # of the ends: bodies whose limbs disagree still speak
-_UNREST_SHARE = 0.5  # of the threshold
+_HOLDING_SQUARED_SIGMAS = 4.0  # two sigmas: a mover with a clearer filtered velocity still seems to move
+_ENDS_ACROSS = 4  # two fragments: across the line of sight the position of each end is a measurement
+_ENDS_ALONG = 8  # four fragments: along it only the distance between two ends is, and ends slide
+_LEVEL_SHARE = 0.5  # of the threshold: with less level motion across, as many ends are needed as along
+_MIN_AGREEMENT = 0.18  # share of agreeing ends: low, since the limbs of a body disagree
+_UNREST_SHARE = 0.5  # of the threshold, for the filtered velocity of a restless body
 _LASTING_UNREST_S = 0.4  # longer than a limb swings one way
-_LIKELY_SHARE = 0.25  # of the threshold: two of four sigmas; a slow machine on legs stays at two and a half
-_OWN_PROOF = 3.0  # squared sigmas of this frame alone: the filter does not speak of the past only
-_SHARED_PROOF = 0.55  # of the threshold, where fragments and surface say the same
-_SPEED_PER_METRE = 0.02  # of distance: by so much more the least speed is, as all errors grow with it
-_ARRIVED_CELLS = 8  # fewer come and go with noise at a rim
-_ARRIVED_SHARE = 0.05  # of the surface: who walks arrives with one side of himself
+_LIKELY_SHARE = 0.25  # of the threshold: 2 of 4 sigmas; a slow machine on legs reaches no more than 2.5
+_OWN_PROOF = 3.0  # squared sigmas of this frame alone, so that the proof does not rest on the past only
+_SHARED_PROOF = 0.55  # of the threshold, where the surface confirms the velocity of the fragments
+_SPEED_PER_METRE = 0.02  # m/s more minimum speed per metre of distance, since all errors grow with it
+_ARRIVED_CELLS = 8  # fewer arrived cells come and go with noise at a rim
+_ARRIVED_SHARE = 0.05  # of the surface: a walking person arrives with one side
 _MUCH_CELLS = 20  # about a forearm 4 m away
 _MUCH_SHARE = 0.2  # of the surface: more than a rim that noise widens
-_STANDING_SHARE = 0.6  # of the least speed: what is slower stands
-_KNOWN_SPEED = 2.0  # of the least speed: with less doubt than this, a slow mover has stopped
-_CLEAN_ACROSS_S = 0.25  # static surfaces seldom feign a speed for longer, and along the line of sight,
-_CLEAN_ALONG_S = 0.5  # where the noise of depth is shared by neighbours, somewhat longer
-_CLEAR_WAY = 4.0  # times the noise of one pixel's depth: no noise that neighbours share feigns so long a way
-_CLEAN_LOOKS = 2.5  # three of them, where frames are few
-_EVEN_CELLS = 48  # fewer lie on two or three patches of depth noise, and go to and fro with these
-_COMPACT_M = 2.2  # a tall person; larger things are seen in part only, and their middle wanders
-_WANDER = 0.5  # of its size: from front to side the middle of the visible surface goes half a width
-_LARGEST_M = 3.0  # wider parts are walls and racks; what moves in front of them is carved out
-# The velocity as filtered, of this frame's fragments, of the surface; the first less the last.
+_STANDING_SHARE = 0.6  # of the minimum speed: a slower track stands still
+_KNOWN_SPEED = 2.0  # times the minimum speed: if sigma is less, a mover below the minimum has stopped
+_CLEAN_ACROSS_S = 0.25  # static surfaces seldom show a false speed across the line of sight for longer
+_CLEAN_ALONG_S = 0.5  # somewhat longer along it, where neighbours share the noise of depth
+_CLEAR_WAY = 4.0  # times the depth noise of one pixel: shared noise never shows so large a displacement
+_CLEAN_LOOKS = 2.5  # frame intervals: at least three frames at a low frame rate
+_EVEN_CELLS = 48  # fewer cells lie on 2 or 3 patches of depth noise, and move back and forth with them
+_COMPACT_M = 2.2  # a tall person; larger things are seen in part only, and their centre wanders
+_WANDER = 0.5  # of its size: as the view turns from front to side, the centre moves by half a width
+_LARGEST_M = 3.0  # wider parts are walls and racks; movers in front of them are carved out
+# Velocities: filtered; of this frame's fragments; of the surface; the difference of first and third.
 _FILTERED, _OWN, _SURFACE, _APART = range(4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proof:
-    """Of T tracks, (T,) each. moves: proven; strength: how many times as clearly as it has to be. stands: its
-    fragments are sure; over: that it goes, if it did, is over, by these or otherwise; goes_on: nothing new
-    proves that it moves, but nothing speaks against it. sigmas: squared, of the velocity as filtered."""
+    """Of T tracks, (T,) each.
+
+    moves, strength: motion is proven, and how many times the threshold is exceeded.
+    stands: this frame's fragments are sure that it stands still.
+    over: a motion has ended, by stands or by another sign.
+    goes_on: nothing new proves motion, but nothing speaks against it.
+    sigmas: squared Mahalanobis distance of the filtered velocity from zero.
+    """
 
     moves: BoolArray
     strength: FloatArray
@@ -64,7 +67,7 @@ class Proof:
 
 
 class _Part(NamedTuple):
-    """A velocity of one track, and its parts: see Split."""
+    """A velocity of one track and its components; see Split."""
 
     speed_mps: float
     sigma_mps: float
@@ -76,7 +79,7 @@ class _Part(NamedTuple):
 
 
 class _Second(NamedTuple):
-    """What its surface says of that of its fragments: see SecondOpinion."""
+    """What the surface's velocity says of the fragments' velocity; see SecondOpinion."""
 
     denies_along: bool
     denies_across: bool
@@ -85,7 +88,7 @@ class _Second(NamedTuple):
 
 
 class _Ends(NamedTuple):
-    """Of one track's fragments. agreeing: 0 where these are too small a share of all."""
+    """Ends of one track's fragments: all, and agreeing, which is 0 if they are too small a share."""
 
     all: int
     agreeing: float
@@ -94,7 +97,7 @@ class _Ends(NamedTuple):
 
 
 class _Surface(NamedTuple):
-    """What is seen of one track. wander_mps: so fast its centre may go while it stands."""
+    """Visible surface of one track. wander_mps: how fast its centre may move while the body is static."""
 
     cells: int
     size_m: float
@@ -105,7 +108,7 @@ class _Surface(NamedTuple):
 
 @inlined
 def _by_fragments(filtered: _Part, own: _Part, second: _Second, ends: _Ends, threshold: float) -> bool:
-    """Whether filter and fragments show a velocity that the surface does not deny, or that it shares."""
+    """Whether filter and fragments show a velocity that the surface does not contradict, or confirms."""
     many, some = ends.agreeing >= _ENDS_ALONG, ends.agreeing >= _ENDS_ACROSS
     across = _shown_across(filtered, own, threshold) and (some or ends.restless)
     across = across and (not second.denies_across or many)
@@ -120,16 +123,15 @@ def _by_fragments(filtered: _Part, own: _Part, second: _Second, ends: _Ends, thr
 
 @inlined
 def _shown_across(filtered: _Part, own: _Part, threshold: float) -> bool:
-    """Whether filter and fragments say that it goes across the line of sight, however few these are."""
+    """Whether filter and fragments show motion across the line of sight, by however few fragments."""
     return filtered.across > threshold and own.across > 0.5 * threshold
 
 
 @inlined
 def _by_unrest(filtered: _Part, ends: _Ends, threshold: float) -> bool:
-    """Whether many ends, by whatever each of them does, bear out the filter's velocity.
+    """Whether many ends contradict standing still, even in different ways, and the filter shows a velocity.
 
-    That of a slow body with swinging limbs never becomes clear. Where its ends have denied for longer than
-    any limb swings one way, it need only be likely.
+    That of a slow body with swinging limbs never becomes clear: after _LASTING_UNREST_S a likely one will do.
     """
     share = _LIKELY_SHARE if ends.unrest_s >= _LASTING_UNREST_S else _UNREST_SHARE
     return ends.restless and ends.all >= _ENDS_ALONG and filtered.total > share * threshold
@@ -137,18 +139,17 @@ def _by_unrest(filtered: _Part, ends: _Ends, threshold: float) -> bool:
 
 @inlined
 def _by_arrival(filtered: _Part, arrived: bool, threshold: float) -> bool:
-    """Whether what has arrived bears out the filter's velocity."""
+    """Whether arrived cells support the filtered velocity."""
     return arrived and filtered.total > 0.5 * threshold
 
 
 @inlined
 def _by_surface(centre: _Part, seen: _Surface, least_mps: float, dt_s: float, threshold: float) -> bool:
-    """Whether the centre of a whole, compact surface moves too long and too clearly for an accident.
+    """Whether the centre of a whole, compact surface moves for too long and too clearly to be chance.
 
-    A new viewpoint shows other sides of a thing that stands still, so its centre wanders with the view, and
-    it wanders while more and more of it comes to be seen: that much speed proves nothing. Nor does a few
-    cells' way along the line of sight: a wall seen through a chair has not many more. Along it a longer time
-    is asked for, unless the way is far beyond what depth is off by.
+    Up to wander_mps proves nothing: the centre of a static thing moves as the viewpoint changes, and as more
+    of it becomes visible. Nor does motion of a few cells along the line of sight: a wall seen through a chair
+    has few. Along it a longer time is needed, unless the displacement is far beyond the error of depth.
     """
     looks_s = _CLEAN_LOOKS * dt_s
     far = abs(centre.value) * seen.clean_s >= _CLEAR_WAY * seen.depth_sigma_m
@@ -161,27 +162,27 @@ def _by_surface(centre: _Part, seen: _Surface, least_mps: float, dt_s: float, th
 
 @inlined
 def _holds(filtered: _Part, goes: bool, arrived: bool, least_mps: float) -> bool:
-    """Whether a mover still goes, though nothing new proves it."""
+    """Whether a mover still seems to move, though nothing new proves it."""
     going = (goes and filtered.total > _HOLDING_SQUARED_SIGMAS) or arrived
     return going and filtered.speed_mps > _STANDING_SHARE * least_mps
 
 
 @inlined
 def _waits(filtered: _Part, own: _Part, fast: bool, agreeing: float, threshold: float) -> bool:
-    """What one fragment alone shows is no proof, but no reason either to forget what more of them showed."""
+    """Whether one fragment alone shows motion: no proof, but a reason to keep what more of them showed."""
     return fast and _shown_across(filtered, own, threshold) and agreeing >= 2
 
 
 @inlined
 def _stands(own: _Part, agreeing: float, least_mps: float) -> bool:
-    """Whether this frame's fragments are sure that it stands."""
+    """Whether this frame's fragments are sure that the track stands still."""
     slow = own.speed_mps < _STANDING_SHARE * least_mps
     return slow and own.sigma_mps < 0.5 * least_mps and agreeing >= _ENDS_ACROSS
 
 
 @inlined
 def _part(velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: int, t: int) -> _Part:
-    """Velocity k of track t; for the arguments see _proofs."""
+    """Velocity k of track t with its components; for the arguments see _proofs."""
     v, c, of = velocity[k, t], covariance[k, t], parts[:, k, t]
     speed_mps = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     sigma_mps = math.sqrt(c[0, 0] + c[1, 1] + c[2, 2])
@@ -218,7 +219,7 @@ def _proofs(
     dt_s: float,
     threshold: float,
 ) -> tuple[BoolArray, FloatArray, BoolArray, BoolArray, BoolArray]:
-    """moves, strength, stands, over and goes_on of Proof. velocity (4, T, 3), covariance (4, T, 3, 3) and
+    """moves, strength, stands, over and goes_on of Proof. velocity (4, T, 3), covariance (4, T, 3, 3), and
     parts (5, 4, T), value to level of Split: of each of the four velocities. opinion (4, T): SecondOpinion.
     threshold: squared sigmas."""
     count = len(moving)
@@ -242,15 +243,14 @@ def _proofs(
             or _by_arrival(filtered, some, threshold)
             or _by_surface(centre, seen, least_mps[t], dt_s, threshold)
         )
-        # Where a mover has stopped was free space until a moment ago: no proof that it still goes.
+        # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.
         stopped = moving[t] and not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
         moves[t] = trusted and possible and ((evident and fast) or (much and not stopped))
         shown = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(own.along, own.across))
         strength[t] = np.minimum(shown / threshold, told.agreeing / _ENDS_ACROSS)
         stands[t] = _stands(own, told.agreeing, least_mps[t])
         slow = filtered.speed_mps < _STANDING_SHARE * least_mps[t]
-        # What nothing tells from what stands around it, and no fragment tells of: its cells would go on over
-        # a wall for as long as its velocity has them go.
+        # Neither depth nor a fragment tells it from the static surface beside it, along which it would drift.
         lost = moving[t] and guessed[t] and ends[t] == 0 and not some
         over[t] = stands[t] or (stopped and slow) or lost
         holds = moving[t] and _holds(filtered, goes[t], some, least_mps[t])
@@ -262,7 +262,7 @@ def _proofs(
 def prove(
     seen: MotionEvidence, moving: BoolArray, fastest_mps: float, dt_s: float, settings: MotionSettings
 ) -> Proof:
-    """Of T tracks, of which moving (T,) moved by the last verdict. fastest_mps: no body is faster."""
+    """The proofs of this frame. moving (T,): last verdict. fastest_mps: no body is faster."""
     velocity, covariance = np.empty((4, len(moving), 3)), np.empty((4, len(moving), 3, 3))
     velocity[_FILTERED], covariance[_FILTERED] = seen.velocity, seen.covariance
     velocity[_OWN], covariance[_OWN] = seen.own_velocity, seen.own_covariance

@@ -1,4 +1,4 @@
-"""What tracking knows, put into the Scene and the Fragments that others read."""
+"""The last step of tracking: tracks and fragments are written as the Obstacles and Fragments of the Scene."""
 
 from __future__ import annotations
 
@@ -15,24 +15,23 @@ from vision.detection import Detection
 from vision.motion.least_squares import FragmentVelocities
 from vision.scene import Fragments, Obstacle
 
-MIN_SIGHTINGS = 3  # frames: what lasts for one or two is taken for a speckle
-_LISTED_UNSEEN_S = 0.15  # a track is remembered for longer, but no longer shown as seen
-_WAY_SIGMA_M = 0.06  # one sigma of where a mover went that is not seen
-_STATIC_SCORE = 0.5  # nothing is estimated of what stands: neither sure nor unsure
-_LAST_CELLS = 12  # less of a sliver is no sight of anybody
+MIN_SIGHTINGS = 3  # frames: a track seen in one or two is taken for a speckle
+_LISTED_UNSEEN_S = 0.15  # maximum time unseen for a listed track; tracks themselves are kept for longer
+_WAY_SIGMA_M = 0.06  # maximum standard deviation of an unseen mover's displacement for it to be listed
+_STATIC_SCORE = 0.5  # score of static obstacles, for which no confidence is estimated
+_LAST_CELLS = 12  # minimum cells of a sliver: with fewer, the mover's position is not known well enough
 _OVERHEAD_CELLS = 24  # half of a head, 6 m away
-# For so long a new mover may be a piece of something else, at most so far before or behind it: of a mover so
-# many times as large that covers so much of it, as a wheel of a cart is; or, if it is less than half of a
-# body and ends in what stands by guess, of somebody close to that, as a leg is.
-_PIECE_S = 0.3
-_PIECE_M = 1.5
-_PIECE_OF = 2.0
-_PIECE_SHARE = 0.3
-_PIECE_M2 = 0.5
+# For some time a new mover may be a piece of another one and is not reported as moving: a wheel of a cart, or
+# a leg of a person close to a static surface.
+_PIECE_S = 0.3  # duration of that time
+_PIECE_M = 1.5  # maximum difference in depth between the piece and the mover
+_PIECE_OF = 2.0  # wheel: the mover's area in the image is larger than the piece's by at least this factor
+_PIECE_SHARE = 0.3  # wheel: minimum share of the piece that the mover's box covers
+_PIECE_M2 = 0.5  # leg: maximum area of the piece, less than half of a body; it has to be guessed (Tracks) too
 
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
-    """The tracks seen often enough, in the camera axes of the detection."""
+    """The tracks that are listed as obstacles, in the camera axes of the detection."""
     pose, camera, moving = detection.pose, detection.camera, tracks.moving
     local, velocity, covariance = _in_camera(
         tracks.state, tracks.covariance, pose.rotation, pose.translation_m
@@ -80,8 +79,10 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
 def _in_camera(
     state: FloatArray, covariance: FloatArray, rotation: FloatArray, translation_m: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Position (T, 3), velocity (T, 3) and its covariance (T, 3, 3) in the axes of a camera at rotation and
-    translation_m."""
+    """Position (T, 3), velocity (T, 3) and its covariance (T, 3, 3) in the camera axes.
+
+    rotation, translation_m: pose of the camera in the fixed frame.
+    """
     count = len(state)
     local, velocity, spread = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3, 3))
     for t in range(count):
@@ -98,10 +99,10 @@ def _in_camera(
 
 @inlined
 def _known(unseen_s: float, cells: int, moving: bool, sliver: bool, sigma_mps: float) -> bool:
-    """Whether it is known well enough where a track went since it was seen."""
+    """Whether the present position of a track is known well enough, unseen_s after it was last seen."""
     if unseen_s > _LISTED_UNSEEN_S or (moving and not sigma_mps * unseen_s <= _WAY_SIGMA_M):
         return False
-    # What was seen last of somebody who went behind something tells little of where he is now.
+    # The last sliver of a mover that went behind something tells little about its present position.
     return not (moving and sliver) or cells >= _LAST_CELLS
 
 
@@ -127,23 +128,23 @@ def _listed(
     width: float,
     height: float,
 ) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Which tracks (T,) are shown; and where (T, 4) in the image they are, cut at its border."""
+    """Which tracks are listed, (T,); and their boxes in the image, cut at its border, (T, 4)."""
     listed, bbox = np.zeros(len(local), np.bool_), bbox_px.copy()
     for t in range(len(local)):
         x, y, z = local[t, 0], local[t, 1], max(local[t, 2], 0.1)
         sigma_mps = math.sqrt(covariance[t, 3, 3] + covariance[t, 4, 4] + covariance[t, 5, 5])
         listed[t] = sightings[t] >= MIN_SIGHTINGS and local[t, 2] > 0.0
         listed[t] = listed[t] and _known(unseen_s[t], cells[t], moving[t], sliver[t], sigma_mps)
-        # What is above the robot may end there. What goes has legs behind what hides them; of slivers that is
-        # hard to tell.
+        # Something seen only above the robot may hang there. But a mover has legs, which something hides; a
+        # sliver is too small to tell.
         legs = moving[t] and cells[t] >= _OVERHEAD_CELLS
         listed[t] = listed[t] and (not overhead[t] or legs)
         unseen = unseen_s[t] != 0.0
         if unseen:
             u, v = x / z * fx + cx, y / z * fy + cy
             listed[t] = listed[t] and 0.0 <= u < width and 0.0 <= v < height
-        # A mover that is out of sight, but for a sliver, is where it goes, whole, and not where its rest is
-        # seen.
+        # The box of a mover that is hidden, or visible as a sliver only, is that of the whole body at its
+        # predicted position, not that of the visible rest.
         if moving[t] and (unseen or sliver[t]):
             left, right = (x + box_m[t, 0]) / z * fx + cx, (x + box_m[t, 2]) / z * fx + cx
             top, bottom = (y + box_m[t, 1]) / z * fy + cy, (y + box_m[t, 3]) / z * fy + cy
@@ -158,7 +159,7 @@ def _listed(
 def _pieces(
     tracks: Tracks, listed: NDArray[np.bool_], bbox_px: FloatArray, depth_m: FloatArray, focal_px: float
 ) -> NDArray[np.bool_]:
-    """(T,) movers so new that they may be a piece of something larger."""
+    """(T,) new movers that may be a piece of a larger mover."""
     result = np.zeros(len(tracks), np.bool_)
     new = (tracks.moving & listed & (tracks.moving_s < _PIECE_S)).nonzero()[0]
     if len(new):
@@ -178,7 +179,7 @@ def fragments(
     moving: NDArray[np.bool_],
     velocities: FragmentVelocities,
 ) -> Fragments:
-    """The fragments with their owners (N,) and whether these move (N,)."""
+    """The Fragments of the Percept. owner (N,): ids of their tracks. moving (N,): whether these move."""
     camera = detection.camera
     depth, position, velocity, sigma = _of_fragments(
         detection.ends_px,
@@ -218,8 +219,10 @@ def _of_fragments(
     cx: float,
     cy: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Depth (N,) and position (N, 3) of their middles; velocity (N, 3) and its sigma (N, 3), NaN where
-    neither of the two ends is usable."""
+    """Depth (N,) and position (N, 3) of the fragments' middles; velocity (N, 3) and its sigma (N, 3).
+
+    Velocity and sigma are NaN where neither of the two ends is usable.
+    """
     count = len(ends_px)
     depth, position = np.empty(count), np.empty((count, 3))
     velocity, sigma = np.full((count, 3), np.nan), np.full((count, 3), np.nan)

@@ -1,14 +1,16 @@
 """Measurement update of each track's filters by the centroid of its visible surface.
 
-What the centroid measures depends on what is seen:
+What the centroid is used to measure depends on how much of the surface is visible. In each case the name of
+the kind in the code is given:
 
-* Position and velocity (Tracks.locate): the same whole surface as before, neither cut at its side by the
-  image's border nor hidden there, of about its usual area, and without a jump.
-* Position and velocity, but with a larger variance: any other surface of a track that is known to move. A
-  body cannot be far from what is seen of it.
-* Position only (Tracks.relocate): a surface of a static track that is cut, hidden in part or suddenly another
-  one; any surface after a jump, or while the camera's own motion is not known.
-* Neither: a sliver, the little that is left to see of a mover that goes behind something.
+* _SMOOTH: position and velocity (Tracks.locate). The whole surface is visible, as before: its left and right
+  sides are neither cut by the image border nor hidden, its area is about the usual one, and its centroid has
+  not jumped.
+* _ROUGH: position and velocity, but with a larger variance. Any other surface of a track that is known to
+  move. A body cannot be far from its visible part.
+* _CUT: position only (Tracks.relocate). A surface of a static track that is cut, partly hidden or changed in
+  area; also any surface after a jump, or while the camera's own motion is not known.
+* _SLIVER: nothing. The small rest that is visible of a mover that is passing behind something.
 """
 
 from __future__ import annotations
@@ -27,23 +29,26 @@ from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
-MIN_CELLS = 6  # as many as a part has (_SPECKLE_CELLS of vision/depth/connected.py)
-_CENTRE_SIGMA_M = 0.015  # of the centre of the smallest thing: a cell is as wide 2.3 m away
-_CENTRE_SHARE = 0.0125  # of its size, across the line of sight: cells at the rim come and go
-_CENTRE_DEPTH_SHARE = 0.04  # of its size along the line of sight, where what is seen of it changes more
-_SHIFT_SHARE = 0.35  # of its size: the middle of what is seen of a body, from where it is while all is seen
-_CUT_SIGMA_M = 1.0  # in height, of what reaches beyond the image above or below
-_CENTRE_NOISE = 0.2  # of a pixel's depth noise: neighbours share it, so that it does not average out
-_SAME_AREA = 0.3  # a surface that grows or shrinks by more is not the same part of its body
-_AREA_MEMORY_S = 0.32  # a tenth of what is new each frame at 30 a second
-_SLIVER_SHARE = 0.4  # of its usual surface
-_JUMP_M = 0.3  # and two sigmas of depth: a centre farther from where it was expected has jumped
-# What is seen of a track: hardly anything; or as above, in that order.
+# Fewer cells than the smallest part has are no sighting (_SPECKLE_CELLS of vision/depth/connected.py).
+MIN_CELLS = 6
+# Standard deviation of the centroid of a very small surface: the width of a cell 2.3 m away.
+_CENTRE_SIGMA_M = 0.015
+_CENTRE_SHARE = 0.0125  # more of it, per metre of size across the line of sight: cells at the rim come and go
+_CENTRE_DEPTH_SHARE = 0.04  # the same per metre of size along it: there the visible part changes more
+# Standard deviation of the centroid of a partly visible surface from that of the whole, as a share of size.
+_SHIFT_SHARE = 0.35
+_CUT_SIGMA_M = 1.0  # standard deviation in height of a surface that the upper or lower image border cuts
+_CENTRE_NOISE = 0.2  # share of a pixel's depth noise: neighbours share it, so it does not average out fully
+_SAME_AREA = 0.3  # a relative change of area above this means that another part of the body is visible
+_AREA_MEMORY_S = 0.32  # time constant of the averaged area: a gain of 0.1 per frame at 30 frames a second
+_SLIVER_SHARE = 0.4  # of the usual area: a mover's surface smaller than this is a sliver
+_JUMP_M = 0.3  # plus two sigmas of depth: a centroid farther from its prediction than this has jumped
+# How a track is visible: with fewer than MIN_CELLS cells; then the kinds of the module docstring, in order.
 _UNSEEN, _SMOOTH, _ROUGH, _CUT, _SLIVER = range(5)
 
 
 def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
-    """Update tracks with the surfaces measured, entry k for track k; without cells they stay as predicted."""
+    """Update tracks with the surfaces measured, entry k for track k; one without cells stays predicted."""
     dt_s, rotation = detection.dt_s, detection.pose.rotation
     kind, centre_m, change, tracks.area_m2 = _kinds(
         measured.cells,
@@ -116,8 +121,12 @@ def _kinds(
     floor_m: float,
     quadratic_per_m: float,
 ) -> tuple[NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
-    """(T,) what kind each surface is of; (T, 3) where its centre is in the fixed frame; (T,) by what share of
-    its usual area it differs; and (T,) that area, with as much of what is new as gain says."""
+    """Classify each surface.
+
+    Returns its kind (T,), its centroid in the fixed frame (T, 3), the relative change from its usual area
+    (T,), and the usual area (T,), updated with gain. moving (T,): verdict of the frame before. gain: of the
+    running average. floor_m, quadratic_per_m: depth noise.
+    """
     kind, change, usual_m2 = np.full(len(cells), _UNSEEN), np.zeros(len(cells)), area_m2.copy()
     centre_m = np.zeros((len(cells), 3))
     for t in range(len(cells)):
@@ -135,12 +144,12 @@ def _kinds(
                 centre_m[t, i] += rotation[i, k] * position_m[t, k]
             squared += (centre_m[t, i] - state[t, i]) ** 2
         expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
-        # Else the camera's own error would be theirs.
+        # Without a known motion of the camera, its error would be taken for a motion of the tracks.
         steady = motion_known and math.sqrt(squared) <= expected_m
         if wide[t] and change[t] <= _SAME_AREA and steady:
             kind[t] = _SMOOTH
         elif moving[t] and now_m2 < _SLIVER_SHARE * usual_m2[t]:
-            # What is left to see of a mover that goes behind something is not where its body is.
+            # The visible rest of a mover that is passing behind something does not show where its body is.
             kind[t] = _SLIVER
             continue
         elif moving[t] and steady:
@@ -161,7 +170,7 @@ def _centre_covariances(
     floor_m: float,
     quadratic_per_m: float,
 ) -> FloatArray:
-    """(T, 3, 3) of the centres of the surfaces seen, in the fixed frame that rotation leads to."""
+    """(T, 3, 3) covariance of the centroids in the fixed frame. rotation: camera axes to fixed frame."""
     covariance, variance = np.zeros((len(kind), 3, 3)), np.empty(3)
     for t in range(len(kind)):
         if kind[t] == _UNSEEN:
@@ -193,8 +202,10 @@ def _boxes_m(
     cx: float,
     cy: float,
 ) -> FloatArray:
-    """box_m (T, 4), of those shown (T,) anew: left, upper, right and lower edge from their centres, at their
-    depth."""
+    """box_m (T, 4) with the entries of the tracks shown (T,) renewed.
+
+    Left, upper, right and lower edge of the image box as offsets from the centroid, in metres at its depth.
+    """
     result = box_m.copy()
     for t in range(len(shown)):
         if shown[t]:
@@ -205,7 +216,7 @@ def _boxes_m(
 
 
 def expected_bodies(tracks: Tracks, pose: Pose, noise: DepthNoise) -> ExpectedBodies:
-    """Where the bodies of tracks are expected by a camera at pose."""
+    """Where the bodies of tracks are expected in the axes of a camera at pose."""
     centre_m, sigma_m = _expected(
         tracks.state,
         pose.rotation,
@@ -242,7 +253,10 @@ def up(detection: Detection) -> FloatArray | None:
 
 
 def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
-    """(T,) rate at which the camera's way turns directions sight (T, 3) to what is distance_m (T,) off."""
+    """(T,) rate at which the camera's translation changes the viewing direction of each track.
+
+    sight (T, 3): unit vectors from the camera to the tracks. distance_m (T,): their distances.
+    """
     ego = detection.ego_motion
     if ego.dt_s <= 0.0:
         return np.zeros(len(sight))
@@ -252,7 +266,7 @@ def view_radps(detection: Detection, sight: FloatArray, distance_m: FloatArray) 
 
 @compiled("float64[:], float64[:, ::1], float64[::1]")
 def _turns(way: FloatArray, sight: FloatArray, distance_m: FloatArray) -> FloatArray:
-    """As view_radps; way (3,) of the camera in a second."""
+    """As view_radps. way (3,): velocity of the camera in the fixed frame, m/s."""
     squared = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
     turn = np.empty(len(sight))
     for t in range(len(sight)):
@@ -262,7 +276,7 @@ def _turns(way: FloatArray, sight: FloatArray, distance_m: FloatArray) -> FloatA
 
 
 def _at_border(bbox_px: FloatArray, detection: Detection) -> NDArray[np.bool_]:
-    """(K,) boxes (K, 4) that reach the left or right border of the image: their rest is outside of it."""
+    """(K,) whether boxes (K, 4) reach the left or right border of the image: the rest may lie outside."""
     step_px = detection.grid.step_px
     result: NDArray[np.bool_] = (bbox_px[:, 0] <= step_px) | (
         bbox_px[:, 2] >= detection.camera.width - step_px

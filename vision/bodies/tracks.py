@@ -1,4 +1,8 @@
-"""The obstacles that are followed: struct of arrays over T tracks, in the fixed frame of the detector."""
+"""The state of all tracks: a struct of arrays over T tracks, in the fixed frame of the detector.
+
+vision/tracker.py predicts the tracks at the start of each frame; vision/bodies/sightings.py, the fragment
+velocities and vision/bodies/judgement.py update them.
+"""
 
 from __future__ import annotations
 
@@ -11,57 +15,52 @@ from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.numerics import kalman
 
-_TRAIL_S = 0.3  # over which a centre is averaged: several frames, and less than a step
-_GOING_SHARE = 0.4  # of its velocity: what stands has a centre that goes nowhere, by its noise
-_UNPROVEN_S = 0.05  # a frame or two, and proof may fail to come by chance
-_GONE_SHARE = 0.6  # of its width
+_TRAIL_S = 0.3  # time constant of the trailing average of a centre: several frames, less than a step lasts
+# A track really goes if its centre advances at this share of the filtered velocity at least. The centre of
+# something static does not advance; its filtered velocity is noise.
+_GOING_SHARE = 0.4
+_UNPROVEN_S = 0.05  # a frame or two: for that long proof may be missing by chance
+_GONE_SHARE = 0.6  # of its width: a track displaced by more has clearly left its former place
 
 
 class Tracks:
-    """Parallel arrays, one entry for each of T tracks; what each of them means is said where it is made."""
+    """Parallel arrays with one entry per track; __init__ explains each of them."""
 
     def __init__(self) -> None:
-        self.ids = np.empty(0, np.int64)  # growing
-        # Position and velocity (T, 6); as a second opinion the same from the centres of the visible surface
-        # alone, without the fragments.
+        self.ids = np.empty(0, np.int64)  # in ascending order
+        # Filter of position and velocity (T, 6), from the centres of the surface and from the fragments.
         self.state = np.empty((0, 6))
         self.covariance = np.empty((0, 6, 6))
+        # The same from the centres of the visible surface alone, as a second opinion.
         self.surface_state = np.empty((0, 6))
         self.surface_covariance = np.empty((0, 6, 6))
-        self.trailing_m = np.empty((0, 3))  # where the centre was of late, averaged
-        # When it was seen first and last, and in how many frames.
-        self.born_ns = np.empty(0, np.int64)
-        self.seen_ns = np.empty(0, np.int64)
-        self.sightings = np.empty(0, np.intp)
-        # What was seen of it last: its box in the image, its size in the camera's axes, cells of the grid (0:
-        # it went behind something since), fragments on it.
-        self.bbox_px = np.empty((0, 4))
-        self.extent_m = np.empty((0, 3))
-        self.cells = np.empty(0, np.intp)
-        self.fragments = np.empty(0, np.intp)
-        # Edges of the last box that showed all of it, at its depth, from its centre.
-        self.box_m = np.empty((0, 4))
-        self.area_m2 = np.empty(0)  # averaged, up to a common factor
-        # How fast its centre may wander because it shows more or less of itself.
-        self.growth_mps = np.empty(0)
-        # For how long its surface's centre has told of the velocity without a break.
-        self.clean_s = np.empty(0)
-        self.sliver = np.empty(0, np.bool_)  # a mover of which hardly anything was left to see
-        # A mover that ends in what stands around it where a guess has it.
+        self.trailing_m = np.empty((0, 3))  # running average of the centre
+        self.born_ns = np.empty(0, np.int64)  # first seen
+        self.seen_ns = np.empty(0, np.int64)  # last seen
+        self.sightings = np.empty(0, np.intp)  # number of frames in which it was seen
+        # As last seen.
+        self.bbox_px = np.empty((0, 4))  # box in the image
+        self.extent_m = np.empty((0, 3))  # size along the camera axes
+        self.cells = np.empty(0, np.intp)  # cells of the depth grid; 0: it has gone behind something since
+        self.fragments = np.empty(0, np.intp)  # number of fragments on it
+        self.box_m = np.empty((0, 4))  # edges of the last box that showed all of it, from its centre
+        self.area_m2 = np.empty(0)  # running average, up to a common factor
+        self.growth_mps = np.empty(0)  # speed of the centre that a growing or shrinking surface can explain
+        self.clean_s = np.empty(0)  # for how long the centre has measured the velocity without a break
+        self.sliver = np.empty(0, np.bool_)  # a mover of which only a small rest was visible
+        # A mover without an edge in depth to the static surface beside it: where it ends there is a guess.
         self.guessed = np.empty(0, np.bool_)
-        # Seen only above the robot; the rest is hidden, or beside the view.
-        self.overhead = np.empty(0, np.bool_)
-        # The verdict (vision/bodies/judgement.py): the score it rests on, now, ever, how surely (0..1), and
-        # whether its fragments are sure that it stands.
-        self.evidence = np.empty(0)
-        self.moving = np.empty(0, np.bool_)
-        self.has_moved = np.empty(0, np.bool_)
-        self.confidence = np.empty(0)
-        self.stands = np.empty(0, np.bool_)
-        self.calm_s = np.empty(0)  # since there was evidence; inf: there never was
+        self.overhead = np.empty(0, np.bool_)  # seen only above the robot's height; the rest is out of sight
+        # The verdict (vision/bodies/judgement.py).
+        self.evidence = np.empty(0)  # the score it rests on
+        self.moving = np.empty(0, np.bool_)  # now
+        self.has_moved = np.empty(0, np.bool_)  # at any time
+        self.confidence = np.empty(0)  # 0..1
+        self.stands = np.empty(0, np.bool_)  # its fragments are sure that it stands still
+        self.calm_s = np.empty(0)  # time without evidence; inf: there never was any
         self.moving_s = np.empty(0)  # for how long the verdict has been that it moves
-        self.unproven_s = np.empty(0)  # since a frame proved that it moves, or since its birth
-        # For how long nearly all ends denied that it stands, less how long they did not.
+        self.unproven_s = np.empty(0)  # since a frame last proved that it moves, or since its birth
+        # Time in which nearly all ends contradicted standing still, less the time in which they did not.
         self.unrest_s = np.empty(0)
         self._fields = tuple(vars(self))
         self._next_id = 1
@@ -71,40 +70,43 @@ class Tracks:
 
     @property
     def mover(self) -> NDArray[np.bool_]:
-        """(T,) who moves, or is suspected of it."""
+        """(T,) tracks that move by the verdict, or have evidence of it."""
         return self.moving | (self.evidence > 0.0)
 
     @property
     def speed_mps(self) -> FloatArray:
-        """(T,) as filtered."""
+        """(T,) filtered speed."""
         return _speeds(self.state)
 
     @property
     def velocity_sigma_mps(self) -> FloatArray:
-        """(T,) of the filtered velocities, over all directions."""
+        """(T,) standard deviation of the filtered velocity: root of the sum of the variances of its axes."""
         result: FloatArray = np.sqrt(self.covariance[:, 3:, 3:].trace(axis1=1, axis2=2))
         return result
 
     def clear(self) -> None:
-        """Forget all tracks; ids go on."""
+        """Forget all tracks; ids are not used again."""
         self.keep(np.zeros(len(self), np.bool_))
 
     def keep(self, chosen: NDArray[np.bool_]) -> None:
         """Drop all but the chosen tracks."""
         if chosen.all():
             return
-        kept = chosen.nonzero()[0]  # a choice by index is several times as fast
+        kept = chosen.nonzero()[0]  # taking by index is several times as fast as by mask
         for name in self._fields:
             setattr(self, name, getattr(self, name).take(kept, axis=0))
 
     def index_of(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
-        """(N,) index of each track id, -1 where there is none (any more)."""
+        """(N,) index of each track id; -1 where there is no such track, or no longer."""
         return _places(self.ids, ids)
 
     def start(
         self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
     ) -> None:
-        """Begin tracks at positions (K, 3) with unknown velocity: bounded by max_speed_mps, not zero."""
+        """Begin tracks at positions (K, 3), known to sigma_m, with unknown velocity.
+
+        Its mean is 0 and its standard deviation is max_speed_mps.
+        """
         count = len(position_m)
         given: dict[str, object] = {
             "ids": np.arange(self._next_id, self._next_id + count),
@@ -126,13 +128,19 @@ class Tracks:
             setattr(self, name, np.concatenate((old, new)))
 
     def twin(self, track: int, evidence: float, now_ns: int) -> None:
-        """Begin a track with the velocity of another one that it was taken for a part of. It has to prove
-        its motion itself: it may be what the mover passes by."""
+        """Begin a track that was part of another one, with that one's velocity.
+
+        It has to prove its motion by itself: it may be something static that the mover passes.
+        """
         self.start(self.state[track : track + 1, :3], 0.3, 1.0, evidence, now_ns)
         self.state[-1, 3:] = self.state[track, 3:]
 
     def predict(self, dt_s: float, accel_density: float, up: FloatArray | None) -> None:
-        """Move every track on. up (3,): along the floor's normal nothing keeps going; None: not known."""
+        """Predict all tracks dt_s ahead.
+
+        accel_density: spectral density of the acceleration, (m/s^2)^2 s. up (3,): the floor's normal, along
+        which a velocity dies out; None where it is not known.
+        """
         if len(self) and dt_s > 0:
             self.state, self.covariance = kalman.predict(self.state, self.covariance, dt_s, accel_density, up)
             self.surface_state, self.surface_covariance = kalman.predict(
@@ -140,8 +148,10 @@ class Tracks:
             )
 
     def follow_trails(self, dt_s: float) -> NDArray[np.bool_]:
-        """Take in where the centres are, dt_s on; (T,) whether they really go about as fast as the velocities
-        say. Once a frame."""
+        """Update the trailing averages; (T,) whether the centres advance about as fast as the velocities say.
+
+        Call once a frame, dt_s after the frame before.
+        """
         gain, behind_s = -math.expm1(-dt_s / _TRAIL_S), dt_s / math.expm1(dt_s / _TRAIL_S)
         self.trailing_m, goes = _followed(self.state, self.trailing_m, gain, behind_s)
         return goes
@@ -151,27 +161,32 @@ class Tracks:
         return _sight(self.state, camera_m)
 
     def overdue(self, elapsed_s: float, sight: FloatArray, resolves_m: FloatArray) -> NDArray[np.bool_]:
-        """(T,) movers of which nothing has proved just now that they go on, and which by their velocity are
-        clearly no longer where they were elapsed_s ago: across the line of sight by most of their width, or
-        along it by what depth can tell apart there, resolves_m (T,). sight (T, 3): unit vectors."""
+        """(T,) movers without recent proof of motion that must have left their place of elapsed_s ago.
+
+        By their velocity they have moved across the line of sight by most of their width, or along it by what
+        depth can resolve there, resolves_m (T,). sight (T, 3): unit vectors from the camera to the tracks.
+        """
         if elapsed_s <= 0.0:
             return np.zeros(len(self), np.bool_)
         asked = self.moving & (self.unproven_s >= _UNPROVEN_S)
         return _gone(asked, self.state, self.extent_m, sight, resolves_m, elapsed_s)
 
     def count_on(self, proven: NDArray[np.bool_], dt_s: float) -> None:
-        """For how long it has been so, after a verdict, dt_s after the last. proven (T,): by this frame."""
+        """Update the durations after a verdict, dt_s after the last. proven (T,): motion, by this frame."""
         self.unproven_s = np.where(proven, 0.0, self.unproven_s + dt_s)
         self.moving_s = np.where(self.moving, self.moving_s + dt_s, 0.0)
         self.calm_s = np.where(self.evidence > 0.0, 0.0, self.calm_s + dt_s)
 
     def hide(self, chosen: NDArray[np.bool_]) -> None:
-        """Tracks of which nothing is to be seen any more, behind what stands there."""
+        """Mark the chosen tracks as hidden: nothing of them is visible behind a static surface."""
         self.sliver |= chosen
         self.cells[chosen] = 0
 
     def locate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
-        """The centres of tracks index (K,) were seen at position_m (K, 3) with covariance noise (K, 3, 3)."""
+        """Update both filters of tracks index (K,) with measured centres.
+
+        position_m (K, 3): in the fixed frame. noise (K, 3, 3): their covariance.
+        """
         if len(index) == 0:
             return
         self.state[index], self.covariance[index] = kalman.update(
@@ -186,7 +201,7 @@ class Tracks:
         )
 
     def relocate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
-        """As locate, where the centre says nothing of the velocity."""
+        """As locate, but the centre tells nothing about the velocity."""
         if len(index) == 0:
             return
         self.state[index], self.covariance[index] = kalman.place(
@@ -202,7 +217,7 @@ class Tracks:
 
 @compiled("int64[::1], int64[::1]")
 def _places(known: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.intp]:
-    """(N,) where each of ids (N,) stands among those known, which grow; -1: nowhere."""
+    """(N,) position of each of ids (N,) among known, which is in ascending order; -1 where it is not."""
     result = np.full(len(ids), -1, np.intp)
     for k in range(len(ids)):
         place = np.searchsorted(known, ids[k])
@@ -225,7 +240,7 @@ def _speeds(state: FloatArray) -> FloatArray:
 def _followed(
     state: FloatArray, trailing_m: FloatArray, gain: float, behind_s: float
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """trailing_m (T, 3) a step on, and follow_trails; behind_s: by so much it trails what goes steadily."""
+    """Updated trailing_m (T, 3) and the result of follow_trails. behind_s: lag at a steady velocity."""
     trails_m, goes = trailing_m.copy(), np.empty(len(state), np.bool_)
     for t in range(len(state)):
         way, squared = 0.0, 0.0
@@ -261,7 +276,7 @@ def _gone(
     resolves_m: FloatArray,
     elapsed_s: float,
 ) -> NDArray[np.bool_]:
-    """(T,) those asked for that are clearly no longer where they were elapsed_s ago."""
+    """(T,) of the tracks asked (T,), those that must have left their place of elapsed_s ago."""
     gone = np.zeros(len(asked), np.bool_)
     for t in range(len(asked)):
         along_m, squared = 0.0, 0.0

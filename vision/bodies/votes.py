@@ -1,18 +1,17 @@
-"""Which cells of the depth grid belong to which track, by the votes of what was predicted.
+"""Assignment of connected parts to tracks, by votes of the predicted cells. Terms: vision/__init__.py.
 
-Each track predicts where its cells are (predict of vision/bodies/masks.py), and these vote:
+The cells that each track is predicted to cover (predict of vision/bodies/masks.py) vote:
 
 1. count_votes: each predicted cell is one vote of its track for the connected part in which it lies. A few
-   stray votes do not count, and of several static tracks in a part only the strongest stays.
-2. withdraw: an exception. A mover that must have gone on loses what was there before and is claimed by what
-   stands: it went behind that, at about its depth.
-3. release: another one. A standing track loses a newly arrived part if the rest of the track was there
-   before: somebody who stood beside furniture has left it.
-4. divide: a part with one voter goes to that track as a whole. A part with several voters (at most one of
-   them is static) is divided: each cell goes to the nearest vote.
+   stray votes do not count, and of several static tracks in a part only the one with the most votes stays.
+2. withdraw, an exception: a mover that must have moved on loses a part that was there before and that a
+   static track claims as well. The mover has gone behind the static surface, at about its depth.
+3. release, another exception: a static track loses a part that has newly arrived if the rest of the track was
+   there before. Somebody who stood beside furniture, as one part with it, has left it.
+4. divide: a part that one track claims goes to that track as a whole. A part that several tracks claim (at
+   most one of them static) is divided: each cell goes to the track of the nearest vote.
 
-Between 3 and 4, vision/bodies/grouping.py corrects to which track a whole part goes. Terms:
-vision/__init__.py.
+Between 3 and 4, vision/bodies/grouping.py corrects the winners of whole parts.
 """
 
 from __future__ import annotations
@@ -26,19 +25,30 @@ from hal.compiled import compiled
 from vision.depth.connected import IntGrid, spread_labels
 from vision.depth.depth_grid import BoolGrid
 
-_LEAST_VOTES = 4  # cells: fewer are strays of a prediction that is off by a cell
-_SHARE_OF_PART = 0.15  # of all votes in it, or
-_SHARE_OF_TRACK = 0.30  # of all votes of the track, whichever is less: else they are strays, too
-_CAME_CELLS = 20  # as much as an arrival that proves by itself (vision/bodies/proof.py), and
-_CAME_SHARE = 0.3  # of the part: who leaves furniture comes out of it side first
-_LEAVING_SHARE = 0.75  # of what stands: a larger part is the thing itself
-_STAYED_SHARE = 0.7  # of its votes: the rest is where the rims of both lie
+# A track needs this many votes in a part to claim it, in cells: fewer are strays of a prediction that is off
+# by one cell.
+_LEAST_VOTES = 4
+# It also needs this share of all votes in the part, or this share of all votes of the track, whichever is
+# less. Fewer are strays as well.
+_SHARE_OF_PART = 0.15
+_SHARE_OF_TRACK = 0.30
+# A part has newly arrived if at least this many of its cells have (as many as an arrival that is proof by
+# itself, vision/bodies/proof.py), and this share: a person who leaves furniture emerges with one side first.
+_CAME_CELLS = 20
+_CAME_SHARE = 0.3
+_LEAVING_SHARE = 0.75  # of a static track's cells: a larger part is the static thing itself and cannot leave
+_STAYED_SHARE = 0.7  # of a mover's votes must be for cells that have stayed; the others lie at the rims
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ballot:
-    """present (P, T): the tracks that a part may belong to. cast (P, T): votes for each. winner (P,): track
-    index + 1 of the one with the most, 0 for none. votes (P,): the winner's."""
+    """The votes of T tracks in P parts.
+
+    present: the tracks that claim a part, to which it may belong, (P, T).
+    cast: votes of each track in each part, (P, T).
+    winner: index + 1 of the claiming track with the most votes, 0 for none, (P,).
+    votes: the winner's votes, (P,).
+    """
 
     present: NDArray[np.bool_]
     cast: NDArray[np.intp]
@@ -49,9 +59,9 @@ class Ballot:
 def count_votes(
     parts: IntGrid, count: int, predicted: IntGrid, tracks: int, mover: NDArray[np.bool_]
 ) -> Ballot:
-    """How the cells predicted (h, w), track index + 1, vote in the connected parts 1..count of parts.
+    """Count the votes of predicted (h, w), track index + 1, in the connected parts 1..count of parts.
 
-    mover (T,): tracks that move, or may: only these divide a part; of the static ones the strongest stays.
+    mover (T,): tracks that move, or may. All movers stay in a part; of the static tracks only the strongest.
     """
     votes = _votes(parts, predicted, count, tracks)
     return elect(_claims(votes, mover), votes)
@@ -59,7 +69,7 @@ def count_votes(
 
 @compiled("int32[:, ::1], int32[:, ::1], int64, int64")
 def _votes(parts: IntGrid, predicted: IntGrid, count: int, tracks: int) -> NDArray[np.intp]:
-    """(P, T) how many cells speak for each track in each part."""
+    """(P, T) how many predicted cells each track has in each part."""
     height, width = parts.shape
     votes = np.zeros((count, tracks), np.intp)
     for i in range(height):
@@ -71,12 +81,12 @@ def _votes(parts: IntGrid, predicted: IntGrid, count: int, tracks: int) -> NDArr
 
 @compiled("int64[:, ::1], boolean[::1]")
 def _claims(votes: NDArray[np.intp], mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(P, T) the tracks that a part may belong to."""
+    """(P, T) which tracks have enough votes in a part to claim it."""
     parts, tracks = votes.shape
     present = np.zeros((parts, tracks), np.bool_)
     total, own = votes.sum(axis=1), votes.sum(axis=0)
     for p in range(parts):
-        strongest, most = 0, 0  # of the static ones
+        strongest, most = 0, 0  # of the static tracks
         for t in range(tracks):
             least = min(_SHARE_OF_PART * total[p], _SHARE_OF_TRACK * own[t])
             present[p, t] = votes[p, t] >= max(least, _LEAST_VOTES)
@@ -88,7 +98,7 @@ def _claims(votes: NDArray[np.intp], mover: NDArray[np.bool_]) -> NDArray[np.boo
 
 
 def elect(present: NDArray[np.bool_], cast: NDArray[np.intp]) -> Ballot:
-    """The ballot of P parts, each for the one with the most votes, cast (P, T), of those present."""
+    """The ballot in which each part goes to the track with the most votes, cast (P, T), of those present."""
     return Ballot(present, cast, *_elected(present, cast))
 
 
@@ -96,7 +106,7 @@ def elect(present: NDArray[np.bool_], cast: NDArray[np.intp]) -> Ballot:
 def _elected(
     present: NDArray[np.bool_], cast: NDArray[np.intp]
 ) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
-    """winner and votes of Ballot. Of those with as many votes it is the first."""
+    """winner and votes of Ballot. Of tracks with equally many votes the first one wins."""
     parts, tracks = cast.shape
     winner, votes = np.zeros(parts, np.int32), np.zeros(parts, np.intp)
     for p in range(parts):
@@ -107,8 +117,10 @@ def _elected(
 
 
 def guessed(ballot: Ballot, mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(T,) movers, mover (T,), all of whose parts something that stands claims as well: where such a mover
-    ends is a guess."""
+    """(T,) movers, of mover (T,), all of whose parts are claimed by a static track as well.
+
+    The border between the two within such a part is a guess.
+    """
     return _guessed(ballot.present, mover)
 
 
@@ -130,10 +142,10 @@ def _guessed(present: NDArray[np.bool_], mover: NDArray[np.bool_]) -> NDArray[np
 def release(
     ballot: Ballot, cells: NDArray[np.intp], arrived: NDArray[np.intp], mover: NDArray[np.bool_]
 ) -> Ballot:
-    """ballot without what stands for parts that have come while the rest of it was there: somebody who stood
-    beside furniture, as one part with it, has left it.
+    """ballot without static tracks in parts that have newly arrived while the rest of the track was there.
 
-    cells (P,) of the parts; arrived (P,): those where free space was seen. mover (T,): keep what is theirs.
+    Somebody who stood beside furniture, as one part with it, has left it. cells (P,): of the parts. arrived
+    (P,): cells of them in space that was seen free. mover (T,): these keep their parts.
     """
     came = (arrived >= _CAME_CELLS) & (arrived >= _CAME_SHARE * cells)
     if not (came.any() and ballot.present.any()):
@@ -152,11 +164,13 @@ def withdraw(
     overdue: NDArray[np.bool_],
     mover: NDArray[np.bool_],
 ) -> tuple[Ballot, NDArray[np.bool_]]:
-    """ballot without movers that must have gone on for parts that something that stands claims as well, if
-    most of their votes there are for surfaces that have stayed: they went behind them, at about their depth.
-    And which tracks (T,) have lost all of their parts so.
+    """ballot without overdue movers in parts of static surfaces; and (T,) tracks that so lost all parts.
 
-    parts, predicted and mover as for count_votes; stayed (h, w); overdue (T,): the movers in question.
+    A mover loses a part that a static track claims as well if most of its votes there are for cells that have
+    stayed: it has gone behind the static surface, at about its depth.
+
+    parts, predicted, mover: as for count_votes. stayed (h, w): surfaces that were there before. overdue (T,):
+    movers that must have moved on.
     """
     if not overdue.any():
         return ballot, np.zeros(len(mover), np.bool_)
@@ -171,7 +185,7 @@ def withdraw(
 
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:
-    """(h, w) track index + 1: whole parts to their winner (P,), shared ones by the nearest vote."""
+    """(h, w) track index + 1: whole parts go to their winner (P,), cells of shared ones to the nearest."""
     present, filled = ballot.present, predicted
     shared = _shared(present, winner)
     if shared.any():
@@ -182,7 +196,7 @@ def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[n
 
 @compiled("boolean[:, ::1], int32[::1]")
 def _shared(present: NDArray[np.bool_], winner: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(P,) parts that belong to several tracks. Nobody shares in that of a track that begins just now."""
+    """(P,) parts that several tracks claim. A part whose winner is born in this frame is never shared."""
     parts, tracks = present.shape
     result = np.zeros(parts, np.bool_)
     for p in range(parts):
@@ -194,8 +208,7 @@ def _shared(present: NDArray[np.bool_], winner: NDArray[np.int32]) -> NDArray[np
 def _seeds(
     parts: IntGrid, predicted: IntGrid, present: NDArray[np.bool_], shared: NDArray[np.bool_]
 ) -> tuple[IntGrid, BoolGrid]:
-    """(h, w) the votes in the parts that are shared (P,), of those who are present there; and (h, w) where
-    these parts are."""
+    """(h, w) votes in shared parts (P,) of the tracks that claim them; and (h, w) cells of these parts."""
     height, width = parts.shape
     seeds, inside = np.zeros((height, width), np.int32), np.zeros((height, width), np.bool_)
     for i in range(height):
@@ -216,7 +229,7 @@ def _divided(
     shared: NDArray[np.bool_],
     winner: NDArray[np.int32],
 ) -> IntGrid:
-    """(h, w) the winner of each part; in shared ones (P,) what is filled in, if that one is present there."""
+    """(h, w) the winner of each part; in shared parts (P,) the label in filled, if it claims the part."""
     height, width = parts.shape
     labels = np.zeros((height, width), np.int32)
     for i in range(height):

@@ -1,1 +1,10 @@
-"""The camera itself: its lens, its gyro, where it is mounted, and how far a frame can be trusted."""
+"""The camera itself: its gyro, its health, its mounting, the floor below it, and its lens.
+
+Files, in the order in which they come into play within one frame:
+
+* gyro - samples of the gyro, and the rotation between two frames.
+* floor - finds the floor in the depth, for a camera without a known mounting.
+* health - how far a frame can be trusted.
+* mount_check - whether the floor is where the mounting puts it.
+* lens - pixels to rays and back; used throughout.
+"""

@@ -1,8 +1,8 @@
-"""Where the floor is, found in the depth: for a camera in the hand, whose mounting nobody knows.
+"""The floor, found in the depth image: for a hand-held camera, whose mounting is not known.
 
-The inverse depth of a plane is affine in the image, 1/z = a x + b y + c on rays (x, y, 1), and the noise
-of a stereo camera is constant in it, so planes are fitted there. Of all planes below the camera
-the floor is the one that much is seen of and under which next to nothing is seen.
+The inverse depth of a plane is affine in the image, 1/z = a x + b y + c on rays (x, y, 1), and the noise of a
+stereo camera is constant in inverse depth, so planes are fitted there. Of all planes below the camera, the
+floor is the one with many cells on it and hardly any below it. Also used by vision/camera/mount_check.py.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from hal.types import FloatArray
 from vision.depth.depth_grid import CELL_HEIGHT_NOISE, DepthGrid
 from vision.depth.depth_noise import depth_sigma_m
 
-_EVERY = 3  # cells, in both directions
-_TRIES = 96  # where half of what is looked at is floor, one in eight hits it three times
-_LEAST_SHARE = 0.06  # of the cells looked at: less floor than this is no floor
-_BELOW_COSTS = 3.0  # cells seen under a plane speak against it more than cells on it speak for it
-_TOLERANCE = 0.012  # 1/m, four standard deviations of a cell
-_LEAST_UPRIGHT = 0.7  # cosine: a camera held more askew than 45 degrees is not expected
-_HELD_M = (0.15, 2.5)  # as low as a small robot's camera, as high as over a head
-_REFINEMENTS = 3  # each from the cells on the plane before
-_KEEP_FRAMES = 5  # without it: by then the camera may have turned too far for the last one
-_SEARCH_EVERY = 5  # frames, while a floor is followed
-_SIGMA_M = 0.01  # of the plane itself
+_EVERY = 3  # every third cell is used, in both directions
+_TRIES = 96  # random planes: if half of the cells are floor, one try in eight has all three on the floor
+_LEAST_SHARE = 0.06  # minimum share of the cells that lie on the floor
+_BELOW_COSTS = 3.0  # a cell below a plane counts against it three times as much as a cell on it counts for it
+_TOLERANCE = 0.012  # 1/m, of a cell on a plane: four standard deviations of a cell
+_LEAST_UPRIGHT = 0.7  # cosine: a camera held more than 45 degrees off is not expected
+_HELD_M = (0.15, 2.5)  # height range: from a small robot's camera to one held above the head
+_REFINEMENTS = 3  # repeated fits, each to the cells on the plane before
+_KEEP_FRAMES = 5  # the last floor is kept for this many frames; then the camera may have turned too far
+_SEARCH_EVERY = 5  # frames between two full searches while a floor is followed
+_SIGMA_M = 0.01  # standard deviation of the plane's height
 _SIGMA_PER_METRE = 0.006  # and of its tilt: a third of a degree
 
 
@@ -42,9 +42,12 @@ class Floor:
 
 
 class FloorFinder:
-    """Follows the floor from frame to frame. Every few frames, and at once when it is lost, all of the view
-    is searched for planes; that of the frame before is compared with them. Until one is found that is done in
-    every frame. heights_m: the least and the greatest height of the camera that is possible."""
+    """Follows the floor from frame to frame.
+
+    The plane of the frame before is refined. Every few frames, and at once when the plane is lost, the whole
+    view is searched for planes, and the plane of the frame before is one of the candidates. Until a floor is
+    found, every frame is searched. heights_m: minimum and maximum possible height of the camera.
+    """
 
     def __init__(self, heights_m: tuple[float, float] = _HELD_M) -> None:
         self._heights_m = heights_m
@@ -53,7 +56,7 @@ class FloorFinder:
         self._missed = 0
 
     def find(self, grid: DepthGrid) -> Floor | None:
-        """The floor in grid; for a few frames the last one where it is not to be seen, then None."""
+        """The floor in grid. If it is not visible, the last one for a few frames, then None."""
         rows, columns = np.nonzero(grid.valid[::_EVERY, ::_EVERY])
         plane = None
         if len(rows) >= 3:
@@ -68,7 +71,7 @@ class FloorFinder:
         return None if self._plane is None else _floor(self._plane)
 
     def _plane_in(self, cells: FloatArray, inverse: FloatArray, least_cells: float) -> FloatArray | None:
-        """(3,) the plane of the floor among cells (3, K); None: not found, or not looked for now."""
+        """(3,) the plane of the floor among cells (3, K); None: not found, or not searched for this time."""
         self._unsearched += 1
         due = self._plane is None or self._unsearched >= _SEARCH_EVERY
         if self._plane is not None and not due:
@@ -83,7 +86,7 @@ class FloorFinder:
 
 
 def on_floor(grid: DepthGrid, floor: Floor, noise: DepthNoise) -> DepthGrid:
-    """grid with heights over floor and distances along it."""
+    """grid with heights above floor and distances along it."""
     rise = floor.up[0] * grid.x[None, :] + (floor.up[1] * grid.y + floor.up[2])[:, None]
     rise = rise.astype(np.float32)
     ahead = np.array([0.0, 0.0, 1.0]) - floor.up[2] * floor.up
@@ -110,7 +113,10 @@ def cells_on(grid: DepthGrid, floor: Floor) -> int:
 def _best_plane(
     cells: FloatArray, inverse: FloatArray, before: FloatArray | None, heights_m: tuple[float, float]
 ) -> FloatArray | None:
-    """(3,) a, b, c of what is most likely the floor of cells (3, K) with inverse depth (K,)."""
+    """(3,) a, b, c of the plane that is most likely the floor; None if no plane is possible.
+
+    cells (3, K): rays. inverse (K,): their inverse depth. before (3,): plane of the frame before.
+    """
     chosen = (_picks() * len(inverse)).astype(np.intp)
     corners = cells[:, chosen].transpose(1, 2, 0)
     flat = np.abs(np.linalg.det(corners)) > 1e-4
@@ -131,12 +137,13 @@ def _refined(
     least_cells: float,
     heights_m: tuple[float, float],
 ) -> FloatArray | None:
-    """plane (3,) fitted to the cells on it; None: it is no floor."""
+    """plane (3,) fitted to the cells on it; None if the result is no floor."""
     for _ in range(_REFINEMENTS):
         on_it = np.abs(plane @ cells - inverse) <= _TOLERANCE
         if np.count_nonzero(on_it) < max(3.0, least_cells):
             return None
-        # Three unknowns of one size: the normal equations will do. A row of cells only is no plane.
+        # With three unknowns of similar size the normal equations suffice. SVD also handles a single row of
+        # cells, which does not determine a plane.
         chosen = cells * on_it
         _, found = cv2.solve(chosen @ cells.T, chosen @ inverse[:, None], flags=cv2.DECOMP_SVD)
         plane = np.asarray(found, np.float64)[:, 0]
@@ -145,7 +152,7 @@ def _refined(
 
 
 def _score(planes: FloatArray, cells: FloatArray, inverse: FloatArray) -> FloatArray:
-    """(P,) cells on each plane (P, 3), less those seen through it."""
+    """(P,) number of cells on each plane (P, 3), less _BELOW_COSTS times that of the cells below it."""
     above = planes @ cells
     np.subtract(inverse, above, out=above)  # positive: nearer than the plane
     below = np.count_nonzero(above < -2.0 * _TOLERANCE, axis=1)
@@ -155,7 +162,7 @@ def _score(planes: FloatArray, cells: FloatArray, inverse: FloatArray) -> FloatA
 
 
 def _possible(planes: FloatArray, heights_m: tuple[float, float]) -> NDArray[np.bool_]:
-    """(P,) which planes (P, 3) lie below a camera held more or less upright."""
+    """(P,) which planes (P, 3) lie below an approximately upright camera, at a possible height."""
     low_m, high_m = heights_m
     size = np.sqrt(np.square(planes).sum(axis=1))
     result: NDArray[np.bool_] = (
@@ -171,8 +178,10 @@ def _floor(plane: FloatArray) -> Floor:
 
 @lru_cache(maxsize=1)
 def _picks() -> FloatArray:
-    """(tries, 3) in [0, 1): where three cells of each try lie in the order of rows. The floor is low in the
-    image, so two of three come from its lower half. The same in every run."""
+    """(tries, 3) in [0, 1): positions of the three cells of each try in the list of cells, row by row.
+
+    Two of the three are from the lower half, since the floor is low in the image. The seed is fixed.
+    """
     share = np.random.default_rng(1).random((_TRIES, 3))
     share[:, 1:] = 0.5 + 0.5 * share[:, 1:]
     return share

@@ -1,7 +1,7 @@
-"""The gyro's samples, kept until the frame of their time has come, and the turn that they tell of.
+"""Buffer of gyro samples, and the rotation of the camera between two frames by them.
 
-A frame arrives some 30 ms after its exposure, with all samples up to its arrival: most of those between two
-exposures come with the frame before.
+A frame arrives some 30 ms after its exposure, with all samples up to its arrival. So most samples between two
+exposures come with the first of the two frames and have to be kept for the second.
 """
 
 from __future__ import annotations
@@ -12,33 +12,34 @@ from numpy.typing import NDArray
 from hal.types import FloatArray, GyroSamples
 
 _NS_PER_S = 1e9
-_KEPT = 2048  # 5 s at 400 Hz; frames farther apart are not compared
-_GAP_NS = 25_000_000  # samples farther apart tell nothing of what was between them
-_EDGE_NS = 10_000_000  # a sample stands for so much before the first and after the last one
-_COVERED = 0.8  # of the time between two exposures
+_KEPT = 2048  # maximum number of samples, 5 s at 400 Hz; frames farther apart are not compared
+_GAP_NS = 25_000_000  # maximum interval of two samples between which the rate is interpolated
+_EDGE_NS = 10_000_000  # time before the first and after the last sample that these two cover
+_COVERED = 0.8  # share of the time between two exposures that samples have to cover
 
 
 class GyroMemory:
-    """Takes the samples of every frame, also of those that are not followed."""
+    """Takes the samples of every frame, including frames that are not followed."""
 
     def __init__(self) -> None:
         self.clear()
 
     def clear(self) -> None:
-        """Forget: time has stepped."""
+        """Forget all samples."""
         self._stamps_ns = np.empty(0, np.int64)
         self._rates_radps = np.empty((0, 3))
 
     def add(self, samples: GyroSamples) -> None:
-        """In the order of time; what is not finite, or not newer than the one before it, is left out."""
+        """Add samples in the order of time, except those that are not finite or not newer than the last."""
         stamps_ns = samples.stamps_ns
         if len(stamps_ns) == 0:
             return
         if len(self._stamps_ns) and stamps_ns[-1] < self._stamps_ns[-1]:
-            # Time has stepped back; or one stamp was wrong, and nothing would be newer for long.
+            # Time has stepped back, or an earlier stamp was wrong and too late. Drop what is not older than
+            # the new samples, or no sample would count as newer for a long time.
             self._keep(slice(None, int(self._stamps_ns.searchsorted(stamps_ns[0]))))
         new = np.asarray(np.isfinite(samples.rates_radps).all(axis=1))
-        # The stamps rest on an estimate of the device's clock, and may go back by a little.
+        # The stamps come from an estimate of the device's clock, and may step back slightly.
         latest_ns = np.maximum.accumulate(stamps_ns)
         new[1:] &= stamps_ns[1:] > latest_ns[:-1]
         if len(self._stamps_ns):
@@ -47,18 +48,20 @@ class GyroMemory:
         self._rates_radps = np.concatenate((self._rates_radps, samples.rates_radps[new]))[-_KEPT:]
 
     def forget(self, before_ns: int) -> None:
-        """What is older is not asked for again; the last sample of it stays, for what follows it."""
+        """Drop samples older than before_ns, except the last of them, which is needed for interpolation."""
         self._keep(slice(max(int(self._stamps_ns.searchsorted(before_ns, "right")) - 1, 0), None))
 
     def turn_rad(self, from_ns: int, to_ns: int) -> FloatArray | None:
-        """(3,) the rate integrated from from_ns to to_ns, straight between samples; None where they do
-        not cover most of that time."""
+        """(3,) rotation vector from from_ns to to_ns; None if the samples do not cover most of that time.
+
+        The rate is interpolated linearly between samples and integrated.
+        """
         if len(self._stamps_ns) == 0 or to_ns <= from_ns:
             return None
         if self._covered_ns(from_ns, to_ns) < _COVERED * (to_ns - from_ns):
             return None
         first, end = self._stamps_ns.searchsorted((from_ns, to_ns), "right")
-        # From the first of these on time fits into a float.
+        # Times relative to from_ns fit into a float without loss.
         at = np.concatenate(([from_ns], self._stamps_ns[first:end], [to_ns])) - from_ns
         known = (self._stamps_ns - from_ns).astype(float)
         rates = np.stack([np.interp(at, known, axis) for axis in self._rates_radps.T], axis=1)
@@ -70,7 +73,7 @@ class GyroMemory:
         self._stamps_ns, self._rates_radps = self._stamps_ns[which], self._rates_radps[which]
 
     def _covered_ns(self, from_ns: int, to_ns: int) -> int:
-        """How much of the time between has samples close enough to each other."""
+        """How much of the time from from_ns to to_ns is covered by samples close enough to each other."""
         stamps: NDArray[np.int64] = self._stamps_ns
         begin, end = stamps[:-1], stamps[1:]
         close = end - begin <= _GAP_NS

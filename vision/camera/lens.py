@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray, Intrinsics
 
-# Images and grids are float32, geometry is float64; what reads both takes either.
+# Images and grids are float32, geometry is float64; functions that read both take either.
 RealArray = NDArray[np.float32] | NDArray[np.float64]
 
 
 def rays(pixels: RealArray, camera: Intrinsics) -> FloatArray:
     """(N, 3) points at z = 1 m behind pixels (N, 2)."""
-    # Coordinate by coordinate, as those who turn or scale the rays read them.
+    # Stored coordinate by coordinate, as the code that rotates or scales the rays reads them.
     result = np.empty((3, len(pixels)))
     result[0] = (pixels[:, 0] - camera.cx) / camera.fx
     result[1] = (pixels[:, 1] - camera.cy) / camera.fy
@@ -25,12 +25,12 @@ def rays(pixels: RealArray, camera: Intrinsics) -> FloatArray:
 
 
 def row_delays(v_px: RealArray, camera: Intrinsics) -> FloatArray:
-    """(N,) when the rows v_px (N,) of an image are read: -0.5 for its first to 0.5 for its last one."""
+    """(N,) when rows v_px (N,) are read, in read-out times: -0.5 for the first row, 0.5 for the last one."""
     return v_px.astype(np.float64) / camera.height - 0.5
 
 
 def project(points_m: FloatArray, camera: Intrinsics) -> FloatArray:
-    """(N, 2) pixels of points (N, 3) in the optical frame; the caller keeps z > 0."""
+    """(N, 2) pixels of points (N, 3) in the optical frame; the caller ensures z > 0."""
     inverse_z = 1.0 / points_m[:, 2]
     result = np.empty((len(points_m), 2))
     result[:, 0] = points_m[:, 0] * inverse_z * camera.fx + camera.cx
@@ -46,7 +46,7 @@ def rotation_from_vector(vector_rad: FloatArray) -> FloatArray:
 
 def vector_from_rotation(rotation: FloatArray) -> FloatArray:
     """(3,) axis times angle of a rotation of less than half a turn."""
-    # Nine numbers: plain floats are several times as fast as arrays.
+    # For nine numbers plain floats are several times as fast as arrays.
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = rotation.tolist()
     x, y, z = 0.5 * (r21 - r12), 0.5 * (r02 - r20), 0.5 * (r10 - r01)
     sine = math.sqrt(x * x + y * y + z * z)

@@ -1,5 +1,8 @@
-"""Is the camera where its mounting says? With a pitch wrong by 20 degrees nothing is an obstacle, since
-everything passes for the floor, or the floor itself is one."""
+"""Check of the configured mounting: is the camera where the mounting says it is?
+
+With a pitch that is wrong by 20 degrees, either nothing is an obstacle, since everything is taken for floor,
+or the floor itself is one. vision/detector.py calls it in each frame of a camera with a known mounting.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,10 @@ from vision.camera.health import worsened
 from vision.depth.depth_grid import DepthGrid
 from vision.scene import CameraCondition, CameraHealth
 
-# Looked at so often, and more rarely once it was found in its place so many times.
+# Interval of the looks at the floor; the longer one once all of the last looks have found it in its place.
 _OFTEN_NS, _RARELY_NS = 500_000_000, 5_000_000_000
-_LOOKS = 5  # one look may take a ramp or a table for the floor; so many in a row do not agree on one
-_MOST_WRONG = 2  # of these: the majority decides
+_LOOKS = 5  # one look may take a ramp or a table for the floor; five in a row do not agree on one
+_MOST_WRONG = 2  # of these may be plainly wrong: the majority decides
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,29 +27,34 @@ class _Bounds:
     height_m: float
 
 
-# Slopes, vibration and a rough measure are less; tables and pallets do not hide most of the floor.
+# With errors above this the mounting is wrong by a majority of looks. Slopes, vibration and a rough
+# measurement of the mounting are smaller; tables and pallets do not hide most of the floor.
 _PLAINLY_WRONG = _Bounds(math.radians(5.0), 0.2)
-# A pallet is lost in the floor, or the floor becomes a surface some metres ahead. One look tells to 0.3
-# degrees and 6 mm; slopes are as much, but not the same in all looks.
+# With errors above this it is wrong if all looks agree: a pallet is taken for floor, or the floor becomes an
+# obstacle some metres ahead. One look is accurate to 0.3 degrees and 6 mm. A slope may be as large as this,
+# but not the same in all looks.
 _WRONG = _Bounds(math.radians(1.5), 0.05)
-_SAME = _Bounds(math.radians(0.5), 0.03)  # what one look is right to, with room for the robot's vibration
-# Also where depth is in another unit, five times as much or as little.
+_SAME = _Bounds(math.radians(0.5), 0.03)  # looks that agree differ by less: their accuracy, plus vibration
+# Heights searched: wide enough to find the floor if depth is in another unit, five times too large or small.
 _HEIGHTS_M = (0.05, 8.0)
-_OTHER_UNIT = 1.8  # times: no mounting is measured so wrongly
-_STILL_FLOOR = 0.5  # of the cells of the plane that was found
+_OTHER_UNIT = 1.8  # ratio of heights from which the unit of depth is suspected, not the mounting
+_STILL_FLOOR = 0.5  # the mounting is right if its plane holds this share of the cells of the plane found
 
 
 class MountCheck:
-    """Finds the floor in the depth now and then, and compares it with where the mounting puts it."""
+    """Finds the floor in the depth at intervals, and compares it with the floor by the mounting."""
 
     def __init__(self) -> None:
         self._looks: deque[_Look] = deque(maxlen=_LOOKS)
         self._next_ns: int | None = None
 
     def judge(self, grid: DepthGrid, captured_ns: int, health: CameraHealth) -> CameraHealth:
-        """health, or worse if most looks have found the floor plainly elsewhere, or all of them at one other
-        place. grid: with the mounting's floor."""
-        # Where time has stepped back, the next look is not as far away as it was.
+        """health, degraded if the mounting is wrong.
+
+        It is wrong if most looks have found the floor plainly elsewhere, or all of them elsewhere at one
+        place. grid: with heights by the mounting.
+        """
+        # The lower bound is for time that has stepped back: the next look would be too far away.
         if self._next_ns is None or not self._next_ns - _RARELY_NS <= captured_ns < self._next_ns:
             floor = FloorFinder(_HEIGHTS_M).find(grid)
             if floor is not None:
@@ -67,7 +75,7 @@ class MountCheck:
 
 @dataclass(frozen=True, slots=True)
 class _Look:
-    """off, plainly_off: by how much the floor is not where the mounting puts it."""
+    """One look at the floor. off, plainly_off: it is elsewhere by more than _WRONG, by _PLAINLY_WRONG."""
 
     floor: Floor
     off: bool

@@ -1,1 +1,13 @@
-"""Depth without fragments: a coarse grid, the parts of the view that stand out, free space."""
+"""Depth without fragments: a coarse grid, the connected parts that stand out of the floor, free space.
+
+Files, in the order in which they come into play:
+
+* depth_noise - standard deviation of measured depth.
+* depth_grid - the coarse grid of depth, with heights over the floor.
+* depth_mask - near and far surface around pixels; the depth of fragments.
+* connected - cells that stand out of the floor, and their connected parts.
+* regions - box, centre, size and occlusion of each part.
+* level_bands - the upright bands of the view in which free space is given.
+* near_floor - learns how near to the camera the floor can be measured.
+* depth_guard - the nearest surface and the known distance in each band: FreeSpace.
+"""

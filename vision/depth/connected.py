@@ -1,4 +1,7 @@
-"""Parts: the cells that stand out of the floor, parted where depth jumps. Terms: vision/__init__.py."""
+"""Parts: connected components of the cells that stand out of the floor, separated at jumps in depth.
+
+standing selects the cells, components labels the parts. Terms: vision/__init__.py.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,18 @@ from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 
 IntGrid = NDArray[np.int32]
 
-# 1/m: 0.15 m at 5 m, below which it is noise; a body's depth at 3 m, above which a slope is no excuse.
-LEAST_JUMP = 0.006
-MOST_JUMP = 0.03
-_USUAL_STEPS = 12.0  # of the middle one from cell to cell: so much more is a jump
-_SPECKLE_CELLS = 6  # fewer are taken for wrong matches of a stereo camera
+# Bounds of the step in inverse depth (1/m) between two cells that counts as a jump.
+LEAST_JUMP = 0.006  # 0.15 m at 5 m: a smaller step is noise
+MOST_JUMP = 0.03  # the depth of a body at 3 m: a larger step is a jump even on a slope
+_USUAL_STEPS = 12.0  # between the bounds, a jump is this many times the median step from cell to cell
+_SPECKLE_CELLS = 6  # parts with fewer cells are taken for wrong stereo matches
 
 
 def standing(grid: DepthGrid, clearance_m: float) -> BoolGrid:
-    """(h, w) cells that stand out of the floor; every valid cell where the floor is not known."""
+    """(h, w) cells higher above the floor than clearance_m plus the noise of height and the error of tilt.
+
+    Every valid cell where the floor is not known.
+    """
     if grid.height_m is None or grid.height_sigma_m is None:
         return grid.valid
     return _above_floor(grid.valid, grid.depth_m, grid.height_m, grid.height_sigma_m, np.float32(clearance_m))
@@ -38,20 +44,20 @@ def _above_floor(
 
 
 def components(grid: DepthGrid, mask: BoolGrid) -> tuple[int, IntGrid]:
-    """Connected parts of mask, parted where depth jumps: how many, and labels (h, w), 0 for none.
+    """Connected parts of mask, separated at jumps in depth: their number, and labels (h, w), 0 for none.
 
-    Depth noise of a stereo camera is constant in inverse depth, so that is where a jump is measured. The
-    far side of a jump is taken out, so that a pole one cell wide stays whole.
+    Jumps are measured in inverse depth, in which the noise of a stereo camera is constant. Only the cell on
+    the far side of a jump is removed, so that a pole one cell wide stays whole.
     """
     kept = _without_jumps(grid.inverse_depth, mask)
-    # Counting the cells here is a fraction of the work of OpenCV's own statistics.
+    # Counting the cells ourselves takes a fraction of the time of OpenCV's own statistics.
     count, found = cv2.connectedComponents(kept, connectivity=4)
     return _without_speckles(np.asarray(found, np.int32), count)
 
 
 @inlined
 def _usual_step(inverse: FloatGrid, mask: BoolGrid) -> float:
-    """The middle one of the steps from cell to cell within mask, in every second row; 0 without any."""
+    """Median step in inverse depth between neighbouring cells of mask, in every second row; 0 without any."""
     height, width = inverse.shape
     steps = np.empty(((height + 1) // 2) * width, np.float32)
     count = 0
@@ -69,7 +75,7 @@ def _usual_step(inverse: FloatGrid, mask: BoolGrid) -> float:
 
 @compiled("float32[:, ::1], boolean[:, ::1]")
 def _without_jumps(inverse: FloatGrid, mask: BoolGrid) -> NDArray[np.uint8]:
-    """(h, w) 1 where mask is, but for the far side of each jump."""
+    """(h, w) 1 in the cells of mask, except for those on the far side of a jump."""
     usual = _USUAL_STEPS * _usual_step(inverse, mask)
     jump = np.float32(min(max(usual, LEAST_JUMP), MOST_JUMP))
     height, width = inverse.shape
@@ -89,7 +95,7 @@ def _without_jumps(inverse: FloatGrid, mask: BoolGrid) -> NDArray[np.uint8]:
 
 @compiled("int32[:, ::1], int64")
 def _without_speckles(labels: IntGrid, count: int) -> tuple[int, IntGrid]:
-    """Labels 1..n for those of labels (h, w), below count, that are no speckles, in their order; and n."""
+    """n, and labels (h, w) renumbered 1..n in their order, without speckles. count: labels, with 0."""
     cells = np.zeros(count, np.int64)
     for part in labels.flat:
         cells[part] += 1
@@ -106,11 +112,11 @@ def _without_speckles(labels: IntGrid, count: int) -> tuple[int, IntGrid]:
 
 
 def spread_labels(labels: IntGrid, mask: BoolGrid) -> IntGrid:
-    """labels (h, w) with every unlabelled (0) cell of mask given the label of the nearest labelled cell."""
+    """labels (h, w) with each unlabelled (0) cell of mask given the label of the nearest labelled cell."""
     owned = labels > 0
     if not owned.any():
         return labels
-    # Nothing outside of the cells in question is nearer to one of them than what is inside.
+    # The bounding box of all cells involved suffices: it holds every labelled cell.
     u, v, width, height = cv2.boundingRect((mask | owned).view(np.uint8))
     box = slice(v, v + height), slice(u, u + width)
     inner, owned = labels[box], owned[box]

@@ -1,4 +1,8 @@
-"""A coarse grid of depth with its height over the floor; bodies and free space are read from it."""
+"""A coarse grid of depth with heights over the floor, from which bodies and free space are computed.
+
+make_grid makes it of each frame, first thing in vision/detector.py. Each cell is a robust sample of its block
+of pixels, smoothed by a median over 5x5 cells.
+"""
 
 from __future__ import annotations
 
@@ -19,27 +23,34 @@ from vision.depth.depth_noise import depth_sigma_of
 FloatGrid = NDArray[np.float32]
 BoolGrid = NDArray[np.bool_]
 
-# Noise of a cell's height over what one pixel's depth would make: of a median of many pixels, but neighbours,
-# so not as little as their count tells. An estimate; standing() in vision/depth/connected.py has a margin
-# beside it. From one look to another it has been measured, and is more: _CELL_NOISE_OVER_TIME in
-# vision/bodies/arrivals.py.
+# Noise of a cell's height relative to the noise that one pixel's depth would cause. A cell is the median of
+# many pixels, but these are neighbours and share noise, so the factor is larger than their number suggests.
+# The value is an estimate; standing() in vision/depth/connected.py adds a margin. The noise between two
+# frames has been measured and is larger: _CELL_NOISE_OVER_TIME in vision/bodies/arrivals.py.
 CELL_HEIGHT_NOISE = 0.4
-_FARTHEST = np.uint16(65535)  # raw depth of what is not valid: sorts behind all that is
-_LEAST_SIDE_PX = 32  # as config/recording.py and config/camera.py ask for
-_FOUR_FROM_PX = 4  # cells so large take four samples each, smaller ones their middle pixel
-_AGREE_INVERSE = 0.03  # 1/m: two of a cell's four samples further apart lie on two surfaces
+_FARTHEST = np.uint16(65535)  # raw depth of an invalid cell: it sorts behind all valid ones
+_LEAST_SIDE_PX = 32  # as config/recording.py and config/camera.py require
+_FOUR_FROM_PX = 4  # from this cell size on a cell takes four samples, below it the middle pixel
+_AGREE_INVERSE = 0.03  # 1/m: samples of a cell that differ by more lie on two surfaces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthGrid:
-    """Cell (i, j) stands for the pixels around (offset + step i, offset + step j) of the image.
+    """Depth of the view in (h, w) cells, each for one block of pixels.
 
-    depth_m (h, w): 0 where not valid. inverse_depth (h, w): 0 where not valid. valid (h, w).
-    beyond (h, w): measured, but farther than range_m: seen through up to there at least. range_m: the depth
-    mask's, or as far as 16 bits go in the camera's unit.
-    x (w,), y (h,): ray at z = 1 m. forward_m (h, w): distance along the floor. height_m (h, w) over the
-    floor, height_sigma_m (h, w) and up (3,), the floor's normal in optical axes: None where the floor is not
-    known. pitch_rad: of the mounting, NaN where the mounting is not known.
+    step_px, offset_px: cell (i, j) stands for the pixels around row offset + step * i, column offset + step *
+        j.
+    depth_m: 0 where not valid, (h, w).
+    inverse_depth: 0 where not valid, (h, w).
+    valid: measured within the range, (h, w).
+    beyond: measured, but farther than range_m, so that space is seen free up to there, (h, w).
+    x, y: ray at z = 1 m of each column, (w,), and row, (h,).
+    forward_m: distance along the floor, (h, w); depth_m where the floor is not known.
+    height_m, height_sigma_m: over the floor, (h, w); None where the floor is not known.
+    camera_height_m: over the floor; NaN where the floor is not known.
+    pitch_rad: of the mounting; NaN where that is not known.
+    up: the floor's normal in optical axes, (3,); None where the floor is not known.
+    range_m: of the depth mask, or as far as 16 bits reach in the camera's unit.
     """
 
     step_px: int
@@ -59,7 +70,7 @@ class DepthGrid:
     range_m: float
 
     def points(self, cells: NDArray[np.intp]) -> FloatGrid:
-        """(3, K) camera coordinates of flat cell indices (K,)."""
+        """(3, K) points in the camera axes of flat cell indices (K,)."""
         rows = cells // self.depth_m.shape[1]
         columns = cells - rows * self.depth_m.shape[1]
         depth = self.depth_m.ravel().take(cells)
@@ -72,15 +83,16 @@ class DepthGrid:
 
 @inlined
 def nearest_cell(pixel: float, offset_px: float, step_px: float, count: int) -> int:
-    """The row of a pixel's v, or the column of its u, in a grid of so many: the last one beyond the rim."""
+    """The row of a pixel's v, or the column of its u, in a grid of count; clamped at the border."""
     return min(max(int(np.rint((pixel - offset_px) / step_px)), 0), count - 1)
 
 
 def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | None) -> DepthGrid:
-    """Sub-sample the depth of frame; depth outside [min_depth_m, max_depth_m] is not valid, nor is the
-    largest number, at which far depth is cut off.
+    """Sub-sample the depth of frame. Heights are None where mount is None.
 
-    Raises ValueError for an image of less than 32 x 32 pixels: what looks around a pixel has no room there.
+    Depth outside [min_depth_m, max_depth_m] is not valid, nor is the largest raw number, at which far depth
+    is cut off. Raises ValueError for an image of less than 32 x 32 pixels: the neighbourhoods of pixels that
+    later steps read do not fit into it.
     """
     if min(frame.depth.shape) < _LEAST_SIDE_PX:
         sides = f"{frame.depth.shape[1]}x{frame.depth.shape[0]}"
@@ -91,7 +103,7 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     raw, valid, beyond = _sampled(
         np.ascontiguousarray(frame.depth), step, scale_m, np.float32(config.min_depth_m), np.float32(range_m)
     )
-    # The middle one of raw depths is that of their inverses, and whole numbers are sorted faster.
+    # The median of raw depths is that of their inverses too, and integers are sorted faster.
     middle = np.asarray(cv2.medianBlur(raw, 5), np.uint16)
     inverse, depth_m = _smoothed(raw, middle, scale_m)
     view = _view(frame.intrinsics, mount, depth_m.shape, step, offset)
@@ -145,8 +157,12 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
-    """Where the cells look: x (w,), y (h,) as in DepthGrid. ahead, drop (h,): metres along the floor and
-    metres down per metre of depth."""
+    """Ray directions of the cells, per metre of depth.
+
+    x, y: as in DepthGrid, (w,) and (h,).
+    ahead: metres along the floor, (h,).
+    drop: metres down, (h,).
+    """
 
     x: FloatGrid
     y: FloatGrid
@@ -158,7 +174,7 @@ class _View:
 def _view(
     camera: Intrinsics, mount: CameraMount | None, shape: tuple[int, int], step: int, offset: float
 ) -> _View:
-    """The same in every frame of one camera."""
+    """The view of one camera; cached, since it is the same in every frame."""
     u = (offset + step * np.arange(shape[1])).astype(np.float32)
     v = (offset + step * np.arange(shape[0])).astype(np.float32)
     x = (u - np.float32(camera.cx)) / np.float32(camera.fx)
@@ -173,8 +189,11 @@ def _view(
 
 @inlined
 def _of_four(depth: DepthImage, row: int, column: int, low: int, high: int, agree: np.float32) -> int:
-    """One raw depth of four samples of the block at row and column: the mean of the middle two, or, where
-    these lie on two surfaces, the nearer. A block with more than one sample without data has none."""
+    """One raw depth from four samples of the block at row and column.
+
+    The mean of the middle two, or the nearer of these where they lie on two surfaces. A block with more than
+    one sample without data has no depth (0).
+    """
     a, b = depth[row + low, column + low], depth[row + low, column + high]
     c, d = depth[row + high, column + low], depth[row + high, column + high]
     first = max(min(a, b), min(c, d))
@@ -194,7 +213,7 @@ def _row(
     agree: np.float32,
     into: NDArray[np.uint16],
 ) -> None:
-    """Raw depth of the blocks whose uppermost row of pixels this is."""
+    """Put the raw depth of the blocks whose uppermost pixel row is row into into."""
     for j in range(len(into)):
         if step >= _FOUR_FROM_PX:
             into[j] = _of_four(depth, row, step * j, step // 4, step // 4 + step // 2, agree)
@@ -206,7 +225,7 @@ def _row(
 def _sampled(
     depth: DepthImage, step: int, scale_m: np.float32, min_m: np.float32, range_m: np.float32
 ) -> tuple[DepthImage, BoolGrid, BoolGrid]:
-    """(h, w) raw depth of one cell per step x step block, _FARTHEST where it is not valid; valid; beyond."""
+    """(h, w) raw depth of each step x step block, _FARTHEST where not valid; valid (h, w); beyond (h, w)."""
     rest = 0 if step >= _FOUR_FROM_PX else step - 1 - step // 2
     height, width = (depth.shape[0] + rest) // step, (depth.shape[1] + rest) // step
     raw = np.empty((height, width), np.uint16)
@@ -214,7 +233,7 @@ def _sampled(
     agree = np.float32(_AGREE_INVERSE) * scale_m
     for i in range(height):
         if step == _FOUR_FROM_PX:
-            # A step known to the compiler takes half of the time.
+            # With a step that the compiler knows it takes half of the time.
             _row(depth, step * i, _FOUR_FROM_PX, agree, raw[i])
         else:
             _row(depth, step * i, step, agree, raw[i])
@@ -228,10 +247,10 @@ def _sampled(
 
 @compiled("uint16[:, ::1], uint16[:, ::1], float32")
 def _smoothed(raw: DepthImage, middle: DepthImage, scale_m: np.float32) -> tuple[FloatGrid, FloatGrid]:
-    """Inverse depth (h, w) and depth of the cells, both 0 where not valid: their median over 5x5 cells, as in
-    middle (h, w), but a cell that differs much keeps its own: a thin pole, a rim of a body.
+    """Inverse depth and depth of the cells, (h, w) each, 0 where not valid.
 
-    Without data, an inverse depth of 0, is the farthest.
+    They are the median over 5x5 cells, as in middle (h, w). A cell that differs much from the median keeps
+    its own depth: a thin pole, the rim of a body. In the median a cell without data counts as the farthest.
     """
     one, zero = np.float32(1.0), np.float32(0.0)
     inverse, depth_m = np.zeros(raw.shape, np.float32), np.zeros(raw.shape, np.float32)
@@ -255,8 +274,10 @@ def _over_floor(
     floor_m: np.float32,
     quadratic_per_m: np.float32,
 ) -> tuple[FloatGrid, FloatGrid, FloatGrid]:
-    """forward_m, height_m, height_sigma_m of cells of depth_m (h, w). ahead, drop (h,): see _View. floor_m,
-    quadratic_per_m: of depth_sigma_m."""
+    """forward_m, height_m and height_sigma_m of cells with depth_m (h, w).
+
+    ahead, drop (h,): see _View. floor_m, quadratic_per_m: depth noise.
+    """
     forward_m, height_m = np.empty(depth_m.shape, np.float32), np.empty(depth_m.shape, np.float32)
     height_sigma_m = np.empty(depth_m.shape, np.float32)
     for i in range(depth_m.shape[0]):

@@ -1,6 +1,7 @@
-"""What edges cannot see: the nearest surface in every direction, and how far the space was seen at all.
+"""Free space from depth: the nearest surface in every direction, and how far the space is known at all.
 
-A plain wall has no fragments, and a corridor without valid depth (glass, black, too near) is not free.
+It covers what fragments miss: a plain wall has no fragments. And a corridor without valid depth (glass,
+black, too near) is not free. vision/tracker.py calls it in each frame, and the result is part of the Scene.
 """
 
 from __future__ import annotations
@@ -17,26 +18,26 @@ from vision.depth.level_bands import LevelBands, level_bands
 from vision.depth.near_floor import FLOOR_EXCESS
 from vision.scene import NEVER_M, FreeSpace
 
-_SUPPORT = 3  # this many cells of a band must agree before they are a surface
-_BLANK_SHARE = 0.1  # of a band's cells: stray ones are measured even where something covers the lens
-_LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5  # as level and as steep as a ray may be to have a tangent worth telling
+_SUPPORT = 3  # a surface needs this many cells in a band: the distance is that of the third nearest
+_BLANK_SHARE = 0.1  # maximum share of measured cells in a blank band: stray cells are measured even there
+_LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5  # bounds of a ray's angle, so that its tangent stays meaningful
 
 
 def free_space(
     grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float, unmeasured_m: float = 0.0
 ) -> FreeSpace:
-    """Nearest obstacle cell (supported) and known distance for each of at most 80 upright bands.
+    """Nearest obstacle surface and known distance for each of at most 80 upright bands.
 
-    obstacle (h, w): cells between clearance and the robot's height; all valid ones where the floor is not
-    known. unmeasured_m: floor nearer than this depth cannot be measured (vision/depth/near_floor.py), and no
-    data there is no hole; 0.0: all can. Without a known mounting, space is known up to the nearest surface
-    only.
+    obstacle (h, w): cells between clearance and the robot's height; all valid cells where the floor is not
+    known. unmeasured_m: floor nearer than this depth cannot be measured (vision/depth/near_floor.py), so that
+    missing data there is no hole; 0.0: all floor can be measured. Without a known mounting, space is known up
+    to the nearest surface only.
     """
     bands, blind_m = level_bands(grid), 0.0
     nearest = _nearest_m(grid.forward_m, obstacle, bands.band, len(bands))
     if math.isfinite(grid.pitch_rad):
         known, blind_m = _known_m(grid, bands, max_depth_m, unmeasured_m)
-        # What stands there hides what is behind it.
+        # A surface hides everything behind it.
         known = np.where(np.isfinite(nearest), nearest, known)
     else:
         known = np.where(np.isfinite(nearest), nearest, 0.0)
@@ -56,8 +57,10 @@ def free_space(
 def _blank(
     grid: DepthGrid, bands: LevelBands, known_m: FloatArray, nearest_m: FloatArray
 ) -> NDArray[np.bool_]:
-    """FreeSpace.blank: what is right before the lens fills its bands from below to above. A hole in the floor
-    does not."""
+    """FreeSpace.blank: something right in front of the lens fills a band from bottom to top.
+
+    A hole in the floor does not.
+    """
     blank = (known_m <= 0.0) & np.isinf(nearest_m)
     if blank.any():
         rows = len(grid.y)
@@ -68,7 +71,7 @@ def _blank(
 
 
 def _floor_from_m(grid: DepthGrid) -> float:
-    """FreeSpace.floor_from_m, of the lowest row of cells."""
+    """FreeSpace.floor_from_m, by the lowest row of cells."""
     if not math.isfinite(grid.pitch_rad):
         return 0.0
     down_rad = math.atan(float(grid.y[-1])) + grid.pitch_rad
@@ -77,7 +80,7 @@ def _floor_from_m(grid: DepthGrid) -> float:
 
 
 def _up_tan(grid: DepthGrid) -> float:
-    """FreeSpace.up_tan, of the uppermost row of cells."""
+    """FreeSpace.up_tan, by the uppermost row of cells."""
     if not math.isfinite(grid.pitch_rad):
         return math.inf
     up_rad = math.atan(-float(grid.y[0])) - grid.pitch_rad
@@ -86,8 +89,8 @@ def _up_tan(grid: DepthGrid) -> float:
 
 @compiled("float32[:, ::1], boolean[:, ::1], int32[:, ::1], int64")
 def _nearest_m(forward_m: FloatGrid, obstacle: BoolGrid, band: NDArray[np.int32], bands: int) -> FloatArray:
-    """(B,) forward distance of the nearest surface that enough obstacle cells agree on, inf without."""
-    # The nearest few of each band, in order.
+    """(B,) forward distance of the _SUPPORT-th nearest obstacle cell of each band, inf if there are fewer."""
+    # The nearest _SUPPORT distances of each band, in ascending order.
     nearest = np.full((bands, _SUPPORT), np.inf)
     for i in range(obstacle.shape[0]):
         for j in range(obstacle.shape[1]):
@@ -106,23 +109,23 @@ def _nearest_m(forward_m: FloatGrid, obstacle: BoolGrid, band: NDArray[np.int32]
 def _known_m(
     grid: DepthGrid, bands: LevelBands, max_depth_m: float, unmeasured_m: float
 ) -> tuple[FloatArray, float]:
-    """(B,) how far the floor, or something on it, was seen without a hole; and FreeSpace.blind_m."""
+    """(B,) forward distance up to which the floor is seen without a hole; and FreeSpace.blind_m."""
     cos_pitch, sin_pitch = math.cos(grid.pitch_rad), math.sin(grid.pitch_rad)
     y = grid.y.astype(float)
     drop = y * cos_pitch + sin_pitch
     below = drop > grid.camera_height_m / (1.5 * max_depth_m)
-    rows = below.nonzero()[0][::-1]  # from the bottom of the image outwards
+    rows = below.nonzero()[0][::-1]  # from the bottom of the image upwards, nearest floor first
     if len(rows) == 0:
         return np.zeros(len(bands)), 0.0
     floor_depth = grid.camera_height_m / drop[rows]
     floor_forward = floor_depth * (cos_pitch - y[rows] * sin_pitch)
     limit_m = (FLOOR_EXCESS * floor_depth).astype(np.float32)
     unmeasured = int(np.count_nonzero(floor_depth < unmeasured_m))
-    # Where even the uppermost ray meets the floor, nothing beyond that was looked at.
+    # If even the uppermost row meets the floor, nothing beyond that is in view.
     horizon_m = max_depth_m if len(rows) < len(grid.y) else floor_forward[-1]
     reach_m = np.minimum(np.concatenate((floor_forward, (horizon_m,))), max_depth_m)
     first = _first_hole(grid.valid, grid.beyond, grid.depth_m, bands.cells, bands.width, limit_m, unmeasured)
-    # Nearer than the lowest row nothing can be seen: with a hole there, nothing is known.
+    # With a hole in the lowest row nothing is known, since nothing nearer is in view.
     known: FloatArray = np.where(first == 0, 0.0, reach_m[first])
     return known, float(floor_forward[unmeasured - 1]) if unmeasured else 0.0
 
@@ -137,12 +140,14 @@ def _first_hole(
     limit_m: NDArray[np.float32],
     unmeasured: int,
 ) -> NDArray[np.intp]:
-    """(B,) row from the bottom on, 0 the lowest, at which the floor ends: the first of two in a row that show
-    less than half of it; the last one may be alone; len(limit_m) where there is none. 0 where a hole comes
-    before any floor.
+    """(B,) row at which the floor ends in each band, counted from the bottom (0); len(limit_m): nowhere.
 
-    limit_m (k,): what is farther in the lowest k rows is no floor. unmeasured: so many of these are too near
-    to be measured: no data there is no hole, but what is measured and is no floor is one as elsewhere.
+    A row is a hole if less than half of its cells show floor. The floor ends at the first of two successive
+    holes, or at a hole in the last row. It is 0 if some rows are unmeasured and none before the hole shows
+    floor.
+
+    limit_m (k,): maximum depth of floor in the lowest k rows. unmeasured: the number of these that are too
+    near to be measured. In them cells without data are no hole; measured cells count as elsewhere.
     """
     bands, rows = cells.shape[1] // width, len(limit_m)
     depth, is_valid, is_beyond = depth_m.ravel(), valid.ravel(), beyond.ravel()
@@ -158,7 +163,7 @@ def _first_hole(
                     nothing += not (is_valid[cell] or is_beyond[cell])
             hole = 2 * floor < width and not (row < unmeasured and 2 * nothing >= width)
             shown |= 2 * floor >= width
-            # A single row may be lost to noise.
+            # A single row without floor may be noise.
             if hole and (before or row == rows - 1):
                 first = row - 1 if before else row
                 break

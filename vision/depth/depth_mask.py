@@ -1,8 +1,8 @@
-"""The depth of fragments: valid up to 10 m (Daeef 2020, "Filtering featured fragments"), nearer surface.
+"""Near and far surface around pixels: the depth of fragments (Daeef 2020, "Filtering featured fragments").
 
-An edge that separates a body from what is behind it belongs to the body; the depth image is least
-trustworthy just there. So depth is read from a small neighbourhood: its samples fall into a near
-surface and, at a silhouette, a far one.
+Depth is valid up to 10 m. An edge between a body and its background belongs to the body, but the depth image
+is least reliable just there. So depth is read from a small neighbourhood, whose samples form a near surface
+and, at a silhouette, a far one as well.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ from hal.types import DepthImage, FloatArray
 from vision.camera.lens import RealArray
 from vision.depth.depth_noise import depth_sigma_of
 
-# 5x5 samples over 13 px: beyond the rim of some pixels where depth is wrong.
+# 5x5 samples over 13 px: wider than the rim of a few pixels at an edge where depth is wrong.
 _REACH_PX, _EVERY_PX, _SAMPLES = 6, 3, 25
 _NEAR_RANK = 4  # the 5th nearest of 25 samples: a corner of a body still covers a fifth of them
-_MIN_SUPPORT = 4  # of 25 samples: fewer are stray ones
-_HOLES = 0.25  # of the surroundings: so much without depth may be another surface
-UNSEEN_M = 12.0  # how far that is taken to be
-_CUT_OFF = np.iinfo(np.uint16).max  # what is as far as this, or farther
+_MIN_SUPPORT = 4  # minimum of valid samples, of 25: fewer are stray ones
+_HOLES = 0.25  # share of samples without depth from which on there may be another, unseen surface
+UNSEEN_M = 12.0  # assumed depth of an unseen surface
+_CUT_OFF = np.iinfo(np.uint16).max  # raw depth that stands for this distance and all larger ones
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceDepth:
-    """near_m (N,): depth of the nearest supported surface around each point, NaN where there is none.
+    """Surfaces around N pixels.
 
-    far_m (N,): depth of what lies behind it, equal to near_m where there is one surface only. Where much of
-    the surroundings has no depth, another surface may be there: then it is UNSEEN_M or more.
-    holes (N,): share of the surroundings without any depth, where it is not known what lies there.
+    near_m (N,): depth of the nearest supported surface, NaN where there is none.
+    far_m (N,): depth of the surface behind it; equal to near_m where there is one surface only. Where many of
+    the samples have no depth, there may be another surface, and it is UNSEEN_M or more.
+    holes (N,): share of the samples without depth.
     """
 
     near_m: FloatArray
@@ -42,7 +43,7 @@ class SurfaceDepth:
 
 
 def measurable_m(max_m: float, scale_m: float) -> float:
-    """How far surfaces are measured: up to max_m, or, with a small unit scale_m, as far as 16 bits go."""
+    """Maximum depth that is measured: max_m, or less if 16 bits in units of scale_m do not reach that far."""
     return min(max_m, (_CUT_OFF - 0.5) * scale_m)
 
 
@@ -56,7 +57,8 @@ def surface_depth(
 ) -> SurfaceDepth:
     """Near and far surface around pixels (N, 2), the near one within [min_m, max_m] (the paper's 10 m).
 
-    The far one may be beyond: the texture of a distant wall mixes with an outline as that of a near one does.
+    The far one may be beyond max_m: the texture of a distant wall disturbs an outline as much as that of a
+    near one.
     """
     near_m, far_m, holes = _surfaces(
         np.ascontiguousarray(depth),
@@ -79,8 +81,10 @@ def _samples(
     min_m: np.float32,
     into_m: NDArray[np.float32],
 ) -> int:
-    """How many of the samples around a pixel are no holes; into_m (_SAMPLES,) begins with these. Close to the
-    border they lie to one side, within the image."""
+    """Put the valid samples around a pixel at the start of into_m (_SAMPLES,); returns how many there are.
+
+    Close to the border of the image the samples are shifted inwards.
+    """
     height, width = depth.shape
     column = min(max(int(np.rint(u)), _REACH_PX), width - 1 - _REACH_PX)
     row = min(max(int(np.rint(v)), _REACH_PX), height - 1 - _REACH_PX)
@@ -94,10 +98,10 @@ def _samples(
 
 @inlined
 def _note_nearest(sample_m: NDArray[np.float32], count: int, nearest_m: NDArray[np.float32]) -> None:
-    """The nearest of the first count samples, in order, into nearest_m (_NEAR_RANK + 1,)."""
+    """Put the nearest of the first count samples, in ascending order, into nearest_m (_NEAR_RANK + 1,)."""
     nearest_m[:] = np.inf
     for j in range(count):
-        # Handed down from place to place, without a branch: a processor that guesses wrong takes longer.
+        # Insertion without a branch, since mispredicted branches take longer.
         farther_m = sample_m[j]
         for place in range(_NEAR_RANK + 1):
             held_m = nearest_m[place]
@@ -115,7 +119,7 @@ def _surfaces(
     floor_m: float,
     quadratic_per_m: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """near_m, far_m and holes, (N,) each. max_m: of the near surface."""
+    """near_m, far_m and holes of SurfaceDepth. max_m: of the near surface."""
     count = len(pixels)
     near_m, far_m, holes = np.full(count, np.nan), np.full(count, np.nan), np.empty(count)
     sample_m, nearest_m = np.empty(_SAMPLES, np.float32), np.empty(_NEAR_RANK + 1, np.float32)
@@ -128,7 +132,7 @@ def _surfaces(
         if within < _MIN_SUPPORT:
             continue
         _note_nearest(sample_m, measured, nearest_m)
-        # With holes around, the same share of what is valid decides.
+        # With many holes the rank is lowered to a third of the valid samples.
         anchor_m = nearest_m[min(_NEAR_RANK, within // 3)]
         gate_m = np.float32(0.06 + 3.0 * depth_sigma_of(anchor_m, floor_m, quadratic_per_m))
         near_sum, near_count, far_sum, far_count = 0.0, 0, 0.0, 0

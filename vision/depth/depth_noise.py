@@ -1,4 +1,4 @@
-"""How far off measured depth is."""
+"""Standard deviation of measured depth; used wherever depths are compared."""
 
 from __future__ import annotations
 
@@ -21,6 +21,6 @@ def depth_sigma_of(depth_m: Real, floor_m: Real, quadratic_per_m: Real) -> Real:
 
 
 def depth_sigma_m(depth_m: Depths, noise: DepthNoise) -> Depths:
-    """The same of depths of any shape; float32 stays so."""
+    """The same for an array of depths of any shape; float32 stays float32."""
     sigma_m: Depths = noise.floor_m + noise.quadratic_per_m * depth_m * depth_m
     return sigma_m

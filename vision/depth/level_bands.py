@@ -1,8 +1,9 @@
-"""Upright bands of the view, in which free space is told, and which cells of the depth grid lie in them.
+"""Upright bands of the view, in which free space is given, and the cells of the depth grid within each band.
 
-A band is upright over the floor: right over forward is the same all along it. Of a camera that looks straight
-ahead it is some columns of the image. The farther down a camera looks, the more the bands fan out towards the
-lower rows: at 30 degrees columns would tell an edge 0.40 m aside as 0.44 m.
+A band is a vertical sector over the floor: the ratio of right to forward is the same throughout. For a camera
+that looks straight ahead a band is a group of image columns. The farther down a camera looks, the more the
+bands fan out towards the lower rows: at 30 degrees, columns would report an edge at 0.40 m to the side as
+0.44 m.
 """
 
 from __future__ import annotations
@@ -17,18 +18,21 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.depth.depth_grid import DepthGrid
 
-BANDS = 80  # across 60 degrees: 8 cm wide 6 m ahead
-_FAN_BANDS = 1.5  # columns will do where no cell is farther than so many bands from where it belongs
-_PITCH_RAD = math.radians(0.1)  # in such steps: less moves no cell into another band
-_LEAST_AHEAD = 0.05  # metres along the floor per metre of depth; less is straight down, or behind
+BANDS = 80  # maximum number: over 60 degrees a band is 8 cm wide 6 m ahead
+_FAN_BANDS = 1.5  # columns are used as bands where this puts no cell off by more than this many bands
+_PITCH_RAD = math.radians(0.1)  # the pitch is rounded to this: less moves no cell into another band
+_LEAST_AHEAD = 0.05  # minimum metres along the floor per metre of depth: rays straight down have less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LevelBands:
-    """bearing_tan (B,): right over forward of the middles; half_width_tan. width: cells of one row in a band.
+    """B bands across the view.
 
-    band (h, w): which one each cell lies in, at the sides the last one. cells (h, B * width): the flat cells
-    along each row, band after band, -1 where the image ends.
+    bearing_tan: right over forward of the middle of each band, (B,).
+    half_width_tan: half the width of a band.
+    width: cells per row in a band.
+    band: index of the band in which each cell lies, clamped at the sides, (h, w).
+    cells: flat cells along each row, band after band, -1 beyond the image, (h, B * width).
     """
 
     bearing_tan: FloatArray
@@ -42,9 +46,9 @@ class LevelBands:
 
 
 def level_bands(grid: DepthGrid) -> LevelBands:
-    """At most 80 bands across the view of grid; the same object for one camera."""
+    """At most 80 bands across the view of grid; cached, so that one camera has one object."""
     x, y = grid.x, grid.y
-    # A camera in the hand has another pitch in each frame: a tenth of a degree is exact enough.
+    # A rounded pitch makes the cache hit; it is exact enough.
     pitch_rad = _PITCH_RAD * round(grid.pitch_rad / _PITCH_RAD) if math.isfinite(grid.pitch_rad) else None
     return _bands(float(x[0]), float(x[1] - x[0]), len(x), float(y[0]), float(y[-1]), len(y), pitch_rad)
 
@@ -54,7 +58,7 @@ def _bands(
     x0: float, step: float, columns: int, y0: float, y1: float, rows: int, pitch_rad: float | None
 ) -> LevelBands:
     width = -(-columns // BANDS)
-    bands = -(-columns // width)  # the last one may reach beyond the image: nothing is seen there
+    bands = -(-columns // width)  # the last one may reach beyond the image, where nothing is seen
     middle: FloatArray = x0 + step * (width * np.arange(bands, dtype=np.float64) + 0.5 * (width - 1))
     half_width = 0.5 * width * step
     column = np.arange(columns)
@@ -72,7 +76,7 @@ def _bands(
         if off > _FAN_BANDS * 2.0 * half_width:
             edge = middle[0] - half_width
             band = np.floor((x / ahead - edge) / (2.0 * half_width)).clip(0, bands - 1)
-            # So close to each other that none is left out in the row that sees farthest ahead.
+            # So many that no cell is left out in the row with the largest ahead, where a band is widest.
             width = math.ceil(2.0 * half_width * float(ahead.max()) / step)
             along = edge + 2.0 * half_width / width * (np.arange(bands * width) + 0.5)
             nearest = np.rint((along * ahead - x0) / step).astype(np.intp)

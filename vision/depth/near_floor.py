@@ -1,9 +1,13 @@
-"""How near the camera measures the floor: nearer, rows without depth tell of the camera, not of the floor.
+"""The minimum distance at which the camera can measure the floor, learned from the frames.
 
-Stereo and time-of-flight have a least depth, 0.3 to 0.5 m, often more than the data sheet says. A camera that
-is low or looks far down has floor nearer than that in its lowest rows, which are never anything but a hole.
-What the rows have shown so far tells where that ends. Fail closed: only close before the camera, only rows in
-which hardly ever floor was seen, and only cells without any data; a drop that is measured is a hole.
+Stereo and time-of-flight cameras have a minimum depth of 0.3 to 0.5 m, often more than the data sheet says. A
+camera that is low or looks far down has floor nearer than that in its lowest rows. These rows never have
+data, which does not mean that there is a hole in the floor. How often each row has shown floor so far tells
+where the floor begins to be measurable.
+
+Fail closed: missing data is excused only close in front of the camera, only in rows that have hardly ever
+shown floor, and only in cells without any data. A drop that is measured is always a hole
+(vision/depth/depth_guard.py).
 """
 
 from __future__ import annotations
@@ -16,26 +20,32 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from vision.depth.depth_grid import DepthGrid
 
-FLOOR_EXCESS = 1.35  # a ray that goes this much farther than the floor has found a hole in it
-_NEVER_BEYOND_M = 0.6  # farther away it has another reason; sight.near_m of the decision reaches farther
-_MARGIN = 1.15  # the least depth is no sharp line, and the robot shakes
-_SHARE = 0.25  # of a row's cells: so many have to show floor
-_FRAMES_SHARE = 0.1  # so often; a bump, after which the lowest rows look farther, is much shorter
-_FRAMES = 900  # of which that is a share: hours before a pallet are not counted against the floor behind it
+FLOOR_EXCESS = 1.35  # a depth of more than this times that of the floor is a hole in it
+# Maximum depth at which missing data is excused; farther away it has another reason. sight.near_m of the
+# decision reaches farther.
+_NEVER_BEYOND_M = 0.6
+_MARGIN = 1.15  # on the nearest measured depth: the minimum depth is no sharp limit, and the robot shakes
+_SHARE = 0.25  # a row shows floor if at least this share of its cells do
+# A row counts as measurable if it shows floor in more than this share of the frames. A bump, after which the
+# lowest rows look farther, takes a much smaller share.
+_FRAMES_SHARE = 0.1
+# After this many frames the counts are halved, so that hours in front of a pallet do not outweigh the floor
+# that is seen afterwards.
+_FRAMES = 900
 
 
 def floor_depth_m(grid: DepthGrid) -> FloatArray:
-    """(h,) depth at which the rows of grid meet the floor, inf above the horizon. Its mounting is known."""
+    """(h,) depth at which the rows of grid meet the floor, inf above the horizon. Needs a known mounting."""
     drop = grid.y * math.cos(grid.pitch_rad) + math.sin(grid.pitch_rad)
     with np.errstate(divide="ignore"):
         return np.where(drop > 0.0, grid.camera_height_m / np.maximum(drop, 0.0), np.inf).astype(float)
 
 
 class NearFloor:
-    """Looks at the lowest rows of each frame. Keeps how often each of them has shown floor."""
+    """Counts in how many frames each of the lowest rows has shown floor."""
 
     def __init__(self, min_depth_m: float) -> None:
-        """min_depth_m: what is nearer is not valid in the grid."""
+        """min_depth_m: nearer depths are not valid in the grid."""
         self._most_m = max(_NEVER_BEYOND_M, _MARGIN * min_depth_m)
         self._of: tuple[float, float, int] | None = None
         self._depth_m: FloatArray = np.empty(0)
@@ -44,8 +54,10 @@ class NearFloor:
         self._frames = 0
 
     def unmeasured_m(self, grid: DepthGrid, trusted: bool) -> float:
-        """Floor whose depth is less than this may have no data; 0.0 where the lowest row has shown floor.
-        trusted: what grid shows is to be learnt from."""
+        """Depth up to which the floor may have no data; 0.0 if the lowest row has shown floor.
+
+        trusted: the frame is used for learning.
+        """
         view = (grid.camera_height_m, grid.pitch_rad, len(grid.y))
         if view != self._of:
             self._begin(grid, view)

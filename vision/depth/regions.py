@@ -1,6 +1,7 @@
-"""What each part of the view measures: box, centre, size, and what hides some of it.
+"""Regions: box, centre and size of each labelled set of cells, and whether something hides part of it.
 
-Terms (cell, part, region): vision/__init__.py.
+Used for connected parts (vision/depth/connected.py) and for the surfaces of tracks. Terms (cell, part,
+region): vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -15,22 +16,29 @@ from hal.types import FloatArray
 from vision.depth.connected import LEAST_JUMP, MOST_JUMP, IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 
-_UNIFORM = 3.46  # a uniform spread is this many standard deviations long
-_FOOT_M, _FOOT_PER_METRE = 0.12, 0.015  # taken for floor: standing()'s clearance and margins
-_OCCLUDED_SHARE = 0.15  # of its rows: at fewer rims it is noise that is nearer
-_GAP_CELLS = 3  # beside what is nearer a stereo camera measures nothing for some cells
-_HIDDEN_SHARE = 0.5  # of its width: else some of its lower end is seen, and ends there
-_HEAD_M = 0.2  # a head to the chin: less is a strip of something
-_RIM = 8  # one in so many columns of a part is its rim, on either side
+_UNIFORM = 3.46  # the length of a uniform distribution in standard deviations: square root of 12
+# A part this close to the floor, in metres and per metre of depth, stands on it: the lowest part of a body is
+# taken for floor because of the clearance and the margins of standing().
+_FOOT_M, _FOOT_PER_METRE = 0.12, 0.015
+_OCCLUDED_SHARE = 0.15  # of its rows: at fewer rims, a nearer neighbour is noise
+_GAP_CELLS = 3  # a stereo camera measures nothing in some cells beside a nearer surface
+_HIDDEN_SHARE = 0.5  # of its width: if less of its lower end is hidden, the rest is seen to end
+_HEAD_M = 0.2  # height of a head down to the chin: a lower part is a strip of something
+_RIM = 8  # the rim of a part on either side is 1/8 of its columns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Regions:
-    """What R labelled parts of the grid measure; entries without cells have cells == 0.
+    """Measures of R labelled parts of the grid. An entry without cells has cells == 0.
 
-    cells (R,). rows (R,) of the grid that they reach over. bbox_px (R, 4): u0, v0, u1, v1. position_m (R, 3):
-    centre of the visible surface. extent_m (R, 3). wide (R,): not cut by the image's left or right border,
-    tall (R,): nor above or below. overlapped (R,): by something nearer, seen from its side.
+    cells: number of cells, (R,).
+    rows: number of rows from its first to its last cell, (R,).
+    bbox_px: box in the image, u0, v0, u1, v1, (R, 4).
+    position_m: centre of the visible surface in the camera axes, (R, 3).
+    extent_m: size along the camera axes, (R, 3).
+    wide: not cut by the left or right border of the image, (R,). See also unhidden.
+    tall: not cut by its upper or lower border, (R,).
+    overlapped: something nearer begins at its left or right rim, (R,).
     """
 
     cells: NDArray[np.intp]
@@ -44,12 +52,12 @@ class Regions:
 
     @property
     def whole(self) -> NDArray[np.bool_]:
-        """(R,) parts that are cut on no side, and of which nothing nearer hides any."""
+        """(R,) parts that are cut on no side and not hidden in part by something nearer."""
         return self.wide & self.tall & ~self.overlapped
 
 
 def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> Regions:
-    """regions, where chosen (R,) those of others."""
+    """regions with the chosen (R,) entries taken from others."""
     return Regions(
         cells=np.where(chosen, others.cells, regions.cells),
         rows=np.where(chosen, others.rows, regions.rows),
@@ -63,9 +71,9 @@ def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> R
 
 
 def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
-    """Boxes, centres and sizes of the parts 1..count of labels (h, w); entry k - 1 is part k.
+    """Regions of the parts 1..count of labels (h, w); entry k - 1 is part k.
 
-    wide knows of the image's border only; see unhidden.
+    wide accounts for the image border only, and overlapped is False; unhidden adds occlusion.
     """
     on_floor = grid.up is not None
     cells, rows, bbox_px, position_m, extent_m, wide, tall = _measured(
@@ -85,8 +93,10 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
 
 @inlined
 def _edges(labels: IntGrid, count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """(R,) cells of parts 1..count of labels (h, w), and (R, 4) their first and last columns and rows: left,
-    top, right, bottom; 0, 0, 0, -1 of those without cells."""
+    """(R,) number of cells of parts 1..count of labels (h, w), and (R, 4) their left, top, right, bottom.
+
+    These are columns and rows of the grid; 0, 0, 0, -1 for parts without cells.
+    """
     height, width = labels.shape
     cells, edges = np.zeros(count, np.intp), np.zeros((count, 4), np.intp)
     edges[:, 3] = -1
@@ -114,10 +124,10 @@ def _foot_px(
     depth_m: float,
     bottom: int,
 ) -> float:
-    """Image row where a part that nearly reaches down to the floor stands on it; -inf for others. height_m:
-    of the camera.
+    """Image row where a part that nearly reaches the floor stands on it; -inf for other parts.
 
-    The lowest hand's breadth of a body is taken for floor, as the noise of depth demands.
+    The lowest hand's breadth of a body is taken for floor, because of the noise of depth. up (3,): the
+    floor's normal. height_m: of the camera. middle_x: ray x of the part's middle. bottom: its last row.
     """
     # On the floor: camera height = - up . ray * depth.
     floor_y = (-height_m / depth_m - up[2] - up[0] * middle_x) / up[1]
@@ -151,12 +161,14 @@ def _measured(
     NDArray[np.bool_],
 ]:
     """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), wide and tall (R,) of the parts.
-    height_m: of the camera, NaN where the floor is not known; up (3,): its normal."""
+
+    height_m: of the camera, NaN where the floor is not known. up (3,): the floor's normal.
+    """
     (cells, edges), rows = _edges(labels, count), np.zeros(count, np.intp)
     wide, tall = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
-    # Sums over each part: inverse depth, its square, x, y; and over its left and its right rim, which are
-    # measured each at its own depth: cells, inverse depth. Whoever looks along a side of a body would take it
-    # for wider, at the depth of its middle, than it is.
+    # Sums over each part: inverse depth, its square, x, y. Sums over its left and over its right rim: cells,
+    # inverse depth. The width is measured with each rim at its own depth, since a body seen along one of its
+    # sides would seem too wide at the depth of its middle.
     sums, rims = np.zeros((count, 4)), np.zeros((count, 4))
     for i in range(labels.shape[0]):
         for j in range(labels.shape[1]):
@@ -193,7 +205,7 @@ def _measured(
             foot_px = _foot_px(y, step_px, offset_px, up, height_m, mean_x, depth_m, bottom)
             bbox_px[part, 3] = max(bbox_px[part, 3], foot_px)
         position_m[part] = mean_x * depth_m, mean_y * depth_m, depth_m
-        # What goes back and outwards has its far end on the inner rim.
+        # abs: of a surface that recedes outwards, the rim at the left may be farther right in space.
         extent_m[part, 0] = abs(
             x[right] * rims[part, 2] / rims[part, 3] - x[left] * rims[part, 0] / rims[part, 1]
         )
@@ -203,8 +215,11 @@ def _measured(
 
 
 def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
-    """regions as measured, wide only where nothing nearer hides a part, either, and where it ends at an edge
-    in depth: what was divided from its surroundings by guess has its middle where the guess put it."""
+    """regions with occlusion taken into account: wide is restricted, overlapped is set.
+
+    A part stays wide only if no nearer surface hides its left or right side, and if it ends there at an edge
+    in depth. Where a part was divided from its surroundings by a guess, its centre depends on the guess.
+    """
     hidden, overlapped = _hidden_cells(grid.inverse_depth, labels, len(regions.cells), np.float32(LEAST_JUMP))
     least = _OCCLUDED_SHARE * regions.rows
     return replace(regions, wide=regions.wide & (hidden <= least), overlapped=overlapped > least)
@@ -214,16 +229,18 @@ def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
 def _hidden_cells(
     inverse: FloatGrid, labels: IntGrid, count: int, jump: np.float32
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """(count,) cells at the left or right rim of each part beside which something else stands nearer, or
-    another part goes on at the same depth; and (count,) those that end at another part, which is nearer.
+    """Two counts of rim cells of each part, (count,) each.
 
-    Beside what stands nearer a stereo camera measures nothing, and the far side of a jump is of no part: what
-    comes after that gap is the neighbour. jump: in 1/m; less is noise.
+    The first: cells at the left or right rim beside which there is something nearer, or another part at the
+    same depth. The second: rim cells beside which there is another part that is nearer.
+
+    Beside a nearer surface a stereo camera measures nothing, and the far side of a jump belongs to no part.
+    Therefore the neighbour is the next part after a gap of up to _GAP_CELLS. jump: 1/m; less is noise.
     """
     room = max(count, labels.max()) + 1
     hidden, overlapped = np.zeros(room, np.intp), np.zeros(room, np.intp)
     for i in range(labels.shape[0]):
-        neighbour = -1  # the last cell of a part in this row
+        neighbour = -1  # column of the last cell in this row that belongs to a part
         for j in range(labels.shape[1]):
             here = labels[i, j]
             if j > 0 and labels[i, j - 1] != here:
@@ -244,8 +261,11 @@ def _hidden_cells(
 
 
 def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[np.bool_]:
-    """(R,) parts whose lower end something nearer hides, for at least half of their width: what they are
-    further down is not known. A beam ends before what is farther away. A head is as tall as _HEAD_M."""
+    """(R,) parts of at least _HEAD_M height whose lower end is hidden over at least half of their width.
+
+    How far down they reach is not known. Below the lower end of a beam, in contrast, something farther is
+    seen.
+    """
     inverse, flat = grid.inverse_depth.ravel(), labels.ravel()
     width = labels.shape[1]
     rims = ((flat[:-width] > 0) & (flat[:-width] != flat[width:])).nonzero()[0]

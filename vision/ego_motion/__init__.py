@@ -1,1 +1,10 @@
-"""How the camera moved: a prior, the anchored ends that stand still, and rows read one after another."""
+"""The camera's own motion: a prior, a robust fit to static anchored ends, and the rolling shutter.
+
+Files, in the order in which they come into play:
+
+* motion_prior - the prior of the motion, from odometry, a gyro, or the motion before.
+* reprojection - anchored points, and where they are seen now.
+* robust_fit - robust Gauss-Newton on the reprojection error.
+* camera_motion - the estimate: gates, the conflict with the prior, the covariance.
+* rolling_shutter - correction of pixels for the sweep; learns the read-out time.
+"""

@@ -1,8 +1,8 @@
 """The camera's own motion, from static fragments, depth and a prior.
 
-* Unknowns, 8: the pose of the camera now (rotation 3, translation 3) and its sweep (2), that is how far it
+* Unknowns, 8: the pose of the camera now (rotation 3, translation 3) and its sweep (2), which is how far it
   turned about x and y while the rows of the image were read (vision/ego_motion/rolling_shutter.py).
-* Measurements: where anchored points are seen now. A point is anchored if its place in the fixed frame is
+* Measurements: where anchored points are seen now. A point is anchored if its position in the fixed frame is
   known from some frames ago (vision/fragments/store.py).
 * Prior: mean and standard deviation of the motion, and of the sweep (vision/ego_motion/motion_prior.py).
 
@@ -10,11 +10,16 @@ Method: robust Gauss-Newton on the reprojection error (vision/ego_motion/robust_
 a pixel part and a depth part. Depth moves the prediction along its epipolar line only, so a point with
 uncertain depth still measures across it.
 
-Gate: a point enters only if its error at the start has a chi-square of 9.21 at most (99 % of static points),
+Gate: a point is used only if its error at the start has a chi-square of at most 9.21 (99 % of static points),
 widened by the uncertainty of the prior. Therefore a person who fills half of the view cannot outvote the
-odometry. If the result contradicts a binding prior, it is solved again with a tighter one; if that fails or
-too few points agree, the prior alone is the answer. But if nearly all points agree on what contradicts the
-prior, it is no longer plain which is wrong: the tracks may slip, or all that is seen may move.
+odometry.
+
+Conflict with a binding prior (from odometry, or from the kinematics of a tracked robot):
+
+* If nearly all points agree on a motion that contradicts the prior, the estimate is theirs, but it is marked
+  as disputed: the robot's tracks may slip, or everything in view may move.
+* Otherwise the fit is repeated with a tighter prior. If the result still contradicts it, or too few points
+  agree, the prior alone is the answer.
 """
 
 from __future__ import annotations
@@ -29,25 +34,31 @@ from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors, view_of
 from vision.ego_motion.robust_fit import Fit, fit
 
-_MIN_POINTS = 8  # two equations each: twice as many as unknowns
-_MIN_INLIER_RATIO = 0.25  # where fewer agree, something else than the ground may have been followed
-_MIN_BACKGROUND_RATIO = 0.10  # the same where the prior binds: what agrees with it may be a small rest
-_UNANIMOUS_RATIO = 0.9  # somebody large leaves more than a tenth of the ground in view
-_LOOSE_SHARE = np.array([5.0] * 6 + [1.0] * 2)  # of the prior's sigma
-_YAW_AND_WAY = np.array([1, 3, 4, 5])
+_MIN_POINTS = 8  # with two equations each: twice as many as unknowns
+_MIN_INLIER_RATIO = 0.25  # with fewer inliers, something other than the static world may have been followed
+_MIN_BACKGROUND_RATIO = 0.10  # the same with a tightened prior: the ground that agrees may be a small rest
+_UNANIMOUS_RATIO = 0.9  # inliers for a disputed estimate: a large mover leaves more than 10 % of the ground
+_LOOSE_SHARE = np.array([5.0] * 6 + [1.0] * 2)  # of the prior's sigma, for a fit that may contradict it
+_YAW_AND_WAY = np.array([1, 3, 4, 5])  # the unknowns that are compared with the prior
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
-_TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, where it decides
-_BENT_CHI2 = 16.0  # four sigmas
-_STRAIGHTENED_SHARE = 0.05  # of the points: so many more have to agree once the image is straightened
+_TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, tightened
+_BENT_CHI2 = 16.0  # four sigmas: the image alone shows another sweep than the fit
+_STRAIGHTENED_SHARE = 0.05  # of the points: so many more inliers are needed to accept the larger sweep
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraEstimate:
-    """pose: the camera in the fixed frame, when the middle row was read. sweep_rad (2,): how far it turned
-    about x and y from the first row to the last. covariance (8, 8) of a small motion of it and of
-    sweep_rad. bend_rad, bend_variance (2,): the sweep as the image alone tells it, inf where it tells
-    nothing. inlier_ratio: NaN where not estimated. visual: False where only the prior speaks. disputed:
-    nearly all points contradict the prior; the pose is theirs, and neither is to be relied on."""
+    """The camera's pose and sweep in one frame.
+
+    pose: the camera in the fixed frame, when the middle row was read.
+    sweep_rad: how far it turned about x and y from the first row to the last, (2,).
+    bend_rad, bend_variance: the sweep as measured by the image alone, without a prior, (2,); the variance is
+        inf where it tells nothing.
+    covariance: of a small motion of the camera and of sweep_rad, (8, 8).
+    inlier_ratio: share of the usable points that agree; NaN where not estimated.
+    visual: the pose is estimated from the images; False: it is the prior, or disputed.
+    disputed: nearly all points contradict the prior. The pose is theirs; neither of the two can be relied on.
+    """
 
     pose: Pose
     sweep_rad: FloatArray
@@ -67,9 +78,9 @@ def estimate(
     sweep: SweepPrior,
     camera: Intrinsics,
 ) -> CameraEstimate:
-    """The camera now, from where anchored points are seen now (pixels (N, 2)).
+    """The camera now, from where anchored points are seen now, pixels (N, 2).
 
-    before: the camera of the frame before, in the fixed frame.
+    before: pose of the camera in the frame before, in the fixed frame. sweep: prior of the sweep.
     """
     start, sigma = before @ prior.motion, np.concatenate((prior.sigma, sweep.sigma_rad))
     use = anchors.usable.nonzero()[0]
@@ -79,7 +90,7 @@ def estimate(
     found = fit(view, start, sigma)
     bend_rad, bend_variance = _bend(found)
     if (np.square(bend_rad - found.sweep_rad) > _BENT_CHI2 * bend_variance).any():
-        # Before the read-out is known, what is not certain may all the same be plain to see.
+        # Before the read-out time is known, a larger sweep than is certain may be plain in the image.
         possible = np.concatenate((prior.sigma, sweep.most_rad))
         straightened = fit(view, start, possible)
         if straightened.inliers >= found.inliers + _STRAIGHTENED_SHARE * len(use):
@@ -89,20 +100,20 @@ def estimate(
     torn = prior.binding and _conflict(found, prior.sigma)
     disputed = False
     if torn:
-        # Where the prior is far off, its gate shuts out what denies it.
+        # If the prior is far off, its gate excludes the points that contradict it. Fit with a wide one.
         freely = fit(view, start, sigma * _LOOSE_SHARE)
         disputed = freely.inliers >= _UNANIMOUS_RATIO * len(use)
         if disputed:
             found = freely
         else:
-            # Something large moves, and the data follow it. What agrees with the prior is the ground.
+            # The fit has followed something large that moves. The ground is what agrees with the prior.
             found = fit(view, start, sigma * _TRUSTED_SHARE)
             least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
-            # Still far from a prior that is trusted: too little of the ground is seen to overrule it.
+            # If it is still far from the prior, too little of the ground is in view to correct the prior.
             torn = _conflict(found, prior.sigma)
         bend_rad, bend_variance = _bend(found)
     ratio = found.inliers / len(use)
-    # OpenCV answers zeros where there is no inverse: the least that is known would seem the most.
+    # Without an inverse OpenCV returns zeros, which would mean perfect knowledge: check regular below.
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
     if found.inliers < least or (torn and not disputed) or not regular:
         return _unseen(start, sigma, ratio)
@@ -120,7 +131,7 @@ def estimate(
 
 
 def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:
-    """Only the prior speaks."""
+    """The estimate from the prior alone."""
     nothing, unknown = np.zeros(2), np.full(2, np.inf)
     return CameraEstimate(
         pose=start,
@@ -134,7 +145,7 @@ def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstima
 
 
 def _bend(found: Fit) -> tuple[FloatArray, FloatArray]:
-    """The sweep and its variance, (2,) each, had nothing been assumed of it: one more step from the last."""
+    """The sweep and its variance, (2,) each, without its prior: one more Gauss-Newton step."""
     regular, covariance = cv2.invert(found.free, flags=cv2.DECOMP_CHOLESKY)
     if not regular:
         return np.zeros(2), np.full(2, np.inf)
@@ -143,6 +154,6 @@ def _bend(found: Fit) -> tuple[FloatArray, FloatArray]:
 
 
 def _conflict(found: Fit, sigma: FloatArray) -> bool:
-    """Whether yaw and translation are farther from where the fit began than sigma (6,) admits."""
+    """Whether yaw and translation differ from the prior by more than its sigma (6,) allows."""
     off = (found.back / sigma)[_YAW_AND_WAY]
     return float(off @ off) > _CONFLICT_CHI2

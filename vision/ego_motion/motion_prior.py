@@ -1,10 +1,13 @@
-"""The prior of vision/ego_motion/camera_motion.py: how the camera moved since the frame before, as known
-before looking.
+"""Priors of the camera's motion since the frame before, for vision/ego_motion/camera_motion.py.
 
-A prior has a mean (a Pose) and six standard deviations. From odometry: odometry_prior. Without odometry:
-rolling_prior for a camera on a robot (a tracked base rolls ahead and turns, never sideways), steady_prior for
-any other camera (it goes on as it did). A gyro (vision/camera/gyro.py) replaces the rotation of any of them:
-with_gyro. The sweep, the camera's turn while the rows of one image are read, has its own: SweepPrior.
+A prior has a mean (a Pose) and six standard deviations. It does not depend on the present image.
+
+* odometry_prior: from odometry.
+* rolling_prior: without odometry, for a camera on a robot. A tracked base moves forward and turns, but never
+  moves sideways.
+* steady_prior: without odometry, for any other camera. Its motion continues as before.
+* with_gyro: replaces the rotation of any of these by that of a gyro (vision/camera/gyro.py).
+* SweepPrior: prior of the sweep, the camera's rotation while the rows of one image are read.
 """
 
 from __future__ import annotations
@@ -18,14 +21,19 @@ from config.perception import EgoMotionSettings
 from hal.types import CameraMount, FloatArray, Pose
 from vision.camera.lens import rotation_from_vector, vector_from_rotation
 
-_ASIDE_MPS = 0.10  # one sigma across the way: vibration, and slip while it turns
+_ASIDE_MPS = 0.10  # one sigma across the direction of travel: vibration, and slip while turning
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionPrior:
-    """What is known before looking: motion (the camera now in the camera before) and the standard
-    deviation (6,) of a small motion of the camera now: rotation about, translation along x, y, z.
-    binding: it is known that well, so that data which contradict it follow something large that moves."""
+    """Prior of the camera's motion.
+
+    motion: the camera now, in the camera frame before.
+    sigma: standard deviations of a small motion of the camera now: rotation about x, y, z, then translation
+        along x, y, z, (6,).
+    source: "odometry" or "none"; see EgoMotion.
+    binding: so reliable that image data which contradict it must have followed something large that moves.
+    """
 
     motion: Pose
     sigma: FloatArray
@@ -35,15 +43,18 @@ class MotionPrior:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SweepPrior:
-    """What is known of how far the camera turns about x and y while an image is read: one sigma of what is
-    certain, sigma_rad (2,), and of what is possible, most_rad (2,)."""
+    """Prior of how far the camera turns about x and y while an image is read; its mean is 0.
+
+    sigma_rad (2,): one sigma of the sweep that is certain. most_rad (2,): one sigma of the sweep that is
+    possible.
+    """
 
     sigma_rad: FloatArray
     most_rad: FloatArray
 
 
 def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
-    """A prior from dead reckoning: good in translation, slipping in yaw, blind to vibration."""
+    """A prior from dead reckoning: good in translation, subject to slip in yaw, blind to vibration."""
     turn_rad = math.hypot(*vector_from_rotation(motion.rotation).tolist())
     way_m = math.hypot(*motion.translation_m.tolist())
     yaw = settings.odometry_yaw_ratio * turn_rad + settings.odometry_rotation_radps * dt_s
@@ -53,7 +64,10 @@ def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> Mo
 
 
 def steady_prior(last: Pose, last_dt_s: float, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
-    """A prior where nothing else is known: the camera goes on as it did. last_dt_s 0: not even that."""
+    """A prior of constant velocity, where nothing else is known.
+
+    last, last_dt_s: the last motion and its duration; last_dt_s is 0 if it is not known.
+    """
     known = last_dt_s > 0
     share = dt_s / last_dt_s if known else 0.0
     turn = rotation_from_vector(vector_from_rotation(last.rotation) * share)
@@ -65,11 +79,12 @@ def steady_prior(last: Pose, last_dt_s: float, dt_s: float, settings: EgoMotionS
 def rolling_prior(
     last: Pose, last_dt_s: float, dt_s: float, mount: CameraMount, settings: EgoMotionSettings
 ) -> MotionPrior:
-    """A prior without odometry: the robot goes on ahead and turns as it did; last_dt_s 0: not even that.
+    """A prior without odometry: the robot keeps its forward speed and its rate of turn.
 
-    Across its way the camera moves only as the turn swings it around the turning centre, and it tilts
-    only as far as it vibrates. What crosses the view therefore does not pass for the robot's own motion; nor
-    does, since tracks gather and lose speed slowly, what goes ahead of it at its own pace.
+    Sideways the camera moves only as a turn swings it around the turning centre, and it tilts only by
+    vibration. Therefore something that crosses the view is not taken for the robot's own motion. Nor is
+    something that moves ahead of the robot at its own speed, since a tracked robot changes its speed slowly.
+    last, last_dt_s: the last motion and its duration; last_dt_s is 0 if it is not known.
     """
     known = last_dt_s > 0
     share = dt_s / last_dt_s if known else 0.0
@@ -100,7 +115,7 @@ def rolling_prior(
 def with_gyro(
     prior: MotionPrior, turn_rad: FloatArray, dt_s: float, settings: EgoMotionSettings
 ) -> MotionPrior:
-    """The prior with its rotation taken from turn_rad (3,), what a gyro told of the interval dt_s."""
+    """The prior with its rotation replaced by turn_rad (3,), which a gyro measured over the interval dt_s."""
     sigma = prior.sigma.copy()
     sigma[:3] = settings.gyro_radps * dt_s
     motion = Pose(rotation_from_vector(turn_rad), prior.motion.translation_m)

@@ -1,4 +1,4 @@
-"""Anchored points, and how they are seen now: what vision/ego_motion/robust_fit.py fits the camera to."""
+"""Anchored points, and where they are seen now: the input of the fit (vision/ego_motion/robust_fit.py)."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ from vision.camera.lens import row_delays
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Anchors:
-    """Points seen some frames ago: points_m (N, 3) in the fixed frame, range_m (N, 3) their derivative
-    with respect to depth, depth_sigma_m (N,), pixel_cov (N, 3): xx, xy, yy of where they are seen now,
-    usable (N,) bool."""
+    """N points seen some frames ago.
+
+    points_m: in the fixed frame, (N, 3).
+    range_m: their derivative with respect to depth, (N, 3).
+    depth_sigma_m: standard deviation of depth, (N,).
+    pixel_cov: covariance xx, xy, yy of where they are seen now, px^2, (N, 3).
+    usable: (N,).
+    """
 
     points_m: FloatArray
     range_m: FloatArray
@@ -28,9 +33,13 @@ class Anchors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The N points that count. lines (N, 2, 3): each point and its derivative by depth. seen (N, 3): where it
-    is on the plane z = 1, and when its row was read (row_delays). doubt (N, 4): w0, w1, w2, which turn an
-    error (a, b) on that plane into (w0 a, w1 a + w2 b), of unit variance; then the variance of its depth."""
+    """The usable points as arrays for the fit.
+
+    lines: each point and its derivative by depth, (N, 2, 3).
+    seen: its position on the plane z = 1, and when its row was read (row_delays), (N, 3).
+    doubt: w0, w1, w2, which whiten an error (a, b) on that plane to (w0 a, w1 a + w2 b), of unit variance;
+        then the variance of its depth, (N, 4).
+    """
 
     lines: FloatArray
     seen: FloatArray
@@ -38,7 +47,7 @@ class View:
 
 
 def view_of(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: Intrinsics) -> View:
-    """Of the points use (M,)."""
+    """The View of the points use (M,), as indices. pixels (N, 2): where the points are seen now."""
     return View(
         *_view(
             anchors.points_m,
@@ -82,7 +91,7 @@ def _view(
             lines[k, 0, i], lines[k, 1, i] = points_m[one, i], range_m[one, i]
         seen[k, 0], seen[k, 1] = (pixels[one, 0] - cx) / fx, (pixels[one, 1] - cy) / fy
         seen[k, 2] = delays[one]
-        # The inverse of Cholesky's factor.
+        # The inverse of the Cholesky factor.
         first = math.sqrt(pixel_cov[one, 0])
         low = pixel_cov[one, 1] / first
         second = math.sqrt(max(pixel_cov[one, 2] - low * low, 1e-6))

@@ -1,9 +1,10 @@
-"""Robust Gauss-Newton on the reprojection error: the camera that fits where anchored points are seen.
+"""Robust Gauss-Newton on the reprojection error: the camera pose that fits where anchored points are seen.
 
-For a pose of the camera: where the points of a View are predicted in the image, how far from there they are
-seen (the residual), and how that changes with each unknown, all in standard deviations. The unknowns are a
-small motion of the camera (rotation 3, translation 3) and its sweep (2). Depth moves a prediction along its
-epipolar line only: what its variance does there is taken off, by Sherman and Morrison.
+For a pose of the camera, the points of a View (vision/ego_motion/reprojection.py) are predicted in the image.
+The residual of a point is how far from there it is seen. Residuals and their derivatives by the unknowns are
+in standard deviations of the pixel noise. The unknowns are a small motion of the camera (rotation 3,
+translation 3) and its sweep (2). The variance of a point's depth acts along its epipolar line only; it is
+included by the Sherman-Morrison formula.
 """
 
 from __future__ import annotations
@@ -19,21 +20,28 @@ from hal.types import FloatArray, Pose
 from vision.ego_motion.reprojection import View
 
 _GATE_CHI2 = 9.21  # 99 % of static points, 2 degrees of freedom
-_ITERATIONS = 6  # at most: two that anneal, the others until it has converged
-_ANNEAL = (32.0, 4.0)  # robust scale of the first iterations, falling to 1
-_CONVERGED_SIGMAS = 0.2  # a step of less is nothing beside what the pose may be off anyway
-_STRAIGHT = 1e-3  # for no longer a way (rad, m) the image moves as its derivatives say, to 0.01 px
-_LEAST_AHEAD_M = 0.1  # what is nearer is not in front of the camera
+_ITERATIONS = 6  # maximum: two that anneal, the others until convergence
+_ANNEAL = (32.0, 4.0)  # scale of the robust weights in the first iterations; 1 after them
+_CONVERGED_SIGMAS = 0.2  # a smaller step is negligible beside the uncertainty of the pose
+_STRAIGHT = 1e-3  # maximum motion (rad, m) for which the linearisation is exact to 0.01 px
+_LEAST_AHEAD_M = 0.1  # nearer points do not count as in front of the camera
 _UNKNOWNS = 8  # rotation and translation (3 each), sweep about x and y
-_SWEEP = 6  # the first unknown that is no motion
-_RESIDUAL = _UNKNOWNS  # the column of the residual, after those of the derivatives
+_SWEEP = 6  # index of the first unknown of the sweep
+_RESIDUAL = _UNKNOWNS  # column of the residual, after those of the derivatives
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """back (6,): the small motion of pose that leads back to where the fit began. information (8, 8), of a
-    small motion and the sweep. inliers: points that fit. free (8, 8), free_side (8,): normal equations of the
-    last step, from a sweep of free_from_rad (2,) on, without the prior of the sweep."""
+    """Result of a fit.
+
+    pose: the camera in the fixed frame.
+    sweep_rad: about x and y, (2,).
+    back: the small motion of pose that leads back to the start of the fit, (6,).
+    information: of a small motion and the sweep, (8, 8).
+    inliers: number of points that fit.
+    free, free_side: normal equations of the last step without the prior of the sweep, (8, 8) and (8,).
+    free_from_rad: the sweep at which these were linearised, (2,).
+    """
 
     pose: Pose
     sweep_rad: FloatArray
@@ -46,7 +54,7 @@ class Fit:
 
 
 def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
-    """Iteratively reweighted Gauss-Newton from start, which is known to sigma (8,)."""
+    """Iteratively reweighted Gauss-Newton from start. sigma (8,): prior of the motion and the sweep."""
     began = np.empty((3, 4))
     began[:, :3], began[:, 3] = start.rotation, start.translation_m
     pose, sweep_rad, back, information, inliers, free, free_side, free_from_rad = _fitted(
@@ -66,7 +74,7 @@ def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
 
 @inlined
 def _moved(pose: FloatArray, step: FloatArray) -> FloatArray:
-    """A pose (3, 4), rotation and translation, after a small motion step (6,) of its own."""
+    """A pose (3, 4), rotation and translation, after a small motion step (6,) in its own axes."""
     x, y, z = step[0], step[1], step[2]
     angle = math.sqrt(x * x + y * y + z * z)
     result = pose.copy()
@@ -115,13 +123,13 @@ def _turned_back(pose: FloatArray, x: float, y: float, z: float) -> tuple[float,
 
 @inlined
 def _in_camera(pose: FloatArray, point_m: FloatArray) -> tuple[float, float, float]:
-    """A point (3,) of the fixed frame as the camera has it."""
+    """A point (3,) of the fixed frame in the camera frame."""
     return _turned_back(pose, point_m[0] - pose[0, 3], point_m[1] - pose[1, 3], point_m[2] - pose[2, 3])
 
 
 @inlined
 def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: FloatArray) -> FloatArray:
-    """A better pose to start from: turned by the median miss of all points, as far as sigma (8,) admits."""
+    """A better start pose: start rotated by the median residual of all points, by 3 sigma (8,) at most."""
     across, down, turn = np.empty(len(seen)), np.empty(len(seen)), np.zeros(6)
     for k in range(len(seen)):
         x, y, z = _in_camera(start, lines[k, 0])
@@ -136,10 +144,11 @@ def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: Floa
 def _linearised(
     lines: FloatArray, seen: FloatArray, doubt: FloatArray, pose: FloatArray, sweep_rad: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-    """At a pose and sweep: table (N, 2, 9), by_depth (N, 2), shrink (N,), in_front (N,).
+    """Linearise the residuals at a pose and sweep.
 
-    table, across and down the image, in sigmas: derivatives by the unknowns, then the residual. by_depth: the
-    derivative by depth; shrink: what the variance of depth takes off the square of an error along that.
+    table (N, 2, 9): derivatives by the unknowns, then the residual; across and down the image, in sigmas.
+    by_depth (N, 2): derivative by depth. shrink (N,): the factor by which the variance of depth reduces the
+    weight of an error along by_depth (Sherman-Morrison). in_front (N,): in front of the camera.
     """
     count = len(seen)
     table, by_depth = np.empty((count, 2, _UNKNOWNS + 1)), np.empty((count, 2))
@@ -150,7 +159,7 @@ def _linearised(
         in_front[k] = z > _LEAST_AHEAD_M
         inverse = 1.0 / max(z, _LEAST_AHEAD_M)
         x, y = x * inverse, y * inverse
-        # The camera turns by w and goes by v: a point goes by -(w x p) - v in its frame.
+        # If the camera turns by w and moves by v, a point p moves by -(w x p) - v in its frame.
         across, down = table[k, 0], table[k, 1]
         across[0], down[0] = x * y, 1.0 + y * y
         across[1], down[1] = -1.0 - x * x, -x * y
@@ -177,7 +186,7 @@ def _linearised(
 
 @inlined
 def _chi2(rows: FloatArray, by_depth: FloatArray, shrink: float) -> float:
-    """Of one point with rows (2, 9) in table."""
+    """Chi-square of a point with rows (2, 9) of table."""
     a, b = rows[0, _RESIDUAL], rows[1, _RESIDUAL]
     along = a * by_depth[0] + b * by_depth[1]
     result: float = a * a + b * b - shrink * along * along
@@ -186,7 +195,7 @@ def _chi2(rows: FloatArray, by_depth: FloatArray, shrink: float) -> float:
 
 @inlined
 def _assumed_variance(rows: FloatArray, sigma: FloatArray) -> float:
-    """Of where a point is seen, before anything is known but sigma (8,)."""
+    """Variance of a point's predicted position by the prior sigma (8,) alone, in pixel variances."""
     result = 0.0
     for i in range(_UNKNOWNS):
         result += sigma[i] * sigma[i] * (rows[0, i] * rows[0, i] + rows[1, i] * rows[1, i])
@@ -205,7 +214,7 @@ def _add(rows: FloatArray, by_depth: FloatArray, shrink: float, weight: float, n
 
 @inlined
 def _solved(matrix: FloatArray, side: FloatArray) -> FloatArray:
-    """x of matrix x = side, for a positive matrix (8, 8), by Cholesky's factor."""
+    """Solve matrix x = side for a positive definite matrix (8, 8), by Cholesky factorisation."""
     factor, result = np.zeros_like(matrix), side.copy()
     for i in range(_UNKNOWNS):
         for j in range(i + 1):
@@ -227,10 +236,11 @@ def _solved(matrix: FloatArray, side: FloatArray) -> FloatArray:
 def _fitted(
     lines: FloatArray, seen: FloatArray, doubt: FloatArray, start: FloatArray, sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, int, FloatArray, FloatArray, FloatArray]:
-    """The fields of Fit; the poses (3, 4): rotation and translation."""
+    """The fields of Fit. Poses are (3, 4): rotation and translation."""
     prior, pose, sweep_rad = 1.0 / np.square(sigma), _shifted(lines, seen, start, sigma), np.zeros(2)
     table, by_depth, shrink, in_front = _linearised(lines, seen, doubt, pose, sweep_rad)
-    missing, gone = np.zeros(_UNKNOWNS), np.zeros(_UNKNOWNS)  # gone: since the image was linearised
+    # missing: from the present estimate to the prior mean. gone: the sum of steps since the linearisation.
+    missing, gone = np.zeros(_UNKNOWNS), np.zeros(_UNKNOWNS)
     missing[:_SWEEP] = _back(pose, start)
     chi2, allowed = np.empty(len(seen)), np.zeros(len(seen), np.bool_)
     for iteration in range(_ITERATIONS):
@@ -246,7 +256,7 @@ def _fitted(
                 _add(table[k], by_depth[k], shrink[k], weight, normal)
         for i in range(_UNKNOWNS):
             normal[i:, i] = normal[i, i:_UNKNOWNS]
-        # With the prior of the motion alone, then with that of the sweep, too.
+        # First with the prior of the motion alone (free), then with that of the sweep as well.
         free, free_side = normal[:, :_UNKNOWNS].copy(), normal[:, _RESIDUAL].copy()
         free_from_rad = -missing[_SWEEP:]
         for i in range(_SWEEP):
@@ -258,7 +268,7 @@ def _fitted(
             side[i] += prior[i] * missing[i]
         step = _solved(information, side)
         gone += step
-        # The step in standard deviations, squared.
+        # step * side is the squared length of the step in standard deviations.
         if iteration >= len(_ANNEAL) and (step * side).sum() < _CONVERGED_SIGMAS**2:
             break
         if np.abs(gone).max() > _STRAIGHT:

@@ -1,14 +1,14 @@
-"""Rolling shutter: the rows of an image are read one after another, so a camera that shakes bends the image.
+"""Rolling shutter: the rows of an image are read one after another, so a shaking camera distorts the image.
 
 The colour sensor of a D435i has a rolling shutter; such sensors take some 10 to 30 ms from their first row to
-their last. The robot's tracks shake the camera by a quarter of a radian per second and more. That stretches
-and shrinks the image by pixels, and the length ratio (vision/motion/velocities.py) would take this for speed.
+their last. The robot's crawler tracks shake the camera by a quarter of a radian per second and more. That
+stretches and shrinks the image by pixels, and the length ratio (vision/motion/velocities.py) would take this
+for speed.
 
 The sweep is how far the camera turned about x and y while one image was read.
-vision/ego_motion/camera_motion.py estimates it for each image, and straight_rays corrects pixels by it. How
-far the camera can have turned follows from the rate of turn and the read-out time of the image. No recording
-states the read-out time, so ReadOut learns it. For a global shutter ReadOut learns 0, and nothing is
-corrected.
+vision/ego_motion/camera_motion.py estimates it for each image, and straight_rays corrects pixels by it. The
+prior of the sweep follows from the rate of turn and the read-out time of the image. No recording states the
+read-out time, so ReadOut learns it. For a global shutter ReadOut learns 0, and nothing is corrected.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from vision.camera.lens import RealArray, rays, row_delays
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.motion_prior import SweepPrior
 
-_UNKNOWN_S = 0.015  # one sigma of the read-out before anything is seen
-_MOST_S = 0.035  # frames follow each other in that time
-_MEMORY = 0.98  # a frame: of what is known; what was learned from a bad start fades
-_OTHER_BENDS_RAD = 0.7e-3  # one sigma, by whatever else bends an image
-_LEAST_RAD = 1e-9  # nothing, but no division by zero
-_RATE_MEMORY = 0.9  # a frame: of the fastest turn, since vibration comes and goes between frames
+_UNKNOWN_S = 0.015  # one sigma of the read-out time before anything is learned
+_MOST_S = 0.035  # maximum read-out time: about the interval of frames
+_MEMORY = 0.98  # per frame: old information decays, so that mistakes made at the start fade
+_OTHER_BENDS_RAD = 0.7e-3  # one sigma of distortions of the image by other causes
+_LEAST_RAD = 1e-9  # practically 0, but avoids a division by 0
+_RATE_MEMORY = 0.9  # per frame: decay of the fastest rate of turn, since vibration varies between frames
 
 
 def straight_rays(pixels: RealArray, camera: Intrinsics, sweep_rad: FloatArray) -> FloatArray:
@@ -42,25 +42,25 @@ def straight_rays(pixels: RealArray, camera: Intrinsics, sweep_rad: FloatArray) 
 
 @compiled("float64[:, ::1], float64[::1], float64, float64")
 def _straightened(plane: FloatArray, delays: FloatArray, sweep_x: float, sweep_y: float) -> FloatArray:
-    """plane and result (3, N). delays (N,): when each point was read."""
+    """As straight_rays. plane and the result: (3, N). delays (N,): when each point was read."""
     result = np.ones_like(plane)
     for k in range(len(delays)):
         x, y, about_x, about_y = plane[0, k], plane[1, k], sweep_x * delays[k], sweep_y * delays[k]
-        # The derivatives of a small rotation, as in vision/ego_motion/robust_fit.py.
+        # Derivatives by a small rotation, as in vision/ego_motion/robust_fit.py.
         result[0, k] = x - (about_x * x * y - about_y * (1.0 + x * x))
         result[1, k] = y - (about_x * (1.0 + y * y) - about_y * x * y)
     return result
 
 
 class ReadOut:
-    """How long the rows of an image take, learned from how it bends while the camera pitches.
+    """Learns the read-out time of an image from its distortion (bend) while the camera pitches.
 
-    Least squares of the bend over the rate of turn at that image, from a prior of 0 +- 15 ms. Only pitch
-    teaches: vibration goes to and fro, while a steady turn bends all images alike, which nothing shows.
+    Least squares of the bend over the rate of turn at that image, with a prior of 0 +- 15 ms. Only pitch is
+    used: vibration alternates, while a steady turn distorts all images alike, which cannot be observed.
     """
 
     def __init__(self, vibration_radps: float) -> None:
-        """vibration_radps: as fast as the camera may turn before it has been seen to."""
+        """vibration_radps: assumed rate of turn before any is observed."""
         self._rates_radps = np.full(2, vibration_radps)
         self._information = 0.0
         self._told = 0.0
@@ -68,12 +68,12 @@ class ReadOut:
 
     @property
     def seconds(self) -> float:
-        """From the first row to the last: what is certain to one sigma, 0 for a global shutter."""
+        """From the first row to the last: the estimate less one sigma, 0 for a global shutter."""
         information = self._information + 1.0 / _UNKNOWN_S**2
         return min(max(self._told / information - 1.0 / math.sqrt(information), 0.0), _MOST_S)
 
     def sweep(self) -> SweepPrior:
-        """How far the camera turns about x and y while the next image is read."""
+        """The prior of how far the camera turns about x and y while the next image is read."""
         information = self._information + 1.0 / _UNKNOWN_S**2
         most_s = min(max(self._told / information, 0.0) + 1.0 / math.sqrt(information), _MOST_S)
         return SweepPrior(
@@ -81,10 +81,10 @@ class ReadOut:
         )
 
     def learn(self, found: CameraEstimate, turn_rad: FloatArray, dt_s: float) -> None:
-        """After an image.
+        """Learn from an image.
 
-        turn_rad (3,): the camera's turn since the frame before, dt_s ago. The rate at an image is known one
-        frame later, when its turns before and after it are.
+        found: the estimate for this image. turn_rad (3,): the camera's rotation since the frame before, dt_s
+        ago. The rate of turn at an image follows one frame later, from the rotations before and after it.
         """
         if self._bend is not None:
             bend_rad, variance, before_rad, before_s = self._bend
@@ -98,5 +98,5 @@ class ReadOut:
         self._rates_radps = np.maximum(_RATE_MEMORY * self._rates_radps, np.abs(turn_rad[:2]) / dt_s)
 
     def lose(self) -> None:
-        """The next image does not follow the last one."""
+        """Forget the bend of the last image: the next image does not follow it."""
         self._bend = None

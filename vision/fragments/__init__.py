@@ -1,1 +1,13 @@
-"""Featured fragments in the image: edges, contours, segments, followed from frame to frame and renewed."""
+"""Featured fragments: line segments in the image, tracked from frame to frame and renewed.
+
+Files, in the order in which they come into play within one frame:
+
+* store - the fragments with their history; gives the anchors.
+* optical_flow - the end points are tracked into the new image.
+* renewal - new fragments are searched where they have become few.
+* edges - Canny edges.
+* contours - runs of edge pixels, cut into pieces.
+* segments - line segments from edges, with their ends moved to corners.
+* candidates - segments become new fragments: trackable ends, depth on one surface.
+* attention - bodies with too few fragments are searched by themselves.
+"""

@@ -1,8 +1,9 @@
-"""A closer look at bodies of which too few fragments tell how they move.
+"""A closer look at bodies with too few fragments to measure their motion.
 
-The fragments of an image are spread over all of it, long ones first; what is small, plain or half hidden gets
-none. Here one such body a frame is searched by itself, for shorter ones too. What is found is a witness of
-that body alone: the camera's motion does not rest on it, for the body may go.
+The fragments are spread over the whole image, long ones first, so a small, plain or partly hidden body gets
+none. wanted lists such bodies at the end of tracking. In the next frame Attention searches the image box of
+one of them, for shorter segments as well. The fragments that it finds are witnesses: they measure the motion
+of that body only. The camera's motion is not estimated from them, since the body may move.
 """
 
 from __future__ import annotations
@@ -30,35 +31,46 @@ from vision.fragments.candidates import (
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
-_FEW_FRAGMENTS = 4  # eight ends are what a verdict along the line of sight takes (vision/bodies/proof.py)
-_ENOUGH_OF_A_MOVER = 2  # to follow it, its surface helps
+_FEW_FRAGMENTS = 4  # fewer are too few: a verdict along the line of sight takes 8 ends (bodies/proof.py)
+_ENOUGH_OF_A_MOVER = 2  # enough to follow a mover, together with its surface
 _MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py): less is a sliver
-_REACH_M = 9.0  # short of the depth mask's 10 m by about the noise of depth there
-_URGENT_SIGHTINGS = 45  # who is new in view, or under suspicion, is looked at more often
-# Beside no whole number of frames at 30, 15 or 10 Hz, or the rounding of a stamp would decide.
+_REACH_M = 9.0  # maximum distance: the depth mask's 10 m less about the noise of depth there
+_URGENT_SIGHTINGS = 45  # bodies seen in fewer frames, and suspects, are urgent
+# Minimum time between two looks at an urgent body. It is just below a whole number of frame intervals at 30,
+# 15 or 10 Hz, so that the rounding of a stamp does not decide.
 _URGENT_NS = 95_000_000
-_IDLE_NS = 495_000_000  # who is known well is looked at twice a second
-_MARGIN_PX = 6  # around its box: an edge is at the rim of a body, and corners are looked for beside it
-_MIN_SIDE_PX = 16  # the least length of a segment here
-_MIN_LENGTH = 0.5  # of the length of other fragments
-_MIN_END_DISTANCE_PX = 8.0  # half of the least length of a segment here: ends were moved to corners
-_LEAST_HELD = 600.0  # on a short edge without corners both ends slide alike; noise alone makes 220
-# Not what vision/fragments/renewal.py has adapted to there, mostly more: velocities were no better known by
-# it.
+_IDLE_NS = 495_000_000  # the same at any other body: it is looked at twice a second
+_MARGIN_PX = 6  # around the box: edges are at the rim of a body, and corners are looked for beside them
+_MIN_SIDE_PX = 16  # of the box: the minimum length of a segment here
+_MIN_LENGTH = 0.5  # minimum length of a segment here, relative to that of other fragments
+_MIN_END_DISTANCE_PX = 8.0  # after the ends were moved to corners: half of the minimum length of a segment
+# Minimum of the smaller eigenvalue of the structure tensor at both ends: on a short edge without corners both
+# ends slide alike. Noise alone makes 220.
+_LEAST_HELD = 600.0
+# Contrast of an edge. The threshold that vision/fragments/renewal.py has adapted to there is mostly higher;
+# with it the velocities were not known any better.
 _CONTRAST = 60.0
-_CANDIDATES = 48  # the longest ones, which bounds the time that one look takes
-_AT_ONCE = 4  # from none to enough in one look, and no body takes all free places
-_GATE_M = 0.3  # about a body's depth, and
-_GATE_SIGMAS = 2.0  # 95 % of what is there, by the noise of depth
-_DEEPEST_M = 1.0  # of its measured depth no more counts: the rest of something deeper is noise, or a wall
-_ONE_SURFACE = 0.5  # of the gate
-_HOLES = 0.2  # of the 25 samples around an end: from a quarter on another surface may be there
+_CANDIDATES = 48  # only the longest segments: bounds the time of one look
+_AT_ONCE = 4  # maximum per look: takes a body from none to enough, and leaves room for other bodies
+# Gate on depth around the centre of the body: the sum of the depth of a body, of two sigmas of noise (95 %),
+# and of half of its measured extent in depth, which counts up to 1 m: more is noise or a wall.
+_GATE_M = 0.3
+_GATE_SIGMAS = 2.0
+_DEEPEST_M = 1.0
+_ONE_SURFACE = 0.5  # maximum distance of near and far surface at an end, as a share of the gate
+_HOLES = 0.2  # of the 25 samples around an end: from 0.25 on there may be another surface (depth_mask.py)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wanted:
-    """K bodies that too few fragments tell of. ids (K,); box_px (K, 4): u0, v0, u1, v1; depth_m (K,) and
-    gate_m (K,): how deep they are, and by how much what is on them may be off; urgent (K,)."""
+    """K bodies with too few fragments.
+
+    ids: of their tracks, (K,).
+    box_px: u0, v0, u1, v1, (K, 4).
+    depth_m: of their centres, (K,).
+    gate_m: maximum difference in depth of a fragment on them, (K,).
+    urgent: new, or under suspicion of moving, (K,).
+    """
 
     ids: NDArray[np.int64]
     box_px: FloatArray
@@ -68,7 +80,7 @@ class Wanted:
 
 
 def wanted(tracks: Tracks, detection: Detection, config: PerceptionConfig) -> Wanted:
-    """Of the tracks seen in this frame."""
+    """The tracks seen in this frame that have too few fragments."""
     noise = config.depth_noise
     chosen, depth_m, gate_m, urgent = _told_of_by_too_few(
         tracks.state,
@@ -107,8 +119,10 @@ def _told_of_by_too_few(
     floor_m: float,
     quadratic_per_m: float,
 ) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Which of the tracks are wanted, and depth_m, gate_m and urgent of these. floor_m and quadratic_per_m:
-    the noise of depth."""
+    """Indices of the wanted tracks, and their depth_m, gate_m and urgent.
+
+    rotation, camera_m: pose of the camera. floor_m, quadratic_per_m: depth noise.
+    """
     chosen, depth_m, gate_m = np.empty(len(state), np.intp), np.empty(len(state)), np.empty(len(state))
     urgent, count = np.empty(len(state), np.bool_), 0
     for n in range(len(state)):
@@ -128,7 +142,7 @@ def _told_of_by_too_few(
 
 
 class Attention:
-    """Keeps when each body was looked at last."""
+    """Searches one body per frame for fragments. Keeps when each body was looked at last."""
 
     def __init__(self, config: PerceptionConfig) -> None:
         self._config = config
@@ -138,7 +152,7 @@ class Attention:
     def find(
         self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], bodies: Wanted
     ) -> NewFragments:
-        """Fragments on the body whose turn it is, where none of ends_px (K, 2, 2) are: all present ones."""
+        """New fragments on the body whose turn it is, away from the present ones, ends_px (K, 2, 2)."""
         settings = self._config.fragments
         room = settings.max_fragments + settings.closer_fragments - len(ends_px)
         one = self._next(bodies, frame.captured_ns) if room > 0 else None
@@ -159,8 +173,10 @@ class Attention:
         return new_fragments(picked[: min(room, _AT_ONCE)], ends, tensor, surface, settings)
 
     def _on_it(self, surface: SurfaceDepth, depth_m: float, gate_m: float) -> NDArray[np.bool_]:
-        """(N,) segments of the body at depth_m. One with an end between two surfaces, or beside what has no
-        depth, would be a witness of either."""
+        """(N,) segments that lie on the body at depth_m.
+
+        A segment with an end between two surfaces, or beside pixels without depth, may belong to either.
+        """
         near_m, far_m, holes = surface.near_m[:, ::4], surface.far_m[:, ::4], surface.holes[:, ::4]
         here = np.abs(near_m - depth_m) <= gate_m
         alone = (far_m - near_m <= _ONE_SURFACE * gate_m) & (holes <= _HOLES)
@@ -168,8 +184,8 @@ class Attention:
         return result & (here & alone).all(axis=1)
 
     def _next(self, bodies: Wanted, now_ns: int) -> int | None:
-        """Index of the body whose turn it is: an urgent one, of these the one that has waited for longest."""
-        # At the very beginning everything is new, and waits for its turn.
+        """Index of the body whose turn it is: urgent ones first, of these the one that has waited longest."""
+        # A body that was never looked at has waited since the first call.
         self._began_ns = now_ns if self._began_ns is None else min(self._began_ns, now_ns)
         ids = bodies.ids.tolist()
         if not ids:

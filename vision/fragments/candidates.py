@@ -1,4 +1,7 @@
-"""Segments found in an image -> new fragments: ends that can be followed, and the depth along them."""
+"""Segments found in an image become new fragments: their ends must be trackable, their depth on one surface.
+
+Used by vision/fragments/renewal.py and attention.py.
+"""
 
 from __future__ import annotations
 
@@ -15,19 +18,24 @@ from vision.depth.depth_noise import depth_sigma_of
 from vision.fragments.edges import GreyImage
 from vision.fragments.segments import snap_to_corners
 
-_TAKEN_PX = 6  # about half a search window: closer ends would follow the same pixels
-# What image noise of 3 grey levels adds to both eigenvalues over 7x7 px.
+_TAKEN_PX = 6  # size of a place: about half a search window, since closer ends would track the same pixels
+# Image noise of 3 grey levels adds this to both eigenvalues of the structure tensor over 7x7 px.
 _NOISE_STRUCTURE = np.float32(220.0)
-_LEAST_STRUCTURE = np.float32(3.0)  # of either eigenvalue: an end held so weakly is known to 3.5 px
-_STAIRS = np.float32(0.05)  # of the larger eigenvalue, that a coarsely sampled edge adds to the smaller one
-_MATCH_VARIANCE = np.float32(6.0**2)  # of the grey levels in two sights of the same patch
+_LEAST_STRUCTURE = np.float32(3.0)  # minimum of either eigenvalue, at which an end is known to 3.5 px
+_STAIRS = np.float32(0.05)  # share of the larger eigenvalue that a coarsely sampled edge adds to the smaller
+_MATCH_VARIANCE = np.float32(6.0**2)  # of grey levels between two images of the same patch
 _HALF = np.float32(0.5)
-_PLACES = 5  # along a segment, evenly from end to end, where its depth is read
+_PLACES = 5  # number of points along a segment, evenly from end to end, at which its depth is read
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NewFragments:
-    """ends_px (N, 2, 2), near_m and far_m (N, 2), pixel_cov (N, 2, 3): xx, xy, yy of one flow step, px^2."""
+    """N new fragments.
+
+    ends_px: (N, 2, 2).
+    near_m, far_m: depth at the ends, (N, 2).
+    pixel_cov: xx, xy, yy of one flow step at each end, px^2, (N, 2, 3).
+    """
 
     ends_px: NDArray[np.float32]
     near_m: NDArray[np.float32]
@@ -50,9 +58,12 @@ def held_ends(
     min_distance_px: float,
     least_held: float = 0.0,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Of segments (N, 2, 2) those whose ends, moved to corners, are no nearer to each other than
-    min_distance_px and no fragment's of ends_px (K, 2, 2): (M, 2, 2), the best held ones first, and the
-    structure tensor at their ends (M, 2, 3). least_held: of its smaller eigenvalue at either end.
+    """The trackable segments among segments_px (N, 2, 2), with their ends moved to corners.
+
+    A segment is kept if its ends are at least min_distance_px apart, if no present fragment, ends_px
+    (K, 2, 2), and no better segment has an end in the same place, and if the smaller eigenvalue of the
+    structure tensor is at least least_held at both ends. Returns the segments (M, 2, 2), those with the
+    largest such eigenvalue first, and the structure tensor at their ends (M, 2, 3).
     """
     snapped, tensor = snap_to_corners(grey, segments_px)
     height, width = grey.shape
@@ -61,7 +72,7 @@ def held_ends(
 
 
 def depth_along(segments_px: NDArray[np.float32], frame: RgbdFrame, config: PerceptionConfig) -> SurfaceDepth:
-    """Depth along segments (N, 2, 2), from end to end: (N, 5) each."""
+    """Near and far surface at 5 points along each of segments (N, 2, 2), from end to end: (N, 5) each."""
     found = surface_depth(
         frame.depth,
         frame.depth_scale_m,
@@ -74,9 +85,9 @@ def depth_along(segments_px: NDArray[np.float32], frame: RgbdFrame, config: Perc
 
 
 def on_one_surface(near_m: FloatArray, config: PerceptionConfig) -> NDArray[np.bool_]:
-    """(N,) of near_m (N, 5) as in depth_along.
+    """(N,) whether segments with near_m (N, 5), as from depth_along, lie on one surface.
 
-    Inverse depth runs straight along a segment of one plane; a segment across a depth edge jumps.
+    Inverse depth is linear along a segment on one plane; across a depth edge it jumps.
     """
     noise = config.depth_noise
     return _on_one_surface(np.ascontiguousarray(near_m), noise.floor_m, noise.quadratic_per_m)
@@ -89,21 +100,21 @@ def new_fragments(
     surface: SurfaceDepth,
     settings: FragmentSettings,
 ) -> NewFragments:
-    """Those picked (M,) of segments with what held_ends and depth_along say of them."""
+    """The fragments of the segments picked (M,), from the results of held_ends and depth_along."""
     floor_px2 = np.float32(settings.pixel_sigma_px**2)
     return NewFragments(*_fragments(picked, segments_px, tensor, surface.near_m, surface.far_m, floor_px2))
 
 
 @inlined
 def _eigenvalues(uu: np.float32, uv: np.float32, vv: np.float32) -> tuple[np.float32, np.float32]:
-    """Of a structure tensor: the middle between its two eigenvalues, and how far they are from it."""
+    """Mean of the two eigenvalues of a structure tensor, and half of their difference."""
     half_difference = _HALF * (uu - vv)
     return _HALF * (uu + vv), np.sqrt(half_difference * half_difference + uv * uv)
 
 
 @inlined
 def _take(taken: NDArray[np.bool_], end_px: NDArray[np.float32]) -> bool:
-    """Whether nobody had the place of an end (2,) yet: from now on it is taken. No end is beyond the rim."""
+    """Whether the place of an end (2,) was free; marks it as taken. Places are clamped to the image."""
     share = np.float32(1.0 / _TAKEN_PX)
     row = min(max(int(end_px[1] * share), 0), taken.shape[0] - 1)
     column = min(max(int(end_px[0] * share), 0), taken.shape[1] - 1)
@@ -122,7 +133,7 @@ def _best_held(
     min_distance_px: float,
     least_held: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What held_ends returns, of segments that are moved to corners already."""
+    """As held_ends, for segments whose ends have been moved to corners already."""
     taken = np.zeros((height // _TAKEN_PX + 1, width // _TAKEN_PX + 1), np.bool_)
     for n in range(len(ends_px)):
         _take(taken, ends_px[n, 0])
@@ -133,7 +144,7 @@ def _best_held(
             middle, radius = _eigenvalues(tensor[n, end, 0], tensor[n, end, 1], tensor[n, end, 2])
             held[n] = min(held[n], middle - radius)
     wanted, count = np.empty(len(segments_px), np.intp), 0
-    for n in np.argsort(-held, kind="mergesort"):  # a stable one
+    for n in np.argsort(-held, kind="mergesort"):  # mergesort is stable
         first, second = _take(taken, segments_px[n, 0]), _take(taken, segments_px[n, 1])
         du = segments_px[n, 0, 0] - segments_px[n, 1, 0]
         dv = segments_px[n, 0, 1] - segments_px[n, 1, 1]
@@ -146,7 +157,7 @@ def _best_held(
 
 @compiled("float32[:, :, ::1]")
 def _points_along(segments_px: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(5 N, 2) pixels along segments (N, 2, 2), from end to end."""
+    """(5N, 2) pixels along segments (N, 2, 2), from end to end."""
     result = np.empty((len(segments_px) * _PLACES, 2), np.float32)
     for n in range(len(segments_px)):
         for k in range(2):
@@ -158,7 +169,7 @@ def _points_along(segments_px: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @compiled("float64[:, ::1], float64, float64")
 def _on_one_surface(near_m: FloatArray, floor_m: float, quadratic_per_m: float) -> NDArray[np.bool_]:
-    """What on_one_surface returns."""
+    """As on_one_surface."""
     result = np.empty(len(near_m), np.bool_)
     for n in range(len(near_m)):
         begin, end = 1.0 / near_m[n, 0], 1.0 / near_m[n, -1]
@@ -170,7 +181,7 @@ def _on_one_surface(near_m: FloatArray, floor_m: float, quadratic_per_m: float) 
                 missing += 1
             elif not abs(near_m[n, place] - expected_m) <= gate_m:
                 jumps = True
-        # One of the three samples in between may fall into a hole.
+        # One of the three inner points may have no depth.
         result[n] = not jumps and missing <= 1
     return result
 
@@ -179,11 +190,11 @@ def _on_one_surface(near_m: FloatArray, floor_m: float, quadratic_per_m: float) 
 def _flow_covariance(
     uu: np.float32, uv: np.float32, vv: np.float32, floor_px2: np.float32
 ) -> tuple[np.float32, np.float32, np.float32]:
-    """xx, xy, yy of one flow step from the structure tensor: wide along an edge.
+    """Covariance xx, xy, yy of one flow step from the structure tensor; large along an edge.
 
-    Image noise makes every direction look structured, and so do the stairs that a strong edge has where it
-    is sampled coarsely; they wander along it as it turns. Both shares are taken off first, or an end on a
-    straight edge would seem as well held along the edge as across it.
+    Image noise adds to both eigenvalues. The stair steps of a strong, coarsely sampled edge add to the
+    smaller one, but they wander along the edge as it turns. Both contributions are subtracted first, or an
+    end on a straight edge would seem as well held along the edge as across it.
     """
     middle, radius = _eigenvalues(uu, uv, vv)
     larger = max(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)

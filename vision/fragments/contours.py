@@ -1,4 +1,4 @@
-"""Contours: continuous runs of edge pixels, filtered by length (Daeef 2020: from 32 px on)."""
+"""Contours: continuous runs of edge pixels, filtered by length (Daeef 2020: 32 px or more)."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from vision.fragments.edges import GreyImage
 
-_PIECE = 1.5  # a piece of a contour is at most this many times the least length
+_PIECE = 1.5  # maximum length of a piece of a contour, relative to the minimum length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contours:
-    """ends_px (N, 2, 2): the two ends of each piece of a contour. edges (H, W) uint8: what is left of
-    the edge image when the short contours are taken away."""
+    """ends_px (N, 2, 2): the two ends of each piece of a contour. edges (H, W): edge image without the short
+    contours."""
 
     ends_px: NDArray[np.float32]
     edges: GreyImage
@@ -26,9 +26,9 @@ class Contours:
 def find_contours(edges: GreyImage, min_length_px: float) -> Contours:
     """The contours of an edge image that are at least min_length_px long, as pieces with two ends.
 
-    An open curve one pixel wide is walked there and back, so its length is half of the walk. A long walk
-    is cut into equal pieces of min_length_px to 1.5 min_length_px: the two ends of a winding contour
-    would say nothing of what lies between them.
+    OpenCV follows an open curve one pixel wide there and back, so the curve is half as long as its list of
+    points. A long list is cut into equal pieces of min_length_px to 1.5 min_length_px, since the two ends of
+    a winding contour would tell nothing about its course in between.
     """
     found, _ = cv2.findContours(edges, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     kept = [curve for curve in found if len(curve) >= 2.0 * min_length_px]
@@ -49,8 +49,10 @@ def _drawn(
     height: int,
     width: int,
 ) -> tuple[NDArray[np.float32], GreyImage]:
-    """The two ends of each of count pieces, and an image of all points (N, 2). lengths: how many of the
-    points are of each curve, in turn; pieces: into how many it is cut."""
+    """The two ends of each of count pieces, (count, 2, 2), and an image (height, width) of all points (N, 2).
+
+    lengths: number of points of each curve, in turn. pieces: into how many pieces each curve is cut.
+    """
     ends_px, image = np.empty((count, 2, 2), np.float32), np.zeros((height, width), np.uint8)
     start, one = 0, 0
     for curve in range(len(lengths)):

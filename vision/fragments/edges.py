@@ -1,4 +1,4 @@
-"""Edges by Canny's detector (Daeef 2020, "Initialize featured fragments")."""
+"""Edges by the Canny detector (Daeef 2020, "Initialize featured fragments")."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 GreyImage = NDArray[np.uint8]
 
-_LOW_SHARE = 0.4  # of the contrast that makes an edge: with so much of it, one goes on
+_LOW_SHARE = 0.4  # Canny's lower threshold, with which an edge is continued, as a share of the upper one
 
 
 def find_edges(grey: GreyImage, contrast: float) -> GreyImage:
-    """(H, W) uint8, 255 on edges. contrast: the gradient that makes one, grey levels (3x3 Sobel, L1 norm)."""
+    """(H, W) uint8, 255 on edges. contrast: upper threshold of the gradient (3x3 Sobel, L1), grey levels."""
     return np.asarray(cv2.Canny(grey, _LOW_SHARE * contrast, contrast), dtype=np.uint8)

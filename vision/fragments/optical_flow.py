@@ -1,4 +1,4 @@
-"""Pyramidal Lucas-Kanade on the end points, with a forward-backward check."""
+"""Tracking of the end points into the next image: pyramidal Lucas-Kanade with a forward-backward check."""
 
 from __future__ import annotations
 
@@ -14,26 +14,29 @@ from vision.fragments.edges import GreyImage
 from vision.numerics.order import median
 
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)  # px: far below an end's own sigma
-_MIN_EIGENVALUE = 1e-5  # low: straight edges are to pass, and are held by the expectation
-# Eigenvalues are at hand; the other error that could be asked for would be worked out pixel by pixel.
+_MIN_EIGENVALUE = 1e-5  # low, so that straight edges pass: along the edge the expectation holds them
+# The minimum eigenvalue is available anyway; OpenCV would compute its other error measure pixel by pixel.
 _FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
-_EXPECTATION_PX = 2.0  # one sigma of where an end is expected, once what all have in common is taken off
-_RIM_PX = 2  # of the image: an end there is about to leave it
+_EXPECTATION_PX = 2.0  # sigma of an expected position, after the median error of all ends has been removed
+_RIM_PX = 2  # of the image border: an end this close is about to leave the image
 
-# An image, then itself at half the size, at a quarter, and so on.
+# An image, then the same at half the size, at a quarter, and so on.
 Pyramid = tuple[GreyImage, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Flow:
-    """pixels (N, 2) float32 in the new image; found (N,) bool: tracked, came back, still inside."""
+    """Where N points are in the new image.
+
+    pixels (N, 2). found (N,): tracked, confirmed by the way back, and inside the image.
+    """
 
     pixels: NDArray[np.float32]
     found: NDArray[np.bool_]
 
 
 def pyramid(grey: GreyImage, settings: FragmentSettings) -> Pyramid:
-    """grey with its smaller copies: no more than the settings ask for, nor smaller than the search window."""
+    """grey and its smaller copies: as many as the settings ask for, none smaller than the search window."""
     levels = [grey]
     while len(levels) <= settings.lk_levels:
         if min(levels[-1].shape) < 2 * settings.lk_window_px + 1:
@@ -52,16 +55,16 @@ def track(
 ) -> Flow:
     """Where pixels (N, 2) of the image before are now, searched from guess (N, 2).
 
-    covariance (N, 3): xx, xy, yy of one flow step. An end may slide along its edge, there and back alike;
-    across the edge it has to return. Therefore the miss is measured in its own sigmas.
+    covariance (N, 3): xx, xy, yy of one flow step. An end may slide along its edge both forward and backward;
+    across the edge it has to return. Therefore the forward-backward error is measured in these sigmas.
 
-    The way back starts from where the guess says that the point came from, not from the point itself:
-    a search that starts at its goal proves nothing.
+    The backward search starts where the guess predicts the origin of the point, not at its true origin: a
+    search that starts at its goal proves nothing.
     """
     if len(pixels) == 0:
         return Flow(np.empty((0, 2), np.float32), np.empty(0, np.bool_))
     there, there_ok = _search(before, now, pixels, guess, settings.lk_window_px)
-    # What all ends have in common was the guess's own error: a turn of the camera it did not know of.
+    # The median difference is an error common to all guesses: a camera rotation that they do not include.
     expected = guess + median((there - guess).T)
     back_guess = there - (expected - pixels)
     back, back_ok = _search(now[:2], before[:2], there, back_guess, settings.lk_window_px)
@@ -86,9 +89,10 @@ def _search(
     guess: NDArray[np.float32],
     window_px: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Where pixels (N, 2) are found, coarse to fine from guess (N, 2) on, and which are: (N, 2), (N,).
+    """Search for pixels (N, 2) from guess (N, 2), coarse to fine; positions (N, 2) and whether found (N,).
 
-    Level by level: a call for all of them at once would make the pyramids of both images anew, twice a frame.
+    OpenCV is called level by level: one call for all levels would build the pyramids of both images again,
+    twice a frame.
     """
     there, found = guess * np.float32(0.5 ** len(now)), np.empty((0, 1), np.uint8)
     for level in reversed(range(len(now))):
@@ -109,7 +113,7 @@ def _search(
 
 @compiled("float32[:, ::1], float32[:, ::1]")
 def mahalanobis(miss: NDArray[np.float32], covariance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(N,) squared length of miss (N, 2) in sigmas of covariance (N, 3)."""
+    """(N,) squared Mahalanobis length of miss (N, 2) under covariance (N, 3): xx, xy, yy."""
     result = np.empty(len(miss), np.float32)
     for n in range(len(miss)):
         xx, xy, yy = covariance[n, 0], covariance[n, 1], covariance[n, 2]
@@ -131,11 +135,11 @@ def _confirmed(
     height: int,
     width: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Where ends are that were found there, with the part that the image cannot tell taken from expected; and
-    which of them came back but for a small miss (N, 2), and are inside of the image: (N, 2), (N,).
+    """Fuse found and expected positions, and check the ends; positions (N, 2) and whether confirmed (N,).
 
-    Along a straight edge a search ends anywhere; across it, it ends on the edge. The two are weighted by
-    covariance (N, 3) and by how far off an expectation usually is.
+    Along a straight edge the search ends anywhere; across it, it ends on the edge. So the found position
+    there, with covariance (N, 3), is fused with the expected one, with a sigma of _EXPECTATION_PX. An end is
+    confirmed if the forward-backward error miss (N, 2) is small and it is inside the image.
     """
     end, good = np.empty_like(there), np.empty(len(there), np.bool_)
     prior = np.float32(_EXPECTATION_PX**2)

@@ -1,4 +1,4 @@
-"""New fragments where they have thinned out, one part of the image at a time."""
+"""New fragments where there are too few, searched for in one part of the image at a time."""
 
 from __future__ import annotations
 
@@ -23,19 +23,21 @@ from vision.fragments.candidates import (
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
-PART_PX = (240, 160)  # rows, columns: as much as a frame has time for; eight of them are 640x480
+PART_PX = (240, 160)  # rows, columns: as much as a frame has time for; a 640x480 image has eight parts
 _BLOCKS = 2  # per part, one above the other: each has its own threshold of contrast
 _MARGIN_PX = 8  # around a part: a segment across its border is found from either side
-_MANY_MISSING = 8  # where more than one fragment in so many is missing, all parts of a band are searched
-_FEW_MISSING = 16  # where less than one in so many is, none: a search costs as much for one as for ten
-_MIN_END_DISTANCE_PX = 12.0  # a third of the least length: ends were moved to corners
-_CANDIDATES_PER_TILE = 4  # twice what a tile takes, for some have no depth or no corner
-_SHARE_WITHOUT_DEPTH = 0.15  # of all fragments: they tell of the camera's turn, of nothing else
+_MANY_MISSING = 8  # if more than 1/8 of the fragments are missing, a whole column of parts is searched
+_FEW_MISSING = 16  # if less than 1/16 are missing, none is: a search for one costs as much as for ten
+_MIN_END_DISTANCE_PX = 12.0  # after the ends were moved to corners: a third of the minimum length
+_CANDIDATES_PER_TILE = 4  # twice what a tile takes, since some have no depth or no corner
+_SHARE_WITHOUT_DEPTH = 0.15  # maximum share of all fragments: these measure only the camera's rotation
 
 
 class Renewal:
-    """Decides where to look and finds segments there. Keeps when each part of the image was last visited,
-    and how much contrast makes an edge in each block of it."""
+    """Decides where to search, and finds new fragments there.
+
+    Keeps when each part of the image was last searched, and the contrast threshold of edges in each block.
+    """
 
     def __init__(self, config: PerceptionConfig) -> None:
         self._config = config
@@ -46,11 +48,12 @@ class Renewal:
     def find(
         self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], without_depth: int
     ) -> NewFragments:
-        """Fragments for the tiles that hold too few of ends_px (N, 2, 2), in the part of the image that was
-        not visited for longest, or in the upright band of such parts where many are missing, or everywhere
-        where there are none. Nowhere while few are missing.
+        """New fragments for the tiles that hold too few ends of the present ones, ends_px (N, 2, 2).
 
-        without_depth: how many of the present ones have no depth; only a small share of all may.
+        The part of the image that was searched longest ago is searched. If many fragments are missing, it is
+        a column of such parts; if there are no fragments at all, all parts; if few are missing, none.
+
+        without_depth: how many of the present fragments have no depth; only a small share may.
         """
         settings = self._config.fragments
         rows, columns = (max(1, round(size / part)) for size, part in zip(grey.shape, PART_PX, strict=True))
@@ -74,7 +77,7 @@ class Renewal:
     def _segments(
         self, grey: GreyImage, counts: NDArray[np.int64], row: int, column: int
     ) -> NDArray[np.float32]:
-        """Segments of one part, outside of tiles that are full."""
+        """Segments in one part of the image, outside of full tiles."""
         settings = self._config.fragments
         rows, columns = (
             slice(
@@ -89,8 +92,10 @@ class Renewal:
         return find_segments(searched, settings.min_length_px, (columns.start, rows.start))
 
     def _edges(self, grey: GreyImage, thresholds: FloatArray) -> GreyImage:
-        """Edges of one part, block by block. The next visit looks closer where little was seen, less close
-        where much: thresholds (_BLOCKS,) are changed."""
+        """Edges of one part, block by block.
+
+        Changes thresholds (_BLOCKS,) for the next search: lower after few edges, higher after many.
+        """
         settings = self._config.fragments
         edges = np.empty(grey.shape, np.uint8)
         borders = [len(grey) * block // _BLOCKS for block in range(_BLOCKS + 1)]
@@ -112,7 +117,10 @@ class Renewal:
         counts: NDArray[np.int64],
         room: tuple[int, int],
     ) -> NewFragments:
-        """Thin out to what the tiles lack; drop what has no depth, crosses a depth edge or is untrackable."""
+        """Select from candidates what the tiles lack; drop those that are untrackable or cross a depth edge.
+
+        room: maximum number of fragments in all, and of fragments without depth.
+        """
         settings, config = self._config.fragments, self._config
         tile_px, per_tile = settings.tile_px, settings.fragments_per_tile
         wanted = _wanted(longest_first(candidates), counts, tile_px, per_tile)
@@ -125,14 +133,14 @@ class Renewal:
 
 @inlined
 def _tile(tiles: NDArray[np.int64], u: np.float32, v: np.float32, share: float) -> tuple[int, int]:
-    """Row and column of the tile with a pixel, of which share is a tile's; none is beyond the rim."""
+    """Row and column of the tile of a pixel, clamped to the image. share: 1 / side of a tile in pixels."""
     row, column = int(v * np.float32(share)), int(u * np.float32(share))
     return min(max(row, 0), tiles.shape[0] - 1), min(max(column, 0), tiles.shape[1] - 1)
 
 
 @compiled("float32[:, :, ::1], int64, int64, int64")
 def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width: int) -> NDArray[np.int64]:
-    """Ends per tile of an image."""
+    """Number of ends in each tile of the image."""
     counts = np.zeros((-(-height // tile_px), -(-width // tile_px)), np.int64)
     for n in range(len(ends_px)):
         for end in range(2):
@@ -142,7 +150,7 @@ def _tile_counts(ends_px: NDArray[np.float32], tile_px: int, height: int, width:
 
 @compiled("bool_[:, ::1], int64, uint8[:, ::1], int64, int64")
 def _outside_of(full: NDArray[np.bool_], tile_px: int, edges: GreyImage, top: int, left: int) -> GreyImage:
-    """edges without those in full tiles; its first pixel is in row top and column left of the image."""
+    """edges without those in full tiles. top, left: row and column of its first pixel in the image."""
     result = edges.copy()
     height, width = edges.shape
     for i in range(top // tile_px, (top + height - 1) // tile_px + 1):
@@ -157,9 +165,9 @@ def _outside_of(full: NDArray[np.bool_], tile_px: int, edges: GreyImage, top: in
 def _wanted(
     segments_px: NDArray[np.float32], counts: NDArray[np.int64], tile_px: int, per_tile: int
 ) -> NDArray[np.float32]:
-    """The first few segments (N, 2, 2) with their middle in each tile where some are missing.
+    """The first few of segments (N, 2, 2) with their middle in each tile where some are missing.
 
-    counts: ends in each tile; per_tile: segments that it is to have.
+    counts: ends in each tile. per_tile: wanted number of segments in a tile.
     """
     wanted, count, seen = np.empty(len(segments_px), np.intp), 0, np.zeros_like(counts)
     for n in range(len(segments_px)):
@@ -183,10 +191,10 @@ def _picked(
     room: int,
     far_room: int,
 ) -> NDArray[np.intp]:
-    """Which of segments (N, 2, 2) fill up their tiles: no more than room, and far_room without any depth.
+    """Indices of the segments (N, 2, 2) that fill up their tiles: at most room, and far_room without depth.
 
-    near_m (N, 5): along them; whole (N,): on one surface. Where nothing is measured at all, it is mostly far
-    away: good to know the camera's turn by.
+    near_m (N, 5): depth along them. whole (N,): on one surface. A segment without any measured depth is
+    mostly far away, and so measures the camera's rotation.
     """
     picked, count, seen = np.empty(len(segments_px), np.intp), 0, np.zeros_like(counts)
     for n in range(len(segments_px)):

@@ -1,7 +1,7 @@
 """Line segments: by the Hough transform and by the two ends of contours (Daeef 2020, "Find the best match").
 
-A segment is kept as its two end points. An end in the middle of a straight edge would slide along
-it, so each end is moved to the most corner-like pixel close by.
+A segment is stored as its two end points. An end in the middle of a straight edge would slide along the edge,
+so each end is moved to the most corner-like pixel close by.
 """
 
 from __future__ import annotations
@@ -19,21 +19,24 @@ from vision.fragments.edges import GreyImage
 
 Reals = TypeVar("Reals", np.float32, NDArray[np.float32])
 
-_SNAP_PX = 4  # how far an end may be moved: edges end somewhat before a corner
-_WINDOW_PX = 3  # on either side: 7x7, less than the 11x11 that is followed
+_SNAP_PX = 4  # maximum distance that an end is moved: edges end somewhat before a corner
+_WINDOW_PX = 3  # half window of the structure tensor: 7x7, less than the 11x11 of optical flow
 _REACH_PX = _SNAP_PX + _WINDOW_PX
-_MARGIN_PX = _REACH_PX + 2  # one for the gradient, one for what fills up a row
+_MARGIN_PX = _REACH_PX + 2  # one for the gradient, one for the padding of a row
 _SIDE, _WINDOW, _ROWS = 2 * _SNAP_PX + 1, 2 * _WINDOW_PX + 1, 2 * _REACH_PX + 1
-_ROW = _ROWS + 1  # values kept of a row: the processor works on sixteen at a time
-# A segment of 32 px turns by somewhat more when an end moves by a pixel: finer says no more. Upright, level
-# and diagonal lines are met exactly.
+_ROW = _ROWS + 1  # values stored per row: padded to 16, which the processor handles at a time
+# Angular step of the Hough transform. A segment of 32 px turns by somewhat more than this when an end moves
+# by one pixel, so a finer step gains nothing. Vertical, horizontal and diagonal lines are among the steps.
 _ANGLE_RAD = math.pi / 120.0
-_VOTES = 0.8  # of a segment's pixels: the others may be missing, or beside the line
+_VOTES = 0.8  # minimum share of a segment's pixels on the line: the others may be missing, or beside it
 
 
 def find_segments(edges: GreyImage, min_length_px: float, corner_px: tuple[int, int]) -> NDArray[np.float32]:
-    """(N, 2, 2) segments of one part of an image, by the Hough transform and by contours; short contours take
-    part in neither. edges (H, W): of that part; corner_px (u, v): its upper left pixel in the image."""
+    """(N, 2, 2) segments in one part of an image, by the Hough transform and by contours.
+
+    Short contours are used in neither. edges (H, W): of that part. corner_px (u, v): its upper left pixel in
+    the image.
+    """
     contours = find_contours(edges, min_length_px)
     found = np.concatenate((hough_segments(contours.edges, min_length_px), contours.ends_px))
     found += np.array(corner_px, np.float32)
@@ -53,10 +56,10 @@ def hough_segments(edges: GreyImage, min_length_px: float) -> NDArray[np.float32
 def snap_to_corners(
     grey: GreyImage, ends_px: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The ends (N, 2, 2), each at the pixel within 4 px whose surroundings are most corner-like, and the
-    structure tensor there (N, 2, 3): uu, uv, vv of the grey level's gradient, summed over 7x7 px.
+    """The ends (N, 2, 2), each moved to the most corner-like pixel within 4 px in u and v.
 
-    Corner-like: largest smaller eigenvalue of the structure tensor (Shi and Tomasi).
+    Also returns the structure tensor there (N, 2, 3): uu, uv, vv of the grey level's gradient, summed over
+    7x7 px. Most corner-like is the pixel with the largest smaller eigenvalue of this tensor (Shi and Tomasi).
     """
     if len(ends_px) > 0 and min(grey.shape) < 2 * _MARGIN_PX + 1:
         raise ValueError(f"no end has its surroundings in an image of {grey.shape[1]}x{grey.shape[0]} pixels")
@@ -65,7 +68,7 @@ def snap_to_corners(
 
 @inlined
 def smaller_eigenvalue(uu: Reals, uv: Reals, vv: Reals) -> Reals:
-    """Of the symmetric 2x2 matrices with these entries."""
+    """The smaller eigenvalue of symmetric 2x2 matrices with these entries."""
     half = np.float32(0.5)
     half_difference = half * (uu - vv)
     smaller: Reals = half * (uu + vv) - np.sqrt(half_difference * half_difference + uv * uv)
@@ -76,7 +79,7 @@ def smaller_eigenvalue(uu: Reals, uv: Reals, vv: Reals) -> Reals:
 def _gradient_products(
     grey: GreyImage, u: int, v: int, uu: NDArray[np.int32], uv: NDArray[np.int32], vv: NDArray[np.int32]
 ) -> None:
-    """Of twice the gradient at the pixels within 7 px of u and v, row by row: into uu, uv, vv (15 * 16,)."""
+    """Put products of twice the gradient, at the pixels within 7 px of u, v, into uu, uv, vv (15 * 16,)."""
     patch = grey[v - _REACH_PX - 1 : v + _REACH_PX + 2, u - _REACH_PX - 1 : u + _REACH_PX + 3]
     for i in range(_ROWS):
         for j in range(_ROW):
@@ -88,10 +91,10 @@ def _gradient_products(
 
 @inlined
 def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], into: NDArray[np.float32]) -> None:
-    """A quarter of the sums of values (15 * 16,) over 7x7 px, at the pixels within 4 px: into (9 * 16,). Of a
-    row's sixteen sums the first nine are valid; over_rows (10 * 16,) is room to work in.
+    """Put a quarter of the sums of values (15 * 16,) over 7x7 px into into (9 * 16,), at pixels within 4 px.
 
-    Whole quarters, far below 2^24 of them: exact.
+    Of the sixteen sums of a row the first nine are valid. over_rows (10 * 16,): work space. The sums are
+    integers far below 2^24, so a quarter of them is exact in single precision.
     """
     for place in range(_SIDE * _ROW):
         total = 0
@@ -109,8 +112,10 @@ def _sums(values: NDArray[np.int32], over_rows: NDArray[np.int32], into: NDArray
 def _most_corner_like(
     uu: NDArray[np.float32], uv: NDArray[np.float32], vv: NDArray[np.float32], held: NDArray[np.float32]
 ) -> int:
-    """Place of the largest smaller eigenvalue, the first of equal ones; all (9 * 16,), of which the first
-    nine of a row are valid. held is room to work in."""
+    """Index of the largest smaller eigenvalue, the first of equal ones.
+
+    All arrays are (9 * 16,), of which the first nine values of a row are valid. held: work space.
+    """
     for place in range(_SIDE * _ROW):
         held[place] = smaller_eigenvalue(uu[place], uv[place], vv[place])
     best = 0
@@ -125,7 +130,7 @@ def _most_corner_like(
 def _snapped(
     grey: GreyImage, ends_px: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What snap_to_corners returns."""
+    """As snap_to_corners."""
     height, width = grey.shape
     snapped, at_best = np.empty_like(ends_px), np.empty((len(ends_px), 2, 3), np.float32)
     products = np.empty((3, _ROWS * _ROW), np.int32)
@@ -148,7 +153,7 @@ def _snapped(
 
 @compiled("float32[:, :, ::1]")
 def lengths_px(ends_px: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(N,) L_t of the paper: distance between the two ends."""
+    """(N,) distance between the two ends: L_t of the paper."""
     length = np.empty(len(ends_px), np.float32)
     for n in range(len(ends_px)):
         du, dv = ends_px[n, 0, 0] - ends_px[n, 1, 0], ends_px[n, 0, 1] - ends_px[n, 1, 1]
@@ -158,5 +163,5 @@ def lengths_px(ends_px: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @compiled("float32[:, :, ::1]")
 def longest_first(segments_px: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Segments (N, 2, 2) by their length; of equal ones the first stays first."""
+    """Segments (N, 2, 2) sorted by length, longest first; the order of equally long ones stays."""
     return segments_px[np.argsort(-lengths_px(segments_px), kind="mergesort")]

@@ -1,7 +1,7 @@
-"""The featured fragments as they live: kept from frame to frame, dropped when lost, renewed when thin.
+"""The store of all fragments: a struct of arrays over N fragments with two ends each, with a history.
 
-Struct of arrays over N fragments with two ends each. A history of the last frames gives every fragment
-an anchor: where its ends were and how deep, up to a window of time ago.
+The history of the last frames gives every fragment an anchor: the direction and depth of its ends some frames
+ago, at most a window of time.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Intrinsics, Pose
 from vision.ego_motion.rolling_shutter import straight_rays
 
-HISTORY = 24  # frames: the window of 0.25 s at 90 frames a second
-_FEWEST_PLACES = 64  # to begin with; it grows by doubling
+HISTORY = 24  # frames: enough for the window of 0.25 s at 90 frames a second
+_FEWEST_PLACES = 64  # places in the history at first; it grows by doubling
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnchorEnds:
-    """Where the 2N ends of the fragments were some frames ago, both ends of one next to each other.
+    """Where the 2N ends of N fragments were some frames ago; the two ends of a fragment are adjacent.
 
-    direction, origin (3, 2N): a point of depth d lay at d * direction + origin in the fixed frame.
-    depth_m, far_m, looks (2N,) as in the store. lag_frames, lag_s (N,): how long ago.
+    direction, origin: an end of depth d was at d * direction + origin in the fixed frame, (3, 2N).
+    depth_m, far_m, looks: as in FragmentStore, (2N,).
+    lag_frames, lag_s: how long ago, (N,).
     """
 
     direction: FloatArray
@@ -37,14 +38,19 @@ class AnchorEnds:
 
 
 class FragmentStore:
-    """Holds the fragments and their history. Changed only by the detector.
+    """Holds the fragments and their history. Only the detector changes it.
 
-    near_m, far_m (N, 2): depth measured in this frame. depth_m (N, 2): of the near surface, averaged over
-    looks (N, 2) frames as for a static point. witness (N,): found on a body whose motion is in question; they
-    do not tell of the camera's.
+    ids: in ascending order, (N,).
+    ends_px: the two end points (u, v), (N, 2, 2).
+    near_m, far_m: depth of the near and the far surface measured in this frame, (N, 2).
+    depth_m: depth of the near surface averaged over looks frames, as for a static point, (N, 2).
+    age_frames: frames since it was found, (N,).
+    pixel_cov: xx, xy, yy of one flow step at each end, px^2, (N, 2, 3).
+    witness: found on a body that may move (vision/fragments/attention.py), so not used for the camera's
+        motion, (N,).
 
-    The history is a ring of frames. Each fragment keeps its place in it for life, so that neither losing
-    nor finding fragments moves what is remembered of the others.
+    The history is a ring buffer of frames. Each fragment keeps its place in it for life, so that nothing has
+    to be moved when fragments are lost or found.
     """
 
     def __init__(self) -> None:
@@ -62,7 +68,7 @@ class FragmentStore:
         self.age_frames = np.empty(0, np.intp)
         self.pixel_cov = np.empty((0, 2, 3), np.float32)
         self.witness = np.empty(0, np.bool_)
-        # By frame and place, of both ends: direction (3), depth, far depth and looks.
+        # [frame, place, end]: direction (3), depth, far depth, looks.
         self._history = np.full((HISTORY, _FEWEST_PLACES, 2, 6), np.nan)
         self._place = np.empty(0, np.intp)
         self._stamps_ns = np.zeros(HISTORY, np.int64)
@@ -77,7 +83,7 @@ class FragmentStore:
         """Drop all but the chosen fragments."""
         if chosen.all():
             return
-        kept = chosen.nonzero()[0]  # a choice by index is several times as fast
+        kept = chosen.nonzero()[0]  # taking by index is several times as fast as by mask
         self.ids = self.ids.take(kept)
         self.ends_px = self.ends_px.take(kept, axis=0)
         self.near_m = self.near_m.take(kept, axis=0)
@@ -97,7 +103,7 @@ class FragmentStore:
         pixel_cov: NDArray[np.float32],
         witness: bool = False,
     ) -> None:
-        """New fragments, seen for the first time in the frame that is committed next."""
+        """Add new fragments, seen for the first time in the frame that is committed next."""
         count = len(ends_px)
         if count == 0:
             return
@@ -114,7 +120,7 @@ class FragmentStore:
         self._place = np.concatenate((self._place, self._free_places(count)))
 
     def _free_places(self, count: int) -> NDArray[np.intp]:
-        """Places in the history that no fragment has; it grows where they do not suffice."""
+        """Free places in the history; it grows if there are too few."""
         free = np.ones(self._history.shape[1], np.bool_)
         free[self._place] = False
         places = free.nonzero()[0]
@@ -127,8 +133,10 @@ class FragmentStore:
         return places[:count]
 
     def commit(self, stamp_ns: int, pose: Pose, camera: Intrinsics, sweep_rad: FloatArray) -> None:
-        """Write the present ends into the history, with the camera of this frame; sweep_rad as in
-        straight_rays."""
+        """Write the present ends into the history, with the camera pose of this frame.
+
+        sweep_rad (2,): see straight_rays.
+        """
         self._head = (self._head + 1) % HISTORY
         self._comparable = min(self._comparable + 1, HISTORY)
         direction = pose.rotation @ straight_rays(self.ends_px.reshape(-1, 2), camera, sweep_rad).T
@@ -141,22 +149,22 @@ class FragmentStore:
         self.age_frames += 1
 
     def break_history(self) -> None:
-        """The camera's way to the frame that is committed next is not known: do not look back beyond it."""
+        """Do not look back beyond the frame that is committed next: the motion to it is not known."""
         self._comparable = 0
 
     def anchors(self, now_ns: int, window_s: float) -> AnchorEnds:
-        """The oldest sight of each fragment that is no older than window_s; at least the last one.
+        """The oldest entry of each fragment that is at most window_s old, but no newer than the last frame.
 
-        Call between tracking and commit: the history then ends with the frame before.
+        Call between optical flow and commit: the history then ends with the frame before.
         """
         return self._look_back(now_ns, self._comparable, window_s)
 
     def before(self, now_ns: int) -> AnchorEnds:
-        """The last sight of each fragment: in the frame before."""
+        """The last entry of each fragment: that of the frame before."""
         return self._look_back(now_ns, 1, np.inf)
 
     def _look_back(self, now_ns: int, most_frames: int, window_s: float) -> AnchorEnds:
-        """By no more than most_frames."""
+        """As anchors, looking back by most_frames at most."""
         ends, origin, lag, lag_s = _sights(
             self._history,
             self._origins,
@@ -193,10 +201,10 @@ def _sights(
     most_frames: int,
     window_s: float,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.intp], FloatArray]:
-    """The oldest sight of each fragment within window_s, at least the last one: ends (6, 2 N), the camera's
-    origin then (3, 2 N), and by how many frames and seconds (N,) that is back.
+    """The oldest entry of each fragment within window_s, or else the last one.
 
-    head: the last frame of history and stamps_ns, which are rings.
+    Returns the ends (6, 2N), the camera's position then (3, 2N), and the age in frames and seconds, (N,)
+    each. head: the last frame in the ring buffers history, origins and stamps_ns.
     """
     within = 0
     for back in range(most_frames):

@@ -1,8 +1,9 @@
-"""The depth of anchored ends: what it is good for, and how it is averaged from frame to frame.
+"""The depth of anchored ends: its uncertainty, and its running average from frame to frame.
 
-Depth is averaged over the frames as if an end stood still (average_depth), and told with what is known of its
-doubt (appraise): from this follow the points that the camera's motion is found by (static_points) and the
-residuals (vision/motion/evidence.py).
+appraise gives the depth of each anchor with its standard deviation. static_points makes of this the points
+from which the camera's motion is estimated; the residuals use it too (vision/motion/evidence.py). depth_steps
+gives the change of depth since the anchor. Once the camera's new pose is known, average_depth updates the
+running average of each end's depth, as if the end were static.
 """
 
 from __future__ import annotations
@@ -21,18 +22,27 @@ from vision.depth.depth_noise import depth_sigma_of
 from vision.ego_motion.reprojection import Anchors
 from vision.fragments.store import AnchorEnds, FragmentStore
 
-# Where depth is missing it is most likely great; the reprojection then counts across the epipolar line only.
+# Missing depth is most likely large. With this standard deviation the reprojection error counts across the
+# epipolar line only.
 _UNSEEN_SIGMA_M = 10.0
-_MOST_LOOKS = 6.0  # a running mean over so many; what they share does not average out, see below
-_SETTLED_LATE_FRAMES = 4.0  # between the plain mean of the first looks and the running one: 2.5 to 5
-_COMMON_NOISE = 0.5  # of depth: what neighbouring frames share, and no mean takes off
-_MIXED_SIGMAS = 3.0  # of depth, and 0.1 m: less is one surface
+_MOST_LOOKS = 6.0  # length of the running mean in frames; _COMMON_NOISE is why a longer one would not help
+# Mean age in frames of the depths in a full running mean: between 2.5 (plain mean of the first 6 frames) and
+# 5 (running mean in the long run).
+_SETTLED_LATE_FRAMES = 4.0
+_COMMON_NOISE = 0.5  # share of the depth noise that successive frames have in common: no mean reduces it
+_MIXED_SIGMAS = 3.0  # of depth, plus 0.1 m: if near and far differ by less, they are one surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnchorDepths:
-    """What the depths (2N,) of anchored ends are good for: near_m, sigma_m and far_m are finite throughout,
-    known tells where they were measured; mixed, where the end lies on two surfaces."""
+    """Depths of 2N anchored ends with their uncertainty, (2N,) each.
+
+    near_m: of the near surface; finite everywhere.
+    sigma_m: standard deviation of near_m; finite everywhere.
+    far_m: of the far surface; finite everywhere.
+    known: depth was measured.
+    mixed: the surroundings of the end lie on two surfaces.
+    """
 
     near_m: FloatArray
     sigma_m: FloatArray
@@ -42,7 +52,7 @@ class AnchorDepths:
 
 
 def appraise(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
-    """Where depth is missing, the end is taken for a distant one whose depth is hardly known."""
+    """AnchorDepths of anchor. An end without depth is taken for a distant one whose depth is hardly known."""
     return AnchorDepths(
         *_appraised(
             np.ascontiguousarray(anchor.depth_m),
@@ -62,10 +72,12 @@ def static_points(
     moving: NDArray[np.bool_],
     distant_m: float,
 ) -> Anchors:
-    """The 2N ends as points to find the camera by. pixel_cov (N, 2, 3) and moving (N,) of the fragments.
+    """The 2N ends as points from which the camera's motion is estimated.
 
-    An end on two surfaces could be on either. Where one of them is farther than distant_m away, it tells of
-    the camera's turn all the same: across its epipolar line. In a wide hall hardly any others may be left.
+    pixel_cov (N, 2, 3), moving (N,): of the fragments. Ends of moving fragments are not usable. An end on two
+    surfaces could be on either, so it is usable only if one of them is farther away than distant_m: then it
+    still measures the camera's rotation, across its epipolar line. In a wide hall there may be hardly any
+    other ends.
     """
     points_m, sigma_m, usable = _static(
         np.ascontiguousarray(anchor.direction),
@@ -87,10 +99,10 @@ def static_points(
 
 
 def average_depth(store: FragmentStore, before: AnchorEnds, pose: Pose, noise: DepthNoise) -> None:
-    """Carry the depth of every end on as if it were static, and average it with what is measured now.
+    """Predict the depth of every end as if it were static, and average it with the measured depth.
 
-    A measurement that does not fit begins anew: another surface, or something that moves in depth.
-    before: the ends in the frame before. pose: the camera now.
+    If the two do not agree, the average begins anew: the end is on another surface, or it moves in depth.
+    before: the ends in the frame before. pose: the camera now. Changes depth_m and looks of store.
     """
     store.depth_m, store.looks = _averaged(
         np.ascontiguousarray(before.direction),
@@ -108,8 +120,10 @@ def average_depth(store: FragmentStore, before: AnchorEnds, pose: Pose, noise: D
 def depth_steps(
     store: FragmentStore, anchor: AnchorEnds, depths: AnchorDepths, static_m: FloatArray, noise: DepthNoise
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """depth_step_m, depth_step_sigma_m and depth_lag_s of PointMotion (vision/motion/velocities.py), from
-    where the ends would be if they were static, static_m (2N, 3), in the camera's axes."""
+    """depth_step_m, depth_step_sigma_m and depth_lag_s of PointMotion (vision/motion/velocities.py).
+
+    static_m (2N, 3): where the ends would be if they were static, in the camera's axes.
+    """
     return _steps(
         static_m,
         depths.sigma_m,
@@ -139,7 +153,7 @@ def _appraised(
         if known[k]:
             near[k], far[k] = depth_m[k], far_m[k]
             single = depth_sigma_of(depth_m[k], floor_m, quadratic_per_m)
-            # What is left of the noise, which is alike in part, after so many frames.
+            # The noise of a mean over these frames, part of which they have in common.
             sigma[k] = single * max(1.0 / math.sqrt(max(looks[k], 1.0)), _COMMON_NOISE)
             mixed[k] = far[k] - near[k] > 0.1 + _MIXED_SIGMAS * single
     return near, sigma, far, known, mixed
@@ -187,7 +201,7 @@ def _averaged(
     floor_m: float,
     quadratic_per_m: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """depth_m and looks (N, 2), as average_depth leaves them."""
+    """depth_m and looks (N, 2) of the store after average_depth."""
     mean_m, new_looks = near_m.copy(), np.ones_like(looks)
     for k in range(len(depth_m)):
         carried_m = 0.0
@@ -195,7 +209,7 @@ def _averaged(
             carried_m += rotation[i, 2] * (direction[i, k] * depth_m[k] + origin[i, k] - translation_m[i])
         fragment, end = k // 2, k % 2
         off_m = near_m[fragment, end] - carried_m
-        # Not where either is missing.
+        # False where either depth is missing (NaN).
         if abs(off_m) <= 0.05 + 3.0 * depth_sigma_of(carried_m, floor_m, quadratic_per_m):
             new_looks[fragment, end] = min(looks[fragment, end] + 1.0, _MOST_LOOKS)
             mean_m[fragment, end] = carried_m + off_m / new_looks[fragment, end]

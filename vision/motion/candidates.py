@@ -1,5 +1,7 @@
-"""Which fragments move, by their residuals, and which have long stood still; which moving ones are neighbours
-that move alike (cluster)."""
+"""Which fragments move by their residuals, which have long been static, and which neighbours move alike.
+
+Used by vision/bodies/carving.py and adoption.py.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +16,16 @@ from vision.motion.velocities import PointMotion
 
 _STATIC_END_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
-_LONG_S = 0.26  # about the window of time in which motion is measured
-_NEAR_M = 0.5  # fragments of one body are no farther apart: it is a chain of neighbours that makes a group
-_VELOCITY_GATE_MPS = 0.5  # allowed for limbs, which go unlike their body, beside two sigmas
+_LONG_S = 0.26  # about the time window over which motion is measured
+_NEAR_M = 0.5  # maximum distance of neighbours; a chain of neighbours makes a group
+_VELOCITY_GATE_MPS = 0.5  # plus two sigmas: allows for limbs, which move differently from their body
 
 
 def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(N,) fragments that no static surface explains: both ends miss, at either depth of a silhouette."""
+    """(N,) fragments that no static surface explains.
+
+    Both ends contradict it, at the near and at the far depth of a silhouette.
+    """
     chi2 = np.where(motion.usable, motion.static_chi2, 0.0)
     one, other = chi2[0::2], chi2[1::2]
     both = (one > _STATIC_END_CHI2) & (other > _STATIC_END_CHI2)
@@ -29,7 +34,7 @@ def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDAr
 
 
 def long_static(motion: PointMotion, age_s: FloatArray) -> NDArray[np.bool_]:
-    """(N,) fragments seen for a while, age_s (N,), both of whose ends are where something static would be."""
+    """(N,) fragments of some age, age_s (N,), both of whose ends are static by their residuals."""
     still = (motion.usable & (motion.static_chi2 <= _STATIC_END_CHI2)).reshape(-1, 2)
     result: NDArray[np.bool_] = still[:, 0] & still[:, 1] & (age_s >= _LONG_S)
     return result
@@ -38,8 +43,11 @@ def long_static(motion: PointMotion, age_s: FloatArray) -> NDArray[np.bool_]:
 def cluster(
     position_m: FloatArray, velocity: FloatArray, covariance: FloatArray, depth_sigma_m: FloatArray
 ) -> NDArray[np.intp]:
-    """(M,) which group each of M moving fragments belongs to, as the index of its first one: neighbours in
-    space that move alike are of one body."""
+    """(M,) group of each of M moving fragments, as the index of the group's first fragment.
+
+    Neighbours in space that move alike belong to one group. position_m (M, 3), velocity (M, 3), covariance
+    (M, 3, 3): in the camera's axes. depth_sigma_m (M,): depth noise at their distance.
+    """
     return _clusters(
         np.ascontiguousarray(position_m),
         np.ascontiguousarray(velocity),
@@ -75,7 +83,7 @@ def _alike(
 def _clusters(
     position_m: FloatArray, velocity: FloatArray, covariance: FloatArray, sigma_m: FloatArray
 ) -> NDArray[np.intp]:
-    """As cluster: from each fragment that has no group yet along the chains of its neighbours."""
+    """As cluster: a group spreads from a fragment without one along the chains of its neighbours."""
     count = len(position_m)
     group, reached = np.full(count, -1), np.empty(count, np.intp)
     for first in range(count):

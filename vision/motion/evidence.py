@@ -1,9 +1,11 @@
 """Residual of every fragment end (end point of a fragment) against the prediction that it is static.
 
-The prediction: where the end would be now if it had stayed at its anchor, by the camera's own motion. The
-residual (innovation): how far from there it is seen, with its covariance and chi-square (PointMotion). The
-ends that are not known to move also give the scale of the noise (observed_variance_scale). The evidence of
-tracks, which rests on these residuals among other things, is in vision/motion/motion_evidence.py.
+The prediction is where the end would be now, by the camera's own motion, if it had stayed at its anchor. The
+residual (innovation) is how far from there it is seen, with its covariance and chi-square (PointMotion). The
+ends that are not known to move also give the scale of the noise (observed_variance_scale).
+
+vision/detector.py calls this after the camera's motion has been estimated. The evidence of tracks, which
+rests on these residuals among other things, is in vision/motion/motion_evidence.py.
 """
 
 from __future__ import annotations
@@ -24,17 +26,17 @@ from vision.motion.anchor_depths import AnchorDepths, depth_steps
 from vision.motion.velocities import PointMotion
 from vision.numerics.order import quantile
 
-_SETTLED_FRAMES = 3  # younger ends are hardly farther from their anchors than the noise
-_LEAST_ENDS = 16  # a third of fewer tells no scale
-_CHI2_THIRD = 0.811  # a third of static ends, 2 degrees of freedom, lies below
-_SCALE_GAIN = 0.15  # of what is new in each frame: half of it in four, as the floor or the light changes
-# Sigmas of 0.55 to 2.8 times the assumed ones: beyond that it is something else than noise.
+_SETTLED_FRAMES = 3  # the residuals of younger ends are hardly larger than their noise
+_LEAST_ENDS = 16  # minimum for a scale: it is taken from the lower third
+_CHI2_THIRD = 0.811  # one third of static ends lies below; 2 degrees of freedom
+_SCALE_GAIN = 0.15  # per frame: half of a change of floor or light is taken up in four frames
+# Bounds: sigmas of 0.55 to 2.8 times the assumed ones. Anything beyond is not noise.
 _LEAST_SCALE = 0.3
 _MOST_SCALE = 8.0
-_STEPS_SHARE = 0.5  # flow errors of successive frames cancel in part
-_STATIC_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom, lie below
-_MIXED_ALONG_PX = 3.0  # how far an end slides along a fragment at least, where two surfaces cross
-_MIXED_ACROSS_PX = 0.3  # across it: twice what a clear end is known to
+_STEPS_SHARE = 0.5  # of the sum of the flow variances of all frames: successive errors cancel in part
+_STATIC_CHI2 = 6.0  # 95 % of static ends lie below; 2 degrees of freedom
+_MIXED_ALONG_PX = 3.0  # minimum sigma along the fragment of an end where the edges of two surfaces cross
+_MIXED_ACROSS_PX = 0.3  # its sigma across the fragment: twice that of a clear end
 
 
 def residuals(
@@ -46,9 +48,9 @@ def residuals(
     noise: DepthNoise,
     variance_scale: float,
 ) -> PointMotion:
-    """Of the 2N ends in store, from their anchors and the camera's pose now.
+    """Residuals of the 2N ends in store, from their anchors and the camera's pose now.
 
-    variance_scale: how much larger the variance of static ends has been found than it was assumed.
+    variance_scale: ratio of the observed variance of static ends to the assumed one.
     """
     variance = now.covariance.diagonal().tolist()
     static_m, ray, miss_m, covariance, depth_effect, static_chi2, told = _missed(
@@ -91,10 +93,11 @@ def residuals(
 def observed_variance_scale(
     motion: PointMotion, age_frames: NDArray[np.intp], moving: NDArray[np.bool_], before: float
 ) -> float:
-    """The scale for the next frame, after one in which before was used: what static ends really scatter.
+    """The variance scale for the next frame, from the scatter of static ends in this one.
 
-    Blur, a rolling shutter, depth beside its colour: no table knows them, the background shows them. The
-    lower third of the ends decides, so that movers not yet known as such have no say.
+    It covers errors that are not modelled, such as blur, a rolling shutter, or depth not aligned with colour.
+    The lower third of the ends decides, so that movers which are not yet known do not count. moving (N,):
+    fragments known to move. before: the scale used in this frame.
     """
     settled = motion.usable & ((age_frames >= _SETTLED_FRAMES) & ~moving).repeat(2)
     chi2 = motion.static_chi2[settled]
@@ -108,7 +111,7 @@ def observed_variance_scale(
 def _squared_sigmas(
     miss: tuple[float, float], covariance: tuple[float, float, float], effect: tuple[float, float]
 ) -> float:
-    """Squared Mahalanobis length of miss under covariance (xx, xy, yy) plus effect effect'."""
+    """Squared Mahalanobis length of miss under covariance (xx, xy, yy) plus effect * effect'."""
     a, b = miss
     xx = covariance[0] + effect[0] * effect[0]
     xy = covariance[1] + effect[0] * effect[1]
@@ -119,11 +122,12 @@ def _squared_sigmas(
 
 @inlined
 def _slide(ends_px: NDArray[np.float32], passing: tuple[float, float]) -> tuple[float, float, float]:
-    """Covariance uu, uv, vv, px^2, of a mixed end of the fragment with ends_px (2, 2) beside that of others.
+    """Additional covariance uu, uv, vv (px^2) of a mixed end of the fragment with ends_px (2, 2).
 
-    An end whose surroundings lie on two surfaces is often no corner of a body but the place where the outline
-    of one crosses a line of another: it slides along the fragment when either moves, by as much as they pass
-    each other in the image, passing (px). Across the fragment it is held as well as any.
+    An end whose surroundings lie on two surfaces is often not a corner of a body, but the place where the
+    outline of one crosses a line of another. It slides along the fragment when either moves, by as much as
+    they move relative to each other in the image, passing (px). Across the fragment it is held as well as any
+    other end.
     """
     du = np.float64(ends_px[1, 0]) - np.float64(ends_px[0, 0])
     dv = np.float64(ends_px[1, 1]) - np.float64(ends_px[0, 1])
@@ -140,7 +144,7 @@ def _camera_axes(
     direction: FloatArray,
     origin: FloatArray,
 ) -> tuple[float, float, float, float, float, float]:
-    """A direction (3,) and an origin (3,) of the fixed frame as the camera with this pose has them."""
+    """A direction (3,) and an origin (3,) of the fixed frame in the axes of the camera with this pose."""
     dx, dy, dz, x, y, z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         along, away = direction[i], origin[i] - translation_m[i]
@@ -179,8 +183,11 @@ def _missed(
     quadratic_per_m: float,
     variance_scale: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-    """static_m, ray, miss_m, covariance, depth_effect and static_chi2 of PointMotion, and which of them tell
-    of what is near. straight (3, 2N): rays to where the ends are seen; variances: of the camera's pose."""
+    """static_m, ray, miss_m, covariance, depth_effect and static_chi2 of PointMotion, and which are usable.
+
+    straight (3, 2N): rays to the ends as seen now. turn_variance, way_variance: of the camera's rotation
+    (rad^2) and translation (m^2).
+    """
     count = len(near_m)
     static_m, ray, miss_m = np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2))
     covariance, effect, chi2 = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
@@ -188,7 +195,7 @@ def _missed(
     for k in range(count):
         dx, dy, dz, x0, y0, z0 = _camera_axes(rotation, translation_m, direction[:, k], origin[:, k])
         u, v = straight[0, k], straight[1, k]
-        # Where the near surface and the far one would be.
+        # Where a static end would be now if it is on the near surface, and if it is on the far one.
         x, y, z = dx * near_m[k] + x0, dy * near_m[k] + y0, dz * near_m[k] + z0
         far_x, far_y, far_z = dx * far_m[k] + x0, dy * far_m[k] + y0, dz * far_m[k] + z0
         ahead, far_ahead = max(z, 0.1), max(far_z, 0.1)
@@ -223,7 +230,7 @@ def _missed(
         covariance[k, 0], covariance[k, 1], covariance[k, 2] = xx, xy, yy
         effect[k, 0], effect[k, 1] = near_effect
         chi2[k] = min(near_chi2, far_chi2)
-        # What is where the far one of two surfaces would have it says nothing of how the near one moves.
+        # An end that is where a static far surface would have it tells nothing about the near surface.
         behind = near_chi2 > _STATIC_CHI2 and far_chi2 <= _STATIC_CHI2
         tells[k] = z > 0.1 and not behind and math.isfinite(near_miss[0] + near_miss[1])
     return static_m, ray, miss_m, covariance, effect, chi2, tells

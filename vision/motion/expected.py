@@ -1,4 +1,7 @@
-"""Where the ends of fragments are expected in the next image, by what was known of them before it."""
+"""Where the ends of fragments are expected in the next image, by what is known of them before it is read.
+
+The optical flow search starts there (vision/fragments/optical_flow.py).
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,15 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.fragments.store import FragmentStore
 from vision.scene import Fragments
 
-_UNKNOWN_M = 5.0  # where depth is missing
-_LEAST_AHEAD_M = 0.1  # nearer nothing is seen
+_UNKNOWN_M = 5.0  # assumed where depth is missing
+_LEAST_AHEAD_M = 0.1  # lower bound of depth, so that a projection stays finite
 
 
 def known_motion(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Which of the fragments ids (N,), in ascending order, tracking knew as moving, and how fast: (N,),
-    (N, 3), over ground in the camera's axes, 0 for what does not move."""
+    """Which fragments tracking reported as moving in the frame before, (N,), and their velocity, (N, 3).
+
+    ids (N,): in ascending order. The velocity is over ground, in the camera's axes, and 0 where not moving.
+    """
     if previous is None:
         return np.zeros(len(ids), np.bool_), np.zeros((len(ids), 3))
     return _known_motion(
@@ -30,8 +35,10 @@ def known_motion(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[ND
 def expected_px(
     store: FragmentStore, velocity_mps: FloatArray, motion: Pose, dt_s: float, camera: Intrinsics
 ) -> NDArray[np.float32]:
-    """(2N, 2) where the ends in store will be seen dt_s later, after motion of the camera; velocity_mps
-    (N, 3) of the fragments over ground, in the camera's axes before."""
+    """(2N, 2) pixels where the ends in store will be seen dt_s later, after motion of the camera.
+
+    velocity_mps (N, 3): of the fragments over ground, in the camera's axes of the frame before.
+    """
     return _expected_px(
         np.ascontiguousarray(store.ends_px),
         np.ascontiguousarray(store.near_m),
@@ -84,14 +91,14 @@ def _expected_px(
     cx: float,
     cy: float,
 ) -> NDArray[np.float32]:
-    """As expected_px. way_m (N, 3): of the fragments meanwhile; rotation, translation_m: of the camera."""
+    """As expected_px. way_m (N, 3): displacement of the fragments; rotation, translation_m: of the camera."""
     result = np.empty((2 * len(ends_px), 2), np.float32)
     point, moved = np.empty(3), np.empty(3)
     for k in range(2 * len(ends_px)):
         fragment, end = k // 2, k % 2
         measured_m = near_m[fragment, end]
         depth_m = _UNKNOWN_M if np.isnan(measured_m) else np.float64(measured_m)
-        # As rays of vision/camera/lens.py: in single precision.
+        # As rays in vision/camera/lens.py, in single precision.
         point[0] = depth_m * ((ends_px[fragment, end, 0] - np.float32(cx)) / np.float32(fx))
         point[1] = depth_m * ((ends_px[fragment, end, 1] - np.float32(cy)) / np.float32(fy))
         point[2] = depth_m

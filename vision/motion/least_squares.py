@@ -1,4 +1,8 @@
-"""Least-squares velocities: of each fragment by its two ends, of each body by all ends that belong to it."""
+"""Least-squares velocities over ground: of each fragment by its two ends, of each body by all of its ends.
+
+Both sum the linear equations of vision/motion/velocities.py over ends and solve for one velocity. That of a
+body is robust (iteratively reweighted), since some of its ends slide along edges or are on limbs.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +15,26 @@ from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 from vision.motion.velocities import PointMotion, normal_equations
 
-_ROBUST_CHI2 = 9.0  # 99 % of ends that go with the body, 2 degrees of freedom; others lose their weight
-_MEDIAN_CHI2 = 1.386  # of 2 degrees of freedom
-_SPREAD_ENDS = 6  # fewer of them do not show how widely they scatter
-_MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom
-_ANNEAL = (64.0, 16.0, 4.0, 1.0)  # from plain least squares to robust: a start at rest must not pin a mover
-_INDEPENDENT_DEPTHS = 10.0  # depth noise is shared by neighbours: a body never has more looks than these
+_ROBUST_CHI2 = 9.0  # 99 % of ends that move with the body, 2 degrees of freedom; others lose their weight
+_MEDIAN_CHI2 = 1.386  # median for 2 degrees of freedom
+_SPREAD_ENDS = 6  # minimum number of ends to estimate their scatter
+_MOVED_CHI2 = 13.8  # 99.9 % of static ends, 2 degrees of freedom; ends above contradict standing still
+# Scale of the robust weights: from plain least squares to robust, so that a mover is not held at the start
+# velocity of 0.
+_ANNEAL = (64.0, 16.0, 4.0, 1.0)
+_INDEPENDENT_DEPTHS = 10.0  # neighbours share depth noise: a body has no more independent depths than this
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyVelocities:
-    """Of G bodies: velocity_mps (G, 3) over ground, covariance (G, 3, 3), ends (G,) how many points
-    speak, agreement (G,): share of them that agree; unexplained (G,): share of them that would not be
-    where they are if the body stood still."""
+    """Velocities of G bodies.
+
+    velocity_mps: over ground, (G, 3).
+    covariance: (G, 3, 3).
+    ends: number of usable ends, (G,).
+    agreement: share of them that agree with the velocity, (G,).
+    unexplained: share of them that contradict a static body, (G,).
+    """
 
     velocity_mps: FloatArray
     covariance: FloatArray
@@ -34,9 +45,12 @@ class BodyVelocities:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FragmentVelocities:
-    """Of N fragments: velocity_mps (N, 3) over ground, covariance (N, 3, 3), each from its two ends alone.
-    per_end (14, 2N): what every end says, see NormalEquations; then the information on the velocity along z
-    in what depth itself does, and that times the velocity. Zero where an end is not usable."""
+    """Velocities of N fragments, each from its two ends alone.
+
+    per_end (14, 2N): the equations of every end. Rows 0 to 11 as in NormalEquations; row 12: information on
+    the velocity along z from the change of depth; row 13: the same times that velocity. Zero where an end is
+    not usable. velocity_mps (N, 3): over ground. covariance (N, 3, 3).
+    """
 
     per_end: FloatArray
     velocity_mps: FloatArray
@@ -44,7 +58,7 @@ class FragmentVelocities:
 
 
 def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> FragmentVelocities:
-    """Weighted least squares for the two ends of each fragment."""
+    """Weighted least squares over the two ends of each fragment."""
     per_end, velocity_mps, covariance = _fragments(
         normal_equations(motion, motion.usable.astype(float)).table,
         np.ascontiguousarray(motion.usable),
@@ -64,10 +78,10 @@ def body_velocities(
     start_mps: FloatArray,
     max_speed_mps: float,
 ) -> BodyVelocities:
-    """Weighted least squares for one velocity per body, robust against ends that slide or swing.
+    """Robust weighted least squares for one velocity per body; some ends may slide or be on limbs.
 
-    per_end (14, 2N): as in FragmentVelocities. owner (2N,): body of each end, -1 for none. start_mps (G, 3):
-    velocity to judge outliers by at first.
+    per_end (14, 2N): as in FragmentVelocities. owner (2N,): body of each end, -1 for none. bodies: G.
+    start_mps (G, 3): velocities at which the first weights are computed.
     """
     first, members = _grouped(
         np.ascontiguousarray(owner, np.int64), np.ascontiguousarray(motion.usable), bodies
@@ -90,15 +104,15 @@ def body_velocities(
 
 @inlined
 def _solve(sums: FloatArray, max_speed_mps: float, velocity_mps: FloatArray, covariance: FloatArray) -> None:
-    """Put the velocity (3,) and its covariance (3, 3) that follow from sums (14,) over ends, see
-    FragmentVelocities, into the last two.
+    """Solve for a velocity and put it and its covariance into velocity_mps (3,) and covariance (3, 3).
 
-    What the equations leave open is bounded by max_speed_mps (the paper's V_omax), never zero.
+    sums (14,): per_end of FragmentVelocities, summed over ends. Directions that the equations do not
+    determine get a standard deviation of max_speed_mps (the paper's V_omax), not 0.
     """
     least = 1.0 / max_speed_mps**2
     xx, xy, xz = sums[0] + least, sums[1], sums[2]
     yy, yz, zz = sums[3] + least, sums[4], sums[5] + sums[12] + least
-    # The inverse, by the cofactors.
+    # The inverse, by its cofactors.
     c00, c01, c02 = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
     c11, c12, c22 = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
     scale = 1.0 / (xx * c00 + xy * c01 + xz * c02)
@@ -108,7 +122,7 @@ def _solve(sums: FloatArray, max_speed_mps: float, velocity_mps: FloatArray, cov
     velocity_mps[0] = c00 * x + c01 * y + c02 * z
     velocity_mps[1] = c01 * x + c11 * y + c12 * z
     velocity_mps[2] = c02 * x + c12 * y + c22 * z
-    # What an error of depth that all ends share makes of it.
+    # The effect of one sigma of a depth error that all ends share.
     x, y, z = sums[9], sums[10], sums[11]
     x, y, z = c00 * x + c01 * y + c02 * z, c01 * x + c11 * y + c12 * z, c02 * x + c12 * y + c22 * z
     covariance[0, 0], covariance[1, 1], covariance[2, 2] = c00 + x * x, c11 + y * y, c22 + z * z
@@ -126,7 +140,7 @@ def _fragments(
     lag_s: FloatArray,
     max_speed_mps: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """per_end, velocity_mps and covariance of FragmentVelocities. equations (12, 2N): of every end."""
+    """per_end, velocity_mps and covariance of FragmentVelocities. equations (12, 2N): see NormalEquations."""
     ends = len(usable)
     per_end = np.zeros((14, ends))
     per_end[:12] = equations
@@ -148,7 +162,7 @@ def _fragments(
 def _grouped(
     owner: NDArray[np.int64], usable: NDArray[np.bool_], bodies: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """first (G + 1,), members (M,): the ends of body g that speak are members[first[g] : first[g + 1]]."""
+    """first (G + 1,), members (M,): the usable ends of body g are members[first[g] : first[g + 1]]."""
     first = np.zeros(bodies + 1, np.intp)
     for k in range(len(owner)):
         if usable[k] and 0 <= owner[k] < bodies:
@@ -165,7 +179,7 @@ def _grouped(
 
 @inlined
 def _middle(values: FloatArray) -> float:
-    """The one of values (M,) that would stand in the middle, at M // 2, if they were sorted (quickselect)."""
+    """The value that would be at M // 2 if values (M,) were sorted (quickselect)."""
     values, middle = values.copy(), len(values) // 2
     low, high = 0, len(values) - 1
     while low < high:
@@ -189,11 +203,10 @@ def _middle(values: FloatArray) -> float:
 
 @inlined
 def _spread(chi2: FloatArray) -> float:
-    """How much more the ends of a body, of which these are chi2 (M,), scatter than their own errors make
-    them, by the median: >= 1.
+    """Ratio of the scatter of a body's ends, by the median of their chi2 (M,), to that of their noise: >= 1.
 
-    Limbs are no outliers of a rigid body: where half of the ends do not fit, the robust weights have to
-    widen until they do, or the velocity becomes that of whichever limb comes first.
+    Ends on limbs are not outliers of a rigid body. Where half of the ends do not fit, the robust weights have
+    to widen until they do, or the velocity becomes that of an arbitrary limb.
     """
     if len(chi2) < _SPREAD_ENDS:
         return 1.0
@@ -203,8 +216,10 @@ def _spread(chi2: FloatArray) -> float:
 
 @inlined
 def _information(covariance: FloatArray, effect: FloatArray, result: FloatArray) -> None:
-    """Put entries xx, xy, yy of the inverse of covariance (3,): xx, xy, yy, plus effect effect', with effect
-    (2,), into result (3,)."""
+    """Put the inverse of covariance + effect * effect' into result (3,): its entries xx, xy, yy.
+
+    covariance (3,): xx, xy, yy. effect (2,): change by one sigma of depth.
+    """
     xx = covariance[0] + effect[0] * effect[0]
     xy = covariance[1] + effect[0] * effect[1]
     yy = covariance[2] + effect[1] * effect[1]
@@ -216,7 +231,7 @@ def _information(covariance: FloatArray, effect: FloatArray, result: FloatArray)
 def _chi2(
     velocity_mps: FloatArray, ray: FloatArray, lag_s: float, miss_m: FloatArray, trust: FloatArray
 ) -> float:
-    """Of an end with information trust (3,) if it moves with velocity (3,)."""
+    """Chi-square of an end with information trust (3,) under the hypothesis of velocity (3,)."""
     a = miss_m[0] - lag_s * (velocity_mps[0] - ray[0] * velocity_mps[2])
     b = miss_m[1] - lag_s * (velocity_mps[1] - ray[1] * velocity_mps[2])
     result: float = (trust[0] * a + trust[1] * b) * a + (trust[1] * a + trust[2] * b) * b
@@ -240,8 +255,11 @@ def _bodies(
     start_mps: FloatArray,
     max_speed_mps: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """velocity_mps, covariance, agreement and unexplained of BodyVelocities. first and members as of
-    _grouped, the others as of PointMotion."""
+    """velocity_mps, covariance, agreement and unexplained of BodyVelocities.
+
+    first, members: see _grouped. per_end, start_mps, max_speed_mps: see body_velocities. The others: see
+    PointMotion.
+    """
     bodies = len(first) - 1
     velocity_mps, spread_out = start_mps.copy(), np.empty((bodies, 3, 3))
     agreement, unexplained = np.zeros(bodies), np.zeros(bodies)
@@ -272,7 +290,7 @@ def _bodies(
             unexplained[g] += static_chi2[k] > _MOVED_CHI2
         agreement[g] /= max(ends, 1)
         unexplained[g] /= max(ends, 1)
-        # What the model does not explain (limbs, turning, sliding) widens the result.
+        # Motion that the model does not explain (limbs, rotation, sliding) increases the covariance.
         excess = np.minimum(chi2, _ROBUST_CHI2 * _spread(chi2)).sum() / max(2.0 * ends - 3.0, 1.0)
         spread_out[g] *= max(1.0, excess)
     return velocity_mps, spread_out, agreement, unexplained

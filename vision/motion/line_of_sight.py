@@ -1,7 +1,8 @@
-"""Velocities along the line of sight and across it, in their own standard deviations.
+"""Velocities split into components along and across the line of sight, in their own standard deviations.
 
-The two are known very differently: across from the image, along from depth and from changes of length.
-A camera that pitches feigns what goes up and down in the image, but nothing that goes level across it.
+The two are known with very different precision: across it from the image, along it from depth and from
+changes of length. A pitching camera causes false vertical motion in the image, but no false level motion, so
+the level component across is given separately. vision/bodies/proof.py uses the result.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ from numpy.typing import NDArray
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
-_FLOOR_SIGMA_MPS = 0.03  # allowed for: an error of the camera's own motion, which no filter knows of
-_CONTRADICTION_SIGMAS = 2.5  # 99 % of velocities that are the same differ by less
-_CONFIRMING_SIGMAS = 2.5  # as clearly as what contradicts
-_LEAST_LEVEL = 1e-6  # straight up or down nothing is level
+_FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, which no filter models
+_CONTRADICTION_SIGMAS = 2.5  # 99 % of equal velocities differ by less
+_CONFIRMING_SIGMAS = 2.5  # as clear as a contradiction has to be
+_LEAST_LEVEL = 1e-6  # lower bound of a length: in a vertical line of sight no direction is level
 _FLOOR = _FLOOR_SIGMA_MPS**2
 _AXES = 3
 _NOWHERE = np.zeros(3)
@@ -26,10 +27,14 @@ _NOWHERE = np.zeros(3)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Split:
-    """A velocity along the line of sight and across. value, variance (..., T): the component along it; rest
-    (..., T, 3): what is left. along, across, total (..., T): squared distance from zero in sigmas, of either
-    and of the whole; level (..., T): of what goes across and level, the same as across where the floor is not
-    known."""
+    """Velocities of T bodies, split along and across the line of sight.
+
+    value, variance: the component along it, (..., T).
+    rest: the remainder, across it, (..., T, 3).
+    along, across, total: squared Mahalanobis distance from zero of the component along, of the remainder, and
+        of the whole velocity, (..., T).
+    level: the same of the level component across, (..., T); equal to across where the floor is not known.
+    """
 
     value: FloatArray
     variance: FloatArray
@@ -40,7 +45,7 @@ class Split:
     level: FloatArray
 
     def __getitem__(self, k: int) -> Split:
-        """Of the first axis, entry k."""
+        """Entry k of the first axis."""
         return Split(
             value=self.value[k],
             variance=self.variance[k],
@@ -53,8 +58,10 @@ class Split:
 
 
 def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray | None) -> Split:
-    """Of velocity (..., T, 3) with covariance (..., T, 3, 3), seen along sight (T, 3). up (3,): the floor's
-    normal, None where the floor is not known."""
+    """Split velocity (..., T, 3) with covariance (..., T, 3, 3).
+
+    sight (T, 3): unit vectors along the lines of sight. up (3,): the floor's normal, None if not known.
+    """
     value, variance, rest, along, across, total, level = _parts(
         np.ascontiguousarray(velocity).reshape(-1, _AXES),
         np.ascontiguousarray(covariance).reshape(-1, _AXES, _AXES),
@@ -76,7 +83,7 @@ def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: F
 
 @inlined
 def _component(velocity: FloatArray, covariance: FloatArray, direction: FloatArray) -> tuple[float, float]:
-    """Of velocity (3,) in direction (3,), and its variance."""
+    """The component of velocity (3,) in direction (3,), and its variance."""
     value, variance = 0.0, 0.0
     for i in range(_AXES):
         value += velocity[i] * direction[i]
@@ -87,7 +94,7 @@ def _component(velocity: FloatArray, covariance: FloatArray, direction: FloatArr
 
 @inlined
 def _squared_sigmas(vector: FloatArray, covariance: FloatArray) -> float:
-    """Squared length of vector (3,) in sigmas of covariance (3, 3), by the cofactors of that."""
+    """Squared Mahalanobis length of vector (3,) under covariance (3, 3), by cofactors."""
     c = covariance
     c00 = c[1, 1] * c[2, 2] - c[1, 2] * c[1, 2]
     c01 = c[0, 2] * c[1, 2] - c[0, 1] * c[2, 2]
@@ -103,8 +110,10 @@ def _squared_sigmas(vector: FloatArray, covariance: FloatArray) -> float:
 
 @inlined
 def _put_across(covariance: FloatArray, variance: float, sight: FloatArray, doubt: FloatArray) -> None:
-    """Put (I - s s') C (I - s s') into doubt (3, 3): what is left of a covariance across sight s (3,), along
-    which its variance is s' C s. There it is 1 instead: doubt has to have an inverse."""
+    """Put the covariance across sight s (3,), (I - s s') C (I - s s'), into doubt (3, 3).
+
+    variance: s' C s. Along s the entry is set to 1, so that doubt has an inverse.
+    """
     for i in range(_AXES):
         for j in range(_AXES):
             mixed = 0.0
@@ -115,7 +124,7 @@ def _put_across(covariance: FloatArray, variance: float, sight: FloatArray, doub
 
 @inlined
 def _put_aside(sight: FloatArray, up: FloatArray, aside: FloatArray) -> None:
-    """Put the unit vector across both into aside (3,)."""
+    """Put the unit vector perpendicular to sight and up into aside (3,)."""
     aside[0] = sight[1] * up[2] - sight[2] * up[1]
     aside[1] = sight[2] * up[0] - sight[0] * up[2]
     aside[2] = sight[0] * up[1] - sight[1] * up[0]
@@ -128,8 +137,10 @@ def _put_aside(sight: FloatArray, up: FloatArray, aside: FloatArray) -> None:
 def _parts(
     velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """value, variance, rest, along, across, total and level of Split, of velocities (K, 3): one of each of T
-    bodies, then another one of each, and so on."""
+    """value, variance, rest, along, across, total and level of Split, of velocities (K, 3).
+
+    K is a multiple of T: one velocity of each of T bodies, then another one of each, and so on.
+    """
     count = len(velocity)
     value, variance, rest = np.empty(count), np.empty(count), np.empty((count, _AXES))
     along, across, total, level = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
@@ -156,7 +167,7 @@ def _parts(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SecondOpinion:
-    """What a body's surface says of its fragments' speed, along the line of sight and across: (T,)."""
+    """Whether the surface's velocity denies or confirms the fragments', along and across: (T,) each."""
 
     denies_along: NDArray[np.bool_]
     denies_across: NDArray[np.bool_]
@@ -165,7 +176,7 @@ class SecondOpinion:
 
 
 def second_opinion(fragments: Split, surface: Split, apart: Split) -> SecondOpinion:
-    """Of the velocities of T bodies by their fragments and by their surfaces; apart: their difference."""
+    """Compare velocities of T bodies by their fragments and by their surfaces; apart: the difference."""
     denied, least = _CONTRADICTION_SIGMAS**2, _CONFIRMING_SIGMAS**2
     denies_along = np.square(apart.value) > denied * apart.variance
     same_way = surface.value * fragments.value > 0

@@ -1,4 +1,4 @@
-"""What one frame says of whether the tracks move: vision/bodies/judgement.py adds it up and decides."""
+"""All evidence of one frame on whether the tracks move; vision/bodies/judgement.py decides by it."""
 
 from __future__ import annotations
 
@@ -16,27 +16,38 @@ from vision.detection import LEAST_AGREEMENT, Detection
 from vision.motion.least_squares import BodyVelocities
 from vision.motion.limbs import believable, restless
 
-# Without odometry: so large a share of the fragments on one motion of the camera leaves no doubt about it.
+# Without odometry: if at least this share of the fragments fits one motion of the camera, it is beyond doubt.
 _AGREED = 0.65
-_LEAST_BORNE_OUT = 0.2  # two people before the camera are half of what it sees
+# Minimum weight of a frame's proof, where hardly enough fragments agree: two people in front of the camera
+# may be half of what it sees.
+_LEAST_BORNE_OUT = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionEvidence:
-    """Of T tracks, along the axes of the fixed frame.
+    """Evidence of T tracks, (T, ...) each unless stated; vectors along the axes of the fixed frame.
 
-    sight (T, 3): unit vector from the camera; distance_m (T,); depth_sigma_m (T,): of one pixel's depth
-    there. velocity (T, 3), covariance (T, 3, 3): as filtered. own_velocity, own_covariance: of this
-    frame's fragments alone, from ends (T,) points of which agreement (T,) agree; restless (T,): by these it
-    does not stand still, whether they agree or not; unrest_s (T,): for how long it has not.
-    surface_velocity, surface_covariance: from the surface's centre alone.
-    arrived (T,) and cells (T,) of its surface; size_m (T,): its greatest extent; clean_s (T,): for how long
-    its centre has been seen without a break; view_radps (T,): how fast the camera comes to see it from
-    another side; growth_mps (T,): how fast its centre may wander because its visible part grows or shrinks.
-    goes (T,): its centre really goes about as fast as the velocity says. guessed (T,): where it ends in what
-    stands around it is a guess. up (3,): the floor's normal, None
-    where it is not known. trusted: the camera's motion is known. reckoned: odometry says it, too, not the
-    images alone. borne_out: how well the fragments bear it out, from 0 to 1.
+    sight: unit vector from the camera, (T, 3).
+    distance_m: from the camera.
+    depth_sigma_m: standard deviation of one pixel's depth at that distance.
+    velocity, covariance: as filtered, (T, 3) and (T, 3, 3), m/s.
+    own_velocity, own_covariance: by this frame's fragments alone.
+    surface_velocity, surface_covariance: by the centre of the surface alone.
+    ends: number of ends that own_velocity rests on.
+    agreement: share of these that agree with it.
+    restless: most ends contradict standing still, whether they agree with each other or not.
+    unrest_s: for how long the track has been restless.
+    arrived, cells: of the surface.
+    size_m: largest extent of the surface.
+    clean_s: for how long the centre has measured the velocity without a break.
+    view_radps: how fast the viewing direction changes.
+    growth_mps: speed of the centre that a growing or shrinking visible part can explain.
+    goes: the centre really advances about as fast as the velocity says.
+    guessed: the border to the static surface beside it is a guess.
+    up: the floor's normal, (3,); None where it is not known.
+    trusted: the camera's motion is known.
+    reckoned: it is supported by odometry, not by the images alone.
+    borne_out: how well the fragments support it, 0..1.
     """
 
     sight: FloatArray
@@ -75,8 +86,10 @@ def evidence_of(
     cells: NDArray[np.intp],
     noise: DepthNoise,
 ) -> MotionEvidence:
-    """What detection, and body, the velocities of the tracks by their fragments, say of the tracks, whose
-    filters have taken these in. goes, arrived and cells (T,): see MotionEvidence."""
+    """Gather the evidence of this frame; the filters of tracks have to be updated before.
+
+    body: velocities of the tracks by their fragments. goes, arrived, cells (T,): see MotionEvidence.
+    """
     rotation = detection.pose.rotation
     sight, distance_m = tracks.sight(detection.pose.translation_m)
     return MotionEvidence(
@@ -109,12 +122,12 @@ def evidence_of(
 
 
 def borne_out(detection: Detection) -> float:
-    """How far this frame's proof can be believed, as far as the camera's own motion goes.
+    """Weight of this frame's proof, 0..1, according to how well the camera's own motion is known.
 
-    Where hardly more fragments agree on that than have to, and no odometry says it, too, it may be the motion
-    of something else, and then all that stands moves, for as long as the mistake lasts.
+    Without odometry, and with hardly more agreeing fragments than the minimum, the estimated motion may be
+    relative to something that moves. Then everything static seems to move for as long as the mistake lasts.
     """
     if detection.reckoned:
         return 1.0
     spare = (detection.ego_motion.inlier_ratio - LEAST_AGREEMENT) / (_AGREED - LEAST_AGREEMENT)
-    return min(spare, 1.0) if spare > _LEAST_BORNE_OUT else _LEAST_BORNE_OUT  # not where NaN
+    return min(spare, 1.0) if spare > _LEAST_BORNE_OUT else _LEAST_BORNE_OUT  # NaN gives the minimum

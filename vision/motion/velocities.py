@@ -1,15 +1,15 @@
-"""How fast things move over ground, from what static things would have done (eqs. 6 to 9 of Daeef 2020).
+"""Linear equations for the velocity of points over ground (eqs. 6 to 9 of Daeef 2020).
 
-A point anchored at (x, y, z) some frames ago and static would now be at S = (X, Y, Z) in the camera
-frame: the robot's own motion is in S. If it moved with velocity V over ground for a time T it is at
-S + V T, and it is seen at (x', y') on the plane z = 1, so
+A point anchored at (x, y, z) some frames ago would now, if it were static, be at S = (X, Y, Z) in the camera
+frame: S contains the robot's own motion. If it moved with velocity V over ground for a time T, it is at
+S + V T. It is seen at (x', y') on the plane z = 1, so
 
     x' (Z + Vz T) = X + Vx T        y' (Z + Vz T) = Y + Vy T        z' = Z + Vz T
 
-which is linear in V. For two ends of one segment at one depth the difference of the first two is the
-paper's length ratio, Z + Vz T = Z L_static / L_now (eqs. 6, 8), and the first is its lateral speed,
-X + Vx T = x' (Z + Vz T) (eqs. 7, 9), without a division by the image x, which is zero in the centre.
-The third is the depth image itself, as good as its noise.
+which is linear in V. For two ends of one segment at one depth, the difference of the image equations of the
+two ends is the paper's length ratio, Z + Vz T = Z L_static / L_now (eqs. 6, 8). The first equation is the
+paper's lateral speed, X + Vx T = x' (Z + Vz T) (eqs. 7, 9), without a division by the image x, which is zero
+in the centre. The third equation is the measurement of the depth image, weighted by its noise.
 """
 
 from __future__ import annotations
@@ -22,22 +22,27 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import FloatArray
 
-_LEAST_DETERMINANT = 1e-18  # m^4, of a covariance: less is none
-# Where the six different entries of a symmetric matrix (3, 3) stand among its nine.
+_LEAST_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
+# Row of the table for each entry of a symmetric (3, 3) matrix, of which only six differ.
 _ALL = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointMotion:
-    """Residuals of N tracked points, in the camera axes now. All NaN-free where usable.
+    """Residuals of N tracked points, in the present camera axes. Symbols: see the module docstring.
 
-    static_m (N, 3): where it would be if static. ray (N, 2): x', y' now. lag_s (N,): T.
-    miss_m (N, 2): x' Z - X, y' Z - Y: zero for a static point. covariance (N, 3): xx, xy, yy of miss_m
-    from pixels (m^2). depth_effect (N, 2): change of miss_m by one sigma of the anchor's depth.
-    depth_step_m (N,): z' - Z, NaN where depth is missing. depth_step_sigma_m (N,). depth_lag_s (N,): the
-    time in which it came about; longer than T, since Z is an average over the frames before, too.
-    static_chi2 (N,): 2 degrees of freedom, the smaller one of the near and the far surface.
-    usable (N,) bool.
+    static_m: S, where the point would be if it were static, (N, 3).
+    ray: x', y', (N, 2).
+    lag_s: T, (N,).
+    miss_m: x' Z - X, y' Z - Y; zero for a static point, (N, 2).
+    covariance: xx, xy, yy of miss_m in m^2, from pixels and the camera's pose, (N, 3).
+    depth_effect: change of miss_m by one sigma of the anchor's depth, (N, 2).
+    depth_step_m: z' - Z, NaN where depth is missing, (N,).
+    depth_step_sigma_m: its standard deviation, (N,).
+    depth_lag_s: time in which it came about, (N,). It is longer than T, since Z is an average over the frames
+        before the anchor as well.
+    static_chi2: with 2 degrees of freedom, the smaller one for the near and the far surface, (N,).
+    usable: none of the others but depth_step_m is NaN where this is true, (N,).
     """
 
     static_m: FloatArray
@@ -55,27 +60,27 @@ class PointMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NormalEquations:
-    """Of the weighted least squares for V, one column of table (12, N) per point.
+    """Normal equations of the weighted least squares for V, one column of table (12, N) per point.
 
-    Rows 0 to 5: entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right side. Rows 9 to
-    11, doubt: the right side that one sigma of a depth error common to all points of a body would make.
+    Rows 0 to 5: entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right-hand side. Rows 9
+    to 11 (doubt): right-hand side for one sigma of a depth error common to all points of a body.
     """
 
     table: FloatArray
 
     @property
     def matrix(self) -> FloatArray:
-        """(N, 3, 3)."""
+        """(N, 3, 3), of each point."""
         return self.table.take(_ALL, axis=0).transpose(2, 0, 1)
 
     @property
     def rhs(self) -> FloatArray:
-        """(N, 3)."""
+        """(N, 3) right-hand side."""
         return self.table[6:9].T
 
     @property
     def doubt(self) -> FloatArray:
-        """(N, 3)."""
+        """(N, 3) right-hand side for one sigma of a common depth error."""
         return self.table[9:].T
 
 
@@ -101,7 +106,7 @@ def _equations(
     depth_effect: FloatArray,
     weight: FloatArray,
 ) -> FloatArray:
-    """(12, N) table of NormalEquations; zero where weight is, whatever else there is."""
+    """(12, N) table of NormalEquations. Zero where weight is zero, even if other inputs are NaN there."""
     table = np.zeros((12, len(weight)))
     for k in range(len(weight)):
         if weight[k] == 0.0:

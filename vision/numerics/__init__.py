@@ -1,1 +1,6 @@
-"""Small arrays: filters, medians, transforms."""
+"""Numerics on small arrays, used by all other packages of vision.
+
+* order - medians and quantiles by sorting.
+* relative_pose - points transformed between the axes of two poses.
+* kalman - constant-velocity Kalman filters of all tracks at once.
+"""

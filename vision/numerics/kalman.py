@@ -1,4 +1,4 @@
-"""Constant-velocity Kalman filters of T obstacles at once, in the fixed frame."""
+"""Constant-velocity Kalman filters of T tracks at once, in the fixed frame (vision/bodies/tracks.py)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
 
-_VERTICAL_S = 0.1  # how long a vertical velocity lasts: limbs have one, bodies have not
+_VERTICAL_S = 0.1  # time constant of a vertical velocity: limbs have one, bodies do not
 _UNKNOWNS = 6  # position, then velocity
-_MEASURED = 3  # of them at once: either
+_MEASURED = 3  # entries measured at once: either position or velocity
 _NOWHERE = np.zeros(3)
 
 
@@ -22,10 +22,10 @@ def predict(
     accel_density: float,
     up: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """States (T, 6), position then velocity, and covariances (T, 6, 6) dt_s later; accel_density:
-    spectral density of a white acceleration, (m/s^2)^2 s.
+    """States (T, 6), position then velocity, and covariances (T, 6, 6), predicted dt_s ahead.
 
-    up (3,): what stands on the floor keeps no velocity along it; None where the floor is not known.
+    accel_density: spectral density of a white acceleration, (m/s^2)^2 s. up (3,): the floor's normal, along
+    which a velocity decays, since bodies stay on the floor; None where the floor is not known.
     """
     lost, along = (0.0, _NOWHERE) if up is None else (1.0 - math.exp(-dt_s / _VERTICAL_S), up)
     return _carried(
@@ -45,7 +45,11 @@ def update(
     noise: FloatArray,
     first: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """After measuring three entries from index first (0: position, 3: velocity): (T, 3) with (T, 3, 3)."""
+    """States and covariances after a measurement of three entries of the state.
+
+    measured (T, 3), noise (T, 3, 3): the measurement and its covariance. first: index of the first entry
+    measured, 0 for position and 3 for velocity.
+    """
     return _corrected(
         np.ascontiguousarray(state),
         np.ascontiguousarray(covariance),
@@ -58,9 +62,10 @@ def update(
 def place(
     state: FloatArray, covariance: FloatArray, position: FloatArray, noise: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Put the states (T, 6) at position (T, 3), known to noise (T, 3, 3), and learn nothing of the velocity.
+    """Set the positions of states (T, 6) to position (T, 3) with covariance noise (T, 3, 3).
 
-    For a centre that jumps because the surface was cut elsewhere, by the image's border or by a neighbour.
+    The velocity stays as it is, and its covariance with the position becomes 0. This is for a centre that
+    jumps because the image border or a neighbour cuts the surface elsewhere.
     """
     new_state, new_covariance = state.copy(), covariance.copy()
     new_state[:, :3] = position
@@ -71,8 +76,10 @@ def place(
 
 @inlined
 def _carry(vector: FloatArray, up: FloatArray, lost: float, dt_s: float) -> None:
-    """Move a vector (6,), position then velocity, dt_s on, in which so much of its velocity along up (3,) is
-    lost."""
+    """Move a vector (6,), position then velocity, dt_s ahead.
+
+    lost: the share of its velocity along up (3,) that decays in this time.
+    """
     along = lost * (up[0] * vector[3] + up[1] * vector[4] + up[2] * vector[5])
     for i in range(3):
         vector[i] += dt_s * vector[i + 3]
@@ -88,7 +95,7 @@ def _carried(
     dt_s: float,
     accel_density: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """As predict. What is linear carries a covariance as it does a vector: each column, then each row."""
+    """As predict. The linear map is applied to each column of a covariance, then to each row."""
     new_state, new_covariance = state.copy(), covariance.copy()
     for t in range(len(state)):
         _carry(new_state[t], up, lost, dt_s)
@@ -107,7 +114,7 @@ def _carried(
 
 @inlined
 def _invert(matrix: FloatArray, result: FloatArray) -> None:
-    """The inverse of a symmetric matrix (3, 3), by its cofactors, into result."""
+    """Put the inverse of a symmetric matrix (3, 3), by its cofactors, into result."""
     result[0, 0] = matrix[1, 1] * matrix[2, 2] - matrix[1, 2] * matrix[1, 2]
     result[0, 1] = matrix[0, 2] * matrix[1, 2] - matrix[0, 1] * matrix[2, 2]
     result[0, 2] = matrix[0, 1] * matrix[1, 2] - matrix[0, 2] * matrix[1, 1]
@@ -123,7 +130,7 @@ def _invert(matrix: FloatArray, result: FloatArray) -> None:
 
 @inlined
 def _add_carried(change: FloatArray, covariance: FloatArray, result: FloatArray) -> None:
-    """Add change C change^T to result (6, 6), of a covariance C (K, K) and change (6, K)."""
+    """Add change C change^T to result (6, 6), for a covariance C (K, K) and change (6, K)."""
     for i in range(_UNKNOWNS):
         for j in range(len(covariance)):
             between = 0.0
@@ -155,7 +162,7 @@ def _corrected(
                     gain[i, j] += covariance[t, i, first + m] * trust[m, j]
                 keep[i, first + j] -= gain[i, j]
                 new_state[t, i] += gain[i, j] * (measured[t, j] - state[t, first + j])
-        # Joseph's form: stays symmetric and positive whatever the rounding.
+        # Joseph form: stays symmetric and positive definite despite rounding.
         _add_carried(keep, covariance[t], new_covariance[t])
         _add_carried(gain, noise[t], new_covariance[t])
     return new_state, new_covariance

@@ -18,20 +18,20 @@ Reals = TypeVar("Reals", NDArray[np.float32], NDArray[np.float64])
 
 
 def median(values: Reals) -> Reals:
-    """Along the last axis of values (..., N), N > 0; of an even number the mean of the middle two."""
+    """Median along the last axis of values (..., N), N > 0; for even N the mean of the middle two."""
     ordered, middle = np.sort(values, axis=-1), values.shape[-1] // 2
     result: Reals = ordered[..., middle]
     return result if values.shape[-1] % 2 else 0.5 * (ordered[..., middle - 1] + result)
 
 
 def quantiles(values: RealArray, shares: Sequence[float]) -> tuple[float, ...]:
-    """Of values (N,), N > 0: share 0 is the smallest, 1 the largest; linear in between."""
+    """Quantiles of values (N,), N > 0, with linear interpolation: share 0 is the smallest, 1 the largest."""
     ordered = np.sort(values)
     return tuple(_at(ordered, share) for share in shares)
 
 
 def quantile(values: RealArray, share: float) -> float:
-    """One of quantiles."""
+    """One quantile of values (N,), N > 0."""
     return quantiles(values, (share,))[0]
 
 

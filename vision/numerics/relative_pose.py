@@ -1,4 +1,4 @@
-"""Points carried from the axes of one pose to those of another, in single precision, for compiled steps."""
+"""Points transformed from one pose's axes to another's, in single precision, for compiled steps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from hal.compiled import inlined
 from hal.types import FloatArray
 
-# One row of the relative transform: three of its rotation's, and the translation in metres.
+# One row of the relative transform: three entries of the rotation, and the translation in metres.
 Row = tuple[np.float32, np.float32, np.float32, np.float32]
 
 
@@ -19,7 +19,7 @@ def relative_row(
     from_origin_m: FloatArray,
     axis: int,
 ) -> Row:
-    """The row of the transform from one pose's axes to another's that gives the coordinate along axis."""
+    """The row of the transform between two poses that gives the coordinate along axis of the to-pose."""
     x, y, z, shift_m = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         along = to_rotation[i, axis]
@@ -31,5 +31,5 @@ def relative_row(
 
 @inlined
 def coordinate_m(row: Row, x_m: np.float32, y_m: np.float32, z_m: np.float32) -> np.float32:
-    """That coordinate of a point."""
+    """The coordinate that row gives of a point."""
     return row[0] * x_m + row[1] * y_m + row[2] * z_m + row[3]
