@@ -184,8 +184,8 @@ _STATUS_LAYOUTS: Mapping[int, _StatusLayout] = MappingProxyType(
 
 
 def status(data: bytes) -> Status:
-    """Of a reply to 90; the length tells which of the two layouts it is. A bit of neither table is an error: what
-    a newer firmware says with it is not known, and it may be that the motors stop."""
+    """Of a reply to 90; the length tells which of the two layouts it is. A bit of neither table is an error:
+    what a newer firmware says with it is not known, and it may be that the motors stop."""
     layout = _STATUS_LAYOUTS[len(data)]
     bits = int.from_bytes(data, "big")
     errors, warnings = [], []
