@@ -110,7 +110,7 @@ class ControlLoop:
         )
         setpoint, fault = self._setpoint(decision, on_path, now_ns)
         self._state = self._chassis.exchange(setpoint, now_ns)
-        self.localiser.add_odometry(now_ns, self._state.pose)
+        self.localiser.add_odometry(self._state.stamp_ns, self._state.pose)
         to_go_m = self.path.length_m - on_path.s_m
         if to_go_m < -PASSED_M:
             self.request_stop("went past the target", Outcome.BROKEN_OFF)

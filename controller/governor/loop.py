@@ -73,7 +73,7 @@ class GovernorLoop:
         governed = self._governor.step(now_ns, scene, asked.twist, pose, measured_mps, asked.silence)
         setpoint = Setpoint(now_ns, governed.v_mps, governed.a_mps2, governed.w_radps)
         self._state = self._chassis.exchange(setpoint, now_ns)
-        self.localiser.add_odometry(now_ns, self._state.pose)
+        self.localiser.add_odometry(self._state.stamp_ns, self._state.pose)
         moved = self.localiser.pose
         self._travelled_m += float(np.hypot(moved.x_m - pose.x_m, moved.y_m - pose.y_m))
         self.ending.conclude(self._state, setpoint, now_ns, arrived=False)

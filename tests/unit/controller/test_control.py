@@ -155,6 +155,17 @@ def test_a_robot_that_knows_not_where_it_is_stops_and_the_loop_goes_on() -> None
     assert all(math.isfinite(step.setpoint.v_mps + step.setpoint.w_radps) for step in taken)
 
 
+def test_odometry_has_the_time_for_which_the_chassis_tells_it() -> None:
+    loop = loop_on(ObedientChassis(late_ns=4_000_000))
+    last = drive(loop, 100)[-1]
+    assert last.setpoint.v_mps > 0.2
+    then = loop.localiser.body_pose(last.now_ns + 4_000_000)
+    assert then == loop.localiser.pose
+    before = loop.localiser.body_pose(last.now_ns)
+    assert before is not None
+    assert then.x_m - before.x_m == pytest.approx(0.004 * last.setpoint.v_mps, rel=0.01)
+
+
 class RollingChassis(ObedientChassis):
     """On a slope that it does not hold: from its hundredth exchange on it tells of going back."""
 

@@ -73,6 +73,20 @@ def test_nothing_moves_before_the_base_is_armed_and_then_it_does_as_asked() -> N
     )
 
 
+def test_odometry_has_the_time_for_which_the_chassis_tells_it() -> None:
+    rig = Rig()
+    rig.loop = GovernorLoop(
+        SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S),
+        rig.planner,
+        localiser := Localiser(ORIGIN, MOUNT),
+        ObedientChassis(late_ns=4_000_000),
+    )
+    last = rig.run(2.0)[-1]
+    assert last.setpoint.v_mps > 0.2
+    assert localiser.body_pose(last.now_ns + 4_000_000) == localiser.pose
+    assert localiser.body_pose(last.now_ns) != localiser.pose
+
+
 def test_the_planner_is_told_what_really_went_out() -> None:
     rig = Rig()
     steps = rig.run(3.0)
