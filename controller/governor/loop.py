@@ -44,6 +44,7 @@ class GovernorLoop:
         self._state: ChassisState | None = None
         self._scene_ns: int | None = None
         self._travelled_m = 0.0
+        self._came_from = localiser.pose
 
     @property
     def finished(self) -> bool:
@@ -74,8 +75,12 @@ class GovernorLoop:
         setpoint = Setpoint(now_ns, governed.v_mps, governed.a_mps2, governed.w_radps)
         self._state = self._chassis.exchange(setpoint, now_ns)
         self.localiser.add_odometry(self._state.stamp_ns, self._state.pose)
+        if pose.finite:
+            self._came_from = pose
         moved = self.localiser.pose
-        self._travelled_m += float(np.hypot(moved.x_m - pose.x_m, moved.y_m - pose.y_m))
+        if moved.finite:
+            before = self._came_from
+            self._travelled_m += float(np.hypot(moved.x_m - before.x_m, moved.y_m - before.y_m))
         self.ending.conclude(self._state, setpoint, now_ns, arrived=False)
         self._commands.tell(governed.v_mps, governed.w_radps, governed.decision, self._mode)
         on_path = self._governor.on_path

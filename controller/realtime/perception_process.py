@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import socket
 import time
 from contextlib import suppress
@@ -92,19 +91,19 @@ class RemoteBody:
 
     def _by_odometry(self, odometry: PlanarPose) -> PlanarPose | None:
         """On the path's floor; the first odometry is that of its start. None while the base knows of none."""
-        if not math.isfinite(odometry.x_m + odometry.y_m + odometry.heading_rad):
+        if not odometry.finite:
             return None
         if self._from_odometry is None:
             self._from_odometry = self._start @ body_in_floor(odometry).inverse()
         return planar(self._from_odometry @ body_in_floor(odometry))
 
     def _carried_on(self, pose: PlanarPose, from_ns: int, stamp_ns: int) -> PlanarPose | None:
-        """pose, at from_ns, moved on to stamp_ns with the newest twist; None if that is too far."""
+        """pose, at from_ns, moved on to stamp_ns with the newest twist; None: too far, or not known."""
         assert self._newest is not None
         ahead_ns = stamp_ns - from_ns
         state = self._newest.chassis
         twist_known = state.v_mps == state.v_mps and state.w_radps == state.w_radps
-        if not 0 <= ahead_ns <= REACH_S * NS_PER_S or not twist_known:
+        if not 0 <= ahead_ns <= REACH_S * NS_PER_S or not (twist_known and pose.finite):
             return None
         return advance_pose(pose, state.v_mps, state.w_radps, ahead_ns / NS_PER_S)
 

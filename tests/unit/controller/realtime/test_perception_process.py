@@ -104,6 +104,16 @@ def test_what_the_base_reports_is_of_the_time_for_which_it_says_so(
         assert true.y_m == pytest.approx(START.y_m + x_m - 1.0)
 
 
+def test_where_the_base_does_not_say_where_it_is_nothing_is_known(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    for now_ms in range(0, 100, 20):
+        control.send(step_at(now_ms, 1.0 if now_ms < 40 else math.nan, 0.0))
+    assert body.body_pose(15 * MS) == PlanarPose(1.0, 0.0, 0.0)
+    for stamp_ms in (30, 80, 90):
+        assert body.body_pose(stamp_ms * MS) is None
+        assert body.camera_pose(stamp_ms * MS) is None
+
+
 def test_but_not_for_ever(ends: tuple[RemoteBody, Channel]) -> None:
     body, control = ends
     control.send(step_at(0, 1.0, 1.5))
