@@ -84,9 +84,9 @@ class GovernorLoop:
         self.ending.conclude(self._state, setpoint, now_ns, arrived=False)
         self._commands.tell(governed.v_mps, governed.w_radps, governed.decision, self._mode)
         on_path = self._governor.on_path
-        sequence = None if scene is None else scene.sequence
+        scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
-            now_ns, pose, self._travelled_m, on_path.d_m, sequence, governed.decision, setpoint,
+            now_ns, pose, self._travelled_m, on_path.d_m, scene_ns, governed.decision, setpoint,
             self._state, self._ahead(), governed.fault,
         )  # fmt: skip
 

@@ -89,7 +89,7 @@ def test_nothing_moves_before_there_is_a_scene() -> None:
     for index in range(100):
         step = loop.step(None, index * PERIOD_NS)
         assert step.setpoint.v_mps == 0.0
-        assert step.scene_sequence is None
+        assert step.scene_ns is None
 
 
 def test_a_latched_chassis_ends_the_drive_with_its_reason() -> None:
