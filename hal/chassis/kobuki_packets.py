@@ -31,7 +31,9 @@ _STRAIGHT_RADPS = 1e-4
 _SPIN_M = 1e-3
 _INT16 = 32_767
 
+# What the core's charger byte says: charged and charging by a cable, and not at all or in the dock.
 STANDING_ON_CABLE = (18, 22)
+OFF_CABLE = (0, 2, 6)
 
 
 def base_control(v_mps: float, w_radps: float) -> bytes:
