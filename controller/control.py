@@ -29,16 +29,16 @@ class ControlStep:
     """What one step knew, decided and sent.
 
     pose: the body in the path's frame; progress_m along the path, lateral_m to its left.
-    scene_sequence: which frame the decision used, None if there was none yet. ahead_m: (N, 2) the way ahead
-    in the body frame, where it is not the path that the runner knows. fault: why the shaper had to brake by
-    the stop profile, "" if it had not.
+    scene_ns: when the frame was taken that the decision used, None if there was none yet. ahead_m: (N, 2) the
+    way ahead in the body frame, where it is not the path that the runner knows. fault: why the shaper had to
+    brake by the stop profile, "" if it had not.
     """
 
     now_ns: int
     pose: PlanarPose
     progress_m: float
     lateral_m: float
-    scene_sequence: int | None
+    scene_ns: int | None
     decision: Decision
     setpoint: Setpoint
     chassis: ChassisState
@@ -110,15 +110,15 @@ class ControlLoop:
         )
         setpoint, fault = self._setpoint(decision, on_path, now_ns)
         self._state = self._chassis.exchange(setpoint, now_ns)
-        self.localiser.add_odometry(now_ns, self._state.pose)
+        self.localiser.add_odometry(self._state.stamp_ns, self._state.pose)
         to_go_m = self.path.length_m - on_path.s_m
         if to_go_m < -PASSED_M:
             self.request_stop("went past the target", Outcome.BROKEN_OFF)
         arrived = -PASSED_M <= to_go_m <= ARRIVED_M
         self.ending.conclude(self._state, setpoint, now_ns, arrived=arrived)
-        sequence = None if scene is None else scene.sequence
+        scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
-            now_ns, pose, on_path.s_m, on_path.d_m, sequence, decision, setpoint, self._state, fault=fault
+            now_ns, pose, on_path.s_m, on_path.d_m, scene_ns, decision, setpoint, self._state, fault=fault
         )
 
     def _learn(self, scene: Scene | None) -> None:

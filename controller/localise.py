@@ -9,6 +9,9 @@ the camera was.
 The slip belongs to the base and its floor, so a better estimate holds for the path already driven, too. That
 path is stored as legs (distance, raw turn by odometry) and re-integrated with each new yaw ratio. The pose
 therefore moves a little with each estimate.
+
+Odometry that is not a number says nothing: as long as it does not, the pose is not known, and whoever decides
+stops for that. When it says something again, it has gone on from where it was.
 """
 
 from __future__ import annotations
@@ -33,6 +36,8 @@ MOST_LEGS = 2000
 # Prior of the yaw ratio (true / odometry): 1 +/- 0.15, a skid-steered base on a hard floor.
 PRIOR_RATIO_SIGMA = 0.15
 
+UNKNOWN = PlanarPose(math.nan, math.nan, math.nan)
+
 
 class PoseHistory:
     """The last poses with their times, interpolated. Beyond the last, for a short reach, what moved goes on
@@ -44,7 +49,10 @@ class PoseHistory:
         self._reach_ns = int(reach_s * NS_PER_S)
 
     def append(self, stamp_ns: int, pose: PlanarPose) -> None:
-        """Add a pose; a stamp that does not advance replaces the last one."""
+        """Add a pose; a stamp that does not advance replaces the last one. A pose that is not known is not
+        kept, so that after it the last one grows old."""
+        if not pose.finite:
+            return
         stamps_ns, poses, oldest_ns = self._stamps_ns, self._poses, stamp_ns - _HISTORY_NS
         while stamps_ns and stamps_ns[-1] >= stamp_ns:
             stamps_ns.pop()
@@ -99,7 +107,8 @@ class Localiser:
     """
 
     def __init__(self, start: PlanarPose, mount: CameraMount) -> None:
-        self.pose = start
+        self._pose = start
+        self._lost = False
         self._mount = mount
         self._camera_in_body = camera_in_body(mount).rotation
         self._odometry = PoseHistory()
@@ -111,23 +120,35 @@ class Localiser:
         self._sum_odometry_odometry = 1.0 / PRIOR_RATIO_SIGMA**2
 
     @property
+    def pose(self) -> PlanarPose:
+        """The newest; NaN while the odometry does not say where the base is."""
+        return UNKNOWN if self._lost else self._pose
+
+    @property
     def yaw_ratio(self) -> float:
         """Estimated share of the odometry's yaw that really happens: 1 - slip."""
         return self._sum_odometry_visual / self._sum_odometry_odometry
 
     def add_odometry(self, stamp_ns: int, odometry: PlanarPose) -> PlanarPose:
-        """Dead reckoning of the chassis at stamp_ns, in its own frame; returns the fused pose."""
+        """Dead reckoning of the chassis at stamp_ns, in its own frame; returns the fused pose. One that is
+        not finite is missing, and what is driven meanwhile is in the next that is."""
+        self._lost = not odometry.finite
+        if self._lost:
+            return UNKNOWN
         if self._last_odometry is not None:
             distance_m, turn_rad = _increment(self._last_odometry, odometry)
-            self.pose = _move(self.pose, distance_m, turn_rad * self.yaw_ratio)
+            self._pose = _move(self._pose, distance_m, turn_rad * self.yaw_ratio)
             self._remember(distance_m, turn_rad)
         self._last_odometry = odometry
         self._odometry.append(stamp_ns, odometry)
-        self._fused.append(stamp_ns, self.pose)
-        return self.pose
+        self._fused.append(stamp_ns, self._pose)
+        return self._pose
 
     def add_ego_motion(self, captured_ns: int, ego: EgoMotion) -> None:
-        """Learn from the rotation that the camera saw between the frame before and captured_ns."""
+        """Learn from the rotation that the camera saw between the frame before and captured_ns. What is not
+        finite teaches nothing: the sums would never be rid of it."""
+        if not (math.isfinite(ego.dt_s) and ego.motion.finite):
+            return
         before = self._odometry.at(captured_ns - round(ego.dt_s * NS_PER_S))
         after = self._odometry.at(captured_ns)
         if ego.source != "visual" or before is None or after is None or not ego.sigma_rotation_rad > 0.0:
@@ -155,7 +176,7 @@ class Localiser:
         turns = self.yaw_ratio * legs[:, 1]
         ends = self._settled.heading_rad + np.cumsum(turns)
         middles = ends - 0.5 * turns
-        self.pose = PlanarPose(
+        self._pose = PlanarPose(
             self._settled.x_m + float(legs[:, 0] @ np.cos(middles)),
             self._settled.y_m + float(legs[:, 0] @ np.sin(middles)),
             wrap_angle_rad(float(ends[-1])),

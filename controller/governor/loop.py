@@ -44,6 +44,7 @@ class GovernorLoop:
         self._state: ChassisState | None = None
         self._scene_ns: int | None = None
         self._travelled_m = 0.0
+        self._came_from = localiser.pose
 
     @property
     def finished(self) -> bool:
@@ -73,15 +74,19 @@ class GovernorLoop:
         governed = self._governor.step(now_ns, scene, asked.twist, pose, measured_mps, asked.silence)
         setpoint = Setpoint(now_ns, governed.v_mps, governed.a_mps2, governed.w_radps)
         self._state = self._chassis.exchange(setpoint, now_ns)
-        self.localiser.add_odometry(now_ns, self._state.pose)
+        self.localiser.add_odometry(self._state.stamp_ns, self._state.pose)
+        if pose.finite:
+            self._came_from = pose
         moved = self.localiser.pose
-        self._travelled_m += float(np.hypot(moved.x_m - pose.x_m, moved.y_m - pose.y_m))
+        if moved.finite:
+            before = self._came_from
+            self._travelled_m += float(np.hypot(moved.x_m - before.x_m, moved.y_m - before.y_m))
         self.ending.conclude(self._state, setpoint, now_ns, arrived=False)
         self._commands.tell(governed.v_mps, governed.w_radps, governed.decision, self._mode)
         on_path = self._governor.on_path
-        sequence = None if scene is None else scene.sequence
+        scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
-            now_ns, pose, self._travelled_m, on_path.d_m, sequence, governed.decision, setpoint,
+            now_ns, pose, self._travelled_m, on_path.d_m, scene_ns, governed.decision, setpoint,
             self._state, self._ahead(), governed.fault,
         )  # fmt: skip
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import socket
 import time
 from contextlib import suppress
@@ -35,7 +34,7 @@ class RemoteBody:
         self._start = body_in_floor(start)
         self._from_odometry: Pose | None = None
         self._true = PoseHistory(reach_s=0.0)
-        self._newest_true = start
+        self._newest_true, self._newest_true_ns = start, 0
         self._fused = PoseHistory(reach_s=0.0)
         self._odometry = PoseHistory(reach_s=0.0)
         self._newest: ControlStep | None = None
@@ -48,11 +47,14 @@ class RemoteBody:
             step = self._newest = message.control
             self._unread.append(step)
             self._fused.append(step.now_ns, step.pose)
-            self._odometry.append(step.now_ns, step.chassis.pose)
-            true_pose = message.true_pose or self._by_odometry(step.chassis.pose)
+            # The base is asked later than the step begins: by as much as the step has taken.
+            self._odometry.append(step.chassis.stamp_ns, step.chassis.pose)
+            true_pose, true_ns = message.true_pose, step.now_ns
+            if true_pose is None:
+                true_pose, true_ns = self._by_odometry(step.chassis.pose), step.chassis.stamp_ns
             if true_pose is not None:
-                self._newest_true = true_pose
-                self._true.append(step.now_ns, true_pose)
+                self._newest_true, self._newest_true_ns = true_pose, true_ns
+                self._true.append(true_ns, true_pose)
 
     def take_steps(self) -> list[ControlStep]:
         """The control steps that have arrived since the last call."""
@@ -65,7 +67,7 @@ class RemoteBody:
         self.listen()
         known = self._fused.at(stamp_ns)
         if known is None and self._newest is not None:
-            return self._carried_on(self._newest.pose, stamp_ns)
+            return self._carried_on(self._newest.pose, self._newest.now_ns, stamp_ns)
         return known
 
     def true_pose(self, stamp_ns: int) -> PlanarPose | None:
@@ -75,7 +77,7 @@ class RemoteBody:
         self.listen()
         known = self._true.at(stamp_ns)
         if known is None and self._newest is not None:
-            return self._carried_on(self._newest_true, stamp_ns)
+            return self._carried_on(self._newest_true, self._newest_true_ns, stamp_ns)
         return known
 
     def camera_pose(self, stamp_ns: int) -> Pose | None:
@@ -83,24 +85,25 @@ class RemoteBody:
         self.listen()
         known = self._odometry.at(stamp_ns)
         if known is None and self._newest is not None:
-            known = self._carried_on(self._newest.chassis.pose, stamp_ns)
+            state = self._newest.chassis
+            known = self._carried_on(state.pose, state.stamp_ns, stamp_ns)
         return None if known is None else camera_in_floor(known, self._mount)
 
     def _by_odometry(self, odometry: PlanarPose) -> PlanarPose | None:
         """On the path's floor; the first odometry is that of its start. None while the base knows of none."""
-        if not math.isfinite(odometry.x_m + odometry.y_m + odometry.heading_rad):
+        if not odometry.finite:
             return None
         if self._from_odometry is None:
             self._from_odometry = self._start @ body_in_floor(odometry).inverse()
         return planar(self._from_odometry @ body_in_floor(odometry))
 
-    def _carried_on(self, pose: PlanarPose, stamp_ns: int) -> PlanarPose | None:
-        """pose of the newest step, moved on to stamp_ns with its twist; None if that is too far."""
+    def _carried_on(self, pose: PlanarPose, from_ns: int, stamp_ns: int) -> PlanarPose | None:
+        """pose, at from_ns, moved on to stamp_ns with the newest twist; None: too far, or not known."""
         assert self._newest is not None
-        ahead_ns = stamp_ns - self._newest.now_ns
+        ahead_ns = stamp_ns - from_ns
         state = self._newest.chassis
         twist_known = state.v_mps == state.v_mps and state.w_radps == state.w_radps
-        if not 0 <= ahead_ns <= REACH_S * NS_PER_S or not twist_known:
+        if not 0 <= ahead_ns <= REACH_S * NS_PER_S or not (twist_known and pose.finite):
             return None
         return advance_pose(pose, state.v_mps, state.w_radps, ahead_ns / NS_PER_S)
 

@@ -1,4 +1,6 @@
-"""Commands that leave at the same moment of every period, however long the decision before them took."""
+"""Commands that leave at the same moment of every period, however long the decision before them took, and
+whoever looks at them last knows when they leave.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +17,10 @@ class PunctualChassis(Enclosing):
 
     The first exchange sets the beat; each later one is held until a fifth of its period is over. A step
     that took longer goes out at once.
+
+    A step has one time, that of its beginning, which its setpoint is stamped with. What is behind this object
+    is told the time that it is: else a setpoint were never old, however long the step took, and neither the
+    output guard nor the driver could refuse it. The state says by its stamp_ns for when it holds.
     """
 
     def __init__(self, chassis: Chassis, clock: Clock, period_ns: int) -> None:
@@ -33,12 +39,12 @@ class PunctualChassis(Enclosing):
         beats = (now_ns - self._first_ns + self._period_ns // 2) // self._period_ns
         began_ns = self._first_ns + beats * self._period_ns
         self._clock.sleep_until_ns(began_ns + self._hold_ns)
-        return self._chassis.exchange(setpoint, now_ns)
+        return self._chassis.exchange(setpoint, self._clock.now_ns())
 
     def arm(self, now_ns: int) -> None:
         """See hal.api.Chassis."""
-        self._chassis.arm(now_ns)
+        self._chassis.arm(self._clock.now_ns())
 
     def stop(self, now_ns: int) -> None:
         """See hal.api.Chassis."""
-        self._chassis.stop(now_ns)
+        self._chassis.stop(self._clock.now_ns())

@@ -5,6 +5,7 @@ The notify protocol is the one of sd_notify(3): datagrams to the socket named in
 
 from __future__ import annotations
 
+import re
 import signal
 import socket
 from collections.abc import Iterator, Mapping
@@ -12,6 +13,9 @@ from contextlib import contextmanager
 from types import FrameType
 
 from hal.clocks import NS_PER_S
+
+# What systemd writes. str.isdigit() is also true of what int() does not take: superscripts, or 5000 digits.
+_UINT64 = re.compile("[0-9]{1,20}")
 
 
 class ServiceManager:
@@ -61,7 +65,7 @@ def _watchdog_interval_ns(environment: Mapping[str, str], pid: int) -> int | Non
     if meant_for and meant_for != str(pid):
         return None
     microseconds = environment.get("WATCHDOG_USEC", "")
-    if not microseconds.isdigit() or int(microseconds) == 0:
+    if _UINT64.fullmatch(microseconds) is None or int(microseconds) == 0:
         return None
     return int(microseconds) * (NS_PER_S // 1_000_000)
 

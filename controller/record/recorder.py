@@ -15,6 +15,7 @@ from config.robot import Body
 from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.errors import UserError
+from controller.outlet import say
 from controller.path.path import Path
 from controller.perceive import Look
 from controller.record.frame_recorder import FrameRecorder
@@ -28,6 +29,9 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 
 PATH_SHOWN_M = 12.0
 PATH_STEP_M = 0.25
+
+# Half a second of a camera of 90 frames a second: a scene older than that is decided on by nobody.
+MOST_WAITING = 45
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +74,11 @@ class Recorder:
         self._composer = Composer(surroundings.top_speed_mps, surroundings.range_m)
         self._surroundings = surroundings
         self._timed = timed
+
+    @property
+    def records(self) -> bool:
+        """Anything is wanted at all."""
+        return any(sink is not None for sink in (self._observations, self._frames, self._video))
 
     def record(
         self,
@@ -136,26 +145,37 @@ def open_recorder(options: RecordingOptions, surroundings: Surroundings) -> Iter
 
 
 class RunRecorder:
-    """Pairs each look with the first control step whose decision knew it, which comes some latency later."""
+    """Pairs each look with the first control step whose decision knew it, which comes some latency later.
+
+    By the time of its frame: the numbers of frames begin anew when a camera does. A look that waits for
+    longer than a decision can take is recorded without one: whole frames wait here, some 2 MB each.
+    """
 
     def __init__(self, recorder: Recorder, path: Path) -> None:
         self._recorder = recorder
         self._path = path
         self._waiting: deque[Look] = deque()
+        self._undecided = 0
 
     def saw(self, look: Look) -> None:
         """A look whose decision is still to come."""
+        if not self._recorder.records:
+            return
         self._waiting.append(look)
+        if len(self._waiting) > MOST_WAITING:
+            self._undecided += 1
+            self._recorder.record(self._waiting.popleft(), None)
 
     def decided(self, step: ControlStep) -> None:
         """Records every look that step's decision knew."""
-        while (
-            self._waiting
-            and step.scene_sequence is not None
-            and self._waiting[0].scene.sequence <= step.scene_sequence
-        ):
+        if not any(look.scene.captured_ns == step.scene_ns for look in self._waiting):
+            return
+        known = False
+        while not known:
+            look = self._waiting.popleft()
+            known = look.scene.captured_ns == step.scene_ns
             self._recorder.record(
-                self._waiting.popleft(),
+                look,
                 step.decision,
                 step.setpoint.v_mps,
                 step.chassis.v_mps,
@@ -163,9 +183,15 @@ class RunRecorder:
             )
 
     def finish(self) -> None:
-        """Records what no decision has used: the run ended first."""
+        """Records what no decision has used: the run ended first. Says where that was not why."""
         while self._waiting:
             self._recorder.record(self._waiting.popleft(), None)
+        if self._undecided:
+            why = f"none came within {MOST_WAITING} frames"
+            say(
+                f"treadwatch: {self._undecided} frames were recorded without a decision: {why}",
+                to_stderr=True,
+            )
 
 
 def path_ahead(path: Path, progress_m: float, body: PlanarPose) -> FloatArray:

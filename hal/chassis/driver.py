@@ -106,8 +106,8 @@ class ChassisDriver(ABC):
         self._rolling_back.step(self._told.pose, now_ns, expected=self._may_go_back)
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
         command = self._commands.fit(setpoint, now_ns) if self._arming.may_move else zero(now_ns)
-        self._following.ordered(command)
         # While not armed, the base may be pushed, or driven by somebody else.
+        self._following.ordered(command if self._arming.may_move else None)
         self._may_go_back = command.v_mps < 0.0 or not self._arming.may_move
         return self._state(now_ns, self._say(command, now_ns))
 
@@ -213,8 +213,8 @@ class ChassisDriver(ABC):
             disobeys=told.disobeys,
             stop_cause=told.stop_cause
             or self._objection
-            or self._following.sentence
-            or self._rolling_back.sentence,
+            or self._rolling_back.sentence
+            or self._following.sentence,
             standing=told.standing,
             command_is_zero=is_zero(self._asked),
             silence=self._silence(),

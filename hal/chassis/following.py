@@ -1,11 +1,12 @@
-"""Does the base move as it is told? Its motors may be held, its encoders dead, its reports long old, the
-scale of its speed wrong, and no fault bit says so: then the robot stands for ever, drives on with nobody
-knowing how far, or goes faster than it may."""
+"""Does the base move as it is told? Its motors may be held or run away, its encoders dead, its reports long
+old, the scale of its speed wrong, and no fault bit says so: then the robot stands for ever, drives on with
+nobody knowing how far, goes faster than it may, or sets off though it is told to stand."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 from hal.chassis.command import is_zero
 from hal.clocks import NS_PER_S
@@ -27,10 +28,24 @@ _TURN_SLACK_RAD = 0.6
 _TURN_RATIO = 0.5
 
 # How fast it may tell of going: this many times what was commanded at any time in the last seconds, whatever
-# its lag, and a little more; not twice in a row is it faster, over so long each.
+# its lag, and a little more; not twice in a row is it faster, over so long each. A turn counts with its arm.
 _FASTEST_SHARE, _FASTEST_MPS = 1.5, 0.15
 _LAG_NS = 6 * NS_PER_S
 _GLANCE_NS = NS_PER_S // 2
+
+# Told to stand for so long, a base that lags by two seconds has slowed to a fiftieth, and may move no more
+# than one that rolls back (rolling_back.py). Who pushes or turns it by hand, by more than 5 cm or 10 degrees
+# in a second, latches it too: it tells the same when a motor runs away.
+_REST_NS = 8 * NS_PER_S
+_RESTING_MPS = 0.05
+
+
+class _Ordered(NamedTuple):
+    """How fast, m/s and rad/s without sign, was commanded until until_ns."""
+
+    until_ns: int
+    mps: float
+    radps: float
 
 
 class Following:
@@ -38,68 +53,84 @@ class Following:
 
     def __init__(self) -> None:
         self.sentence = ""
-        self._ordered = Setpoint(0, 0.0, 0.0, 0.0)
+        self._ordered: Setpoint | None = None
         self._pose: PlanarPose | None = None
         self._last_ns = self._since_ns = 0
         self._commanded_m = self._told_m = 0.0
         self._commanded_rad = self._turning_rad = self._told_rad = 0.0
-        self._lately: deque[tuple[int, float]] = deque()  # until when which speed was commanded
-        self._glance_ns, self._glanced_m, self._too_fast = 0, 0.0, False
+        self._lately: deque[_Ordered] = deque()
+        self._glance_ns, self._glanced_m, self._glanced_rad = 0, 0.0, 0.0
+        self._too_fast = self._turns_too_fast = False
 
     def step(self, pose: PlanarPose, now_ns: int) -> None:
         """What the base has told since the last step, beside what it was ordered since."""
         before, self._pose = self._pose, pose
         elapsed_s, self._last_ns = (now_ns - self._last_ns) / NS_PER_S, now_ns
-        self._note_speed(now_ns)
-        if before is None or is_zero(self._ordered):
+        self._note_order(now_ns)
+        if before is None or self._ordered is None:
             self.sentence = ""
             self._restart(now_ns)
-            self._glance_ns, self._glanced_m, self._too_fast = now_ns, 0.0, False
+            self._glance_anew(now_ns)
+            self._too_fast = self._turns_too_fast = False
             return
-        way_m = math.hypot(pose.x_m - before.x_m, pose.y_m - before.y_m)
-        overspeed = self._overspeed(way_m, now_ns)
-        if overspeed:
-            self.sentence = overspeed
+        way_m = _way_m(before, pose)
+        turn_rad = wrap_angle_rad(pose.heading_rad - before.heading_rad)
+        too_much = self._too_much(way_m, turn_rad, now_ns)
+        if is_zero(self._ordered):
+            self.sentence = too_much
+            self._restart(now_ns)
             return
         self._commanded_m += (abs(self._ordered.v_mps) + _ARM_M * abs(self._ordered.w_radps)) * elapsed_s
         self._commanded_rad += self._ordered.w_radps * elapsed_s
         self._turning_rad += abs(self._ordered.w_radps) * elapsed_s
-        turn_rad = wrap_angle_rad(pose.heading_rad - before.heading_rad)
         self._told_rad += turn_rad
-        self._told_m += way_m + _ARM_M * abs(turn_rad)
-        if self._commanded_m < _JUDGED_M or now_ns - self._since_ns < _JUDGED_NS:
-            return
-        self.sentence = self._judged((now_ns - self._since_ns) / NS_PER_S)
-        self._restart(now_ns)
+        self._told_m += abs(way_m) + _ARM_M * abs(turn_rad)
+        if self._commanded_m >= _JUDGED_M and now_ns - self._since_ns >= _JUDGED_NS:
+            self.sentence = self._judged((now_ns - self._since_ns) / NS_PER_S)
+            self._restart(now_ns)
+        self.sentence = self.sentence or too_much
 
-    def ordered(self, command: Setpoint) -> None:
-        """What the base is told from now on; zero ends the comparison."""
+    def ordered(self, command: Setpoint | None) -> None:
+        """What the base is told from now on. Zero ends the comparison with how much was commanded, not that
+        with how fast; None ends both: it is not armed, and may be pushed or driven by somebody else."""
         self._ordered = command
 
-    def _note_speed(self, now_ns: int) -> None:
+    def _note_order(self, now_ns: int) -> None:
         """What was commanded until now_ns. A change is enough: a base may stand for days."""
-        speed_mps = abs(self._ordered.v_mps)
-        if self._lately and self._lately[-1][1] == speed_mps:
+        order = self._ordered
+        mps, radps = (0.0, 0.0) if order is None else (abs(order.v_mps), abs(order.w_radps))
+        if self._lately and self._lately[-1][1:] == (mps, radps):
             self._lately.pop()
-        self._lately.append((now_ns, speed_mps))
-        while self._lately[0][0] < self._glance_ns - _LAG_NS:
+        self._lately.append(_Ordered(now_ns, mps, radps))
+        while self._lately[0].until_ns < self._glance_ns - _REST_NS:
             self._lately.popleft()
 
-    def _overspeed(self, way_m: float, now_ns: int) -> str:
-        """What is wrong if the base, way_m on, tells of going faster than it was told of late."""
+    def _too_much(self, way_m: float, turn_rad: float, now_ns: int) -> str:
+        """What is wrong if the base, way_m on and turn_rad further, tells of going or turning faster than it
+        was told of late."""
+        # With their signs: the jitter of a counter at rest is no travel.
         self._glanced_m += way_m
+        self._glanced_rad += turn_rad
         if now_ns - self._glance_ns < _GLANCE_NS:
             return ""
-        told_mps = self._glanced_m * NS_PER_S / (now_ns - self._glance_ns)
-        commanded_mps = max(mps for _, mps in self._lately)
-        before, self._too_fast = self._too_fast, told_mps > _FASTEST_SHARE * commanded_mps + _FASTEST_MPS
-        self._glance_ns, self._glanced_m = now_ns, 0.0
-        if not (before and self._too_fast):
-            return ""
-        return (
-            f"the base does not follow: it tells of {told_mps:.2f} m/s while at most {commanded_mps:.2f} m/s "
-            "was commanded; are the scales of its speed and of its counters right in chassis:?"
-        )
+        seconds = (now_ns - self._glance_ns) / NS_PER_S
+        told_mps, told_radps = abs(self._glanced_m) / seconds, abs(self._glanced_rad) / seconds
+        resting = not any(one.mps or one.radps for one in self._lately)
+        recent = [one for one in self._lately if one.until_ns >= self._glance_ns - _LAG_NS]
+        mps, radps = max(one.mps for one in recent), max(one.radps for one in recent)
+        slack_mps = _RESTING_MPS if resting else _FASTEST_MPS
+        before, self._too_fast = self._too_fast, told_mps > _FASTEST_SHARE * mps + slack_mps
+        too_fast = before and self._too_fast
+        fastest_radps = _FASTEST_SHARE * radps + slack_mps / _ARM_M
+        before, self._turns_too_fast = self._turns_too_fast, told_radps > fastest_radps
+        turns_too_fast = before and self._turns_too_fast
+        self._glance_anew(now_ns)
+        stood = mps == 0.0 and radps == 0.0
+        if too_fast:
+            return _overdone(f"{told_mps:.2f} m/s", f"{mps:.2f} m/s", stood)
+        if turns_too_fast:
+            return _overdone(f"{told_radps:.2f} rad/s", f"{radps:.2f} rad/s", stood)
+        return ""
 
     def _judged(self, seconds: float) -> str:
         apart_rad = abs(self._told_rad - self._commanded_rad)
@@ -114,7 +145,27 @@ class Following:
             "commanded; are its tracks free and its encoders connected?"
         )
 
+    def _glance_anew(self, now_ns: int) -> None:
+        self._glance_ns, self._glanced_m, self._glanced_rad = now_ns, 0.0, 0.0
+
     def _restart(self, now_ns: int) -> None:
         self._since_ns = now_ns
         self._commanded_m = self._told_m = 0.0
         self._commanded_rad = self._turning_rad = self._told_rad = 0.0
+
+
+def _way_m(before: PlanarPose, after: PlanarPose) -> float:
+    """From one pose to the next, negative backwards."""
+    x_m, y_m = after.x_m - before.x_m, after.y_m - before.y_m
+    ahead_m = x_m * math.cos(before.heading_rad) + y_m * math.sin(before.heading_rad)
+    return math.copysign(math.hypot(x_m, y_m), ahead_m)
+
+
+def _overdone(told: str, commanded: str, stood: bool) -> str:
+    """stood: no motion was commanded at all."""
+    ask = (
+        "does it hold itself where it stands, and do its motors obey?"
+        if stood
+        else "are the scales of its speed and of its counters right in chassis:?"
+    )
+    return f"the base does not follow: it tells of {told} while at most {commanded} was commanded; {ask}"

@@ -10,6 +10,7 @@ from hal.chassis.frame_age import FrameAge
 from hal.chassis.kobuki_packets import (
     CLOCK_BITS,
     ENCODER_BITS,
+    OFF_CABLE,
     STANDING_ON_CABLE,
     TICK_M,
     WHEEL_BASE_M,
@@ -125,6 +126,8 @@ class KobukiFeedback:
         ]
         if core.charger in STANDING_ON_CABLE:
             causes.append("the charging cable is plugged in")
+        elif core.charger not in OFF_CABLE:
+            causes.append(f"unknown state {core.charger} of the charger")
         if self._disagreement.sentence and not causes:
             return self._disagreement.sentence
         return f"emergency stop by the base's own sensors: {', '.join(causes)}" if causes else ""

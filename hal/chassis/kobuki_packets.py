@@ -32,8 +32,9 @@ _STRAIGHT_RADPS = 1e-4
 _SPIN_M = 1e-3
 _INT16 = 32_767
 
-# Values of Core.charger while the charging cable is plugged in.
+# Values of Core.charger: while the charging cable is plugged in, and without it (in the dock or off it).
 STANDING_ON_CABLE = (18, 22)
+OFF_CABLE = (0, 2, 6)
 
 
 def base_control(v_mps: float, w_radps: float) -> bytes:

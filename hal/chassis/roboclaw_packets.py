@@ -184,7 +184,8 @@ _STATUS_LAYOUTS: Mapping[int, _StatusLayout] = MappingProxyType(
 
 
 def status(data: bytes) -> Status:
-    """Of a reply to 90; the length tells which of the two layouts it is. Unknown bits are warnings."""
+    """Of a reply to 90; the length tells which of the two layouts it is. A bit of neither table is an error:
+    what a newer firmware says with it is not known, and it may be that the motors stop."""
     layout = _STATUS_LAYOUTS[len(data)]
     bits = int.from_bytes(data, "big")
     errors, warnings = [], []
@@ -192,10 +193,10 @@ def status(data: bytes) -> Status:
         bit = 1 << position
         if not bits & bit or bit == layout.estop:
             continue
-        if bit in layout.errors:
-            errors.append(f"error: {layout.errors[bit]}")
+        if bit in layout.warnings:
+            warnings.append(f"warning: {layout.warnings[bit]}")
         else:
-            warnings.append(f"warning: {layout.warnings.get(bit, f'unknown bit 0x{bit:X}')}")
+            errors.append(f"error: {layout.errors.get(bit, f'unknown bit 0x{bit:X}')}")
     return Status(bool(bits & layout.estop), tuple(errors), tuple(warnings))
 
 

@@ -153,10 +153,12 @@ class _Opening(Generic[DeviceT]):
         except HalError as error:
             self._error = error
         finally:
+            # Whoever abandons it right after this closes it: which of the two does is settled in here.
             with self._lock:
-                self._device = device if self._wanted else None
+                if self._wanted:
+                    self._device, device = device, None
                 self.done = True
-        if device is not None and self._device is None:
+        if device is not None:
             self._link._shut(device)
 
 

@@ -1,4 +1,4 @@
-"""Held tracks and dead encoders, on every emulated base: no fault bit tells of them."""
+"""Held tracks, dead encoders and motors that run away, on every emulated base: no fault bit tells of them."""
 
 from __future__ import annotations
 
@@ -57,3 +57,29 @@ def test_a_base_that_rolls_back_latches(rig: Rig, monkeypatch: pytest.MonkeyPatc
     rig.plant.command(0.0, 0.0)
     rig.run(1.0, 0.5)
     assert rig.stands(), "held again, and yet it needs consent"
+
+
+@pytest.mark.parametrize(("v_mps", "w_radps"), [(0.4, 0.0), (0.0, 1.0)])
+def test_a_base_that_moves_on_its_own_latches_and_one_that_is_not_armed_may(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, v_mps: float, w_radps: float
+) -> None:
+    rig.run(0.2)
+    with monkeypatch.context() as away:
+        rig.plant.command(v_mps, w_radps)
+        away.setattr(rig.plant, "command", lambda v_mps, w_radps: None)
+        away.setattr(rig.plant, "command_tracks", lambda left_mps, right_mps: None)
+        assert rig.run(3.0, 0.0).mode is ChassisMode.STANDBY, "pushed, or driven by somebody else"
+    rig.plant.command(0.0, 0.0)
+    rig.run(1.0, 0.0)
+    rig.arm()
+    rig.run(1.0, 0.0)
+    with monkeypatch.context() as away:
+        rig.plant.command(v_mps, w_radps)
+        away.setattr(rig.plant, "command", lambda v_mps, w_radps: None)
+        away.setattr(rig.plant, "command_tracks", lambda left_mps, right_mps: None)
+        rig.run(2.0, 0.0)
+        assert rig.state.mode is ChassisMode.ESTOP
+        assert "does not follow" in rig.state.reason
+    rig.plant.command(0.0, 0.0)
+    rig.run(1.0, 0.5)
+    assert rig.stands(), "it stands again, and yet it needs consent"

@@ -17,10 +17,10 @@ NO_FRAGMENTS = fragments(np.zeros((0, 2, 2)), [], [])
 KEEP = Decision(Action.KEEP, 0.5, Reason("free", "the way is free"))
 
 
-def control_step(now_ns: int, sequence: int | None, decision: Decision = KEEP) -> ControlStep:
+def control_step(now_ns: int, scene_ns: int | None, decision: Decision = KEEP) -> ControlStep:
     """A step of a robot that stands at the start."""
     setpoint = Setpoint(now_ns, 0.0, 0.0, 0.0)
-    return ControlStep(now_ns, ORIGIN, 0.0, 0.0, sequence, decision, setpoint, chassis_state(now_ns))
+    return ControlStep(now_ns, ORIGIN, 0.0, 0.0, scene_ns, decision, setpoint, chassis_state(now_ns))
 
 
 class NotingDrive:
@@ -48,7 +48,7 @@ class NotingDrive:
         self._left -= 1
         sequence = None if seen is None else seen.sequence
         self.seen.append((now_ns, sequence))
-        return control_step(now_ns, sequence)
+        return control_step(now_ns, None if seen is None else seen.captured_ns)
 
 
 class TickingCamera:

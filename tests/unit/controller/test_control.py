@@ -89,7 +89,7 @@ def test_nothing_moves_before_there_is_a_scene() -> None:
     for index in range(100):
         step = loop.step(None, index * PERIOD_NS)
         assert step.setpoint.v_mps == 0.0
-        assert step.scene_sequence is None
+        assert step.scene_ns is None
 
 
 def test_a_latched_chassis_ends_the_drive_with_its_reason() -> None:
@@ -151,8 +151,23 @@ class LosingChassis(ObedientChassis):
 def test_a_robot_that_knows_not_where_it_is_stops_and_the_loop_goes_on() -> None:
     taken = drive(loop_on(LosingChassis()), 140)
     assert len(taken) == 140
-    assert any("where the robot is is not known" in step.decision.reason.sentence for step in taken)
+    faults = [index for index, step in enumerate(taken) if step.decision.reason.rule == "fault"]
+    assert faults == [100, 101, 102]
+    assert taken[100].decision.reason.sentence == "where the robot is is not known: stop"
+    way_m = sum(PERIOD_S * step.setpoint.v_mps for step in taken[3:-1])
+    assert taken[-1].progress_m == pytest.approx(way_m, abs=1e-3), "and it knows again what it has driven"
     assert all(math.isfinite(step.setpoint.v_mps + step.setpoint.w_radps) for step in taken)
+
+
+def test_odometry_has_the_time_for_which_the_chassis_tells_it() -> None:
+    loop = loop_on(ObedientChassis(late_ns=4_000_000))
+    last = drive(loop, 100)[-1]
+    assert last.setpoint.v_mps > 0.2
+    then = loop.localiser.body_pose(last.now_ns + 4_000_000)
+    assert then == loop.localiser.pose
+    before = loop.localiser.body_pose(last.now_ns)
+    assert before is not None
+    assert then.x_m - before.x_m == pytest.approx(0.004 * last.setpoint.v_mps, rel=0.01)
 
 
 class RollingChassis(ObedientChassis):

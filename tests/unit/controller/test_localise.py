@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,6 +70,51 @@ def test_without_scenes_the_pose_is_the_odometry_from_the_start() -> None:
     expected = advance_pose(start, 0.5, 0.2, 1.0)
     assert (localiser.pose.x_m, localiser.pose.y_m) == pytest.approx((expected.x_m, expected.y_m), abs=1e-6)
     assert localiser.pose.heading_rad == pytest.approx(expected.heading_rad)
+
+
+@pytest.mark.parametrize("missing", [math.nan, math.inf])
+def test_a_pose_that_is_not_known_is_not_kept_and_the_last_one_grows_old(missing: float) -> None:
+    history = PoseHistory(reach_s=0.1)
+    history.append(0, ORIGIN)
+    history.append(50 * MS, PlanarPose(0.0, missing, 0.0))
+    assert history.at(50 * MS) is ORIGIN
+    history.append(150 * MS, PlanarPose(0.0, 0.0, missing))
+    assert history.at(150 * MS) is None
+
+
+def test_odometry_that_is_missing_is_no_pose_and_no_standing_and_then_it_goes_on() -> None:
+    """Half a second on an arc of which the odometry tells nothing for a fifth."""
+    localiser, odometry = Localiser(ORIGIN, MOUNT), PlanarPose(5.0, 5.0, 1.0)
+    for step in range(26):
+        missing = 10 <= step < 20
+        told = PlanarPose(math.nan, odometry.y_m, 0.0) if missing else odometry
+        fused = localiser.add_odometry(step * 20 * MS, told)
+        assert fused.finite is not missing
+        assert localiser.pose.finite is not missing
+        odometry = advance_pose(odometry, 0.5, 0.2, 0.02)
+        if step == 19:
+            assert localiser.camera_pose(19 * 20 * MS) is None, "10 periods without any"
+            assert localiser.body_pose(19 * 20 * MS) is None
+            localiser.add_ego_motion(160 * MS, ego(0.004, 0.02))
+            assert not localiser.pose.finite, "what a camera sees of earlier does not make it known"
+    expected = advance_pose(ORIGIN, 0.5, 0.2, 0.5)
+    assert (localiser.pose.x_m, localiser.pose.y_m) == pytest.approx((expected.x_m, expected.y_m), abs=1e-5)
+    assert localiser.pose.heading_rad == pytest.approx(expected.heading_rad, abs=1e-3)
+
+
+@pytest.mark.parametrize("broken", ["rotation", "dt_s"])
+def test_ego_motion_that_is_not_a_number_teaches_nothing(broken: str) -> None:
+    localiser = Localiser(ORIGIN, MOUNT)
+    for step in range(10):
+        localiser.add_odometry(step * 20 * MS, PlanarPose(0.01 * step, 0.0, 0.01 * step))
+    seen = ego(0.01, 0.02)
+    if broken == "rotation":
+        seen = replace(seen, motion=Pose(np.full((3, 3), math.nan), np.zeros(3)))
+    else:
+        seen = replace(seen, dt_s=math.nan)
+    localiser.add_ego_motion(180 * MS, seen)
+    assert localiser.yaw_ratio == 1.0
+    assert localiser.pose.finite
 
 
 def drive_with_slip(true_ratio: float, source: str) -> tuple[Localiser, PlanarPose]:

@@ -1,4 +1,5 @@
-"""A base that tells of no motion while it is told to move, of a turn nobody commanded, of going too fast."""
+"""A base that tells of no motion while it is told to move, of a turn nobody commanded, of going too fast, of
+motion while it is told to stand."""
 
 import math
 import tracemalloc
@@ -7,6 +8,7 @@ import pytest
 
 from config.chassis import PlantConfig
 from hal.chassis.following import Following
+from hal.geometry import advance_pose
 from hal.types import PlanarPose, Setpoint
 from sim.plant import TrackedPlant
 from tests.support.chassis_rig import PERIOD_NS
@@ -140,6 +142,99 @@ def test_the_sentence_names_both_speeds_and_what_to_look_at() -> None:
         "the base does not follow: it tells of 2.00 m/s while at most 1.00 m/s was commanded; "
         "are the scales of its speed and of its counters right in chassis:?"
     )
+
+
+def runs_away(
+    v_mps: float, w_radps: float, stood_s: float, driven_mps: float = 0.0
+) -> tuple[float, str] | None:
+    """After how many seconds it is noticed that a base moves so on its own, which has driven and was then
+    told to stand for stood_s, and what is said; None if it is not, within 20 s."""
+    following, pose = Following(), STANDS
+    for period in range(round(20 * 50 + 100 + 50 * stood_s)):
+        now_s = period / 50 - 2.0 - stood_s
+        following.step(pose, period * PERIOD_NS)
+        if following.sentence:
+            return now_s, following.sentence
+        told = (v_mps, w_radps) if now_s >= 0.0 else (driven_mps if now_s < -stood_s else 0.0, 0.0)
+        pose = advance_pose(pose, *told, 0.02)
+        order_mps = driven_mps if now_s < -stood_s else 0.0
+        following.ordered(Setpoint(period * PERIOD_NS, order_mps, 0.0, 0.0))
+    return None
+
+
+@pytest.mark.parametrize(
+    ("v_mps", "w_radps", "stood_s", "driven_mps", "at_most_s"),
+    [
+        (0.5, 0.0, 1.0, 0.0, 1.5),
+        (-0.5, 0.0, 1.0, 0.0, 1.5),
+        (0.0, 1.0, 1.0, 0.0, 1.5),
+        (0.0, -1.0, 1.0, 0.5, 1.5),
+        (1.0, 0.0, 1.0, 0.5, 1.5),
+        (0.5, 0.0, 1.0, 0.5, 7.0),  # as fast as it was told to go until a moment ago
+        (0.06, 0.0, 10.0, 0.5, 1.5),  # creeps, long after it was told to stand
+        (0.0, 0.2, 10.0, 0.5, 1.5),
+    ],
+)
+def test_a_base_that_moves_while_it_is_told_to_stand_is_noticed(
+    v_mps: float, w_radps: float, stood_s: float, driven_mps: float, at_most_s: float
+) -> None:
+    noticed = runs_away(v_mps, w_radps, stood_s, driven_mps)
+    assert noticed is not None
+    assert 0.5 < noticed[0] <= at_most_s
+    assert "does not follow" in noticed[1]
+
+
+def test_the_sentence_of_one_that_runs_away_asks_whether_it_holds_itself() -> None:
+    noticed = runs_away(0.0, 1.0, 10.0)
+    assert noticed is not None
+    assert noticed[1] == (
+        "the base does not follow: it tells of 1.00 rad/s while at most 0.00 rad/s was commanded; "
+        "does it hold itself where it stands, and do its motors obey?"
+    )
+
+
+@pytest.mark.parametrize(("v_mps", "w_radps"), [(0.04, 0.0), (-0.04, 0.0), (0.0, 0.15)])
+def test_what_hardly_moves_stands(v_mps: float, w_radps: float) -> None:
+    assert runs_away(v_mps, w_radps, 10.0) is None
+
+
+@pytest.mark.parametrize("lag_s", [0.2, 1.0, 2.0])
+@pytest.mark.parametrize("w_radps", [0.0, 1.5])
+def test_a_base_that_comes_to_rest_late_is_not_one_that_runs_away(lag_s: float, w_radps: float) -> None:
+    """The command is a step: harder than any that the program sends."""
+    assert_follows(lag_s, [(1.5 if w_radps == 0.0 else 0.3, w_radps)] * 250 + [(0.0, 0.0)] * 1000)
+
+
+@pytest.mark.parametrize("begins", [1000, 1007, 1013, 1020])
+def test_somebody_who_knocks_against_a_standing_base_does_not_latch_it(begins: int) -> None:
+    """4 cm and 8 degrees, within 0.3 s."""
+    following = Following()
+    for period in range(2000):
+        shoved = min(max(period - begins, 0) / 15, 1.0)
+        following.step(PlanarPose(0.04 * shoved, 0.0, 0.14 * shoved), period * PERIOD_NS)
+        assert following.sentence == ""
+        following.ordered(Setpoint(period * PERIOD_NS, 0.0, 0.0, 0.0))
+
+
+def test_the_jitter_of_a_counter_at_rest_is_no_motion() -> None:
+    """An odometer of 1 mm steps that stands right between two of them, on the left."""
+    following, width_m = Following(), 0.5
+    for period in range(2000):
+        left_m = 0.001 * (period % 2)
+        following.step(PlanarPose(0.5 * left_m, 0.0, -left_m / width_m), period * PERIOD_NS)
+        assert following.sentence == ""
+        following.ordered(Setpoint(period * PERIOD_NS, 0.0, 0.0, 0.0))
+
+
+def test_a_base_that_is_not_armed_may_be_pushed_and_turned() -> None:
+    following, pose = Following(), STANDS
+    for period in range(1000):
+        following.step(pose, period * PERIOD_NS)
+        assert following.sentence == ""
+        armed = period >= 500
+        following.ordered(Setpoint(period * PERIOD_NS, 0.0, 0.0, 0.0) if armed else None)
+        if not armed:
+            pose = advance_pose(pose, 1.0, 1.0, 0.02)
 
 
 def test_a_base_that_stands_for_hours_takes_no_memory_for_it() -> None:

@@ -62,6 +62,7 @@ def test_a_zero_that_replaces_motion_does_not_wait_for_the_period() -> None:
         ("wheel_drop", 1, "wheel dropped (right)"),
         ("wheel_drop", 8, "wheel dropped (unknown bit 3)"),
         ("charger", 22, "the charging cable is plugged in"),
+        ("charger", 16, "unknown state 16 of the charger"),
     ],
 )
 def test_its_own_sensors_stop_and_latch(switch: str, bits: int, words: str) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 
 from hal.errors import DeviceNotFound, LinkLost
+from hal.links import reopening
 from hal.links.reopening import ReopeningLink
 
 # Another thread has to have its turn, on a busy machine too.
@@ -139,6 +141,36 @@ def test_what_is_begun_again_waits_until_the_lost_one_is_closed(link: SlowLink) 
     assert (link.use(), link.closed) == ("device 2", ["device 1"])
     link.__exit__(None, None, None)
     assert link.closed == ["device 1", "device 2"]
+
+
+def test_the_end_right_after_it_was_opened_closes_it_once(
+    link: SlowLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The worst moment: the thread has just told that it is done, and has not ended yet."""
+    ended = threading.Event()
+
+    class EndsTheLink:
+        """A lock behind which, once the thread of the opening has released it, the link is left."""
+
+        def __init__(self) -> None:
+            self._lock = threading.Lock()
+
+        def __enter__(self) -> None:
+            self._lock.acquire()
+
+        def __exit__(self, *_: object) -> None:
+            self._lock.release()
+            if threading.current_thread().name == "reopen port" and not ended.is_set():
+                ended.set()
+                link.__exit__(None, None, None)
+
+    watched = SimpleNamespace(Lock=EndsTheLink, Thread=threading.Thread)
+    monkeypatch.setattr(reopening, "threading", watched)
+    link.may_close.set()
+    link.lose()
+    link.may_open.set()
+    wait_until(lambda: ended.is_set() and not reopening_threads())
+    assert sorted(link.closed) == ["device 1", "device 2"]
 
 
 def reopening_threads() -> list[threading.Thread]:

@@ -210,6 +210,7 @@ def test_a_restart_at_rest_shows_in_the_time_out() -> None:
     [
         (0x40, ChassisMode.ESTOP, ("error: motor 1 driver fault",)),
         (0x80000, ChassisMode.ARMED, ("warning: main voltage low",)),
+        (0x80000000, ChassisMode.ESTOP, ("error: unknown bit 0x80000000",)),
     ],
 )
 def test_errors_latch_and_warnings_are_told(bits: int, mode: ChassisMode, faults: tuple[str, ...]) -> None:

@@ -63,6 +63,14 @@ def test_an_impossible_obstacle_stops(broken: Obstacle) -> None:
     assert stops(bench.step(bench.scene(broken)), "camera", "obstacle 5 is impossible")
 
 
+def test_a_scene_from_where_nobody_knows_stops() -> None:
+    bench = Bench()
+    bench.settle()
+    nowhere = replace(bench.scene(), robot_pose=PlanarPose(0.0, math.nan, 0.0))
+    assert stops(bench.step(nowhere), "camera", "where the robot was when the scene was taken is not known")
+    assert bench.step(bench.scene()).reason.rule != "camera"
+
+
 def test_scenes_out_of_order_stop() -> None:
     bench = Bench()
     old = bench.scene(age_ns=AGE_NS + 40_000_000)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -18,7 +20,7 @@ from controller.governor.inbox import Asked
 from controller.governor.loop import GovernorLoop
 from controller.governor.request import Twist
 from controller.localise import Localiser
-from hal.types import CameraMount, ChassisMode
+from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
 from tests.support.scenes import ORIGIN, free_space, scene
 
@@ -43,8 +45,13 @@ class Planner:
 
 
 class Rig:
-    def __init__(self, asks: Callable[[float], Asked] = lambda _: GO, arms_after: int = 3) -> None:
-        self.chassis, self.planner = ObedientChassis(arms_after), Planner(asks)
+    def __init__(
+        self,
+        asks: Callable[[float], Asked] = lambda _: GO,
+        arms_after: int = 3,
+        chassis: ObedientChassis | None = None,
+    ) -> None:
+        self.chassis, self.planner = chassis or ObedientChassis(arms_after), Planner(asks)
         governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)
         self.loop = GovernorLoop(governor, self.planner, Localiser(ORIGIN, MOUNT), self.chassis)
         self.steps: list[ControlStep] = []
@@ -71,6 +78,33 @@ def test_nothing_moves_before_the_base_is_armed_and_then_it_does_as_asked() -> N
     assert steps[-1].progress_m == pytest.approx(
         sum(0.02 * one.setpoint.v_mps for one in steps[:-1]), abs=0.02
     )
+
+
+def test_odometry_has_the_time_for_which_the_chassis_tells_it() -> None:
+    rig = Rig(chassis=ObedientChassis(late_ns=4_000_000))
+    last, localiser = rig.run(2.0)[-1], rig.loop.localiser
+    assert last.setpoint.v_mps > 0.2
+    assert localiser.body_pose(last.now_ns + 4_000_000) == localiser.pose
+    assert localiser.body_pose(last.now_ns) != localiser.pose
+
+
+class LosingChassis(ObedientChassis):
+    """For three exchanges on its way nobody knows where it is."""
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        state = super().exchange(setpoint, now_ns)
+        lost = 60 <= len(self.sent) < 63
+        return replace(state, pose=PlanarPose(math.nan, 0.0, 0.0)) if lost else state
+
+
+def test_a_base_that_does_not_say_for_a_moment_where_it_is_is_governed_on() -> None:
+    rig = Rig(chassis=LosingChassis())
+    steps = rig.run(6.0)
+    faults = [index for index, one in enumerate(steps) if one.decision.reason.rule == "fault"]
+    assert faults == [60, 61, 62]
+    way_m = sum(PERIOD_S * one.setpoint.v_mps for one in steps[3:])
+    assert steps[-1].progress_m == pytest.approx(way_m, abs=1e-3)
+    assert steps[-1].setpoint.v_mps == pytest.approx(0.6)
 
 
 def test_the_planner_is_told_what_really_went_out() -> None:

@@ -193,6 +193,20 @@ def test_a_robot_that_does_not_know_where_it_is_stops() -> None:
     assert max(abs(np.diff(speeds))) <= LIMITS.max_accel_mps2 * PERIOD_S + 1e-9
 
 
+def test_a_scene_from_where_nobody_knows_stops_it_and_spoils_nothing() -> None:
+    def alter(scene: Scene, t_s: float) -> Scene:
+        nowhere = PlanarPose(math.nan, 0.0, 0.0)
+        return replace(scene, robot_pose=nowhere) if 4.0 <= t_s < 4.3 else scene
+
+    steps = GovernedDrive(always(0.8), alter=alter).run(9.0)
+    unknown = [one.governed.decision for one in after(steps, 4.1) if one.t_s < 4.3]
+    assert {one.reason.sentence for one in unknown} == {
+        "where the robot was when the scene was taken is not known: stop"
+    }
+    assert {one.target_speed_mps for one in unknown} == {0.0}
+    assert steps[-1].governed.v_mps > 0.5
+
+
 def test_noise_makes_no_false_stop() -> None:
     things = [Thing(stands(4.0, 1.8)), Thing(stands(8.0, -1.4)), Thing(stands(12.0, 1.6))]
     steps = GovernedDrive(always(0.8), things, noise=Noise(0.0075, 0.1, 3)).run(14.0)

@@ -85,6 +85,35 @@ def test_or_from_where_a_base_outside_of_this_program_reports_to_be(
     assert (pose.x_m, pose.y_m, pose.heading_rad) == pytest.approx((2.0, 3.5, math.pi / 2))
 
 
+def test_what_the_base_reports_is_of_the_time_for_which_it_says_so(
+    ends: tuple[RemoteBody, Channel],
+) -> None:
+    """A slow step asks it long after it has begun."""
+    body, control = ends
+    for now_ms, x_m in ((0, 1.0), (20, 1.04)):
+        message = step_at(now_ms, x_m, 1.0)
+        chassis = dataclasses.replace(message.control.chassis, stamp_ns=(now_ms + 20) * MS)
+        control.send(
+            dataclasses.replace(message, control=dataclasses.replace(message.control, chassis=chassis))
+        )
+    for at_ms, x_m in ((30, 1.02), (50, 1.05)):
+        camera, true = body.camera_pose(at_ms * MS), body.true_pose(at_ms * MS)
+        assert camera is not None
+        assert true is not None
+        assert camera.translation_m[0] == pytest.approx(10.0 + x_m + MOUNT.forward_m)
+        assert true.y_m == pytest.approx(START.y_m + x_m - 1.0)
+
+
+def test_where_the_base_does_not_say_where_it_is_nothing_is_known(ends: tuple[RemoteBody, Channel]) -> None:
+    body, control = ends
+    for now_ms in range(0, 100, 20):
+        control.send(step_at(now_ms, 1.0 if now_ms < 40 else math.nan, 0.0))
+    assert body.body_pose(15 * MS) == PlanarPose(1.0, 0.0, 0.0)
+    for stamp_ms in (30, 80, 90):
+        assert body.body_pose(stamp_ms * MS) is None
+        assert body.camera_pose(stamp_ms * MS) is None
+
+
 def test_but_not_for_ever(ends: tuple[RemoteBody, Channel]) -> None:
     body, control = ends
     control.send(step_at(0, 1.0, 1.5))

@@ -51,6 +51,8 @@ def test_the_watchdog_is_fed_at_half_its_interval(manager_socket: socket.socket)
         {"WATCHDOG_USEC": "1000000", "WATCHDOG_PID": "8"},
         {"WATCHDOG_USEC": "0"},
         {"WATCHDOG_USEC": "soon"},
+        {"WATCHDOG_USEC": "\N{SUPERSCRIPT TWO}"},
+        {"WATCHDOG_USEC": "1" * 5000},
     ],
 )
 def test_no_watchdog_that_is_not_meant_for_us(

@@ -1,4 +1,6 @@
+import gc
 import json
+import weakref
 from pathlib import Path as FilePath
 
 import cv2
@@ -10,6 +12,7 @@ from config.robot import Body, Robot
 from controller.path.path import Path
 from controller.record.observations import ObservationFile
 from controller.record.recorder import (
+    MOST_WAITING,
     Recorder,
     RecordingOptions,
     RunRecorder,
@@ -17,8 +20,9 @@ from controller.record.recorder import (
     open_recorder,
     path_ahead,
 )
-from hal.types import CameraMount, PlanarPose
+from hal.types import CameraMount, ColourImage, PlanarPose
 from tests.support.drives import PlainEyes, TickingCamera, control_step
+from tests.support.video_moments import frame
 
 AROUND = Surroundings(CameraMount(0.45, 0.0, 0.6, 0.07), Body(), 0.54, 30.0, 1.5, 10.0)
 STRAIGHT = Path(PathSpec(segments=(LineSpec(kind="line", length_m=20.0),)), Robot())
@@ -42,6 +46,56 @@ def test_a_frame_is_written_with_the_first_decision_that_knew_it(tmp_path: FileP
     lines = written(tmp_path / "o.jsonl")
     assert [line["frame"] for line in lines] == [0, 1, 2]
     assert [line["decision"] is not None for line in lines] == [True, False, False]
+
+
+def test_a_camera_that_counts_anew_is_paired_all_the_same(tmp_path: FilePath) -> None:
+    """It was re-plugged: its numbers begin at 0, and its time may be an earlier one."""
+    eyes = PlainEyes()
+    with ObservationFile(tmp_path / "o.jsonl") as observations:
+        recorder = RunRecorder(Recorder(observations, None, None, AROUND, timed=False), STRAIGHT)
+        for captured_ms, sequence in ((100, 7), (133, 8), (33, 0), (66, 1)):
+            recorder.saw(eyes.look(frame(sequence, captured_ms * 1_000_000)))
+            recorder.decided(control_step(200_000_000, captured_ms * 1_000_000))
+        recorder.saw(eyes.look(frame(2, 99_000_000)))
+        recorder.finish()
+    lines = written(tmp_path / "o.jsonl")
+    assert [line["frame"] for line in lines] == [7, 8, 0, 1, 2]
+    assert [line["decision"] is not None for line in lines] == [True] * 4 + [False]
+
+
+def test_frames_that_no_decision_comes_for_do_not_pile_up(
+    tmp_path: FilePath, capsys: pytest.CaptureFixture[str]
+) -> None:
+    camera, eyes = TickingCamera(33_000_000), PlainEyes()
+    frames: list[weakref.ref[ColourImage]] = []
+    with ObservationFile(tmp_path / "o.jsonl") as observations:
+        recorder = RunRecorder(Recorder(observations, None, None, AROUND, timed=False), STRAIGHT)
+        for _ in range(MOST_WAITING + 10):
+            taken = camera.read(0.0)
+            frames.append(weakref.ref(taken.colour))
+            recorder.saw(eyes.look(taken))
+        del taken
+        gc.collect()
+        assert [kept() is None for kept in frames] == [True] * 10 + [False] * MOST_WAITING
+        recorder.decided(control_step(20_000_000, 33_000_000 * (MOST_WAITING + 9)))
+        recorder.finish()
+    lines = written(tmp_path / "o.jsonl")
+    assert [line["frame"] for line in lines] == list(range(MOST_WAITING + 10))
+    assert [line["decision"] is None for line in lines] == [True] * 10 + [False] * MOST_WAITING
+    assert capsys.readouterr().err == (
+        "treadwatch: 10 frames were recorded without a decision: none came within 45 frames\n"
+    )
+
+
+def test_where_nothing_is_recorded_no_frame_is_kept() -> None:
+    with open_recorder(RecordingOptions(), AROUND) as nothing:
+        recorder = RunRecorder(nothing, STRAIGHT)
+        taken = TickingCamera(33_000_000).read(0.0)
+        kept = weakref.ref(taken.colour)
+        recorder.saw(PlainEyes().look(taken))
+        del taken
+        gc.collect()
+        assert kept() is None
 
 
 def test_durations_are_written_only_where_time_is_real(tmp_path: FilePath) -> None:
