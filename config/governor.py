@@ -47,7 +47,10 @@ class GovernorConfig(Section):
         default=0.25, ge=0.05, le=2, description="without a command for so long: a jerk-limited stop"
     )
     resume_s: float = Field(
-        default=0.2, ge=0, le=5, description="after silence, commands must have come again for so long"
+        default=0.2,
+        ge=0,
+        le=5,
+        description="after silence, commands must have come again for so long; 0: the first one is obeyed",
     )
     late_s: float = Field(
         default=0.2, gt=0, le=2, description="a message this much later than the fastest one is not obeyed"
