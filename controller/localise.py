@@ -127,7 +127,10 @@ class Localiser:
         return self.pose
 
     def add_ego_motion(self, captured_ns: int, ego: EgoMotion) -> None:
-        """Learn from the rotation that the camera saw between the frame before and captured_ns."""
+        """Learn from the rotation that the camera saw between the frame before and captured_ns, if that is
+        known."""
+        if not (ego.motion.finite and math.isfinite(ego.dt_s)):
+            return
         before = self._odometry.at(captured_ns - round(ego.dt_s * NS_PER_S))
         after = self._odometry.at(captured_ns)
         if ego.source != "visual" or before is None or after is None or not ego.sigma_rotation_rad > 0.0:

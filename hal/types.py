@@ -6,6 +6,7 @@ A value that is not known is NaN or None, never 0.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -104,6 +105,11 @@ class PlanarPose:
     x_m: float
     y_m: float
     heading_rad: float
+
+    @property
+    def finite(self) -> bool:
+        """Every number is known."""
+        return math.isfinite(self.x_m + self.y_m + self.heading_rad)
 
 
 @dataclass(frozen=True, slots=True)

@@ -167,7 +167,7 @@ class Knowledge:
             self.health, self._captured_ns = scene.health, scene.captured_ns
             return ""
         pose = scene.robot_pose or self._poses.at(scene.captured_ns)
-        if pose is None:
+        if pose is None or not pose.finite:
             return "where the robot was when the scene was taken is not known"
         try:
             check_scan(scene.free_space)

@@ -122,8 +122,7 @@ class SpeedGovernor:
         measured_mps: by the chassis.
         """
         wish = Wish(Kind.REFUSED, why=silence) if requested is None else understand(requested, self._robot)
-        known_pose = math.isfinite(pose.x_m + pose.y_m + pose.heading_rad)
-        if known_pose:
+        if pose.finite:
             self._look(scene, pose, now_ns)
         self._choose_motion(wish)
         decision = self._decided(scene, pose, measured_mps, now_ns)
@@ -139,7 +138,7 @@ class SpeedGovernor:
         if scene is None or (self._scenes and scene.captured_ns <= self._scenes[-1].captured_ns):
             return
         then = scene.robot_pose or self._poses.at(scene.captured_ns)
-        if then is None or scene.captured_ns > now_ns:
+        if then is None or not then.finite or scene.captured_ns > now_ns:
             return
         if scene.health.condition is CameraCondition.UNTRUSTWORTHY:
             return  # the decision gets it and stops; nothing is learned of the ground
@@ -199,7 +198,7 @@ class SpeedGovernor:
         fits: what was seen lately is then looked at again, along the new arc."""
         arc = self._motion.kind is Kind.ARC
         wanted = (self._motion.curvature_1pm, self._motion.speed_mps) if arc else (0.0, self._shape.v_mps)
-        if not math.isfinite(pose.x_m + pose.y_m + pose.heading_rad):
+        if not pose.finite:
             pose = PlanarPose(0.0, 0.0, 0.0) if self._path is None else self._path.start
         if self._path is not None:
             self._on_path = on = self._path.project(pose, self._on_path.s_m)

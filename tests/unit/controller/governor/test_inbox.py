@@ -99,7 +99,7 @@ def test_one_lone_command_is_never_obeyed_while_resume_s_asks_for_more(timeout_s
 
 
 def test_two_commands_far_apart_do_not_keep_coming_and_three_do() -> None:
-    """A wait counts for half of resume_s at most: a slow planner needs a third message, and is obeyed then."""
+    """A wait counts for half of resume_s at most: a slow planner is obeyed from its third message on."""
     talk = Talk(resume_s=0.2, timeout_s=2.0)
     talk.say(1, 0)
     talk.poll(0)
