@@ -128,7 +128,10 @@ class Path:
         return self._projection.locate(points_m, velocity_mps, times_s, from_s_m, to_s_m)
 
     def speed_limit(self, s_m: float) -> float:
-        """The greatest speed at s_m so that every section and bend ahead is entered slowly enough, m/s."""
+        """The greatest speed at s_m so that every section and bend ahead is entered slowly enough, m/s.
+        Raises ValueError for NaN, which would pass for the path's beginning."""
+        if math.isnan(s_m):
+            raise ValueError("where on the path the robot is is not known: there is no speed for it")
         return _between(self._speed, min(max(0.0, s_m), self.length_m) / self._speed_step_m)
 
     def _piece_at(self, s_m: FloatArray) -> IntArray:
