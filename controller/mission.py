@@ -33,7 +33,7 @@ from hal.clocks import SimulatedClock
 
 
 def run_mission(options: MissionOptions) -> int:
-    """Drive once; the exit code: 0, or 1 if anything was touched or the target was missed.
+    """Drive once; the exit code: 0 where controller.result says that it succeeded, else 1.
 
     Raises ConfigError, HalError, UserError.
     """
