@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,11 +28,10 @@ NO_NUMBER = st.sampled_from([math.nan, math.inf, -math.inf])
 
 def changed(name: str, band: int, value: float) -> FreeSpace:
     """A free scan with one number changed; band counts for what is told of bands alone."""
-    told = getattr(FREE, name)
-    if not isinstance(told, np.ndarray):
-        return replace(FREE, **{name: value})
-    told = told.copy()
-    told[band] = value
+    told: Any = value
+    if isinstance(getattr(FREE, name), np.ndarray):
+        told = getattr(FREE, name).copy()
+        told[band] = value
     return replace(FREE, **{name: told})
 
 

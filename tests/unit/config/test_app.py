@@ -212,10 +212,10 @@ def test_a_ramp_softer_than_the_stopping_model_is_refused(
     assert "\n" not in told
 
 
-def frames(camera: dict[str, object], stale_s: float, **runner: object) -> dict[str, object]:
-    return SIM | {
-        "camera": {"kind": "simulated"} | camera,
-        "runner": SIM["runner"] | runner,
+def frames(camera: dict[str, object], stale_s: float) -> dict[str, object]:
+    return {
+        **SIM,
+        "camera": {"kind": "simulated", **camera},
         "decision": {"sight": {"stale_s": stale_s}},
     }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,7 @@ DRIVING = record(PLACE, drive(0.8), 12, QVGA).frames
 
 def healths(frames: list[RgbdFrame], odometry: list[Pose] | None = None) -> list[CameraHealth]:
     eyes = Perception(SMALL, MOUNT, 0.8, 0.05)
-    known = odometry or [None] * len(frames)
+    known: Sequence[Pose | None] = odometry or [None] * len(frames)
     return [eyes.perceive(frame, pose, None).scene.health for frame, pose in zip(frames, known, strict=True)]
 
 
