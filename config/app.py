@@ -8,8 +8,15 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from config.camera import CameraConfig
-from config.chassis import COMMAND_EARLY, ChassisConfig, PlantConfig, RoboteqChassisConfig
+from config.camera import AnyCameraConfig, CameraConfig, ReplayCameraConfig, SimulatedCameraConfig
+from config.chassis import (
+    COMMAND_EARLY,
+    AnyChassisConfig,
+    ChassisConfig,
+    PlantConfig,
+    RoboclawChassisConfig,
+    RoboteqChassisConfig,
+)
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.loader import Section, load, read_yaml
@@ -107,6 +114,65 @@ def _check_latency(runner: LockstepRunner | RealtimeRunner, decision: DecisionCo
         )
 
 
+def _check_frames(
+    camera: AnyCameraConfig,
+    runner: LockstepRunner | RealtimeRunner,
+    perception: PerceptionConfig,
+    decision: DecisionConfig,
+) -> None:
+    """Frames so rare that each scene is stale before the next would have the robot brake between any two.
+    Raises ValueError. Of a recording only the recording knows."""
+    if isinstance(camera, ReplayCameraConfig):
+        return
+    period_s, latency_s = 1.0 / camera.fps, 0.0
+    if isinstance(runner, LockstepRunner):
+        latency_s = runner.perception_latency_s
+    elif not isinstance(camera, SimulatedCameraConfig):
+        latency_s = camera.latency_s
+    if period_s + latency_s > decision.sight.stale_s + 1e-9:
+        raise ValueError(
+            f"camera.fps ({camera.fps:g}): a scene is {period_s + latency_s:.3g} s old before the next one "
+            f"comes, with the latency of {latency_s:g} s, and stale after decision.sight.stale_s "
+            f"({decision.sight.stale_s:g}): the robot would stop between any two; raise fps or stale_s"
+        )
+    if period_s > perception.max_gap_s:
+        raise ValueError(
+            f"camera.fps ({camera.fps:g}): frames are {period_s:.3g} s apart, more than perception.max_gap_s "
+            f"({perception.max_gap_s:g}), so no two would be compared; raise either"
+        )
+
+
+def _check_turns(robot: Robot, chassis: AnyChassisConfig) -> None:
+    """A turn that the base cannot make is slowed by the driver, speed and all, in one step. Raises
+    ValueError."""
+    limits = robot.limits
+    makes_radps = chassis.top_yaw_rate_radps(limits.max_speed_mps)
+    if limits.max_yaw_rate_radps > makes_radps:
+        raise ValueError(
+            f"robot.limits.max_yaw_rate_radps ({limits.max_yaw_rate_radps:g}) is more than the base makes by "
+            f"its section chassis, {makes_radps:.4g} rad/s where it goes at robot.limits.max_speed_mps "
+            f"({limits.max_speed_mps:g}): lower the yaw rate, or the speed if that leaves too little"
+        )
+
+
+def _check_ramp(robot: Robot, chassis: RoboclawChassisConfig) -> None:
+    """A controller that brakes more softly than the stopping model does drives on where a stop was promised.
+
+    The outer track of a bend of radius R goes, and brakes, 1 + width / 2R times as hard as the middle; no
+    bend and no arc is tighter than half the body's width. Raises ValueError.
+    """
+    hardest_mps2 = robot.limits.emergency_decel_mps2
+    needed_mps2 = hardest_mps2 * (1.0 + chassis.effective_width_m / robot.body.width_m)
+    ramp_mps2 = chassis.accel_qpps2 / chassis.counts_per_m
+    if ramp_mps2 < needed_mps2:
+        raise ValueError(
+            f"chassis.accel_qpps2 ({chassis.accel_qpps2}) is a ramp of {ramp_mps2:.3g} m/s2, but to stop at "
+            f"robot.limits.emergency_decel_mps2 ({hardest_mps2:g}) the outer track of the tightest bend has "
+            f"to slow down at {needed_mps2:.3g} m/s2: the base would stop later than is reckoned with; write "
+            f"at least {math.ceil(needed_mps2 * chassis.counts_per_m)}, or lower the limit"
+        )
+
+
 class AppConfig(Section):
     """What `treadwatch run` and `treadwatch govern` read with --config FILE."""
 
@@ -128,6 +194,7 @@ class AppConfig(Section):
         _check_speeds(self.robot, self.perception)
         _check_range(self.perception, self.decision)
         _check_latency(self.runner, self.decision)
+        _check_frames(self.camera, self.runner, self.perception, self.decision)
         if self.robot.limits.max_speed_mps > self.chassis.top_speed_mps:
             raise ValueError(
                 f"robot.limits.max_speed_mps ({self.robot.limits.max_speed_mps:g}) is more than the base "
@@ -148,10 +215,13 @@ class AppConfig(Section):
             raise ValueError("a simulation drives the path of its scenario: write it there, not here")
         if not simulated:
             self._check_real_robot()
+        _check_turns(self.robot, self.chassis)
         if self.runner.kind == "lockstep" and not simulated:
             raise ValueError(
                 "runner.kind 'lockstep' runs on simulated time and needs camera.kind 'simulated'"
             )
+        if self.chassis.kind == "roboclaw":
+            _check_ramp(self.robot, self.chassis)
         if self.chassis.kind == "roboclaw" and self.runner.control_rate_hz < ROBOCLAW_RATE_HZ:
             raise ValueError(
                 f"runner.control_rate_hz must be at least {ROBOCLAW_RATE_HZ:g} with a RoboClaw, "

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ipaddress
-from collections.abc import Mapping
-from types import MappingProxyType
+from abc import abstractmethod
 from typing import Annotated, Literal, Self, get_args
 from urllib.parse import urlsplit
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
+from config.agilex import AGILEX_TOP_SPEED_MPS, AGILEX_TOP_YAW_RATE_RADPS, NO_SERIAL, AgilexModelName
 from config.loader import Section
 
 # A command may be early by a quarter of its period: a loop with jitter would else miss every other one.
@@ -97,31 +97,6 @@ def _names_host_and_port(url: str) -> bool:
         return False
 
 
-AgilexModelName = Literal["bunker", "bunker_mini", "bunker_pro", "scout", "scout_mini", "tracer"]
-
-# Why a model cannot be reached over RS-232.
-NO_SERIAL: Mapping[AgilexModelName, str] = MappingProxyType(
-    {
-        "bunker_mini": "it has CAN only",
-        "bunker_pro": "it has CAN only",
-        "tracer": "its serial line speaks another protocol (percentages), which has no driver here",
-    }
-)
-
-
-# What a model makes; where the numbers are from: hal/chassis/agilex_models.py.
-AGILEX_TOP_SPEED_MPS: Mapping[AgilexModelName, float] = MappingProxyType(
-    {
-        "bunker": 3.0,
-        "bunker_mini": 1.5,
-        "bunker_pro": 1.5,
-        "scout": 1.5,
-        "scout_mini": 3.0,
-        "tracer": 1.5,
-    }
-)
-
-
 def _wire(link: object) -> str:
     """Which of the two link sections this is: a serial port has a url."""
     if isinstance(link, dict):
@@ -163,6 +138,11 @@ class AgilexChassisConfig(Section):
         """No command goes beyond it."""
         return AGILEX_TOP_SPEED_MPS[self.model]
 
+    def top_yaw_rate_radps(self, v_mps: float) -> float:
+        """How fast it turns at most, at any speed v_mps; its limit is of what it is told, slip_factor times
+        that. With more, as with more than top_speed_mps, the driver would slow the robot in one step."""
+        return AGILEX_TOP_YAW_RATE_RADPS[self.model] / self.slip_factor
+
     @model_validator(mode="after")
     def _has_that_wire(self) -> Self:
         if isinstance(self.link, SerialLinkConfig) and self.model in NO_SERIAL:
@@ -199,6 +179,20 @@ class _TwoChannelConfig(Section):
     def right_sign(self) -> int:
         """Direction of channel 2 that means ahead."""
         return -1 if self.invert_right else 1
+
+    @property
+    def effective_width_m(self) -> float:
+        """See hal.chassis.tracks.TrackGeometry."""
+        return self.track_width_m * self.slip_factor
+
+    @property
+    @abstractmethod
+    def top_speed_mps(self) -> float:
+        """No command to a track goes beyond it."""
+
+    def top_yaw_rate_radps(self, v_mps: float) -> float:
+        """With which the outer track goes as fast as it may, where the middle goes at v_mps."""
+        return 2.0 * max(self.top_speed_mps - v_mps, 0.0) / self.effective_width_m
 
 
 class RoboclawChassisConfig(_TwoChannelConfig):
@@ -242,8 +236,9 @@ class RoboteqChassisConfig(_TwoChannelConfig):
         return self.full_speed_mps
 
 
-# What a wheel of a Kobuki makes (its user guide: 70 cm/s).
+# What a wheel of a Kobuki makes (its user guide: 70 cm/s), and how far apart its wheels are.
 KOBUKI_TOP_SPEED_MPS = 0.7
+KOBUKI_WHEEL_BASE_M = 0.23
 
 
 class KobukiChassisConfig(Section):
@@ -270,6 +265,11 @@ class KobukiChassisConfig(Section):
     def top_speed_mps(self) -> float:
         """No command goes beyond it."""
         return self.max_speed_mps
+
+    def top_yaw_rate_radps(self, v_mps: float) -> float:
+        """With which the outer wheel goes as fast as it makes, where the middle goes at v_mps."""
+        outer_radps = 2.0 * max(KOBUKI_TOP_SPEED_MPS - v_mps, 0.0) / (KOBUKI_WHEEL_BASE_M * self.slip_factor)
+        return min(self.max_yaw_rate_radps, outer_radps)
 
 
 AnyChassisConfig = (

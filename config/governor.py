@@ -50,7 +50,10 @@ class GovernorConfig(Section):
         description="without a command for this long, the robot makes a jerk-limited stop",
     )
     resume_s: float = Field(
-        default=0.2, ge=0, le=5, description="after silence, commands must have arrived again for this long"
+        default=0.2,
+        ge=0,
+        le=5,
+        description="after silence, commands must have kept coming for this long; 0: the first one is obeyed",
     )
     late_s: float = Field(
         default=0.2, gt=0, le=2, description="a message this much later than the fastest one is not obeyed"

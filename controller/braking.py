@@ -61,7 +61,7 @@ def stop(v_mps: float, a_mps2: float, limits: BrakeLimits) -> Stop:
     """
     distance_m, time_s = _one_stop(v_mps, a_mps2, limits.decel_mps2, limits.jerk_mps3)
     if math.isnan(distance_m):
-        _check_state(v_mps, a_mps2)
+        raise _unknown(v_mps, a_mps2)
     return Stop(distance_m, time_s)
 
 
@@ -75,14 +75,14 @@ def required_distance(
 ) -> float:
     """The distance at which something must be seen so that the robot stands before it arrives, in metres.
 
-    S_n = (V + V_o) tau + S(V, a) + V_o T(V, a) + margin (motion-formulas 4.8). closing_mps is the speed of
-    the obstacle itself towards the robot; what moves away counts as standing.
+    S_n = (V + V_o) tau + S(V, a) + V_o T(V, a) + margin (motion-formulas 4.8). closing_mps: of the obstacle's
+    own towards the robot; what moves away counts as standing. Raises ValueError as stop(), and for any NaN.
     """
     decel_mps2, jerk_mps3 = limits.decel_mps2, limits.jerk_mps3
-    required_m = _required_m(v_mps, a_mps2, closing_mps, latency_s, decel_mps2, jerk_mps3)
+    required_m = margin_m + _required_m(v_mps, a_mps2, closing_mps, latency_s, decel_mps2, jerk_mps3)
     if math.isnan(required_m):
-        _check_state(v_mps, a_mps2)
-    return required_m + margin_m
+        raise _unknown(v_mps, a_mps2, closing_mps, latency_s, margin_m)
+    return required_m
 
 
 def speed_for_distance(
@@ -96,12 +96,14 @@ def speed_for_distance(
 ) -> float:
     """The greatest speed with required_distance(...) <= distance_m: its inverse; 0 where none fits.
 
-    a_mps2: the present acceleration. Without it, where A is reached, this is
-    v = -A b + sqrt(A^2 b^2 + 2 A d) with b = tau + A / 2J + V_o / A (4.7), else the root of a cubic in
-    sqrt(v).
+    a_mps2: the present acceleration. Without it, where A is reached, this is v = -A b + sqrt(A^2 b^2 + 2 A d)
+    with b = tau + A / 2J + V_o / A (4.7), else the root of a cubic in sqrt(v). Raises ValueError for NaN.
     """
     free_m = distance_m - margin_m
-    return _speed_for(free_m, a_mps2, closing_mps, latency_s, limits.decel_mps2, limits.jerk_mps3)
+    v_mps = _speed_for(free_m, a_mps2, closing_mps, latency_s, limits.decel_mps2, limits.jerk_mps3)
+    if math.isnan(v_mps):
+        raise _unknown(distance_m, a_mps2, closing_mps, latency_s, margin_m)
+    return v_mps
 
 
 def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float:
@@ -112,9 +114,9 @@ def slowing_distance(v_mps: float, end_mps: float, limits: BrakeLimits) -> float
 
 
 def speed_before_section(distance_m: float, section_mps: float, limits: BrakeLimits) -> float:
-    """The greatest steady speed from which section_mps (ValueError below 0) is met within distance_m."""
-    if not section_mps >= 0.0:
-        raise ValueError(f"a section's speed is 0 or more, got {section_mps} m/s")
+    """The greatest steady speed from which section_mps is met within distance_m. ValueError: below 0, NaN."""
+    if not section_mps >= 0.0 or math.isnan(distance_m):
+        raise ValueError(f"a section has a place and a speed >= 0, got {distance_m} m, {section_mps} m/s")
     if distance_m <= 0.0:
         return section_mps
     return _before_section(distance_m, section_mps, limits.decel_mps2, limits.jerk_mps3)
@@ -146,9 +148,8 @@ def paper_detection_distance(v_mps: float, closing_mps: float, decel_mps2: float
     return required_distance(v_mps, 0.0, closing_mps, 0.0, BrakeLimits(decel_mps2, math.inf))
 
 
-def _check_state(v_mps: float, a_mps2: float) -> None:
-    if not (0.0 <= v_mps < math.inf and math.isfinite(a_mps2)):
-        raise ValueError(f"a stop needs a known speed >= 0 and acceleration, got {v_mps} m/s, {a_mps2} m/s2")
+def _unknown(*given: float) -> ValueError:
+    return ValueError(f"a stop needs a known speed >= 0, acceleration, distances and times, got {given}")
 
 
 @inlined
@@ -237,8 +238,7 @@ def _bisect_speed(
     """The rare states: the law is not one closed form, but it still grows with the speed."""
     # Too fast: easing the acceleration off sheds a^2 / J at most, and from what is left v^2 / 2A is too far.
     # free_m is below 0 only by rounding of what is next to nothing.
-    room_m = max(free_m, 0.0)
-    low, high = 0.0, math.sqrt(2.0 * big_a * room_m) + abs(a_mps2) + a_mps2**2 / j
+    low, high = 0.0, math.sqrt(2.0 * big_a * max(free_m, 0.0)) + abs(a_mps2) + a_mps2**2 / j
     for _ in range(_NEWTON_STEPS):
         middle = 0.5 * (low + high)
         if _required(middle, a_mps2, towards_mps, latency_s, big_a, j) <= free_m:
@@ -269,19 +269,19 @@ def _slowing_m(v_mps: float, end_mps: float, big_a: float, j: float) -> float:
 def _speed_for(
     free_m: float, a_mps2: float, closing_mps: float, latency_s: float, big_a: float, j: float
 ) -> float:
-    """speed_for_distance() without a margin."""
+    """speed_for_distance() without a margin; NaN where anything is."""
+    if math.isnan(free_m) or math.isnan(a_mps2) or math.isnan(closing_mps) or math.isnan(latency_s):
+        return math.nan
     towards_mps = max(closing_mps, 0.0)
-    # Even who stands needs what comes nearer during the latency.
-    if free_m <= towards_mps * latency_s:
+    # Even who stands needs what comes nearer during the latency; whoever comes without end leaves no speed.
+    if not (free_m > towards_mps * latency_s and towards_mps + latency_s < math.inf):
         return 0.0
     if abs(a_mps2) > big_a:
         return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, big_a, j)
     # In terms of u = v + a^2 / 2J, every a adds only a linear term and a constant to the law for a = 0.
     extra_s = latency_s + a_mps2 / j
     shift_mps = a_mps2 * a_mps2 / (2.0 * j)
-    constant_m = (
-        a_mps2**3 / (3.0 * j * j) - extra_s * shift_mps + towards_mps * (latency_s + a_mps2 / j) - free_m
-    )
+    constant_m = a_mps2**3 / (3.0 * j * j) - extra_s * shift_mps + towards_mps * extra_s - free_m
     speed = _solve_from_steady(extra_s, towards_mps, constant_m, big_a, j) - shift_mps
     if a_mps2 < 0.0 and speed < shift_mps:
         return _bisect_speed(free_m, a_mps2, towards_mps, latency_s, big_a, j)

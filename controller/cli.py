@@ -38,7 +38,11 @@ def cli() -> None:
 @config_option("of robot, camera, chassis and path")
 @mission_options
 def run(options: MissionOptions) -> None:
-    """Drive the path. Exit code 1 if anything was touched or the target was missed."""
+    """Drive the path.
+
+    Exit code 0 if the target was reached, or the robot came to rest before it because a signal (Ctrl-C,
+    SIGTERM) asked for that, and nothing was touched and the limits were kept; else 1.
+    """
     from controller.mission import run_mission
 
     sys.exit(run_mission(options))
@@ -53,7 +57,8 @@ def govern(options: MissionOptions) -> None:
     """Slow another planner's commands down to what is safe.
 
     It sends (v, w), until SIGTERM. The messages, and a client in thirty lines: docs/governor.md.
-    Exit code 1 if anything was touched.
+    Exit code 0 if the robot came to rest as the signal asked, nothing was touched and the limits were kept;
+    else 1.
     """
     from controller.governor.command import run_governor
 

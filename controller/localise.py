@@ -145,8 +145,10 @@ class Localiser:
         return self._pose
 
     def add_ego_motion(self, captured_ns: int, ego: EgoMotion) -> None:
-        """Learn from the rotation that the camera saw between the frame before and captured_ns. What is not
-        finite teaches nothing: the sums would never be rid of it."""
+        """Learn from the rotation that the camera saw between the frame before and captured_ns.
+
+        What is not finite teaches nothing: the sums would never be rid of it.
+        """
         if not (math.isfinite(ego.dt_s) and ego.motion.finite):
             return
         before = self._odometry.at(captured_ns - round(ego.dt_s * NS_PER_S))

@@ -113,7 +113,7 @@ class PlanarPose:
 
     @property
     def finite(self) -> bool:
-        """Every number is one."""
+        """Every number is known."""
         return math.isfinite(self.x_m + self.y_m + self.heading_rad)
 
 

@@ -76,7 +76,7 @@ class Detector:
         odometry = odometry if odometry is None or odometry.finite else None
         grey = np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
         grid = self._grid(frame)
-        check = self._health.check(frame, grey, grid)
+        check = self._health.check(frame, grey, grid, odometry)
         usable = check.usable_colour and check.usable_depth
         health = check.health
         if self._mount is not None and usable:

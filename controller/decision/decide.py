@@ -159,19 +159,26 @@ class DecisionMaker:
 
         return Limit(end, why)
 
-    def _camera_limits(self, known: Knowledge) -> list[Limit]:
+    def camera_limit(self, known: Knowledge) -> Limit | None:
+        """What the camera's condition alone allows, wherever the robot goes; None: it limits nothing."""
         sight = self._config.sight
         if known.fault:
             # Brake hard if bodies were moving when the camera failed, or if it failed so long ago that
             # somebody may have come since.
             urgent = bool(known.bodies.moving.any()) or known.since_s > sight.blind_s
             reason = Reason("camera", f"{known.fault}: stop")
-            return [Limit(0.0, lambda: reason, urgent=urgent)]
-        found = [self._range_limit(known.age_s)]
-        if known.health.condition is CameraCondition.DEGRADED:
-            sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"
-            found.append(Limit(sight.degraded_mps, lambda: Reason("camera", sentence)))
-        return found
+            return Limit(0.0, lambda: reason, urgent=urgent)
+        if known.health.condition is not CameraCondition.DEGRADED:
+            return None
+        sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"
+        return Limit(sight.degraded_mps, lambda: Reason("camera", sentence))
+
+    def _camera_limits(self, known: Knowledge) -> list[Limit]:
+        by_condition = self.camera_limit(known)
+        if known.fault and by_condition is not None:
+            return [by_condition]
+        by_range = self._range_limit(known.age_s)
+        return [by_range] if by_condition is None else [by_range, by_condition]
 
     def _range_limit(self, age_s: float) -> Limit:
         """The limit by the camera's range: stand before an obstacle arrives from beyond it at V_omax.

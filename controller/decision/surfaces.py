@@ -17,6 +17,11 @@ from vision.scene import FreeSpace
 # A point this near to an obstacle's box is part of it: swinging limbs, a box that lags a little.
 AROUND_M = 0.3
 _DEPTH_SIGMAS = 3.5
+# Bands stand side by side: the middles of two are as far apart as a band is wide, to such a share.
+_APART = 0.1
+_NO_SCAN = "the scan of the free space is impossible"
+# In the order in which _impossible() looks at them.
+_LOOKED_AT = ("half_width_tan", "blind_m", "floor_from_m", "up_tan", "bearing_tan", "nearest_m", "known_m")
 
 
 @record(frozen=True, slots=True, eq=False)
@@ -43,12 +48,28 @@ NO_SURFACES = Surfaces(np.zeros(0), np.zeros(0, np.intp), np.zeros(0), np.zeros(
 
 
 def check_scan(free: FreeSpace) -> None:
-    """Raises SceneError where free does not tell the same of every band: what reads it goes by number."""
+    """Raises SceneError where free does not tell the same of every band (what reads it goes by number), or
+    tells what cannot be: NaN compares as free somewhere, and a distance below 0 is nowhere ahead."""
     bands = free.bearing_tan.shape
     blank = np.zeros(bands, np.bool_) if free.blank is None else free.blank
     alike = len(bands) == 1 and free.nearest_m.shape == free.known_m.shape == blank.shape == bands
     if not (alike and free.bearing_tan.dtype == free.nearest_m.dtype == free.known_m.dtype == np.float64):
-        raise SceneError("the scan of the free space is impossible: its bands are not told of alike")
+        raise SceneError(f"{_NO_SCAN}: its bands are not told of alike")
+    wrong, band = _impossible(
+        free.bearing_tan,
+        free.nearest_m,
+        free.known_m,
+        free.half_width_tan,
+        free.blind_m,
+        free.floor_from_m,
+        free.up_tan,
+    )
+    if wrong < 0:
+        return
+    name, value = _LOOKED_AT[wrong], getattr(free, _LOOKED_AT[wrong])
+    if band >= 0:
+        raise SceneError(f"{_NO_SCAN}: {name} of band {band} is {value[band]:g}")
+    raise SceneError(f"{_NO_SCAN}: {name} is {value:g}")
 
 
 def surfaces_of(
@@ -122,6 +143,38 @@ def _eye(pose: PlanarPose, mount: CameraMount) -> tuple[float, float, float, flo
         cos,
         sin,
     )
+
+
+@compiled("float64[:], float64[:], float64[:], float64, float64, float64, float64")
+def _impossible(
+    bearing_tan: FloatArray,
+    nearest_m: FloatArray,
+    known_m: FloatArray,
+    half_width_tan: float,
+    blind_m: float,
+    floor_from_m: float,
+    up_tan: float,
+) -> tuple[int, int]:
+    """Which of _LOOKED_AT cannot be and, of what is told of bands, in which band; -1 for what is none."""
+    # Written so that NaN fails every comparison.
+    if not 0.0 < half_width_tan < math.inf:
+        return 0, -1
+    if not 0.0 <= blind_m < math.inf:
+        return 1, -1
+    if not 0.0 <= floor_from_m < math.inf:
+        return 2, -1
+    if not up_tan > -math.inf:
+        return 3, -1
+    width_tan = 2.0 * half_width_tan
+    for b in range(len(bearing_tan)):
+        apart_tan = width_tan if b == 0 else bearing_tan[b] - bearing_tan[b - 1]
+        if not (math.isfinite(bearing_tan[b]) and abs(apart_tan - width_tan) <= _APART * width_tan):
+            return 4, b
+        if not nearest_m[b] >= 0.0:
+            return 5, b
+        if not 0.0 <= known_m[b] < math.inf:
+            return 6, b
+    return -1, -1
 
 
 @compiled("float64[:], float64")

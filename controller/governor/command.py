@@ -38,7 +38,7 @@ class Governing(DriveResult):
 
 
 def run_governor(options: MissionOptions) -> int:
-    """Govern until SIGTERM; the exit code: 0, or 1 if anything was touched, broken or given up.
+    """Govern until SIGTERM; the exit code: 0 where Governing says that it succeeded, else 1.
 
     Raises ConfigError, HalError, UserError.
     """

@@ -46,7 +46,6 @@ _STANDING_MPS = 0.01
 _SAME_MPS = 1e-3
 # At the end of the camera's range 10 cm aside, and a centimetre where the robot may have to stop.
 _SAME_1PM = 0.002
-_CAMERA_RULES = frozenset({"camera", "fault"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,24 +220,23 @@ class SpeedGovernor:
         return path
 
     def _turn(self, decision: Decision, pose: PlanarPose, now_ns: int) -> Decision:
-        """A turn in place: only what the camera's condition says is taken from the decision ahead."""
+        """A turn in place: of the decision ahead only the faults count. The camera's condition is asked for
+        by itself: as the reason ahead, it may stand behind another limit that is lower for the moment."""
         assert self._known is not None
-        speed_mps = self._motion.speed_mps
-        objection = ""
-        if decision.reason.rule in _CAMERA_RULES:
-            speed_mps = min(speed_mps, decision.target_speed_mps)
-            if speed_mps <= 0.0:
-                objection = decision.reason.sentence
-        elif self._known.lens.covered:
-            objection = f"{COVERED}: stop"
-        else:
-            objection = turn_objection(
-                self._ground, self._known.bodies, pose, self._robot, self._decision,
-                self._config.turn_memory_s, now_ns,
-            )  # fmt: skip
+        if decision.reason.rule == "fault":
+            return self._with(decision, 0.0, decision.reason, emergency=False)
+        camera = self._decide.camera_limit(self._known)
+        if camera is not None and camera.speed_mps <= 0.0:
+            return self._with(decision, 0.0, camera.reason, emergency=False)
+        objection = f"{COVERED}: stop" if self._known.lens.covered else turn_objection(
+            self._ground, self._known.bodies, pose, self._robot, self._decision,
+            self._config.turn_memory_s, now_ns,
+        )  # fmt: skip
         if objection:
-            rule = decision.reason.rule if decision.reason.rule in _CAMERA_RULES else "turn"
-            return self._with(decision, 0.0, Reason(rule, objection), emergency=rule == "turn")
+            return self._with(decision, 0.0, Reason("turn", objection), emergency=True)
+        speed_mps = self._motion.speed_mps
+        if camera is not None and camera.speed_mps < speed_mps:
+            return self._with(decision, camera.speed_mps, camera.reason, emergency=False)
         yaw_radps = self._motion.left * speed_mps / corner_m(self._robot)
         reason = Reason("requested", f"turns in place at {yaw_radps:.2f} rad/s")
         return self._with(decision, speed_mps, reason, emergency=False)

@@ -25,6 +25,9 @@ _MOST_A_POLL = 64
 _DRIFT = 1e-3
 # Of what is allowed: so late the message before a late one was where lateness grows.
 _GROWN = 0.5
+# Of resume_s: what one wait for a message counts for at most, so that two messages alone do not keep coming.
+_ONE_WAIT = 0.5
+_ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +41,15 @@ class Asked:
 @dataclass(slots=True)
 class _Session:
     """One planner while it has the command. least_offset_s: our clock minus its, of its fastest message.
-    late_s: how much later than that one the last one came."""
+    late_s: how much later than that one the last one came. steady_s: for how long its messages have kept
+    coming, up to the last one: the time since then proves nothing."""
 
     sender: Sender | None
-    began_ns: int
     last: Request
     last_ns: int
     least_offset_s: float
     late_s: float = 0.0
+    steady_s: float = 0.0
 
     def lateness_s(self, offset_s: float, now_ns: int) -> float:
         """Of a message that comes now."""
@@ -77,9 +81,8 @@ class Inbox:
             if self._heard_ns is None:
                 return Asked(None, "no command yet")
             return Asked(None, f"no command for {(now_ns - self._heard_ns) // NS_PER_MS} ms")
-        steady_s = (now_ns - session.began_ns) / NS_PER_S
-        if steady_s < self._config.resume_s:
-            return Asked(None, f"commands have come for only {steady_s:.2f} s")
+        if session.steady_s < self._config.resume_s - _ROUNDING_S:
+            return Asked(None, f"commands have come for only {session.steady_s:.2f} s")
         return Asked(session.last.twist)
 
     def tell(self, v_mps: float, w_radps: float, decision: Decision, chassis: str) -> None:
@@ -120,11 +123,13 @@ class Inbox:
             if (sender, request) == self._heard:
                 self._drop("duplicate", f"seq {request.seq} came again after silence")
                 return
-            session = self._session = _Session(sender, now_ns, request, now_ns, offset_s)
+            session = self._session = _Session(sender, request, now_ns, offset_s)
         elif not self._in_order(session, request, sender, offset_s, now_ns):
             return
         session.late_s = max(session.lateness_s(offset_s, now_ns), 0.0)
         session.least_offset_s = offset_s - session.late_s
+        waited_s = (now_ns - session.last_ns) / NS_PER_S
+        session.steady_s += min(waited_s, _ONE_WAIT * self._config.resume_s)
         session.last, session.last_ns = request, now_ns
         self._heard, self._heard_ns = (sender, request), now_ns
         self._to_answer = request

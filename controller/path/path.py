@@ -134,7 +134,12 @@ class Path:
         return self._projection.locate(points_m, velocity_mps, times_s, from_s_m, to_s_m)
 
     def speed_limit(self, s_m: float) -> float:
-        """The greatest speed at s_m, in m/s, at which every slower section and bend ahead can be met."""
+        """The greatest speed at s_m, in m/s, at which every slower section and bend ahead can be met.
+
+        Raises ValueError for NaN, which would pass for the beginning of the path.
+        """
+        if math.isnan(s_m):
+            raise ValueError("the robot's place on the path is not known: there is no speed limit for it")
         return _between(self._speed, min(max(0.0, s_m), self.length_m) / self._speed_step_m)
 
     def _piece_at(self, s_m: FloatArray) -> IntArray:

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from config.chassis import AGILEX_TOP_SPEED_MPS, AgilexChassisConfig, SerialLinkConfig
+from config.agilex import AGILEX_TOP_SPEED_MPS, AGILEX_TOP_YAW_RATE_RADPS
+from config.chassis import AgilexChassisConfig, SerialLinkConfig
 
 VEHICLE_NORMAL = 0
 VEHICLE_ESTOP = 1
@@ -93,14 +94,18 @@ def _describe(bits: int, names: Mapping[int, str], what: str) -> tuple[str, ...]
 
 # Limits: the vendor's SDK for BUNKER (robot_limits). The fault table was published only as pictures, so every
 # bit is reported by its number until it has been checked on a robot.
-BUNKER = AgilexModel(name="bunker", max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker"], max_yaw_rate_radps=2.5235)
+BUNKER = AgilexModel(
+    name="bunker",
+    max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker"],
+    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["bunker"],
+)
 
 # BUNKER MINI manual pp. 7-9: CAN only; 0x421 every 20 ms, or the base leaves command mode after 500 ms. No
 # limits were found: these are what the paper's task needs.
 BUNKER_MINI = AgilexModel(
     name="bunker_mini",
     max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker_mini"],
-    max_yaw_rate_radps=1.0,
+    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["bunker_mini"],
     mode_serial=None,
     mode_period_ms=20,
 )
@@ -109,7 +114,7 @@ BUNKER_MINI = AgilexModel(
 BUNKER_PRO = AgilexModel(
     name="bunker_pro",
     max_speed_mps=AGILEX_TOP_SPEED_MPS["bunker_pro"],
-    max_yaw_rate_radps=1.0,
+    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["bunker_pro"],
     mode_serial=None,
 )
 
@@ -117,7 +122,7 @@ BUNKER_PRO = AgilexModel(
 SCOUT = AgilexModel(
     name="scout",
     max_speed_mps=AGILEX_TOP_SPEED_MPS["scout"],
-    max_yaw_rate_radps=0.5235,
+    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["scout"],
     actuators=4,
     system_faults=MappingProxyType(
         {
@@ -142,7 +147,7 @@ SCOUT = AgilexModel(
 SCOUT_MINI = AgilexModel(
     name="scout_mini",
     max_speed_mps=AGILEX_TOP_SPEED_MPS["scout_mini"],
-    max_yaw_rate_radps=2.5235,
+    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["scout_mini"],
     actuators=4,
 )
 
@@ -151,7 +156,7 @@ SCOUT_MINI = AgilexModel(
 TRACER = AgilexModel(
     name="tracer",
     max_speed_mps=AGILEX_TOP_SPEED_MPS["tracer"],
-    max_yaw_rate_radps=0.7853,
+    max_yaw_rate_radps=AGILEX_TOP_YAW_RATE_RADPS["tracer"],
     mode_names=MappingProxyType({0: "remote control or standby", 1: "CAN", 2: "serial"}),
     mode_serial=None,
     modes_remote=frozenset(),

@@ -14,7 +14,9 @@ from functools import reduce
 from operator import xor
 from types import MappingProxyType
 
-WHEEL_BASE_M = 0.23
+from config.chassis import KOBUKI_WHEEL_BASE_M
+
+WHEEL_BASE_M = KOBUKI_WHEEL_BASE_M
 WHEEL_RADIUS_M = 0.035
 TICK_M = 0.002436916871363930187454 * WHEEL_RADIUS_M
 ENCODER_BITS = 16

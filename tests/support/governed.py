@@ -49,11 +49,12 @@ class GovernedDrive:
         lag_s: float = 0.1,
         yaw_ratio: float = 1.0,
         config: GovernorConfig | None = None,
+        decision: DecisionConfig | None = None,
     ) -> None:
         self.robot = Robot()
         self.planner, self.alter = planner, alter
         self.governor = SpeedGovernor(
-            config or GovernorConfig(), DecisionConfig(), self.robot, MOUNT, PERIOD_S
+            config or GovernorConfig(), decision or DecisionConfig(), self.robot, MOUNT, PERIOD_S
         )
         self._eyes = Mission(straight(1.0), things or [], noise)
         self._lag_s, self._yaw_ratio = lag_s, yaw_ratio

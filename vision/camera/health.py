@@ -9,7 +9,8 @@ import numpy as np
 
 from config.perception import PerceptionConfig
 from hal.compiled import compiled
-from hal.types import RgbdFrame
+from hal.types import Pose, RgbdFrame
+from vision.camera.frozen_depth import FrozenDepth
 from vision.depth.depth_grid import DepthGrid
 from vision.fragments.edges import GreyImage
 from vision.scene import CameraCondition, CameraHealth
@@ -53,11 +54,14 @@ class HealthMonitor:
         self._last_ns: int | None = None
         self._last_grey: GreyImage = np.empty((0, 0), np.uint8)
         self._same = 0
+        self._frozen_depth = FrozenDepth()
         self._earlier_ns: int | None = None
         self._earlier_frames = 0
 
-    def check(self, frame: RgbdFrame, grey: GreyImage, grid: DepthGrid) -> FrameCheck:
-        """The worst finding decides the condition; each finding has its sentence."""
+    def check(
+        self, frame: RgbdFrame, grey: GreyImage, grid: DepthGrid, odometry: Pose | None = None
+    ) -> FrameCheck:
+        """The worst finding decides the condition; each finding has its sentence. odometry: of the camera."""
         dark, bright, alike = _samples(grey, self._last_grey)
         continuity, gap_s = self._continuity(frame)
         problems: list[tuple[CameraCondition, str]] = []
@@ -70,12 +74,13 @@ class HealthMonitor:
             problems.append((bad, "frame has the time of the one before: it is a repetition"))
         elif continuity is Continuity.GAP:
             problems.append((poor, f"{gap_s:.2f} s without a frame: motion cannot be compared across it"))
-        # Colour alone: a sensor's noise never repeats, whatever depth does beside it.
+        # Colour alone: a sensor's noise never repeats, whatever depth does beside it (frozen_depth.py).
         # Hardly any gets past the comparison of samples.
         repeated = alike and bool((self._last_grey == grey).all())
         self._same = self._same + 1 if repeated else 0
         if self._same >= _FROZEN_FRAMES:
             problems.append((bad, f"image has not changed by a single grey level for {self._same} frames"))
+        frozen = self._frozen_depth.step(frame.depth, grey, odometry, repeated)
         usable_colour = max(dark, bright) < _BAD_SHARE
         if dark >= _BAD_SHARE:
             problems.append((bad, f"{dark:.0%} of the colour image is black: is the lens covered?"))
@@ -90,6 +95,8 @@ class HealthMonitor:
             problems.append((bad, f"only {near_share:.1%} of the depth image holds {within}"))
         elif share < _POOR_DEPTH_SHARE:
             problems.append((poor, f"only {share:.0%} of the depth image holds data"))
+        if usable_depth and frozen:
+            problems.append((bad, f"depth has not changed by a single unit for {frozen} frames of motion"))
         if continuity is not Continuity.BACKWARD:
             self._last_ns = frame.captured_ns
             self._last_grey = grey

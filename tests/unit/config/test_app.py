@@ -72,7 +72,7 @@ def test_what_the_speed_counts_on_having_seen_must_be_looked_at(
     ("shipped", "too_fast_mps", "makes"),
     [
         ("hil-kobuki.yaml", 0.8, "0.7"),
-        ("hil-roboclaw.yaml", 1.2, "1.16667"),
+        ("hil-roboclaw.yaml", 1.3, "1.25"),
         ("hil-roboteq.yaml", 1.6, "1.5"),
         ("hil-agilex.yaml", 3.5, "3"),
     ],
@@ -155,6 +155,97 @@ def test_a_latency_with_which_every_scene_is_stale_is_refused(tmp_path: Path) ->
     def late(latency_s: float) -> dict[str, object]:
         return {**SIM, "runner": {**SIM["runner"], "perception_latency_s": latency_s}}
 
-    load_app(written(tmp_path, late(0.29)))
+    load_app(written(tmp_path, late(0.26)))
     with pytest.raises(ConfigError, match=r"latency_s \(0\.3\) must be less than decision\.sight\.stale_s"):
         load_app(written(tmp_path, late(0.3)))
+
+
+@pytest.mark.parametrize(
+    ("shipped", "chassis", "limits", "makes"),
+    [
+        ("hil-agilex.yaml", {"model": "scout", "slip_factor": 1.0}, {}, "0.5235"),
+        ("hil-agilex.yaml", {"model": "tracer", "slip_factor": 1.1}, {}, "0.7139"),
+        # 2 (top speed - speed) / (0.48 m times 1.1), for the outer track.
+        ("hil-roboclaw.yaml", {"max_qpps": 14000}, {"max_speed_mps": 1.0}, "0.6313"),
+        ("hil-roboteq.yaml", {}, {"max_speed_mps": 1.4}, "0.3788"),
+        ("hil-roboteq.yaml", {}, {"max_speed_mps": 1.5}, "0"),
+        # 2 x 0.05 m/s / 0.23 m; and what the base itself makes.
+        ("hil-kobuki.yaml", {}, {"max_speed_mps": 0.65}, "0.4348"),
+        ("hil-kobuki.yaml", {"max_yaw_rate_radps": 0.5}, {"max_speed_mps": 0.3}, "0.5"),
+    ],
+)
+def test_a_turn_that_the_base_does_not_make_at_full_speed_is_refused(
+    tmp_path: Path, shipped: str, chassis: dict[str, object], limits: dict[str, object], makes: str
+) -> None:
+    """The driver would slow the robot to it in one step, behind the guard: no jerk limit holds there."""
+    content = yaml.safe_load((CONFIG_DIR / shipped).read_text())
+    content["chassis"] |= chassis
+    content["robot"]["limits"] = limits
+    with pytest.raises(ConfigError) as refused:
+        load_app(written(tmp_path, content))
+    told = str(refused.value)
+    assert "robot.limits.max_yaw_rate_radps (0.8) is more than the base makes" in told
+    assert f"{makes} rad/s where it goes at robot.limits.max_speed_mps" in told
+    assert "\n" not in told
+    if float(makes):
+        limits["max_yaw_rate_radps"] = 0.99 * float(makes)
+        load_app(written(tmp_path, content))
+
+
+@pytest.mark.parametrize(
+    ("accel_qpps2", "enough"), [(100, False), (8400, False), (15791, False), (15792, True)]
+)
+def test_a_ramp_softer_than_the_stopping_model_is_refused(
+    tmp_path: Path, accel_qpps2: int, enough: bool
+) -> None:
+    """0.7 m/s2 of the middle are 0.7 (1 + 0.48 x 1.1 / 0.60) = 1.316 of the outer track at half the width."""
+    content = yaml.safe_load((CONFIG_DIR / "hil-roboclaw.yaml").read_text())
+    content["chassis"]["accel_qpps2"] = accel_qpps2
+    if enough:
+        load_app(written(tmp_path, content))
+        return
+    with pytest.raises(ConfigError) as refused:
+        load_app(written(tmp_path, content))
+    told = str(refused.value)
+    assert f"chassis.accel_qpps2 ({accel_qpps2}) is a ramp of {accel_qpps2 / 12000.0:.3g} m/s2" in told
+    assert "at least 15792" in told
+    assert "\n" not in told
+
+
+def frames(camera: dict[str, object], stale_s: float) -> dict[str, object]:
+    return {
+        **SIM,
+        "camera": {"kind": "simulated", **camera},
+        "decision": {"sight": {"stale_s": stale_s}},
+    }
+
+
+def test_frames_so_rare_that_each_scene_is_stale_before_the_next_are_refused(tmp_path: Path) -> None:
+    load_app(written(tmp_path, frames({"fps": 5.0}, 0.26)))
+    with pytest.raises(ConfigError) as refused:
+        load_app(written(tmp_path, frames({"fps": 2.0}, 0.3)))
+    told = str(refused.value)
+    assert "camera.fps (2): a scene is 0.56 s old before the next one comes" in told
+    assert "decision.sight.stale_s (0.3)" in told
+    assert "\n" not in told
+    with pytest.raises(ConfigError, match=r"a scene is 0\.26 s old"):
+        load_app(written(tmp_path, frames({"fps": 5.0}, 0.25)))
+
+
+@pytest.mark.parametrize(("latency_s", "enough"), [(0.03, True), (0.2, False)])
+def test_in_real_time_the_latency_is_the_camera_s_own(tmp_path: Path, latency_s: float, enough: bool) -> None:
+    content = yaml.safe_load((CONFIG_DIR / "robot-bunker.yaml").read_text())
+    content["camera"] |= {"fps": 6, "latency_s": latency_s}
+    if enough:
+        load_app(written(tmp_path, content))
+        return
+    with pytest.raises(ConfigError, match=r"camera\.fps \(6\): a scene is 0\.367 s old"):
+        load_app(written(tmp_path, content))
+
+
+def test_frames_farther_apart_than_can_be_compared_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(
+        ConfigError, match=r"fps \(1\): frames are 1 s apart, more than perception\.max_gap_s"
+    ):
+        load_app(written(tmp_path, frames({"fps": 1.0}, 4.0)))
+    load_app(written(tmp_path, frames({"fps": 1.0}, 4.0) | {"perception": {"max_gap_s": 1.0}}))

@@ -277,7 +277,7 @@ def test_impossible_limits_are_refused(a: float, j: float) -> None:
 
 @pytest.mark.parametrize("section_mps", [-0.1, math.nan])
 def test_a_section_without_a_speed_is_refused(section_mps: float) -> None:
-    with pytest.raises(ValueError, match="a section's speed is 0 or more"):
+    with pytest.raises(ValueError, match="a section has a place and a speed >= 0"):
         braking.speed_before_section(2.0, section_mps, BrakeLimits(0.3, 0.6))
 
 
@@ -286,3 +286,38 @@ def test_speeding_up_is_no_slowing_down() -> None:
         braking.slowing_distance(0.5, 1.0, BrakeLimits(0.3, 0.6))
     with pytest.raises(ValueError, match="can only slow down"):
         braking.slowing_distance(0.5, -0.5, BrakeLimits(0.3, 0.6))
+
+
+NAN = math.nan
+
+
+@pytest.mark.parametrize("name", ["distance_m", "latency_s", "closing_mps", "margin_m", "a_mps2"])
+def test_what_is_not_known_is_no_speed(name: str) -> None:
+    """As stop() refuses it: no comparison with NaN may turn into a speed."""
+    given = {"distance_m": 5.0, "latency_s": 0.2, "closing_mps": 0.5, "margin_m": 0.4, "a_mps2": 0.1}
+    limits = BrakeLimits(0.7, 2.0)
+    assert braking.speed_for_distance(limits=limits, **given) > 0.0
+    with pytest.raises(ValueError, match=r"known .*nan"):
+        braking.speed_for_distance(limits=limits, **given | {name: NAN})
+
+
+@pytest.mark.parametrize("unknown", [(NAN, 0.2, 0.0), (0.5, NAN, 0.0), (0.5, 0.2, NAN)])
+def test_what_is_not_known_is_no_distance(unknown: tuple[float, float, float]) -> None:
+    closing_mps, latency_s, margin_m = unknown
+    with pytest.raises(ValueError, match=r"known .*nan"):
+        braking.required_distance(1.0, 0.0, closing_mps, latency_s, BrakeLimits(0.7, 2.0), margin_m)
+
+
+def test_a_section_that_is_nobody_knows_where_is_no_speed() -> None:
+    with pytest.raises(ValueError, match="a section has a place"):
+        braking.speed_before_section(NAN, 0.5, BrakeLimits(0.3, 0.6))
+
+
+@pytest.mark.parametrize(("closing_mps", "latency_s"), [(math.inf, 0.0), (math.inf, 0.2), (0.0, math.inf)])
+def test_no_speed_is_slow_enough_for_what_comes_without_end(closing_mps: float, latency_s: float) -> None:
+    limits = BrakeLimits(0.7, 2.0)
+    assert braking.speed_for_distance(5.0, limits, closing_mps=closing_mps, latency_s=latency_s) == 0.0
+
+
+def test_a_free_way_without_end_is_as_fast_as_can_be() -> None:
+    assert braking.speed_for_distance(math.inf, BrakeLimits(0.7, 2.0)) == math.inf

@@ -161,3 +161,13 @@ def test_the_prior_for_perception_is_dead_reckoning_not_the_fused_pose() -> None
     assert prior is not None
     forward = prior.rotation @ np.array([0.0, 0.0, 1.0])
     assert math.atan2(forward[1], forward[0]) == pytest.approx(math.remainder(0.3 * 10.0, math.tau), abs=1e-6)
+
+
+def test_an_ego_motion_that_is_not_known_spoils_nothing() -> None:
+    """Once in the sums, one NaN would make every pose to come unknown."""
+    localiser, _ = drive_with_slip(0.9, "visual")
+    before = localiser.yaw_ratio
+    for unknown in (ego(math.nan, 0.04), ego(0.01, math.nan), ego(0.01, math.inf)):
+        localiser.add_ego_motion(5 * 20 * MS, unknown)
+    assert localiser.yaw_ratio == before
+    assert localiser.pose.finite

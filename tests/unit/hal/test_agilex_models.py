@@ -6,7 +6,8 @@ from typing import get_args
 
 import pytest
 
-from config.chassis import NO_SERIAL, AgilexModelName, CanLinkConfig, SerialLinkConfig
+from config.agilex import NO_SERIAL, AgilexModelName
+from config.chassis import CanLinkConfig, SerialLinkConfig
 from hal.chassis.agilex import AgilexChassis
 from hal.chassis.agilex_messages import (
     ActuatorFast,

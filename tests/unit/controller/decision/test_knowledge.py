@@ -95,3 +95,12 @@ def test_depth_is_as_noisy_as_the_configuration_says() -> None:
     bench = Bench()
     known.update(bench.scene(), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
     assert known.surfaces.noise == noise
+
+
+@pytest.mark.parametrize("unknown", [PlanarPose(np.nan, 0.0, 0.0), PlanarPose(0.0, 0.0, np.inf)])
+def test_a_scene_from_nobody_knows_where_tells_nothing(unknown: PlanarPose) -> None:
+    bench = Bench()
+    bench.settle()
+    decision = bench.step(replace(bench.scene(), robot_pose=unknown))
+    assert decision.target_speed_mps == 0.0
+    assert "where the robot was when the scene was taken is not known" in decision.reason.sentence

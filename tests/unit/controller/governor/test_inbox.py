@@ -48,10 +48,11 @@ class Wire:
 class Talk:
     """A planner and its inbox on one made-up clock, in milliseconds."""
 
-    def __init__(self, resume_s: float = 0.0) -> None:
+    def __init__(self, resume_s: float = 0.0, timeout_s: float = 0.25) -> None:
         self.wire = Wire()
         self.warnings: list[str] = []
-        self.inbox = Inbox(self.wire, GovernorConfig(resume_s=resume_s), self.warnings.append)
+        config = GovernorConfig(resume_s=resume_s, timeout_s=timeout_s)
+        self.inbox = Inbox(self.wire, config, self.warnings.append)
 
     def say(
         self, seq: int, t_ms: float, v_mps: float = 0.5, sender: Sender | None = PLANNER, **more: object
@@ -83,8 +84,40 @@ def test_after_silence_commands_must_come_again_for_a_while() -> None:
     assert talk.poll(400) == Asked(None, "no command for 300 ms")
     talk.say(9, 420)
     assert talk.poll(420) == Asked(None, "commands have come for only 0.00 s")
-    talk.say(10, 520)
-    assert talk.poll(520).twist is not None
+    for k in range(1, 6):
+        talk.say(9 + k, 420 + 20 * k)
+        assert (talk.poll(420 + 20 * k).twist is None) == (k < 5)
+
+
+@pytest.mark.parametrize("timeout_s", [0.25, 1.0, 2.0])
+def test_one_lone_command_is_never_obeyed_while_resume_s_asks_for_more(timeout_s: float) -> None:
+    talk = Talk(resume_s=0.2, timeout_s=timeout_s)
+    talk.say(1, 0)
+    for now_ms in range(0, 2100, 10):
+        assert talk.poll(now_ms).twist is None
+    assert talk.inbox.accepted == 1
+
+
+def test_two_commands_far_apart_do_not_keep_coming_and_three_do() -> None:
+    """A wait counts for half of resume_s at most: a slow planner is obeyed from its third message on."""
+    talk = Talk(resume_s=0.2, timeout_s=2.0)
+    talk.say(1, 0)
+    talk.poll(0)
+    talk.say(2, 1000)
+    assert talk.poll(1000) == Asked(None, "commands have come for only 0.10 s")
+    assert talk.poll(1900).twist is None
+    talk.say(3, 2000)
+    assert talk.poll(2000).twist == Twist(0.5, 0.1)
+    assert talk.poll(3990).twist == Twist(0.5, 0.1), "who has kept coming holds until the time-out"
+
+
+def test_a_burst_that_comes_at_once_has_not_kept_coming() -> None:
+    talk = Talk(resume_s=0.2)
+    for k in range(20):
+        talk.say(k, 20 * k)
+    for now_ms in range(0, 300, 20):
+        assert talk.poll(now_ms).twist is None
+    assert talk.inbox.accepted == 20
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from config.decision import DecisionConfig, SightConfig
 from config.robot import Robot
 from controller.decision.decision import Action
+from controller.governor.arcs import corner_m
 from controller.governor.request import Twist
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
@@ -158,6 +160,21 @@ def test_a_camera_that_cannot_be_trusted_stops_it_and_a_degraded_one_slows_it() 
     assert "cannot be trusted: it rains" in sentence_at_the_end(steps)
     steps = unhealthy(CameraCondition.DEGRADED).run(9.0)
     assert steps[-1].governed.v_mps == pytest.approx(0.5)
+
+
+def test_with_a_degraded_camera_no_corner_of_a_turn_in_place_is_faster_than_it_may() -> None:
+    """From rest, where a limit of the way ahead is lower than the camera's for the first moments."""
+    bad = CameraHealth(CameraCondition.DEGRADED, "it rains", 0.2)
+    drive = GovernedDrive(
+        always(0.0, 0.8),
+        alter=lambda scene, _: replace(scene, health=bad),
+        decision=DecisionConfig(sight=SightConfig(degraded_mps=0.1)),
+    )
+    steps = drive.run(6.0)
+    corner_mps = [abs(one.governed.w_radps) * corner_m(drive.robot) for one in steps]
+    assert max(corner_mps) == pytest.approx(0.1, abs=1e-9)
+    assert corner_mps[-1] == pytest.approx(0.1)
+    assert "degraded (it rains): at most 0.10 m/s" in sentence_at_the_end(steps)
 
 
 @pytest.mark.parametrize("planner", [always(0.8, 0.1), always(0.0, 0.5)])

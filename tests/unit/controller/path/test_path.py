@@ -209,3 +209,8 @@ def test_a_point_beside_the_path_is_found_again(s: float, d: float) -> None:
     found_s, found_d = HOOK.project_points(point, s - 0.5, s + 0.5)
     assert found_s[0] == pytest.approx(s, abs=1e-6)
     assert found_d[0] == pytest.approx(d, abs=1e-6)
+
+
+def test_nowhere_on_the_path_there_is_no_speed() -> None:
+    with pytest.raises(ValueError, match="is not known"):
+        HOOK.speed_limit(math.nan)

@@ -1,0 +1,53 @@
+"""What a drive's exit code says, and that the help says the same."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from config.robot import Limits
+from controller.cli import cli
+from controller.ending import Outcome
+from controller.governor.command import Governing
+from controller.record.tally import SetpointTally
+from controller.result import DriveResult, MissionResult
+from tests.support.pages import ROOT
+
+
+def ended(kind: Any, outcome: Outcome, *, violations: int = 0, contacts: tuple[str, ...] = ()) -> Any:
+    tally = SetpointTally(Limits(), 0.02)
+    tally.violations = violations
+    loop = SimpleNamespace(ending=SimpleNamespace(outcome=outcome))
+    simulation = SimpleNamespace(referee=SimpleNamespace(contacts=list(contacts)))
+    more = {"inbox": None} if kind is Governing else {}
+    return kind(setpoints=tally, loop=loop, simulation=simulation, **more)
+
+
+@pytest.mark.parametrize(
+    ("kind", "good"),
+    [(MissionResult, {Outcome.REACHED, Outcome.STOPPED}), (Governing, {Outcome.STOPPED})],
+)
+def test_a_drive_succeeds_where_it_ended_as_asked_touched_nothing_and_kept_its_limits(
+    kind: type[DriveResult], good: set[Outcome]
+) -> None:
+    assert {outcome for outcome in Outcome if ended(kind, outcome).succeeded} == good
+    for outcome in good:
+        assert not ended(kind, outcome, violations=1).succeeded
+        assert not ended(kind, outcome, contacts=("a crate",)).succeeded
+
+
+@pytest.mark.parametrize("command", ["run", "govern"])
+def test_the_help_says_so(command: str) -> None:
+    shown = " ".join(CliRunner().invoke(cli, [command, "--help"]).output.split())
+    assert "Exit code 0 if" in shown
+    assert "came to rest" in shown
+    assert "nothing was touched and the limits were kept; else 1." in shown
+
+
+def test_the_readme_says_so() -> None:
+    text = " ".join((ROOT / "README.md").read_text().split())
+    assert "exit code of `treadwatch run` is 0 if the robot reached its target, or came to rest" in text
+    assert "touched nothing and kept its limits; 1 if not; 2 for a mistake" in text
