@@ -179,8 +179,9 @@ class Appraiser:
         speed = braking.speed_before_section(ahead_m - rolls_m, slow_mps, self._comfort)
 
         def why() -> Reason:
-            sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
-            return Reason("corner", sentence + allowed(speed), distance_m=ahead_m)
+            left_m = max(ahead_m, 0.0)  # 0 while the opening behind it is passed
+            sentence = f"a blind corner {left_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
+            return Reason("corner", sentence + allowed(speed), distance_m=left_m)
 
         return [Limit(speed, why)]
 

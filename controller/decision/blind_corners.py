@@ -28,6 +28,9 @@ _SLACK = 1.5
 # Nobody steps out of a narrower gap; between the goods of a rack there are many.
 _PASSAGE_M = 0.8
 _SAME_M = 0.6  # ends that are nearer to each other are the same corner
+# Width of the opening behind the corner, about a doorway. Until the front is past it, somebody may step out of it
+# beside the view, which is too narrow to see into an opening that is level with the robot.
+_OPENING_M = 1.0
 # Nearer than this ahead of the front, too little of the face is in view to tell that there is no corner.
 _SURE_M = 3.2
 # A corner counts from this score on, and its score is not raised above the second: a scene that shows the
@@ -45,7 +48,7 @@ class _Corner:
 
 @record(frozen=True, slots=True)
 class BlindCorner:
-    """A corner at s_m along the path, beside_m beside the swept width."""
+    """A corner at s_m along the path, beside_m beside the swept width; an opening begins there."""
 
     s_m: float
     beside_m: float
@@ -88,11 +91,14 @@ class BlindCorners:
         for end in ends.tolist():
             beside_m = float(abs(d_m[end]) - half_width_m[end])
             self._note(float(s_m[end]), bool(d_m[end] > 0.0), beside_m)
-        self._corners = [one for one in self._corners if one.sightings > 0 and one.s_m > front_s_m - _SAME_M]
+        self._corners = [
+            one for one in self._corners if one.sightings > 0 and one.s_m > front_s_m - _OPENING_M
+        ]
 
     def nearest(self, front_s_m: float) -> BlindCorner | None:
-        """The next one ahead of the robot's front; None: there is none."""
-        ahead = [one for one in self._corners if one.s_m > front_s_m and one.sightings >= _SIGHTINGS]
+        """The next one whose opening the robot's front is not past; None: there is none."""
+        past_m = front_s_m - _OPENING_M
+        ahead = [one for one in self._corners if one.s_m > past_m and one.sightings >= _SIGHTINGS]
         if not ahead:
             return None
         first = min(ahead, key=lambda one: one.s_m)

@@ -61,13 +61,14 @@ def test_the_end_of_a_rack_is_a_blind_corner(side: int) -> None:
     assert corner.beside_m == pytest.approx(0.6, abs=0.05)
 
 
-def test_it_is_remembered_until_it_is_passed() -> None:
+def test_it_is_remembered_until_the_front_is_past_the_opening_behind_it() -> None:
     aisle = Aisle(5.0, 0.6, 1)
-    for s_m in np.arange(1.0, 4.2, 0.05):
+    for s_m in np.arange(1.0, 5.4, 0.05):
         aisle.look(float(s_m))
-    assert aisle.corners.nearest(4.2 + FRONT_M) is not None
-    aisle.look(5.2)
-    assert aisle.corners.nearest(5.2 + FRONT_M) is None
+    assert aisle.corners.nearest(5.0 + 0.8) is not None
+    assert aisle.corners.nearest(5.0 + 1.1) is None
+    aisle.look(6.0)
+    assert aisle.corners.nearest(5.0 + 0.8) is None  # forgotten once passed
 
 
 def test_a_rack_further_away_leaves_time_enough() -> None:
