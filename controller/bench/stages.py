@@ -126,7 +126,7 @@ def summarise(
 
 
 def modules_of(package: ModuleType) -> tuple[ModuleType, ...]:
-    """The package and everything in it, imported."""
+    """The package and all its modules, imported."""
     inside = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
     return (package, *(importlib.import_module(info.name) for info in inside))
 

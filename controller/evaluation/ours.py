@@ -14,7 +14,7 @@ from vision.perception import Perception
 from vision.scene import Fragments, Obstacle
 
 _ROOM = 1.0 - CALLED_MOVING  # the part of the confidence scale for obstacles that are called moving
-_DOUBT_SPEED_MPS = 0.1  # standard deviation added to that of the velocity
+_DOUBT_SPEED_MPS = 0.1  # standard deviation whose square is added to the velocity's covariance
 
 
 class Treadwatch:

@@ -30,8 +30,9 @@ _FIGURES = (
 
 
 def prepare_folder(folder: Path) -> None:
-    """Make the folder before the run, so that a long run does not fail at its end. Deletes old results.
+    """Make the folder before the run, so that a long run does not fail at its end.
 
+    Deletes what an earlier run left there, except the pictures of recordings.
     Raises UserError.
     """
     ours = {one.name for one in sequences()}

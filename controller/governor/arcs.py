@@ -63,7 +63,8 @@ def corner_m(robot: Robot) -> float:
 
 
 def tightest_m(robot: Robot) -> float:
-    """The least radius that can be driven; on a tighter one the inner track would run backwards."""
+    """The least radius that can be driven: the inner track must not run backwards, and the path must accept
+    the bend (controller/path/path.py)."""
     return 1.01 * max(robot.body.width_m / 2.0, _least_radius_by_yaw_m(robot))
 
 
