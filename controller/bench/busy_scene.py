@@ -1,4 +1,4 @@
-"""A scene as a busy hall would give it, for a control step that has something to decide."""
+"""A fixed scene with ten obstacles, as in a busy hall, for measuring the control step."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _BANDS = 80
 _HALF_VIEW_TAN = 0.52
 _RANGE_M = 10.0
 
-# x right, z forward (m), and velocity over ground along them (m/s): things at rest on both sides, people who
-# walk along, cross far ahead and come towards the robot beside its path.
+# x right, z forward (m), and velocity over ground along them (m/s): static obstacles on both sides, and
+# movers that go the robot's way, cross far ahead, and come towards it beside its path.
 _LAYOUT = (
     (-1.4, 2.5, 0.0, 0.0),
     (1.3, 3.0, 0.0, 0.0),
@@ -29,7 +29,7 @@ _LAYOUT = (
 
 
 def busy_scene(captured_ns: int, sequence: int, robot_pose: PlanarPose | None) -> Scene:
-    """OBSTACLES obstacles around a free way, at the same places in every frame."""
+    """A scene of OBSTACLES obstacles beside a free path, at the same places in every frame."""
     age_s = 0.5 + sequence / 30.0
     obstacles = tuple(
         _obstacle(index + 1, x_m, z_m, vx_mps, vz_mps, age_s)

@@ -1,4 +1,4 @@
-"""`treadwatch bench`: everything that is worth measuring, on fixed seeds, one thing after the other."""
+"""`treadwatch bench`: all measurements of processing time, with fixed seeds, one after the other."""
 
 from __future__ import annotations
 
@@ -50,8 +50,17 @@ _REPLAY = CONFIG_DIR / "replay.yaml"
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How much is measured, and on what. mission: a simulated one in lock-step. sizes: of the simulated
-    camera; the renderer is measured at the first. A recording that is not installed is left out."""
+    """What is measured, and how much of it.
+
+    mission: configuration of a simulated mission in lock-step.
+    sizes: of the simulated camera; the renderer is measured at the first.
+    frames: number of frames of each simulated reel.
+    recording: left out if it is not installed.
+    recording_passes: how often perception runs over the recording.
+    pictures: number of rendered pictures.
+    control_steps: number of control steps and of exchanges of each driver.
+    stretch_s: simulated duration of the lock-step mission.
+    """
 
     mission: FilePath = CONFIG_DIR / "sim.yaml"
     sizes: tuple[tuple[int, int], ...] = ((640, 480), (848, 480))
@@ -67,7 +76,7 @@ _stopwatches = Stopwatches(processor_ns=time.process_time_ns, elapsed_ns=time.pe
 
 
 def run_bench(frames: int, json_path: FilePath | None) -> None:
-    """Measure, print the tables, write json_path. frames: of each simulated reel. Raises UserError."""
+    """Measure, print tables, write json_path if given. frames: of each simulated reel. Raises UserError."""
     if json_path is not None:
         _prepare(json_path)
     with one_opencv_thread():
@@ -85,7 +94,7 @@ def run_bench(frames: int, json_path: FilePath | None) -> None:
 
 
 def measure_all(plan: Plan) -> BenchReport:
-    """One run of everything. Raises ConfigError, HalError."""
+    """Run all measurements. Raises ConfigError, HalError."""
     began_s, began_cpu_s = time.perf_counter(), time.process_time()
     config = load_app(plan.mission)
     perception = {f"simulated_{w}x{h}": _simulated_reel_figures(config, plan, w, h) for w, h in plan.sizes}
@@ -108,7 +117,7 @@ def measure_all(plan: Plan) -> BenchReport:
 
 
 def _prepare(json_path: FilePath) -> None:
-    """Find out before measuring, not after it, that the figures cannot be written."""
+    """Check before measuring, not after it, that the figures can be written. Raises UserError."""
     try:
         json_path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -120,7 +129,7 @@ def _prepare(json_path: FilePath) -> None:
 
 
 def _simulated_camera(config: AppConfig, plan: Plan, width: int, height: int) -> SimulatedCamera:
-    """A camera of this size on a body that cruises along the mission's path."""
+    """A camera of this size on a robot that drives along the mission's path at constant speed."""
     assert isinstance(config.camera, SimulatedCameraConfig), "the mission's camera is simulated"
     middle = {"cx": 0.5 * (width - 1), "cy": 0.5 * (height - 1)}
     camera = config.camera.model_copy(update={"width": width, "height": height, **middle})
@@ -170,7 +179,7 @@ def _renderer_figures(config: AppConfig, plan: Plan) -> RendererFigures:
 
 
 def _control_figures(config: AppConfig, plan: Plan) -> ControlFigures:
-    """The control step without the exchange of the mission's chassis driver."""
+    """Measure the control step, without the exchange of the mission's chassis driver."""
     timed, emulator = _base(config, plan)
     loop = build_control(config, plan.mission, timed)
     with progress("control step", plan.control_steps) as tick:

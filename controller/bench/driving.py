@@ -1,4 +1,4 @@
-"""The driving side: the control step among ten obstacles, and the exchange of each chassis driver."""
+"""Measures the control step among ten obstacles, and the exchange of a chassis driver."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ from hal.enclosing import Enclosing
 from hal.types import ChassisMode, ChassisState, Setpoint
 from sim.simulation import Emulator
 
-PERIOD_NS = NS_PER_S // 50
+PERIOD_NS = NS_PER_S // 50  # of the control step
 _FRAME_NS = NS_PER_S // 30
-_LATENCY_NS = NS_PER_S * 60 // 1000
-# No base takes longer to obey; a bench that waited on would wait for ever.
-_ARM_STEPS = 250
+_LATENCY_NS = NS_PER_S * 60 // 1000  # from the exposure of a frame to its scene
+_ARM_STEPS = 250  # a base that takes more steps to arm will never arm, so the bench gives up
 
 
 class TimedChassis(Enclosing):
-    """A chassis with a stopwatch on its exchange: spent_ns of the last one."""
+    """A chassis whose exchanges are timed. spent_ns: duration of the last one."""
 
     def __init__(self, chassis: Chassis, stopwatch_ns: Callable[[], int]) -> None:
         super().__init__(chassis)
@@ -50,7 +49,7 @@ class TimedChassis(Enclosing):
 
 @dataclass(frozen=True, slots=True)
 class ControlFigures:
-    """step: one control step without the driver's exchange (localise, decide, shape, follow)."""
+    """Figures of the control step. step: localise, decide, shape, follow; without the driver's exchange."""
 
     obstacles: int
     step: Durations
@@ -68,9 +67,10 @@ def measure_control(
     stopwatch_ns: Callable[[], int],
     tick: Tick,
 ) -> ControlFigures:
-    """Armed steps of loop, which must drive chassis; scenes come at 30 Hz, 60 ms after their exposure.
+    """Time the steps of loop while the base is armed. Scenes come at 30 Hz, 60 ms after their exposure.
 
-    Raises RuntimeError if the emulated base does not obey: that is a fault of the program.
+    chassis: the one that loop drives.
+    Raises RuntimeError if the emulated base does not arm, which is a bug in the program.
     """
     spent_ns: list[int] = []
     with emulator, chassis:
@@ -92,10 +92,10 @@ def measure_control(
 
 
 class Answering(Closing, Protocol):
-    """What stands at the other end of the link."""
+    """The base at the other end of the link."""
 
     def advance_to(self, now_ns: int) -> None:
-        """Obey, move and answer up to now_ns."""
+        """Simulate up to now_ns: take commands, move, answer."""
         ...
 
 
@@ -106,11 +106,10 @@ def measure_exchange(
     tick: Tick,
     carry: Callable[[], None] = lambda: None,
 ) -> Durations:
-    """Exchanges with an armed base that drives a bend at 0.5 m/s; the emulator's own work is not counted.
+    """Time exchanges with an armed base that drives a bend at 0.5 m/s, without the emulator's own work.
 
-    carry: waits until what was written at one end of the wire has arrived at the other.
-
-    Raises RuntimeError if the emulated base does not obey: that is a fault of the program.
+    carry: waits until what was written at one end of the link has arrived at the other.
+    Raises RuntimeError if the emulated base does not arm, which is a bug in the program.
     """
     spent_ns: list[int] = []
     with emulator, chassis:
@@ -120,7 +119,7 @@ def measure_exchange(
             carry()
             emulator.advance_to(now_ns)
             carry()
-            # A quarter of a m/s2: the output guard lets no jump pass.
+            # Accelerates at 0.25 m/s^2, because the output guard does not let a jump in speed pass.
             v_mps = min(0.005 * len(spent_ns), 0.5)
             setpoint = Setpoint(now_ns, v_mps, 0.0, 0.4 * v_mps)
             state = chassis.exchange(setpoint, now_ns)

@@ -1,4 +1,4 @@
-"""The exchange of every chassis driver over every link that works without hardware."""
+"""Measures the exchange of every chassis driver over every link that works without hardware."""
 
 from __future__ import annotations
 
@@ -28,14 +28,18 @@ from sim.plant import TrackedPlant
 from sim.simulation import Emulator
 
 _ORIGIN = PlanarPose(0.0, 0.0, 0.0)
-# The kernel carries the bytes of a pseudo-terminal when it likes, soon.
-_CARRIED_NS = 100_000
+_CARRIED_NS = 100_000  # within this time the kernel passes on the bytes of a pseudo-terminal
 
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """name: as in the figures. file: of which hil-*.yaml. build: the guarded driver and the base at the other
-    end. asynchronous: what was sent arrives a moment later."""
+    """One chassis driver on one kind of link.
+
+    name: as in the figures.
+    file: the * of its hil-*.yaml.
+    build: makes the guarded driver and the base at the other end.
+    asynchronous: what was sent arrives a moment later.
+    """
 
     name: str
     file: str
@@ -74,7 +78,7 @@ def _on_terminal(config: AppConfig) -> tuple[Chassis, Emulator]:
 
 
 def wires() -> tuple[Wire, ...]:
-    """Of every hil-*.yaml. Buses and ports are drawn anew at each call."""
+    """All drivers (hil-*.yaml) on all links. Buses and ports are chosen at random at each call."""
     virtual = CanLinkConfig(interface="virtual", channel=f"bench-{uuid4().hex}")
     multicast = CanLinkConfig(
         interface="udp_multicast", channel="239.74.163.90", port=20_000 + uuid4().int % 40_000
@@ -92,7 +96,7 @@ def wires() -> tuple[Wire, ...]:
 
 
 def measure_exchanges(exchanges: int, stopwatch_ns: Callable[[], int]) -> dict[str, Durations]:
-    """By name of chassis and link. A link that this machine does not have is left out."""
+    """Durations by name of chassis and link. A link that this machine does not have is left out."""
     figures = {}
     for wire in wires():
         config = load_app(CONFIG_DIR / f"hil-{wire.file}.yaml")
@@ -113,11 +117,11 @@ def _measure(
 
 
 def _wait() -> None:
-    # Not asleep: what is measured next would find cold caches, whatever the driver does.
+    # Does not sleep, because the next measurement would then begin with cold caches.
     ends_ns = time.perf_counter_ns() + _CARRIED_NS
     while time.perf_counter_ns() < ends_ns:
         os.sched_yield()
 
 
 def _go_on() -> None:
-    """What was sent is there at once."""
+    """Do not wait: what was sent has arrived."""

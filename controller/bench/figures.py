@@ -1,4 +1,4 @@
-"""What many measurements of one thing come down to."""
+"""Statistics of repeated time measurements."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from hal.clocks import NS_PER_MS
 
 @dataclass(frozen=True, slots=True)
 class Stopwatches:
-    """processor_ns: time on cores, of all threads of this program, whatever else the machine does meanwhile.
-    elapsed_ns: by a clock on the wall. On an idle machine both say the same of work on one core."""
+    """Two clocks. On an idle machine both give the same for work on one core.
+
+    processor_ns: processor time of all threads of this program, whatever else the machine does meanwhile.
+    elapsed_ns: wall-clock time.
+    """
 
     processor_ns: Callable[[], int]
     elapsed_ns: Callable[[], int]
@@ -30,7 +33,7 @@ class Durations:
 
     @classmethod
     def of(cls, samples_ns: Sequence[int]) -> Self:
-        """Raises ValueError when nothing was measured: a duration that is not known is not zero."""
+        """Statistics of these samples. Raises ValueError if there are none: unknown is not zero."""
         if not samples_ns:
             raise ValueError("nothing was measured")
         values_ms = np.asarray(samples_ns, dtype=float) / NS_PER_MS
@@ -46,10 +49,10 @@ class Durations:
 
 
 def median_ratio(numerators_ns: Sequence[int], denominators_ns: Sequence[int]) -> float:
-    """Median of the ratios of pairs that were measured side by side.
+    """Median of the ratios of pairs that were measured directly one after the other.
 
-    What slows the machine down for a moment hits both of a pair, so this is steadier than the ratio
-    of two medians. A pair whose denominator is zero says nothing and is left out; NaN if no pair is left.
+    A moment in which the machine is slow affects both of a pair, so this varies less than the ratio of the
+    two medians. Pairs with a denominator of zero are left out; NaN if no pair is left.
     """
     pairs = zip(numerators_ns, denominators_ns, strict=True)
     ratios = [above / below for above, below in pairs if below > 0]

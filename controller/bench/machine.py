@@ -1,4 +1,4 @@
-"""What the figures were measured on; without it they say little."""
+"""Describes the machine that the figures were measured on."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _CPUINFO = Path("/proc/cpuinfo")
 
 
 def describe_machine() -> dict[str, str | int]:
-    """CPU, cores that this process may use, and the versions that matter."""
+    """CPU, number of cores that this process may use, and versions that affect the figures."""
     return {
         "cpu": cpu_name(_CPUINFO),
         "cores": usable_cores(),
@@ -27,7 +27,7 @@ def describe_machine() -> dict[str, str | int]:
 
 
 def cpu_name(cpuinfo: Path) -> str:
-    """The processor as Linux names it; elsewhere, and on boards that do not say, its architecture."""
+    """The processor's name in Linux's /proc/cpuinfo; its architecture if there is no name."""
     try:
         lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -40,7 +40,7 @@ def cpu_name(cpuinfo: Path) -> str:
 
 
 def usable_cores() -> int:
-    """Cores that this process may run on, which a container can limit."""
+    """Number of cores that this process may run on; a container can limit it."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -48,7 +48,7 @@ def usable_cores() -> int:
 
 @contextmanager
 def one_opencv_thread() -> Iterator[None]:
-    """OpenCV computes in the calling thread only, as it must beside a control loop."""
+    """Limit OpenCV to the calling thread inside the block, as it must be beside a control loop."""
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:

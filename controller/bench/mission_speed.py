@@ -1,4 +1,4 @@
-"""Lock-step simulation against real time: rendering, perception, control and the emulated base together."""
+"""Measures the speed of lock-step simulation: rendering, perception, control and emulated base together."""
 
 from __future__ import annotations
 
@@ -22,8 +22,12 @@ from hal.clocks import NS_PER_S, SimulatedClock
 
 @dataclass(frozen=True, slots=True)
 class LockstepFigures:
-    """A stretch of a mission from its start: how long it is, and how long it took, by a clock on the wall
-    and in processor time."""
+    """The first part of a mission.
+
+    simulated_s: its duration in the simulation.
+    wall_s, processor_s: the time that this took, by wall clock and in processor time.
+    frames: number of camera frames.
+    """
 
     simulated_s: float
     wall_s: float
@@ -32,12 +36,12 @@ class LockstepFigures:
 
     @property
     def speed(self) -> float:
-        """Simulated seconds a second."""
+        """Simulated seconds per second."""
         return self.simulated_s / self.wall_s
 
     @property
     def speed_on_own_core(self) -> float:
-        """Simulated seconds a second of processor time: the speed on a machine with nothing else to do."""
+        """Simulated seconds per second of processor time: the speed on an otherwise idle machine."""
         return self.simulated_s / self.processor_s
 
     def as_json(self) -> dict[str, object]:
@@ -55,7 +59,7 @@ class LockstepFigures:
 def measure_lockstep(
     config: AppConfig, config_path: FilePath, stretch_s: float, stopwatches: Stopwatches, tick: Tick
 ) -> LockstepFigures:
-    """Drive the first stretch_s of config's mission, without recording it; building it is not counted."""
+    """Drive the first stretch_s of the mission in config, without recording. Start-up is not counted."""
     clock = SimulatedClock()
     runner = config.runner
     assert isinstance(runner, LockstepRunner), "the bench drives a simulated mission"

@@ -1,7 +1,7 @@
-"""Which OpenCV functions a package calls, with what, and how long they take when nothing is around them.
+"""Records a package's OpenCV calls with their arguments, and times the same calls alone.
 
-The modules of the package see a stand-in for cv2 for a while; cv2 itself stays as it is, so OpenCV at
-work elsewhere (a thread that decodes images, the renderer) is not counted.
+For a while, the modules of the package see a stand-in for cv2. cv2 itself is not changed, so OpenCV calls
+from elsewhere (a thread that decodes images, the renderer) are not counted.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ class OpenCvCall:
     kwargs: dict[str, Any]
 
     def fresh(self) -> OpenCvCall:
-        """The same call with arguments of its own: some functions write into theirs."""
+        """The same call with copied arguments, because some functions write into their arguments."""
         args, kwargs = copy.deepcopy((self.args, self.kwargs))
         return OpenCvCall(self.name, args, kwargs)
 
     def execute(self) -> Any:
-        """Do it, once: what the function writes into the arguments stays there."""
+        """Make the call. Call this once only, because the function may write into the arguments."""
         return getattr(cv2, self.name)(*self.args, **self.kwargs)
 
 
 class OpenCvStandIn:
-    """Looks like cv2; hands every call of a function to on_call, which must make it.
+    """Replaces cv2; passes every function call to on_call, which must make the call.
 
-    Classes and constants pass through. Methods of OpenCV objects are not seen.
+    Classes and constants are passed through. Methods of OpenCV objects are not intercepted.
     """
 
     def __init__(self, on_call: OnCall) -> None:
@@ -59,7 +59,7 @@ class OpenCvStandIn:
 
 @contextmanager
 def stand_in_for_cv2(modules: Sequence[ModuleType], on_call: OnCall) -> Iterator[None]:
-    """While inside, modules that have imported cv2 call on_call instead."""
+    """Inside the block, OpenCV calls of these modules go to on_call."""
     users = [module for module in modules if getattr(module, "cv2", None) is cv2]
     stand_in = OpenCvStandIn(on_call)
     for module in users:
@@ -73,7 +73,7 @@ def stand_in_for_cv2(modules: Sequence[ModuleType], on_call: OnCall) -> Iterator
 
 @contextmanager
 def recorded_calls(modules: Sequence[ModuleType]) -> Iterator[list[OpenCvCall]]:
-    """While inside, the OpenCV calls that modules make gather in the list, in order."""
+    """Inside the block, the OpenCV calls of these modules are appended to the list, in order."""
     calls: list[OpenCvCall] = []
 
     def record(name: str, real: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
@@ -85,9 +85,9 @@ def recorded_calls(modules: Sequence[ModuleType]) -> Iterator[list[OpenCvCall]]:
 
 
 def time_bare(calls: Sequence[OpenCvCall], stopwatch_ns: Callable[[], int]) -> dict[str, int]:
-    """Nanoseconds by function name of executing calls one after the other, with nothing in between.
+    """Nanoseconds by function name for making the calls one after the other, with nothing in between.
 
-    Copying the arguments and releasing the results' names is not counted; freeing the results is.
+    Copying the arguments is not counted; freeing the results is.
     """
     spent_ns: dict[str, int] = {}
     for call in [call.fresh() for call in calls]:

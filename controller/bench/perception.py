@@ -1,4 +1,4 @@
-"""Perception beside the bare OpenCV calls that it makes on the same images, and where its time goes."""
+"""Measures perception, compares it with its bare OpenCV calls on the same images, and times its functions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MakePerception = Callable[[], Perception]
 
 @dataclass(frozen=True, slots=True)
 class FrameTime:
-    """Of one frame: processor time of detect and of track, elapsed time of both."""
+    """Times of one frame: processor time of detect and of track, elapsed time of both together."""
 
     detect_ns: int
     track_ns: int
@@ -32,10 +32,14 @@ class FrameTime:
 
 @dataclass
 class SideBySide:
-    """Nanoseconds of each frame, the same index for the same frame: perception, and OpenCV alone.
+    """Times of each frame for perception and for OpenCV alone; the same index is the same frame.
 
-    Processor time, but for elapsed_ns of detect and track together. opencv_ns: by function name. first_ns:
-    the first frame of each pass, which is in none of the other lists. whole_ns: see WholeImages.
+    detect_ns, track_ns: processor time of the two steps of perception.
+    elapsed_ns: elapsed time of both together.
+    bare_ns: processor time of the bare OpenCV calls.
+    whole_ns: processor time of the paper's calls, see WholeImages.
+    opencv_ns: bare calls by function name.
+    first_ns: the first frame of each pass, which is in none of the other lists.
     """
 
     detect_ns: list[int] = field(default_factory=list)
@@ -52,7 +56,7 @@ class SideBySide:
         return [detect + track for detect, track in zip(self.detect_ns, self.track_ns, strict=True)]
 
     def add(self, spent: FrameTime, opencv_ns: dict[str, int], whole_ns: int) -> None:
-        """One frame; a function that it does not call takes no time in it."""
+        """Add one frame; a function that is not called in it counts as zero."""
         known = len(self.detect_ns)
         self.detect_ns.append(spent.detect_ns)
         self.track_ns.append(spent.track_ns)
@@ -67,10 +71,19 @@ class SideBySide:
 
 @dataclass(frozen=True, slots=True)
 class PerceptionFigures:
-    """Of one reel. total: detect and track, in processor time; elapsed: the same by a clock on the wall.
-    ratio_of_medians and median_ratio: perception over bare OpenCV, once of the two medians and once frame by
-    frame. whole, ratio_to_whole: the paper's calls on whole images, perception over these. functions and
-    modules: names as in the code."""
+    """Figures of one reel, per frame.
+
+    total: detect and track together, in processor time.
+    elapsed: the same in wall-clock time.
+    bare: the same OpenCV calls alone.
+    whole: the paper's calls on whole images.
+    first: the first frame of each pass.
+    ratio_of_medians: median of perception over median of bare OpenCV.
+    median_ratio: median over the frames of perception over bare OpenCV.
+    ratio_to_whole: median of perception over median of whole.
+    opencv: bare calls by function name.
+    modules, functions: time inside perception, by names as in the code.
+    """
 
     total: Durations
     elapsed: Durations
@@ -113,9 +126,11 @@ def measure_perception(
     stopwatches: Stopwatches,
     tick: Tick,
 ) -> PerceptionFigures:
-    """Side by side first, then once more with a stopwatch on every function. Two ticks a frame and pass.
+    """Measure side by side first, then again with a stopwatch on every function.
 
-    make: a new perception, for each pass over reel; settings: its fragments'.
+    make: makes a new perception, for each pass over reel.
+    settings: of its fragments.
+    tick: called twice a frame and pass.
     """
     modules = modules_of(vision)
     side = SideBySide()
@@ -152,11 +167,12 @@ def run_side_by_side(
     result: SideBySide,
     tick: Tick,
 ) -> None:
-    """Every frame through four: a perception that is timed and untouched, one whose OpenCV calls are
-    recorded, those calls alone, and the paper's calls on the whole image.
+    """Process every frame four times, and add the times to result.
 
-    Which of the timed two goes first changes from frame to frame: neither shall always find warm caches.
-    The first frame searches the whole image, as after every restart, and is kept apart.
+    By a perception that records its OpenCV calls, by these calls alone, by an unchanged perception, and by
+    the paper's calls on the whole image. The bare calls and the unchanged perception take turns in going
+    first, so that neither always finds warm caches. The first frame is kept apart, because perception then
+    searches the whole image, as after every restart.
     """
     timed, recorded, whole = make(), make(), WholeImages(settings, stopwatches.processor_ns)
     for index, (frame, odometry) in enumerate(zip(reel.frames, reel.odometry, strict=True)):
@@ -182,7 +198,7 @@ def run_watched(
     stopwatch_ns: Callable[[], int],
     tick: Tick,
 ) -> list[dict[str, Spent]]:
-    """What every function of modules spent, frame by frame, without the first frame."""
+    """Time of every function of modules, frame by frame, without the first frame."""
     watch = StageWatch(stopwatch_ns)
     spent: list[dict[str, Spent]] = []
     with watched(modules, watch):
@@ -208,7 +224,7 @@ def _time(
 
 
 def _module_of(function: str) -> str:
-    """vision.fragments.renewal of vision.fragments.renewal.Renewal.find."""
+    """The module of a function's full name: a.b for a.b.Class.method."""
     name = function
     while name not in sys.modules:
         name = name.rpartition(".")[0]

@@ -1,7 +1,7 @@
-"""The command period in real time, while perception works without a pause in the other process.
+"""Measures the command period in real time, while perception works without a pause in the other process.
 
-What is measured is the program itself: `treadwatch run` with the base emulated in a third process. Only the
-camera is made faster than perception can look, so that its process never waits.
+It measures the program itself: `treadwatch run`, with the base emulated in a third process. The only change
+is a camera that is faster than perception, so that the perception process never waits.
 """
 
 from __future__ import annotations
@@ -32,20 +32,23 @@ from hal.api import Clock
 from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 
 PERIOD_NS = 20_000_000
-# Not in this list: the first commands, before the processes have settled.
-_SETTLE_S = 2.0
-_BEFORE_DRIVING_S = 8.0
-# No camera is so fast that perception would have to wait for it.
-_FLOOD_FPS = 300.0
-# Slow, so that the path lasts as long as the measurement.
-_SPEED_MPS = 0.25
+_SETTLE_S = 2.0  # the first commands are not counted, until the processes have settled
+_BEFORE_DRIVING_S = 8.0  # allowance for the start, on top of the measurement
+_FLOOD_FPS = 300.0  # fast enough that perception never waits for a frame
+_SPEED_MPS = 0.25  # slow enough that the path is long enough for the measurement
 _CONFIG = CONFIG_DIR / "hil-agilex.yaml"
 _STAT = FilePath("/proc/stat")
 
 
 @dataclass(frozen=True, slots=True)
 class PeriodFigures:
-    """Milliseconds between two commands in a row, and how far from 20 ms. p99, worst: of the distance."""
+    """Statistics of the time between consecutive commands.
+
+    commands: their number.
+    median_ms: of the period.
+    p99_off_ms, worst_off_ms: 99th percentile and maximum of the difference from 20 ms.
+    within_1_ms: share of the periods that differ by at most 1 ms.
+    """
 
     commands: int
     median_ms: float
@@ -55,7 +58,7 @@ class PeriodFigures:
 
     @classmethod
     def of(cls, commanded_ns: Sequence[int]) -> Self:
-        """From when each command had gone out. Raises ValueError for fewer than two."""
+        """Statistics from the times at which the commands were sent. Raises ValueError for fewer than two."""
         if len(commanded_ns) < 2:
             raise ValueError("fewer than two commands went out: there is no period")
         periods_ns = np.diff(np.asarray(commanded_ns, dtype=np.int64))
@@ -79,7 +82,7 @@ def run_period_bench(seconds: float) -> None:
     clock = MonotonicClock()
     for name, priority in (("ordinary", 0), ("SCHED_FIFO", 50)):
         _print_row(name, partial(measure_period, priority, seconds))
-    # This process has become what the second drive made of it.
+    # This process keeps the real-time scheduling of the second drive.
     _print_row("SCHED_FIFO, empty loop", partial(measure_floor, clock, seconds))
     say(
         "off: distance of one period from 20 ms. empty loop: nothing but waiting for the next 20 ms, so it\n"
@@ -99,7 +102,7 @@ def _print_row(name: str, measure: Callable[[], PeriodFigures]) -> None:
 
 
 def stolen_s(stat: FilePath) -> float:
-    """Processor time given to others by the host since the start (/proc/stat); NaN where nobody counts it."""
+    """Processor time that the host gave to others since the start (/proc/stat); NaN if it is not counted."""
     try:
         fields = stat.read_text(encoding="ascii").split("\n", 1)[0].split()
         return int(fields[8]) / os.sysconf("SC_CLK_TCK")
@@ -108,7 +111,7 @@ def stolen_s(stat: FilePath) -> float:
 
 
 def measure_floor(clock: Clock, seconds: float) -> PeriodFigures:
-    """What the machine itself does to a loop that only waits."""
+    """The period of a loop that only waits, which shows the machine's own jitter."""
     deadline_ns = clock.now_ns()
     woken_ns = []
     for _ in range(round(seconds * NS_PER_S / PERIOD_NS)):
@@ -119,7 +122,7 @@ def measure_floor(clock: Clock, seconds: float) -> PeriodFigures:
 
 
 def measure_period(priority: int, seconds: float) -> PeriodFigures:
-    """One drive of this length. priority: of SCHED_FIFO; 0 for ordinary scheduling. Raises UserError."""
+    """Measure one drive of this length. priority: of SCHED_FIFO; 0: ordinary scheduling. Raises UserError."""
     config, runner = _flooded(load_app(_CONFIG), priority, seconds + _SETTLE_S + _BEFORE_DRIVING_S)
     link = config.chassis.link
     assert isinstance(link, CanLinkConfig), "the bench drives over CAN"
@@ -135,7 +138,7 @@ def measure_period(priority: int, seconds: float) -> PeriodFigures:
 
 
 def _flooded(config: AppConfig, priority: int, seconds: float) -> tuple[AppConfig, RealtimeRunner]:
-    """The program as it ships, on a bus of its own, slow, with a camera that never lets perception wait."""
+    """The configuration with a bus of its own, a low speed, and a camera that never lets perception wait."""
     assert isinstance(config.runner, RealtimeRunner)
     assert isinstance(config.camera, SimulatedCameraConfig)
     runner = config.runner.model_copy(update={"priority": priority, "max_duration_s": seconds})
@@ -152,7 +155,7 @@ def _flooded(config: AppConfig, priority: int, seconds: float) -> tuple[AppConfi
 
 @contextmanager
 def _emulator(link: CanLinkConfig) -> Iterator[None]:
-    """`treadwatch emulate agilex` as its own process. Raises UserError when it does not start."""
+    """Run `treadwatch emulate agilex` as its own process. Raises UserError if it does not start."""
     command = [sys.executable, "-m", "controller", "emulate", "agilex", "--port", str(link.port)]
     pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
     with subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=pipe, text=True) as process:

@@ -1,4 +1,4 @@
-"""How far the bench is, on a terminal; silent elsewhere."""
+"""A progress bar for the bench; hidden if standard error is no terminal."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import click
 
 @contextmanager
 def progress(label: str, steps: int) -> Iterator[Callable[[], None]]:
-    """A bar on standard error; call what this yields once a step."""
+    """A progress bar on standard error. Yields a function to be called once a step."""
     hidden = not sys.stderr.isatty()
     with click.progressbar(length=steps, label=f"{label:40}", file=sys.stderr, hidden=hidden) as bar:
         yield lambda: bar.update(1)

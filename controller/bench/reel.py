@@ -1,4 +1,4 @@
-"""Frames to measure perception on, made ready beforehand: rendered along the path, or from a recording."""
+"""Frames to measure perception on, prepared beforehand: rendered along the path, or from a recording."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TIMEOUT_S = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reel:
-    """Frames in the order in which they were taken, each with the camera by dead reckoning at its time."""
+    """Frames in order, each with the camera's pose by dead reckoning at its time, if known."""
 
     frames: tuple[RgbdFrame, ...]
     odometry: tuple[Pose | None, ...]
@@ -28,12 +28,12 @@ class Reel:
 
 
 def cruise(path: Path, stamp_ns: int) -> PlanarPose:
-    """The body at stamp_ns on its way along path at CRUISE_MPS; at the end it stays there."""
+    """The robot's pose at stamp_ns on a drive along path at CRUISE_MPS; it stays at the end."""
     return path.pose(min(CRUISE_MPS * stamp_ns / NS_PER_S, path.length_m))
 
 
 def render_reel(camera: FrameSource, path: Path, mount: CameraMount, frames: int, tick: Tick) -> Reel:
-    """frames from a simulated camera on a body that cruises along path from time zero of its clock."""
+    """Frames of a simulated camera on a robot that drives along path from time zero of the camera's clock."""
     taken: list[RgbdFrame] = []
     with camera:
         for _ in range(frames):
@@ -44,7 +44,7 @@ def render_reel(camera: FrameSource, path: Path, mount: CameraMount, frames: int
 
 
 def recorded_reel(camera: FrameSource, mount: CameraMount | None) -> Reel:
-    """All frames of a recording, without odometry. mount: None where it is not known."""
+    """All frames of a recording, without odometry. mount: None if it is not known."""
     taken: list[RgbdFrame] = []
     with camera:
         while True:

@@ -1,4 +1,4 @@
-"""The simulated camera: what one picture costs, and what a whole exposure with the sensor's noise does."""
+"""Measures the simulated camera: one picture, and a whole exposure with the sensor's noise."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ from sim.rendering.render import Renderer
 
 @dataclass(frozen=True, slots=True)
 class RendererFigures:
-    """picture: colour and exact depth. exposure: the picture with colour and depth noise, as a frame.
+    """Figures of the renderer.
 
-    faces: in the view of a typical picture, those that nearer ones hide included.
+    width, height: of the picture, in pixels.
+    faces: median number of faces in view, including those hidden by nearer ones.
+    picture: colour and exact depth.
+    exposure: the picture with colour and depth noise, as a frame.
     """
 
     width: int
@@ -41,9 +44,11 @@ class RendererFigures:
 def measure_renderer(
     camera: SimulatedCamera, renderer: Renderer, frames: int, stopwatch_ns: Callable[[], int], tick: Tick
 ) -> RendererFigures:
-    """Each picture twice: by renderer, which must draw the camera's world, and within an exposure.
+    """Render each picture twice: by renderer, and by the camera within an exposure.
 
-    The camera's clock must start at zero. The first picture, which prepares the textures, is not counted.
+    renderer: must render the camera's world.
+    camera: its clock must start at zero.
+    The first picture prepares the textures and is not counted.
     """
     picture_ns: list[int] = []
     exposure_ns: list[int] = []

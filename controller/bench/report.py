@@ -1,4 +1,4 @@
-"""All figures of one run: as JSON with keys that stay, and as tables for people."""
+"""All figures of one run: as JSON with stable keys, and as tables for the terminal."""
 
 from __future__ import annotations
 
@@ -13,17 +13,23 @@ from controller.bench.perception import PerceptionFigures
 from controller.bench.rendering import RendererFigures
 from controller.bench.stages import StageFigures
 
-SCHEMA = 1
-_NAME = 34
-# Rows of the stage table below this in every column are left to the JSON file.
+SCHEMA = 1  # version of the JSON layout
+_NAME = 34  # width of the name column, in characters
+# Rows of the stage table that are below this in every column appear in the JSON file only.
 _SHOWN_MS = 0.02
-_BUSY_SHARE = 0.9
+_BUSY_SHARE = 0.9  # with less than this share of a core, the machine counts as busy
 
 
 @dataclass(frozen=True, slots=True)
 class BenchReport:
-    """taken_at: ISO 8601. cpu_share: processor time over real time of the whole run; what is missing to 1
-    went to other programs. perception: by reel. drivers: one exchange each, by name of chassis and link."""
+    """All figures of one run.
+
+    taken_at: ISO 8601.
+    cpu_share: processor time over elapsed time of the whole run; below 1, other programs took the rest.
+    machine: what it ran on.
+    perception: by reel.
+    drivers: one exchange of each, by name of chassis and link.
+    """
 
     taken_at: str
     cpu_share: float
@@ -35,7 +41,7 @@ class BenchReport:
     lockstep: LockstepFigures
 
     def as_json(self) -> dict[str, object]:
-        """Plain values. A key, once published, keeps its meaning; SCHEMA counts up if one cannot."""
+        """Plain values. Published keys keep their meaning; SCHEMA is raised if one has to change."""
         return {
             "schema": SCHEMA,
             "taken_at": self.taken_at,
@@ -49,11 +55,11 @@ class BenchReport:
         }
 
     def to_text(self) -> str:
-        """The JSON as it is written to a file."""
+        """The JSON text of the file."""
         return json.dumps(self.as_json(), indent=2, allow_nan=False) + "\n"
 
     def lines(self) -> Iterator[str]:
-        """For the terminal."""
+        """Lines for the terminal."""
         machine = self.machine
         yield (
             f"{machine['cpu']}, {machine['cores']} cores, Python {machine['python']}, "
@@ -106,7 +112,7 @@ def _perception_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
 
 
 def _stage_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
-    """Each stage's own time and that of OpenCV in it, a column pair a reel; then OpenCV's functions alone."""
+    """Each stage's own time and that of its OpenCV calls, for each reel; then the OpenCV functions alone."""
     width = max(17, *(len(name) for name in reels))
     heads = "".join(f"  {name.replace('_', ' ', 1):>{width}}" for name in reels)
     yield f"{'stage, own + OpenCV':{_NAME}}{heads}"
@@ -122,7 +128,7 @@ def _stage_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
 
 
 def _rows(columns: list[dict[str, StageFigures]]) -> list[str]:
-    """Names that matter in any column; the first column's order leads."""
+    """Names that reach _SHOWN_MS in any column, in the order of the first column."""
     return list(
         dict.fromkeys(
             name

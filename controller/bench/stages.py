@@ -1,7 +1,7 @@
-"""Where the time goes inside a package: every function's own time, and that of the OpenCV calls in it.
+"""Times every function of a package: its own time, and that of its OpenCV calls.
 
-For a while every function of the package is wrapped by a stopwatch. That costs a few microseconds a
-call, so it is done in a pass of its own and never falsifies a total.
+For a while, every function of the package is wrapped by a stopwatch. That costs a few microseconds a call, so
+it is done in a separate pass and does not distort the totals.
 """
 
 from __future__ import annotations
@@ -25,7 +25,12 @@ from hal.clocks import NS_PER_MS
 
 @dataclass(slots=True)
 class Spent:
-    """Of one function: times called, its own nanoseconds (without functions inside it), those in OpenCV."""
+    """Time of one function.
+
+    calls: how often it was called.
+    own_ns: its own time, without the functions and OpenCV calls inside it.
+    opencv_ns: time of its OpenCV calls.
+    """
 
     calls: int = 0
     own_ns: int = 0
@@ -34,7 +39,7 @@ class Spent:
 
 @dataclass
 class StageWatch:
-    """Adds up by function name. While an inner function runs, the outer one's watch stands still."""
+    """Adds up times by function name. While an inner function runs, the outer one is not charged."""
 
     stopwatch_ns: Callable[[], int]
     spent: defaultdict[str, Spent] = field(default_factory=lambda: defaultdict(Spent))
@@ -42,7 +47,7 @@ class StageWatch:
     _mark_ns: int = 0
 
     def take(self) -> dict[str, Spent]:
-        """What was spent since the last take."""
+        """The times since the last call."""
         spent, self.spent = dict(self.spent), defaultdict(Spent)
         return spent
 
@@ -62,7 +67,7 @@ class StageWatch:
     def run_opencv(
         self, name: str, function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]
     ) -> Any:
-        """Call a function of cv2 and charge it to the OpenCV share of the function that calls it."""
+        """Call a function of cv2 and charge its time as OpenCV to the calling function."""
         self._charge()
         try:
             return function(*args, **kwargs)
@@ -81,7 +86,7 @@ class StageWatch:
 
 @dataclass(frozen=True, slots=True)
 class StageFigures:
-    """A function or a group of them in one frame: mean of the calls, medians of the times as in Spent."""
+    """A function or a group of them per frame: mean number of calls, medians of the times as in Spent."""
 
     calls: float
     own_ms: float
@@ -99,8 +104,9 @@ class StageFigures:
 def summarise(
     frames: Sequence[Mapping[str, Spent]], group: Callable[[str], str] = lambda name: name
 ) -> dict[str, StageFigures]:
-    """Over frames, by the group that a function name belongs to; the one with most own time first.
+    """Figures over all frames by group, the one with the most own time first.
 
+    group: gives the group of a function name.
     A frame in which a function did not run counts as zero for it.
     """
     names = dict.fromkeys(group(name) for spent in frames for name in spent)
@@ -120,16 +126,16 @@ def summarise(
 
 
 def modules_of(package: ModuleType) -> tuple[ModuleType, ...]:
-    """The package and everything in it, imported."""
+    """The package and all its modules, imported."""
     inside = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
     return (package, *(importlib.import_module(info.name) for info in inside))
 
 
 @contextmanager
 def watched(modules: Sequence[ModuleType], watch: StageWatch) -> Iterator[None]:
-    """While inside, watch sees every function and method that modules define, and their OpenCV calls.
+    """Inside the block, watch times every function and method of modules, and their OpenCV calls.
 
-    Names that double underscores enclose are left alone: what they take counts as their caller's.
+    Methods whose names begin with two underscores are not wrapped; their time counts as their caller's.
     """
     undo: list[tuple[Any, str, object]] = []
     try:
@@ -144,7 +150,7 @@ def watched(modules: Sequence[ModuleType], watch: StageWatch) -> Iterator[None]:
 
 
 def _functions(modules: Sequence[ModuleType]) -> list[tuple[Any, str, FunctionType]]:
-    """Every place that holds a function of modules: where it is defined and where it is imported to."""
+    """All names bound to a function of modules, where it is defined and where it is imported."""
     own = {module.__name__ for module in modules}
     found: list[tuple[Any, str, FunctionType]] = []
     for module in modules:

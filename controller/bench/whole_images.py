@@ -1,7 +1,7 @@
-"""The paper's chain of OpenCV calls on whole images: what a search everywhere takes.
+"""The paper's chain of OpenCV calls on whole images: the time of a search without any ROI.
 
-Canny, contours, Hough, and Lucas-Kanade there and back for as many ends as perception follows, with its own
-settings and nothing around them.
+Canny, contours, Hough, and forward-backward Lucas-Kanade for as many fragment ends as perception tracks, with
+perception's settings and nothing else.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vision.fragments.segments import hough_segments, longest_first
 
 
 class WholeImages:
-    """Keeps the image before, and the ends that were found in it."""
+    """Keeps the previous image and the fragment ends found in it."""
 
     def __init__(self, settings: FragmentSettings, stopwatch_ns: Callable[[], int]) -> None:
         self._settings = settings
@@ -28,7 +28,7 @@ class WholeImages:
         self._ends_px = np.empty((0, 2), np.float32)
 
     def step(self, colour: ColourImage) -> int:
-        """Nanoseconds of the calls on the next image; the first one has nothing to be followed."""
+        """Nanoseconds of the calls on the next image; in the first one there is nothing to track."""
         settings = self._settings
         began_ns = self._stopwatch_ns()
         grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY), np.uint8)

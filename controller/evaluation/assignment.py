@@ -1,4 +1,4 @@
-"""Which detection belongs to which true object: one to one, as many pairs as possible, then the cheapest."""
+"""One-to-one assignment of detections to true objects: as many pairs as possible, then the least cost."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ Pairs = tuple[tuple[int, int], ...]
 
 
 def assign(cost: FloatArray) -> Pairs:
-    """Pairs (row, column) of cost (N, M), inf where a pair is impossible.
+    """Pairs (row, column), sorted. cost: (N, M), inf where a pair is impossible.
 
-    Exact: no other choice has more pairs, and none with as many has a smaller sum (Kuhn-Munkres with
-    potentials, O(n^3)). Raises ValueError for a cost that is negative or NaN.
+    Exact: no other assignment has more pairs, and none with as many pairs has a smaller sum (Kuhn-Munkres
+    with potentials, O(n^3)). Raises ValueError for a cost that is negative or NaN.
     """
     rows, columns = cost.shape
     if np.isnan(cost).any() or (cost < 0.0).any():
@@ -21,7 +21,7 @@ def assign(cost: FloatArray) -> Pairs:
     if rows == 0 or columns == 0:
         return ()
     possible = np.isfinite(cost)
-    # One impossible pair costs more than all possible ones together: their number comes first.
+    # An impossible pair costs more than all possible ones together, so the number of pairs comes first.
     never = 1.0 + 2.0 * float(np.where(possible, cost, 0.0).sum())
     whole = np.where(possible, cost, never)
     chosen = _kuhn_munkres(whole) if rows <= columns else _kuhn_munkres(whole.T)
@@ -33,7 +33,7 @@ def _kuhn_munkres(cost: FloatArray) -> list[int]:
     """For each row the column of the cheapest complete assignment; rows <= columns."""
     rows, columns = cost.shape
     row_potential, column_potential = np.zeros(rows + 1), np.zeros(columns + 1)
-    row_of = np.zeros(columns + 1, dtype=np.intp)  # row + 1 that holds each column + 1; 0: free
+    row_of = np.zeros(columns + 1, dtype=np.intp)  # row assigned to each column, both from 1; 0: free
     for row in range(1, rows + 1):
         row_of[0] = row
         came_from = np.zeros(columns + 1, dtype=np.intp)

@@ -1,4 +1,4 @@
-"""The whole simulated set before all methods, on as many processes as wished."""
+"""Runs all methods on the whole simulated set, on a chosen number of processes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from controller.workers import worker_processes
 
 Baselines = Literal["none", "some", "all"]
 
-# The slow baselines look at these by default: every kind of drive, both noises, movers and none.
+# By default the slow baselines run on these sequences only. They contain every kind of drive, both kinds of
+# noise, and scenes with and without movers.
 BASELINE_SEQUENCES = frozenset(
     {
         "still-group",
@@ -32,6 +33,7 @@ BASELINE_SEQUENCES = frozenset(
         "static-s-curve",
     }
 )
+# Frames for Fig. 6, by sequence.
 SHOWN_FRAMES: dict[str, tuple[int, ...]] = {
     "walk-oncoming": (45,),
     "slow-crossing": (60,),
@@ -41,14 +43,14 @@ SHOWN_FRAMES: dict[str, tuple[int, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One sequence and the methods that look at it."""
+    """One sequence and the methods that run on it."""
 
     sequence: Sequence
     methods: tuple[str, ...]
 
 
 def plan(sequences: tuple[Sequence, ...], baselines: Baselines) -> tuple[Task, ...]:
-    """baselines: "some" looks at BASELINE_SEQUENCES alone. The longest tasks first."""
+    """One task a sequence, the longest first. baselines: "some" runs them on BASELINE_SEQUENCES only."""
     tasks = [
         Task(one, ALWAYS + (BASELINES if _with_baselines(one.name, baselines) else ())) for one in sequences
     ]
@@ -62,8 +64,10 @@ def _with_baselines(name: str, baselines: Baselines) -> bool:
 def run_campaign(
     tasks: tuple[Task, ...], workers: int, on_done: Callable[[SequenceRecord], None]
 ) -> tuple[SequenceRecord, ...]:
-    """Records by name of the sequence; on_done as each is finished. Equal for any number of workers,
-    but for the times."""
+    """One record a sequence, sorted by name. Apart from times they do not depend on the number of workers.
+
+    on_done: called with each record as it is finished.
+    """
     records = []
     with closing(_records(tasks, workers)) as done:
         for record in done:
@@ -80,7 +84,7 @@ def _records(tasks: tuple[Task, ...], workers: int) -> Generator[SequenceRecord,
 
 
 def run_task(task: Task) -> SequenceRecord:
-    """What one worker does: everything on one core."""
+    """Run one task; called in a worker process. OpenCV is held to one core."""
     cv2.setNumThreads(1)
     shown = SHOWN_FRAMES.get(task.sequence.name, ())
     return run_sequence(task.sequence, task.methods, shown, time.perf_counter_ns)

@@ -1,7 +1,7 @@
 """Charts for a report, drawn with OpenCV: axes with round ticks, lines, markers, bars, a legend.
 
-One Chart owns a rectangle of a picture. Data coordinates go in, anti-aliased strokes come out; what is not
-known is left out. Colours are those of Okabe and Ito (2008) on white.
+A Chart draws into one rectangle of an image. It takes data coordinates; NaN values are left out. Strokes are
+anti-aliased. The colours are those of Okabe and Ito (2008), on white.
 """
 
 from __future__ import annotations
@@ -33,15 +33,20 @@ SKY = bgr("56B4E9")
 AMBER = bgr("E69F00")
 GREY = bgr("7F8891")
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 78, 22, 50, 62
-_TITLE, _LABEL, _TICK, _LEGEND = 21, 17, 15, 15
+_LEFT, _RIGHT, _TOP, _BOTTOM = 78, 22, 50, 62  # pixels around the plot, for title, ticks and labels
+_TITLE, _LABEL, _TICK, _LEGEND = 21, 17, 15, 15  # sizes of the lettering
 
 Marker = Literal["circle", "square", "diamond", "cross"]
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """From low to high; log: to base ten, both ends above zero. ticks: own places instead of round ones."""
+    """An axis from low to high.
+
+    label: its title.
+    log: logarithmic to base ten; both ends must be above zero.
+    ticks: values and labels; None: round values.
+    """
 
     label: str
     low: float
@@ -50,7 +55,7 @@ class Axis:
     ticks: tuple[tuple[float, str], ...] | None = None
 
     def share(self, values: FloatArray) -> FloatArray:
-        """Where values stand between low (0) and high (1)."""
+        """Position of values along the axis: 0 at low, 1 at high."""
         if not self.log:
             return (values - self.low) / (self.high - self.low)
         safe = np.where(values > 0.0, values, np.nan)
@@ -58,7 +63,7 @@ class Axis:
         return span
 
     def places(self) -> list[tuple[float, str]]:
-        """Ticks and their labels."""
+        """The ticks: value and label."""
         if self.ticks is not None:
             return list(self.ticks)
         if self.log:
@@ -79,7 +84,7 @@ def round_ticks(low: float, high: float) -> list[float]:
 
 @dataclass(frozen=True, slots=True)
 class LegendEntry:
-    """A line, a marker, or both, and what they stand for."""
+    """A line, a marker, or both, with the label."""
 
     label: str
     colour: Colour
@@ -89,7 +94,7 @@ class LegendEntry:
 
 
 class Chart:
-    """Draws one diagram into area of image."""
+    """Draws one diagram into the given area of an image."""
 
     def __init__(self, image: Image, area: Rect, title: str, x: Axis, y: Axis) -> None:
         self._image = image
@@ -115,7 +120,7 @@ class Chart:
         marker: Marker | None = None,
         dashed: bool = False,
     ) -> None:
-        """A line through the points; what leaves the axes is cut off."""
+        """A line through the points; points outside the axes are moved to the frame."""
         points = self._inside(self.to_px(x, y))
         if dashed:
             finite = points[np.isfinite(points).all(axis=1)]
@@ -147,7 +152,7 @@ class Chart:
         colour: Colour,
         label: str | None = None,
     ) -> None:
-        """Upright bars from the lower end of the axis, with an arrow above the frame if they go on."""
+        """Vertical bars from the lower end of the axis; an arrow marks a bar that is higher than the plot."""
         base = np.full(len(height), self._y.low)
         tops, feet = self.to_px(left, height), self.to_px(right, base)
         for (u0, v0), (u1, v1) in zip(self._inside(tops), feet, strict=True):
@@ -159,7 +164,7 @@ class Chart:
         self._remember(label, colour, True, None, False)
 
     def level(self, value: float, colour: Colour, label: str) -> None:
-        """A dashed line across, for a target."""
+        """A dashed horizontal line, for a target."""
         self.line([self._x.low, self._x.high], [value, value], colour, label, dashed=True)
 
     def note(self, x: float, y: float, words: str, colour: Colour = SOFT_INK, size: int = 14) -> None:
@@ -169,7 +174,7 @@ class Chart:
             text.put(self._image, words, round(u) - text.width(words, size) // 2, round(v) - 7, colour, size)
 
     def legend(self, where: Literal["upper right", "lower right", "lower left", "upper left"]) -> None:
-        """A box with all that has a label, in the order in which it was drawn."""
+        """A legend box with all labelled items, in the order in which they were drawn."""
         if not self._legend:
             return
         row = 24
@@ -187,7 +192,7 @@ class Chart:
             text.put(self._image, entry.label, x + 48, middle + 5, INK, _LEGEND)
 
     def key(self) -> None:
-        """All that has a label in one row, at the right end of the title's line."""
+        """A legend in one row, at the right end of the title's line."""
         room = [text.width(entry.label, _LEGEND) + 46 for entry in self._legend]
         x, middle = self.plot.right - sum(room), self.plot.y - 24
         for entry, width in zip(self._legend, room, strict=True):
@@ -211,7 +216,7 @@ class Chart:
             self._legend.append(LegendEntry(label, colour, line, marker, dashed))
 
     def _inside(self, points: FloatArray) -> FloatArray:
-        """Held at the frame; NaN stays."""
+        """Pixels (N, 2), limited to the plot; NaN stays NaN."""
         low = (self.plot.x, self.plot.y)
         high = (self.plot.right - 1, self.plot.bottom - 1)
         held: FloatArray = np.clip(points, low, high)
@@ -264,7 +269,7 @@ def blank(width: int, height: int) -> Image:
 
 
 def _put_upright(image: Image, words: str, x: int, middle: int) -> None:
-    """Text that reads from below to above, its middle at the given row."""
+    """Text that reads upwards, its middle at the given row."""
     length = text.width(words, _LABEL)
     strip = blank(length + 4, _LABEL + 10)
     text.put(strip, words, 2, _LABEL + 1, INK, _LABEL)

@@ -1,4 +1,4 @@
-"""The methods that are compared, each as something that answers a simulated frame and is timed."""
+"""The compared methods: each answers simulated frames and is timed while it does so."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from sim.world import World
 
 Stopwatch = Callable[[], int]
 
+# Names of the methods.
 OURS = "treadwatch"
 OURS_ALONE = "treadwatch, no odometry"
 LIDAR = "lidar"
@@ -37,6 +38,7 @@ TRACKING = "object tracking"
 LOW_RANK = "low rank and sparse"
 DENSE_FLOW = "dense flow minus rigid flow"
 
+# ALWAYS runs on every sequence, BASELINES on some unless asked for (controller/evaluation/campaign.py).
 ALWAYS = (OURS, OURS_ALONE, LIDAR)
 BASELINES = (BACKGROUND, TRAJECTORIES, TRACKING, LOW_RANK, DENSE_FLOW)
 
@@ -45,13 +47,13 @@ class Contestant(Protocol):
     """Answers the frames of one sequence in order."""
 
     def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
-        """And how many milliseconds of thinking it took; NaN where there was nothing to think about."""
+        """The answer, and its processing time in milliseconds; NaN if there was nothing to process."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class CameraContestant:
-    """A method that looks at the camera's frames."""
+    """A method that processes the camera's frames."""
 
     method: Method
     with_odometry: bool
@@ -64,7 +66,7 @@ class CameraContestant:
 
 
 class TrackingContestant:
-    """Is told the first true box of every object when it becomes eligible, and nothing more."""
+    """Object tracking. It is given the true box of each object once, when the object becomes eligible."""
 
     def __init__(self, stopwatch_ns: Stopwatch) -> None:
         self._tracking = BoxTracking()
@@ -83,7 +85,7 @@ class TrackingContestant:
 
 
 class LidarContestant:
-    """Scans the same world at its own rate; only clustering and tracking are timed."""
+    """Scans the same world at the lidar's own rate; only clustering and tracking are timed."""
 
     def __init__(
         self, sequence: Sequence, drive: ScriptedDrive, intrinsics: Intrinsics, stopwatch_ns: Stopwatch
@@ -113,7 +115,7 @@ class LidarContestant:
 def line_up(
     names: tuple[str, ...], sequence: Sequence, intrinsics: Intrinsics, stopwatch_ns: Stopwatch
 ) -> dict[str, Contestant]:
-    """The named methods, fresh for one sequence."""
+    """The named methods, newly made for one sequence."""
     makers: dict[str, Callable[[], Contestant]] = {
         OURS: lambda: CameraContestant(ours(), True, stopwatch_ns),
         OURS_ALONE: lambda: CameraContestant(ours(), False, stopwatch_ns),
@@ -128,7 +130,7 @@ def line_up(
 
 
 def ours() -> Treadwatch:
-    """Our detector as it ships, on the simulated robot."""
+    """Our detector with its default settings, on the simulated robot."""
     return Treadwatch(PerceptionConfig(), MOUNT, Body())
 
 

@@ -1,4 +1,4 @@
-"""How the evaluation's robot moves, what its odometry makes of that, and where its camera is."""
+"""The motion of the evaluation's robot, the odometry that it measures, and its camera mount."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hal.clocks import NS_PER_S
 from hal.geometry import advance_pose, camera_in_floor
 from hal.types import CameraMount, PlanarPose, Pose
 
-_STEP_S = 0.005
+_STEP_S = 0.005  # step of the integration
 MOUNT = CameraMount(forward_m=0.45, left_m=0.0, height_m=0.60, pitch_rad=math.radians(4.0))
 
 
@@ -26,7 +26,10 @@ class Knot:
 
 @dataclass(frozen=True, slots=True)
 class OdometryError:
-    """Dead reckoning = distance_ratio x way, yaw_ratio x turn (tracks slip), plus a constant drift."""
+    """Errors of dead reckoning, because tracks slip.
+
+    It measures distance_ratio x the true distance and yaw_ratio x the true rotation, plus a constant drift.
+    """
 
     distance_ratio: float = 1.01
     yaw_ratio: float = 1.02
@@ -37,7 +40,7 @@ SLIPPING = OdometryError(distance_ratio=1.03, yaw_ratio=1.10, drift_radps=0.02)
 
 
 class ScriptedDrive:
-    """A course over the floor as a pure function of time, and the course that the odometry tells."""
+    """The true course over the floor and the course that odometry measures, as pure functions of time."""
 
     def __init__(self, knots: tuple[Knot, ...], duration_s: float, error: OdometryError) -> None:
         self._times = np.array([knot.t_s for knot in knots])
@@ -58,15 +61,15 @@ class ScriptedDrive:
         return float(np.interp(t_s, self._times, self._v)), float(np.interp(t_s, self._times, self._w))
 
     def pose(self, t_s: float) -> PlanarPose:
-        """Where the robot truly is."""
+        """The robot's true pose."""
         return self._at(self._true, t_s, self.twist(t_s))
 
     def odometry(self, t_s: float) -> PlanarPose:
-        """Where its tracks say that it is."""
+        """The robot's pose by odometry."""
         return self._at(self._told, t_s, self._believed(*self.twist(t_s)))
 
     def odometry_camera(self, stamp_ns: int) -> Pose:
-        """The camera by dead reckoning: it knows nothing of vibration."""
+        """The camera's pose by dead reckoning, which does not contain the vibration."""
         return camera_in_floor(self.odometry(stamp_ns / NS_PER_S), MOUNT)
 
     def _believed(self, v_mps: float, w_radps: float) -> tuple[float, float]:

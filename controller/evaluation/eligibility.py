@@ -1,4 +1,4 @@
-"""Which true objects a detector is answerable for, frame by frame."""
+"""Which true objects a detector must find, may find, or must not call moving, frame by frame."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from controller.evaluation.types import FrameTruth, TrueObject
 MIN_VISIBLE_PX = 400
 MAX_DISTANCE_M = 10.0
 MIN_VISIBLE_RATIO = 0.3
-MOVING_MPS = 0.1  # slower than this nobody has to see it move
-STANDING_MPS = 0.02  # and from here down nobody may say that it does
-STANDING_S = 0.5  # once it has stood for this long
-SETTLING_S = 0.5  # the first time of an object, in which it need not be found yet
+MOVING_MPS = 0.1  # slower objects need not be found
+STANDING_MPS = 0.02  # slower objects stand: calling them moving is wrong ...
+STANDING_S = 0.5  # ... once they have stood for this long
+SETTLING_S = 0.5  # an object need not be found in its first eligible frames, for this long
 
 
 class Standing(Enum):
-    """ELIGIBLE: must be found. EXCUSED: may be. STILL: calling it moving is wrong."""
+    """ELIGIBLE: must be found. EXCUSED: may be found. STILL: calling it moving is wrong."""
 
     ELIGIBLE = "eligible"
     EXCUSED = "excused"
@@ -27,14 +27,14 @@ class Standing(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One object in one frame. settled: its first SETTLING_S as an eligible object are over."""
+    """The verdict on one object in one frame. settled: it became eligible at least SETTLING_S ago."""
 
     standing: Standing
     settled: bool
 
 
 def calls(frames: Sequence[FrameTruth]) -> list[dict[int, Call]]:
-    """For each frame, the call of each object by its id."""
+    """For each frame, the verdict on each object, by the object's id."""
     first_eligible_s: dict[int, float] = {}
     last_moved_s: dict[int, float] = {}
     result = []
@@ -47,7 +47,7 @@ def calls(frames: Sequence[FrameTruth]) -> list[dict[int, Call]]:
             if standing is Standing.ELIGIBLE:
                 first_eligible_s.setdefault(true.id, frame.stamp_s)
             since_s = first_eligible_s.get(true.id)
-            # Stamps are multiples of a frame's time: half a millisecond is rounding, not waiting.
+            # Stamps are multiples of the frame period; half a millisecond allows for rounding.
             settled = since_s is not None and frame.stamp_s - since_s >= SETTLING_S - 5e-4
             called[true.id] = Call(standing, settled)
         result.append(called)

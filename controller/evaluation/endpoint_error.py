@@ -1,9 +1,9 @@
-"""How well fragments are followed: their tracked ends against the true flow, by distance (paper: Fig. 5).
+"""Endpoint error: the tracked ends of fragments against the true flow, by distance (paper: Fig. 5).
 
-Static scene, moving camera. A fragment that is known in two frames in a row has moved each end by an
-estimated flow; true depth and the true motion of the camera say where the surface point there really
-went. At the outline of a thing the pixel may belong to what lies behind it, so the depth is the
-smallest of the 3x3 pixels around the end: outlines belong to the nearer side.
+For static scenes with a moving camera. Where a fragment is tracked from one frame to the next, each of its
+two ends has an estimated flow. The true flow of that surface point follows from the true depth and the
+camera's true motion. On the outline of an object the pixel itself may belong to the background, but an
+outline belongs to the nearer surface. So the depth is the smallest of the 3x3 pixels around the end.
 """
 
 from __future__ import annotations
@@ -17,12 +17,17 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.scene import Fragments
 
 DISTANCE_BINS_M = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-_NEAR_M = 0.05
+_NEAR_M = 0.05  # points nearer to the camera than this are left out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EndpointErrors:
-    """Of N tracked ends: distance_m (N,) of the surface, error_px (N,), flow_px (N,): of the true flow."""
+    """Errors of N tracked ends, each array (N,).
+
+    distance_m: depth of the surface.
+    error_px: tracked end minus its true place, magnitude.
+    flow_px: magnitude of the true flow.
+    """
 
     distance_m: FloatArray
     error_px: FloatArray
@@ -30,7 +35,7 @@ class EndpointErrors:
 
     @staticmethod
     def none() -> EndpointErrors:
-        """No end at all."""
+        """An empty set."""
         return EndpointErrors(np.empty(0), np.empty(0), np.empty(0))
 
     def __add__(self, other: EndpointErrors) -> EndpointErrors:
@@ -44,7 +49,11 @@ class EndpointErrors:
 def endpoint_errors(
     before: Fragments, now: Fragments, depth_m: NDArray[np.float32], motion: Pose, k: Intrinsics
 ) -> EndpointErrors:
-    """depth_m (H, W): true, of the frame before, 0 where nothing is. motion: that camera in the one now."""
+    """The errors of the fragments that are in both frames.
+
+    depth_m: (H, W) true depth of the previous frame, 0 where there is no surface.
+    motion: pose of the previous camera in the current one.
+    """
     _, old, new = np.intersect1d(before.ids, now.ids, assume_unique=True, return_indices=True)
     start = before.ends_px[old].reshape(-1, 2).astype(np.float64)
     end = now.ends_px[new].reshape(-1, 2).astype(np.float64)
@@ -59,7 +68,7 @@ def endpoint_errors(
 
 
 def _nearest_m(points_px: FloatArray, depth_m: NDArray[np.float32]) -> FloatArray:
-    """(N,) the smallest depth in the 3x3 pixels around each point; NaN where there is none."""
+    """(N,) the smallest depth of the 3x3 pixels around each point; NaN where none has depth."""
     height, width = depth_m.shape
     steps = np.array([(dv, du) for dv in (-1, 0, 1) for du in (-1, 0, 1)])
     around = np.rint(points_px[:, ::-1]).astype(np.intp)[:, None] + steps

@@ -1,4 +1,4 @@
-"""`treadwatch evaluate`: the simulated set, recordings, or both, into one report folder."""
+"""`treadwatch evaluate`: evaluates the simulated set, recordings, or both, and writes one report folder."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from controller.outlet import say
 
 @dataclass(frozen=True, slots=True)
 class EvaluationOptions:
-    """The command line of `treadwatch evaluate`. only: names of sequences, all of them where empty."""
+    """The command line of `treadwatch evaluate`. only: names of sequences; empty: all of them."""
 
     recordings: tuple[Path, ...]
     simulated: bool
@@ -49,7 +49,11 @@ class EvaluationOptions:
 
 
 def run_evaluation(options: EvaluationOptions) -> None:
-    """Raises UserError, HalError: nothing to evaluate, an unknown sequence, a bad recording, no folder."""
+    """Evaluate, and write the report.
+
+    Raises UserError or HalError: nothing to evaluate, an unknown sequence, a bad recording, or a report
+    folder that cannot be written.
+    """
     if not options.recordings and not options.simulated:
         raise UserError("there is nothing to evaluate; give recordings, or --sim for the simulated set")
     if options.only and not options.simulated:
@@ -58,7 +62,7 @@ def run_evaluation(options: EvaluationOptions) -> None:
         raise UserError("--static says that nothing moves in the recordings; give recordings with it")
     chosen = choose(options.only)
     for folder in options.recordings:
-        open_replay(folder, options.odometry)  # a mistake is told now, not after minutes
+        open_replay(folder, options.odometry)  # reports a bad recording now, not after minutes
     names = distinct_names(options.recordings)
     prepare_folder(options.report)
     result: dict[str, Any] = {}
@@ -82,7 +86,7 @@ def run_evaluation(options: EvaluationOptions) -> None:
 
 
 def choose(names: tuple[str, ...]) -> tuple[Sequence, ...]:
-    """The named sequences, or all. Raises UserError."""
+    """The named sequences, or all if there are no names. Raises UserError for an unknown name."""
     every = sequences()
     unknown = sorted(set(names) - {one.name for one in every})
     if unknown:
@@ -114,7 +118,7 @@ def _hidden(options: EvaluationOptions) -> bool:
 
 
 def command_of(options: EvaluationOptions) -> str:
-    """What makes this report again."""
+    """The command that makes this report again."""
     parts = ["treadwatch", "evaluate", *map(str, options.recordings)]
     if options.recordings and options.odometry != "auto":
         parts.extend(("--odometry", options.odometry))
@@ -130,7 +134,7 @@ def command_of(options: EvaluationOptions) -> str:
 
 
 def _say_figures(summary: Summary) -> None:
-    """The figures that have targets, on one screen."""
+    """Print the figures that have targets, on one screen."""
     for split in ("reporting", "tuning"):
         methods = summary.splits[split]
         for name, alone in ((OURS, False), (OURS_ALONE, True)):

@@ -1,4 +1,4 @@
-"""The report's diagrams, each from figures alone."""
+"""The report's diagrams, drawn from figures only. Pictures with camera images are in pictures.py."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ COLOURS: dict[str, Colour] = {
     DENSE_FLOW: INK,
 }
 _SHARE = Axis("", 0.0, 1.02, ticks=tuple((value / 5, f"{value / 5:g}") for value in range(6)))
-_PANEL = (760, 620)
-TARGET_ENDPOINT_PX = 0.15
+_PANEL = (760, 620)  # width and height of one diagram
+TARGET_ENDPOINT_PX = 0.15  # for the median beyond 2 m
 
 
 def precision_recall(summary: Summary) -> Image:
-    """Fig. 4: curves at pixel level (left) and at object level (right), with the working points."""
+    """Fig. 4: curves at pixel level (left) and at object level (right), with the operating points."""
     width, height = _PANEL
     image = blank(2 * width, height)
     ours = summary.splits["reporting"][OURS]
@@ -118,7 +118,7 @@ def speed_error(methods: dict[str, MethodSummary]) -> Image:
 
 
 def latency(methods: dict[str, MethodSummary]) -> Image:
-    """Share of the objects that have been detected, over the time since they became eligible."""
+    """Share of the objects detected by a time, counted from when each became eligible."""
     width, height = _PANEL
     image = blank(width + 200, height)
     chart = Chart(
@@ -140,7 +140,7 @@ def latency(methods: dict[str, MethodSummary]) -> Image:
 
 
 def found_by_distance(one: MethodSummary) -> Image:
-    """How many objects there were at each distance, and how many of them were found."""
+    """The number of objects at each distance, and how many of them were found."""
     width, height = _PANEL
     image = blank(width + 200, height)
     counts = one.figures.found_by_distance
@@ -157,7 +157,7 @@ def found_by_distance(one: MethodSummary) -> Image:
 
 
 def table_one(methods: dict[str, MethodSummary]) -> Image:
-    """Table 1 measured: precision and recall per object, and what a frame costs."""
+    """Table 1 as measured: precision and recall per object, and processing time per frame."""
     names = list(methods)
     width, row = 1520, 58
     height = 140 + row * len(names)
@@ -213,7 +213,7 @@ def _measures_speed(one: MethodSummary) -> bool:
 
 
 def _round_up(value: float) -> float:
-    """To a number that leaves some room above."""
+    """The next round number that is at least 5 % higher, so that there is some room above."""
     power = 10.0 ** math.floor(math.log10(value))
     steps = (1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0, 15.0)
     return next(step * power for step in steps if step * power >= 1.05 * value)

@@ -1,7 +1,8 @@
-"""The lidar baseline: clusters tracked by Kalman filters, moving by chi-square.
+"""The lidar baseline: clusters are tracked by Kalman filters and judged moving by a chi-square test.
 
-Background-free as reference [20] of the paper is understood: no map and no model of the background, only
-consecutive scans. It is given the same odometry as the camera, and corrects its slip by matching scans.
+It is background-free, as reference [20] of the paper is understood: no map and no background model, only
+consecutive scans. It is given the same odometry as the camera and corrects the slip by scan matching
+(controller/evaluation/lidar_matching.py).
 """
 
 from __future__ import annotations
@@ -19,20 +20,29 @@ from controller.evaluation.types import CALLED_MOVING, NO_BOX, Answer, DetectedO
 from hal.geometry import body_in_floor, camera_in_body
 from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose, Pose
 
-_GATE_M = 0.6
-_POSITION_SIGMA_M = 0.06  # of a cluster's middle: noise, and the shape's change with the view
-_CUT_SIGMA_M = 0.35  # of one that is partly hidden
-_ACCEL_MPS2 = 1.0
+_GATE_M = 0.6  # a cluster farther from a track does not belong to it
+# Standard deviation of a cluster's middle: noise, and the change of the outline with the view.
+_POSITION_SIGMA_M = 0.06
+_CUT_SIGMA_M = 0.35  # the same for a cluster that is partly occluded
+_ACCEL_MPS2 = 1.0  # standard deviation of a track's acceleration
+# Thresholds for calling a track moving.
 _MIN_SPEED_MPS = 0.25
 _CHI2 = 25.0  # five standard deviations of the velocity
 _MIN_SCANS = 4
-_MIN_WAY_M = 0.12  # and it must have gone somewhere
-_FORGET_S = 0.5
+_MIN_WAY_M = 0.12  # distance from where the track began
+_FORGET_S = 0.5  # a track without clusters for longer is dropped
 
 
 @dataclass(slots=True, eq=False)
 class _Track:
-    """state: x, y, vx, vy on the floor of the first scan. streak: scans in a row that speak for moving."""
+    """One tracked cluster, in the floor frame of the first scan.
+
+    state, covariance: of x, y, vx, vy.
+    born_m: (2,) where the track began.
+    seen_s: time of the last cluster.
+    scans: number of clusters so far.
+    streak: consecutive scans that passed the thresholds for moving.
+    """
 
     id: int
     state: FloatArray
@@ -44,7 +54,7 @@ class _Track:
     moving: bool = False
 
     def predict(self, dt_s: float) -> None:
-        """Constant velocity with random acceleration."""
+        """Predict by dt_s: constant velocity, with white acceleration noise."""
         f = np.eye(4)
         f[0, 2] = f[1, 3] = dt_s
         g = np.array([[0.5 * dt_s**2, 0.0], [0.0, 0.5 * dt_s**2], [dt_s, 0.0], [0.0, dt_s]])
@@ -52,7 +62,7 @@ class _Track:
         self.covariance = f @ self.covariance @ f.T + g @ g.T * _ACCEL_MPS2**2
 
     def correct(self, seen_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
-        """A cluster's middle (2,)."""
+        """Kalman update with a cluster's middle seen_m (2,), and a new verdict on moving."""
         innovation_cov = self.covariance[:2, :2] + np.eye(2) * sigma_m**2
         gain = self.covariance[:, :2] @ np.linalg.inv(innovation_cov)
         self.state = self.state + gain @ (seen_m - self.state[:2])
@@ -63,7 +73,7 @@ class _Track:
 
     @property
     def chi2(self) -> float:
-        """Of the velocity against rest."""
+        """Squared Mahalanobis distance of the velocity from zero."""
         velocity = self.state[2:]
         return float(velocity @ np.linalg.solve(self.covariance[2:, 2:], velocity))
 
@@ -79,7 +89,7 @@ class _Track:
 
 
 class LidarTracker:
-    """Scans and odometry in, tracks out; predicts to the time of each camera frame."""
+    """Takes scans and odometry, gives tracks, predicted to the time of each camera frame."""
 
     def __init__(self, model: LidarModel, mount: CameraMount, intrinsics: Intrinsics) -> None:
         self._model = model
@@ -92,7 +102,7 @@ class LidarTracker:
         self._pose = Pose(np.eye(3), np.zeros(3))
 
     def update(self, scan: Scan, odometry: PlanarPose) -> None:
-        """One scan, taken with the robot at odometry."""
+        """Take in one scan. odometry: the robot's pose at that time."""
         clusters = find_clusters(scan)
         self._predict_to(scan.stamp_s)
         self._move(scan, odometry)
@@ -112,7 +122,7 @@ class LidarTracker:
         self._tracks = [track for track in self._tracks if scan.stamp_s - track.seen_s <= _FORGET_S]
 
     def answer(self, t_s: float, odometry: PlanarPose) -> Answer:
-        """The tracks in the camera's field of view at t_s, on the optical axes; height is not measured."""
+        """The tracks in the camera's field of view at t_s, in the optical frame; height is not measured."""
         self._predict_to(t_s)
         since = self._since_last_scan(odometry)
         camera = self._pose @ body_in_floor(since) @ camera_in_body(self._mount)
@@ -132,7 +142,7 @@ class LidarTracker:
         return Answer(tuple(detections))
 
     def _move(self, scan: Scan, odometry: PlanarPose) -> None:
-        """The robot's own way since the last scan, by odometry and scan matching."""
+        """Update the robot's pose by odometry, corrected by matching this scan to the last one."""
         if self._last is not None:
             before, _ = self._last
             sensor = Pose(np.eye(3), np.array([self._model.forward_m, 0.0, 0.0]))
@@ -142,7 +152,7 @@ class LidarTracker:
         self._last = (scan, odometry)
 
     def _since_last_scan(self, odometry: PlanarPose) -> PlanarPose:
-        """The robot now in the robot at the last scan, by odometry."""
+        """Pose of the robot relative to its pose at the last scan, by odometry."""
         if self._last is None:
             return PlanarPose(0.0, 0.0, 0.0)
         return _planar(body_in_floor(self._last[1]).inverse() @ body_in_floor(odometry))
@@ -170,7 +180,7 @@ def _on_floor(points_m: FloatArray) -> FloatArray:
 
 
 def _confidence(track: _Track) -> float:
-    """By the chi-square of the velocity; from CALLED_MOVING on exactly where the track is moving."""
+    """Confidence by the chi-square of the velocity; CALLED_MOVING or more exactly if the track is moving."""
     evidence = 1.0 - math.exp(-0.5 * track.chi2 / _CHI2)
     return (
         CALLED_MOVING + (1.0 - CALLED_MOVING) * evidence if track.moving else CALLED_MOVING * 0.999 * evidence

@@ -1,4 +1,4 @@
-"""A scan cut into clusters where the range jumps: the candidates of background-free tracking."""
+"""Segments a scan into clusters at range jumps. Their middles are the input of the lidar tracker."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ import numpy as np
 from controller.evaluation.lidar_scan import Scan
 from hal.types import FloatArray
 
-_JUMP_M = 0.25  # between neighbouring beams, besides what a slanted surface does
-_JUMP_PER_M = 0.02
+_JUMP_M = 0.25  # least distance between neighbouring points of two clusters
+_JUMP_PER_M = 0.02  # what is added to it per metre of range, because of slanted surfaces
 _MIN_BEAMS = 4
-_MAX_SIZE_M = 1.8  # wider things are walls and racks; people and robots are not
+_MAX_SIZE_M = 1.8  # wider clusters are walls and racks, not people or robots
 _MIN_SIZE_M = 0.12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clusters:
-    """middle_m (N, 2) and size_m (N,) on the sensor's axes (forward, left).
+    """N clusters on the sensor's axes (forward, left).
 
-    whole (N,) bool: nothing nearer cuts it off at either end, so its middle stays where it is when
-    the sensor moves.
+    middle_m: (N, 2).
+    size_m: (N,).
+    whole: (N,) bool, nothing nearer occludes it at either end. Then its middle does not shift when the
+    sensor moves.
     """
 
     middle_m: FloatArray
@@ -30,7 +32,7 @@ class Clusters:
 
 
 def find_clusters(scan: Scan) -> Clusters:
-    """All clusters that could be a person or a robot."""
+    """All clusters whose size fits a person or a robot."""
     back = np.isfinite(scan.range_m)
     index = np.flatnonzero(back)
     if len(index) == 0:
@@ -44,7 +46,7 @@ def find_clusters(scan: Scan) -> Clusters:
     last = np.concatenate([first[1:], [len(index)]]) - 1
     size_m = np.hypot(*(points[last] - points[first]).T)
     fits = (last - first + 1 >= _MIN_BEAMS) & (size_m <= _MAX_SIZE_M) & (size_m >= _MIN_SIZE_M)
-    # A neighbour beam that ended nearer hides a part; so does the border of the field of view.
+    # Occluded if the next beam at an end has a shorter range, or is beyond the field of view.
     padded = np.concatenate([[0.0], scan.range_m, [0.0]])
     hidden = (padded[index[first]] < range_m[first]) | (padded[index[last] + 2] < range_m[last])
     chosen = np.flatnonzero(fits)

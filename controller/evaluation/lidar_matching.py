@@ -1,7 +1,7 @@
-"""Scan matching: how the sensor moved between two scans, with the odometry as the first guess.
+"""Scan matching: the sensor's motion between two scans, with the odometry as the first guess.
 
-Point to line (Chen and Medioni 1992), robust: what moved by itself does not fit and does not count. It
-corrects what slipping tracks tell about the yaw; without it everything static would turn.
+Point-to-line ICP (Chen and Medioni 1992) with robust weights, so that points on movers have little weight. It
+corrects the yaw error of slipping tracks; without it, static objects would seem to rotate about the sensor.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from controller.evaluation.lidar_scan import Scan
 from hal.types import FloatArray, PlanarPose
 
 _ITERATIONS = 8
-_WINDOW = 4  # beams to either side in which the partner is looked for
-_GATE_M = 0.25
-_ROBUST_M = 0.05
+_WINDOW = 4  # the corresponding point is searched this many beams to either side
+_GATE_M = 0.25  # greatest distance of corresponding points
+_ROBUST_M = 0.05  # residuals above this lose weight (Cauchy)
 _MIN_POINTS = 30
-# How far the odometry may be off within one scan: it decides where the scene says nothing.
+# Standard deviation of the odometry within one scan. It decides in directions that the scene leaves open.
 _GUESS_SIGMA = np.array([0.01, 0.01, 0.01])  # m, m, rad
 
 
 def refine(before: Scan, now: Scan, guess: PlanarPose) -> PlanarPose:
-    """The sensor now in the sensor before; the guess itself where too little can be matched."""
+    """Pose of the current sensor in the previous one; the guess itself if too few points match."""
     reference = _points(before)
     normals = _normals(reference)
     valid = np.isfinite(now.range_m)
@@ -53,13 +53,13 @@ def refine(before: Scan, now: Scan, guess: PlanarPose) -> PlanarPose:
 
 
 def _points(scan: Scan) -> FloatArray:
-    """(N, 2) on the sensor's axes; NaN where nothing came back."""
+    """(N, 2) on the sensor's axes; NaN where a beam has no return."""
     range_m = np.where(np.isfinite(scan.range_m), scan.range_m, np.nan)
     return np.stack([range_m * np.cos(scan.bearings_rad), range_m * np.sin(scan.bearings_rad)], axis=1)
 
 
 def _normals(points: FloatArray) -> FloatArray:
-    """(N, 2) unit normals from the neighbours two beams away; NaN at ends, edges and gaps."""
+    """(N, 2) unit normals from the points two beams to either side; NaN at ends, edges and gaps."""
     along = np.full_like(points, np.nan)
     along[2:-2] = points[4:] - points[:-4]
     length = np.hypot(along[:, 0], along[:, 1])
@@ -78,7 +78,7 @@ def _transform(points: FloatArray, pose: FloatArray) -> FloatArray:
 def _partners(
     points: FloatArray, reference: FloatArray, scan: Scan
 ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.intp]], FloatArray]:
-    """The nearest reference point in a window of beams around each point (N,), and how far away it is."""
+    """For each of N points, index and distance of the nearest reference point in a window of beams."""
     step_rad = float(scan.bearings_rad[1] - scan.bearings_rad[0])
     bearing = np.arctan2(points[:, 1], points[:, 0])
     middle = np.rint((bearing - scan.bearings_rad[0]) / step_rad).astype(np.intp)

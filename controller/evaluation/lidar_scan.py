@@ -1,4 +1,4 @@
-"""A planar lidar in the simulated world: rays against the footprints of whatever reaches its height."""
+"""A simulated planar lidar: rays against the walls and the outlines of all bodies at the scanner's height."""
 
 from __future__ import annotations
 
@@ -12,12 +12,20 @@ from config.scenario import Room
 from hal.types import FloatArray, PlanarPose
 from sim.world import BodyState
 
-_LEGS = 0.6
+_LEGS = 0.6  # size of a person's outline, as a share of the footprint
 
 
 @dataclass(frozen=True, slots=True)
 class LidarModel:
-    """A common safety or navigation scanner. forward_m: ahead of the turning centre."""
+    """A common safety or navigation scanner.
+
+    height_m: above the floor.
+    forward_m: ahead of the robot's centre of rotation.
+    field_deg, step_deg: field of view, and angle between beams.
+    rate_hz: scans per second.
+    range_m: greatest range.
+    noise_m: standard deviation of a range.
+    """
 
     height_m: float = 0.30
     forward_m: float = 0.45
@@ -29,7 +37,7 @@ class LidarModel:
 
     @property
     def bearings_rad(self) -> FloatArray:
-        """(N,) of the beams, right to left."""
+        """(N,) bearings of the beams, from right to left."""
         count = round(self.field_deg / self.step_deg) + 1
         half = math.radians(self.field_deg) / 2.0
         return np.linspace(-half, half, count)
@@ -37,7 +45,7 @@ class LidarModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scan:
-    """range_m (N,): per beam, inf where nothing came back."""
+    """One scan. bearings_rad, range_m: (N,), one a beam; range inf where there is no return."""
 
     stamp_s: float
     bearings_rad: FloatArray
@@ -45,8 +53,11 @@ class Scan:
 
 
 class Lidar:
-    """Scans the world. A person is one convex outline, _LEGS of the room that swinging limbs take: two legs
-    that hide each other in turn would be harder."""
+    """Scans the world.
+
+    A person is one convex outline, _LEGS times the footprint that swinging limbs need. This favours the
+    lidar: two legs that occlude each other in turn would be harder to track.
+    """
 
     def __init__(self, model: LidarModel, room: Room, seed: int) -> None:
         self._model = model
@@ -62,7 +73,7 @@ class Lidar:
         self._generator = np.random.default_rng((seed, 301))
 
     def scan(self, t_s: float, robot: PlanarPose, bodies: Sequence[BodyState]) -> Scan:
-        """From where the robot truly stands."""
+        """One scan with noise. robot: its true pose."""
         model = self._model
         outlines = [
             np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
@@ -85,7 +96,7 @@ def _outline(body: BodyState) -> FloatArray:
 
 
 def cast(origin: FloatArray, angles_rad: FloatArray, segments: FloatArray) -> FloatArray:
-    """(N,) distance from origin (2,) along angles (N,) to the nearest of segments (M, 2, 2), inf: none."""
+    """(N,) distance from origin (2,) along angles (N,) to the nearest of segments (M, 2, 2); inf: no hit."""
     direction = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=1)[:, None, :]
     start = segments[None, :, 0] - origin
     along = (segments[:, 1] - segments[:, 0])[None]

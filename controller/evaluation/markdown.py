@@ -1,4 +1,4 @@
-"""Markdown for reports: tables, paragraphs, numbers."""
+"""Markdown for reports: tables, sections, images, numbers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """A table and the empty line after it. Raises ValueError where a row is not as long as the head."""
+    """A table and the empty line after it. Raises ValueError for a row that is not as long as the head."""
     lines = [_row(head), "|" + "---|" * len(head)]
     for row in rows:
         if len(row) != len(head):
@@ -30,7 +30,7 @@ def picture(title: str, file: str) -> list[str]:
 
 
 def fixed(value: float, digits: int = 3) -> str:
-    """A number for a table; n/a where it is not known, and never where it is infinite."""
+    """A number for a table: "n/a" for NaN, "never" for infinity."""
     if math.isnan(value):
         return "n/a"
     return f"{value:.{digits}f}" if math.isfinite(value) else "never"

@@ -1,4 +1,4 @@
-"""When a detection and a true object are the same: their boxes overlap, or their middles are close."""
+"""Matches detections to true objects: a pair is possible if the boxes overlap or the middles are close."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_DISTANCE_M = 0.5
 
 
 def iou(a: Box, b: Box) -> float:
-    """Intersection over union of two boxes; 0 where one of them is not known (NaN) or empty."""
+    """Intersection over union of two boxes; 0 if one of them is unknown (NaN) or empty."""
     if not np.isfinite([*a, *b]).all():
         return 0.0
     width = min(a[2], b[2]) - max(a[0], b[0])
@@ -27,14 +27,14 @@ def iou(a: Box, b: Box) -> float:
 
 
 def distance_m(detection: DetectedObject, true: TrueObject) -> float:
-    """Between the middles, over the components that the method measures; inf where it measures none."""
+    """Distance of the middles, over the components that the method measures; inf if it measures none."""
     difference = detection.position_m - true.position_m
     known = np.isfinite(difference)
     return float(np.linalg.norm(difference[known])) if known.any() else np.inf
 
 
 def costs(detections: Sequence[DetectedObject], objects: Sequence[TrueObject]) -> FloatArray:
-    """(N, M): 0 for a perfect match up to 2 for the poorest one; inf where the two are not the same."""
+    """(N, M) costs, from 0 for a perfect match to 2 for the poorest one; inf for an impossible pair."""
     cost = np.full((len(detections), len(objects)), np.inf)
     for row, detection in enumerate(detections):
         for column, true in enumerate(objects):

@@ -1,4 +1,4 @@
-"""Our own detector and tracker among the methods."""
+"""Our own detector and tracker, as one of the compared methods."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.perception import Perception
 from vision.scene import Fragments, Obstacle
 
-# Half of the scale belongs to each verdict.
-_ROOM = 1.0 - CALLED_MOVING
-_DOUBT_SPEED_MPS = 0.1  # a speed of this size says as much against rest as one standard deviation
+_ROOM = 1.0 - CALLED_MOVING  # the part of the confidence scale for obstacles that are called moving
+_DOUBT_SPEED_MPS = 0.1  # standard deviation whose square is added to the velocity's covariance
 
 
 class Treadwatch:
-    """vision.perception as a Method; keeps the last fragments for the pictures."""
+    """vision.perception as a Method. fragments: those of the last frame, for the pictures."""
 
     def __init__(self, config: PerceptionConfig, mount: CameraMount | None, body: Body) -> None:
         self._perception = Perception(config, mount, body.height_m, body.clearance_m)
@@ -32,7 +31,7 @@ class Treadwatch:
 
 
 def detection_of(obstacle: Obstacle) -> DetectedObject:
-    """An obstacle as the scores take it."""
+    """An obstacle as a detection for the scores."""
     return DetectedObject(
         obstacle.id,
         obstacle.bbox_px,
@@ -44,11 +43,11 @@ def detection_of(obstacle: Obstacle) -> DetectedObject:
 
 
 def motion_confidence(obstacle: Obstacle) -> float:
-    """0..1 that the obstacle moves; CALLED_MOVING and above exactly where it is called moving.
+    """Confidence 0..1 that the obstacle moves; CALLED_MOVING or more exactly if it is called moving.
 
-    The score of an obstacle that is called moving is its confidence in that. Below the verdict the
-    evidence is its velocity over ground by its own uncertainty, so that a precision-recall
-    curve goes on beyond the working point.
+    For an obstacle that is called moving, it follows from the obstacle's score. For all others, it follows
+    from the velocity over ground divided by its uncertainty, so that the precision-recall curve goes on
+    beyond the operating point.
     """
     if obstacle.moving:
         return CALLED_MOVING + _ROOM * min(max(obstacle.score, 0.0), 1.0)
@@ -57,7 +56,7 @@ def motion_confidence(obstacle: Obstacle) -> float:
 
 
 def _velocity_sigmas(velocity: FloatArray, covariance: FloatArray) -> float:
-    """How many standard deviations the velocity is away from rest; 0 where it is not known."""
+    """How many standard deviations the velocity is away from zero; 0 if it is not known."""
     if not (np.isfinite(velocity).all() and np.isfinite(covariance).all()):
         return 0.0
     widened = covariance + np.eye(3) * _DOUBT_SPEED_MPS**2

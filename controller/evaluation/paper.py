@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Reported:
-    """objects that there were, correct and wrong ones; precision and recall as printed; seconds a frame."""
+    """One row of the table. objects: true ones; correct, wrong: detections; precision, recall: as printed."""
 
     objects: int
     correct: int

@@ -1,4 +1,4 @@
-"""Pictures with images in them: Fig. 6 (scene, depth, result), and frames in which something went wrong."""
+"""The report's pictures with camera images: Fig. 6 (scene, depth, result), and frames with errors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from vision.scene import Fragments
 _MISSED = bgr("E02424")
 _FOUND = GREEN
 _CLAIMED = ORANGE
-_UNJUDGED = BLUE  # true and moving, but new, small, hidden or far: it may be found and need not be
+_UNJUDGED = BLUE  # a true object that need not be found: new, slow, small, occluded or far
 _DEPTH_RANGE_M = 10.0
 _GAP, _HEAD = 12, 40
 _CELL = (480, 360)
@@ -30,7 +30,7 @@ _BRIGHTNESS = 0.8
 
 
 def scene_depth_result(snapshots: Sequence[Snapshot]) -> Image:
-    """Fig. 6: one row a snapshot; what the camera saw, its depth, what was made of it."""
+    """Fig. 6: one row a snapshot, with colour image, depth and result."""
     width, height = _CELL
     image = blank(3 * width + 4 * _GAP, _HEAD + len(snapshots) * (height + _GAP))
     for column, title in enumerate(("Scene", "Depth: near is bright, black is none", "Result")):
@@ -46,7 +46,7 @@ def scene_depth_result(snapshots: Sequence[Snapshot]) -> Image:
 
 
 def depth_picture(depth_m: NDArray[np.float32]) -> Image:
-    """Near is bright, far is dark, no data is black."""
+    """Depth as an image: near is bright, far is dark, no data is black."""
     levels = cv2.convertScaleAbs(depth_m, alpha=255.0 / _DEPTH_RANGE_M)
     return np.asarray(colour_table()[levels], np.uint8)
 
@@ -64,7 +64,7 @@ def result_picture(snapshot: Snapshot) -> Image:
 
 
 def failure_picture(snapshot: Snapshot) -> Image:
-    """A frame with what is true and what was claimed, and a sentence beneath."""
+    """A frame with true objects and detections drawn in, and a caption that names the errors."""
     image = snapshot.colour.copy()
     labels = []
     for true in snapshot.truth.objects:
@@ -88,7 +88,7 @@ def _colour_of(identity: int, score: FrameScore) -> Colour:
 
 
 def describe_faults(snapshot: Snapshot) -> str:
-    """What is wrong with the frame, in words."""
+    """The errors in the frame, in words."""
     by_id = {true.id: true for true in snapshot.truth.objects}
     parts = [
         f"missed: {by_id[one].kind} at {by_id[one].distance_m:.1f} m" for one in snapshot.score.missed_settled

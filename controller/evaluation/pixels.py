@@ -1,9 +1,9 @@
-"""Pixel level: which pixels a method claims as moving, held against the mask of the bodies that move.
+"""Scores at pixel level: the pixels that a method calls moving against the true mask of the moving bodies.
 
-A method without a silhouette of its own claims, for each obstacle, the pixels inside its box whose measured
-depth lies within the obstacle's visible surface. What counts is every pixel with a true depth up to
-10 m; moving are those of bodies that move, and those of bodies that just stopped or are too small
-count neither way, as for objects.
+A method without a mask of its own claims, for each obstacle, the pixels inside its box whose measured depth
+lies within the obstacle's visible surface. Pixels with a true depth of up to 10 m count. Those of bodies that
+move at 0.1 m/s or more are moving. Those of slower bodies that creep or turn on the spot count neither way;
+the caller lists them as excused (controller/evaluation/run_sequence.py).
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from controller.evaluation.types import DetectedObject
 from hal.types import RgbdFrame
 
 STEP_PX = 2  # every second pixel of every second row is judged
-_DEPTH_MARGIN_M = 0.15  # of measured depth around the surface, and
-_DEPTH_MARGIN_PER_M2 = 0.015  # two standard deviations of a real RealSense's
+# Pixels belong to an obstacle within a margin of depth around its surface. The second part grows with the
+# square of the depth: two standard deviations of a real RealSense camera.
+_DEPTH_MARGIN_M = 0.15
+_DEPTH_MARGIN_PER_M2 = 0.015
 
 
 def claimed(frame: RgbdFrame, detections: Sequence[DetectedObject]) -> NDArray[np.uint8]:
-    """(H / 2, W / 2) levels 0..255 by which the detections claim the pixels of a frame."""
+    """(H / 2, W / 2) levels 0..255: the greatest confidence of the detections that claim the pixel."""
     depth_m = frame.depth[::STEP_PX, ::STEP_PX].astype(np.float32) * np.float32(frame.depth_scale_m)
     levels = np.zeros(depth_m.shape, np.uint8)
     height, width = depth_m.shape
@@ -53,7 +55,11 @@ def count_pixels(
     moving: Collection[int],
     excused: Collection[int],
 ) -> PixelCounts:
-    """levels, instances (body ids), true depth_m: (H / 2, W / 2)."""
+    """Histograms of the levels, for moving pixels and for the rest.
+
+    levels, instances, depth_m: (H / 2, W / 2) levels from claimed(), body ids, true depth.
+    moving, excused: ids of bodies that move, and of those whose pixels do not count.
+    """
     judged = (depth_m > 0.0) & (depth_m <= MAX_DISTANCE_M)
     moves = judged & np.isin(instances, list(moving))
     rests = judged & ~moves & ~np.isin(instances, list(excused))

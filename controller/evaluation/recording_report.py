@@ -53,7 +53,7 @@ def write_recording_pictures(folder: Path, records: Sequence[RecordingRecord]) -
 
 
 def recording_lines(records: Sequence[RecordingRecord], command: str) -> list[str]:
-    """report.md about recordings. command: how to get it again."""
+    """The lines of report.md about recordings. command: the one that made this report."""
     rows = [
         (
             record.name,
@@ -84,7 +84,7 @@ def recording_lines(records: Sequence[RecordingRecord], command: str) -> list[st
 
 
 def _files(records: Sequence[RecordingRecord]) -> list[str]:
-    """One name for each; numbered where it is taken, as that of a-b is by a/b."""
+    """A file name for each record. A name that is taken gets a number: a/b and a-b would be the same."""
     files: list[str] = []
     for record in records:
         stem = f"recording-{record.name.replace('/', '-')}-{record.odometry}"

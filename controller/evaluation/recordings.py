@@ -1,6 +1,7 @@
-"""Recordings before our detector. Nobody knows what moves in them: counts, times, pictures, no recall.
+"""Runs our detector on recordings. It gives counts, times and pictures.
 
-When told that nothing but the camera moves (--static), everything that is called moving is false.
+There is no truth about what moves in a recording, so there is no recall. If the user says that nothing but
+the camera moves (--static), everything that is called moving is false.
 """
 
 from __future__ import annotations
@@ -29,17 +30,24 @@ from hal.errors import EndOfStream
 from vision.scene import CameraCondition
 
 MOST_PICTURES = 6
-_APART_FRAMES = 5
+_APART_FRAMES = 5  # least distance of two pictures
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingRecord:
-    """One recording. name: see distinct_names. moving_objects: identities that were called moving in three
-    frames or more.
+    """The result for one recording.
 
-    odometry: file, none or groundtruth, whichever was used.
-    seconds: of recording. ms: of detect and track together, per frame. pictures: the first frame, and
-    frames in which something was called moving.
+    name: see distinct_names.
+    odometry: "file", "none" or "groundtruth", whichever was used.
+    static: nothing but the camera moves, as the user says.
+    frames, skipped: number of frames used, and of unusable ones.
+    seconds: duration of the recording.
+    objects: number of track ids.
+    moving_objects: ids that were called moving in three frames or more.
+    frames_with_moving: number of frames with something called moving.
+    ms: per frame, detect and track together.
+    conditions, ego_sources: number of frames by camera condition and by source of the ego-motion.
+    pictures: the second frame, and frames in which something was called moving.
     """
 
     folder: Path
@@ -59,13 +67,13 @@ class RecordingRecord:
 
     @property
     def false_per_minute(self) -> float:
-        """NaN where it is not known what moves, or nothing was seen."""
+        """False moving objects per minute; NaN if it is not known what moves, or the recording is empty."""
         return ratio(len(self.moving_objects), self.seconds / 60.0) if self.static else math.nan
 
 
 @dataclass
 class _Tally:
-    """Collects while the frames go by."""
+    """Counts over the frames of one recording."""
 
     seen: set[int] = field(default_factory=set)
     moving: Counter[int] = field(default_factory=Counter)
@@ -77,7 +85,7 @@ class _Tally:
     pictures: list[Snapshot] = field(default_factory=list)
 
     def add(self, name: str, look: Look) -> None:
-        """One frame."""
+        """Count one frame."""
         moving = [obstacle.id for obstacle in look.scene.obstacles if obstacle.moving]
         self.seen.update(obstacle.id for obstacle in look.scene.obstacles)
         self.moving.update(moving)
@@ -93,7 +101,7 @@ class _Tally:
 
     @property
     def seconds(self) -> float:
-        """From the first frame to the end of the last one."""
+        """From the start of the first frame to the end of the last one."""
         if len(self.stamps_ns) < 2:
             return 0.0
         span_s = (max(self.stamps_ns) - min(self.stamps_ns)) / NS_PER_S
@@ -101,9 +109,9 @@ class _Tally:
 
 
 def distinct_names(folders: Sequence[Path]) -> list[str]:
-    """What each recording is called: the end of its path, as long as it takes to tell it from the others.
+    """A name for each recording: the last parts of its path, as many as make it unique.
 
-    Raises UserError for one that is given twice.
+    Raises UserError for a recording that is given twice.
     """
     paths = [folder.resolve() for folder in folders]
     for given, path in zip(folders, paths, strict=True):
@@ -126,7 +134,11 @@ def evaluate_recording(
     on_frame: Callable[[], None] = lambda: None,
     name: str | None = None,
 ) -> RecordingRecord:
-    """Every usable frame through detect and track. name: the folder's, if not given. Raises HalError."""
+    """Run detect and track on every usable frame. Raises HalError.
+
+    on_frame: called after each frame.
+    name: the folder's if None.
+    """
     name = folder.name if name is None else name
     source, poses = open_replay(folder, odometry)
     perceiver = build_replay_perceiver(config, source.mount, poses, time.perf_counter_ns)

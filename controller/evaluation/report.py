@@ -1,4 +1,4 @@
-"""The report folder: report.md, summary.json and the pictures."""
+"""Writes the report folder: report.md, summary.json and the pictures."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ _FIGURES = (
 
 
 def prepare_folder(folder: Path) -> None:
-    """Make it at once, so that a long run does not fail at its end; what an earlier run left there goes.
+    """Make the folder before the run, so that a long run does not fail at its end.
 
+    Deletes what an earlier run left there, except the pictures of recordings.
     Raises UserError.
     """
     ours = {one.name for one in sequences()}
@@ -50,7 +51,7 @@ def prepare_folder(folder: Path) -> None:
 
 
 def write_figures(folder: Path, summary: Summary, records: Sequence[SequenceRecord]) -> None:
-    """The diagrams, and Fig. 6. Raises UserError."""
+    """Write the diagrams, and Fig. 6. Raises UserError."""
     reporting = summary.splits["reporting"]
     if OURS in reporting:
         write_picture(folder / "fig4-precision-recall.png", figures.precision_recall(summary))
@@ -67,7 +68,10 @@ def write_figures(folder: Path, summary: Summary, records: Sequence[SequenceReco
 
 
 def write_failures(folder: Path, records: Sequence[SequenceRecord]) -> list[tuple[Snapshot, str]]:
-    """Pictures of the worst frames, and where they are in the folder. Raises UserError."""
+    """Write pictures of the worst frames; gives the frames with the picture's path in the folder.
+
+    Raises UserError.
+    """
     every = [snapshot for record in records for snapshot in record.failures]
     every.sort(key=lambda snapshot: (-snapshot.score.faults, snapshot.sequence, snapshot.index))
     worst = sorted(every[:MOST_FAILURES], key=lambda snapshot: (snapshot.sequence, snapshot.index))
@@ -78,7 +82,7 @@ def write_failures(folder: Path, records: Sequence[SequenceRecord]) -> list[tupl
 
 
 def write_texts(folder: Path, result: dict[str, Any], lines: Sequence[str]) -> None:
-    """summary.json and report.md. Raises UserError."""
+    """Write summary.json and report.md. Raises UserError."""
     text = json.dumps(result, indent=1, allow_nan=False)
     try:
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
@@ -88,6 +92,6 @@ def write_texts(folder: Path, result: dict[str, Any], lines: Sequence[str]) -> N
 
 
 def write_picture(path: Path, image: Image) -> None:
-    """As PNG. Raises UserError."""
+    """Write an image as PNG. Raises UserError."""
     if not cv2.imwrite(str(path), image):
         raise UserError(f"{path}: cannot be written; is the disk full?")

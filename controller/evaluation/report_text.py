@@ -1,4 +1,4 @@
-"""report.md about the simulated set."""
+"""The text of report.md about the simulated set."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def simulated_lines(
     failures: Sequence[tuple[Snapshot, str]],
     command: str,
 ) -> list[str]:
-    """command: how to get it again. failures: with the files of their pictures."""
+    """The lines of report.md. command: the one that made it. failures: frames with their picture files."""
     reporting = summary.splits["reporting"]
     count = {split: sum(one.split == split for one in records) for split in ("reporting", "tuning")}
     lines = ["# Evaluation on the simulated set", ""]

@@ -1,4 +1,4 @@
-"""One sequence before all methods: each frame is drawn once, shown to everybody, and forgotten."""
+"""Runs all methods on one sequence. Each frame is rendered once, given to every method, and dropped."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class MethodRecord:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """A frame worth a picture: our detector's view of it, and what is true."""
+    """A frame to be shown in the report: its images, our detections, the truth, the score."""
 
     sequence: str
     index: int
@@ -58,7 +58,7 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequenceRecord:
-    """Everything that one sequence came to. failures: our worst frames; shown: the frames asked for."""
+    """The results of one sequence. failures: our detector's worst frames. shown: the frames asked for."""
 
     name: str
     split: str
@@ -75,7 +75,7 @@ def run_sequence(
     show_frames: tuple[int, ...],
     stopwatch_ns: Stopwatch,
 ) -> SequenceRecord:
-    """show_frames: indices of frames to keep for pictures."""
+    """Run the named methods. show_frames: indices of frames to keep for pictures."""
     world = build_world(sequence)
     intrinsics = intrinsics_of(sequence.camera())
     teller = TruthTeller(world, intrinsics)
@@ -87,7 +87,7 @@ def run_sequence(
 
 
 class _Recorder:
-    """Collects while the frames go by."""
+    """Collects the answers of all methods, frame by frame."""
 
     def __init__(self, sequence: Sequence, methods: tuple[str, ...], show_frames: tuple[int, ...]) -> None:
         self._sequence = sequence
@@ -101,7 +101,7 @@ class _Recorder:
         self._shown: dict[int, tuple[RgbdFrame, Fragments | None]] = {}
 
     def add(self, index: int, seen: SimulatedFrame, contestants: dict[str, Contestant]) -> None:
-        """One frame before all contestants."""
+        """Give one frame to all contestants, and keep their answers."""
         self._truths.append(seen.truth)
         for name, contestant in contestants.items():
             answer, duration_ms = contestant.answer(seen)
@@ -115,7 +115,7 @@ class _Recorder:
             self._shown[index] = (seen.frame, fragments)
 
     def result(self) -> SequenceRecord:
-        """When the last frame has been added."""
+        """The results, after the last frame has been added."""
         records = {
             name: MethodRecord(tuple(answers), self._pixels[name]) for name, answers in self._answers.items()
         }
@@ -176,7 +176,7 @@ def _fragments(contestants: dict[str, Contestant]) -> Fragments | None:
 
 
 def _spread(indices: list[int]) -> list[int]:
-    """The first few that are at least ten frames apart: neighbours show the same fault again."""
+    """The first few that are at least ten frames apart; neighbouring frames show the same error."""
     chosen: list[int] = []
     for index in indices:
         if len(chosen) < FAILURES_PER_SEQUENCE and all(abs(index - other) >= 10 for other in chosen):

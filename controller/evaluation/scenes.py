@@ -1,4 +1,4 @@
-"""The simulated set's scenes: movers placed in the robot's view, clutter around their ways."""
+"""The scenes of the simulated set: movers placed relative to the robot, and clutter off their paths."""
 
 from __future__ import annotations
 
@@ -34,17 +34,19 @@ from hal.types import FloatArray, PlanarPose
 
 Kind = Literal["person", "robot", "cart"]
 
-_AT_ONCE_MPS2 = 20.0  # a mover of this acceleration is under way from the first moment
-_ROBOT_ROOM_M = 1.1  # from the robot's way to any clutter
-_MOVER_ROOM_M = 0.9
+_AT_ONCE_MPS2 = 20.0  # acceleration of movers that are in motion from the start
+_ROBOT_ROOM_M = 1.1  # least distance of clutter from the robot's path
+_MOVER_ROOM_M = 0.9  # least distance of clutter from a mover's path
 
 
 @dataclass(frozen=True, slots=True)
 class Mover:
-    """Goes straight through a point that lies ahead_m and left_m of the robot's camera at at_s.
+    """A mover on a straight line. At at_s it is ahead_m ahead and left_m to the left of the robot.
 
-    course_deg: relative to the robot's heading then; 180 comes towards it, 90 crosses to the left.
-    starts_s: stands until then. stops_s: stands from then on. Both with an ordinary acceleration.
+    course_deg: relative to the robot's heading at at_s; 180 comes towards it, 90 crosses to the left.
+    starts_s, stops_s: stands until the first and from the second; with an ordinary acceleration (1.5 m/s^2).
+    height_m: of a person.
+    load_m: height of a robot's load.
     """
 
     kind: Kind
@@ -62,7 +64,7 @@ class Mover:
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """Where a mover goes, on the floor."""
+    """A mover's straight path on the floor."""
 
     start: FloatArray
     end: FloatArray
@@ -72,7 +74,7 @@ class _Way:
 def side_by_side(
     leader: Mover, count: int, spacing_m: float = 0.75, stagger_m: float = 0.0
 ) -> tuple[Mover, ...]:
-    """A group that walks abreast, each stagger_m behind the one before; heights and clothes differ."""
+    """A group that walks abreast, each stagger_m behind the previous one; heights and textures differ."""
     course = math.radians(leader.course_deg)
     c, s = math.cos(course), math.sin(course)
     textures: tuple[Texture, ...] = ("fine", "coarse", "fine")
@@ -96,7 +98,7 @@ def build(
     duration_s: float,
     seed: int,
 ) -> Scenario:
-    """A scene with the movers under way, and clutter where neither they nor the robot go."""
+    """A scene with the movers, and clutter off their paths and the robot's."""
     generator = np.random.default_rng((seed, 7))
     ways = [_way(mover, drive, duration_s) for mover in movers]
     bodies: list[BodySpec] = [
@@ -164,14 +166,14 @@ def _mover_body(index: int, mover: Mover, way: _Way) -> BodySpec:
 
 
 def _distance_m(point: FloatArray, way: _Way) -> float:
-    """From a point to a way."""
+    """Distance of a point from a path."""
     along = way.end - way.start
     share = float(np.clip((point - way.start) @ along / max(float(along @ along), 1e-9), 0.0, 1.0))
     return float(np.hypot(*(point - way.start - share * along)))
 
 
 def _reach_m(body: BodySpec) -> float:
-    """From its middle to its furthest corner over the floor."""
+    """Radius of the circle around its footprint."""
     match body:
         case Column() | Pole():
             return 0.5 * body.diameter_m
@@ -190,7 +192,7 @@ Place = tuple[Room, list[BodySpec], list[BodySpec]]
 
 
 def _hall(generator: np.random.Generator, course: FloatArray) -> Place:
-    """Large and half empty: columns, crates, loaded pallets, a pole; walls some metres beyond."""
+    """A large hall with scattered columns, crates, pallets and poles; the walls are some metres away."""
     x0, x1, y0, y1 = _bounds(course, 11.0)
     tape = tuple(TapeLine(ax_m=x0, ay_m=y_m, bx_m=x1, by_m=y_m) for y_m in (1.4, -1.4))
     room = Room(x_min_m=x0, x_max_m=x1, y_min_m=y0, y_max_m=y1, height_m=5.5, tape=tape)
@@ -198,7 +200,7 @@ def _hall(generator: np.random.Generator, course: FloatArray) -> Place:
 
 
 def _aisle(generator: np.random.Generator, course: FloatArray) -> Place:
-    """Between racks, with a gap to either side some metres ahead."""
+    """An aisle between racks, with a gap on either side some metres ahead."""
     end = float(course[:, 0].max())
     tape = (TapeLine(ax_m=-4.0, ay_m=1.2, bx_m=end + 12.0, by_m=1.2, colour="white"),)
     room = Room(x_min_m=-4.0, x_max_m=end + 12.0, y_min_m=-7.0, y_max_m=7.0, floor="coarse", tape=tape)
@@ -219,7 +221,7 @@ def _aisle(generator: np.random.Generator, course: FloatArray) -> Place:
 
 
 def _workshop(generator: np.random.Generator, course: FloatArray) -> Place:
-    """Brick walls near by, benches, poles, plain boxes, a beam overhead."""
+    """A workshop: textured walls nearby, scattered objects, a beam overhead."""
     x0, x1, y0, y1 = _bounds(course, 8.5)
     room = Room(
         x_min_m=x0,
@@ -244,7 +246,7 @@ _PLACES = {"hall": _hall, "aisle": _aisle, "workshop": _workshop}
 def _scatter(
     generator: np.random.Generator, area: tuple[float, float, float, float], count: int
 ) -> list[BodySpec]:
-    """Things to stand around, at least 1.2 m apart."""
+    """Clutter: static objects, at least 1.2 m apart."""
     x0, x1, y0, y1 = area
     placed: list[FloatArray] = []
     bodies: list[BodySpec] = []

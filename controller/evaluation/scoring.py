@@ -1,9 +1,9 @@
-"""One method on one sequence: which moving objects it found, which things it called moving wrongly.
+"""Scores one method on one sequence: which moving objects it found, and what it wrongly called moving.
 
-An object is found when it is matched in at least half of its eligible frames after its first 0.5 s. An
-identity that is called moving in three frames or more without being any moving object is a wrong
-object. A second detection of an object that is matched already is false in that frame (the
-precision per frame pays for it), but it is not a wrong object: something does move there.
+An object is found if it is matched in at least half of its eligible frames after its first 0.5 s. A track id
+that is called moving in three frames or more without matching a moving object is a wrong object. A second
+detection of an object that is already matched is false in that frame and lowers the precision per frame. It
+is no wrong object, because something does move there.
 """
 
 from __future__ import annotations
@@ -19,14 +19,19 @@ from controller.evaluation.eligibility import Call, Standing, calls
 from controller.evaluation.matching import costs, match
 from controller.evaluation.types import CALLED_MOVING, DetectedObject, FrameDetections, FrameTruth, TrueObject
 
-MIN_SHARE = 0.5
-WRONG_FRAMES = 3
+MIN_SHARE = 0.5  # of the judged frames in which a found object is matched
+WRONG_FRAMES = 3  # frames from which a wrong track id is a wrong object
 
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """A detection that is an eligible object. speed_error_mps: norm of the difference of the velocities,
-    over the components that the method measures; NaN where it measures none."""
+    """A detection matched to an eligible object.
+
+    object_id, distance_m: of the true object.
+    speed_error_mps: norm of the difference of the velocities, over the components that the method measures;
+    NaN if it measures none.
+    settled: the object has been eligible for at least 0.5 s.
+    """
 
     object_id: int
     distance_m: float
@@ -36,9 +41,14 @@ class Hit:
 
 @dataclass(frozen=True, slots=True)
 class FrameScore:
-    """hits; missed: ids of eligible objects without a detection, those that are settled also in
-    missed_settled; wrong: ids of detections that are no moving object; duplicates: ids of
-    further detections of something that does move."""
+    """The score of one frame.
+
+    hits: matched detections.
+    missed: ids of eligible objects without a detection.
+    missed_settled: those of them that are settled.
+    wrong: ids of detections that match no moving object.
+    duplicates: ids of further detections of an eligible object.
+    """
 
     hits: tuple[Hit, ...]
     missed: tuple[int, ...]
@@ -48,16 +58,18 @@ class FrameScore:
 
     @property
     def faults(self) -> int:
-        """How much is wrong with this frame."""
+        """The number of errors in this frame."""
         return len(self.missed_settled) + len(self.wrong) + len(self.duplicates)
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectScore:
-    """judged: eligible frames after the first 0.5 s; detected: those of them in which it was matched.
+    """The score of one true object.
 
-    latency_s: from becoming eligible to the first match, inf if there was none. distance_m: median over
-    the judged frames.
+    judged: number of eligible frames after the first 0.5 s.
+    detected: number of judged frames in which it was matched.
+    latency_s: from becoming eligible to the first match, inf if there was none.
+    distance_m: median over the judged frames.
     """
 
     id: int
@@ -69,13 +81,13 @@ class ObjectScore:
 
     @property
     def found(self) -> bool:
-        """In at least half of the judged frames."""
+        """Matched in at least half of the judged frames."""
         return self.detected >= MIN_SHARE * self.judged
 
 
 @dataclass(frozen=True, slots=True)
 class SequenceScore:
-    """objects: those with at least one judged frame. wrong_objects: identities, sorted."""
+    """The score of one sequence. objects: those with a judged frame. wrong_objects: track ids, sorted."""
 
     frames: tuple[FrameScore, ...]
     objects: tuple[ObjectScore, ...]
@@ -86,9 +98,9 @@ class SequenceScore:
 def score(
     truths: Sequence[FrameTruth], answers: Sequence[FrameDetections], threshold: float = CALLED_MOVING
 ) -> SequenceScore:
-    """Score the answers; only detections of at least this confidence count.
+    """Score the answers. threshold: detections of less confidence do not count.
 
-    truths and answers are the same frames in the same order; raises ValueError where they are not.
+    truths and answers must be the same frames in the same order; raises ValueError if they are not.
     """
     if len(truths) != len(answers) or any(
         truth.stamp_s != answer.stamp_s for truth, answer in zip(truths, answers, strict=False)
@@ -167,7 +179,7 @@ def _score_objects(
 
 
 def _duration_s(truths: Sequence[FrameTruth]) -> float:
-    """From the first frame to the end of the last one."""
+    """From the start of the first frame to the end of the last one."""
     if len(truths) < 2:
         return 0.0
     span_s = truths[-1].stamp_s - truths[0].stamp_s

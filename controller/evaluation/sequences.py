@@ -1,7 +1,7 @@
-"""The simulated set: which sequences there are, and which of them the detector may be tuned on.
+"""The simulated set: the sequences, and which of them the detector may be tuned on.
 
-Seeds are fixed: every run renders the same images. About a third is for tuning; figures are reported on the
-others. Nothing here is fitted to what a detector finds hard or easy.
+Seeds are fixed, so every run renders the same images. About a third is for tuning; figures are reported on
+the others. The sequences were not chosen by what a detector finds hard or easy.
 """
 
 from __future__ import annotations
@@ -25,7 +25,13 @@ _STATIC_S = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """One run of the robot through a scene. noise: of the depth. vibration_deg: pitch, amplitude."""
+    """One run of the robot through a scene.
+
+    course: speed and yaw rate over time.
+    noise: model of the depth noise.
+    error: of the odometry.
+    vibration_deg: amplitude in pitch.
+    """
 
     name: str
     split: Split
@@ -40,11 +46,11 @@ class Sequence:
 
     @property
     def static(self) -> bool:
-        """Nothing moves but the camera."""
+        """Whether nothing but the camera moves."""
         return not self.movers
 
     def drive(self) -> ScriptedDrive:
-        """The robot's course."""
+        """The robot's motion."""
         return ScriptedDrive(self.course, self.duration_s, self.error)
 
     def scenario(self) -> Scenario:
@@ -52,7 +58,7 @@ class Sequence:
         return build(self.name, self.place, self.drive(), self.movers, self.duration_s, self.seed)
 
     def camera(self) -> SimulatedCameraConfig:
-        """640x480 at 30 frames a second."""
+        """The camera: 640x480 at 30 frames per second."""
         return SimulatedCameraConfig(
             width=640,
             height=480,
@@ -63,7 +69,7 @@ class Sequence:
 
 
 def straight(v_mps: float) -> tuple[Knot, ...]:
-    """At one speed."""
+    """Straight ahead at a constant speed."""
     return (Knot(0.0, v_mps),)
 
 

@@ -1,4 +1,4 @@
-"""Runs the robot through a simulated sequence: what its camera and its tracks say, and what is true."""
+"""Simulates a sequence: the camera's frames and the odometry, with the truth of each frame."""
 
 from __future__ import annotations
 
@@ -17,9 +17,13 @@ from sim.world import BodyState, World
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedFrame:
-    """odometry: the camera by dead reckoning. camera: where it truly is, on the floor's axes.
+    """One frame, the odometry, and the truth.
 
-    bodies: all of them, still or not.
+    odometry: the camera's pose by dead reckoning.
+    camera: its true pose in the floor frame.
+    truth: about the bodies that move.
+    images: true images of instances and depth.
+    bodies: all bodies, moving or not.
     """
 
     frame: RgbdFrame

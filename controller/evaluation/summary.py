@@ -1,4 +1,4 @@
-"""Everything the evaluation found, as plain JSON values under stable keys."""
+"""Summary of all results of the simulated set, also as plain JSON values under stable keys."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from controller.evaluation.totals import (
     total,
 )
 
-VERSION = 1
-BEYOND_M = 2.0  # the target for endpoint errors counts from here
+VERSION = 1  # of the JSON layout
+BEYOND_M = 2.0  # the target for endpoint errors counts from this distance on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MethodSummary:
-    """One method on the sequences of one split that it saw."""
+    """One method on the sequences of one split that it ran on. sequences: their number."""
 
     figures: Figures
     pixels: PixelCounts
@@ -43,15 +43,23 @@ class MethodSummary:
 
     @property
     def pixel_counts(self) -> Counts:
-        """At the level from which a pixel counts as called moving; zeros where nothing is claimed."""
+        """Counts at the level from which a pixel is called moving; zeros if the method claims no pixels."""
         claimed = self.pixels.moving[1:].sum() + self.pixels.rest[1:].sum()
         return self.pixels.at(PIXEL_LEVEL) if claimed else Counts(0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Summary:
-    """splits: "reporting", "tuning" and "baselines" (those sequences that every method saw), each with its
-    methods by name. curves: of our detector on the reporting split. scores: ours by sequence and method."""
+    """All results of the simulated set.
+
+    splits: "reporting", "tuning" and "baselines" (the sequences that every method ran on), each with its
+    methods by name.
+    per_object, per_frame, per_pixel: curves of our detector on the reporting split.
+    endpoint: endpoint errors by distance.
+    endpoint_beyond: their median and mean from BEYOND_M on, in pixels.
+    scores: by sequence and method.
+    split_of: split by sequence.
+    """
 
     splits: dict[str, dict[str, MethodSummary]]
     per_object: Curve
@@ -112,7 +120,7 @@ def _by_method(
 
 
 def as_json(summary: Summary) -> dict[str, Any]:
-    """Numbers that are not known are null."""
+    """The summary as JSON values; unknown numbers are null."""
     return {
         "version": VERSION,
         "splits": {
@@ -140,7 +148,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
 
 
 def number(value: float, digits: int = 4) -> float | None:
-    """Rounded; None where it is not known."""
+    """The value, rounded; None if it is not finite."""
     return round(float(value), digits) if math.isfinite(value) else None
 
 

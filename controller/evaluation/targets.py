@@ -1,4 +1,4 @@
-"""What the detector is asked to reach on the simulated set, with and without odometry."""
+"""The figures that the detector has to reach on the simulated set, with and without odometry."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from controller.evaluation.totals import Figures
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A figure, its bounds with and without odometry, and whether it must be at least or at most that."""
+    """A figure and its bounds.
+
+    value: the figure, from all figures of a method.
+    with_odometry, alone: bounds with and without odometry.
+    at_least: the figure must be at least the bound; otherwise at most.
+    """
 
     name: str
     unit: str
@@ -21,11 +26,11 @@ class Target:
     at_least: bool
 
     def bound(self, alone: bool) -> str:
-        """As a person reads it."""
+        """The bound as text, such as ">= 0.99"."""
         return f"{'>=' if self.at_least else '<='} {self.alone if alone else self.with_odometry:g}"
 
     def reached(self, value: float, alone: bool) -> bool:
-        """A figure that is not known (NaN) reaches nothing."""
+        """Whether the value meets the bound; an unknown value (NaN) does not."""
         compare = operator.ge if self.at_least else operator.le
         return bool(compare(value, self.alone if alone else self.with_odometry))
 

@@ -1,4 +1,4 @@
-"""The scores of many sequences as one set of figures, and as precision-recall curves."""
+"""Combines the scores of many sequences into one set of figures and into precision-recall curves."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ DISTANCE_BINS_M = (0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
 
 
 def ratio(part: float, whole: float) -> float:
-    """NaN where there is nothing to divide by."""
+    """part / whole; NaN if whole is 0."""
     return part / whole if whole else math.nan
 
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What a precision and a recall are made of."""
+    """Counts for precision and recall."""
 
     correct: int
     wrong: int
@@ -43,7 +43,7 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class ByDistance:
-    """A quantity in bins of the distance from the camera; NaN where a bin is empty."""
+    """Statistics of a quantity in bins of the distance from the camera; NaN where a bin is empty."""
 
     edges_m: tuple[float, ...]
     count: tuple[int, ...]
@@ -54,8 +54,17 @@ class ByDistance:
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """One method on many sequences. objects: per object; settled: per frame without the first 0.5 s of
-    each object; frames: per frame, all of them. Times are those of the objects that were detected at all."""
+    """One method on many sequences.
+
+    objects: counts per object.
+    settled: counts per frame, without the first 0.5 s of each object.
+    frames: counts per frame, with the first 0.5 s.
+    minutes: duration of the sequences.
+    latencies_s: one an object, inf if it was never detected.
+    speed_error: in m/s, by distance.
+    found_by_distance: one a bin of DISTANCE_BINS_M; nothing counts as wrong in it.
+    ms_per_frame: median.
+    """
 
     objects: Counts
     settled: Counts
@@ -70,12 +79,12 @@ class Figures:
 
     @property
     def wrong_per_minute(self) -> float:
-        """Wrong objects a minute of recording."""
+        """Wrong objects per minute."""
         return ratio(self.objects.wrong, self.minutes)
 
     @property
     def latency_median_s(self) -> float:
-        """From eligible to detected; an object that was never detected counts as infinitely late."""
+        """Median time from eligible to detected; an object that was never detected counts as infinite."""
         return float(np.median(self.latencies_s)) if self.latencies_s else math.nan
 
 
@@ -95,7 +104,7 @@ def bin_by_distance(
 
 
 def total(scores: Sequence[SequenceScore], durations_ms: Sequence[float]) -> Figures:
-    """Sum up. durations_ms: of every frame that the method was given, NaN where it had nothing to do."""
+    """The figures of all scores together. durations_ms: one a frame, NaN if there was nothing to process."""
     objects = [one for sequence in scores for one in sequence.objects]
     frames = [frame for sequence in scores for frame in sequence.frames]
     hits = [hit for frame in frames for hit in frame.hits]
@@ -140,7 +149,7 @@ def _frame_counts(frames: Sequence[FrameScore]) -> Counts:
 
 
 def _found_by_distance(scores: Sequence[SequenceScore]) -> tuple[Counts, ...]:
-    """Objects by the median distance at which they were judged."""
+    """Counts of objects by their median distance over the judged frames."""
     objects = [one for sequence in scores for one in sequence.objects]
     result = []
     for low, high in itertools.pairwise(DISTANCE_BINS_M):
@@ -171,7 +180,7 @@ THRESHOLDS = tuple(float(value) for value in np.round(np.linspace(1.0, 0.0, 41),
 
 
 def object_curves(recorded: Sequence[Recorded]) -> tuple[Curve, Curve]:
-    """Curves per object and per frame, over the confidence from which a detection counts."""
+    """Precision-recall curves per object and per frame, over the threshold of confidence."""
     per_object, per_frame = [], []
     for threshold in THRESHOLDS:
         figures = total([score(one.truths, one.answers, threshold) for one in recorded], ())
@@ -182,9 +191,9 @@ def object_curves(recorded: Sequence[Recorded]) -> tuple[Curve, Curve]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelCounts:
-    """Pixels of moving bodies and of the rest, by the level 0..255 of confidence that they were given.
+    """Histograms of the confidence 0..255 that a method gave to the pixels of moving bodies and of the rest.
 
-    moving, rest: (256,). Pixels of excused bodies, and those beyond the range, are in neither.
+    moving, rest: (256,). Pixels of excused bodies and those beyond the range are in neither.
     """
 
     moving: NDArray[np.int64]
@@ -199,24 +208,23 @@ class PixelCounts:
         return PixelCounts(self.moving + other.moving, self.rest + other.rest)
 
     def at(self, level: int) -> Counts:
-        """When every pixel from this level on is called moving."""
+        """Counts if every pixel of this level or above is called moving."""
         return Counts(
             int(self.moving[level:].sum()), int(self.rest[level:].sum()), int(self.moving[:level].sum())
         )
 
 
-# What is called moving begins at half of the scale, as for objects.
-PIXEL_LEVEL = 128
+PIXEL_LEVEL = 128  # a pixel of this level or above is called moving: half of the scale, as for objects
 
 
 def pixel_curve(counts: PixelCounts) -> Curve:
-    """The curve over all levels but zero: a pixel of which nothing was said is never called moving."""
+    """The curve over all levels except zero, which marks pixels that no detection claims."""
     levels = range(255, 0, -1)
     return _curve(tuple(level / 255.0 for level in levels), [counts.at(level) for level in levels])
 
 
 def _curve(thresholds: tuple[float, ...], counts: Sequence[Counts]) -> Curve:
-    """Only where something was detected: precision of nothing is not known."""
+    """The curve at the thresholds where precision and recall are defined."""
     known = [
         (threshold, count.precision, count.recall)
         for threshold, count in zip(thresholds, counts, strict=True)

@@ -1,4 +1,4 @@
-"""The simulator's truth about one frame, as the scores need it."""
+"""Ground truth of one frame from the simulator, in the form that the scores need."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _MIN_TURN_RADPS = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueImages:
-    """instances (H, W) uint16: body ids; depth_m (H, W) float32, 0 where nothing is."""
+    """instances: (H, W) uint16 body ids. depth_m: (H, W) float32, 0 where there is no surface."""
 
     instances: NDArray[np.uint16]
     depth_m: NDArray[np.float32]
 
 
 class TruthTeller:
-    """Truth of one world through one camera."""
+    """Ground truth of one world as seen by one camera."""
 
     def __init__(self, world: World, intrinsics: Intrinsics) -> None:
         self._world = world
@@ -33,13 +33,13 @@ class TruthTeller:
         self._movers = frozenset(body.id for body in world.bodies(0.0) if body.moves)
 
     def images(self, picture: Picture) -> TrueImages:
-        """Copies: they outlive the picture."""
+        """True images of instances and depth; copies, so they stay valid after the picture."""
         inverse = picture.inverse_depth
         depth_m = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=inverse > 0.0)
         return TrueImages(picture.instance_mask(), depth_m)
 
     def frame(self, picture: Picture) -> FrameTruth:
-        """All bodies that have a plan of motion, seen or not."""
+        """All bodies that have a motion plan, visible or not."""
         if not self._movers:
             return FrameTruth(picture.t_s, ())
         seen = {body.state.id: body for body in self._truth.bodies(picture, self._movers)}

@@ -1,4 +1,4 @@
-"""What is compared: the truth of a frame, and what a method says about it."""
+"""The records that are compared: the truth of a frame, and a method's answer to it."""
 
 from __future__ import annotations
 
@@ -13,17 +13,20 @@ from hal.types import FloatArray, Pose, RgbdFrame
 
 Box = tuple[float, float, float, float]
 NO_BOX: Box = (math.nan, math.nan, math.nan, math.nan)
-CALLED_MOVING = 0.5  # a detection of this confidence and above is called moving
+CALLED_MOVING = 0.5  # a detection of this confidence or above is called moving
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueObject:
-    """One body that has a plan of motion, at the time of one frame.
+    """One body that has a motion plan, at the time of one frame.
 
-    box: of its visible pixels, the edges inclusive (u0, v0, u1, v1); NaN where nothing of it is seen.
-    visible_px: seen pixels; visible_ratio: their share of its whole silhouette, occlusion and image border
-    cut away. position_m (3,): mean of its visible surface in the optical frame, or the body's middle where
-    nothing is seen. velocity_mps (3,): over ground, along the camera's axes. turning: on the spot or not.
+    kind: as in the scenario, such as "person".
+    box: of its visible pixels, edges inclusive (u0, v0, u1, v1); NaN if none is visible.
+    visible_px: number of visible pixels.
+    visible_ratio: visible share of its silhouette, after occlusion and the image border.
+    position_m: (3,) mean of its visible surface in the optical frame; the body's middle if none is visible.
+    velocity_mps: (3,) over ground, along the camera's axes.
+    turning: it rotates, on the spot or while it moves.
     """
 
     id: int
@@ -37,18 +40,18 @@ class TrueObject:
 
     @property
     def speed_mps(self) -> float:
-        """Magnitude of the velocity."""
+        """Magnitude of the velocity over ground."""
         return float(np.linalg.norm(self.velocity_mps))
 
     @property
     def distance_m(self) -> float:
-        """From the camera."""
+        """Distance from the camera."""
         return float(np.linalg.norm(self.position_m))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameTruth:
-    """stamp_s: since the sequence began."""
+    """The true objects of one frame. stamp_s: since the sequence began."""
 
     stamp_s: float
     objects: tuple[TrueObject, ...]
@@ -56,11 +59,12 @@ class FrameTruth:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectedObject:
-    """What a method says about one thing.
+    """One detection of a method.
 
-    confidence: 0..1 that it is moving; from CALLED_MOVING on it is called moving. box: NaN where the
-    method has none. position_m, velocity_mps (3,): optical frame; a NaN component was not measured.
-    extent_m (3,): size of the visible surface, NaN where not known.
+    box: (u0, v0, u1, v1), NaN if the method has none.
+    position_m, velocity_mps: (3,) in the optical frame; NaN for a component that is not measured.
+    extent_m: (3,) size of the visible surface, NaN if not known.
+    confidence: 0..1 that it is moving; called moving from CALLED_MOVING on.
     """
 
     id: int
@@ -73,7 +77,7 @@ class DetectedObject:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameDetections:
-    """Everything one method said about one frame, and how long that took."""
+    """All detections of one method in one frame, and the processing time."""
 
     stamp_s: float
     detections: tuple[DetectedObject, ...]
@@ -82,18 +86,20 @@ class FrameDetections:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """detections of a frame; mask (H, W) uint8: 0..255, how surely each pixel moves, None for methods
-    without a silhouette of their own."""
+    """A method's answer to one frame.
+
+    mask: (H / 2, W / 2) uint8, confidence 0..255 that a pixel moves; None for methods without a mask.
+    """
 
     detections: tuple[DetectedObject, ...]
     mask: NDArray[np.uint8] | None = None
 
 
 class Method(Protocol):
-    """One way to find moving objects. Sees what a robot would see, nothing of the truth."""
+    """A method that finds moving objects. It gets the robot's data only, not the truth."""
 
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
-        """odometry: the camera in the odometry frame by dead reckoning; None: there is none."""
+        """Process one frame. odometry: the camera's pose by dead reckoning in the odometry frame, if any."""
         ...
 
 

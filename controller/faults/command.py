@@ -1,4 +1,4 @@
-"""`treadwatch faults`: run every fault, print the tables, and put them into a page of results."""
+"""`treadwatch faults`: runs every fault, prints the tables, and writes them into a page of results."""
 
 from __future__ import annotations
 
@@ -19,17 +19,21 @@ HEADING = "## Faults"
 
 @dataclass(frozen=True, slots=True)
 class FaultsOptions:
-    """The command line. kind: whose processes are killed; None: none are."""
+    """The command line.
+
+    kind: chassis for the faults of processes; None: these are left out.
+    into: page that the tables are written to, if any.
+    """
 
     kind: str | None
     into: Path | None
 
 
 def run_faults(options: FaultsOptions) -> None:
-    """Raises ConfigError, HalError, UserError."""
+    """Run all faults, print the tables. Raises ConfigError, HalError, UserError."""
     page = options.into
     if page is not None and not os.access(page if os.path.exists(page) else page.parent, os.W_OK):
-        # Now, not after minutes of measuring.
+        # Reported now, not after minutes of measuring.
         raise UserError(f"{page}: may not be written; name a page in a folder that exists")
     trials = []
     for kind in KINDS:
@@ -48,7 +52,7 @@ def run_faults(options: FaultsOptions) -> None:
 
 
 def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | None) -> str:
-    """The section, in Markdown."""
+    """The section about faults, in Markdown."""
     lines = [
         HEADING,
         "",
@@ -86,7 +90,7 @@ def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | Non
 
 
 def write_section(path: Path, section: str) -> None:
-    """Put the section into a page, in place of the one that is there. Raises UserError."""
+    """Write the section into a page, in place of an earlier one. Raises UserError."""
     try:
         page = path.read_text(encoding="utf-8") if os.path.exists(path) else "# Measured results\n"
         before, found, after = page.partition(f"{HEADING}\n")

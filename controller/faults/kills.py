@@ -1,4 +1,4 @@
-"""Faults of whole processes, in real time: emulator, control and perception, killed or frozen."""
+"""Faults of whole processes, in real time: emulator, control or perception is killed or frozen."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from pathlib import Path
 
 from controller.errors import UserError
 
-_STANDING_MPS = 1e-3
-_DRIVING_MPS = 0.3
-_START_S = 40.0
-_STOP_S = 15.0
+_STANDING_MPS = 1e-3  # slower than this the base stands
+_DRIVING_MPS = 0.3  # the fault comes when the base is faster than this
+_START_S = 40.0  # longest time until it drives
+_STOP_S = 15.0  # longest time until it stands, and until the drive ends
 
 _TOLD = re.compile(r"v (-?[\d.]+) m/s, w (-?[\d.]+) rad/s, x (-?[\d.]+) m, y (-?[\d.]+) m")
 _ENDED = re.compile(r"^mission +[^:]*: (.*); [\d.]+ m in", re.MULTILINE)
@@ -26,8 +26,12 @@ _ENDED = re.compile(r"^mission +[^:]*: (.*); [\d.]+ m in", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class KillResult:
-    """stood_after_s: until the emulated base stood still; None where it is what was killed. ended: the
-    mission's own words; None where that process was killed."""
+    """The result of one fault.
+
+    stood_after_s: time until the emulated base stood still; None if the base was killed.
+    ended: how the mission says that it ended; None if its process was killed.
+    exit_code: of the mission; None if its process was killed.
+    """
 
     fault: str
     stood_after_s: float | None
@@ -36,7 +40,7 @@ class KillResult:
 
 
 class Trio:
-    """The emulator's and the drive's processes; perception is a child of the drive."""
+    """The processes of emulator and drive; perception is a child of the drive."""
 
     def __init__(self, kind: str, config_path: Path) -> None:
         python = [sys.executable, "-m", "controller"]
@@ -51,14 +55,14 @@ class Trio:
         self.drive = subprocess.Popen(drive, stdout=pipe, stderr=pipe, text=True)
 
     def close(self) -> None:
-        """End what is left of them."""
+        """Kill the processes that still run."""
         for process in (self.drive, self.base):
             process.kill()
             process.communicate()
 
     @property
     def perception(self) -> int:
-        """Its process id. Raises UserError when there is none."""
+        """Process id of perception. Raises UserError if there is no such process."""
         children = Path(f"/proc/{self.drive.pid}/task/{self.drive.pid}/children").read_text().split()
         for child in children:
             if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
@@ -66,12 +70,15 @@ class Trio:
         raise UserError("the drive has no perception process")
 
     def wait_for_drive(self, within_s: float) -> None:
-        """Until the drive has ended by itself, or this long."""
+        """Wait until the drive has ended by itself, at most this long."""
         with suppress(subprocess.TimeoutExpired):
             self.drive.wait(within_s)
 
     def await_speed(self, reached: Callable[[float], bool], within_s: float) -> float:
-        """Read what the base tells until its speed is so; how long that took. Raises UserError."""
+        """Read the base's output until reached() holds for its speed; gives the time that this took.
+
+        Raises UserError if it takes longer than within_s.
+        """
         began_s = time.monotonic()
         assert self.base.stdout is not None
         for line in self.base.stdout:
@@ -135,7 +142,10 @@ KILLS: dict[str, Callable[[Trio], None]] = {
 
 
 def run_kill(kind: str, config_path: Path, fault: str) -> KillResult:
-    """Drive until the base makes 0.3 m/s, break it, and see. Raises UserError when it does not drive."""
+    """Drive until the base is faster than 0.3 m/s, inject the fault, and measure.
+
+    Raises UserError if the base does not drive or does not stop.
+    """
     with _trio(kind, config_path) as trio:
         trio.await_speed(lambda v_mps: v_mps > _DRIVING_MPS, _START_S)
         began_s = time.monotonic()
@@ -150,9 +160,9 @@ def run_kill(kind: str, config_path: Path, fault: str) -> KillResult:
         if KILLS[fault] is _kill_control:
             return KillResult(fault, stood_s, None, None)
         if frozen is not None:
-            # A mission whose scenes are stale waits for better ones; this one has shown what it does.
+            # A mission with stale scenes stops and waits for new ones. That is measured, so end it.
             trio.drive.terminate()
-            # Still frozen: the drive must come to its end without it, and take it along.
+            # Perception is still frozen. The drive must end all the same, and kill perception.
             trio.wait_for_drive(_STOP_S)
             with suppress(ProcessLookupError):
                 os.kill(frozen, signal.SIGKILL)

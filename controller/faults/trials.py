@@ -1,4 +1,7 @@
-"""Faults in simulated time: guard, driver, wire and emulated base of every kind; no process, no port."""
+"""Faults in simulated time, for every kind of chassis: guard, driver, link and emulated base.
+
+Everything runs in this process, without ports.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +21,19 @@ KINDS = tuple(sorted(path.stem.removeprefix("hil-") for path in CONFIG_DIR.glob(
 
 _PERIOD_NS = NS_PER_S // 50
 _SPEED_MPS = 0.5
-_STANDING = 1e-3
-_GIVE_UP_S = 6.0
-_AFTERWARDS_S = 3.0
+_STANDING = 1e-3  # m/s and rad/s; below both the base stands
+_GIVE_UP_S = 6.0  # longest time until it stands
+_AFTERWARDS_S = 3.0  # time in which the base must not move by itself after the fault
 
 
 @dataclass(frozen=True, slots=True)
 class TrialResult:
-    """What one fault led to. stood_after_s, way_m: until the true base stood still, NaN if it did not.
+    """The result of one fault.
 
-    moved_after_m: how far it moved by itself when the cause had gone and a speed was still asked for.
+    mode, reason: of the chassis after the fault.
+    stood_after_s: time until the true base stood still; NaN if it did not.
+    way_m: distance travelled until then.
+    moved_after_m: distance it moved by itself after the fault was over, while a speed was still commanded.
     again: it drove again after a zero command and consent.
     """
 
@@ -42,7 +48,7 @@ class TrialResult:
 
 
 class Bench:
-    """A guarded driver and its base, driven as the control loop does it: speed by the shaper while armed."""
+    """A guarded driver and its base, driven as by the control loop: shaped speeds while armed."""
 
     def __init__(self, kind: str) -> None:
         config = load_app(CONFIG_DIR / f"hil-{kind}.yaml")
@@ -53,27 +59,27 @@ class Bench:
 
     @property
     def stands(self) -> bool:
-        """The true body does."""
+        """Whether the true base stands still."""
         v_mps, w_radps = self.emulator.plant.twist
         return abs(v_mps) < _STANDING and abs(w_radps) < _STANDING
 
     @property
     def way_m(self) -> float:
-        """Travelled by the tracks since the start, the mean of both."""
+        """Distance travelled by the tracks since the start, mean of both."""
         left_m, right_m = self.emulator.plant.track_travel_m
         return 0.5 * (abs(left_m) + abs(right_m))
 
     def coast(self) -> None:
-        """A period in which nobody drives."""
+        """One period without the control loop."""
         self.now_ns += _PERIOD_NS
         self.emulator.advance_to(self.now_ns)
 
     def step(self, wanted_mps: float) -> None:
-        """A period of the control loop."""
+        """One period with the control loop, which asks for this speed."""
         self.coast()
         if self.state is None or self.state.mode is not ChassisMode.ARMED:
             self._shaper.reset()
-            # A loop that goes on asking: only the driver stands between it and the tracks.
+            # The loop keeps asking for the speed; only the driver may keep it from the tracks.
             setpoint = Setpoint(self.now_ns, wanted_mps, 0.0, 0.0)
         else:
             shaped = self._shaper.step(wanted_mps)
@@ -82,12 +88,12 @@ class Bench:
         self.state = self.chassis.exchange(setpoint, self.now_ns)
 
     def run(self, seconds: float, wanted_mps: float) -> None:
-        """Many periods."""
+        """Periods with the control loop for this time."""
         for _ in range(round(seconds * NS_PER_S / _PERIOD_NS)):
             self.step(wanted_mps)
 
     def arm(self) -> bool:
-        """Zero command, consent, and a second to follow it."""
+        """Command zero, give consent, and wait a second; whether the chassis is armed then."""
         self.run(0.2, 0.0)
         self.chassis.arm(self.now_ns)
         self.run(1.0, 0.0)
@@ -100,7 +106,7 @@ def _ask_on(bench: Bench) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """begin it, live through its periods, end it."""
+    """A fault: begin it, run live for each period, end it."""
 
     name: str
     begin: Callable[[Bench], None] = lambda _: None
@@ -121,9 +127,9 @@ FAULTS = (
 
 
 def run_trial(kind: str, fault: Fault) -> TrialResult:
-    """Drive at 0.5 m/s, break it, wait until it stands, mend it, go on asking, then consent.
+    """Drive at 0.5 m/s, begin the fault, wait until the base stands, end it, keep asking, then consent.
 
-    Raises RuntimeError if the emulated base does not drive before the fault: that is a fault of the program.
+    Raises RuntimeError if the emulated base does not drive before the fault, which is a bug in the program.
     """
     bench = Bench(kind)
     with bench.emulator, bench.chassis:
@@ -141,7 +147,7 @@ def run_trial(kind: str, fault: Fault) -> TrialResult:
         fault.live(bench)
         fault.end(bench)
         stood_m = bench.way_m
-        # A stop that was asked for is no fault: there nothing goes on asking.
+        # The first entry is a requested stop and no fault, so nothing asks for a speed afterwards.
         bench.run(_AFTERWARDS_S, 0.0 if fault is FAULTS[0] else _SPEED_MPS)
         state = bench.state
         assert state is not None

@@ -1,4 +1,4 @@
-"""From a requested (v, w) to the path it implies: an arc from where the robot is, with its curvature kept."""
+"""Turns a requested (v, w) into a path: an arc of constant curvature from the robot's pose."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from controller.governor.request import Twist
 from controller.path.path import Path
 from hal.types import PlanarPose
 
-# As controller/path/path.py: the rest of the yaw rate is kept.
+# Share of the yaw rate limit that an arc may use, as in controller/path/path.py; the rest is kept in reserve.
 _YAW_RATE_FOR_THE_BEND = 0.8
-# Slower than this is no motion: encoders and noise of a planner's own arithmetic.
+# Slower requests count as standing: they are rounding errors of the planner or noise of encoders.
 STANDING_MPS = 0.005
 STANDING_RADPS = 0.005
-# Straighter than a circle of 10 km is looked along as a straight line (config.path.ArcSpec ends there).
+# An arc with a radius of more than 10 km becomes a straight line (config.path.ArcSpec allows no larger one).
 _STRAIGHT_1PM = 1e-4
-# An arc is looked along until it has turned round; a very tight one not so far, or it would meet itself.
+# The path follows the arc for at most this angle, nearly half a turn.
 _HALF_TURN_RAD = 3.0
+# The same for a radius below the robot's width; such an arc would otherwise run into itself.
 _TIGHT_TURN_RAD = 2.0
-# Beyond what the camera sees, so that the arc's own end is never what limits the speed.
+# The arc is longer than the camera's range by this, so that its end never limits the speed.
 _BEYOND_M = 2.0
 
 
 class Kind(Enum):
-    """What a request asks for."""
+    """The kind of motion that a request asks for."""
 
     STAND = "stand"
     ARC = "arc"
@@ -39,10 +40,13 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """A request, understood.
+    """A request as a motion of this robot.
 
-    speed_mps: along the arc, or of the body's corner in a turn, as far as the robot's own limits admit it; 0
-    for STAND and REFUSED. curvature_1pm: of the arc. left: a turn's direction, +1 or -1. why: it is refused.
+    speed_mps: along the arc, or of the body's farthest corner in a turn, within the robot's own limits; 0 for
+    STAND and REFUSED.
+    curvature_1pm: of the arc.
+    left: direction of a turn, +1 to the left or -1.
+    why: reason of a refusal.
     """
 
     kind: Kind
@@ -53,23 +57,24 @@ class Wish:
 
 
 def corner_m(robot: Robot) -> float:
-    """From the turning centre to the body's farthest corner."""
+    """Distance from the centre of rotation to the body's farthest corner."""
     body = robot.body
     return math.hypot(max(body.front_m, body.rear_m), body.width_m / 2.0)
 
 
 def tightest_m(robot: Robot) -> float:
-    """The least radius that can be driven: tighter, and the inner track would run backwards."""
+    """The least radius that can be driven: the inner track must not run backwards, and the path must accept
+    the bend (controller/path/path.py)."""
     return 1.01 * max(robot.body.width_m / 2.0, _least_radius_by_yaw_m(robot))
 
 
 def _least_radius_by_yaw_m(robot: Robot) -> float:
-    # controller/path/path.py refuses a bend that cannot be driven at 0.1 m/s.
+    # controller/path/path.py refuses a bend that cannot be driven at 0.1 m/s or more.
     return 0.1 / (_YAW_RATE_FOR_THE_BEND * robot.limits.max_yaw_rate_radps)
 
 
 def understand(twist: Twist, robot: Robot) -> Wish:
-    """What twist asks of this robot."""
+    """The motion that twist asks of this robot."""
     v, w = twist.v_mps, twist.w_radps
     if not (math.isfinite(v) and math.isfinite(w)):
         return Wish(Kind.REFUSED, why=f"the command is not a number: {v} m/s, {w} rad/s")
@@ -93,7 +98,10 @@ def understand(twist: Twist, robot: Robot) -> Wish:
 
 
 def why_stop(wish: Wish, requested: Twist | None) -> Reason:
-    """Why the robot stops for a wish that is no arc, or not yet its motion; requested None: silence."""
+    """Why the robot stops for a wish that asks for no motion, or for another one than the present.
+
+    requested: None if there is no command.
+    """
     if wish.kind is Kind.REFUSED:
         return Reason("no command" if requested is None else "refused", f"{wish.why}: stop")
     if wish.kind is Kind.STAND:
@@ -102,8 +110,11 @@ def why_stop(wish: Wish, requested: Twist | None) -> Reason:
 
 
 def driveable(wish: Wish, v_mps: float, robot: Robot) -> Wish:
-    """An arc that can be driven at once: at v_mps, the most it will still come to, the yaw rate may not yet
-    admit the one that is asked for, so the robot slows down on the tightest that it does admit."""
+    """The wish, with its curvature limited to what the yaw rate limit allows at v_mps.
+
+    v_mps: the highest speed that the robot will still reach. If it is too fast for the requested arc, the
+    robot slows down on the tightest arc that it can drive at that speed.
+    """
     most_1pm = robot.limits.max_yaw_rate_radps / max(v_mps, STANDING_MPS)
     if abs(wish.curvature_1pm) <= most_1pm:
         return wish
@@ -111,8 +122,11 @@ def driveable(wish: Wish, v_mps: float, robot: Robot) -> Wish:
 
 
 def arc_path(pose: PlanarPose, curvature_1pm: float, speed_mps: float, range_m: float, robot: Robot) -> Path:
-    """The arc from pose on, as far as matters: speed_mps is its section's speed, so that the decision never
-    reckons with more than was asked for."""
+    """The arc from pose on, beyond the camera's range and the stopping distance, but less than half a turn.
+
+    speed_mps: the requested speed. It becomes the speed limit of the path's section, so that the decision
+    never assumes a higher speed than requested.
+    """
     stop_m = braking.stop(robot.limits.max_speed_mps, 0.0, braking.comfort(robot.limits)).distance_m
     length_m = max(range_m, stop_m) + _BEYOND_M
     most = max(min(speed_mps, 5.0), STANDING_MPS)

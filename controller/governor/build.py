@@ -1,4 +1,4 @@
-"""The governor's parts from YAML; controller/build.py makes all the others."""
+"""Makes the governor's parts from the configuration; controller/build.py makes all others."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hal.api import Chassis, DatagramLink
 
 
 def build_governor(config: AppConfig) -> SpeedGovernor:
-    """For a program of one's own: step it with scenes and odometry."""
+    """A governor on its own, to be called with scenes and odometry."""
     return SpeedGovernor(
         config.governor or GovernorConfig(),
         config.decision,
@@ -30,11 +30,11 @@ def build_governor(config: AppConfig) -> SpeedGovernor:
 def build_governor_loop(
     config: AppConfig, config_path: FilePath, chassis: Chassis, commands: Commands
 ) -> GovernorLoop:
-    """Around a chassis that is opened elsewhere. Raises ConfigError, PathError."""
+    """A governor's control loop. chassis: opened elsewhere. Raises ConfigError, PathError."""
     start = build_path(config, config_path).start
     return GovernorLoop(build_governor(config), commands, Localiser(start, mount_of(config)), chassis)
 
 
 def build_inbox(link: DatagramLink, config: GovernorConfig, warn: Callable[[str], None]) -> Inbox:
-    """What is made of the messages; warn is told of the first one of each kind that is dropped."""
+    """The inbox for the messages of link. warn: called for the first dropped message of each kind."""
     return Inbox(link, config, warn)

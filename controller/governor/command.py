@@ -1,4 +1,4 @@
-"""`treadwatch govern`: another planner drives, treadwatch decides how fast."""
+"""`treadwatch govern`: another planner drives, treadwatch limits the speed."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from controller.summary import drive_rows
 
 @dataclass(kw_only=True)
 class Governing(DriveResult):
-    """Of a drive that another planner leads."""
+    """The result of a drive with the governor."""
 
     loop: GovernorLoop
     inbox: Inbox
 
     @property
     def succeeded(self) -> bool:
-        """Ended as asked, nothing touched, limits kept."""
+        """Whether it ended on request, without contact, within the limits."""
         return self.loop.ending.outcome is Outcome.STOPPED and self.clean
 
 
 def run_governor(options: MissionOptions) -> int:
-    """Govern until SIGTERM; the exit code: 0 where Governing says that it succeeded, else 1.
+    """Govern until SIGTERM. Exit code 0 where Governing says that it succeeded, else 1.
 
     Raises ConfigError, HalError, UserError.
     """

@@ -1,9 +1,9 @@
-"""The floor around the robot as the camera saw it on the way here: what its view no longer covers.
+"""Remembers the floor around the robot as the camera saw it on the way here, outside the present view.
 
-A path that is known beforehand is looked at long before the robot is there (controller/decision/sight.py). A
-planner's arc begins under the camera's nose, turns into floor beside the view, or sweeps all around the
-robot: what is known of that floor was seen earlier, from elsewhere. Kept in square cells that move along with
-the robot.
+On a path known beforehand, the camera sees the floor long before the robot is there
+(controller/decision/sight.py). A planner's arc begins below the camera's view, turns into floor beside the
+view, or sweeps all around the robot. That floor was seen earlier, from elsewhere. It is kept in a square grid
+around the robot. surroundings.py makes limits from it.
 """
 
 from __future__ import annotations
@@ -28,32 +28,34 @@ IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
 CELL_M = 0.1
-# What was marked so lately is in view, and known better from there.
+# A surface marked within this time is in view; the decision knows it better than this grid.
 IN_VIEW_NS = 300_000_000
-# Cells in a row: what is further away than half of them is forgotten.
+# Cells per side of the grid; what is farther away than half of it is forgotten.
 _SIZE = 128
-_LOOK_M = 4.0
-# Depth farther off is too coarse for cells of this size.
-_SURFACE_M = 3.0
-_THROUGH_M = 0.1
-# Two sightings make a surface; being seen through takes it back three times as slowly as that.
+_LOOK_M = 4.0  # cells up to this distance ahead of the camera can be seen free
+_SURFACE_M = 3.0  # surfaces farther away are ignored: their depth is too coarse for these cells
+_THROUGH_M = 0.1  # a cell is seen free if the view goes on for at least this beyond it
+# A sighting of a surface adds _HIT to the cell's score, up to _MOST_HITS; a scene that sees through the cell
+# takes 1 off. A cell is blocked from _BLOCKED_HITS on, so from the second sighting.
 _HIT, _MOST_HITS, _BLOCKED_HITS = 2, 6, 3
-# What moved may have gone on, unseen, soon after; so has what leaves the view of a robot that stands, which
-# it can only do by moving (as controller/decision/memory.py keeps both).
+# How long a mover's surface stays. It may have moved on unseen soon after. The same holds for what leaves the
+# view of a robot that stands, which it can do only by moving (controller/decision/memory.py does the same).
 _PASSING_NS = 2 * NS_PER_S
 _FOR_EVER_NS = 2**62
-_BESIDE = 2
-_AROUND_M = 0.3
+_BESIDE = 2  # a surface also marks the cells up to this many cells around its own
+_AROUND_M = 0.3  # a surface this near to a mover's box belongs to the mover
 _NEVER_M = -math.inf
-# Floor seen longer ago than this on the way is another place by now, or has been changed by others.
+# Floor seen free longer ago than this travelled distance no longer counts: odometry has drifted meanwhile, or
+# others have changed the place.
 _TRAVEL_M = 8.0
-_TURN_AS_M = 0.3
+_TURN_AS_M = 0.3  # a rotation by 1 rad counts as this travelled distance
 
 
 class GroundMemory:
-    """Takes in scenes; tells of points what is known. Poses are in one frame that does not move.
+    """A grid of the floor: takes in scans, tells which points are free or blocked; poses in a fixed frame.
 
-    Free at the start is a disc around the robot, by the consent of whoever starts it, as long as it stands.
+    As long as the robot has not moved since the start, a disc around it counts as free, by the consent of
+    whoever starts it. consent_m: radius of the disc.
     """
 
     def __init__(self, robot: Robot, mount: CameraMount, config: DecisionConfig) -> None:
@@ -70,7 +72,7 @@ class GroundMemory:
         self._stands = np.zeros((_SIZE, _SIZE), np.bool_)
         self._hidden = np.zeros((_SIZE, _SIZE), np.bool_)
         self._seen_from_m = np.zeros((_SIZE, _SIZE))
-        # Everything that is kept of a cell, and what it is while nothing is known of that place.
+        # The arrays with the state of the cells, and their values for a cell of which nothing is known.
         self._unknown: tuple[tuple[NDArray[Any], float], ...] = (
             (self._free_ns, 0),
             (self._free_at_m, _NEVER_M),
@@ -86,7 +88,7 @@ class GroundMemory:
         self._pose: PlanarPose | None = None
 
     def move(self, pose: PlanarPose, now_ns: int) -> None:
-        """The robot is at pose now: what its body covers is free, and the way that it made counts."""
+        """Set the robot's pose: the floor below its body is free, and the travelled distance is added up."""
         before, self._pose = self._pose, pose
         if before is None:
             self._stamp_disc(pose, now_ns)
@@ -103,20 +105,21 @@ class GroundMemory:
         self._hits[at] = 0
 
     def renew_consent(self, now_ns: int) -> None:
-        """The robot has not moved since it was started: the disc stays free."""
+        """Keep the disc free. To be called as long as the robot has not moved since the start."""
         if self._pose is not None:
             self._stamp_disc(self._pose, now_ns)
 
     def look(
         self, free: FreeSpace, pose: PlanarPose, captured_ns: int, moving: Bodies, standing: bool
     ) -> None:
-        """Take in a scan from a robot at pose. moving: what moved in that scene; standing: the robot does."""
+        """Take in a scan. pose: the robot's. moving: the movers in that scene. standing: the robot stands."""
         if not len(free.bearing_tan):
             return
         self._near_m = max(self._least_near_m, free.floor_from_m)
         self.consent_m = self._reach_m + consented_m(self._least_near_m, free.floor_from_m)
         if self._stood and not standing:
-            # What was still there when the robot set off does not go away by that.
+            # Static surfaces that were in view when the robot set off stay for ever: they leave the view
+            # because the robot moves.
             there = self._stands & (self._marked_ns >= captured_ns - IN_VIEW_NS)
             self._until_ns[there] = _FOR_EVER_NS
             self._hidden[:] = False
@@ -125,7 +128,7 @@ class GroundMemory:
         self._mark_surfaces(free, pose, captured_ns, moving)
 
     def free(self, points_m: FloatArray, since_ns: int = 0) -> BoolArray:
-        """(N,) of floor points (N, 2): seen free, after since_ns and not too far back on the way."""
+        """(N,) whether floor points (N, 2) were seen free, after since_ns and within _TRAVEL_M of travel."""
         index, keys = self._index(points_m)
         mine = (self._key[index] == keys).all(axis=-1)
         recent = (self._free_at_m[index] >= self._travelled_m - _TRAVEL_M) & (
@@ -134,7 +137,10 @@ class GroundMemory:
         return np.asarray(mine & recent, np.bool_)
 
     def blocked(self, points_m: FloatArray, now_ns: int, before_ns: int | None = None) -> BoolArray:
-        """(N,) of floor points (N, 2): a surface stood there when it was last seen (before before_ns)."""
+        """(N,) whether a surface stood at floor points (N, 2) when they were last seen.
+
+        before_ns: only surfaces that were last marked before this time.
+        """
         index, keys = self._index(points_m)
         mine = (self._key[index] == keys).all(axis=-1)
         stands = (self._hits[index] >= _BLOCKED_HITS) & (self._until_ns[index] > now_ns)
@@ -143,7 +149,7 @@ class GroundMemory:
         return np.asarray(mine & stands, np.bool_)
 
     def _see_through(self, free: FreeSpace, pose: PlanarPose, captured_ns: int) -> None:
-        """Cells that lie in view before the first surface."""
+        """Set cells free that are in view and nearer than the first surface."""
         count = round(_LOOK_M / CELL_M)
         middle = np.floor(np.array((pose.x_m, pose.y_m)) / CELL_M) + 0.5
         points = (middle + self._around(count)) * CELL_M
@@ -156,11 +162,12 @@ class GroundMemory:
         through = forward + _THROUGH_M <= reach
         points, forward = points[through], forward[through]
         at = self._cells(points)
-        # A low thing can hide below the view: only from where a surface was seen can its absence be seen.
+        # A low obstacle can be below the view. So a cell's surface counts as gone only if the cell is seen
+        # from near_m or more, or from no nearer than the surface was seen from.
         gone = forward >= np.minimum(self._near_m, self._seen_from_m[at] - _THROUGH_M)
         self._hits[at] = np.where(gone, np.maximum(self._hits[at] - 1, 0), self._hits[at])
         was_free = self._free_at_m[at] >= self._travelled_m - _TRAVEL_M
-        # Hidden by something that then went away before a standing robot: as in a mission, its place is free.
+        # While the robot stood, something hid these cells and then went away. They are free, as in a mission.
         revealed = self._hidden[at] & self._stood
         seen = (forward >= self._near_m) | was_free | revealed
         self._set_free((at[0][seen], at[1][seen]), captured_ns)
@@ -176,7 +183,8 @@ class GroundMemory:
         self._hits[at] = np.minimum(self._hits[at] + _HIT, _MOST_HITS)
         self._stands[at] = ~moves
         self._until_ns[at] = np.where(moves | self._stood, captured_ns + _PASSING_NS, _FOR_EVER_NS)
-        # A surface between two cells falls now into one, now into the other, and a person swings arms.
+        # A surface on the border of two cells falls into either of them, and a person's arms swing. So the
+        # cells around are marked as in view, too.
         beside = self._cells((points[:, None, :] + CELL_M * self._around(_BESIDE)).reshape(-1, 2))
         self._marked_ns[beside] = captured_ns
         if self._stood:
@@ -186,7 +194,7 @@ class GroundMemory:
     @staticmethod
     @cache
     def _around(count: int) -> FloatArray:
-        """Offsets (N, 2) of all cells up to count away, in cells."""
+        """Offsets (N, 2), in cells, of all cells up to count cells away."""
         steps = np.arange(-count, count + 1, dtype=np.float64)
         return np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
 
@@ -202,7 +210,7 @@ class GroundMemory:
         self._free_at_m[at] = self._travelled_m
 
     def _cells(self, points_m: FloatArray) -> tuple[IntArray, IntArray]:
-        """Where these points are kept; a cell that held another place before begins anew."""
+        """Indices of the cells of these points; a cell that held another place before is reset."""
         index, keys = self._index(points_m)
         other = (self._key[index] != keys).any(axis=-1)
         new = (index[0][other], index[1][other])

@@ -1,4 +1,7 @@
-"""One control step of the governor: commands and scene in, governed command out: a Drive of the runners."""
+"""One control step of the governor: takes requests and scene, sends a safe setpoint, answers the planner.
+
+It is a Drive (controller/control.py), so the real-time runner steps it as it does a mission.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ from vision.scene import Scene
 
 
 class Commands(Protocol):
-    """Where requests come from and answers go to; controller.governor.inbox.Inbox is the real one."""
+    """Gives requests and takes answers; implemented by controller.governor.inbox.Inbox."""
 
     def poll(self, now_ns: int) -> Asked: ...
 
@@ -27,10 +30,10 @@ class Commands(Protocol):
 
 
 class GovernorLoop:
-    """Owns the order of things within a control period, as controller.control.ControlLoop does for a path.
+    """The order of work within a control period, as controller.control.ControlLoop for a path.
 
-    Silence of the planner is no fault: the robot stops and goes on when commands come again. A latched
-    chassis ends the drive, as everywhere; then only a person starts it again.
+    A silent planner is no fault: the robot stops, and goes on when commands come again. A chassis that
+    latches a fault ends the drive, as in every drive; then only a person can start it again.
     """
 
     def __init__(
@@ -48,15 +51,15 @@ class GovernorLoop:
 
     @property
     def finished(self) -> bool:
-        """The drive has ended, one way or the other; the chassis has been told to stop."""
+        """Whether the drive has ended; then the chassis has been told to stop."""
         return self.ending.outcome is not None
 
     def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
-        """Come to rest by the comfort profile, then end with this outcome. The first reason stays."""
+        """Stop by the comfort profile, then end with this outcome. The first reason is kept."""
         self.ending.request_stop(reason, outcome)
 
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep:
-        """Take in what is asked, govern it, send, and tell the planner what came of it."""
+        """Take a request, govern it, send the setpoint, and answer the planner."""
         self.ending.begin(now_ns)
         if scene is not None and scene.captured_ns != self._scene_ns:
             self._scene_ns = scene.captured_ns
@@ -67,7 +70,7 @@ class GovernorLoop:
         pose = self.localiser.pose
         obeys = self._state is not None and self._state.mode is ChassisMode.ARMED
         if not obeys:
-            # What the chassis does now is not ours to shape; whenever it obeys again, begin at rest.
+            # The chassis does not follow setpoints now. When it does again, shaping begins from standstill.
             self._governor.rest()
             asked = Asked(None, f"the chassis is not armed ({self._mode})")
         measured_mps = np.nan if self._state is None else self._state.v_mps

@@ -1,8 +1,8 @@
 """The governor's messages: one JSON object a datagram, in both directions.
 
-JSON rather than a packed struct: any language and `nc` can send it, a reader can see what it says, a key that
-is missing or misspelt is noticed instead of shifting every number behind it; and at 50 messages of some 80
-bytes a second there is nothing to save.
+JSON rather than a packed struct: any language and `nc` can send it, and people can read it. A missing or
+misspelt key is noticed; in a struct it would shift every number behind it. At 50 messages of about 80 bytes
+per second there is no need to save bytes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NoReturn
 from controller.decision.decision import Decision
 
 MOST_BYTES = 512
-# Nothing that drives on a floor is faster: such numbers are mistakes, not wishes.
+# Requests above these are rejected as mistakes; nothing that drives on a floor is faster.
 MOST_MPS = 10.0
 MOST_RADPS = 10.0
 MOST_SEQ = 2**53 - 1
@@ -23,12 +23,12 @@ _KEYS = frozenset({"seq", "t_s", "v_mps", "w_radps"})
 
 
 class MessageError(Exception):
-    """A datagram is not a request: what is wrong with it, in one line."""
+    """Raised for a datagram that is no request; its text says in one line what is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """v_mps ahead, w_radps to the left (REP 103)."""
+    """Speed ahead v_mps and yaw rate w_radps, positive to the left (REP 103)."""
 
     v_mps: float
     w_radps: float
@@ -36,8 +36,12 @@ class Twist:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a planner asks for. seq: grows from message to message; t_s: the planner's own clock, of any zero,
-    which must not run backwards and must run at the rate of real time."""
+    """A planner's request.
+
+    seq: must grow from message to message.
+    t_s: time of the planner's own clock, with any zero. It must not go back and must run at the rate of real
+    time.
+    """
 
     seq: int
     t_s: float
@@ -45,7 +49,7 @@ class Request:
 
 
 def parse_request(data: bytes) -> Request:
-    """One datagram. Raises MessageError, and nothing else, whatever the bytes are."""
+    """The request in one datagram. Raises MessageError and nothing else, for any bytes."""
     if len(data) > MOST_BYTES:
         raise MessageError(f"{len(data)} bytes, at most {MOST_BYTES}")
     try:
@@ -69,7 +73,7 @@ def parse_request(data: bytes) -> Request:
 def answer(
     request: Request, v_mps: float, w_radps: float, decision: Decision, chassis: str, dropped: int
 ) -> bytes:
-    """The datagram that goes back: what is really commanded, and why. dropped: messages not obeyed so far."""
+    """The answer as a datagram: what is commanded, and why. dropped: number of messages dropped so far."""
     content = {
         "seq": request.seq,
         "v_mps": round(v_mps, 6),

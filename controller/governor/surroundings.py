@@ -1,4 +1,4 @@
-"""What the remembered floor says of an arc's beginning, and of a turn in place."""
+"""Limits by the remembered floor (controller/governor/ground.py): start of an arc, turn in place."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from controller.path.path import Path
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray, PlanarPose
 
-_LANES = 9
-_STEP_M = 0.1
-# What comes towards a robot that turns must still find it standing.
+_LANES = 9  # points across the corridor
+_STEP_M = 0.1  # distance of the points along it
+# A turning robot needs up to this time to stop. A mover must not be able to reach it sooner.
 _STOP_S = 1.5
 
 
@@ -35,12 +35,14 @@ def near_limits(
     config: DecisionConfig,
     now_ns: int,
 ) -> list[Limit]:
-    """Limits by the floor of the corridor up to to_s_m, which is too near for the camera: from the tail on,
-    because in a bend that swings out."""
+    """Limits by the corridor's floor up to to_s_m, which is too near for the camera to see.
+
+    It begins at the robot's rear, because the rear swings out in a bend. s_m: the robot's place on the path.
+    """
     cells = np.arange(s_m - corridor.rear_m + 0.5 * _STEP_M, to_s_m, _STEP_M)
     points = _across(corridor.path, cells, corridor.half_width(cells))
     flat = points.reshape(-1, 2)
-    # What is in view is the decision's business, which knows it better than to a cell.
+    # Surfaces in view are left to the decision, which knows them more precisely than this grid.
     stands = ground.blocked(flat, now_ns, now_ns - IN_VIEW_NS).reshape(len(cells), _LANES).any(axis=1)
     unknown = ground.free(flat).reshape(len(cells), _LANES).mean(axis=1) < config.sight.known_share
     comfort, margins = braking.comfort(robot.limits), config.margins
@@ -79,7 +81,7 @@ def turn_objection(
     memory_s: float,
     now_ns: int,
 ) -> str:
-    """Why the robot must not turn on the spot at pose; "" if the circle that it sweeps is free."""
+    """Why the robot must not turn in place at pose; "" if the circle that it sweeps is free."""
     sweep_m = corner_m(robot) + config.margins.lateral_m
     if len(bodies):
         comes = np.hypot(bodies.velocity_mps[:, 0], bodies.velocity_mps[:, 1]) * bodies.moving * _STOP_S
@@ -108,7 +110,7 @@ def turn_objection(
 
 
 def _distance_m(bodies: Bodies, pose: PlanarPose) -> FloatArray:
-    """(N,) from the turning centre to each box."""
+    """(N,) distance from the centre of rotation to each box."""
     dx, dy = bodies.xy_m[:, 0] - pose.x_m, bodies.xy_m[:, 1] - pose.y_m
     cos, sin = np.cos(bodies.view_rad), np.sin(bodies.view_rad)
     along = np.maximum(np.abs(dx * cos + dy * sin) - bodies.half_view_m, 0.0)
@@ -118,7 +120,7 @@ def _distance_m(bodies: Bodies, pose: PlanarPose) -> FloatArray:
 
 
 def _where(around_m: FloatArray, pose: PlanarPose) -> str:
-    """The nearest of these offsets in words."""
+    """Where the nearest of these offsets (N, 2) is, in words."""
     k = int(np.hypot(around_m[:, 0], around_m[:, 1]).argmin())
     dx, dy = around_m[k]
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)

@@ -1,1 +1,13 @@
-"""The real-time runner: the loop, the perception process beside it, and what a service owes its manager."""
+"""The real-time runner: the control loop, the perception process beside it, and the service manager.
+
+The files in the order in which they come into play:
+
+* mission.py - a drive along a path; the governor (controller/governor/command.py) begins in rig.py
+* rig.py - chassis, simulated world, perception process and signals around the loop
+* channel.py - messages between the two processes
+* perception_process.py - camera, detect, track, recording, in a process of their own
+* service.py - readiness, watchdog and stop signals (systemd)
+* scheduling.py - SCHED_FIFO, locked memory, no garbage collection
+* runner.py - the loop of the control process
+* punctual.py - sends each command at a fixed time within its period
+"""

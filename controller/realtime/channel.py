@@ -1,7 +1,7 @@
-"""Whole messages between the two processes of the real-time runner, without ever waiting for the other.
+"""Messages between the two processes of the real-time runner; neither ever blocks on the other.
 
-A pair of SOCK_SEQPACKET sockets: a message arrives whole or not at all, so a peer that freezes or dies in the
-middle of something cannot make the reader wait for the rest.
+A pair of SOCK_SEQPACKET sockets: a message arrives whole or not at all. So a peer that freezes or dies while
+it sends cannot make the reader wait for the rest.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ class PeerGone(Exception):
 
 
 class Channel:
-    """One end. Carries any picklable object; both ends are this program's own processes."""
+    """One end. Carries any picklable object; that is safe because both processes are this program's."""
 
     def __init__(self, end: socket.socket) -> None:
         self._end = end
         self._end.setblocking(False)
 
     def send(self, message: object) -> bool:
-        """True if sent; False if the peer does not read and the buffer is full. Raises PeerGone."""
+        """Send; False if the buffer is full because the peer does not read. Raises PeerGone."""
         try:
             self._end.send(pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL))
         except BlockingIOError:
@@ -34,7 +34,7 @@ class Channel:
         return True
 
     def receive(self) -> object | None:
-        """The oldest message that has arrived; None is silence. Raises PeerGone."""
+        """The oldest message that has arrived; None if there is none. Raises PeerGone."""
         try:
             data = self._end.recv(BUFFER_BYTES)
         except BlockingIOError:
@@ -52,7 +52,7 @@ class Channel:
 
 
 def channel_sockets() -> tuple[socket.socket, socket.socket]:
-    """Two connected ends; one goes to the other process as an argument."""
+    """Two connected ends; one is passed to the other process as an argument."""
     here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     for end in (here, there):
         end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)

@@ -1,4 +1,4 @@
-"""A drive along a path in real time."""
+"""Drives along a path in real time; called by `treadwatch run` (controller/mission.py)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hal.types import ChassisMode
 def drive_realtime(
     config: AppConfig, runner: RealtimeRunner, options: MissionOptions, console: Console
 ) -> MissionResult:
-    """Drive on the machine's clock. Raises ConfigError, HalError, UserError, and nothing has moved then."""
+    """Drive the mission. Raises ConfigError, HalError or UserError only if nothing has moved."""
     with realtime_rig(config, runner, options) as rig:
         loop = build_control(config, options.config_path, rig.chassis)
         result = MissionResult(
@@ -41,7 +41,7 @@ def drive_realtime(
 
 
 def describe_base(chassis: AnyChassisConfig) -> str:
-    """What was tried: the kind of base, and the link as configured."""
+    """The kind of base and its link as configured, for messages."""
     link = chassis.link
     kind = f"{chassis.kind} {chassis.model}" if isinstance(chassis, AgilexChassisConfig) else chassis.kind
     if isinstance(link, CanLinkConfig):

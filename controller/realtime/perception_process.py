@@ -1,4 +1,7 @@
-"""The perception process of the real-time runner: camera, detect, track, and what is recorded of it."""
+"""The perception process of the real-time runner: camera, detect, track, recording.
+
+It sends scenes to the control process (controller/realtime/runner.py) and gets its control steps.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +23,15 @@ from hal.errors import EndOfStream, FrameTimeout, HalError
 from hal.geometry import advance_pose, body_in_floor, camera_in_floor, planar
 from hal.types import CameraMount, PlanarPose, Pose
 
-# Odometry is asked for between two control steps: carried on with its last twist for at most this long.
+# A pose after the newest control step is extrapolated with the last twist for at most this long.
 REACH_S = 0.25
 
 
 class RemoteBody:
-    """The robot's motion as the control process tells it (hal.api.OdometrySource). start: where on the path's
-    floor it begins."""
+    """The robot's motion by the messages of the control process (hal.api.OdometrySource).
+
+    start: the robot's first pose in the path's frame.
+    """
 
     def __init__(self, channel: Channel, mount: CameraMount, start: PlanarPose) -> None:
         self._channel = channel
@@ -63,7 +68,7 @@ class RemoteBody:
         return steps
 
     def body_pose(self, stamp_ns: int) -> PlanarPose | None:
-        """The body in the path's frame."""
+        """The robot's estimated pose in the path's frame; None if it is not known."""
         self.listen()
         known = self._fused.at(stamp_ns)
         if known is None and self._newest is not None:
@@ -71,9 +76,11 @@ class RemoteBody:
         return known
 
     def true_pose(self, stamp_ns: int) -> PlanarPose | None:
-        """The body on the path's floor, for a simulated camera to see from: where its world has it, or, with
-        a base outside of this program, where that reports to be. Never where the robot believes to be: its
-        belief follows what the camera sees."""
+        """The robot's true pose in the path's frame, for a simulated camera; None if it is not known.
+
+        It comes from the simulated world or, with a base outside this program, from the base's odometry. It
+        is never the robot's own estimate, because that depends on what the camera sees.
+        """
         self.listen()
         known = self._true.at(stamp_ns)
         if known is None and self._newest is not None:
@@ -81,7 +88,7 @@ class RemoteBody:
         return known
 
     def camera_pose(self, stamp_ns: int) -> Pose | None:
-        """The camera by the chassis' dead reckoning."""
+        """The camera's pose by the chassis' dead reckoning; None if it is not known."""
         self.listen()
         known = self._odometry.at(stamp_ns)
         if known is None and self._newest is not None:
@@ -90,7 +97,7 @@ class RemoteBody:
         return None if known is None else camera_in_floor(known, self._mount)
 
     def _by_odometry(self, odometry: PlanarPose) -> PlanarPose | None:
-        """On the path's floor; the first odometry is that of its start. None while the base knows of none."""
+        """Odometry to the path's frame; its first pose is at the start. None while the base reports none."""
         if not odometry.finite:
             return None
         if self._from_odometry is None:
@@ -98,7 +105,7 @@ class RemoteBody:
         return planar(self._from_odometry @ body_in_floor(odometry))
 
     def _carried_on(self, pose: PlanarPose, from_ns: int, stamp_ns: int) -> PlanarPose | None:
-        """pose, at from_ns, moved on to stamp_ns with the newest twist; None: too far, or not known."""
+        """pose at from_ns, extrapolated to stamp_ns with the newest twist; None if that is too far or unknown."""
         assert self._newest is not None
         ahead_ns = stamp_ns - from_ns
         state = self._newest.chassis
@@ -111,9 +118,9 @@ class RemoteBody:
 def perceive_forever(
     config: AppConfig, config_path: FilePath, end: socket.socket, start_ns: int, recording: RecordingOptions
 ) -> None:
-    """Entry point of the process. start_ns: time zero of a simulated world.
+    """Entry point of the process. Returns when the camera ends or the control process is gone.
 
-    Ends when the camera ends or the control process has gone.
+    start_ns: time zero of a simulated world.
     """
     channel = Channel(end)
     try:
@@ -125,7 +132,7 @@ def perceive_forever(
     except HalError as error:
         _say_farewell(channel, f"camera: {error}")
     except UserError as error:
-        # A recording that cannot be begun or gone on with: why the robot stops is told there.
+        # The recording cannot be written. The control process reports this as the reason of the stop.
         _say_farewell(channel, str(error))
 
 
@@ -144,7 +151,7 @@ def _look_until_the_end(
         run_recorder = RunRecorder(recorder, path)
         try:
             while True:
-                # Without a frame the scene ages and the robot stops; the camera may come back.
+                # Without a frame the newest scene ages and the robot stops; the camera may come back.
                 with suppress(FrameTimeout):
                     look = perceiver.look(camera.read(timeout_s))
                     channel.send(SceneMessage(look.scene, look.timing_ms))

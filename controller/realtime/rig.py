@@ -1,4 +1,4 @@
-"""What every drive in real time has around its loop: base, world, perception process, service manager."""
+"""Everything around the loop of a drive in real time: base, world, perception process, service manager."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import DeviceRefused
 from sim.simulation import Simulation
 
-# The perception process needs a moment to import and open the camera; a simulated world starts after that.
+# A simulated world starts this much later, because the perception process must import and open the camera.
 HEAD_START_S = 3.0
-GOODBYE_S = 5.0
+GOODBYE_S = 5.0  # the perception process is killed if it has not ended after this time
 
 
 class EndingDrive(Drive, Protocol):
-    """A loop that says why it ends."""
+    """A loop with the state of its ending."""
 
     @property
     def ending(self) -> Ending: ...
@@ -45,8 +45,13 @@ class EndingDrive(Drive, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RealtimeRig:
-    """chassis: open, and its commands leave at their moments. simulation: the world of a simulated camera,
-    None with a real one."""
+    """The parts of a drive.
+
+    start_ns: time zero of a simulated world.
+    chassis: open; sends each command at a fixed time within its period.
+    simulation: the world of a simulated camera; None with a real one.
+    punctuality: filled while it drives.
+    """
 
     config: AppConfig
     runner: RealtimeRunner
@@ -61,9 +66,9 @@ class RealtimeRig:
     def under_way(
         self, loop: EndingDrive, console: Console, on_ready: Callable[[ServiceManager], None]
     ) -> Iterator[Iterator[RealtimeMoment]]:
-        """The moments of a drive of this loop, until it has finished; perception ends with the block.
+        """The control steps of a drive with this loop, until it has finished. Perception ends with the block.
 
-        on_ready is called once, when the first scene has come.
+        on_ready: called once, when the first scene has arrived.
         """
         service = ServiceManager(os.environ, os.getpid())
         recording = _recording(self.options)
@@ -72,7 +77,7 @@ class RealtimeRig:
             stop_on_signals() as stop,
             console.beside_a_drive(),
         ):
-            # Last, so that the processes and threads started before keep ordinary scheduling.
+            # After all else, so that processes and threads started before keep ordinary scheduling.
             for refused in become_realtime(self.runner.priority):
                 console.event(f"not permitted, running without: {refused}")
             moments = run_realtime(
@@ -81,11 +86,11 @@ class RealtimeRig:
             try:
                 yield _told(moments, loop.ending, link, service, on_ready)
             except BaseException:
-                # To end the perception process takes seconds; the base must not go on meanwhile.
+                # Ending the perception process takes seconds; the base must not drive on meanwhile.
                 self.chassis.stop(self.clock.now_ns())
                 raise
             finally:
-                # Nobody feeds the watchdog from now on, and perception and its files take seconds to end.
+                # The watchdog is no longer fed, and perception takes seconds to end and to close its files.
                 service.stopping(_why_over(loop.ending))
 
 
@@ -96,9 +101,9 @@ def _told(
     service: ServiceManager,
     on_ready: Callable[[ServiceManager], None],
 ) -> Iterator[RealtimeMoment]:
-    """Tells the service manager when the drive is ready, and when it is about to end.
+    """Passes the moments on, and tells the service manager when the drive is ready and when it is stopping.
 
-    Raises DeviceRefused at the end where perception could not even begin: without a scene nothing moves.
+    Raises DeviceRefused at the end if perception could not start: without a scene nothing has moved.
     """
     told_ready = False
     for moment in moments:
@@ -120,7 +125,7 @@ def _why_over(ending: Ending) -> str:
 
 @contextmanager
 def realtime_rig(config: AppConfig, runner: RealtimeRunner, options: MissionOptions) -> Iterator[RealtimeRig]:
-    """The base, opened, and the simulated world if it is one. Raises ConfigError, HalError, UserError."""
+    """Open the base, and the simulated world if there is one. Raises ConfigError, HalError, UserError."""
     require_camera(config, options.config_path)
     require_writable(_recording(options))
     clock = MonotonicClock()
@@ -146,8 +151,10 @@ def _recording(options: MissionOptions) -> RecordingOptions:
 def perception_beside(
     config: AppConfig, config_path: Path, start_ns: int, recording: RecordingOptions
 ) -> Iterator[PerceptionLink]:
-    """The perception process; when the block ends, its channel is closed, and it with that. start_ns: time
-    zero of a simulated world."""
+    """Run the perception process. At the end of the block its channel is closed, which makes it end.
+
+    start_ns: time zero of a simulated world.
+    """
     here, there = channel_sockets()
     process: BaseProcess = multiprocessing.get_context("spawn").Process(
         target=perceive_forever,
@@ -155,10 +162,11 @@ def perception_beside(
         name="perception",
         daemon=True,
     )
-    # A terminal that goes would end the camera before the robot has come to rest.
+    # The process inherits that these signals are blocked. Otherwise Ctrl-C or a closed terminal would end
+    # the camera before the robot has come to rest.
     with held(signal.SIGINT, signal.SIGHUP):
         process.start()
-    # Ours must be the only open copy of the other end, or its death would not show.
+    # Only the perception process may hold its end open, or this process would not notice its death.
     there.close()
     channel = Channel(here)
     try:

@@ -1,7 +1,7 @@
-"""The real-time runner: this process decides and drives on absolute deadlines, another one looks.
+"""The loop of the real-time runner: decides and drives on absolute deadlines.
 
-The perception process (controller/realtime/perception_process.py) sends scenes; whether it stalls, crashes or
-is frozen, this loop goes on at its rate, the scene ages, and the decision ends in a jerk-limited stop.
+The perception process (controller/realtime/perception_process.py) sends scenes. If it stalls, crashes or is
+frozen, this loop goes on at its rate, the newest scene ages, and the decision makes a jerk-limited stop.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vision.scene import Scene
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneMessage:
-    """Perception to control: what was seen, and how long seeing took."""
+    """Perception to control: a scene, and the processing time of its stages."""
 
     scene: Scene
     timing_ms: dict[str, float]
@@ -34,8 +34,10 @@ class SceneMessage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepMessage:
-    """Control to perception: a step, and where the robot of a simulated world truly was at its time, which a
-    simulated camera sees from; None where no world knows it."""
+    """Control to perception: a control step.
+
+    true_pose: the robot's true pose in a simulated world, for a simulated camera; None without a world.
+    """
 
     control: ControlStep
     true_pose: PlanarPose | None
@@ -43,15 +45,21 @@ class StepMessage:
 
 @dataclass(frozen=True, slots=True)
 class Farewell:
-    """Perception to control: the last message before it ends, and why it ends."""
+    """Perception to control: the last message before the process ends, with the reason."""
 
     reason: str
 
 
 @dataclass
 class Punctuality:
-    """How late the control steps began, in nanoseconds, and when each of their commands had gone out: of the
-    last MOST_SAMPLES, since a robot may be governed for days. steps began, skipped periods had none."""
+    """How punctual the control steps are.
+
+    late_ns: how late each step began.
+    commanded_ns: when each command had been sent.
+    Both keep the last MOST_SAMPLES only, because a robot may be governed for days.
+    steps: number of steps.
+    skipped: number of periods without a step.
+    """
 
     late_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
     commanded_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
@@ -60,15 +68,19 @@ class Punctuality:
 
 
 class SimulatedWorld(Outside, Protocol):
-    """What a simulated robot moves in."""
+    """The world of a simulated robot. body_pose: the robot's true pose."""
 
     @property
     def body_pose(self) -> PlanarPose: ...
 
 
 class PerceptionLink:
-    """The newest scene of the perception process. Once it is gone it stays gone: lost_reason says why, and
-    refused_reason, too, if it took its leave before it had seen anything."""
+    """The control process's link to the perception process. Once lost, it stays lost.
+
+    newest: the newest scene.
+    lost_reason: why the link is lost; None if it is not.
+    refused_reason: the same, if perception said farewell before its first scene.
+    """
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
@@ -97,7 +109,7 @@ class PerceptionLink:
         return arrived
 
     def send(self, message: StepMessage) -> None:
-        """Tell perception where the robot is and what was decided; a full buffer drops the message."""
+        """Send the control step to perception; the message is dropped if the buffer is full."""
         if self.lost_reason is not None:
             return
         try:
@@ -126,8 +138,8 @@ def run_realtime(
 ) -> Iterator[RealtimeMoment]:
     """Step at the control rate until the loop has finished; yields after each step.
 
-    An overrun skips periods and keeps the phase, so that late commands are not sent in a burst: a step that
-    would begin more than half a period late is left out.
+    After an overrun, periods are skipped and the phase is kept, so that late commands are not sent in a
+    burst. A step that would begin half a period late or more is left out.
     """
     period_ns = round(NS_PER_S / config.control_rate_hz)
     started_ns = deadline_ns = clock.now_ns()

@@ -10,10 +10,11 @@ _MCL_CURRENT_AND_FUTURE = 3
 
 
 def become_realtime(priority: int) -> list[str]:
-    """SCHED_FIFO, locked memory, no garbage collection from here on; returns what was not permitted.
+    """Set SCHED_FIFO, lock the memory, and switch garbage collection off; returns what was not permitted.
 
-    Only the calling thread changes; threads started before keep ordinary scheduling. Without the
-    permission (a laptop) the program runs all the same, with a few milliseconds more jitter.
+    SCHED_FIFO holds for the calling thread; threads started before keep ordinary scheduling. Without the
+    permission (a laptop) the program still runs, with a few milliseconds more jitter. priority: 0 leaves
+    scheduling and memory as they are.
     """
     refused = []
     if priority > 0:

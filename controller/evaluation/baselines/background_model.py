@@ -1,7 +1,7 @@
-"""Background modelling (Table 1, first row): MOG2 on images freed of the camera's motion by homographies.
+"""Background modelling (Table 1, first row): MOG2 on images whose camera motion is removed by homographies.
 
-A homography is exact for a far or flat scene only. Near things show parallax and are taken for movers: that
-is the weakness which the paper's table names ("not good for free camera motion").
+A homography is exact only for a distant or flat scene. Near objects show parallax and are taken for movers.
+This is the weakness that the paper's table names ("not good for free camera motion").
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from controller.evaluation.baselines.masks import (
 from controller.evaluation.types import Answer
 from hal.types import FloatArray, Pose, RgbdFrame
 
-_HISTORY = 30
-_VARIANCE = 25.0
+_HISTORY = 30  # frames
+_VARIANCE = 25.0  # threshold on the squared Mahalanobis distance of a pixel from the background
 _LEARNING_RATE = 0.05
 _WARM_UP_FRAMES = 4
-_MIN_OVERLAP = 0.6  # share of the reference that must still be in view
+_MIN_OVERLAP = 0.6  # least share of the reference image still in view; below it the model starts anew
 
 
 class BackgroundModel:
-    """The model lives in a reference image; each frame is warped to it, and the mask back."""
+    """Keeps the model in a reference image. Each frame is warped to it, and the mask is warped back."""
 
     def __init__(self) -> None:
         ego.seed_ransac()
@@ -53,7 +53,7 @@ class BackgroundModel:
         if float(np.count_nonzero(covered)) < _MIN_OVERLAP * covered.size:
             self._restart()
             covered = np.full_like(grey, 255)
-        # Where the frame does not reach, the model is shown what it expects: it learns nothing there.
+        # Outside the frame the model gets its own background image, so that it learns nothing there.
         warped = cv2.warpPerspective(grey, self._to_reference, size)
         known = self._model.getBackgroundImage() if self._age else warped
         warped = np.where(covered == 255, warped, known)

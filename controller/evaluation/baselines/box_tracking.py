@@ -1,8 +1,7 @@
 """Object tracking (Table 1, third row): OpenCV's MIL tracker, given the first true box of each moving object.
 
-"Needs initial good selection of the object", says the table: here it gets the best there is, so that its
-figures tell how well a box is kept, not how it would be found. What it follows counts as moving for as
-long as it follows it.
+The table says "Needs initial good selection of the object". Here it gets the true box, so its figures tell
+how well a box is tracked, not how it would be found. An object counts as moving as long as it is tracked.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ class BoxTracking:
         self._given: list[tuple[int, Box]] = []
 
     def give(self, object_id: int, box: Box) -> None:
-        """The true box of an object in the frame that comes next; once for each object."""
+        """Give the true box of an object in the next frame; once for each object."""
         self._given.append((object_id, box))
 
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
@@ -76,7 +75,7 @@ class BoxTracking:
 
 
 def _position(box: Box, depth_m: np.typing.NDArray[np.float32], k: Intrinsics) -> FloatArray:
-    """The median of the depth in the middle half of the box; NaN where there is none."""
+    """Position by the median depth in the middle half of the box; NaN if there is no depth."""
     u0, v0, u1, v1 = (edge / SCALE for edge in box)
     height, width = depth_m.shape
     left, right = (int(np.clip(u0 + share * (u1 - u0), 0, width)) for share in (0.25, 0.75))

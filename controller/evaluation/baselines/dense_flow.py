@@ -1,7 +1,7 @@
-"""Dense optical flow minus rigid flow: every pixel that does not go where a static scene would take it.
+"""Dense optical flow minus rigid flow: pixels whose flow differs from that of a static scene are moving.
 
-Not in the paper's Table 1, but what most RGB-D methods without learning do today: DIS flow, the rigid
-motion of the camera by RANSAC over a grid of pixels with depth, and what remains.
+It is not in the paper's Table 1, but it is what most RGB-D methods without learning do today: DIS flow, the
+camera's rigid motion by RANSAC over a grid of pixels with depth, and a threshold on the residual flow.
 """
 
 from __future__ import annotations
@@ -23,13 +23,15 @@ from controller.evaluation.types import Answer
 from hal.types import FloatArray, Intrinsics, Pose, RgbdFrame
 
 _GRID_PX = 8
-_TOLERANCE_PX = 0.75
-_BASE_PX = 0.8  # of half-size pixels between two frames, besides
-_PER_FLOW = 0.08  # a share of the rigid flow: depth and flow are the worse the more there is
+_TOLERANCE_PX = 0.75  # inliers of the rigid motion
+# Allowed residual between two frames, in half-size pixels: a constant, and a share of the rigid flow, because
+# the errors of depth and flow grow with it.
+_BASE_PX = 0.8
+_PER_FLOW = 0.08
 
 
 class DenseFlow:
-    """Keeps the image and the depth of the frame before."""
+    """Keeps the image and the depth of the previous frame."""
 
     def __init__(self) -> None:
         ego.seed_ransac()
@@ -38,12 +40,12 @@ class DenseFlow:
         self._identities = Identities()
 
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
-        """Odometry is not used: the images say more."""
+        """Odometry is not used; the images give the motion more accurately."""
         grey, depth_m, k = half_grey(frame), half_depth_m(frame), half_intrinsics(frame.intrinsics)
         before, self._before = self._before, (grey, depth_m)
         if before is None:
             return self._identities.answer([], np.zeros_like(grey))
-        # From now to before, so that the result is on the pixels of this frame.
+        # From the current to the previous frame, so that the result is on the pixels of this frame.
         flow = np.asarray(self._flow.calc(grey, before[0], None), np.float64)  # type: ignore[call-overload]  # the stub lacks None
         mask = self._residual(flow, depth_m, k)
         return self._identities.answer(things(mask, depth_m, k), mask)

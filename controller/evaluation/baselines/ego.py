@@ -1,4 +1,4 @@
-"""The camera's own motion as the baselines need it: a homography, or a rigid motion from depth."""
+"""The camera's ego-motion for the baselines: a homography, or a rigid motion from depth."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from hal.types import FloatArray, Intrinsics, Pose
 Points = NDArray[np.float32]
 
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.01)
-_BACK_PX = 1.0
+_BACK_PX = 1.0  # greatest error of the forward-backward check
 _MIN_POINTS = 8
 _SEED = 20200127
-_APART_PX = 7
+_APART_PX = 7  # least distance of two corners
 
 
 def seed_ransac() -> None:
-    """OpenCV draws its RANSAC samples from a generator of the thread: begin it anew for equal results."""
+    """Seed OpenCV's random generator of this thread, which RANSAC draws from, for reproducible results."""
     cv2.setRNGSeed(_SEED)
 
 
 def corners(grey: Mask, count: int, taken: Points | None = None) -> Points:
-    """(N, 2) good features to track; none near points that are taken already."""
+    """(N, 2) corners (good features to track), at most count; none near the points in taken."""
     mask = None
     if taken is not None and len(taken):
         mask = np.full(grey.shape, 255, np.uint8)
@@ -35,7 +35,7 @@ def corners(grey: Mask, count: int, taken: Points | None = None) -> Points:
 
 
 def follow(before: Mask, now: Mask, points: Points) -> tuple[Points, NDArray[np.bool_]]:
-    """Pyramidal Lucas-Kanade with a forward-backward check: (N, 2) and which were found (N,)."""
+    """Track points by pyramidal Lucas-Kanade with a forward-backward check: (N, 2), and found (N,)."""
     if len(points) == 0:
         return points, np.empty(0, np.bool_)
     shaped = points.reshape(-1, 1, 2)
@@ -48,7 +48,7 @@ def follow(before: Mask, now: Mask, points: Points) -> tuple[Points, NDArray[np.
 
 
 def homography(before: Mask, now: Mask) -> FloatArray | None:
-    """(3, 3) from the image before to now, by RANSAC over tracked corners; None where it cannot be had."""
+    """(3, 3) from the previous image to the current one, by RANSAC over tracked corners; None if it fails."""
     start = corners(before, 300)
     end, found = follow(before, now, start)
     if np.count_nonzero(found) < _MIN_POINTS:
@@ -58,14 +58,14 @@ def homography(before: Mask, now: Mask) -> FloatArray | None:
 
 
 def back_project(points: Points, z_m: FloatArray, k: Intrinsics) -> FloatArray:
-    """(N, 3) in the optical frame."""
+    """Pixels (N, 2) with depth z_m (N,) to points (N, 3) in the optical frame."""
     x = (points[:, 0] - k.cx) / k.fx * z_m
     y = (points[:, 1] - k.cy) / k.fy * z_m
     return np.stack([x, y, z_m], axis=1)
 
 
 def depth_at(points: Points, depth_m: HalfDepth) -> FloatArray:
-    """(N,) of the nearest pixel, 0 where there is none."""
+    """(N,) depth at the nearest pixel, 0 where there is none."""
     height, width = depth_m.shape
     u = np.clip(np.rint(points[:, 0]).astype(int), 0, width - 1)
     v = np.clip(np.rint(points[:, 1]).astype(int), 0, height - 1)
@@ -73,9 +73,11 @@ def depth_at(points: Points, depth_m: HalfDepth) -> FloatArray:
 
 
 def rigid_motion(points_m: FloatArray, pixels: Points, k: Intrinsics, tolerance_px: float) -> Pose | None:
-    """The camera before in the camera now (p_now = motion.apply(p_before)) that most points agree with.
+    """Pose of the previous camera in the current one (p_now = motion.apply(p_before)), by RANSAC and PnP.
 
-    points_m (N, 3) in the camera before, pixels (N, 2) where they are seen now. None where too few agree.
+    points_m: (N, 3) in the previous camera.
+    pixels: (N, 2) where they are seen now.
+    None if there are too few inliers.
     """
     if len(points_m) < _MIN_POINTS:
         return None
@@ -95,6 +97,6 @@ def rigid_motion(points_m: FloatArray, pixels: Points, k: Intrinsics, tolerance_
 
 
 def project(points_m: FloatArray, k: Intrinsics) -> FloatArray:
-    """(N, 2); NaN behind the camera."""
+    """Points (N, 3) to pixels (N, 2); NaN behind the camera."""
     z = np.where(points_m[:, 2] > 0.05, points_m[:, 2], np.nan)
     return np.stack([k.fx * points_m[:, 0] / z + k.cx, k.fy * points_m[:, 1] / z + k.cy], axis=1)

@@ -1,8 +1,9 @@
 """Low rank and sparse representation (Table 1, fourth row): windowed robust principal component analysis.
 
 The last images, aligned to the newest by homographies, are the columns of a matrix. Its low-rank part is the
-background, its sparse part what moves (principal component pursuit by an inexact augmented Lagrange
-multiplier; Candes et al. 2011, Lin et al. 2010). At an eighth of the resolution, or it would take seconds.
+background, its sparse part the movers (principal component pursuit by an inexact augmented Lagrange
+multiplier; Candes et al. 2011, Lin et al. 2010). It works at an eighth of the resolution; at full resolution
+it would take seconds.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ class LowRank:
         height, width = grey.shape[0] // _SHRINK, grey.shape[1] // _SHRINK
         columns = []
         for image, matrix in zip(self._images, self._to_newest, strict=True):
-            # Beyond the border of an old image stands the newest one: unknown is not moving.
+            # Outside an old image, the newest image fills the gap, so that unknown pixels are not moving.
             warped = grey.copy()
             cv2.warpPerspective(
                 image, matrix, (grey.shape[1], grey.shape[0]), dst=warped, borderMode=cv2.BORDER_TRANSPARENT
@@ -79,7 +80,7 @@ class LowRank:
 def robust_pca(data: FloatArray) -> FloatArray:
     """The sparse part (N, K) of data (N, K), N much larger than K.
 
-    Minimises the nuclear norm of data - sparse plus sparse's 1-norm over sqrt(N).
+    Minimises the nuclear norm of (data - sparse) plus the 1-norm of sparse divided by sqrt(N).
     """
     weight = 1.0 / np.sqrt(max(data.shape))
     scale = _norm(data)
@@ -108,8 +109,8 @@ def _shrink_singular_values(matrix: FloatArray, by: float) -> FloatArray:
     return np.asarray(cv2.gemm(matrix, (vectors * share) @ vectors.T, 1.0, np.empty(0), 0.0), np.float64)
 
 
-# OpenCV's products stay on one core. NumPy's wake a thread for each, which at this size costs far more
-# than the product where cores are shared.
+# OpenCV's matrix products stay on one core. NumPy's use several threads, which at this size costs far more
+# than the product itself when cores are shared.
 
 
 def _gram(matrix: FloatArray) -> FloatArray:

@@ -1,8 +1,8 @@
-"""From a mask of moving pixels to things with an identity: what all silhouette methods share.
+"""From a mask of moving pixels to detections with track ids. Shared by all baselines that give a mask.
 
-Images are at half of the resolution. The mask is cleaned by morphology, cut where the depth jumps, and every
-connected part of at least 400 pixels of the full image within 10 m is a thing. A thing is called moving
-from its second frame on.
+Images are at half resolution. The mask is cleaned by morphology and cut at depth jumps. Every connected
+component within 10 m of at least 400 pixels of the full image is a thing. A thing is called moving from its
+second frame on.
 """
 
 from __future__ import annotations
@@ -24,32 +24,33 @@ HalfDepth = NDArray[np.float32]
 SCALE = 2
 MAX_DEPTH_M = 10.0
 _MIN_PIXELS = 400 // SCALE**2
-_MIN_KNOWN = 0.3  # share of a part's pixels that have depth
+_MIN_KNOWN = 0.3  # least share of a component's pixels that have depth
+# Least difference of neighbouring depths that is a jump: a constant, and a part with the square of the depth.
 _JUMP_M = 0.3
 _JUMP_PER_M2 = 0.03
-_GATE_M = 0.6
-_FORGET_FRAMES = 8
-_CONFIRM_FRAMES = 2
+_GATE_M = 0.6  # greatest distance between a thing and its track
+_FORGET_FRAMES = 8  # a track unseen for more frames is dropped
+_CONFIRM_FRAMES = 2  # frames from which a thing is called moving
 _OPEN = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
 _CLOSE = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
 
 
 def half_grey(frame: RgbdFrame) -> Mask:
-    """The colour image as grey, every pixel the mean of four."""
+    """The colour image in grey at half size; each pixel is the mean of four."""
     grey = cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY)
     small = cv2.resize(grey, None, fx=1.0 / SCALE, fy=1.0 / SCALE, interpolation=cv2.INTER_AREA)
     return np.asarray(small, np.uint8)
 
 
 def half_depth_m(frame: RgbdFrame) -> HalfDepth:
-    """Metres, 0 where there is no data or beyond the range."""
+    """Depth at half size, 0 where there is no data or it is beyond MAX_DEPTH_M."""
     depth_m = frame.depth[::SCALE, ::SCALE].astype(np.float32) * np.float32(frame.depth_scale_m)
     depth_m[depth_m > MAX_DEPTH_M] = 0.0
     return depth_m
 
 
 def half_intrinsics(k: Intrinsics) -> Intrinsics:
-    """Of the reduced images."""
+    """Intrinsics of the half-size images."""
     shift = 0.5 * (SCALE - 1)
     return Intrinsics(
         k.width // SCALE,
@@ -63,7 +64,7 @@ def half_intrinsics(k: Intrinsics) -> Intrinsics:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Thing:
-    """A connected part of a mask. box in pixels of the full image; level: mean of the mask, 0..1."""
+    """A connected component of a mask. box: in pixels of the full image. level: mean of the mask, 0..1."""
 
     box: Box
     position_m: FloatArray
@@ -72,7 +73,11 @@ class Thing:
 
 
 def things(mask: Mask, depth_m: HalfDepth, k: Intrinsics) -> list[Thing]:
-    """mask (H / 2, W / 2): 0, or 1..255 how surely a pixel moves. k: of the reduced image."""
+    """The things in a mask.
+
+    mask: (H / 2, W / 2) confidence that a pixel moves, 0..255.
+    k: intrinsics of the half-size image.
+    """
     clean = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _OPEN)
     clean = cv2.morphologyEx(clean, cv2.MORPH_CLOSE, _CLOSE)
     solid = ((clean > 0) & ~depth_jumps(depth_m)).astype(np.uint8)
@@ -93,7 +98,7 @@ def things(mask: Mask, depth_m: HalfDepth, k: Intrinsics) -> list[Thing]:
 
 
 def depth_jumps(depth_m: HalfDepth) -> NDArray[np.bool_]:
-    """(H, W) where a pixel and its right or lower neighbour both have depth, and they differ by a step."""
+    """(H, W) pixels whose depth differs from that of the right or lower neighbour by a jump."""
     allowed = _JUMP_M + _JUMP_PER_M2 * np.square(depth_m)
     jumps = np.zeros(depth_m.shape, np.bool_)
     for axis in (0, 1):
@@ -138,14 +143,14 @@ class _Known:
 
 
 class Identities:
-    """Gives things the identity of the nearest one of the frame before, within a gate."""
+    """Gives each thing the id of the nearest known one within a gate, or a new id."""
 
     def __init__(self) -> None:
         self._known: list[_Known] = []
         self._next_id = 0
 
     def answer(self, found: Sequence[Thing], mask: Mask | None) -> Answer:
-        """Detections of this frame."""
+        """The detections of this frame, with ids."""
         apart = np.array(
             [
                 [float(np.linalg.norm(one.position_m - known.position_m)) for known in self._known]

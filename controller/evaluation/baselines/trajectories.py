@@ -1,8 +1,8 @@
-"""Trajectory classification (Table 1, second row): long tracks, and which of them a rigid scene explains.
+"""Trajectory classification (Table 1, second row): long point tracks, split by the rigid motion of the scene.
 
-Corners are followed over up to half a second. The camera's motion between the oldest and the newest image
-is the rigid motion that most trajectories agree with (RANSAC over points with depth); trajectories that
-stay outside of it, frame after frame, move. Neighbours in space among them are one thing.
+Corners are tracked for up to half a second. RANSAC over the points with depth gives the camera's rigid motion
+between the oldest and the newest image. Trajectories that are outliers in several frames are moving. Those
+that are close in space are one thing.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from controller.evaluation.types import Answer
 from hal.types import FloatArray, Intrinsics, Pose, RgbdFrame
 
 _CORNERS = 400
-_WINDOW = 15
-_MIN_AGE = 6
-_TOLERANCE_PX = 1.0
-_MOVING_PX = 2.0
-_LINK_M = 0.45
-_MIN_TRAJECTORIES = 5
-_MEMORY = 0.6  # of the votes of the frames before
+_WINDOW = 15  # frames
+_MIN_AGE = 6  # least age of the old image, in frames
+_TOLERANCE_PX = 1.0  # inliers of the rigid motion
+_MOVING_PX = 2.0  # a trajectory whose residual is larger gets a vote for moving
+_LINK_M = 0.45  # points that are closer belong to one thing
+_MIN_TRAJECTORIES = 5  # of a thing
+_MEMORY = 0.6  # weight of the votes of earlier frames
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Past:
-    """Where the trajectories ids (N,) were: pixels (N, 2), depth_m (N,)."""
+    """The trajectories in an earlier frame: ids (N,), pixels (N, 2), depth_m (N,)."""
 
     ids: NDArray[np.int64]
     pixels: Points
@@ -47,7 +47,7 @@ class _Past:
 
 
 class Trajectories:
-    """Keeps the corners and where they were in the last images."""
+    """Keeps the corners and their positions in the last images."""
 
     def __init__(self) -> None:
         ego.seed_ransac()
@@ -75,7 +75,7 @@ class Trajectories:
         return self._identities.answer(found_things, None)
 
     def _vote(self, k: Intrinsics) -> None:
-        """Against the oldest image that enough trajectories come from."""
+        """Vote by the motion since the oldest image that shares enough trajectories with the newest."""
         self._votes = self._votes * _MEMORY
         for past in self._past:
             _, old, new = np.intersect1d(past.ids, self._ids, assume_unique=True, return_indices=True)
@@ -106,7 +106,7 @@ class Trajectories:
 
 
 def _group(pixels: Points, z_m: FloatArray, k: Intrinsics) -> list[Thing]:
-    """Single linkage in space: whatever is closer than _LINK_M belongs together."""
+    """Single-linkage clustering in space: points closer than _LINK_M belong together."""
     points_m = ego.back_project(pixels, z_m, k)
     label = np.arange(len(points_m))
     close = np.linalg.norm(points_m[:, None] - points_m[None], axis=2) <= _LINK_M
