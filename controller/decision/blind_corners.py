@@ -28,8 +28,8 @@ _SLACK = 1.5
 # Nobody steps out of a narrower gap; between the goods of a rack there are many.
 _PASSAGE_M = 0.8
 _SAME_M = 0.6  # ends that are nearer to each other are the same corner
-# Width of the opening behind the corner, about a doorway. Until the front is past it, somebody may step out of it
-# beside the view, which is too narrow to see into an opening that is level with the robot.
+# Width of the opening behind the corner, about a doorway. Until the front is past it, somebody may step out
+# of it beside the view, which is too narrow to see into an opening that is level with the robot.
 _OPENING_M = 1.0
 # Nearer than this ahead of the front, too little of the face is in view to tell that there is no corner.
 _SURE_M = 3.2

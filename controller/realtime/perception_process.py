@@ -105,7 +105,7 @@ class RemoteBody:
         return planar(self._from_odometry @ body_in_floor(odometry))
 
     def _carried_on(self, pose: PlanarPose, from_ns: int, stamp_ns: int) -> PlanarPose | None:
-        """pose at from_ns, extrapolated to stamp_ns with the newest twist; None if that is too far or unknown."""
+        """pose at from_ns, extrapolated to stamp_ns by the newest twist; None if too far or unknown."""
         assert self._newest is not None
         ahead_ns = stamp_ns - from_ns
         state = self._newest.chassis
