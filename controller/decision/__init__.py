@@ -4,12 +4,12 @@ The files in the order of one control step:
 
 * situation.py - the input: newest scene, path, robot pose, speed
 * decide.py - one control step: checks the input, asks all below, takes the least limit
-* knowledge.py - takes in each new scene with the files from here to blind_corners.py; judges the camera
+* world_model.py - takes in each new scene with the files from here to blind_corners.py; judges the camera
 * bodies.py - obstacles as boxes on the floor
 * surfaces.py - the free space as points on the floor
-* steadying.py - averages the measured velocities
-* memory.py - keeps bodies that have left the view
-* going.py - which of them move, and with which velocity
+* velocity_filter.py - averages the measured velocities
+* out_of_view.py - keeps bodies that have left the view
+* unseen_motion.py - which of them move, and with which velocity
 * view_edges.py - what is below, above or beside the view
 * seen_through.py - drops remembered bodies whose place is seen empty
 * lens_cover.py - whether something covers the lens
@@ -17,14 +17,14 @@ The files in the order of one control step:
 * sight.py - how far the corridor was seen free, and unexplained surfaces in it
 * blind_corners.py - where somebody may step out
 * limits.py - a speed limit with its reason
-* appraise.py - asks the advisers: depth (sight.py), then those from here to contingency.py
-* standing.py - bodies that stand in the corridor
+* speed_limits.py - asks the advisers: depth (sight.py), then those from here to reachability.py
+* standing_limits.py - bodies that stand in the corridor
 * outline.py - in bends, how far beside the corridor a body stands
 * debounce.py - debounced flags: which bodies enter the corridor
-* moving.py - bodies that cross, come towards the robot or drive ahead
+* moving_limits.py - bodies that cross, come towards the robot or drive ahead
 * crossing.py - the conflicts with them: when and where, and which speeds solve them
-* worst_case.py - what bodies could do at worst
-* contingency.py - its geometry: what bodies could reach, and where emergency stops end
+* worst_case_limit.py - what bodies could do at worst
+* reachability.py - its geometry: what bodies could reach, and where emergency stops end
 * release.py - slower at once, faster after a delay
 * decision.py - the output: action, target speed, reason
 

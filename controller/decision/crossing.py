@@ -1,10 +1,10 @@
 """Conflicts with bodies that cross the robot's path, and the speeds that solve them. Keeps no state.
 
 A conflict lasts from the time when a body enters the swept corridor until it leaves it, and has the stretch
-of the path that the body blocks meanwhile. comes_in says which bodies enter (controller/decision/appraise.py
-calls it), find_conflicts says when and where. choices gives two speeds for a conflict: up to yield_mps the
-robot lets the body pass first, from first_mps on it passes before the body. controller/decision/moving.py
-turns these choices into limits and keeps them from step to step.
+of the path that the body blocks meanwhile. comes_in says which bodies enter (called by
+controller/decision/speed_limits.py), find_conflicts says when and where. choices gives two speeds for a
+conflict: up to yield_mps the robot lets the body pass first, from first_mps on it passes before the body.
+controller/decision/moving_limits.py turns these choices into limits and keeps them from step to step.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ def comes_in(
     """(N,) which bodies are, or are likely to come, within the swept width. times_s (K,) begins at 0 = now.
 
     Likely: even if the sideways velocity is less by its spread, so that noise does not make the robot brake.
-    Less likely entries are covered by controller/decision/worst_case.py. unsure_m (N,): the bodies may be
-    this much nearer to the corridor than where they are placed.
+    Less likely entries are covered by controller/decision/worst_case_limit.py. unsure_m (N,): the bodies may
+    be this much nearer to the corridor than where they are placed.
     """
     nearer_m = np.zeros(len(sigma_side_mps)) if unsure_m is None else unsure_m
     return _comes_in(placed.clear_m, times_s, sigma_side_mps, nearer_m)

@@ -1,9 +1,9 @@
 """Scene, path and state -> Decision: how fast to go now, and why.
 
 Each control step collects all limits of the speed (from obstacles and depth in
-controller/decision/appraise.py; from path, range, camera and faults here) and takes the least. An increase is
-delayed, a decrease is not (controller/decision/release.py). Input that cannot be relied on leads to a
-jerk-limited stop.
+controller/decision/speed_limits.py; from path, range, camera and faults here) and takes the least. An
+increase is delayed, a decrease is not (controller/decision/release.py). Input that cannot be relied on leads
+to a jerk-limited stop.
 """
 
 from __future__ import annotations
@@ -16,9 +16,7 @@ from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller import braking
-from controller.decision.appraise import Appraiser
 from controller.decision.decision import Action, Decision, Reason, Rule
-from controller.decision.knowledge import Knowledge
 from controller.decision.limits import (
     BACKWARDS_MPS,
     BLOCKING_RULES,
@@ -30,6 +28,8 @@ from controller.decision.limits import (
 )
 from controller.decision.release import ReleaseGate
 from controller.decision.situation import Situation
+from controller.decision.speed_limits import SpeedLimits
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount
@@ -65,21 +65,21 @@ class DecisionMaker:
         self._latency_s = period_s + config.chassis_delay_s
         self._sees_m = config.sight.range_m + mount.forward_m - robot.body.front_m
         self._path: Path | None = None
-        self._known: Knowledge | None = None
-        self._appraiser = Appraiser(config, robot.limits, mount)
+        self._known: WorldModel | None = None
+        self._speed_limits = SpeedLimits(config, robot.limits, mount)
         self._gate = ReleaseGate(config.release)
         self._now_ns: int | None = None
         self._emergency = False
         self._stuck_since_ns: int | None = None
         self._last: Reason | None = None
 
-    def take_path(self, path: Path, known: Knowledge) -> None:
+    def take_path(self, path: Path, known: WorldModel) -> None:
         """Continue along another path, of which known is known already; the hysteresis is kept."""
         self._path, self._known = path, known
 
-    def knowledge(self, path: Path, start_s_m: float) -> Knowledge:
-        """New Knowledge of a path about which nothing is known yet, for a robot that stands at start_s_m."""
-        return Knowledge(path, self._robot, self._mount, self._config, start_s_m, self._noise)
+    def knowledge(self, path: Path, start_s_m: float) -> WorldModel:
+        """A new WorldModel of a path of which nothing is known yet, for a robot that stands at start_s_m."""
+        return WorldModel(path, self._robot, self._mount, self._config, start_s_m, self._noise)
 
     def step(self, at: Situation) -> Decision:
         """The decision for at.now_ns."""
@@ -97,7 +97,7 @@ class DecisionMaker:
         on_way = self._path_limit(path, on_path, motion)
         limits = self._camera_limits(known)
         base_mps = min(on_way.speed_mps, _least(limits).speed_mps)
-        limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
+        limits += self._speed_limits.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(on_way, limits, motion, now_ns)
 
     def _input_fault(self, at: Situation) -> str:
@@ -125,7 +125,7 @@ class DecisionMaker:
         action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
         return Decision(action, 0.0, reason, self._emergency)
 
-    def _knowledge(self, path: Path, on_path: OnPath) -> Knowledge:
+    def _knowledge(self, path: Path, on_path: OnPath) -> WorldModel:
         if self._known is None or path is not self._path:
             self._path = path
             self._known = self.knowledge(path, on_path.s_m)
@@ -159,7 +159,7 @@ class DecisionMaker:
 
         return Limit(end, why)
 
-    def _camera_limits(self, known: Knowledge) -> list[Limit]:
+    def _camera_limits(self, known: WorldModel) -> list[Limit]:
         sight = self._config.sight
         if known.fault:
             # Brake hard if bodies were moving when the camera failed, or if it failed so long ago that

@@ -3,7 +3,7 @@
 Floor that was seen free stays free once it is too near to be seen again (controller/decision/sight.py), even
 if somebody has stepped onto it since. Within 0.3 m of the lens hardly any camera measures depth, so whoever
 is there leaves bands of the view without any data, from the lowest row to the uppermost one.
-controller/decision/knowledge.py calls LensCover once a scene.
+controller/decision/world_model.py calls LensCover once a scene.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Speed limits, each with its reason, and what they are made of; the decision takes the least limit.
 
-The advisers (controller/decision/appraise.py) and controller/decision/decide.py make Limits; stop_before()
-makes the most frequent one.
+The advisers (controller/decision/speed_limits.py) and controller/decision/decide.py make Limits;
+stop_before() makes the most frequent one.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Remembered standing bodies just inside the edge of the view whose place a standing robot sees to be empty.
 
 People and vehicles that pass leave narrow tracks behind that were judged standing for a moment. Just inside
-the edge of the view controller/decision/memory.py keeps them, since what is there may be just outside. A
+the edge of the view controller/decision/out_of_view.py keeps them, since what is there may be just outside. A
 robot that waits for such a body would wait without end, so it is dropped once its place is seen through.
 """
 

@@ -2,7 +2,8 @@
 
 Obstacles are found by edges, which a plain wall does not have, and no depth camera measures glass. So a
 surface that no obstacle explains counts as an obstacle, and floor that was not seen is not free.
-controller/decision/knowledge.py calls Sight once a scene; controller/decision/appraise.py makes the limits.
+controller/decision/world_model.py calls Sight once a scene; controller/decision/speed_limits.py makes the
+limits.
 """
 
 from __future__ import annotations
@@ -172,7 +173,7 @@ class Sight:
             seen = seen_of(free, pose, self._mount, lanes, 0.5 * _CELL_M, least_m, in_corridor)
             self._seen_ns = _marked(self._seen_ns, first, seen, self._sight.known_share, captured_ns)
         # Cells too near to be seen again stay free once they were seen free; bodies that may come there are
-        # covered by controller/decision/memory.py and worst_case.py.
+        # covered by controller/decision/out_of_view.py and worst_case_limit.py.
         near_s_m = s_m + self._mount.forward_m + self._near_m + _CELL_M
         memory_ns = round(self._sight.memory_s * NS_PER_S)
         unknown = _first_unknown(

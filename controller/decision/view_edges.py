@@ -2,7 +2,8 @@
 
 The lower edge falls from the camera's height to the floor at near_m ahead; the upper edge rises with the
 slope up_tan from the camera's height; the side edges are at the tangent edge_tan. Heights are over the floor,
-distances ahead of the camera. controller/decision/memory.py, seen_through.py, standing.py and sight.py ask.
+distances ahead of the camera. controller/decision/out_of_view.py, seen_through.py, standing_limits.py and
+sight.py ask.
 """
 
 from __future__ import annotations

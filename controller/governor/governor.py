@@ -19,11 +19,11 @@ from config.robot import Robot
 from controller.decision.bodies import SceneError, bodies_of
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
-from controller.decision.knowledge import Knowledge
 from controller.decision.lens_cover import COVERED
 from controller.decision.limits import Limit, Motion, speed_to_decide_by
 from controller.decision.situation import Situation
 from controller.decision.surfaces import check_scan
+from controller.decision.world_model import WorldModel
 from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand, why_stop
 from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
@@ -86,7 +86,7 @@ class SpeedGovernor:
         # How the robot moves now: kept until it stands, whatever is asked for meanwhile.
         self._motion = Wish(Kind.STAND)
         self._path: Path | None = None
-        self._known: Knowledge | None = None
+        self._known: WorldModel | None = None
         self._laid_out = (0.0, 0.0)
         self._on_path = OnPath(0.0, 0.0, 0.0)
         self._has_moved = False

@@ -39,7 +39,7 @@ _THROUGH_M = 0.1
 # Two sightings make a surface; being seen through takes it back three times as slowly as that.
 _HIT, _MOST_HITS, _BLOCKED_HITS = 2, 6, 3
 # What moved may have gone on, unseen, soon after; so has what leaves the view of a robot that stands, which
-# it can only do by moving (as controller/decision/memory.py keeps both).
+# it can only do by moving (as controller/decision/out_of_view.py keeps both).
 _PASSING_NS = 2 * NS_PER_S
 _FOR_EVER_NS = 2**62
 _BESIDE = 2

@@ -12,12 +12,12 @@ from config.decision import DecisionConfig
 from config.robot import Body, Robot
 from controller.decision.corridor import Corridor
 from controller.decision.decision import Decision
-from controller.decision.knowledge import Knowledge
 from controller.decision.limits import Motion
 from controller.decision.outline import Outline, outline_of
 from controller.decision.situation import Situation
-from controller.decision.standing import StandingLimits
+from controller.decision.standing_limits import StandingLimits
 from controller.decision.surfaces import Surfaces
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath, Path
 from hal.types import FloatArray, PlanarPose
 from tests.support.bodies import arc_path, box, line_path
@@ -202,7 +202,7 @@ def test_on_another_path_what_stands_is_placed_anew_without_a_new_scene() -> Non
     look(bench, obstacle(2.2, 1.0, size_m=(0.4, 0.8)), free_space(bands=80), line_path())
     before = bench.maker._known
     assert before is not None
-    known = Knowledge(path, Robot(), MOUNT, DecisionConfig(), 0.0)
+    known = WorldModel(path, Robot(), MOUNT, DecisionConfig(), 0.0)
     known.go_on_from(before)
     assert known.surfaces is before.surfaces
     assert known.health is before.health

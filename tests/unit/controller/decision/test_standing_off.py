@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from config.decision import DecisionConfig, SightConfig
-from controller.decision.standing import _standing_off
+from controller.decision.standing_limits import _standing_off
 from tests.support.closed_loop import Mission, Thing, stands, straight
 
 

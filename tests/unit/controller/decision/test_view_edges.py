@@ -17,8 +17,8 @@ from controller.campaign.noise_mission import drive_noise
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
 from controller.campaign.task import yardstick
-from controller.decision.knowledge import Knowledge
 from controller.decision.view_edges import beyond_edges, visible_from_m
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from sim.families import generate
@@ -49,9 +49,9 @@ def stops_before_it(robot: Robot, family: str, seed: int) -> bool:
     return row.contacts == 0 and not row.reached and log.s_m[-1] > 3.0
 
 
-def after_a_pallet(floor_from_m: float) -> Knowledge:
+def after_a_pallet(floor_from_m: float) -> WorldModel:
     """What is known when a pallet 1.55 m ahead of the camera is seen no longer, by a robot that drives."""
-    known = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    known = WorldModel(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
     space = replace(free_space(), floor_from_m=floor_from_m)
     pallet = obstacle(2.0, 0.1, size_m=(0.5, 0.1))
     for number, seen in enumerate([(pallet,), ()]):
@@ -69,7 +69,7 @@ def test_what_sinks_below_the_view_is_kept_however_far_ahead_the_view_begins(
 
 
 def test_where_the_view_begins_is_known_on_the_next_path_too() -> None:
-    on = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    on = WorldModel(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
     on.go_on_from(after_a_pallet(1.9))
     assert on.near_m == 1.9
 
@@ -83,9 +83,9 @@ def test_a_long_robot_with_a_high_camera_does_not_drive_over_a_pallet(seed: int)
 LOW = Robot(limits=CONFIG.robot.limits, camera_mount=Mount(height_m=0.25, pitch_deg=0.0))
 
 
-def after_a_beam(up_tan: float, bottom_m: float = 0.65, ahead_m: float = 0.9) -> Knowledge:
+def after_a_beam(up_tan: float, bottom_m: float = 0.65, ahead_m: float = 0.9) -> WorldModel:
     """What is known when a beam as wide as somebody is seen no longer, by a robot that drives."""
-    known = Knowledge(PATH, Robot(), CameraMount(0.45, 0.0, 0.25, 0.0), DecisionConfig(), 0.0)
+    known = WorldModel(PATH, Robot(), CameraMount(0.45, 0.0, 0.25, 0.0), DecisionConfig(), 0.0)
     space = replace(free_space(), up_tan=up_tan)
     beam = obstacle(0.45 + ahead_m, 0.0, size_m=(0.5, 0.2))
     beam = replace(beam, position_m=np.array([0.0, 0.25 - bottom_m - 0.1, ahead_m]))

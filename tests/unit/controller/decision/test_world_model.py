@@ -12,7 +12,7 @@ from config.decision import DecisionConfig
 from config.perception import DepthNoise, PerceptionConfig
 from config.robot import Robot
 from controller.build import build_replay_decision
-from controller.decision.knowledge import Knowledge
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import PlanarPose
 from tests.support.deciding import MOUNT, PATH, Bench, obstacle
@@ -22,10 +22,10 @@ from vision.scene import FreeSpace, Obstacle
 START = OnPath(0.0, 0.0, 0.0)
 
 
-def after(*frames: tuple[Obstacle, ...]) -> Knowledge:
+def after(*frames: tuple[Obstacle, ...]) -> WorldModel:
     """What is known after these were seen, one after the other, by a robot that drives."""
     bench = Bench()
-    known = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    known = WorldModel(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
     for shown in frames:
         bench.now_ns += 33_000_000
         known.update(bench.scene(*shown), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)

@@ -1,6 +1,6 @@
 """Which bodies that are out of view, or about to leave it, move, and with which velocity they go on.
 
-controller/decision/memory.py asks these questions once a scene. Everything is in the frame of the path.
+controller/decision/out_of_view.py asks these questions once a scene. Everything is in the frame of the path.
 """
 
 from __future__ import annotations

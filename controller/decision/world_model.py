@@ -1,10 +1,10 @@
 """What the decision knows of the way ahead: the last good scene, and the bodies out of view since then.
 
-For each new scene, Knowledge turns the obstacles into boxes (controller/decision/bodies.py), averages their
-velocities (controller/decision/steadying.py), adds bodies that have left the view
-(controller/decision/memory.py), and notes free floor and unexplained surfaces along the path
+For each new scene, WorldModel turns the obstacles into boxes (controller/decision/bodies.py), averages their
+velocities (controller/decision/velocity_filter.py), adds bodies that have left the view
+(controller/decision/out_of_view.py), and notes free floor and unexplained surfaces along the path
 (controller/decision/sight.py). In each control step it says whether the camera can be relied on (the field
-fault). controller/decision/appraise.py turns what is known into speed limits.
+fault). controller/decision/speed_limits.py turns what is known into speed limits.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.decision.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.decision.corridor import Corridor
-from controller.decision.going import SETTLED_S
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
-from controller.decision.memory import OutOfView
+from controller.decision.out_of_view import OutOfView
 from controller.decision.sight import Sight
-from controller.decision.steadying import SteadyVelocities
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
+from controller.decision.unseen_motion import SETTLED_S
+from controller.decision.velocity_filter import SteadyVelocities
 from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
@@ -48,7 +48,7 @@ _FUTURE_S = 0.005  # tolerance of the scene's time stamp
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
 
-class Knowledge:
+class WorldModel:
     """Takes in scenes along one path. Points are in metres, in the frame of the path.
 
     bodies: N boxes that count, those in view before those out of view (controller/decision/bodies.py).
@@ -90,8 +90,8 @@ class Knowledge:
         self._boxed = np.zeros(0, np.bool_)
         self._unboxed: Bodies | None = None
         self._boxes = no_bodies(0)
-        self._steady = SteadyVelocities()
-        self._memory = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
+        self._velocity_filter = SteadyVelocities()
+        self._out_of_view = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
         self.edge_tan, self.near_m, self.up_tan = 0.5, config.sight.near_m, math.inf
         # Of the last scenes: capture time, surface points (K, 2) and centres of bodies (M, 2).
         self._places: deque[tuple[int, FloatArray, FloatArray]] = deque()
@@ -107,11 +107,15 @@ class Knowledge:
         """Whether this scene, or a later one, was already looked at."""
         return self._captured_ns is not None and scene.captured_ns <= self._captured_ns
 
-    def go_on_from(self, before: Knowledge) -> None:
+    def go_on_from(self, before: WorldModel) -> None:
         """Take over what does not depend on the path: bodies, velocities, surfaces, the camera's state."""
         self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
-        self._steady, self._memory, self._places = before._steady, before._memory, before._places
+        self._velocity_filter, self._out_of_view, self._places = (
+            before._velocity_filter,
+            before._out_of_view,
+            before._places,
+        )
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
         self.health, self.edge_tan = before.health, before.edge_tan
         self.near_m, self.up_tan = before.near_m, before.up_tan
@@ -181,13 +185,13 @@ class Knowledge:
         boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving)
         if len(free.bearing_tan):
             self.edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
-        self.near_m = self._memory.near_m = max(self._config.sight.near_m, free.floor_from_m)
-        self.up_tan = self._memory.up_tan = free.up_tan
+        self.near_m = self._out_of_view.near_m = max(self._config.sight.near_m, free.floor_from_m)
+        self.up_tan = self._out_of_view.up_tan = free.up_tan
         self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
-        boxes = self._steady.update(self._recognise(seen.select(boxed)))
-        boxes = self._memory.leaving(boxes, pose, self.edge_tan)
+        boxes = self._velocity_filter.update(self._recognise(seen.select(boxed)))
+        boxes = self._out_of_view.leaving(boxes, pose, self.edge_tan)
         standing = v_mps <= STANDING_MPS
-        remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, free)
+        remembered = self._out_of_view.update(self._boxes, boxes, pose, self.edge_tan, standing, free)
         self.bodies = boxes.joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)

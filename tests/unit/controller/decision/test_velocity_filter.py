@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.decision.bodies import Bodies
-from controller.decision.steadying import SteadyVelocities
+from controller.decision.velocity_filter import SteadyVelocities
 from tests.support.bodies import box
 
 FRAME_NS = 33_333_333

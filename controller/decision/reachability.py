@@ -1,6 +1,7 @@
 """The geometry of the worst case: what bodies could reach, and whether an emergency stop ends short of that.
 
-Called by controller/decision/worst_case.py alone, which makes a speed limit of the answers. The assumptions:
+Called by controller/decision/worst_case_limit.py alone, which makes a speed limit of the answers. What is
+assumed:
 
 * A body may stop dead anywhere on its way, so the stretch of the path that it could block only grows.
 * A body may change its velocity by a bounded acceleration, up to the greatest obstacle speed V_omax.

@@ -1,7 +1,7 @@
 """Speed limits for bodies that stand in the corridor: stop before each, where it can still be seen to leave.
 
-controller/decision/appraise.py calls StandingLimits in each control step. Bodies are placed along the path
-once a scene; in bends controller/decision/outline.py tells how far beside the corridor they are.
+controller/decision/speed_limits.py calls StandingLimits in each control step. Bodies are placed along the
+path once a scene; in bends controller/decision/outline.py tells how far beside the corridor they are.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, Placed, place
-from controller.decision.knowledge import Knowledge
 from controller.decision.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
 from controller.decision.outline import outline_of
 from controller.decision.view_edges import visible_from_m
+from controller.decision.world_model import WorldModel
 from hal.compiled import compiled
 from hal.records import record
 from hal.types import CameraMount, FloatArray
@@ -68,7 +68,7 @@ class StandingLimits:
         self._corridor: Corridor | None = None
         self._outlines_m: dict[int, float] = {}
 
-    def limits(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
+    def limits(self, known: WorldModel, s_m: float, motion: Motion) -> list[Limit]:
         """The limits for a robot at s_m."""
         if known.bodies is not self._of or known.corridor is not self._corridor:
             self._take_in(known, s_m)
@@ -95,7 +95,7 @@ class StandingLimits:
             )
         return found
 
-    def _take_in(self, known: Knowledge, s_m: float) -> None:
+    def _take_in(self, known: WorldModel, s_m: float) -> None:
         """Place the standing bodies of a new scene, or along a new path, and drop those too far aside.
 
         Outlines that were measured along another path are not used.
@@ -119,7 +119,7 @@ class StandingLimits:
             numbers = bodies.ids[rows].tolist()
             self._near = [_Near(number, *of) for number, of in zip(numbers, near_ones.tolist(), strict=True)]
 
-    def _clear(self, known: Knowledge, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
+    def _clear(self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
         """(N,) free floor between the bodies and the corridor.
 
         In bends it comes from each body's outline when it was last seen whole, unless a part that is nearer
@@ -141,7 +141,7 @@ class StandingLimits:
             clear_m[row] = max(clear_m[row], min(whole_m, outline.clear_m))
         return clear_m
 
-    def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:
+    def _standing_off(self, known: WorldModel, bodies: Bodies, placed: Placed) -> FloatArray:
         """(N,) distance at which to stand before each body, so that it is still in view and seen to leave.
 
         Never less than the configured stop_m, even if a camera that looks down steeply would see it nearer.

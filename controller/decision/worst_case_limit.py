@@ -1,9 +1,9 @@
 """The worst case as a speed limit: how fast may the robot go and still stand before a body could touch it?
 
-controller/decision/contingency.py has the geometry: what each body could reach, and how much room a stop
+controller/decision/reachability.py has the geometry: what each body could reach, and how much room a stop
 leaves. This file decides how much each body may change its velocity, tries emergency stops from many speeds,
-and makes a Limit of the greatest speed that is safe. controller/decision/appraise.py calls it last, after the
-other advisers.
+and makes a Limit of the greatest speed that is safe. controller/decision/speed_limits.py calls it last, after
+the other advisers.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
-from controller.decision.contingency import (
+from controller.decision.corridor import Course, Placed
+from controller.decision.decision import Reason
+from controller.decision.limits import ALONGSIDE_M, LEAVES_ASLANT, UNSEEN_SIGMAS, Limit, Motion, allowed
+from controller.decision.reachability import (
     Reach,
     Stops,
     gets_through,
@@ -27,9 +30,6 @@ from controller.decision.contingency import (
     room,
     stops,
 )
-from controller.decision.corridor import Course, Placed
-from controller.decision.decision import Reason
-from controller.decision.limits import ALONGSIDE_M, LEAVES_ASLANT, UNSEEN_SIGMAS, Limit, Motion, allowed
 from controller.profile import SpeedRamps, comfortable
 from hal.compiled import compiled
 from hal.types import FloatArray

@@ -1,21 +1,22 @@
 """Obstacles and depth -> speed limits with their reasons, for one control step.
 
-controller/decision/decide.py calls Appraiser.limits and takes the least of these limits and its own (path,
+controller/decision/decide.py calls SpeedLimits.limits and takes the least of these limits and its own (path,
 range, camera). The advisers, in the order in which they are called:
 
 1. Depth (controller/decision/sight.py, lens_cover.py): a blind corner, the nearest surface that no obstacle
    explains, a covered lens, and the end of the floor that was seen free.
-2. standing.StandingLimits: bodies that stand in the swept corridor.
-3. moving.MovingLimits: bodies that cross, come or drive ahead (conflicts: controller/decision/crossing.py).
-4. worst_case.WorstCase: what the watched bodies could do at worst
-   (geometry: controller/decision/contingency.py).
+2. standing_limits.StandingLimits: bodies that stand in the swept corridor.
+3. moving_limits.MovingLimits: bodies that cross, come or drive ahead
+   (conflicts: controller/decision/crossing.py).
+4. worst_case_limit.WorstCase: what the watched bodies could do at worst
+   (geometry: controller/decision/reachability.py).
 
-Words for the bodies that controller/decision/knowledge.py knows:
+Words for the bodies that controller/decision/world_model.py knows:
 
 * watched: bodies that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone.
 * enters: watched bodies that are in the swept corridor or are likely to come into it (crossing.comes_in),
   debounced.
-* remembered: bodies out of the camera's view, kept by controller/decision/memory.py.
+* remembered: bodies out of the camera's view, kept by controller/decision/out_of_view.py.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ from controller.decision.corridor import course_of, place
 from controller.decision.crossing import comes_in
 from controller.decision.debounce import Debounced
 from controller.decision.decision import Reason
-from controller.decision.knowledge import Knowledge
 from controller.decision.lens_cover import COVERED
 from controller.decision.limits import UNSEEN_SIGMAS, Gap, Limit, Motion, allowed, stop_before
-from controller.decision.moving import MovingLimits
-from controller.decision.standing import StandingLimits
-from controller.decision.worst_case import WorstCase
+from controller.decision.moving_limits import MovingLimits
+from controller.decision.standing_limits import StandingLimits
+from controller.decision.world_model import WorldModel
+from controller.decision.worst_case_limit import WorstCase
 from hal.types import CameraMount
 
 _COARSE_S = 0.5  # step of the times beyond those of the worst case
@@ -50,7 +51,7 @@ _SAME_SURFACE_M = 0.8
 _SETTLES_S = 0.3
 
 
-class Appraiser:
+class SpeedLimits:
     """Asks the advisers, in this order: depth, standing bodies, moving bodies, and the worst case."""
 
     def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount) -> None:
@@ -68,7 +69,7 @@ class Appraiser:
         self._remembered = _NONE
 
     def limits(
-        self, known: Knowledge, s_m: float, motion: Motion, base_mps: float, now_s: float
+        self, known: WorldModel, s_m: float, motion: Motion, base_mps: float, now_s: float
     ) -> list[Limit]:
         """Every limit that obstacles and depth put on the speed of a robot at s_m.
 
@@ -111,7 +112,7 @@ class Appraiser:
             found.append(worst)
         return found
 
-    def _take_in(self, known: Knowledge) -> None:
+    def _take_in(self, known: WorldModel) -> None:
         """Once a scene: select the watched bodies, and forget those that are gone."""
         self._of = bodies = known.bodies
         watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
@@ -120,7 +121,7 @@ class Appraiser:
         if self._inside:
             self._inside.intersection_update(bodies.ids.tolist())
 
-    def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
+    def _depth(self, known: WorldModel, s_m: float, motion: Motion) -> list[Limit]:
         """The limits from depth alone (adviser 1 of the module's list)."""
         sight = known.sight
         front_m = s_m + known.corridor.front_m
@@ -134,7 +135,7 @@ class Appraiser:
             found.append(self._unseen(Gap(sight.known_s_m - front_m), motion))
         return found
 
-    def _surface(self, known: Knowledge, surface_s_m: float, s_m: float, motion: Motion) -> Limit:
+    def _surface(self, known: WorldModel, surface_s_m: float, s_m: float, motion: Motion) -> Limit:
         """The limit for the nearest surface that no box explains.
 
         Which obstacle it belongs to is looked up for the sentence only.
@@ -189,7 +190,7 @@ def _covered() -> Reason:
     return Reason("unseen", f"{COVERED}: stop", distance_m=0.0)
 
 
-def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:
+def _owner(known: WorldModel, surface_s_m: float, s_m: float) -> int | None:
     """Id of the obstacle whose surface this is, if an unboxed one is tracked there."""
     unboxed = known.unboxed
     if not len(unboxed):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.memory import OutOfView
+from controller.decision.out_of_view import OutOfView
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
 from vision.scene import FreeSpace

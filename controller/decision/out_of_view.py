@@ -1,6 +1,6 @@
 """Bodies that have left the camera's view but are still there: below, beside or above it.
 
-controller/decision/knowledge.py calls OutOfView.leaving, then OutOfView.update, once a scene. A body of the
+controller/decision/world_model.py calls OutOfView.leaving, then OutOfView.update, once a scene. A body of the
 last scene that is missing in this one is kept while its place is outside the view:
 
 * Standing (seen for at least 0.5 s; the robot drives): kept where it was, until its place is in view again,
@@ -11,7 +11,7 @@ last scene that is missing in this one is kept while its place is outside the vi
   along with the robot. Dropped earlier if its place is well within the view or 2 m behind the camera.
 * Judged standing (a verdict takes some frames), but clearly measured as approaching (or as moving anywhere,
   if seen for 0.5 to 1 s): counts as moving, with the velocity measured last, even if the robot stands
-  (controller/decision/going.py).
+  (controller/decision/unseen_motion.py).
 * Moving, and expected in view where the scene shows free floor: moved sideways to the edge of the free space,
   and no longer approaching (its velocity towards the axis becomes 0, its variance grows). The same 2 s or
   6 s apply. A body that clearly approached may first be some decimetres late.
@@ -30,7 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.going import (
+from controller.decision.seen_through import SeenThrough
+from controller.decision.unseen_motion import (
     NOBODY_HALF_M,
     SETTLED_S,
     alike,
@@ -39,7 +40,6 @@ from controller.decision.going import (
     may_come,
     out_or_coming,
 )
-from controller.decision.seen_through import SeenThrough
 from controller.decision.view_edges import beyond_edges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled

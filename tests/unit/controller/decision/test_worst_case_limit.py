@@ -13,7 +13,7 @@ from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, course_of, place
 from controller.decision.limits import Limit, Motion
-from controller.decision.worst_case import WorstCase
+from controller.decision.worst_case_limit import WorstCase
 from tests.support.bodies import box, line_path
 
 LIMITS = Limits()

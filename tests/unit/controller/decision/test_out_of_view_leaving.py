@@ -10,8 +10,8 @@ import pytest
 from config.decision import DecisionConfig
 from config.robot import Limits, Robot
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.knowledge import Knowledge
-from controller.decision.memory import OutOfView
+from controller.decision.out_of_view import OutOfView
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
@@ -204,7 +204,7 @@ def test_however_certainly_nobody_goes_as_fast_as_a_mistake(fastest_mps: float, 
 def test_how_fast_any_obstacle_is_the_robots_limits_say(fastest_mps: float, goes: bool) -> None:
     """Of a pallet that sinks below the view while it is measured at 2 m/s, standing by the verdict."""
     robot = Robot(limits=Limits(max_obstacle_speed_mps=fastest_mps))
-    known = Knowledge(PATH, robot, MOUNT, DecisionConfig(), 0.0)
+    known = WorldModel(PATH, robot, MOUNT, DecisionConfig(), 0.0)
     sinking = replace(
         obstacle(1.6, 0.1, size_m=(0.5, 0.1), age_s=0.9), velocity_mps=np.array([-2.0, 0.0, 0.0])
     )

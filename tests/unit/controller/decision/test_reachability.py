@@ -7,8 +7,8 @@ import pytest
 
 from config.robot import Body
 from controller.decision.bodies import Bodies
-from controller.decision.contingency import Reach, gets_through, last_in_time, reach, room, stops
 from controller.decision.corridor import Corridor, place
+from controller.decision.reachability import Reach, gets_through, last_in_time, reach, room, stops
 from controller.profile import SpeedRamps
 from hal.types import FloatArray
 from tests.support.bodies import box, line_path

@@ -43,7 +43,8 @@ _STICKY_S = 0.5
 class MovingLimits:
     """Limits for moving bodies; keeps what hysteresis needs.
 
-    times_s (K,): times from now at which bodies are placed. inside: see controller/decision/standing.py.
+    times_s (K,): times from now at which bodies are placed.
+    inside: see controller/decision/standing_limits.py.
     """
 
     def __init__(self, config: DecisionConfig, limits: Limits, times_s: FloatArray, inside: set[int]) -> None:
