@@ -153,26 +153,26 @@ class Course:
 
     along_mps, left_mps: speed along the path and to its left.
     sigma_along_mps, sigma_left_mps: their standard deviations.
-    surprise_along_mps, surprise_left_mps: by how much the newest measurement differs from them.
+    innovation_along_mps, innovation_left_mps: by how much the newest measurement differs from them.
     """
 
     along_mps: FloatArray
     left_mps: FloatArray
     sigma_along_mps: FloatArray
     sigma_left_mps: FloatArray
-    surprise_along_mps: FloatArray
-    surprise_left_mps: FloatArray
+    innovation_along_mps: FloatArray
+    innovation_left_mps: FloatArray
 
 
 def course_of(bodies: Bodies, heading_rad: FloatArray) -> Course:
     """The velocities relative to the path. heading_rad (N,): heading of the path where each body is."""
-    of = _seen_along(bodies.velocity_mps, bodies.surprise_mps, bodies.covariance, heading_rad)
+    of = _seen_along(bodies.velocity_mps, bodies.innovation_mps, bodies.covariance, heading_rad)
     return Course(of[0], of[1], of[2], of[3], of[4], of[5])
 
 
 @compiled("float64[:, :], float64[:, :], float64[:, :, :], float64[:]")
 def _seen_along(
-    velocity_mps: FloatArray, surprise_mps: FloatArray, covariance: FloatArray, heading_rad: FloatArray
+    velocity_mps: FloatArray, innovation_mps: FloatArray, covariance: FloatArray, heading_rad: FloatArray
 ) -> FloatArray:
     """(6, N) the fields of Course."""
     course = np.empty((6, len(heading_rad)))
@@ -181,7 +181,7 @@ def _seen_along(
         cos, sin = math.cos(heading_rad[k]), math.sin(heading_rad[k])
         x, y = velocity_mps[k, 0], velocity_mps[k, 1]
         along[k], left[k] = x * cos + y * sin, y * cos - x * sin
-        x, y = surprise_mps[k, 0], surprise_mps[k, 1]
+        x, y = innovation_mps[k, 0], innovation_mps[k, 1]
         more_along[k], more_left[k] = x * cos + y * sin, y * cos - x * sin
         xx, yy = covariance[k, 0, 0], covariance[k, 1, 1]
         turned = (covariance[k, 0, 1] + covariance[k, 1, 0]) * cos * sin

@@ -110,7 +110,7 @@ class MovingLimits:
         now_s: float,
     ) -> list[Conflict]:
         margins = self._config.margins
-        grazes = np.array([number in self._inside for number in bodies.ids.tolist()])
+        grazes = np.array([track_id in self._inside for track_id in bodies.ids.tolist()])
         beside_m = margins.lateral_m + margins.graze_m * grazes
         sigma_mps = course.sigma_left_mps * self._config.prediction.sigmas
         found = [
@@ -118,22 +118,24 @@ class MovingLimits:
             for one in find_conflicts(placed, self._times_s, sigma_mps, beside_m, rows)
             if one.hi_in_m > s_m and one.lo_in_m > from_s_m
         ]
-        numbers = {int(bodies.ids[one.row]) for one in found}
-        self._inside |= numbers
-        self._goes_first &= numbers
+        track_ids = {int(bodies.ids[one.row]) for one in found}
+        self._inside |= track_ids
+        self._goes_first &= track_ids
         found = [self._steadied(one, int(bodies.ids[one.row]), now_s) for one in found]
-        self._leaves_s = {number: when for number, when in self._leaves_s.items() if number in numbers}
+        self._leaves_s = {
+            track_id: when for track_id, when in self._leaves_s.items() if track_id in track_ids
+        }
         return found
 
-    def _steadied(self, conflict: Conflict, number: int, now_s: float) -> Conflict:
+    def _steadied(self, conflict: Conflict, track_id: int, now_s: float) -> Conflict:
         """The conflict with its time of leaving averaged: each estimate extrapolates a noisy speed."""
         if math.isinf(conflict.out_s):
-            self._leaves_s.pop(number, None)
+            self._leaves_s.pop(track_id, None)
             return conflict
         leaves_s = now_s + conflict.out_s
-        before_s = self._leaves_s.get(number, leaves_s)
-        self._leaves_s[number] = before_s + _AVERAGE * (leaves_s - before_s)
-        return replace(conflict, out_s=max(self._leaves_s[number] - now_s, conflict.in_s))
+        before_s = self._leaves_s.get(track_id, leaves_s)
+        self._leaves_s[track_id] = before_s + _AVERAGE * (leaves_s - before_s)
+        return replace(conflict, out_s=max(self._leaves_s[track_id] - now_s, conflict.in_s))
 
     def _when_it_stays(
         self,
@@ -164,10 +166,10 @@ class MovingLimits:
         return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, rule, what)
 
     def _offer(
-        self, conflict: Conflict, number: int, ramps: SpeedRamps, s_m: float, stays: Limit
+        self, conflict: Conflict, track_id: int, ramps: SpeedRamps, s_m: float, stays: Limit
     ) -> tuple[Choice, Limit]:
         margins = self._config.margins
-        first = number in self._goes_first
+        first = track_id in self._goes_first
         enter_s = margins.crossing_s * (0.5 if first else 1.0) + (0.0 if first else _STICKY_S)
         choice = choices(conflict, ramps, self._speeds, s_m, margins.least_m, margins.crossing_s, enter_s)
         if conflict.in_s <= 0.0 or conflict.hi_in_m <= s_m:
@@ -179,11 +181,11 @@ class MovingLimits:
         def why() -> Reason:
             ahead_m, waits = conflict.lo_in_m - s_m, stays.reason
             sentence = (
-                f"obstacle {number} crosses {max(ahead_m, 0.0):.1f} m ahead until "
+                f"obstacle {track_id} crosses {max(ahead_m, 0.0):.1f} m ahead until "
                 f"{conflict.out_s:.1f} s from now: {allowed(choice.yield_mps)}"
             )
             return Reason(
-                "crossing", sentence, number, ahead_m, waits.closing_mps, waits.required_m, waits.margin_m
+                "crossing", sentence, track_id, ahead_m, waits.closing_mps, waits.required_m, waits.margin_m
             )
 
         return choice, Limit(choice.yield_mps, why)
@@ -207,9 +209,9 @@ class MovingLimits:
             found.append(worst[2])
             waiting.remove(worst)
         for conflict, choice, _ in offers:
-            number = int(bodies.ids[conflict.row])
+            track_id = int(bodies.ids[conflict.row])
             if choice.yield_mps < speed and speed >= choice.first_mps:
-                self._goes_first.add(number)
+                self._goes_first.add(track_id)
             else:
-                self._goes_first.discard(number)
+                self._goes_first.discard(track_id)
         return found, speed

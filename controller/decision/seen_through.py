@@ -40,7 +40,7 @@ class SeenThrough:
         """Start anew: the robot drives, or nothing is remembered."""
         self._since_ns.clear()
 
-    def gone(
+    def seen_empty(
         self, bodies: Bodies, pose: PlanarPose, edge_tan: float, near_m: float, up_tan: float, free: FreeSpace
     ) -> NDArray[np.bool_]:
         """(N,) which of the bodies are no longer there, for a robot that stands at pose. Call once a scene.
@@ -65,7 +65,7 @@ class SeenThrough:
             if _is_free(free, edges_m, float(near[k]), float(far[k])):
                 since_ns[ids[k]] = self._since_ns.get(ids[k], now_ns)
         self._since_ns = since_ns
-        return np.array([now_ns - since_ns.get(number, now_ns) >= _FOR_NS for number in ids], np.bool_)
+        return np.array([now_ns - since_ns.get(track_id, now_ns) >= _FOR_NS for track_id in ids], np.bool_)
 
 
 def _is_free(free: FreeSpace, edges_m: FloatArray, near_m: float, far_m: float) -> bool:

@@ -19,7 +19,7 @@ from controller.decision.blind_corners import BlindCorners
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
 from controller.decision.surfaces import Surfaces, seen_of
-from controller.decision.view_edges import LEAST_TAN, above_from_m, consented_m
+from controller.decision.view_edges import MIN_TAN, assumed_free_m, may_be_above_view_within_m
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -119,19 +119,19 @@ class Sight:
         """Take in where the view begins and ends, if that has changed.
 
         The higher the camera, the longer the stretch of floor below its view, which cannot be seen before the
-        start. It counts as free by consent, unless it is too long (consented_m).
+        start. It counts as free by consent, unless it is too long (assumed_free_m).
         """
         edges = free.floor_from_m, free.up_tan
         if edges == self._edges:
             return
         self._edges = edges
         self._floor_from_m = max(self._sight.near_m, free.floor_from_m)
-        near_m = consented_m(self._sight.near_m, free.floor_from_m)
+        near_m = assumed_free_m(self._sight.near_m, free.floor_from_m)
         if near_m > self._near_m:
             self._consent_s_m += near_m - self._near_m
             self._near_m = near_m
-        above_m = above_from_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
-        if free.up_tan < LEAST_TAN:  # the upper edge hardly rises: where things leave it is not known
+        above_m = may_be_above_view_within_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
+        if free.up_tan < MIN_TAN:  # the upper edge hardly rises: where things leave it is not known
             above_m = min(above_m, _MOST_ABOVE_M)
         self._lost_m = max(self._floor_from_m, above_m)
 

@@ -38,13 +38,13 @@ _NOW = np.zeros(1)
 class _Near:
     """A body that may stand in the corridor.
 
-    number: its id.
+    track_id: its id.
     lo_m, hi_m, clear_m: see corridor.Placed.
     age_s: since it was first seen.
     stop_m: distance from it at which the robot stands.
     """
 
-    number: int
+    track_id: int
     lo_m: float
     hi_m: float
     clear_m: float
@@ -77,18 +77,18 @@ class StandingLimits:
         for near in self._near:
             if near.hi_m <= s_m:
                 continue
-            number, gap_m = near.number, near.lo_m - s_m
-            beside_m = margins.lateral_m + (margins.graze_m if number in self._inside else 0.0)
+            track_id, gap_m = near.track_id, near.lo_m - s_m
+            beside_m = margins.lateral_m + (margins.graze_m if track_id in self._inside else 0.0)
             if gap_m < -ALONGSIDE_M:
                 # The front has passed its near side: only a body that the robot would really touch counts.
                 beside_m = -_INSIDE_BODY_M
             if near.clear_m > beside_m:
-                self._inside.discard(number)
+                self._inside.discard(track_id)
                 continue
-            gap = Gap(gap_m, obstacle_id=number)
+            gap = Gap(gap_m, obstacle_id=track_id)
             if self._may_wait(gap, motion, near.age_s):
                 continue
-            self._inside.add(number)
+            self._inside.add(track_id)
             what = "stands on the path"
             found.append(
                 stop_before(gap, motion, self._comfort, near.stop_m, margins.least_m, "static", what)
@@ -116,8 +116,10 @@ class StandingLimits:
         if len(rows):
             stop_m = self._standing_off(known, bodies, placed)
             near_ones = _columns(rows, placed.lo_m, placed.hi_m, clear_m, bodies.age_s, stop_m)
-            numbers = bodies.ids[rows].tolist()
-            self._near = [_Near(number, *of) for number, of in zip(numbers, near_ones.tolist(), strict=True)]
+            track_ids = bodies.ids[rows].tolist()
+            self._near = [
+                _Near(track_id, *of) for track_id, of in zip(track_ids, near_ones.tolist(), strict=True)
+            ]
 
     def _clear(self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
         """(N,) free floor between the bodies and the corridor.
@@ -135,9 +137,9 @@ class StandingLimits:
         for k, row in enumerate(beside.nonzero()[0].tolist()):
             stretch_m = s_m - ALONGSIDE_M, float(placed.hi_m[row, 0]) + known.corridor.front_m
             outline = outline_of(bodies, k, own[:, k], known.surfaces, known.corridor, stretch_m, depth_m)
-            number = int(bodies.ids[k])
-            whole_m = outline.clear_m if outline.whole else before.get(number, -math.inf)
-            self._outlines_m[number] = whole_m
+            track_id = int(bodies.ids[k])
+            whole_m = outline.clear_m if outline.whole else before.get(track_id, -math.inf)
+            self._outlines_m[track_id] = whole_m
             clear_m[row] = max(clear_m[row], min(whole_m, outline.clear_m))
         return clear_m
 
@@ -183,7 +185,7 @@ def _columns(
     age_s: FloatArray,
     stop_m: FloatArray,
 ) -> FloatArray:
-    """(R, 5) the fields of _Near except number, for the bodies rows (R,)."""
+    """(R, 5) the fields of _Near except track_id, for the bodies rows (R,)."""
     near = np.empty((len(rows), 5))
     for i in range(len(rows)):
         k = rows[i]

@@ -21,20 +21,20 @@ BoolArray = NDArray[np.bool_]
 
 # Uncertainty of the height of a body that is seen only in part.
 UNCERTAIN_M = 0.1
-LEAST_TAN, _LEAST_M = 0.1, 1e-3  # lower bounds of divisors
+MIN_TAN, _MIN_M = 0.1, 1e-3  # lower bounds of divisors
 # A body farther behind the camera than about a robot's length no longer counts as out of view.
 _BEHIND_M = 2.0
 # Floor below the view beyond this distance is too much to be taken as free without having been seen.
-_MOST_CONSENT_M = 2.5
+_MAX_ASSUMED_FREE_M = 2.5
 
 
-def consented_m(near_m: float, floor_from_m: float) -> float:
+def assumed_free_m(near_m: float, floor_from_m: float) -> float:
     """How far ahead of the camera the floor is taken as free although it was never seen, in metres.
 
     Whoever starts the robot consents to that: up to near_m, or to floor_from_m, where the floor comes into
-    view, but never more than _MOST_CONSENT_M (unless near_m is more).
+    view, but never more than _MAX_ASSUMED_FREE_M (unless near_m is more).
     """
-    return max(near_m, min(floor_from_m, _MOST_CONSENT_M))
+    return max(near_m, min(floor_from_m, _MAX_ASSUMED_FREE_M))
 
 
 def beyond_edges(
@@ -56,12 +56,12 @@ def out_of_view(
     near_m: float,
     up_tan: float,
     edge_m: float,
-    late_mps: float,
+    edge_growth_mps: float,
 ) -> BoolArray:
     """(N,) which bodies are beside, below or above the view, and no farther than _BEHIND_M behind the camera.
 
     pose: of the robot that carries the camera. A centre up to edge_m inside the side edge counts as beside
-    the view; of a mover, late_mps more for each second since it was last seen.
+    the view; of a mover, edge_growth_mps more for each second since it was last seen.
     """
     return _out_of_view(
         bodies.xy_m,
@@ -80,14 +80,14 @@ def out_of_view(
         near_m,
         up_tan,
         edge_m,
-        late_mps,
+        edge_growth_mps,
     )
 
 
-def above_from_m(top_m: float, height_m: float, up_tan: float) -> float:
+def may_be_above_view_within_m(top_m: float, height_m: float, up_tan: float) -> float:
     """Distance ahead of the camera below which something with its top at top_m may rise above the view."""
     rise_m = top_m - height_m
-    return max(rise_m, 0.0) / max(up_tan, LEAST_TAN)
+    return max(rise_m, 0.0) / max(up_tan, MIN_TAN)
 
 
 def visible_from_m(
@@ -104,7 +104,7 @@ def visible_from_m(
 @inlined
 def _lowest_seen_m(ahead_m: float, height_m: float, near_m: float) -> float:
     """Height of the lower edge of the view at ahead_m."""
-    return height_m * (1.0 - ahead_m / max(near_m, _LEAST_M))
+    return height_m * (1.0 - ahead_m / max(near_m, _MIN_M))
 
 
 @inlined
@@ -157,14 +157,14 @@ def _out_of_view(
     near_m: float,
     up_tan: float,
     edge_m: float,
-    late_mps: float,
+    edge_growth_mps: float,
 ) -> BoolArray:
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     out = np.empty(len(xy_m), np.bool_)
     for k in range(len(xy_m)):
         dx, dy = xy_m[k, 0] - x_m, xy_m[k, 1] - y_m
         ahead, left = dx * cos + dy * sin - forward_m, dy * cos - dx * sin - left_m
-        within_m = edge_m + (late_mps * unseen_s[k] if moving[k] else 0.0)
+        within_m = edge_m + (edge_growth_mps * unseen_s[k] if moving[k] else 0.0)
         beside = abs(left) > edge_tan * max(ahead, 0.0) - within_m
         beyond = _beyond(ahead - half_view_m[k], bottom_m[k], top_m[k], height_m, near_m, up_tan)
         out[k] = (beside or beyond) and ahead > -_BEHIND_M
@@ -185,6 +185,6 @@ def _visible_from_m(
     for k in range(len(top_m)):
         lowest = min(max(1.0 - (top_m[k] - UNCERTAIN_M) / height_m, 0.0), 1.0)
         rise_m = max(bottom_m[k] + UNCERTAIN_M - height_m, 0.0)
-        beside = abs(side_m[k]) / max(edge_tan, LEAST_TAN)
-        visible[k] = max(beside, near_m * lowest, rise_m / max(up_tan, LEAST_TAN))
+        beside = abs(side_m[k]) / max(edge_tan, MIN_TAN)
+        visible[k] = max(beside, near_m * lowest, rise_m / max(up_tan, MIN_TAN))
     return visible

@@ -26,7 +26,7 @@ from controller.decision.limits import STANDING_MPS
 from controller.decision.out_of_view import OutOfView
 from controller.decision.sight import Sight
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
-from controller.decision.unseen_motion import SETTLED_S
+from controller.decision.unseen_motion import MIN_TRACKED_S
 from controller.decision.velocity_filter import SteadyVelocities
 from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
@@ -37,10 +37,10 @@ from vision.scene import CameraCondition, CameraHealth, Scene
 
 # Half size above which a standing body is no box. The box of a wall or a rack would reach into the corridor
 # wherever the path bends; what of its surface is in the corridor, depth sees (controller/decision/sight.py).
-_SPRAWLING_M = 0.8
+_MAX_BOX_HALF_M = 0.8
 # Half width up to which a standing body is no box but a strip: along a rack there are dozens of strips a
 # centimetre or two wide, different ones in each frame. Poles are wider.
-_STRIP_M = 0.015
+_MIN_BOX_HALF_WIDTH_M = 0.015
 # A new track is no newcomer if something stood within this distance of its place, this long ago.
 _BEFORE_NS = 200_000_000
 _SAME_PLACE_M = 0.25
@@ -107,7 +107,7 @@ class WorldModel:
         """Whether this scene, or a later one, was already looked at."""
         return self._captured_ns is not None and scene.captured_ns <= self._captured_ns
 
-    def go_on_from(self, before: WorldModel) -> None:
+    def take_over(self, before: WorldModel) -> None:
         """Take over what does not depend on the path: bodies, velocities, surfaces, the camera's state."""
         self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
@@ -188,8 +188,8 @@ class WorldModel:
         self.near_m = self._out_of_view.near_m = max(self._config.sight.near_m, free.floor_from_m)
         self.up_tan = self._out_of_view.up_tan = free.up_tan
         self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
-        boxes = self._velocity_filter.update(self._recognise(seen.select(boxed)))
-        boxes = self._out_of_view.leaving(boxes, pose, self.edge_tan)
+        boxes = self._velocity_filter.update(self._age_known_places(seen.select(boxed)))
+        boxes = self._out_of_view.mark_leaving_movers(boxes, pose, self.edge_tan)
         standing = v_mps <= STANDING_MPS
         remembered = self._out_of_view.update(self._boxes, boxes, pose, self.edge_tan, standing, free)
         self.bodies = boxes.joined(remembered)
@@ -201,21 +201,21 @@ class WorldModel:
         self._captured_ns = scene.captured_ns
         return ""
 
-    def _recognise(self, bodies: Bodies) -> Bodies:
+    def _age_known_places(self, bodies: Bodies) -> Bodies:
         """The bodies, where a new track in a place that was occupied before is not taken for a newcomer.
 
-        Its age_s is raised to SETTLED_S, whatever its new number; its tracked_s stays.
+        Its age_s is raised to MIN_TRACKED_S, whatever its new number; its tracked_s stays.
         """
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
-        if not self._places or not np.count_nonzero(bodies.age_s < SETTLED_S):
+        if not self._places or not np.count_nonzero(bodies.age_s < MIN_TRACKED_S):
             return bodies
         captured_ns, *places = self._places[0]
         if captured_ns > bodies.captured_ns - _BEFORE_NS:
             return bodies
         points = np.concatenate(places)
         there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
-        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, SETTLED_S), bodies.age_s))
+        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, MIN_TRACKED_S), bodies.age_s))
 
 
 @compiled("float64[:], float64[:], boolean[:]")
@@ -225,8 +225,8 @@ def _boxed(
     """(N,) which bodies count as boxes: movers, and standing ones that are neither large nor mere strips."""
     boxed = np.empty(len(moving), np.bool_)
     for k in range(len(moving)):
-        sprawls = max(half_view_m[k], half_across_m[k]) > _SPRAWLING_M
-        boxed[k] = moving[k] or (half_across_m[k] > _STRIP_M and not sprawls)
+        sprawls = max(half_view_m[k], half_across_m[k]) > _MAX_BOX_HALF_M
+        boxed[k] = moving[k] or (half_across_m[k] > _MIN_BOX_HALF_WIDTH_M and not sprawls)
     return boxed
 
 

@@ -116,12 +116,14 @@ class WorstCase:
                 # An emergency stop is still in time. Braking for each small fluctuation would only cost time.
                 speed = motion.v_mps
         row = int(np.where(rows, placed.lo_m[:, 0], math.inf).argmin())
-        number = int(bodies.ids[row])
+        track_id = int(bodies.ids[row])
         gap_m = float(placed.lo_m[row, 0]) - s_m
 
         def why() -> Reason:
-            ahead = f"obstacle {number}, {max(gap_m, 0.0):.1f} m ahead"
-            return Reason("worst case", f"{ahead}, could step into the way: {allowed(speed)}", number, gap_m)
+            ahead = f"obstacle {track_id}, {max(gap_m, 0.0):.1f} m ahead"
+            return Reason(
+                "worst case", f"{ahead}, could step into the way: {allowed(speed)}", track_id, gap_m
+            )
 
         return Limit(speed, why, urgent)
 
@@ -175,8 +177,8 @@ class WorstCase:
             course.left_mps,
             course.sigma_along_mps,
             course.sigma_left_mps,
-            course.surprise_along_mps,
-            course.surprise_left_mps,
+            course.innovation_along_mps,
+            course.innovation_left_mps,
             placed.d_m[:, 0],
             placed.clear_m[:, 0],
             bodies.moving,
@@ -225,8 +227,8 @@ def _may_do(
     left_mps: FloatArray,
     sigma_along_mps: FloatArray,
     sigma_left_mps: FloatArray,
-    surprise_along_mps: FloatArray,
-    surprise_left_mps: FloatArray,
+    innovation_along_mps: FloatArray,
+    innovation_left_mps: FloatArray,
     d_m: FloatArray,
     clear_m: FloatArray,
     moving: NDArray[np.bool_],
@@ -264,8 +266,8 @@ def _may_do(
                 sideways[k] = oncoming_mps2
         since[k] = since_s + (0.0 if comes or leaves else unseen_s[k])
         speed[k] = math.hypot(along_mps[k], left_mps[k])
-        spread_along[k] = max(sigmas * sigma_along_mps[k], abs(surprise_along_mps[k]))
-        spread_left[k] = max(sigmas * sigma_left_mps[k], abs(surprise_left_mps[k]))
+        spread_along[k] = max(sigmas * sigma_along_mps[k], abs(innovation_along_mps[k]))
+        spread_left[k] = max(sigmas * sigma_left_mps[k], abs(innovation_left_mps[k]))
         if not leaves:
             unsure_along[k] = unseen_sigmas * unseen_s[k] * sigma_along_mps[k]
             unsure_left[k] = unseen_sigmas * unseen_s[k] * sigma_left_mps[k]

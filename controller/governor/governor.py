@@ -216,7 +216,7 @@ class SpeedGovernor:
             if before is None or before.has_taken_in(scene):
                 known.update(scene, scene.robot_pose, on_start, self._shape.v_mps, scene.captured_ns)
         if before is not None:
-            known.go_on_from(before)
+            known.take_over(before)
         self._decide.take_path(path, known)
         self._path, self._known, self._laid_out, self._on_path = path, known, wanted, on_start
         return path

@@ -19,7 +19,7 @@ from config.decision import DecisionConfig
 from config.robot import Robot
 from controller.decision.bodies import Bodies
 from controller.decision.surfaces import bands_at, floor_points, surfaces_of
-from controller.decision.view_edges import consented_m
+from controller.decision.view_edges import assumed_free_m
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -114,7 +114,7 @@ class GroundMemory:
         if not len(free.bearing_tan):
             return
         self._near_m = max(self._least_near_m, free.floor_from_m)
-        self.consent_m = self._reach_m + consented_m(self._least_near_m, free.floor_from_m)
+        self.consent_m = self._reach_m + assumed_free_m(self._least_near_m, free.floor_from_m)
         if self._stood and not standing:
             # What was still there when the robot set off does not go away by that.
             there = self._stands & (self._marked_ns >= captured_ns - IN_VIEW_NS)

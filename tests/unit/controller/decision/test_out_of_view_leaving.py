@@ -44,7 +44,7 @@ def expected(bodies: Bodies, left_mps: float = 0.0) -> Bodies:
 def after(*scenes: Bodies) -> Bodies:
     """The bodies of the last of some scenes."""
     view = memory()
-    return [view.leaving(scene, HERE, EDGE) for scene in scenes][-1]
+    return [view.mark_leaving_movers(scene, HERE, EDGE) for scene in scenes][-1]
 
 
 def test_who_is_clearly_coming_when_it_leaves_the_view_moves() -> None:

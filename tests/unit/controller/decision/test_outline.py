@@ -203,7 +203,7 @@ def test_on_another_path_what_stands_is_placed_anew_without_a_new_scene() -> Non
     before = bench.maker._known
     assert before is not None
     known = WorldModel(path, Robot(), MOUNT, DecisionConfig(), 0.0)
-    known.go_on_from(before)
+    known.take_over(before)
     assert known.surfaces is before.surfaces
     assert known.health is before.health
     assert known.edge_tan == before.edge_tan

@@ -70,7 +70,7 @@ def test_what_sinks_below_the_view_is_kept_however_far_ahead_the_view_begins(
 
 def test_where_the_view_begins_is_known_on_the_next_path_too() -> None:
     on = WorldModel(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
-    on.go_on_from(after_a_pallet(1.9))
+    on.take_over(after_a_pallet(1.9))
     assert on.near_m == 1.9
 
 
