@@ -1,7 +1,7 @@
 """The floor that the robot's body sweeps along its path (the corridor), and where bodies are relative to it.
 
 Corridor holds the swept width along one path; place() puts bodies into path coordinates at future times;
-course_of() turns their velocities into speeds along the path and across it.
+path_velocities() turns their velocities into speeds along the path and across it.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def _extents(
 
 
 @record(frozen=True, slots=True, eq=False)
-class Course:
+class PathVelocities:
     """Velocities of N bodies relative to the path where they are; each (N,).
 
     along_mps, left_mps: speed along the path and to its left.
@@ -164,19 +164,19 @@ class Course:
     innovation_left_mps: FloatArray
 
 
-def course_of(bodies: Bodies, heading_rad: FloatArray) -> Course:
+def path_velocities(bodies: Bodies, heading_rad: FloatArray) -> PathVelocities:
     """The velocities relative to the path. heading_rad (N,): heading of the path where each body is."""
     of = _seen_along(bodies.velocity_mps, bodies.innovation_mps, bodies.covariance, heading_rad)
-    return Course(of[0], of[1], of[2], of[3], of[4], of[5])
+    return PathVelocities(of[0], of[1], of[2], of[3], of[4], of[5])
 
 
 @compiled("float64[:, :], float64[:, :], float64[:, :, :], float64[:]")
 def _seen_along(
     velocity_mps: FloatArray, innovation_mps: FloatArray, covariance: FloatArray, heading_rad: FloatArray
 ) -> FloatArray:
-    """(6, N) the fields of Course."""
-    course = np.empty((6, len(heading_rad)))
-    along, left, sigma_along, sigma_left, more_along, more_left = course
+    """(6, N) the fields of PathVelocities."""
+    velocities = np.empty((6, len(heading_rad)))
+    along, left, sigma_along, sigma_left, more_along, more_left = velocities
     for k in range(len(heading_rad)):
         cos, sin = math.cos(heading_rad[k]), math.sin(heading_rad[k])
         x, y = velocity_mps[k, 0], velocity_mps[k, 1]
@@ -187,4 +187,4 @@ def _seen_along(
         turned = (covariance[k, 0, 1] + covariance[k, 1, 0]) * cos * sin
         sigma_along[k] = math.sqrt(max(xx * cos * cos + turned + yy * sin * sin, 0.0))
         sigma_left[k] = math.sqrt(max(xx * sin * sin - turned + yy * cos * cos, 0.0))
-    return course
+    return velocities

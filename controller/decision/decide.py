@@ -23,8 +23,8 @@ from controller.decision.limits import (
     STANDING_MPS,
     Limit,
     Motion,
-    allowed,
-    starts_at_mps,
+    allowed_text,
+    min_start_mps,
 )
 from controller.decision.release import ReleaseGate
 from controller.decision.situation import Situation
@@ -144,13 +144,13 @@ class DecisionMaker:
         end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
         if section <= end:
             rule: Rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
-            return Limit(section, lambda: Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
+            return Limit(section, lambda: Reason(rule, f"{left_m:.1f} m to go: {allowed_text(section)}"))
 
         def why() -> Reason:
             required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
             return Reason(
                 "target",
-                f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
+                f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed_text(end)}",
                 distance_m=left_m,
                 closing_mps=0.0,
                 required_m=required,
@@ -169,7 +169,7 @@ class DecisionMaker:
             return [Limit(0.0, lambda: reason, urgent=urgent)]
         found = [self._range_limit(known.age_s)]
         if known.health.condition is CameraCondition.DEGRADED:
-            sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"
+            sentence = f"the camera is degraded ({known.health.reason}): {allowed_text(sight.degraded_mps)}"
             found.append(Limit(sight.degraded_mps, lambda: Reason("camera", sentence)))
         return found
 
@@ -187,7 +187,7 @@ class DecisionMaker:
             margin_m=self._config.margins.least_m,
         )
         return Limit(
-            speed, lambda: Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed(speed)}")
+            speed, lambda: Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed_text(speed)}")
         )
 
     def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
@@ -219,7 +219,7 @@ class DecisionMaker:
         The robot does not creep up to an obstacle, and does not start for a short free distance.
         """
         release, standing = self._config.release, motion.v_mps <= STANDING_MPS
-        least = starts_at_mps(release, self._comfort) if standing else release.creep_mps
+        least = min_start_mps(release, self._comfort) if standing else release.creep_mps
         if limit.speed_mps >= least:
             return limit.speed_mps
         rule = limit.reason.rule

@@ -109,7 +109,7 @@ class OutOfView:
         if not leaves.any():
             return seen
         velocity = seen.velocity_mps.copy()
-        velocity[leaves] = [approach[ids[k]] for k in np.flatnonzero(leaves).tolist()]
+        velocity[leaves] = [self._approach_velocity[ids[k]] for k in np.flatnonzero(leaves).tolist()]
         return replace(seen, velocity_mps=velocity, moving=seen.moving | leaves)
 
     def update(

@@ -14,8 +14,8 @@ range, camera). The advisers, in the order in which they are called:
 Words for the bodies that controller/decision/world_model.py knows:
 
 * watched: bodies that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone.
-* enters: watched bodies that are in the swept corridor or are likely to come into it (crossing.comes_in),
-  debounced.
+* enters: watched bodies that are in the swept corridor or are likely to come into it
+  (crossing.likely_enters), debounced.
 * remembered: bodies out of the camera's view, kept by controller/decision/out_of_view.py.
 """
 
@@ -30,12 +30,12 @@ from config.robot import Limits
 from controller import braking
 from controller.decision.blind_corners import BlindCorner
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.corridor import course_of, place
-from controller.decision.crossing import comes_in
+from controller.decision.corridor import path_velocities, place
+from controller.decision.crossing import likely_enters
 from controller.decision.debounce import Debounced
 from controller.decision.decision import Reason
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import UNSEEN_SIGMAS, Gap, Limit, Motion, allowed, stop_before
+from controller.decision.limits import UNSEEN_ERROR_SIGMAS, Gap, Limit, Motion, allowed_text, stop_before
 from controller.decision.moving_limits import MovingLimits
 from controller.decision.standing_limits import StandingLimits
 from controller.decision.world_model import WorldModel
@@ -81,14 +81,14 @@ class SpeedLimits:
         found += self._standing.limits(known, s_m, motion)
         watched = self._watched
         if not len(watched):
-            self._moving.nobody()
+            self._moving.forget()
             return found
         placed = place(
             watched, known.corridor, known.since_s + self._times_s, s_m, self._config.sight.range_m + 2.0
         )
-        course = course_of(watched, placed.heading_rad[:, 0])
-        sigma_left = course.sigma_left_mps * self._config.prediction.sigmas
-        comes = comes_in(placed, self._times_s, sigma_left)
+        velocities = path_velocities(watched, placed.heading_rad[:, 0])
+        sigma_left = velocities.sigma_left_mps * self._config.prediction.sigmas
+        comes = likely_enters(placed, self._times_s, sigma_left)
         # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
         # there is no noise.
         at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
@@ -96,17 +96,17 @@ class SpeedLimits:
         for limit in found:
             base_mps = min(base_mps, limit.speed_mps)
         in_the_way, chosen_mps = self._moving.limits(
-            watched, placed, course, enters, s_m, motion, base_mps, now_s
+            watched, placed, velocities, enters, s_m, motion, base_mps, now_s
         )
         found += in_the_way
         if self._remembered.any():
             # A body out of view that approaches the path may be nearer to it than expected.
-            unsure_mps = UNSEEN_SIGMAS * course.sigma_left_mps
-            inwards = -np.sign(placed.d_m[:, 0]) * course.left_mps > unsure_mps
-            nearer = comes_in(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
+            unsure_mps = UNSEEN_ERROR_SIGMAS * velocities.sigma_left_mps
+            inwards = -np.sign(placed.d_m[:, 0]) * velocities.left_mps > unsure_mps
+            nearer = likely_enters(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
             enters |= self._remembered & inwards & nearer
         worst = self._worst_case.limit(
-            watched, placed, course, enters, s_m, motion, known.since_s, chosen_mps
+            watched, placed, velocities, enters, s_m, motion, known.since_s, chosen_mps
         )
         if worst is not None:
             found.append(worst)
@@ -161,7 +161,7 @@ class SpeedLimits:
             required_m, margin_m = limit.reason.required_m, limit.reason.margin_m
             return Reason(
                 "unseen",
-                beyond + allowed(limit.speed_mps),
+                beyond + allowed_text(limit.speed_mps),
                 distance_m=gap.distance_m,
                 required_m=required_m,
                 margin_m=margin_m,
@@ -181,7 +181,7 @@ class SpeedLimits:
 
         def why() -> Reason:
             sentence = f"a blind corner {ahead_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
-            return Reason("corner", sentence + allowed(speed), distance_m=ahead_m)
+            return Reason("corner", sentence + allowed_text(speed), distance_m=ahead_m)
 
         return [Limit(speed, why)]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.limits import LEAVES_ASLANT
+from controller.decision.limits import ALONG_TO_SIDE_RATIO
 from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose
 
@@ -67,13 +67,13 @@ def may_enter_way(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     """(N,) which bodies may come into the robot's way.
 
     That is, they move towards the robot's axis from either side, or along with the robot (more than
-    LEAVES_ASLANT times as fast forward as sideways), from where one may cut in.
+    ALONG_TO_SIDE_RATIO times as fast forward as sideways), from where one may cut in.
     """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     left = (bodies.xy_m[:, 1] - pose.y_m) * cos - (bodies.xy_m[:, 0] - pose.x_m) * sin
     leftward = bodies.velocity_mps[:, 1] * cos - bodies.velocity_mps[:, 0] * sin
     forward = bodies.velocity_mps[:, 0] * cos + bodies.velocity_mps[:, 1] * sin
-    comes: BoolArray = (left * leftward < 0.0) | (forward > LEAVES_ASLANT * np.abs(leftward))
+    comes: BoolArray = (left * leftward < 0.0) | (forward > ALONG_TO_SIDE_RATIO * np.abs(leftward))
     return comes
 
 

@@ -22,7 +22,7 @@ from controller import braking
 from controller.build import build_path, mount_of, path_spec
 from controller.decision.bodies import no_bodies
 from controller.decision.corridor import Corridor
-from controller.decision.limits import starts_at_mps
+from controller.decision.limits import min_start_mps
 from controller.decision.sight import Sight
 from controller.decision.surfaces import NO_SURFACES
 from controller.path.path import Path
@@ -159,7 +159,7 @@ def _stands_at(
         np.full(_BANDS, math.inf),
         np.full(_BANDS, view.range_m),
     )
-    go_mps = starts_at_mps(decision.release, braking.comfort(robot.limits))
+    go_mps = min_start_mps(decision.release, braking.comfort(robot.limits))
     # Longer from step to step than floor is remembered, so that of the floor out of view only that right
     # ahead is still known, as after a stop.
     step_ns = round((decision.sight.memory_s + 1.0) * NS_PER_S)

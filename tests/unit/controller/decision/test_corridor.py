@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.robot import Body
-from controller.decision.corridor import Corridor, course_of, place
+from controller.decision.corridor import Corridor, path_velocities, place
 from tests.support.bodies import arc_path, box, line_path
 
 BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)
@@ -68,6 +68,6 @@ def test_velocity_along_and_across_the_path() -> None:
     body = box(4.0, 4.0, -0.3, -1.0, sigma_mps=0.2)
     # At the end of the quarter turn the path leads to +y; its left is -x.
     heading = place(body, corridor, np.zeros(1), 3.0, 12.0).heading_rad[:, 0]
-    course = course_of(body, heading)
-    assert (course.along_mps[0], course.left_mps[0]) == pytest.approx((-1.0, 0.3), abs=1e-6)
-    assert (course.sigma_along_mps[0], course.sigma_left_mps[0]) == pytest.approx((0.2, 0.2))
+    velocities = path_velocities(body, heading)
+    assert (velocities.along_mps[0], velocities.left_mps[0]) == pytest.approx((-1.0, 0.3), abs=1e-6)
+    assert (velocities.sigma_along_mps[0], velocities.sigma_left_mps[0]) == pytest.approx((0.2, 0.2))
