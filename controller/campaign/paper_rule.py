@@ -61,5 +61,8 @@ class PaperRule:
             return []
         placed = place(bodies, corridor, np.zeros(1), s_m, _LOOK_M)
         along = path_velocities(bodies, placed.heading_rad[:, 0]).along_mps
-        rows = np.flatnonzero((placed.clear_m[:, 0] <= 0.0) & (placed.hi_m[:, 0] > s_m))
-        return [(float(placed.lo_m[k, 0]) - s_m, -float(along[k]) if bodies.moving[k] else 0.0) for k in rows]
+        rows = np.flatnonzero((placed.clearance_m[:, 0] <= 0.0) & (placed.block_to_s_m[:, 0] > s_m))
+        return [
+            (float(placed.block_from_s_m[k, 0]) - s_m, -float(along[k]) if bodies.moving[k] else 0.0)
+            for k in rows
+        ]

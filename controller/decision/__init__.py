@@ -39,5 +39,5 @@ Words of this folder:
 * Surprise: by how much the newest velocity differs from the average beyond noise.
 * Unsure: uncertainty of the position of a body out of view.
 * Limit: a speed not to be exceeded now. Urgent: comfortable braking no longer suffices.
-* Clear: free floor between a body and the corridor (clear_m). Margin: a distance that is kept.
+* Clear: free floor between a body and the corridor (clearance_m). Margin: a distance that is kept.
 """

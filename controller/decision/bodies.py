@@ -162,7 +162,6 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     said = np.array([(one.age_s, one.unseen_s, one.moving) for one in scene.obstacles], np.float64)
     age_s, unseen_s, moving = said[:, 0], said[:, 1], said[:, 2] > 0.0
     camera = camera_in_body(mount)
-    # Taking rows by index is quicker than unpacking an array.
     impossible, on_floor, covariance, sizes = _boxes(
         measured,
         age_s,
@@ -177,19 +176,21 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     )
     if impossible >= 0:
         raise SceneError(_complaint(scene.obstacles[impossible].id, measured[impossible]))
+    xy_m, measured_mps, velocity_mps, innovation_mps = on_floor
+    half_view_m, half_across_m, view_rad, top_m, bottom_m = sizes
     return Bodies(
         captured_ns=scene.captured_ns,
         ids=np.array([one.id for one in scene.obstacles], np.int64),
-        xy_m=on_floor[0],
-        velocity_mps=on_floor[2],
-        measured_mps=on_floor[1],
-        innovation_mps=on_floor[3],
+        xy_m=xy_m,
+        velocity_mps=velocity_mps,
+        measured_mps=measured_mps,
+        innovation_mps=innovation_mps,
         covariance=covariance,
-        half_view_m=sizes[0],
-        half_across_m=sizes[1],
-        view_rad=sizes[2],
-        top_m=sizes[3],
-        bottom_m=sizes[4],
+        half_view_m=half_view_m,
+        half_across_m=half_across_m,
+        view_rad=view_rad,
+        top_m=top_m,
+        bottom_m=bottom_m,
         moving=moving,
         age_s=age_s,
         unseen_s=unseen_s,

@@ -38,7 +38,7 @@ from vision.scene import CameraCondition
 __all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
 
 # Emergency braking goes on until the speed exceeds what is allowed by no more than this.
-_OVER_COMFORT_MPS = 0.05
+_EMERGENCY_EXIT_MPS = 0.05
 # The shaper brakes for the target point exactly; this slack keeps the limit from braking earlier than it.
 _END_SLACK_M = 0.02
 _AT_END_M = 0.02  # the robot is at its target
@@ -197,13 +197,13 @@ class DecisionMaker:
         watched: Reason | None = None
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
-            self._last = watched = _in_words(least, raw_mps)
+            self._last = watched = _reason_for(least, raw_mps)
         gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
         target_mps = min(gated_mps, on_way.speed_mps)
         if on_way.speed_mps <= gated_mps:
             reason = on_way.reason
         else:
-            reason = self._reason(watched or _in_words(least, raw_mps), raw_mps, gated_mps)
+            reason = self._reason(watched or _reason_for(least, raw_mps), raw_mps, gated_mps)
         self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         action = self._action(target_mps, motion.v_mps)
@@ -257,7 +257,7 @@ class DecisionMaker:
         """
         if motion.v_mps <= STANDING_MPS:
             return False
-        if self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS:
+        if self._emergency and motion.v_mps > allowed_mps + _EMERGENCY_EXIT_MPS:
             return True
         return any(limit.urgent for limit in limits)
 
@@ -287,7 +287,7 @@ def _unknown(on_floor: float, along: float) -> str:
     return "how fast the robot is is not known"
 
 
-def _in_words(limit: Limit, speed_mps: float) -> Reason:
+def _reason_for(limit: Limit, speed_mps: float) -> Reason:
     """The limit's reason, if speed_mps is what remains of the limit."""
     reason = limit.reason
     if speed_mps < limit.speed_mps:

@@ -89,8 +89,9 @@ class MovingLimits:
         standing = motion.v_mps <= STANDING_MPS
         behind_m = math.inf if standing else ALONGSIDE_M
         if standing:
-            passes = placed.lo_m[:, 0] - s_m <= np.maximum(-velocities.along_mps, 0.0) * _WAIT_FOR_PASSING_S
-            enters = enters | (passes & (placed.clear_m[:, 0] <= self._config.margins.lateral_m))
+            gap_m = placed.block_from_s_m[:, 0] - s_m
+            passes = gap_m <= np.maximum(-velocities.along_mps, 0.0) * _WAIT_FOR_PASSING_S
+            enters = enters | (passes & (placed.clearance_m[:, 0] <= self._config.margins.lateral_m))
         rows = (bodies.moving & ahead & enters).nonzero()[0]
         if not len(rows):
             self.forget()
@@ -166,7 +167,7 @@ class MovingLimits:
         elif along_mps > -_DRIVES_AHEAD_MPS:
             rule, what = "crossing", "is on the path"
         gap = Gap(
-            float(placed.lo_m[conflict.row, 0]) - s_m,
+            float(placed.block_from_s_m[conflict.row, 0]) - s_m,
             closing_mps=-along_mps,
             leader_stop_m=leader_stop_m,
             obstacle_id=int(bodies.ids[conflict.row]),

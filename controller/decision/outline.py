@@ -31,11 +31,11 @@ _BEHIND_M = 0.15
 class Outline:
     """What depth shows of one body.
 
-    clear_m: free floor between the visible part of the body and the corridor; negative: inside it; inf:
+    clearance_m: free floor between the visible part of the body and the corridor; negative: inside it; inf:
     nothing of it is visible. whole: the body is visible from end to end.
     """
 
-    clear_m: float
+    clearance_m: float
     whole: bool
 
 

@@ -33,12 +33,12 @@ class Reach:
     """What N bodies could block at K times; each (N, K).
 
     inside: whether the body could be in the corridor.
-    lo_m, hi_m: it could block the robot's positions between these.
+    block_from_s_m, block_to_s_m: it could block the robot's positions between these.
     """
 
     inside: NDArray[np.bool_]
-    lo_m: FloatArray
-    hi_m: FloatArray
+    block_from_s_m: FloatArray
+    block_to_s_m: FloatArray
 
 
 def reach(
@@ -69,9 +69,9 @@ def reach(
     uncertain_along, uncertain_across = position_uncertainty_m or (certain, certain)
     return Reach(
         *_grown(
-            placed.clear_m,
-            placed.lo_m,
-            placed.hi_m,
+            placed.clearance_m,
+            placed.block_from_s_m,
+            placed.block_to_s_m,
             times_s,
             since_s,
             spread_mps[0],
@@ -107,13 +107,17 @@ def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
 
     Negative where the robot could touch something; inf where nothing is in the way.
     """
-    return _min_room(stopping.distance_m, stopping.moves, s_m, reached.inside, reached.lo_m, reached.hi_m)
+    return _min_room(
+        stopping.distance_m, stopping.moves, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m
+    )
 
 
 def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:
     """How many of the stops, from the first one on, stay short of all bodies in the mask counts (N,)."""
     moves = stopping.moves
-    return _first_too_far(stopping.distance_m, moves, s_m, reached.inside, reached.lo_m, reached.hi_m, counts)
+    return _first_too_far(
+        stopping.distance_m, moves, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m, counts
+    )
 
 
 def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
@@ -124,7 +128,7 @@ def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
 def passes_clear(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:
     """Whether the robot stays clear of all that could be blocked, at all times, along a single ramp."""
     way_m = ramp.distance(times_s[None, :])[0]
-    return _passes_clear(way_m, s_m, reached.inside, reached.lo_m, reached.hi_m)
+    return _passes_clear(way_m, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m)
 
 
 @compiled(
@@ -132,9 +136,9 @@ def passes_clear(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Rea
     "float64[:], float64[:], float64[:], float64[:], float64, float64, boolean[:]"
 )
 def _grown(
-    clear_m: FloatArray,
-    lo_m: FloatArray,
-    hi_m: FloatArray,
+    clearance_m: FloatArray,
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
     times_s: FloatArray,
     since_s: FloatArray,
     spread_along_mps: FloatArray,
@@ -158,22 +162,27 @@ def _grown(
             t = times_s[j] + since_s[k]
             furthest = (max_mps + speed_mps[k]) * t
             across = min(spread_across_mps[k] * t + 0.5 * change_across_mps2[k] * t * t, furthest)
-            if counts[k] and clear_m[k, j] - (uncertain_across_m[k] + across) <= 0.0:
+            if counts[k] and clearance_m[k, j] - (uncertain_across_m[k] + across) <= 0.0:
                 along = min(spread_along_mps[k] * t + 0.5 * change_along_mps2[k] * t * t, furthest)
                 along += uncertain_along_m[k]
                 was_inside = True
-                lowest = min(lowest, lo_m[k, j] - along - margin_m)
-                highest = max(highest, hi_m[k, j] + along)
+                lowest = min(lowest, block_from_s_m[k, j] - along - margin_m)
+                highest = max(highest, block_to_s_m[k, j] + along)
             inside[k, j], lo[k, j], hi[k, j] = was_inside, lowest, highest
     return inside, lo, hi
 
 
 @inlined
 def _room(
-    at_m: float, j: int, inside: NDArray[np.bool_], lo_m: FloatArray, hi_m: FloatArray, k: int
+    at_m: float,
+    j: int,
+    inside: NDArray[np.bool_],
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
+    k: int,
 ) -> float:
     """Distance from at_m to what body k could block at time j; inf: it blocks nothing ahead of at_m."""
-    return float(lo_m[k, j] - at_m) if inside[k, j] and at_m < hi_m[k, j] else math.inf
+    return float(block_from_s_m[k, j] - at_m) if inside[k, j] and at_m < block_to_s_m[k, j] else math.inf
 
 
 @compiled("float64[:, :], boolean[:, :], float64, boolean[:, :], float64[:, :], float64[:, :]")
@@ -182,8 +191,8 @@ def _min_room(
     moves: NDArray[np.bool_],
     s_m: float,
     inside: NDArray[np.bool_],
-    lo_m: FloatArray,
-    hi_m: FloatArray,
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
 ) -> FloatArray:
     """room() in arrays: (R,) for R stops, K times and N bodies."""
     least = np.full(len(distance_m), math.inf)
@@ -192,7 +201,8 @@ def _min_room(
             if not moves[i, j]:
                 continue
             for k in range(len(inside)):
-                least[i] = min(least[i], _room(s_m + distance_m[i, j], j, inside, lo_m, hi_m, k))
+                room_m = _room(s_m + distance_m[i, j], j, inside, block_from_s_m, block_to_s_m, k)
+                least[i] = min(least[i], room_m)
     return least
 
 
@@ -202,8 +212,8 @@ def _first_too_far(
     moves: NDArray[np.bool_],
     s_m: float,
     inside: NDArray[np.bool_],
-    lo_m: FloatArray,
-    hi_m: FloatArray,
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
     counts: NDArray[np.bool_],
 ) -> int:
     """Index of the first of R stops that does not stay short of the bodies in counts (N,); R: none."""
@@ -212,7 +222,8 @@ def _first_too_far(
             if not moves[i, j]:
                 continue
             for k in range(len(inside)):
-                if counts[k] and _room(s_m + distance_m[i, j], j, inside, lo_m, hi_m, k) < 0.0:
+                room_m = _room(s_m + distance_m[i, j], j, inside, block_from_s_m, block_to_s_m, k)
+                if counts[k] and room_m < 0.0:
                     return i
     return len(distance_m)
 
@@ -232,10 +243,14 @@ def _last_stop_before_entry(moves: NDArray[np.bool_], inside: NDArray[np.bool_])
 
 @compiled("float64[:], float64, boolean[:, :], float64[:, :], float64[:, :]")
 def _passes_clear(
-    way_m: FloatArray, s_m: float, inside: NDArray[np.bool_], lo_m: FloatArray, hi_m: FloatArray
+    way_m: FloatArray,
+    s_m: float,
+    inside: NDArray[np.bool_],
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
 ) -> bool:
     for k in range(len(inside)):
         for j in range(len(way_m)):
-            if inside[k, j] and lo_m[k, j] < s_m + way_m[j] < hi_m[k, j]:
+            if inside[k, j] and block_from_s_m[k, j] < s_m + way_m[j] < block_to_s_m[k, j]:
                 return False
     return True

@@ -48,7 +48,7 @@ _NONE = np.zeros(0, np.bool_)
 _SAME_SURFACE_M = 0.8
 # A body must head for the corridor for this long until it counts as coming in, and head elsewhere for as long
 # until it does not. Meanwhile the worst case covers it.
-_SETTLES_S = 0.3
+_DEBOUNCE_S = 0.3
 
 
 class SpeedLimits:
@@ -63,8 +63,8 @@ class SpeedLimits:
         self._inside: set[int] = set()
         self._standing = StandingLimits(config, limits, mount, self._inside)
         self._moving = MovingLimits(config, limits, self._times_s, self._inside)
-        self._enters = Debounced(_SETTLES_S)
-        self._of: Bodies | None = None
+        self._enters = Debounced(_DEBOUNCE_S)
+        self._taken_from: Bodies | None = None
         self._watched = no_bodies(0)
         self._remembered = _NONE
 
@@ -75,7 +75,7 @@ class SpeedLimits:
 
         base_mps: what path and camera allow.
         """
-        if known.bodies is not self._of:
+        if known.bodies is not self._taken_from:
             self._take_in(known)
         found = self._depth(known, s_m, motion)
         found += self._standing.limits(known, s_m, motion)
@@ -91,7 +91,7 @@ class SpeedLimits:
         comes = likely_enters(placed, self._times_s, sigma_left)
         # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
         # there is no noise.
-        at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
+        at_once = np.where(comes, placed.clearance_m[:, 0] <= 0.0, self._remembered)
         enters = self._enters.update(watched.ids, comes, at_once, now_s)
         for limit in found:
             base_mps = min(base_mps, limit.speed_mps)
@@ -114,7 +114,7 @@ class SpeedLimits:
 
     def _take_in(self, known: WorldModel) -> None:
         """Once a scene: select the watched bodies, and forget those that are gone."""
-        self._of = bodies = known.bodies
+        self._taken_from = bodies = known.bodies
         watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
         self._watched = bodies.select(watched)
         self._remembered = known.remembered[watched] if len(self._watched) else _NONE

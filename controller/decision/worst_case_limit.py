@@ -102,12 +102,12 @@ class WorstCase:
         robot that is already slowing down to a safe chosen_mps: then it has to brake harder.
         """
         position_uncertainty_m = UNSEEN_ERROR_SIGMAS * velocities.sigma_along_mps * bodies.unseen_s
-        rows = placed.lo_m[:, 0] + position_uncertainty_m > s_m - ALONGSIDE_M
+        rows = placed.block_from_s_m[:, 0] + position_uncertainty_m > s_m - ALONGSIDE_M
         if not np.count_nonzero(rows):
             return None
         reached = self._reach(bodies, placed, velocities, since_s, rows)
         self._prepare(motion.latency_s)
-        if min(reached.lo_m[:, -1].tolist()) > s_m + self._furthest_m:
+        if min(reached.block_from_s_m[:, -1].tolist()) > s_m + self._furthest_m:
             return None
         young = bodies.age_s < self._config.prediction.confirm_s
         speed = self._speed(reached, young, enters, s_m)
@@ -123,9 +123,9 @@ class WorstCase:
             if not urgent and motion.v_mps <= speed + _TOLERATED_EXCESS_MPS:
                 # An emergency stop is still in time. Braking for each small fluctuation would only cost time.
                 speed = motion.v_mps
-        row = int(np.where(rows, placed.lo_m[:, 0], math.inf).argmin())
+        row = int(np.where(rows, placed.block_from_s_m[:, 0], math.inf).argmin())
         track_id = int(bodies.ids[row])
-        gap_m = float(placed.lo_m[row, 0]) - s_m
+        gap_m = float(placed.block_from_s_m[row, 0]) - s_m
 
         def why() -> Reason:
             ahead = f"obstacle {track_id}, {max(gap_m, 0.0):.1f} m ahead"
@@ -194,7 +194,7 @@ class WorstCase:
             velocities.innovation_along_mps,
             velocities.innovation_left_mps,
             placed.d_m[:, 0],
-            placed.clear_m[:, 0],
+            placed.clearance_m[:, 0],
             bodies.moving,
             bodies.age_s,
             bodies.unseen_s,
@@ -244,7 +244,7 @@ def _may_do(
     innovation_along_mps: FloatArray,
     innovation_left_mps: FloatArray,
     d_m: FloatArray,
-    clear_m: FloatArray,
+    clearance_m: FloatArray,
     moving: NDArray[np.bool_],
     age_s: FloatArray,
     unseen_s: FloatArray,
@@ -268,7 +268,7 @@ def _may_do(
         # long. comes: comes towards the robot, sees it after a while and keeps its lane. leaves: moves away
         # from the path. All but comes and leaves may have changed their velocity since they left the view.
         aslant_mps = max(abs(left_mps[k]), _MIN_SIDEWAYS_MPS)
-        outwards, beside = left_mps[k] * d_m[k] > 0.0, clear_m[k] > 0.0
+        outwards, beside = left_mps[k] * d_m[k] > 0.0, clearance_m[k] > 0.0
         unaware = along_mps[k] > (along_to_side_ratio if outwards else 1.0) * aslant_mps
         comes = along_mps[k] < -aslant_mps
         leaves = outwards and beside and not unaware

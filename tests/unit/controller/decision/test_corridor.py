@@ -42,9 +42,9 @@ def test_a_standing_body_blocks_the_robot_from_front_to_tail() -> None:
     placed = place(box(8.0, 0.9), corridor, np.array([0.0, 4.0]), 0.0, 12.0)
     assert placed.s_m.tolist() == [pytest.approx([8.0, 8.0])]
     assert placed.d_m[0, 0] == pytest.approx(0.9)
-    assert placed.lo_m[0, 0] == pytest.approx(8.0 - 0.2 - 0.5)
-    assert placed.hi_m[0, 0] == pytest.approx(8.0 + 0.2 + 0.5)
-    assert placed.clear_m[0, 0] == pytest.approx(0.9 - 0.25 - 0.4)
+    assert placed.block_from_s_m[0, 0] == pytest.approx(8.0 - 0.2 - 0.5)
+    assert placed.block_to_s_m[0, 0] == pytest.approx(8.0 + 0.2 + 0.5)
+    assert placed.clearance_m[0, 0] == pytest.approx(0.9 - 0.25 - 0.4)
 
 
 def test_a_moving_body_is_followed_in_time() -> None:
@@ -60,7 +60,7 @@ def test_a_body_beside_a_bend_is_turned_against_the_path() -> None:
     placed = place(box(4.0, 4.0, half_view_m=0.1, half_across_m=0.6), corridor, np.zeros(1), 3.0, 12.0)
     assert placed.s_m[0, 0] == pytest.approx(2.0 * math.pi)
     assert placed.half_s_m[0, 0] == pytest.approx(0.6, abs=1e-6)
-    assert placed.clear_m[0, 0] == pytest.approx(-0.1 - corridor.half_width(placed.s_m)[0, 0], abs=1e-6)
+    assert placed.clearance_m[0, 0] == pytest.approx(-0.1 - corridor.half_width(placed.s_m)[0, 0], abs=1e-6)
 
 
 def test_velocity_along_and_across_the_path() -> None:

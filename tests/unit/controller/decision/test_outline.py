@@ -57,7 +57,7 @@ def test_the_side_that_is_seen_decides() -> None:
     """The box's corner would be 0.176 m from the corridor."""
     found = outline(CORNER_ON, 45.0)
     assert found.whole
-    assert found.clear_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
+    assert found.clearance_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
 
 
 def test_behind_a_flat_face_the_body_goes_on() -> None:
@@ -65,14 +65,14 @@ def test_behind_a_flat_face_the_body_goes_on() -> None:
     the body may end."""
     behind_m = 0.3 * math.sin(math.radians(45.0))
     flat = np.array([NEAR_X_M - behind_m, NEAR_Y_M + behind_m]) + EDGE * [1.0, 1.0]
-    assert outline(flat, -45.0).clear_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
+    assert outline(flat, -45.0).clearance_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
 
 
 def test_an_outline_with_a_gap_is_not_whole() -> None:
     assert not outline(np.concatenate((CORNER_ON[:10], CORNER_ON[16:])), 45.0).whole
     front = outline(CORNER_ON[:12], 45.0)
     assert not front.whole
-    assert front.clear_m == pytest.approx(CORNER_ON[11, 1] - 0.4 - HALF_BAND_M)
+    assert front.clearance_m == pytest.approx(CORNER_ON[11, 1] - 0.4 - HALF_BAND_M)
     assert outline(CORNER_ON[:0], 45.0) == Outline(math.inf, whole=False)
     assert outline(np.add(CORNER_ON, (0.0, 1.5)), 45.0) == Outline(math.inf, whole=False)
 

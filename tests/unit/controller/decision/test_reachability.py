@@ -53,7 +53,7 @@ def test_a_crosser_may_stop_dead_in_the_way() -> None:
     worst = reached(box(5.0, 2.0, 0.0, -1.0))
     assert not worst.inside[0, 13]
     assert worst.inside[0, 14:].all()
-    assert worst.lo_m[0, -1] == pytest.approx(5.0 - 0.2 - 0.5 - 0.2)
+    assert worst.block_from_s_m[0, -1] == pytest.approx(5.0 - 0.2 - 0.5 - 0.2)
 
 
 def test_it_may_manoeuvre_into_the_way() -> None:
@@ -62,7 +62,7 @@ def test_it_may_manoeuvre_into_the_way() -> None:
     assert not worst.inside[0, 19]
     assert worst.inside[0, 21]
     # It may also have come nearer by as much.
-    assert worst.lo_m[0, 21] == pytest.approx(4.1 - 0.25 * 2.1**2 + 0.01 * 2.1, abs=0.01)
+    assert worst.block_from_s_m[0, 21] == pytest.approx(4.1 - 0.25 * 2.1**2 + 0.01 * 2.1, abs=0.01)
 
 
 def test_it_does_not_become_faster_than_obstacles_are() -> None:
@@ -84,8 +84,8 @@ def test_how_well_its_place_was_known_counts_from_the_first_moment() -> None:
 
     assert not unsure(0.0, 0.9).inside.any()
     assert unsure(0.0, 1.1).inside.all()
-    assert unsure(0.5, 1.1).lo_m[0, 0] == pytest.approx(unsure(0.0, 1.1).lo_m[0, 0] - 0.5)
-    assert unsure(0.5, 1.1).hi_m[0, -1] == pytest.approx(unsure(0.0, 1.1).hi_m[0, -1] + 0.5)
+    assert unsure(0.5, 1.1).block_from_s_m[0, 0] == pytest.approx(unsure(0.0, 1.1).block_from_s_m[0, 0] - 0.5)
+    assert unsure(0.5, 1.1).block_to_s_m[0, -1] == pytest.approx(unsure(0.0, 1.1).block_to_s_m[0, -1] + 0.5)
 
 
 def test_the_age_of_the_scene_counts() -> None:

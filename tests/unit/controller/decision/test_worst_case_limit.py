@@ -35,7 +35,7 @@ def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:
     config = DecisionConfig(prediction=Prediction(confirm_s=confirm_s))
     worst = WorstCase(config, LIMITS)
     body = box(0.0, 0.0, age_s=age_s, sigma_mps=0.0)
-    at_zero_m = place(body, CORRIDOR, np.zeros(1), 0.0, 12.0).lo_m[0, 0]
+    at_zero_m = place(body, CORRIDOR, np.zeros(1), 0.0, 12.0).block_from_s_m[0, 0]
     body = box(lo_m - at_zero_m, 0.0, age_s=age_s, sigma_mps=0.0)
     return asked(worst, body, LIMITS.max_speed_mps)
 
