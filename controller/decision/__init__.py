@@ -30,14 +30,14 @@ The files in the order of one control step:
 
 Words of this folder:
 
-* Bodies: obstacles as boxes. Young: seen for less than confirm_s. Settled: seen for 0.5 s or more.
+* Bodies: obstacles as boxes. Young: seen for less than confirm_s. Tracked: for MIN_TRACKED_S or more.
 * Remembered: a body out of view that still counts. Boxed: counts as a box; the others as surfaces only.
 * Corridor, swept width: the floor that the robot sweeps along its path. Path coordinates: s_m, d_m.
 * Surface: a point that depth sees. Explained: it belongs to a body. Band: one bearing of the scan.
-* Known: the floor was seen free. By consent: floor below the view at the start, taken as free unseen.
+* Known: the floor was seen free. Assumed free: floor below the view at the start, taken as free unseen.
 * Enters: is in the corridor or is likely to come into it. Conflict: the time and place of that.
-* Surprise: by how much the newest velocity differs from the average beyond noise.
-* Unsure: uncertainty of the position of a body out of view.
+* Innovation: by how much the newest velocity differs from the average beyond noise, counted twice.
+* Position uncertainty: of a body out of view; it grows until the body is seen again.
 * Limit: a speed not to be exceeded now. Urgent: comfortable braking no longer suffices.
-* Clear: free floor between a body and the corridor (clearance_m). Margin: a distance that is kept.
+* Clearance: free floor between a body and the corridor (clearance_m). Margin: a distance that is kept.
 """

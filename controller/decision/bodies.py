@@ -199,14 +199,12 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
 
 
 def _complaint(track_id: int, measured: FloatArray) -> str:
-    position, extent, velocity = (measured[part].tolist() for part in (_POSITION, _EXTENT, _VELOCITY))
-    return (
-        f"obstacle {track_id} is impossible: position {_list(position)} m, size {_list(extent)} m, "
-        f"velocity {_list(velocity)} m/s"
-    )
+    position, extent, velocity = (_list(measured[part]) for part in (_POSITION, _EXTENT, _VELOCITY))
+    values = f"position {position} m, size {extent} m, velocity {velocity} m/s"
+    return f"obstacle {track_id} is impossible: {values}"
 
 
-def _list(values: list[float]) -> str:
+def _list(values: FloatArray) -> str:
     return "(" + ", ".join(f"{value:.2f}" for value in values) + ")"
 
 

@@ -40,7 +40,7 @@ from controller.decision.unseen_motion import (
     velocities_agree,
     with_measured_velocity,
 )
-from controller.decision.view_edges import beyond_edges, out_of_view
+from controller.decision.view_edges import ViewEdges, beyond_edges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -69,13 +69,11 @@ _STRIP_REACH_M = 0.5
 class OutOfView:
     """The bodies out of view; call mark_leaving_movers, then update, once a scene.
 
-    near_m: distance ahead of the camera from which the floor is in view. up_tan: slope of the view's upper
-    edge. Set both before the calls if the scene tells them. max_obstacle_speed_mps: measured speeds that are
-    far above it (IMPLAUSIBLE times) are mistakes.
+    max_obstacle_speed_mps: measured speeds that are far above it (IMPLAUSIBLE times) are mistakes.
     """
 
-    def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
-        self._mount, self.near_m, self.up_tan = mount, near_m, math.inf
+    def __init__(self, mount: CameraMount, max_obstacle_speed_mps: float) -> None:
+        self._mount = mount
         self._mistaken_mps = IMPLAUSIBLE * max_obstacle_speed_mps
         self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
@@ -84,7 +82,7 @@ class OutOfView:
         self._approach_velocity: dict[int, FloatArray] = {}
         self._widest_of, self._widest_half_m = np.zeros(0, np.int64), np.zeros(0)
 
-    def mark_leaving_movers(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
+    def mark_leaving_movers(self, seen: Bodies, pose: PlanarPose, edges: ViewEdges) -> Bodies:
         """The seen bodies, of which some that are judged standing are made moving.
 
         These are the ones that approached the robot's axis when last seen, which perception now only predicts
@@ -105,7 +103,7 @@ class OutOfView:
             ids[k]: before[ids[k]] for k in np.flatnonzero(out).tolist() if ids[k] in before
         }
         came = np.array([one in self._approach_velocity for one in ids], np.bool_)
-        leaves = out & came & self._outside_view(seen, pose, edge_tan)
+        leaves = out & came & self._outside_view(seen, pose, edges)
         if not leaves.any():
             return seen
         velocity = seen.velocity_mps.copy()
@@ -117,7 +115,7 @@ class OutOfView:
         before: Bodies,
         seen: Bodies,
         pose: PlanarPose,
-        edge_tan: float,
+        edges: ViewEdges,
         standing: bool,
         free: FreeSpace,
     ) -> Bodies:
@@ -128,39 +126,55 @@ class OutOfView:
         one that was part of a body that is still seen.
         """
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
-        bodies, since = self._bodies, self._since_s + dt_s
-        missing = _missing(before.ids, seen.ids)
-        if np.count_nonzero(missing):
-            gone = with_measured_velocity(before.select(missing), self._mistaken_mps)
-            gone = gone.select(gone.moving | ((gone.age_s >= MIN_TRACKED_S) & (not standing)))
-            bodies, since = bodies.joined(gone), np.concatenate((since, np.full(len(gone), dt_s)))
+        bodies, since_s = self._with_missing(before, seen, dt_s, standing)
         if not len(bodies):
             self._seen_through.forget()
             return no_bodies(seen.captured_ns)
         some_move = np.count_nonzero(bodies.moving) > 0
         xy_m = self._extrapolated(bodies, dt_s, pose) if some_move else bodies.xy_m
         bodies = bodies.moved_to(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
-        part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
-        kept = self._outside_view(bodies, pose, edge_tan)
-        if some_move:
-            part_of &= velocities_agree(bodies, seen) | ~bodies.moving[:, None]
-            kept &= ~bodies.moving | (
-                since <= np.where(may_enter_way(bodies, pose), _MAY_ENTER_KEPT_S, _MOVING_KEPT_S)
-            )
-        kept = _still_kept(kept, part_of, bodies.ids, seen.ids)
-        if some_move:
-            kept &= ~_leftover_strips(bodies, kept)
+        kept = self._still_out_of_view(bodies, since_s, seen, pose, edges)
         if standing:
-            edges = edge_tan, self.near_m, self.up_tan
-            kept &= ~self._seen_through.seen_empty(bodies, pose, *edges, free)
+            kept &= ~self._seen_through.seen_empty(bodies, pose, edges, free)
         else:
             self._seen_through.forget()
         if np.count_nonzero(kept) < len(kept):
-            since, bodies = since[kept], bodies.select(kept)
-        self._since_s, self._bodies = since, bodies
-        if some_move:
-            self._bodies = self._pushed_out_of_view(self._bodies, pose, free)
+            since_s, bodies = since_s[kept], bodies.select(kept)
+        self._since_s = since_s
+        self._bodies = self._pushed_out_of_view(bodies, pose, edges, free) if some_move else bodies
         return self._bodies
+
+    def _with_missing(
+        self, before: Bodies, seen: Bodies, dt_s: float, standing: bool
+    ) -> tuple[Bodies, FloatArray]:
+        """The bodies kept so far, then those of before that are missing in seen; and since when, in seconds.
+
+        The latter move, or have stood long enough to be believed and vanished while the robot drove.
+        """
+        bodies, since_s = self._bodies, self._since_s + dt_s
+        missing = _missing(before.ids, seen.ids)
+        if not np.count_nonzero(missing):
+            return bodies, since_s
+        gone = with_measured_velocity(before.select(missing), self._mistaken_mps)
+        gone = gone.select(gone.moving | ((gone.age_s >= MIN_TRACKED_S) & (not standing)))
+        return bodies.joined(gone), np.concatenate((since_s, np.full(len(gone), dt_s)))
+
+    def _still_out_of_view(
+        self, bodies: Bodies, since_s: FloatArray, seen: Bodies, pose: PlanarPose, edges: ViewEdges
+    ) -> BoolArray:
+        """(N,) which bodies, last seen since_s ago (N,), are outside the view and not part of a seen one.
+
+        Movers are kept for a limited time only.
+        """
+        part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
+        outside = self._outside_view(bodies, pose, edges)
+        if not np.count_nonzero(bodies.moving):
+            return _still_kept(outside, part_of, bodies.ids, seen.ids)
+        part_of &= velocities_agree(bodies, seen) | ~bodies.moving[:, None]
+        kept_s = np.where(may_enter_way(bodies, pose), _MAY_ENTER_KEPT_S, _MOVING_KEPT_S)
+        outside &= ~bodies.moving | (since_s <= kept_s)
+        kept = _still_kept(outside, part_of, bodies.ids, seen.ids)
+        return kept & ~_leftover_strips(bodies, kept)
 
     def _extrapolated(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:
         """(N, 2) the positions dt_s later at constant velocity.
@@ -182,7 +196,9 @@ class OutOfView:
         xy: FloatArray = bodies.xy_m + way + (side * past_m)[:, None] * leftward
         return xy
 
-    def _pushed_out_of_view(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
+    def _pushed_out_of_view(
+        self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges, free: FreeSpace
+    ) -> Bodies:
         """The bodies, with movers whose expected place is seen to be free moved outwards, out of the view.
 
         They are moved sideways to the edge of the free space, and a velocity towards the axis is replaced by
@@ -194,7 +210,7 @@ class OutOfView:
         offset = bodies.xy_m - (pose.x_m, pose.y_m)
         ahead, left = offset @ forward - self._mount.forward_m, offset @ leftward - self._mount.left_m
         near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
-        within = ~beyond_edges(bodies, near, self._mount.height_m, self.near_m, self.up_tan)
+        within = ~beyond_edges(bodies, near, self._mount.height_m, edges)
         side = np.where(left < 0.0, -1.0, 1.0)
         inner = side * left - bodies.half_across_m
         xy, velocity = bodies.xy_m.copy(), bodies.velocity_mps.copy()
@@ -215,13 +231,12 @@ class OutOfView:
             unseen_s[k] = 0.0
         return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
 
-    def _outside_view(self, bodies: Bodies, pose: PlanarPose, edge_tan: float) -> BoolArray:
+    def _outside_view(self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges) -> BoolArray:
         """(N,) which are beside, below or above the view, and not far behind the camera (out_of_view).
 
         The side edge has a tolerance for the uncertainty of the position, which grows for movers.
         """
-        edges = edge_tan, self.near_m, self.up_tan
-        return out_of_view(bodies, pose, self._mount, *edges, _EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS)
+        return out_of_view(bodies, pose, self._mount, edges, _EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS)
 
 
 def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: float) -> float:
@@ -262,11 +277,11 @@ def _missing(ids: IntArray, seen_ids: IntArray) -> BoolArray:
 
 
 @compiled("boolean[:], boolean[:, :], int64[:], int64[:]")
-def _still_kept(hidden: BoolArray, part_of: BoolArray, ids: IntArray, seen_ids: IntArray) -> BoolArray:
-    """(N,) which bodies are hidden, not among seen_ids (M,), and not part of a seen body: part_of (N, M)."""
+def _still_kept(outside: BoolArray, part_of: BoolArray, ids: IntArray, seen_ids: IntArray) -> BoolArray:
+    """(N,) which bodies are outside, not among seen_ids (M,), and not part of a seen body: part_of (N, M)."""
     kept = np.empty(len(ids), np.bool_)
     for k in range(len(ids)):
-        kept[k] = hidden[k] and not (seen_ids == ids[k]).any() and not part_of[k].any()
+        kept[k] = outside[k] and not (seen_ids == ids[k]).any() and not part_of[k].any()
     return kept
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.view_edges import beyond_edges
+from controller.decision.view_edges import ViewEdges, beyond_edges
 from hal.geometry import wrap_angle_rad
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -41,12 +41,9 @@ class SeenThrough:
         self._since_ns.clear()
 
     def seen_empty(
-        self, bodies: Bodies, pose: PlanarPose, edge_tan: float, near_m: float, up_tan: float, free: FreeSpace
+        self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges, free: FreeSpace
     ) -> NDArray[np.bool_]:
-        """(N,) which of the bodies are no longer there, for a robot that stands at pose. Call once a scene.
-
-        edge_tan, near_m, up_tan: the edges of the view (controller/decision/view_edges.py).
-        """
+        """(N,) which bodies are no longer there, for a robot that stands at pose. Call once a scene."""
         if not abs(wrap_angle_rad(pose.heading_rad - self._heading_rad)) <= _STANDS_RAD:
             self.forget()
             self._heading_rad = pose.heading_rad
@@ -57,8 +54,8 @@ class SeenThrough:
         right = self._mount.left_m - offset @ (-sin, cos)
         near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
         in_view = ~bodies.moving & (near > 0.0)
-        in_view &= ~beyond_edges(bodies, near, self._mount.height_m, near_m, up_tan)
-        in_view &= np.abs(right) + bodies.half_across_m <= edge_tan * near - _WELL_INSIDE_M
+        in_view &= ~beyond_edges(bodies, near, self._mount.height_m, edges)
+        in_view &= np.abs(right) + bodies.half_across_m <= edges.edge_tan * near - _WELL_INSIDE_M
         ids, since_ns = bodies.ids.tolist(), {}
         for k in in_view.nonzero()[0].tolist():
             edges_m = right[k] + np.array([-1.0, 1.0]) * bodies.half_across_m[k]

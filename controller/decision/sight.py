@@ -60,11 +60,11 @@ class Sight:
         # the consent of whoever starts the robot.
         self._near_m = self._floor_from_m = self._out_of_view_within_m = self._sight.near_m
         self._edges = math.nan, math.nan
-        self._consent_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
+        self._assumed_free_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = math.inf
         self.surface_s_m = math.inf
-        self.known_s_m = self._consent_s_m
+        self.known_s_m = self._assumed_free_s_m
         self.corners = BlindCorners(config.sight)
 
     def look(
@@ -128,7 +128,7 @@ class Sight:
         self._floor_from_m = max(self._sight.near_m, free.floor_from_m)
         near_m = assumed_free_m(self._sight.near_m, free.floor_from_m)
         if near_m > self._near_m:
-            self._consent_s_m += near_m - self._near_m
+            self._assumed_free_s_m += near_m - self._near_m
             self._near_m = near_m
         above_m = may_be_above_view_within_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
         if free.up_tan < MIN_TAN:  # the upper edge hardly rises: where things leave it is not known
@@ -177,7 +177,7 @@ class Sight:
         near_s_m = s_m + self._mount.forward_m + self._near_m + _CELL_M
         memory_ns = round(self._sight.memory_s * NS_PER_S)
         unknown = _first_unknown(
-            self._seen_ns, self._cells, first, captured_ns - memory_ns, near_s_m, self._consent_s_m
+            self._seen_ns, self._cells, first, captured_ns - memory_ns, near_s_m, self._assumed_free_s_m
         )
         known = unknown == len(self._cells)
         self.known_s_m = math.inf if known else float(self._cells[unknown]) - 0.5 * _CELL_M
@@ -251,15 +251,15 @@ def _first_unknown(
     first: int,
     since_ns: int,
     near_s_m: float,
-    consent_s_m: float,
+    assumed_free_s_m: float,
 ) -> int:
     """Index of the first unknown cell of the cells (C,) from first on; C if there is none.
 
     A cell is unknown if it was not seen since since_ns; up to near_s_m, if it was never seen; up to
-    consent_s_m, never.
+    assumed_free_s_m, never.
     """
     for c in range(first, len(cells_m)):
-        near, consent = cells_m[c] <= near_s_m, cells_m[c] <= consent_s_m
-        if not (seen_ns[c] >= since_ns or (near and seen_ns[c] > _NEVER_NS) or consent):
+        near, assumed = cells_m[c] <= near_s_m, cells_m[c] <= assumed_free_s_m
+        if not (seen_ns[c] >= since_ns or (near and seen_ns[c] > _NEVER_NS) or assumed):
             return c
     return len(cells_m)

@@ -148,13 +148,11 @@ class StandingLimits:
 
         Never less than the configured stop_m, even if a camera that looks down steeply would see it nearer.
         """
-        visible_m = visible_from_m(
-            bodies, placed.d_m[:, 0], known.edge_tan, known.near_m, self._mount.height_m, known.up_tan
-        )
+        visible_m = visible_from_m(bodies, placed.d_m[:, 0], self._mount.height_m, known.edges)
         front_m = known.corridor.front_m - self._mount.forward_m
         stop_m = self._config.margins.stop_m
         return _stop_distances(
-            visible_m, bodies.bottom_m, self._mount.height_m, front_m, stop_m, max(known.near_m, stop_m)
+            visible_m, bodies.bottom_m, self._mount.height_m, front_m, stop_m, max(known.edges.near_m, stop_m)
         )
 
     def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
@@ -28,6 +29,20 @@ _BEHIND_M = 2.0
 _MAX_ASSUMED_FREE_M = 2.5
 
 
+@record(frozen=True, slots=True)
+class ViewEdges:
+    """Where the camera's view ends.
+
+    edge_tan: tangent of the half angle of view, to either side.
+    near_m: distance ahead of the camera from which the floor is in view.
+    up_tan: slope of the upper edge; inf: not known, then nothing is above the view.
+    """
+
+    edge_tan: float
+    near_m: float
+    up_tan: float
+
+
 def assumed_free_m(near_m: float, floor_from_m: float) -> float:
     """How far ahead of the camera the floor is taken as free although it was never seen, in metres.
 
@@ -37,31 +52,26 @@ def assumed_free_m(near_m: float, floor_from_m: float) -> float:
     return max(near_m, min(floor_from_m, _MAX_ASSUMED_FREE_M))
 
 
-def beyond_edges(
-    bodies: Bodies, near_face_m: FloatArray, height_m: float, near_m: float, up_tan: float
-) -> BoolArray:
+def beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edges: ViewEdges) -> BoolArray:
     """(N,) which bodies are entirely below the view or entirely above it.
 
-    near_face_m (N,): distance of their near faces ahead of the camera. height_m: of the camera. near_m:
-    distance from which it sees the floor. up_tan: slope of the upper edge of its view.
+    near_face_m (N,): distance of their near faces ahead of the camera. height_m: of the camera.
     """
-    return _beyond_edges(near_face_m, bodies.bottom_m, bodies.top_m, height_m, near_m, up_tan)
+    return _beyond_edges(near_face_m, bodies.bottom_m, bodies.top_m, height_m, edges.near_m, edges.up_tan)
 
 
 def out_of_view(
     bodies: Bodies,
     pose: PlanarPose,
     mount: CameraMount,
-    edge_tan: float,
-    near_m: float,
-    up_tan: float,
-    edge_m: float,
-    edge_growth_mps: float,
+    edges: ViewEdges,
+    tolerance_m: float,
+    tolerance_mps: float,
 ) -> BoolArray:
     """(N,) which bodies are beside, below or above the view, and no farther than _BEHIND_M behind the camera.
 
-    pose: of the robot that carries the camera. A centre up to edge_m inside the side edge counts as beside
-    the view; of a mover, edge_growth_mps more for each second since it was last seen.
+    pose: of the robot that carries the camera. A centre up to tolerance_m inside the side edge counts as
+    beside the view; of a mover, tolerance_mps more for each second since it was last seen.
     """
     return _out_of_view(
         bodies.xy_m,
@@ -76,11 +86,11 @@ def out_of_view(
         mount.forward_m,
         mount.left_m,
         mount.height_m,
-        edge_tan,
-        near_m,
-        up_tan,
-        edge_m,
-        edge_growth_mps,
+        edges.edge_tan,
+        edges.near_m,
+        edges.up_tan,
+        tolerance_m,
+        tolerance_mps,
     )
 
 
@@ -90,15 +100,15 @@ def may_be_above_view_within_m(top_m: float, height_m: float, up_tan: float) -> 
     return max(rise_m, 0.0) / max(up_tan, MIN_TAN)
 
 
-def visible_from_m(
-    bodies: Bodies, side_m: FloatArray, edge_tan: float, near_m: float, height_m: float, up_tan: float
-) -> FloatArray:
+def visible_from_m(bodies: Bodies, side_m: FloatArray, height_m: float, edges: ViewEdges) -> FloatArray:
     """(N,) the least distance ahead of the camera at which a body is seen.
 
     There its centre is within the side edges, its top is above the lower edge and its bottom is below the
-    upper edge. side_m (N,): sideways distance of its centre from the camera's axis.
+    upper edge. side_m (N,): sideways distance of its centre from the camera's axis. height_m: of the camera.
     """
-    return _visible_from_m(bodies.top_m, bodies.bottom_m, side_m, edge_tan, near_m, height_m, up_tan)
+    return _visible_from_m(
+        bodies.top_m, bodies.bottom_m, side_m, height_m, edges.edge_tan, edges.near_m, edges.up_tan
+    )
 
 
 @inlined
@@ -156,15 +166,15 @@ def _out_of_view(
     edge_tan: float,
     near_m: float,
     up_tan: float,
-    edge_m: float,
-    edge_growth_mps: float,
+    tolerance_m: float,
+    tolerance_mps: float,
 ) -> BoolArray:
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     out = np.empty(len(xy_m), np.bool_)
     for k in range(len(xy_m)):
         dx, dy = xy_m[k, 0] - x_m, xy_m[k, 1] - y_m
         ahead, left = dx * cos + dy * sin - forward_m, dy * cos - dx * sin - left_m
-        within_m = edge_m + (edge_growth_mps * unseen_s[k] if moving[k] else 0.0)
+        within_m = tolerance_m + (tolerance_mps * unseen_s[k] if moving[k] else 0.0)
         beside = abs(left) > edge_tan * max(ahead, 0.0) - within_m
         beyond = _beyond(ahead - half_view_m[k], bottom_m[k], top_m[k], height_m, near_m, up_tan)
         out[k] = (beside or beyond) and ahead > -_BEHIND_M
@@ -176,9 +186,9 @@ def _visible_from_m(
     top_m: FloatArray,
     bottom_m: FloatArray,
     side_m: FloatArray,
+    height_m: float,
     edge_tan: float,
     near_m: float,
-    height_m: float,
     up_tan: float,
 ) -> FloatArray:
     visible = np.empty(len(top_m))

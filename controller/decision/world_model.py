@@ -28,12 +28,13 @@ from controller.decision.sight import Sight
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
 from controller.decision.unseen_motion import MIN_TRACKED_S
 from controller.decision.velocity_filter import SteadyVelocities
+from controller.decision.view_edges import ViewEdges
 from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
-from vision.scene import CameraCondition, CameraHealth, Scene
+from vision.scene import CameraCondition, CameraHealth, FreeSpace, Scene
 
 # Half size above which a standing body is no box. The box of a wall or a rack would reach into the corridor
 # wherever the path bends; what of its surface is in the corridor, depth sees (controller/decision/sight.py).
@@ -58,9 +59,7 @@ class WorldModel:
     corridor: the floor that the robot sweeps along the path.
     sight: how much of the corridor was seen free, and the nearest unexplained surface in it.
     lens: whether something is too near to the lens to be seen.
-    edge_tan: tangent of the half angle of view.
-    near_m: distance ahead of the camera from which the floor is in view.
-    up_tan: slope of the upper edge of the view.
+    edges: of the camera's view.
     age_s: time since the newest scene was captured; inf: none yet.
     since_s: time since the scene of bodies was captured, the last one of a trustworthy camera; inf: none yet.
     health: of the camera in the newest scene.
@@ -91,8 +90,8 @@ class WorldModel:
         self._unboxed: Bodies | None = None
         self._boxes = no_bodies(0)
         self._velocity_filter = SteadyVelocities()
-        self._out_of_view = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
-        self.edge_tan, self.near_m, self.up_tan = 0.5, config.sight.near_m, math.inf
+        self._out_of_view = OutOfView(mount, robot.limits.max_obstacle_speed_mps)
+        self.edges = ViewEdges(edge_tan=0.5, near_m=config.sight.near_m, up_tan=math.inf)
         # Of the last scenes: capture time, surface points (K, 2) and centres of bodies (M, 2).
         self._places: deque[tuple[int, FloatArray, FloatArray]] = deque()
         self._captured_ns: int | None = None
@@ -117,8 +116,7 @@ class WorldModel:
             before._places,
         )
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
-        self.health, self.edge_tan = before.health, before.edge_tan
-        self.near_m, self.up_tan = before.near_m, before.up_tan
+        self.health, self.edges = before.health, before.edges
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
 
     @property
@@ -183,15 +181,12 @@ class WorldModel:
             return str(error)
         free, s_m = scene.free_space, self.corridor.path.project(pose, on_path.s_m).s_m
         boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving)
-        if len(free.bearing_tan):
-            self.edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
-        self.near_m = self._out_of_view.near_m = max(self._config.sight.near_m, free.floor_from_m)
-        self.up_tan = self._out_of_view.up_tan = free.up_tan
+        self.edges = edges = self._edges_of(free)
         self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
         boxes = self._velocity_filter.update(self._age_known_places(seen.select(boxed)))
-        boxes = self._out_of_view.mark_leaving_movers(boxes, pose, self.edge_tan)
+        boxes = self._out_of_view.mark_leaving_movers(boxes, pose, edges)
         standing = v_mps <= STANDING_MPS
-        remembered = self._out_of_view.update(self._boxes, boxes, pose, self.edge_tan, standing, free)
+        remembered = self._out_of_view.update(self._boxes, boxes, pose, edges, standing, free)
         self.bodies = boxes.joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
@@ -200,6 +195,13 @@ class WorldModel:
         self.health = scene.health
         self._captured_ns = scene.captured_ns
         return ""
+
+    def _edges_of(self, free: FreeSpace) -> ViewEdges:
+        """The edges of the view in a scene; to the sides, the last ones if the scene does not tell."""
+        edge_tan = self.edges.edge_tan
+        if len(free.bearing_tan):
+            edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
+        return ViewEdges(edge_tan, max(self._config.sight.near_m, free.floor_from_m), free.up_tan)
 
     def _age_known_places(self, bodies: Bodies) -> Bodies:
         """The bodies, where a new track in a place that was occupied before is not taken for a newcomer.

@@ -39,6 +39,7 @@ from controller.decision.reachability import (
 )
 from controller.profile import SpeedRamps, comfortable
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import FloatArray
 
 # Times that are looked at: every 0.1 s up to 2 s, where stops from low speeds end, then every 0.2 s.
@@ -56,6 +57,20 @@ _MIN_SIDEWAYS_MPS = 0.1
 _AWARE_AFTER_S = 1.0
 # The robot does not slow yet if it is faster than the worst case allows by no more than this.
 _TOLERATED_EXCESS_MPS = 0.1
+
+
+@record(frozen=True, slots=True, eq=False)
+class _MayDo:
+    """What N bodies may do: arguments of reach(), (N,) each; along the path, and sideways."""
+
+    since_s: FloatArray
+    spread_along_mps: FloatArray
+    spread_left_mps: FloatArray
+    speed_mps: FloatArray
+    change_along_mps2: FloatArray
+    change_left_mps2: FloatArray
+    uncertain_along_m: FloatArray
+    uncertain_left_m: FloatArray
 
 
 class WorstCase:
@@ -186,7 +201,7 @@ class WorstCase:
         counts: NDArray[np.bool_],
     ) -> Reach:
         prediction = self._config.prediction
-        may_do = _may_do(
+        fields = _may_do(
             velocities.along_mps,
             velocities.left_mps,
             velocities.sigma_along_mps,
@@ -206,16 +221,17 @@ class WorstCase:
             ALONG_TO_SIDE_RATIO,
             UNSEEN_ERROR_SIGMAS,
         )
+        may_do = _MayDo(*fields)
         return reach(
             placed,
             self.times_s,
-            may_do[0],
-            spread_mps=(may_do[1], may_do[2]),
-            speed_mps=may_do[3],
-            manoeuvre_mps2=(may_do[4], may_do[5]),
+            may_do.since_s,
+            spread_mps=(may_do.spread_along_mps, may_do.spread_left_mps),
+            speed_mps=may_do.speed_mps,
+            manoeuvre_mps2=(may_do.change_along_mps2, may_do.change_left_mps2),
             max_mps=self._limits.max_obstacle_speed_mps,
             margin_m=self._config.margins.least_m,
-            position_uncertainty_m=(may_do[6], may_do[7]),
+            position_uncertainty_m=(may_do.uncertain_along_m, may_do.uncertain_left_m),
             counts=counts,
         )
 
@@ -256,11 +272,7 @@ def _may_do(
     along_to_side_ratio: float,
     unseen_error_sigmas: float,
 ) -> FloatArray:
-    """(8, N) arguments of reach() for bodies (N,).
-
-    In this order: since_s, spread_mps along the path and to the left, speed_mps, manoeuvre_mps2 along and
-    sideways, position_uncertainty_m along and to the left.
-    """
+    """(8, N) the fields of _MayDo."""
     answers = np.zeros((8, len(along_mps)))
     since, spread_along, spread_left, speed, along, sideways, uncertain_along, uncertain_left = answers
     for k in range(len(along_mps)):
