@@ -95,6 +95,7 @@ class MovingLimits:
         rows = (bodies.moving & ahead & enters).nonzero()[0]
         if not len(rows):
             self.forget()
+            self._note_inside(bodies, set())
             return [], base_mps
         conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, velocities, rows, now_s)
         if not conflicts:
@@ -128,13 +129,19 @@ class MovingLimits:
             if one.hi_in_m > s_m and one.lo_in_m > from_s_m
         ]
         track_ids = {int(bodies.ids[one.row]) for one in found}
-        self._inside |= track_ids
+        self._note_inside(bodies, track_ids)
         self._robot_passes_first &= track_ids
         found = [self._steadied(one, int(bodies.ids[one.row]), now_s) for one in found]
         self._leaves_s = {
             track_id: when for track_id, when in self._leaves_s.items() if track_id in track_ids
         }
         return found
+
+    def _note_inside(self, bodies: Bodies, in_the_way: set[int]) -> None:
+        """Of the bodies that move, those with these ids count as in the corridor, and no others."""
+        if self._inside:
+            self._inside.difference_update(bodies.ids[bodies.moving].tolist())
+        self._inside |= in_the_way
 
     def _steadied(self, conflict: Conflict, track_id: int, now_s: float) -> Conflict:
         """The conflict with its time of leaving averaged: each estimate extrapolates a noisy speed."""
