@@ -16,6 +16,10 @@ class Debounced:
         self._flags: dict[int, bool] = {}
         self._otherwise_since_s: dict[int, float] = {}
 
+    def pause(self) -> None:
+        """Nothing is looked at now: this is a break in what is seen. The flags stay as they are."""
+        self._otherwise_since_s.clear()
+
     def update(self, ids: NDArray[np.int64], seen: BoolArray, at_once: BoolArray, now_s: float) -> BoolArray:
         """(N,) the flags of ids at now_s; other ids are forgotten, and a new one begins with False.
 

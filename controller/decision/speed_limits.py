@@ -82,6 +82,7 @@ class SpeedLimits:
         watched = self._watched
         if not len(watched):
             self._moving.forget()
+            self._enters.pause()
             return found
         placed = place(
             watched, known.corridor, known.since_s + self._times_s, s_m, self._config.sight.range_m + 2.0
