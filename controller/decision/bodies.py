@@ -147,10 +147,13 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     """The obstacles of a scene; pose: of the robot that carries the camera.
 
     depth_m: least depth of a body, from the visible surface on, since its back is hidden.
-    Raises SceneError for values that are unknown or impossible.
+    Raises SceneError for values that are unknown or impossible, and if several have the same id.
     """
     if not scene.obstacles:
         return no_bodies(scene.captured_ns)
+    ids = [one.id for one in scene.obstacles]
+    if len(set(ids)) < len(ids):
+        raise SceneError(f"several obstacles have the id {next(one for one in ids if ids.count(one) > 1)}")
     measured = np.concatenate(
         [
             values
@@ -180,7 +183,7 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     half_view_m, half_across_m, view_rad, top_m, bottom_m = sizes
     return Bodies(
         captured_ns=scene.captured_ns,
-        ids=np.array([one.id for one in scene.obstacles], np.int64),
+        ids=np.array(ids, np.int64),
         xy_m=xy_m,
         velocity_mps=velocity_mps,
         measured_mps=measured_mps,
@@ -199,13 +202,12 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
 
 
 def _complaint(track_id: int, measured: FloatArray) -> str:
-    position, extent, velocity = (_list(measured[part]) for part in (_POSITION, _EXTENT, _VELOCITY))
+    position, extent, velocity = (
+        "(" + ", ".join(f"{value:.2f}" for value in measured[part]) + ")"
+        for part in (_POSITION, _EXTENT, _VELOCITY)
+    )
     values = f"position {position} m, size {extent} m, velocity {velocity} m/s"
     return f"obstacle {track_id} is impossible: {values}"
-
-
-def _list(values: FloatArray) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in values) + ")"
 
 
 @compiled("float64[:, :], float64[:], float64, float64[:, :], float64[:], float64[:], float64[:]")
