@@ -15,9 +15,7 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import Scene
 
 # Nothing in a hall is farther away, larger or faster: such numbers are faults of perception.
-_FARTHEST_M = 200.0
-_LARGEST_M = 50.0
-_FASTEST_MPS = 15.0
+_FARTHEST_M, _LARGEST_M, _FASTEST_MPS = 200.0, 50.0, 15.0
 # Columns of what is measured of an obstacle, and the bounds of possible values.
 _POSITION, _EXTENT, _VELOCITY, _COVARIANCE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 18)
 _MAX = np.repeat([_FARTHEST_M, _LARGEST_M, _FASTEST_MPS, np.finfo(np.float64).max], (3, 3, 3, 9))
@@ -202,12 +200,12 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
 
 
 def _complaint(track_id: int, measured: FloatArray) -> str:
-    position, extent, velocity = (
+    position, size, velocity = (
         "(" + ", ".join(f"{value:.2f}" for value in measured[part]) + ")"
         for part in (_POSITION, _EXTENT, _VELOCITY)
     )
-    values = f"position {position} m, size {extent} m, velocity {velocity} m/s"
-    return f"obstacle {track_id} is impossible: {values}"
+    what = f"position {position} m, size {size} m, velocity {velocity} m/s"
+    return f"obstacle {track_id} is impossible: {what}"
 
 
 @compiled("float64[:, :], float64[:], float64, float64[:, :], float64[:], float64[:], float64[:]")

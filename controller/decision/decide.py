@@ -77,7 +77,7 @@ class DecisionMaker:
         """Continue along another path, of which known is known already; the hysteresis is kept."""
         self._path, self._known = path, known
 
-    def knowledge(self, path: Path, start_s_m: float) -> WorldModel:
+    def world_model(self, path: Path, start_s_m: float) -> WorldModel:
         """A new WorldModel of a path of which nothing is known yet, for a robot that stands at start_s_m."""
         return WorldModel(path, self._robot, self._mount, self._config, start_s_m, self._noise)
 
@@ -87,7 +87,7 @@ class DecisionMaker:
         if fault:
             return self._halt(fault, at.v_mps, at.now_ns)
         path, on_path, v_mps, now_ns = at.path, at.on_path, max(at.v_mps, 0.0), at.now_ns
-        known = self._knowledge(path, on_path)
+        known = self._world_model(path, on_path)
         known.update(at.scene, at.pose, on_path, v_mps, now_ns)
         if not known.has_seen:
             # The release gate is not stepped: the first scene with a free way lets the robot go at once.
@@ -125,10 +125,10 @@ class DecisionMaker:
         action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
         return Decision(action, 0.0, reason, self._emergency)
 
-    def _knowledge(self, path: Path, on_path: OnPath) -> WorldModel:
+    def _world_model(self, path: Path, on_path: OnPath) -> WorldModel:
         if self._known is None or path is not self._path:
             self._path = path
-            self._known = self.knowledge(path, on_path.s_m)
+            self._known = self.world_model(path, on_path.s_m)
         return self._known
 
     def _path_limit(self, path: Path, on_path: OnPath, motion: Motion) -> Limit:

@@ -85,13 +85,13 @@ def stop_before(
     motion: Motion,
     comfort: BrakeLimits,
     margin_m: float,
-    least_m: float,
+    min_left_m: float,
     rule: Rule,
     what: str,
 ) -> Limit:
     """The limit for a comfortable stop margin_m before the end of the gap.
 
-    It is urgent if that stop would leave less than least_m. rule, what: for the reason; what completes the
+    It is urgent if that stop would leave less than min_left_m. rule, what: for the reason; what completes the
     sentence "obstacle 3 ... 2.0 m ahead".
     """
     room_m = gap.distance_m + gap.leader_stop_m
@@ -113,7 +113,7 @@ def stop_before(
         sentence = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: {allowed_text(speed)}"
         return Reason(rule, sentence, gap.obstacle_id, gap.distance_m, gap.closing_mps, required, spare)
 
-    return Limit(speed, why, urgent=motion.v_mps > 0.0 and spare < least_m - margin_m)
+    return Limit(speed, why, urgent=motion.v_mps > 0.0 and spare < min_left_m - margin_m)
 
 
 def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:

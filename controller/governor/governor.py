@@ -210,7 +210,7 @@ class SpeedGovernor:
         path = arc_path(pose, *wanted, self._decision.sight.range_m, self._robot)
         on_start = OnPath(0.0, 0.0, 0.0)
         before = self._known
-        known = self._decide.knowledge(path, _NEAR_EXTRA_M)
+        known = self._decide.world_model(path, _NEAR_EXTRA_M)
         for scene in self._scenes:
             assert scene.robot_pose is not None
             if before is None or before.has_taken_in(scene):
