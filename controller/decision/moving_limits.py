@@ -95,7 +95,7 @@ class MovingLimits:
         rows = (bodies.moving & ahead & enters).nonzero()[0]
         if not len(rows):
             self.forget()
-            self._note_inside(bodies, set())
+            self._note_inside(bodies, placed, set())
             return [], base_mps
         conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, velocities, rows, now_s)
         if not conflicts:
@@ -129,7 +129,7 @@ class MovingLimits:
             if one.hi_in_m > s_m and one.lo_in_m > from_s_m
         ]
         track_ids = {int(bodies.ids[one.row]) for one in found}
-        self._note_inside(bodies, track_ids)
+        self._note_inside(bodies, placed, track_ids)
         self._robot_passes_first &= track_ids
         found = [self._steadied(one, int(bodies.ids[one.row]), now_s) for one in found]
         self._leaves_s = {
@@ -137,10 +137,12 @@ class MovingLimits:
         }
         return found
 
-    def _note_inside(self, bodies: Bodies, in_the_way: set[int]) -> None:
-        """Of the bodies that move, those with these ids count as in the corridor, and no others."""
+    def _note_inside(self, bodies: Bodies, placed: Placed, in_the_way: set[int]) -> None:
+        """The bodies with these ids count as in the corridor; of the others, those that moved away do not."""
         if self._inside:
-            self._inside.difference_update(bodies.ids[bodies.moving].tolist())
+            away_m = self._config.margins.lateral_m + self._config.margins.graze_m
+            away = bodies.moving & (placed.clearance_m[:, 0] > away_m)
+            self._inside.difference_update(bodies.ids[away].tolist())
         self._inside |= in_the_way
 
     def _steadied(self, conflict: Conflict, track_id: int, now_s: float) -> Conflict:

@@ -38,3 +38,13 @@ def test_a_mover_that_has_left_has_no_wider_margin_for_having_grazed(besides: bo
     asked(moving, gone.joined(other) if besides else gone, 2.0)
     assert 1 not in inside
     assert 2 in inside, "not asked of, or still in the way"
+
+
+def test_a_mover_that_is_hardly_out_of_the_way_still_has_it() -> None:
+    """It may stop there, and whether it moves is not certain in each scene."""
+    inside: set[int] = set()
+    moving = MovingLimits(DecisionConfig(), Limits(), TIMES, inside)
+    asked(moving, box(6.0, 0.0, 0.0, 0.5), 0.0)
+    left_m = 0.4 + 0.25 + DecisionConfig().margins.lateral_m + 0.5 * DecisionConfig().margins.graze_m
+    asked(moving, box(6.0, left_m, 0.0, 0.5), 2.0)
+    assert inside == {1}
