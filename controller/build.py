@@ -255,12 +255,21 @@ def build_replay_perceiver(
     return Perceiver(perception, odometry, lambda _stamp_ns: _ORIGIN, stopwatch_ns)
 
 
-def build_replay_decision(config: ReplayConfig, mount: CameraMount | None) -> DecisionMaker:
-    """The decision for each frame; an unknown mounting is assumed to be level, at the robot's front."""
+def build_replay_decision(
+    config: ReplayConfig, mount: CameraMount | None, fps: float | None
+) -> DecisionMaker:
+    """The decision for each frame; an unknown mounting is assumed to be level, at the robot's front.
+
+    fps: of the recording; None if not known.
+    """
     front_m = config.robot.body.front_m
     level = CameraMount(front_m, 0.0, config.robot.camera_mount.height_m, 0.0)
     noise = config.perception.depth_noise
-    return DecisionMaker(config.decision, config.robot, mount or level, 1.0 / REPLAY_FPS, noise)
+    return DecisionMaker(config.decision, config.robot, mount or level, 1.0 / _replay_fps(fps), noise)
+
+
+def _replay_fps(fps: float | None) -> float:
+    return REPLAY_FPS if fps is None else max(fps, _LEAST_FPS)
 
 
 def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: float | None) -> Surroundings:
@@ -270,7 +279,7 @@ def replay_surroundings(config: ReplayConfig, mount: CameraMount | None, fps: fl
         config.robot.body if mount is not None else None,
         config.robot.body.width_m / 2.0 + config.decision.margins.lateral_m,
         # Two decimal places: video containers count time in whole fractions of a second.
-        REPLAY_FPS if fps is None else max(round(fps, 2), _LEAST_FPS),
+        round(_replay_fps(fps), 2),
         config.robot.limits.max_speed_mps,
         config.perception.max_depth_m,
     )

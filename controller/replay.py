@@ -115,7 +115,7 @@ def run_replay(options: ReplayOptions) -> None:
     source, odometry = open_replay(options.recording, options.odometry, options.topics)
     mount = recorded_mount(config, source.mount)
     perceiver = build_replay_perceiver(config, mount, odometry, time.perf_counter_ns)
-    decide = build_replay_decision(config, mount)
+    decide = build_replay_decision(config, mount, source.fps)
     path = straight_ahead(config.robot)
     speed = EgoSpeed(mount)
     tally = ReplayTally()

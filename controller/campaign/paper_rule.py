@@ -12,7 +12,7 @@ from config.robot import Robot
 from controller import braking
 from controller.campaign.rivals import decision, free_speed
 from controller.decision.bodies import Bodies, bodies_of
-from controller.decision.corridor import Corridor, course_of, place
+from controller.decision.corridor import Corridor, path_velocities, place
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
 from hal.types import CameraMount
@@ -60,6 +60,9 @@ class PaperRule:
         if not len(bodies):
             return []
         placed = place(bodies, corridor, np.zeros(1), s_m, _LOOK_M)
-        along = course_of(bodies, placed.heading_rad[:, 0]).along_mps
-        rows = np.flatnonzero((placed.clear_m[:, 0] <= 0.0) & (placed.hi_m[:, 0] > s_m))
-        return [(float(placed.lo_m[k, 0]) - s_m, -float(along[k]) if bodies.moving[k] else 0.0) for k in rows]
+        along = path_velocities(bodies, placed.heading_rad[:, 0]).along_mps
+        rows = np.flatnonzero((placed.clearance_m[:, 0] <= 0.0) & (placed.block_to_s_m[:, 0] > s_m))
+        return [
+            (float(placed.block_from_s_m[k, 0]) - s_m, -float(along[k]) if bodies.moving[k] else 0.0)
+            for k in rows
+        ]

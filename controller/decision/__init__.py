@@ -4,12 +4,12 @@ The files in the order of one control step:
 
 * situation.py - the input: newest scene, path, robot pose, speed
 * decide.py - one control step: checks the input, asks all below, takes the least limit
-* knowledge.py - takes in each new scene with the files from here to blind_corners.py; judges the camera
+* world_model.py - takes in each new scene with the files from here to blind_corners.py; judges the camera
 * bodies.py - obstacles as boxes on the floor
 * surfaces.py - the free space as points on the floor
-* steadying.py - averages the measured velocities
-* memory.py - keeps bodies that have left the view
-* going.py - which of them move, and with which velocity
+* velocity_filter.py - averages the measured velocities
+* out_of_view.py - keeps bodies that have left the view
+* unseen_motion.py - which of them move, and with which velocity
 * view_edges.py - what is below, above or beside the view
 * seen_through.py - drops remembered bodies whose place is seen empty
 * lens_cover.py - whether something covers the lens
@@ -17,27 +17,27 @@ The files in the order of one control step:
 * sight.py - how far the corridor was seen free, and unexplained surfaces in it
 * blind_corners.py - where somebody may step out
 * limits.py - a speed limit with its reason
-* appraise.py - asks the advisers: depth (sight.py), then those from here to contingency.py
-* standing.py - bodies that stand in the corridor
+* speed_limits.py - asks the advisers: depth (sight.py), then those from here to reachability.py
+* standing_limits.py - bodies that stand in the corridor
 * outline.py - in bends, how far beside the corridor a body stands
 * debounce.py - debounced flags: which bodies enter the corridor
-* moving.py - bodies that cross, come towards the robot or drive ahead
+* moving_limits.py - bodies that cross, come towards the robot or drive ahead
 * crossing.py - the conflicts with them: when and where, and which speeds solve them
-* worst_case.py - what bodies could do at worst
-* contingency.py - its geometry: what bodies could reach, and where emergency stops end
+* worst_case_limit.py - what bodies could do at worst
+* reachability.py - its geometry: what bodies could reach, and where emergency stops end
 * release.py - slower at once, faster after a delay
 * decision.py - the output: action, target speed, reason
 
 Words of this folder:
 
-* Bodies: obstacles as boxes. Young: seen for less than confirm_s. Settled: seen for 0.5 s or more.
+* Bodies: obstacles as boxes. Young: seen for less than confirm_s. Tracked: for MIN_TRACKED_S or more.
 * Remembered: a body out of view that still counts. Boxed: counts as a box; the others as surfaces only.
 * Corridor, swept width: the floor that the robot sweeps along its path. Path coordinates: s_m, d_m.
 * Surface: a point that depth sees. Explained: it belongs to a body. Band: one bearing of the scan.
-* Known: the floor was seen free. By consent: floor below the view at the start, taken as free unseen.
+* Known: the floor was seen free. Assumed free: floor below the view at the start, taken as free unseen.
 * Enters: is in the corridor or is likely to come into it. Conflict: the time and place of that.
-* Surprise: by how much the newest velocity differs from the average beyond noise.
-* Unsure: uncertainty of the position of a body out of view.
+* Innovation: by how much the newest velocity differs from the average beyond noise, counted twice.
+* Position uncertainty: of a body out of view; it grows until the body is seen again.
 * Limit: a speed not to be exceeded now. Urgent: comfortable braking no longer suffices.
-* Clear: free floor between a body and the corridor (clear_m). Margin: a distance that is kept.
+* Clearance: free floor between a body and the corridor (clearance_m). Margin: a distance that is kept.
 """

@@ -15,14 +15,12 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import Scene
 
 # Nothing in a hall is farther away, larger or faster: such numbers are faults of perception.
-_FARTHEST_M = 200.0
-_LARGEST_M = 50.0
-_FASTEST_MPS = 15.0
+_FARTHEST_M, _LARGEST_M, _FASTEST_MPS = 200.0, 50.0, 15.0
 # Columns of what is measured of an obstacle, and the bounds of possible values.
 _POSITION, _EXTENT, _VELOCITY, _COVARIANCE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 18)
-_MOST = np.repeat([_FARTHEST_M, _LARGEST_M, _FASTEST_MPS, np.finfo(np.float64).max], (3, 3, 3, 9))
-_LEAST = -_MOST
-_LEAST[_EXTENT] = _LEAST[[9, 13, 17]] = 0.0  # and the variances
+_MAX = np.repeat([_FARTHEST_M, _LARGEST_M, _FASTEST_MPS, np.finfo(np.float64).max], (3, 3, 3, 9))
+_MIN = -_MAX
+_MIN[_EXTENT] = _MIN[[9, 13, 17]] = 0.0  # and the variances
 
 
 class SceneError(Exception):
@@ -37,7 +35,7 @@ class Bodies:
     xy_m: (N, 2) centre.
     velocity_mps: (N, 2) over ground; 0 for bodies judged standing.
     measured_mps: (N, 2) as perception measured it, whether standing or moving.
-    surprise_mps: (N, 2) by how much the newest measurement differs from velocity_mps.
+    innovation_mps: (N, 2) by how much the newest measurement differs from velocity_mps.
     covariance: (N, 2, 2) of the velocity.
     half_view_m, half_across_m: (N,) half sizes along and across view_rad, the direction of view.
     top_m, bottom_m: (N,) heights over the floor.
@@ -51,7 +49,7 @@ class Bodies:
     xy_m: FloatArray
     velocity_mps: FloatArray
     measured_mps: FloatArray
-    surprise_mps: FloatArray
+    innovation_mps: FloatArray
     covariance: FloatArray
     half_view_m: FloatArray
     half_across_m: FloatArray
@@ -79,7 +77,7 @@ class Bodies:
         # For a few rows, take() is ten times as fast as an index.
         return Bodies(self.captured_ns, *[array.take(rows, 0) for array in _arrays_of(self)])
 
-    def gone_on(self, captured_ns: int, xy_m: FloatArray, unseen_s: FloatArray) -> Bodies:
+    def moved_to(self, captured_ns: int, xy_m: FloatArray, unseen_s: FloatArray) -> Bodies:
         """The same bodies at a later time, at xy_m (N, 2)."""
         return Bodies(
             captured_ns,
@@ -87,7 +85,7 @@ class Bodies:
             xy_m,
             self.velocity_mps,
             self.measured_mps,
-            self.surprise_mps,
+            self.innovation_mps,
             self.covariance,
             self.half_view_m,
             self.half_across_m,
@@ -123,7 +121,7 @@ _NOBODY = Bodies(
     xy_m=np.zeros((0, 2)),
     velocity_mps=np.zeros((0, 2)),
     measured_mps=np.zeros((0, 2)),
-    surprise_mps=np.zeros((0, 2)),
+    innovation_mps=np.zeros((0, 2)),
     covariance=np.zeros((0, 2, 2)),
     half_view_m=np.zeros(0),
     half_across_m=np.zeros(0),
@@ -147,10 +145,13 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     """The obstacles of a scene; pose: of the robot that carries the camera.
 
     depth_m: least depth of a body, from the visible surface on, since its back is hidden.
-    Raises SceneError for values that are unknown or impossible.
+    Raises SceneError for values that are unknown or impossible, and if several have the same id.
     """
     if not scene.obstacles:
         return no_bodies(scene.captured_ns)
+    ids = [one.id for one in scene.obstacles]
+    if len(set(ids)) < len(ids):
+        raise SceneError(f"several obstacles have the id {next(one for one in ids if ids.count(one) > 1)}")
     measured = np.concatenate(
         [
             values
@@ -158,11 +159,10 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
             for values in (one.position_m, one.extent_m, one.velocity_mps, one.velocity_cov.ravel())
         ],
         dtype=np.float64,
-    ).reshape(-1, len(_MOST))
+    ).reshape(-1, len(_MAX))
     said = np.array([(one.age_s, one.unseen_s, one.moving) for one in scene.obstacles], np.float64)
     age_s, unseen_s, moving = said[:, 0], said[:, 1], said[:, 2] > 0.0
     camera = camera_in_body(mount)
-    # Taking rows by index is quicker than unpacking an array.
     impossible, on_floor, covariance, sizes = _boxes(
         measured,
         age_s,
@@ -177,19 +177,21 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     )
     if impossible >= 0:
         raise SceneError(_complaint(scene.obstacles[impossible].id, measured[impossible]))
+    xy_m, measured_mps, velocity_mps, innovation_mps = on_floor
+    half_view_m, half_across_m, view_rad, top_m, bottom_m = sizes
     return Bodies(
         captured_ns=scene.captured_ns,
-        ids=np.array([one.id for one in scene.obstacles], np.int64),
-        xy_m=on_floor[0],
-        velocity_mps=on_floor[2],
-        measured_mps=on_floor[1],
-        surprise_mps=on_floor[3],
+        ids=np.array(ids, np.int64),
+        xy_m=xy_m,
+        velocity_mps=velocity_mps,
+        measured_mps=measured_mps,
+        innovation_mps=innovation_mps,
         covariance=covariance,
-        half_view_m=sizes[0],
-        half_across_m=sizes[1],
-        view_rad=sizes[2],
-        top_m=sizes[3],
-        bottom_m=sizes[4],
+        half_view_m=half_view_m,
+        half_across_m=half_across_m,
+        view_rad=view_rad,
+        top_m=top_m,
+        bottom_m=bottom_m,
         moving=moving,
         age_s=age_s,
         unseen_s=unseen_s,
@@ -197,16 +199,13 @@ def bodies_of(scene: Scene, pose: PlanarPose, mount: CameraMount, depth_m: float
     )
 
 
-def _complaint(number: int, measured: FloatArray) -> str:
-    position, extent, velocity = (measured[part].tolist() for part in (_POSITION, _EXTENT, _VELOCITY))
-    return (
-        f"obstacle {number} is impossible: position {_list(position)} m, size {_list(extent)} m, "
-        f"velocity {_list(velocity)} m/s"
+def _complaint(track_id: int, measured: FloatArray) -> str:
+    position, size, velocity = (
+        "(" + ", ".join(f"{value:.2f}" for value in measured[part]) + ")"
+        for part in (_POSITION, _EXTENT, _VELOCITY)
     )
-
-
-def _list(values: list[float]) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in values) + ")"
+    what = f"position {position} m, size {size} m, velocity {velocity} m/s"
+    return f"obstacle {track_id} is impossible: {what}"
 
 
 @compiled("float64[:, :], float64[:], float64, float64[:, :], float64[:], float64[:], float64[:]")
@@ -255,7 +254,7 @@ def _boxes(
 ) -> tuple[int, FloatArray, FloatArray, FloatArray]:
     """Index of the first impossible one of N obstacles (-1: none), and fields of Bodies.
 
-    These are (4, N, 2) xy_m, measured_mps, velocity_mps, surprise_mps; the covariance; (5, N) half_view_m,
+    These are (4, N, 2) xy_m, measured_mps, velocity_mps, innovation_mps; the covariance; (5, N) half_view_m,
     half_across_m, view_rad, top_m, bottom_m. in_body (3, 3), in_body_m (3,): pose of the camera in the robot.
     """
     count, impossible = len(measured), -1
@@ -274,7 +273,7 @@ def _boxes(
         # Written so that NaN fails every comparison.
         possible = age_s[k] >= 0.0 and unseen_s[k] >= 0.0
         for j in range(len(one)):
-            possible = possible and _LEAST[j] <= one[j] <= _MOST[j]
+            possible = possible and _MIN[j] <= one[j] <= _MAX[j]
         if not possible:
             impossible = k
             break

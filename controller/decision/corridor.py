@@ -1,7 +1,7 @@
 """The floor that the robot's body sweeps along its path (the corridor), and where bodies are relative to it.
 
 Corridor holds the swept width along one path; place() puts bodies into path coordinates at future times;
-course_of() turns their velocities into speeds along the path and across it.
+path_velocities() turns their velocities into speeds along the path and across it.
 """
 
 from __future__ import annotations
@@ -58,17 +58,18 @@ class Placed:
     s_m, d_m: centre.
     heading_rad: heading of the path there.
     half_s_m: half size along the path.
-    lo_m, hi_m: while the robot's turning centre is between these, robot and body overlap along the path.
-    clear_m: free floor between the body's side and the corridor; negative: inside it.
+    block_from_s_m, block_to_s_m: while the robot's turning centre is between these, robot and body overlap
+        along the path.
+    clearance_m: free floor between the body's side and the corridor; negative: inside it.
     """
 
     s_m: FloatArray
     d_m: FloatArray
     heading_rad: FloatArray
     half_s_m: FloatArray
-    lo_m: FloatArray
-    hi_m: FloatArray
-    clear_m: FloatArray
+    block_from_s_m: FloatArray
+    block_to_s_m: FloatArray
+    clearance_m: FloatArray
 
 
 def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: float, reach_m: float) -> Placed:
@@ -77,7 +78,6 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
     The path is searched from _BEHIND_M behind near_s_m to reach_m ahead of it.
     """
     reach = near_s_m - _BEHIND_M, near_s_m + reach_m
-    # Taking rows by index is quicker than unpacking an array.
     located = corridor.path.locate(bodies.xy_m, bodies.velocity_mps, times_s, *reach)
     extents = _extents(
         located,
@@ -89,7 +89,7 @@ def place(bodies: Bodies, corridor: Corridor, times_s: FloatArray, near_s_m: flo
         corridor.front_m,
         corridor.rear_m,
     )
-    return Placed(located[0], located[1], located[2], extents[0], extents[1], extents[2], extents[3])
+    return Placed(*located, *extents)
 
 
 @inlined
@@ -125,13 +125,13 @@ def _extents(
     front_m: float,
     rear_m: float,
 ) -> FloatArray:
-    """(4, N, K) half_s_m, lo_m, hi_m and clear_m of Placed, for N bodies.
+    """(4, N, K) half_s_m, block_from_s_m, block_to_s_m and clearance_m of Placed, for N bodies.
 
     located (3, N, K): s_m, d_m and heading_rad of Placed.
     """
     s_m, d_m, heading_rad = located
     extents = np.empty((4, *s_m.shape))
-    half_s, lo, hi, clear = extents
+    half_s, block_from, block_to, clearance = extents
     for k in range(len(s_m)):
         along, across = half_view_m[k], half_across_m[k]
         cos = sin = 0.0
@@ -140,51 +140,52 @@ def _extents(
                 turned = view_rad[k] - heading_rad[k, j]
                 cos, sin = abs(math.cos(turned)), abs(math.sin(turned))
             half_s[k, j] = cos * along + sin * across
-            lo[k, j] = s_m[k, j] - half_s[k, j] - front_m
-            hi[k, j] = s_m[k, j] + half_s[k, j] + rear_m
+            block_from[k, j] = s_m[k, j] - half_s[k, j] - front_m
+            block_to[k, j] = s_m[k, j] + half_s[k, j] + rear_m
             beside = abs(d_m[k, j]) - (sin * along + cos * across)
-            clear[k, j] = beside - _half_width(s_m[k, j], half_widths_m, overhang_m)
+            clearance[k, j] = beside - _half_width(s_m[k, j], half_widths_m, overhang_m)
     return extents
 
 
 @record(frozen=True, slots=True, eq=False)
-class Course:
+class PathVelocities:
     """Velocities of N bodies relative to the path where they are; each (N,).
 
     along_mps, left_mps: speed along the path and to its left.
     sigma_along_mps, sigma_left_mps: their standard deviations.
-    surprise_along_mps, surprise_left_mps: by how much the newest measurement differs from them.
+    innovation_along_mps, innovation_left_mps: by how much the newest measurement differs from them.
     """
 
     along_mps: FloatArray
     left_mps: FloatArray
     sigma_along_mps: FloatArray
     sigma_left_mps: FloatArray
-    surprise_along_mps: FloatArray
-    surprise_left_mps: FloatArray
+    innovation_along_mps: FloatArray
+    innovation_left_mps: FloatArray
 
 
-def course_of(bodies: Bodies, heading_rad: FloatArray) -> Course:
+def path_velocities(bodies: Bodies, heading_rad: FloatArray) -> PathVelocities:
     """The velocities relative to the path. heading_rad (N,): heading of the path where each body is."""
-    of = _seen_along(bodies.velocity_mps, bodies.surprise_mps, bodies.covariance, heading_rad)
-    return Course(of[0], of[1], of[2], of[3], of[4], of[5])
+    return PathVelocities(
+        *_seen_along(bodies.velocity_mps, bodies.innovation_mps, bodies.covariance, heading_rad)
+    )
 
 
 @compiled("float64[:, :], float64[:, :], float64[:, :, :], float64[:]")
 def _seen_along(
-    velocity_mps: FloatArray, surprise_mps: FloatArray, covariance: FloatArray, heading_rad: FloatArray
+    velocity_mps: FloatArray, innovation_mps: FloatArray, covariance: FloatArray, heading_rad: FloatArray
 ) -> FloatArray:
-    """(6, N) the fields of Course."""
-    course = np.empty((6, len(heading_rad)))
-    along, left, sigma_along, sigma_left, more_along, more_left = course
+    """(6, N) the fields of PathVelocities."""
+    velocities = np.empty((6, len(heading_rad)))
+    along, left, sigma_along, sigma_left, more_along, more_left = velocities
     for k in range(len(heading_rad)):
         cos, sin = math.cos(heading_rad[k]), math.sin(heading_rad[k])
         x, y = velocity_mps[k, 0], velocity_mps[k, 1]
         along[k], left[k] = x * cos + y * sin, y * cos - x * sin
-        x, y = surprise_mps[k, 0], surprise_mps[k, 1]
+        x, y = innovation_mps[k, 0], innovation_mps[k, 1]
         more_along[k], more_left[k] = x * cos + y * sin, y * cos - x * sin
         xx, yy = covariance[k, 0, 0], covariance[k, 1, 1]
         turned = (covariance[k, 0, 1] + covariance[k, 1, 0]) * cos * sin
         sigma_along[k] = math.sqrt(max(xx * cos * cos + turned + yy * sin * sin, 0.0))
         sigma_left[k] = math.sqrt(max(xx * sin * sin - turned + yy * cos * cos, 0.0))
-    return course
+    return velocities

@@ -1,10 +1,10 @@
 """Conflicts with bodies that cross the robot's path, and the speeds that solve them. Keeps no state.
 
 A conflict lasts from the time when a body enters the swept corridor until it leaves it, and has the stretch
-of the path that the body blocks meanwhile. comes_in says which bodies enter (controller/decision/appraise.py
-calls it), find_conflicts says when and where. choices gives two speeds for a conflict: up to yield_mps the
-robot lets the body pass first, from first_mps on it passes before the body. controller/decision/moving.py
-turns these choices into limits and keeps them from step to step.
+of the path that the body blocks meanwhile. likely_enters says which bodies enter (called by
+controller/decision/speed_limits.py), find_conflicts says when and where. choices gives two speeds for a
+conflict: up to yield_mps the robot lets the body pass first, from first_mps on it passes before the body.
+controller/decision/moving_limits.py turns these choices into limits and keeps them from step to step.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from hal.types import FloatArray
 
 # The spread of the sideways velocity makes an entry less likely, but by no more than this distance: a body
 # that heads for the corridor must not count as unlikely to enter only because it needs long to get there.
-_MOST_SPREAD_M = 0.5
+_MAX_ENTRY_SPREAD_M = 0.5
 
 
 @record(frozen=True, slots=True)
@@ -43,17 +43,20 @@ class Conflict:
     hi_in_m: float
 
 
-def comes_in(
-    placed: Placed, times_s: FloatArray, sigma_side_mps: FloatArray, unsure_m: FloatArray | None = None
+def likely_enters(
+    placed: Placed,
+    times_s: FloatArray,
+    sigma_side_mps: FloatArray,
+    position_uncertainty_m: FloatArray | None = None,
 ) -> NDArray[np.bool_]:
     """(N,) which bodies are, or are likely to come, within the swept width. times_s (K,) begins at 0 = now.
 
     Likely: even if the sideways velocity is less by its spread, so that noise does not make the robot brake.
-    Less likely entries are covered by controller/decision/worst_case.py. unsure_m (N,): the bodies may be
-    this much nearer to the corridor than where they are placed.
+    Less likely entries are covered by controller/decision/worst_case_limit.py. position_uncertainty_m (N,):
+    the bodies may be this much nearer to the corridor than where they are placed.
     """
-    nearer_m = np.zeros(len(sigma_side_mps)) if unsure_m is None else unsure_m
-    return _comes_in(placed.clear_m, times_s, sigma_side_mps, nearer_m)
+    nearer_m = np.zeros(len(sigma_side_mps)) if position_uncertainty_m is None else position_uncertainty_m
+    return _likely_enters(placed.clearance_m, times_s, sigma_side_mps, nearer_m)
 
 
 def find_conflicts(
@@ -68,7 +71,15 @@ def find_conflicts(
     A body has left only once it is clear of the margin despite the whole spread of its velocity: leaving must
     be certain before the robot relies on it.
     """
-    conflicts = _conflicts(placed.clear_m, placed.lo_m, placed.hi_m, times_s, sigma_side_mps, margin_m, rows)
+    conflicts = _conflicts(
+        placed.clearance_m,
+        placed.block_from_s_m,
+        placed.block_to_s_m,
+        times_s,
+        sigma_side_mps,
+        margin_m,
+        rows,
+    )
     return [
         Conflict(row, *times_and_places)
         for row, times_and_places in zip(rows.tolist(), conflicts.tolist(), strict=True)
@@ -121,47 +132,47 @@ def choices(
 
 
 @inlined
-def _likely(clear_m: float, t_s: float, sigma_mps: float) -> float:
-    """The clearance clear_m at t_s, plus the bounded spread of the sideways velocity."""
-    return clear_m + min(sigma_mps * t_s, _MOST_SPREAD_M)
+def _likely(clearance_m: float, t_s: float, sigma_mps: float) -> float:
+    """The clearance clearance_m at t_s, plus the bounded spread of the sideways velocity."""
+    return clearance_m + min(sigma_mps * t_s, _MAX_ENTRY_SPREAD_M)
 
 
 @inlined
-def _is_0_s(from_s: float, from_m: float, to_s: float, to_m: float) -> float:
+def _zero_crossing_s(from_s: float, from_m: float, to_s: float, to_m: float) -> float:
     """When a value that changes linearly from from_m at from_s to to_m at to_s is 0."""
     return from_s + from_m / (from_m - to_m) * (to_s - from_s)
 
 
 @inlined
-def _enters_s(clear_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_mps: float) -> float:
+def _enters_s(clearance_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_mps: float) -> float:
     """When a body likely comes within margin_m, interpolated between the samples; inf: never."""
-    before_m = clear_m[0] - margin_m
+    before_m = clearance_m[0] - margin_m
     if before_m <= 0.0:
         return 0.0
     for j in range(1, len(times_s)):
-        here_m = _likely(clear_m[j] - margin_m, times_s[j], sigma_mps)
+        here_m = _likely(clearance_m[j] - margin_m, times_s[j], sigma_mps)
         if here_m <= 0.0:
-            return _is_0_s(times_s[j - 1], before_m, times_s[j], here_m)
+            return _zero_crossing_s(times_s[j - 1], before_m, times_s[j], here_m)
         before_m = here_m
     return math.inf
 
 
 @inlined
 def _leaves_s(
-    clear_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_mps: float, after_s: float
+    clearance_m: FloatArray, margin_m: float, times_s: FloatArray, sigma_mps: float, after_s: float
 ) -> float:
     """When, later than after_s, a body is certainly farther away than margin_m; inf: never."""
     before_m = math.inf
     for j in range(len(times_s)):
-        here_m, t_s = clear_m[j] - margin_m - sigma_mps * times_s[j], float(times_s[j])
+        here_m, t_s = clearance_m[j] - margin_m - sigma_mps * times_s[j], float(times_s[j])
         if here_m > 0.0 and t_s > after_s:
-            return t_s if before_m > 0.0 else _is_0_s(times_s[j - 1], before_m, t_s, here_m)
+            return t_s if before_m > 0.0 else _zero_crossing_s(times_s[j - 1], before_m, t_s, here_m)
         before_m = here_m
     return math.inf
 
 
 @inlined
-def _at(t_s: float, times_s: FloatArray, values: FloatArray) -> float:
+def _interpolated(t_s: float, times_s: FloatArray, values: FloatArray) -> float:
     """The value at t_s, interpolated between the samples; the first or last value outside of them."""
     for j in range(1, len(times_s)):
         if t_s <= times_s[j]:
@@ -171,25 +182,25 @@ def _at(t_s: float, times_s: FloatArray, values: FloatArray) -> float:
 
 
 @compiled("float64[:, :], float64[:], float64[:], float64[:]")
-def _comes_in(
-    clear_m: FloatArray, times_s: FloatArray, sigma_mps: FloatArray, nearer_m: FloatArray
+def _likely_enters(
+    clearance_m: FloatArray, times_s: FloatArray, sigma_mps: FloatArray, nearer_m: FloatArray
 ) -> NDArray[np.bool_]:
     """(N,) which bodies' clearance is 0 or less now, or is likely to be at some time."""
-    found = np.zeros(len(clear_m), np.bool_)
-    for k in range(len(clear_m)):
-        found[k] = clear_m[k, 0] - nearer_m[k] <= 0.0
+    found = np.zeros(len(clearance_m), np.bool_)
+    for k in range(len(clearance_m)):
+        found[k] = clearance_m[k, 0] - nearer_m[k] <= 0.0
         for j in range(len(times_s)):
             if found[k]:
                 break
-            found[k] = _likely(clear_m[k, j] - nearer_m[k], times_s[j], sigma_mps[k]) <= 0.0
+            found[k] = _likely(clearance_m[k, j] - nearer_m[k], times_s[j], sigma_mps[k]) <= 0.0
     return found
 
 
 @compiled("float64[:, :], float64[:, :], float64[:, :], float64[:], float64[:], float64[:], int64[:]")
 def _conflicts(
-    clear_m: FloatArray,
-    lo_m: FloatArray,
-    hi_m: FloatArray,
+    clearance_m: FloatArray,
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
     times_s: FloatArray,
     sigma_mps: FloatArray,
     margin_m: FloatArray,
@@ -202,12 +213,12 @@ def _conflicts(
     found = np.empty((len(rows), 5))
     for i in range(len(rows)):
         k = rows[i]
-        in_s = _enters_s(clear_m[k], margin_m[k], times_s, sigma_mps[k])
-        out_s = _leaves_s(clear_m[k], margin_m[k], times_s, sigma_mps[k], in_s)
+        in_s = _enters_s(clearance_m[k], margin_m[k], times_s, sigma_mps[k])
+        out_s = _leaves_s(clearance_m[k], margin_m[k], times_s, sigma_mps[k], in_s)
         found[i, 0], found[i, 1] = in_s, out_s
-        found[i, 2] = _at(in_s, times_s, lo_m[k])
-        found[i, 3] = _at(out_s, times_s, lo_m[k])
-        found[i, 4] = _at(in_s, times_s, hi_m[k])
+        found[i, 2] = _interpolated(in_s, times_s, block_from_s_m[k])
+        found[i, 3] = _interpolated(out_s, times_s, block_from_s_m[k])
+        found[i, 4] = _interpolated(in_s, times_s, block_to_s_m[k])
     return found
 
 

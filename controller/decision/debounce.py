@@ -16,20 +16,24 @@ class Debounced:
         self._flags: dict[int, bool] = {}
         self._otherwise_since_s: dict[int, float] = {}
 
+    def pause(self) -> None:
+        """Nothing is looked at now: this is a break in what is seen. The flags stay as they are."""
+        self._otherwise_since_s.clear()
+
     def update(self, ids: NDArray[np.int64], seen: BoolArray, at_once: BoolArray, now_s: float) -> BoolArray:
         """(N,) the flags of ids at now_s; other ids are forgotten, and a new one begins with False.
 
         seen (N,): what is seen now. at_once (N,): where the flag follows it without delay.
         """
         flags, since = {}, {}
-        for number, yes, now in zip(ids.tolist(), seen.tolist(), at_once.tolist(), strict=True):
-            flag = self._flags.get(number, False)
+        for track_id, yes, now in zip(ids.tolist(), seen.tolist(), at_once.tolist(), strict=True):
+            flag = self._flags.get(track_id, False)
             if yes != flag:
-                began_s = self._otherwise_since_s.get(number, now_s)
+                began_s = self._otherwise_since_s.get(track_id, now_s)
                 if now or now_s - began_s >= self._settle_s:
                     flag = yes
                 else:
-                    since[number] = began_s
-            flags[number] = flag
+                    since[track_id] = began_s
+            flags[track_id] = flag
         self._flags, self._otherwise_since_s = flags, since
         return np.fromiter(flags.values(), np.bool_, len(flags))

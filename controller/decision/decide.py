@@ -1,9 +1,9 @@
 """Scene, path and state -> Decision: how fast to go now, and why.
 
 Each control step collects all limits of the speed (from obstacles and depth in
-controller/decision/appraise.py; from path, range, camera and faults here) and takes the least. An increase is
-delayed, a decrease is not (controller/decision/release.py). Input that cannot be relied on leads to a
-jerk-limited stop.
+controller/decision/speed_limits.py; from path, range, camera and faults here) and takes the least. An
+increase is delayed, a decrease is not (controller/decision/release.py). Input that cannot be relied on leads
+to a jerk-limited stop.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller import braking
-from controller.decision.appraise import Appraiser
 from controller.decision.decision import Action, Decision, Reason, Rule
-from controller.decision.knowledge import Knowledge
 from controller.decision.limits import (
     BACKWARDS_MPS,
     BLOCKING_RULES,
     STANDING_MPS,
     Limit,
     Motion,
-    allowed,
-    starts_at_mps,
+    allowed_text,
+    min_start_mps,
 )
 from controller.decision.release import ReleaseGate
 from controller.decision.situation import Situation
+from controller.decision.speed_limits import SpeedLimits
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount
@@ -38,7 +38,7 @@ from vision.scene import CameraCondition
 __all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
 
 # Emergency braking goes on until the speed exceeds what is allowed by no more than this.
-_OVER_COMFORT_MPS = 0.05
+_EMERGENCY_EXIT_MPS = 0.05
 # The shaper brakes for the target point exactly; this slack keeps the limit from braking earlier than it.
 _END_SLACK_M = 0.02
 _AT_END_M = 0.02  # the robot is at its target
@@ -65,21 +65,21 @@ class DecisionMaker:
         self._latency_s = period_s + config.chassis_delay_s
         self._sees_m = config.sight.range_m + mount.forward_m - robot.body.front_m
         self._path: Path | None = None
-        self._known: Knowledge | None = None
-        self._appraiser = Appraiser(config, robot.limits, mount)
+        self._known: WorldModel | None = None
+        self._speed_limits = SpeedLimits(config, robot.limits, mount)
         self._gate = ReleaseGate(config.release)
         self._now_ns: int | None = None
         self._emergency = False
         self._stuck_since_ns: int | None = None
         self._last: Reason | None = None
 
-    def take_path(self, path: Path, known: Knowledge) -> None:
+    def take_path(self, path: Path, known: WorldModel) -> None:
         """Continue along another path, of which known is known already; the hysteresis is kept."""
         self._path, self._known = path, known
 
-    def knowledge(self, path: Path, start_s_m: float) -> Knowledge:
-        """New Knowledge of a path about which nothing is known yet, for a robot that stands at start_s_m."""
-        return Knowledge(path, self._robot, self._mount, self._config, start_s_m, self._noise)
+    def world_model(self, path: Path, start_s_m: float) -> WorldModel:
+        """A new WorldModel of a path of which nothing is known yet, for a robot that stands at start_s_m."""
+        return WorldModel(path, self._robot, self._mount, self._config, start_s_m, self._noise)
 
     def step(self, at: Situation) -> Decision:
         """The decision for at.now_ns."""
@@ -87,7 +87,7 @@ class DecisionMaker:
         if fault:
             return self._halt(fault, at.v_mps, at.now_ns)
         path, on_path, v_mps, now_ns = at.path, at.on_path, max(at.v_mps, 0.0), at.now_ns
-        known = self._knowledge(path, on_path)
+        known = self._world_model(path, on_path)
         known.update(at.scene, at.pose, on_path, v_mps, now_ns)
         if not known.has_seen:
             # The release gate is not stepped: the first scene with a free way lets the robot go at once.
@@ -97,7 +97,7 @@ class DecisionMaker:
         on_way = self._path_limit(path, on_path, motion)
         limits = self._camera_limits(known)
         base_mps = min(on_way.speed_mps, _least(limits).speed_mps)
-        limits += self._appraiser.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
+        limits += self._speed_limits.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(on_way, limits, motion, now_ns)
 
     def _input_fault(self, at: Situation) -> str:
@@ -125,10 +125,10 @@ class DecisionMaker:
         action = Action.DECREASE if abs(v) > STANDING_MPS else Action.KEEP
         return Decision(action, 0.0, reason, self._emergency)
 
-    def _knowledge(self, path: Path, on_path: OnPath) -> Knowledge:
+    def _world_model(self, path: Path, on_path: OnPath) -> WorldModel:
         if self._known is None or path is not self._path:
             self._path = path
-            self._known = self.knowledge(path, on_path.s_m)
+            self._known = self.world_model(path, on_path.s_m)
         return self._known
 
     def _path_limit(self, path: Path, on_path: OnPath, motion: Motion) -> Limit:
@@ -144,13 +144,13 @@ class DecisionMaker:
         end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
         if section <= end:
             rule: Rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
-            return Limit(section, lambda: Reason(rule, f"{left_m:.1f} m to go: {allowed(section)}"))
+            return Limit(section, lambda: Reason(rule, f"{left_m:.1f} m to go: {allowed_text(section)}"))
 
         def why() -> Reason:
             required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
             return Reason(
                 "target",
-                f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed(end)}",
+                f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed_text(end)}",
                 distance_m=left_m,
                 closing_mps=0.0,
                 required_m=required,
@@ -159,7 +159,7 @@ class DecisionMaker:
 
         return Limit(end, why)
 
-    def camera_limit(self, known: Knowledge) -> Limit | None:
+    def camera_limit(self, known: WorldModel) -> Limit | None:
         """What the camera's condition alone allows, wherever the robot goes; None: it limits nothing."""
         sight = self._config.sight
         if known.fault:
@@ -170,10 +170,10 @@ class DecisionMaker:
             return Limit(0.0, lambda: reason, urgent=urgent)
         if known.health.condition is not CameraCondition.DEGRADED:
             return None
-        sentence = f"the camera is degraded ({known.health.reason}): {allowed(sight.degraded_mps)}"
+        sentence = f"the camera is degraded ({known.health.reason}): {allowed_text(sight.degraded_mps)}"
         return Limit(sight.degraded_mps, lambda: Reason("camera", sentence))
 
-    def _camera_limits(self, known: Knowledge) -> list[Limit]:
+    def _camera_limits(self, known: WorldModel) -> list[Limit]:
         by_condition = self.camera_limit(known)
         if known.fault and by_condition is not None:
             return [by_condition]
@@ -194,7 +194,7 @@ class DecisionMaker:
             margin_m=self._config.margins.least_m,
         )
         return Limit(
-            speed, lambda: Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed(speed)}")
+            speed, lambda: Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed_text(speed)}")
         )
 
     def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
@@ -204,13 +204,13 @@ class DecisionMaker:
         watched: Reason | None = None
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
-            self._last = watched = _in_words(least, raw_mps)
+            self._last = watched = _reason_for(least, raw_mps)
         gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
         target_mps = min(gated_mps, on_way.speed_mps)
         if on_way.speed_mps <= gated_mps:
             reason = on_way.reason
         else:
-            reason = self._reason(watched or _in_words(least, raw_mps), raw_mps, gated_mps)
+            reason = self._reason(watched or _reason_for(least, raw_mps), raw_mps, gated_mps)
         self._emergency = self._brakes_hard(limits, min(raw_mps, on_way.speed_mps), motion)
         self._note_stuck(target_mps, motion, reason, now_ns)
         action = self._action(target_mps, motion.v_mps)
@@ -226,7 +226,7 @@ class DecisionMaker:
         The robot does not creep up to an obstacle, and does not start for a short free distance.
         """
         release, standing = self._config.release, motion.v_mps <= STANDING_MPS
-        least = starts_at_mps(release, self._comfort) if standing else release.creep_mps
+        least = min_start_mps(release, self._comfort) if standing else release.creep_mps
         if limit.speed_mps >= least:
             return limit.speed_mps
         rule = limit.reason.rule
@@ -264,7 +264,7 @@ class DecisionMaker:
         """
         if motion.v_mps <= STANDING_MPS:
             return False
-        if self._emergency and motion.v_mps > allowed_mps + _OVER_COMFORT_MPS:
+        if self._emergency and motion.v_mps > allowed_mps + _EMERGENCY_EXIT_MPS:
             return True
         return any(limit.urgent for limit in limits)
 
@@ -294,7 +294,7 @@ def _unknown(on_floor: float, along: float) -> str:
     return "how fast the robot is is not known"
 
 
-def _in_words(limit: Limit, speed_mps: float) -> Reason:
+def _reason_for(limit: Limit, speed_mps: float) -> Reason:
     """The limit's reason, if speed_mps is what remains of the limit."""
     reason = limit.reason
     if speed_mps < limit.speed_mps:

@@ -3,7 +3,7 @@
 Floor that was seen free stays free once it is too near to be seen again (controller/decision/sight.py), even
 if somebody has stepped onto it since. Within 0.3 m of the lens hardly any camera measures depth, so whoever
 is there leaves bands of the view without any data, from the lowest row to the uppermost one.
-controller/decision/knowledge.py calls LensCover once a scene.
+controller/decision/world_model.py calls LensCover once a scene.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ class LensCover:
         self._found: deque[bool] = deque(maxlen=_FRAMES)
         # Bands that ever had data. Where the colour image is wider than depth, the sides never have any.
         self._shown = np.zeros(0, np.bool_)
+        self._bearing_tan: FloatArray = np.zeros(0)
 
     def look(self, free: FreeSpace, half_width_m: float, left_m: float) -> None:
         """Take in one scene.
@@ -49,14 +50,23 @@ class LensCover:
         half_width_m: half of the swept width. left_m: offset of the camera to the left of the robot's middle.
         """
         blank = _blank(free)
-        if len(self._shown) != len(blank):
-            self._shown = np.zeros(len(blank), np.bool_)
+        if not self._same_bands(free):
+            self._shown, self._bearing_tan = np.zeros(len(blank), np.bool_), free.bearing_tan
         self._shown, hidden, ahead, never = _right_ahead(
             free.bearing_tan, blank, self._shown, half_width_m, left_m
         )
         wide = 2.0 * free.half_width_tan * hidden >= _HIDES_TAN
         self._found.append(wide or not len(blank) or 2 * never > ahead)
         self.covered = 2 * sum(self._found) > len(self._found)
+
+    def _same_bands(self, free: FreeSpace) -> bool:
+        """Whether the bands are those that have shown something before, to within half a band."""
+        bearing_tan = self._bearing_tan
+        if free.bearing_tan is bearing_tan:
+            return True
+        return len(free.bearing_tan) == len(bearing_tan) and bool(
+            (np.abs(free.bearing_tan - bearing_tan) <= free.half_width_tan).all()
+        )
 
 
 def _blank(free: FreeSpace) -> BoolArray:

@@ -1,7 +1,7 @@
 """Speed limits, each with its reason, and what they are made of; the decision takes the least limit.
 
-The advisers (controller/decision/appraise.py) and controller/decision/decide.py make Limits; stop_before()
-makes the most frequent one.
+The advisers (controller/decision/speed_limits.py) and controller/decision/decide.py make Limits;
+stop_before() makes the most frequent one.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ STANDING_MPS = 0.01
 BACKWARDS_MPS = -0.05  # a smaller backward speed is noise of the odometry
 # A body that moves away from the path goes along with the robot only if its speed along the path is more than
 # this many times its sideways speed. Otherwise it is leaving the path.
-LEAVES_ASLANT = 2.0
+ALONG_TO_SIDE_RATIO = 2.0
 # Nothing corrects the expected place of a body out of view: while it is not seen, an error of this many
 # standard deviations of its velocity may add up.
-UNSEEN_SIGMAS = 2.0
+UNSEEN_ERROR_SIGMAS = 2.0
 
 # Rules of a Reason that mean: something stands or moves in the way.
 BLOCKING_RULES: frozenset[Rule] = frozenset(
@@ -65,13 +65,13 @@ class Gap:
 
     distance_m: the free distance along the path.
     closing_mps: its own speed towards the robot; negative if it drives away.
-    runs_m: how far it still goes ahead even if it brakes now.
+    leader_stop_m: how far it still goes ahead even if it brakes now.
     obstacle_id: None if it is not a tracked obstacle.
     """
 
     distance_m: float
     closing_mps: float = 0.0
-    runs_m: float = 0.0
+    leader_stop_m: float = 0.0
     obstacle_id: int | None = None
 
     @property
@@ -85,16 +85,16 @@ def stop_before(
     motion: Motion,
     comfort: BrakeLimits,
     margin_m: float,
-    least_m: float,
+    min_left_m: float,
     rule: Rule,
     what: str,
 ) -> Limit:
     """The limit for a comfortable stop margin_m before the end of the gap.
 
-    It is urgent if that stop would leave less than least_m. rule, what: for the reason; what completes the
+    It is urgent if that stop would leave less than min_left_m. rule, what: for the reason; what completes the
     sentence "obstacle 3 ... 2.0 m ahead".
     """
-    room_m = gap.distance_m + gap.runs_m
+    room_m = gap.distance_m + gap.leader_stop_m
     speed = braking.speed_for_distance(
         room_m,
         comfort,
@@ -110,10 +110,10 @@ def stop_before(
     spare = room_m - required
 
     def why() -> Reason:
-        sentence = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: {allowed(speed)}"
+        sentence = f"{gap.name} {what} {max(gap.distance_m, 0.0):.1f} m ahead: {allowed_text(speed)}"
         return Reason(rule, sentence, gap.obstacle_id, gap.distance_m, gap.closing_mps, required, spare)
 
-    return Limit(speed, why, urgent=motion.v_mps > 0.0 and spare < least_m - margin_m)
+    return Limit(speed, why, urgent=motion.v_mps > 0.0 and spare < min_left_m - margin_m)
 
 
 def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:
@@ -127,11 +127,11 @@ def speed_to_decide_by(commanded_mps: float, measured_mps: float) -> float:
     return measured_mps if measured_mps < BACKWARDS_MPS else max(commanded_mps, measured_mps)
 
 
-def starts_at_mps(release: Release, comfort: BrakeLimits) -> float:
+def min_start_mps(release: Release, comfort: BrakeLimits) -> float:
     """The least allowed speed at which the robot starts from rest while something blocks the way."""
     return max(release.creep_mps, braking.speed_for_distance(release.go_m, comfort))
 
 
-def allowed(speed_mps: float) -> str:
+def allowed_text(speed_mps: float) -> str:
     """The end of a reason's sentence: what speed is allowed."""
     return "stop" if speed_mps <= 0.0 else f"at most {speed_mps:.2f} m/s"

@@ -2,7 +2,7 @@
 
 A body's box is aligned with the direction of view. On a straight path that is as good as any other direction.
 But in a bend, the box of something seen corner-on may reach into the corridor although the body does not.
-controller/decision/standing.py asks for the outlines of bodies near a bend.
+controller/decision/standing_limits.py asks for the outlines of bodies near a bend.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ _BEHIND_M = 0.15
 class Outline:
     """What depth shows of one body.
 
-    clear_m: free floor between the visible part of the body and the corridor; negative: inside it; inf:
+    clearance_m: free floor between the visible part of the body and the corridor; negative: inside it; inf:
     nothing of it is visible. whole: the body is visible from end to end.
     """
 
-    clear_m: float
+    clearance_m: float
     whole: bool
 
 

@@ -13,7 +13,7 @@ from controller.decision.limits import STANDING_MPS
 from hal.clocks import NS_PER_S
 
 
-class _Least:
+class _RunningMin:
     """Running minimum over the last delay_s, or since the first value if that is less."""
 
     def __init__(self, delay_s: float) -> None:
@@ -46,12 +46,12 @@ class ReleaseGate:
         self._config = config
         self._held_mps = 0.0
         self._rising = True
-        self._went_faster = True
+        self._increasing = True
         self._turned_ns: int | None = None
-        self._lately, self._just_now = _Least(config.delay_s), _Least(config.far_delay_s)
+        self._delayed_min, self._recent_min = _RunningMin(config.delay_s), _RunningMin(config.far_delay_s)
 
     def step(
-        self, raw_mps: float, v_mps: float, let_go_mps: float, now_ns: int, most_mps: float = math.inf
+        self, raw_mps: float, v_mps: float, let_go_mps: float, now_ns: int, max_mps: float = math.inf
     ) -> float:
         """The target speed to use.
 
@@ -59,30 +59,30 @@ class ReleaseGate:
         v_mps: the present speed.
         let_go_mps: the speed that is reached if the present deceleration ends now. Keeping that speed is no
         increase, so it is allowed at any time.
-        most_mps: what the path allows; it bounds the gain, and is not delayed here.
+        max_mps: what the path allows; it bounds the gain, and is not delayed here.
         """
         band = self._config.dead_band_mps
-        least_mps, far_mps = self._lately.update(raw_mps, now_ns), self._just_now.update(raw_mps, now_ns)
+        min_mps, far_mps = self._delayed_min.update(raw_mps, now_ns), self._recent_min.update(raw_mps, now_ns)
         if far_mps >= v_mps + self._config.far_mps:
-            least_mps = far_mps
+            min_mps = far_mps
         if raw_mps < self._held_mps - band or raw_mps <= 0.0:
             self._rising = False
         if raw_mps <= self._held_mps or self._rising:
             self._held_mps = raw_mps
-        elif least_mps > self._held_mps:
-            self._raise(least_mps, let_go_mps, now_ns)
+        elif min_mps > self._held_mps:
+            self._raise(min_mps, let_go_mps, now_ns)
         target_mps = self._held_mps
-        hardly = not self._went_faster and min(target_mps, most_mps) < v_mps + self._config.worth_mps
+        hardly = not self._increasing and min(target_mps, max_mps) < v_mps + self._config.worth_mps
         if hardly or not self._may_turn(now_ns):
             target_mps = min(target_mps, v_mps)
         self._note_turn(target_mps, v_mps, now_ns)
         return target_mps
 
-    def _raise(self, least_mps: float, let_go_mps: float, now_ns: int) -> None:
+    def _raise(self, min_mps: float, let_go_mps: float, now_ns: int) -> None:
         if self._may_turn(now_ns):
-            self._held_mps = least_mps
+            self._held_mps = min_mps
         else:
-            self._held_mps = max(self._held_mps, min(least_mps, let_go_mps))
+            self._held_mps = max(self._held_mps, min(min_mps, let_go_mps))
 
     def _may_turn(self, now_ns: int) -> bool:
         turned_ns = self._turned_ns
@@ -91,9 +91,9 @@ class ReleaseGate:
     def _note_turn(self, target_mps: float, v_mps: float, now_ns: int) -> None:
         band = self._config.dead_band_mps
         if target_mps > v_mps + band:
-            self._went_faster = True
-        elif self._went_faster:
+            self._increasing = True
+        elif self._increasing:
             stops = target_mps <= 0.0 and v_mps > STANDING_MPS
             if stops or target_mps < v_mps - band:
-                self._went_faster = False
+                self._increasing = False
                 self._turned_ns = now_ns

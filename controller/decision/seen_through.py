@@ -1,7 +1,7 @@
 """Remembered standing bodies just inside the edge of the view whose place a standing robot sees to be empty.
 
 People and vehicles that pass leave narrow tracks behind that were judged standing for a moment. Just inside
-the edge of the view controller/decision/memory.py keeps them, since what is there may be just outside. A
+the edge of the view controller/decision/out_of_view.py keeps them, since what is there may be just outside. A
 robot that waits for such a body would wait without end, so it is dropped once its place is seen through.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.view_edges import beyond_edges
+from controller.decision.view_edges import ViewEdges, beyond_edges
 from hal.geometry import wrap_angle_rad
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -40,13 +40,10 @@ class SeenThrough:
         """Start anew: the robot drives, or nothing is remembered."""
         self._since_ns.clear()
 
-    def gone(
-        self, bodies: Bodies, pose: PlanarPose, edge_tan: float, near_m: float, up_tan: float, free: FreeSpace
+    def seen_empty(
+        self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges, free: FreeSpace
     ) -> NDArray[np.bool_]:
-        """(N,) which of the bodies are no longer there, for a robot that stands at pose. Call once a scene.
-
-        edge_tan, near_m, up_tan: the edges of the view (controller/decision/view_edges.py).
-        """
+        """(N,) which bodies are no longer there, for a robot that stands at pose. Call once a scene."""
         if not abs(wrap_angle_rad(pose.heading_rad - self._heading_rad)) <= _STANDS_RAD:
             self.forget()
             self._heading_rad = pose.heading_rad
@@ -57,15 +54,15 @@ class SeenThrough:
         right = self._mount.left_m - offset @ (-sin, cos)
         near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
         in_view = ~bodies.moving & (near > 0.0)
-        in_view &= ~beyond_edges(bodies, near, self._mount.height_m, near_m, up_tan)
-        in_view &= np.abs(right) + bodies.half_across_m <= edge_tan * near - _WELL_INSIDE_M
+        in_view &= ~beyond_edges(bodies, near, self._mount.height_m, edges)
+        in_view &= np.abs(right) + bodies.half_across_m <= edges.edge_tan * near - _WELL_INSIDE_M
         ids, since_ns = bodies.ids.tolist(), {}
         for k in in_view.nonzero()[0].tolist():
             edges_m = right[k] + np.array([-1.0, 1.0]) * bodies.half_across_m[k]
             if _is_free(free, edges_m, float(near[k]), float(far[k])):
                 since_ns[ids[k]] = self._since_ns.get(ids[k], now_ns)
         self._since_ns = since_ns
-        return np.array([now_ns - since_ns.get(number, now_ns) >= _FOR_NS for number in ids], np.bool_)
+        return np.array([now_ns - since_ns.get(track_id, now_ns) >= _FOR_NS for track_id in ids], np.bool_)
 
 
 def _is_free(free: FreeSpace, edges_m: FloatArray, near_m: float, far_m: float) -> bool:

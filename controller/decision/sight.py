@@ -2,7 +2,8 @@
 
 Obstacles are found by edges, which a plain wall does not have, and no depth camera measures glass. So a
 surface that no obstacle explains counts as an obstacle, and floor that was not seen is not free.
-controller/decision/knowledge.py calls Sight once a scene; controller/decision/appraise.py makes the limits.
+controller/decision/world_model.py calls Sight once a scene; controller/decision/speed_limits.py makes the
+limits.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from controller.decision.blind_corners import BlindCorners
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
 from controller.decision.surfaces import Surfaces, seen_of
-from controller.decision.view_edges import LEAST_TAN, above_from_m, consented_m
+from controller.decision.view_edges import MIN_TAN, assumed_free_m, may_be_above_view_within_m
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -32,7 +33,7 @@ _NEVER_NS = -(2**62)  # when a cell was seen that never was
 _LANES = 5  # points across the width of a cell
 # If the view's upper edge hardly rises, a surface that vanishes farther away than this has not gone out of
 # view upwards: it was flicker.
-_MOST_ABOVE_M = 3.0
+_MAX_ABOVE_M = 3.0
 # The median of this many scenes counts: one outlier must not brake; three frames are a tenth of a second.
 _FRAMES = 5
 
@@ -57,13 +58,13 @@ class Sight:
         self._seen_ns = np.full(len(self._cells), _NEVER_NS, np.int64)
         # The floor right before and beside the robot is below the view. At the start it counts as free by
         # the consent of whoever starts the robot.
-        self._near_m = self._floor_from_m = self._lost_m = self._sight.near_m
+        self._near_m = self._floor_from_m = self._out_of_view_within_m = self._sight.near_m
         self._edges = math.nan, math.nan
-        self._consent_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
+        self._assumed_free_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
         self._held_s_m = math.inf
         self.surface_s_m = math.inf
-        self.known_s_m = self._consent_s_m
+        self.known_s_m = self._assumed_free_s_m
         self.corners = BlindCorners(config.sight)
 
     def look(
@@ -82,14 +83,14 @@ class Sight:
         pose, s_m: of the robot when the scene was captured; standing: it was at rest then.
         explained_by: bodies; a surface that belongs to one of them is no obstacle of its own.
         """
-        self._take_edges(free)
+        self._update_view_edges(free)
         bands, forward, points = surfaces.bands, surfaces.forward_m, surfaces.points_m
         surface_s, surface_d = self._corridor.path.project_points(
             points, s_m, s_m + self._sight.range_m + 2.0
         )
         half_width = self._corridor.half_width(surface_s)
         belongs = surfaces.of(explained_by)
-        in_corridor, nearest_s, stands = _beside_the_way(
+        in_corridor, nearest_s, stands = _surfaces_in_corridor(
             bands,
             surface_s,
             surface_d,
@@ -114,25 +115,25 @@ class Sight:
         self._note_surface(nearest_s, s_m, standing)
         self._note_floor(free, pose, s_m, captured_ns, in_corridor)
 
-    def _take_edges(self, free: FreeSpace) -> None:
+    def _update_view_edges(self, free: FreeSpace) -> None:
         """Take in where the view begins and ends, if that has changed.
 
         The higher the camera, the longer the stretch of floor below its view, which cannot be seen before the
-        start. It counts as free by consent, unless it is too long (consented_m).
+        start. It counts as free by consent, unless it is too long (assumed_free_m).
         """
         edges = free.floor_from_m, free.up_tan
         if edges == self._edges:
             return
         self._edges = edges
         self._floor_from_m = max(self._sight.near_m, free.floor_from_m)
-        near_m = consented_m(self._sight.near_m, free.floor_from_m)
+        near_m = assumed_free_m(self._sight.near_m, free.floor_from_m)
         if near_m > self._near_m:
-            self._consent_s_m += near_m - self._near_m
+            self._assumed_free_s_m += near_m - self._near_m
             self._near_m = near_m
-        above_m = above_from_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
-        if free.up_tan < LEAST_TAN:  # the upper edge hardly rises: where things leave it is not known
-            above_m = min(above_m, _MOST_ABOVE_M)
-        self._lost_m = max(self._floor_from_m, above_m)
+        above_m = may_be_above_view_within_m(self._corridor.height_m, self._mount.height_m, free.up_tan)
+        if free.up_tan < MIN_TAN:  # the upper edge hardly rises: where things leave it is not known
+            above_m = min(above_m, _MAX_ABOVE_M)
+        self._out_of_view_within_m = max(self._floor_from_m, above_m)
 
     def _note_surface(self, nearest_s_m: float, s_m: float, standing: bool) -> None:
         self._nearest.append(nearest_s_m)
@@ -140,7 +141,7 @@ class Sight:
         steady = sorted(self._nearest)[len(self._nearest) // 2]
         # A surface that leaves the view below or above it because the robot drives on is still there, so it
         # is held. One that vanishes while the robot stands has gone away.
-        blind_s_m = s_m + self._mount.forward_m + self._lost_m
+        blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
         if standing or self._held_s_m < s_m:
             self._held_s_m = math.inf
         elif steady > before + _CELL_M and before < blind_s_m:
@@ -164,19 +165,19 @@ class Sight:
         if last > first and len(free.bearing_tan):
             # Floor too near to be measured was not seen, however far the scan reaches beyond it. Nor was
             # floor below the view, where that stretch is longer than what is free by consent.
-            least_m = free.blind_m + 0.5 * _CELL_M if free.blind_m > 0.0 else 0.0
+            min_m = free.blind_m + 0.5 * _CELL_M if free.blind_m > 0.0 else 0.0
             if self._floor_from_m > self._near_m:
-                least_m = max(least_m, self._floor_from_m)
+                min_m = max(min_m, self._floor_from_m)
             lanes = self._lanes[:, first:last]
             # Ask for the far edge of a cell: it is not known if only its beginning was seen.
-            seen = seen_of(free, pose, self._mount, lanes, 0.5 * _CELL_M, least_m, in_corridor)
+            seen = seen_of(free, pose, self._mount, lanes, 0.5 * _CELL_M, min_m, in_corridor)
             self._seen_ns = _marked(self._seen_ns, first, seen, self._sight.known_share, captured_ns)
         # Cells too near to be seen again stay free once they were seen free; bodies that may come there are
-        # covered by controller/decision/memory.py and worst_case.py.
+        # covered by controller/decision/out_of_view.py and worst_case_limit.py.
         near_s_m = s_m + self._mount.forward_m + self._near_m + _CELL_M
         memory_ns = round(self._sight.memory_s * NS_PER_S)
         unknown = _first_unknown(
-            self._seen_ns, self._cells, first, captured_ns - memory_ns, near_s_m, self._consent_s_m
+            self._seen_ns, self._cells, first, captured_ns - memory_ns, near_s_m, self._assumed_free_s_m
         )
         known = unknown == len(self._cells)
         self.known_s_m = math.inf if known else float(self._cells[unknown]) - 0.5 * _CELL_M
@@ -193,7 +194,7 @@ class Sight:
     "int64[:], float64[:], float64[:], float64[:], float64[:], boolean[:, :], boolean[:],"
     "float64, float64, int64"
 )
-def _beside_the_way(
+def _surfaces_in_corridor(
     bands: NDArray[np.intp],
     surface_s_m: FloatArray,
     surface_d_m: FloatArray,
@@ -250,15 +251,15 @@ def _first_unknown(
     first: int,
     since_ns: int,
     near_s_m: float,
-    consent_s_m: float,
+    assumed_free_s_m: float,
 ) -> int:
     """Index of the first unknown cell of the cells (C,) from first on; C if there is none.
 
     A cell is unknown if it was not seen since since_ns; up to near_s_m, if it was never seen; up to
-    consent_s_m, never.
+    assumed_free_s_m, never.
     """
     for c in range(first, len(cells_m)):
-        near, consent = cells_m[c] <= near_s_m, cells_m[c] <= consent_s_m
-        if not (seen_ns[c] >= since_ns or (near and seen_ns[c] > _NEVER_NS) or consent):
+        near, assumed = cells_m[c] <= near_s_m, cells_m[c] <= assumed_free_s_m
+        if not (seen_ns[c] >= since_ns or (near and seen_ns[c] > _NEVER_NS) or assumed):
             return c
     return len(cells_m)

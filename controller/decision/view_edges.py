@@ -2,7 +2,8 @@
 
 The lower edge falls from the camera's height to the floor at near_m ahead; the upper edge rises with the
 slope up_tan from the camera's height; the side edges are at the tangent edge_tan. Heights are over the floor,
-distances ahead of the camera. controller/decision/memory.py, seen_through.py, standing.py and sight.py ask.
+distances ahead of the camera. controller/decision/out_of_view.py, seen_through.py, standing_limits.py and
+sight.py ask.
 """
 
 from __future__ import annotations
@@ -14,53 +15,63 @@ from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
 from hal.compiled import compiled, inlined
+from hal.records import record
 from hal.types import CameraMount, FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
 
 # Uncertainty of the height of a body that is seen only in part.
 UNCERTAIN_M = 0.1
-LEAST_TAN, _LEAST_M = 0.1, 1e-3  # lower bounds of divisors
+MIN_TAN, _MIN_M = 0.1, 1e-3  # lower bounds of divisors
 # A body farther behind the camera than about a robot's length no longer counts as out of view.
 _BEHIND_M = 2.0
 # Floor below the view beyond this distance is too much to be taken as free without having been seen.
-_MOST_CONSENT_M = 2.5
+_MAX_ASSUMED_FREE_M = 2.5
 
 
-def consented_m(near_m: float, floor_from_m: float) -> float:
+@record(frozen=True, slots=True)
+class ViewEdges:
+    """Where the camera's view ends.
+
+    edge_tan: tangent of the half angle of view, to either side.
+    near_m: distance ahead of the camera from which the floor is in view.
+    up_tan: slope of the upper edge; inf: not known, then nothing is above the view.
+    """
+
+    edge_tan: float
+    near_m: float
+    up_tan: float
+
+
+def assumed_free_m(near_m: float, floor_from_m: float) -> float:
     """How far ahead of the camera the floor is taken as free although it was never seen, in metres.
 
     Whoever starts the robot consents to that: up to near_m, or to floor_from_m, where the floor comes into
-    view, but never more than _MOST_CONSENT_M (unless near_m is more).
+    view, but never more than _MAX_ASSUMED_FREE_M (unless near_m is more).
     """
-    return max(near_m, min(floor_from_m, _MOST_CONSENT_M))
+    return max(near_m, min(floor_from_m, _MAX_ASSUMED_FREE_M))
 
 
-def beyond_edges(
-    bodies: Bodies, near_face_m: FloatArray, height_m: float, near_m: float, up_tan: float
-) -> BoolArray:
+def beyond_edges(bodies: Bodies, near_face_m: FloatArray, height_m: float, edges: ViewEdges) -> BoolArray:
     """(N,) which bodies are entirely below the view or entirely above it.
 
-    near_face_m (N,): distance of their near faces ahead of the camera. height_m: of the camera. near_m:
-    distance from which it sees the floor. up_tan: slope of the upper edge of its view.
+    near_face_m (N,): distance of their near faces ahead of the camera. height_m: of the camera.
     """
-    return _beyond_edges(near_face_m, bodies.bottom_m, bodies.top_m, height_m, near_m, up_tan)
+    return _beyond_edges(near_face_m, bodies.bottom_m, bodies.top_m, height_m, edges.near_m, edges.up_tan)
 
 
 def out_of_view(
     bodies: Bodies,
     pose: PlanarPose,
     mount: CameraMount,
-    edge_tan: float,
-    near_m: float,
-    up_tan: float,
-    edge_m: float,
-    late_mps: float,
+    edges: ViewEdges,
+    tolerance_m: float,
+    tolerance_mps: float,
 ) -> BoolArray:
     """(N,) which bodies are beside, below or above the view, and no farther than _BEHIND_M behind the camera.
 
-    pose: of the robot that carries the camera. A centre up to edge_m inside the side edge counts as beside
-    the view; of a mover, late_mps more for each second since it was last seen.
+    pose: of the robot that carries the camera. A centre up to tolerance_m inside the side edge counts as
+    beside the view; of a mover, tolerance_mps more for each second since it was last seen.
     """
     return _out_of_view(
         bodies.xy_m,
@@ -75,35 +86,35 @@ def out_of_view(
         mount.forward_m,
         mount.left_m,
         mount.height_m,
-        edge_tan,
-        near_m,
-        up_tan,
-        edge_m,
-        late_mps,
+        edges.edge_tan,
+        edges.near_m,
+        edges.up_tan,
+        tolerance_m,
+        tolerance_mps,
     )
 
 
-def above_from_m(top_m: float, height_m: float, up_tan: float) -> float:
+def may_be_above_view_within_m(top_m: float, height_m: float, up_tan: float) -> float:
     """Distance ahead of the camera below which something with its top at top_m may rise above the view."""
     rise_m = top_m - height_m
-    return max(rise_m, 0.0) / max(up_tan, LEAST_TAN)
+    return max(rise_m, 0.0) / max(up_tan, MIN_TAN)
 
 
-def visible_from_m(
-    bodies: Bodies, side_m: FloatArray, edge_tan: float, near_m: float, height_m: float, up_tan: float
-) -> FloatArray:
+def visible_from_m(bodies: Bodies, side_m: FloatArray, height_m: float, edges: ViewEdges) -> FloatArray:
     """(N,) the least distance ahead of the camera at which a body is seen.
 
     There its centre is within the side edges, its top is above the lower edge and its bottom is below the
-    upper edge. side_m (N,): sideways distance of its centre from the camera's axis.
+    upper edge. side_m (N,): sideways distance of its centre from the camera's axis. height_m: of the camera.
     """
-    return _visible_from_m(bodies.top_m, bodies.bottom_m, side_m, edge_tan, near_m, height_m, up_tan)
+    return _visible_from_m(
+        bodies.top_m, bodies.bottom_m, side_m, height_m, edges.edge_tan, edges.near_m, edges.up_tan
+    )
 
 
 @inlined
 def _lowest_seen_m(ahead_m: float, height_m: float, near_m: float) -> float:
     """Height of the lower edge of the view at ahead_m."""
-    return height_m * (1.0 - ahead_m / max(near_m, _LEAST_M))
+    return height_m * (1.0 - ahead_m / max(near_m, _MIN_M))
 
 
 @inlined
@@ -155,15 +166,15 @@ def _out_of_view(
     edge_tan: float,
     near_m: float,
     up_tan: float,
-    edge_m: float,
-    late_mps: float,
+    tolerance_m: float,
+    tolerance_mps: float,
 ) -> BoolArray:
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     out = np.empty(len(xy_m), np.bool_)
     for k in range(len(xy_m)):
         dx, dy = xy_m[k, 0] - x_m, xy_m[k, 1] - y_m
         ahead, left = dx * cos + dy * sin - forward_m, dy * cos - dx * sin - left_m
-        within_m = edge_m + (late_mps * unseen_s[k] if moving[k] else 0.0)
+        within_m = tolerance_m + (tolerance_mps * unseen_s[k] if moving[k] else 0.0)
         beside = abs(left) > edge_tan * max(ahead, 0.0) - within_m
         beyond = _beyond(ahead - half_view_m[k], bottom_m[k], top_m[k], height_m, near_m, up_tan)
         out[k] = (beside or beyond) and ahead > -_BEHIND_M
@@ -175,15 +186,15 @@ def _visible_from_m(
     top_m: FloatArray,
     bottom_m: FloatArray,
     side_m: FloatArray,
+    height_m: float,
     edge_tan: float,
     near_m: float,
-    height_m: float,
     up_tan: float,
 ) -> FloatArray:
     visible = np.empty(len(top_m))
     for k in range(len(top_m)):
         lowest = min(max(1.0 - (top_m[k] - UNCERTAIN_M) / height_m, 0.0), 1.0)
         rise_m = max(bottom_m[k] + UNCERTAIN_M - height_m, 0.0)
-        beside = abs(side_m[k]) / max(edge_tan, LEAST_TAN)
-        visible[k] = max(beside, near_m * lowest, rise_m / max(up_tan, LEAST_TAN))
+        beside = abs(side_m[k]) / max(edge_tan, MIN_TAN)
+        visible[k] = max(beside, near_m * lowest, rise_m / max(up_tan, MIN_TAN))
     return visible

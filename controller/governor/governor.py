@@ -19,11 +19,11 @@ from config.robot import Robot
 from controller.decision.bodies import SceneError, bodies_of
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
-from controller.decision.knowledge import Knowledge
 from controller.decision.lens_cover import COVERED
 from controller.decision.limits import Limit, Motion, speed_to_decide_by
 from controller.decision.situation import Situation
 from controller.decision.surfaces import check_scan
+from controller.decision.world_model import WorldModel
 from controller.governor.arcs import Kind, Wish, arc_path, corner_m, driveable, understand, why_stop
 from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
@@ -85,7 +85,7 @@ class SpeedGovernor:
         # How the robot moves now: kept until it stands, whatever is asked for meanwhile.
         self._motion = Wish(Kind.STAND)
         self._path: Path | None = None
-        self._known: Knowledge | None = None
+        self._known: WorldModel | None = None
         self._laid_out = (0.0, 0.0)
         self._on_path = OnPath(0.0, 0.0, 0.0)
         self._has_moved = False
@@ -208,13 +208,13 @@ class SpeedGovernor:
         path = arc_path(pose, *wanted, self._decision.sight.range_m, self._robot)
         on_start = OnPath(0.0, 0.0, 0.0)
         before = self._known
-        known = self._decide.knowledge(path, _NEAR_EXTRA_M)
+        known = self._decide.world_model(path, _NEAR_EXTRA_M)
         for scene in self._scenes:
             assert scene.robot_pose is not None
             if before is None or before.has_taken_in(scene):
                 known.update(scene, scene.robot_pose, on_start, self._shape.v_mps, scene.captured_ns)
         if before is not None:
-            known.go_on_from(before)
+            known.take_over(before)
         self._decide.take_path(path, known)
         self._path, self._known, self._laid_out, self._on_path = path, known, wanted, on_start
         return path

@@ -19,7 +19,7 @@ from config.decision import DecisionConfig
 from config.robot import Robot
 from controller.decision.bodies import Bodies
 from controller.decision.surfaces import bands_at, floor_points, surfaces_of
-from controller.decision.view_edges import consented_m
+from controller.decision.view_edges import assumed_free_m
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount, FloatArray, PlanarPose
 from vision.scene import FreeSpace
@@ -39,7 +39,7 @@ _THROUGH_M = 0.1  # a cell is seen free if the view goes on for at least this be
 # takes 1 off. A cell is blocked from _BLOCKED_HITS on, so from the second sighting.
 _HIT, _MOST_HITS, _BLOCKED_HITS = 2, 6, 3
 # How long a mover's surface stays. It may have moved on unseen soon after. The same holds for what leaves the
-# view of a robot that stands, which it can do only by moving (controller/decision/memory.py does the same).
+# view of a robot that stands, which it can do only by moving (as in controller/decision/out_of_view.py).
 _PASSING_NS = 2 * NS_PER_S
 _FOR_EVER_NS = 2**62
 _BESIDE = 2  # a surface also marks the cells up to this many cells around its own
@@ -116,7 +116,7 @@ class GroundMemory:
         if not len(free.bearing_tan):
             return
         self._near_m = max(self._least_near_m, free.floor_from_m)
-        self.consent_m = self._reach_m + consented_m(self._least_near_m, free.floor_from_m)
+        self.consent_m = self._reach_m + assumed_free_m(self._least_near_m, free.floor_from_m)
         if self._stood and not standing:
             # Static surfaces that were in view when the robot set off stay for ever: they leave the view
             # because the robot moves.

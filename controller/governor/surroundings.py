@@ -12,7 +12,7 @@ from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor
 from controller.decision.decision import Reason
-from controller.decision.limits import Gap, Limit, Motion, allowed, stop_before
+from controller.decision.limits import Gap, Limit, Motion, allowed_text, stop_before
 from controller.governor.arcs import corner_m
 from controller.governor.ground import CELL_M, IN_VIEW_NS, GroundMemory
 from controller.path.path import Path
@@ -55,9 +55,8 @@ def near_limits(
     if unknown.any():
         gap = Gap(max(float(cells[unknown.argmax()]) - front_s_m, 0.0))
         limit = stop_before(gap, motion, comfort, margins.least_m, -math.inf, "unseen", "")
-        sentence = (
-            f"the floor of the arc was never seen beyond {gap.distance_m:.1f} m: {allowed(limit.speed_mps)}"
-        )
+        sentence = f"the floor of the arc was never seen beyond {gap.distance_m:.1f} m: "
+        sentence += allowed_text(limit.speed_mps)
         reason = Reason("unseen", sentence, distance_m=gap.distance_m, required_m=limit.reason.required_m)
         found.append(Limit(limit.speed_mps, lambda: reason))
     return found

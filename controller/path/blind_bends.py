@@ -22,7 +22,7 @@ from controller import braking
 from controller.build import build_path, mount_of, path_spec
 from controller.decision.bodies import no_bodies
 from controller.decision.corridor import Corridor
-from controller.decision.limits import starts_at_mps
+from controller.decision.limits import min_start_mps
 from controller.decision.sight import Sight
 from controller.decision.surfaces import NO_SURFACES
 from controller.path.path import Path
@@ -37,7 +37,7 @@ _RUN_IN_M = 3.0
 _SPARE_M = 0.2
 _BANDS = 80
 _WIDEST_BEND_M = 20.0  # no larger radius is proposed
-_TO_THE_CM = 0.05  # precision of the proposed radius
+_RADIUS_PRECISION_M = 0.05  # precision of the proposed radius
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,16 +62,16 @@ class CameraView:
 class BlindBend:
     """A bend that the camera cannot see round.
 
-    stand_s_m: where along the path the robot would stand.
+    stop_s_m: where along the path the robot would stand.
     segment: index of the bend among the segments of the path.
     radius_m: its radius.
-    enough_m: the least radius that the camera could see round; None if there is none.
+    min_radius_m: the least radius that the camera could see round; None if there is none.
     """
 
-    stand_s_m: float
+    stop_s_m: float
     segment: int
     radius_m: float
-    enough_m: float | None
+    min_radius_m: float | None
 
 
 def view_of(config: AppConfig) -> CameraView | None:
@@ -98,10 +98,12 @@ def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
     bend = first_blind_bend(spec, path, config.robot, mount_of(config), view, config.decision)
     if bend is None:
         return None
-    wider = "" if bend.enough_m is None else f"widen it to a radius of {bend.enough_m:.1f} m or more, or "
+    wider = (
+        "" if bend.min_radius_m is None else f"widen it to a radius of {bend.min_radius_m:.1f} m or more, or "
+    )
     return (
         f"{where}: path.segments.{bend.segment}: the camera sees {int(view.degrees)} degrees and not round "
-        f"this bend of {bend.radius_m:g} m radius: {bend.stand_s_m:.1f} m along the path the robot may wait "
+        f"this bend of {bend.radius_m:g} m radius: {bend.stop_s_m:.1f} m along the path the robot may wait "
         f"for ever for floor that it cannot see; {wider}take a camera that sees wider"
     )
 
@@ -113,16 +115,16 @@ def first_blind_bend(
     ends = np.cumsum([segment.length_m for segment in spec.segments])
     arcs = [k for k, segment in enumerate(spec.segments) if isinstance(segment, ArcSpec)]
     for begin_m, end_m in _around(ends, arcs, path.length_m):
-        found = _stands_at(path, robot, mount, view, decision, begin_m, end_m)
+        found = _first_deadlock(path, robot, mount, view, decision, begin_m, end_m)
         if found is None:
             continue
-        stand_s_m, unseen_s_m = found
+        stop_s_m, unseen_s_m = found
         # The hidden floor may lie behind the bend, so the bend is the last one that begins before it.
         segment = max((k for k in arcs if ends[k] - spec.segments[k].length_m <= unseen_s_m), default=arcs[0])
         bend = spec.segments[segment]
         assert isinstance(bend, ArcSpec)
-        enough_m = _enough_m(bend, robot, mount, view, decision)
-        return BlindBend(stand_s_m, segment, bend.radius_m, enough_m)
+        min_radius_m = _min_radius_m(bend, robot, mount, view, decision)
+        return BlindBend(stop_s_m, segment, bend.radius_m, min_radius_m)
     return None
 
 
@@ -140,7 +142,7 @@ def _around(ends: FloatArray, arcs: list[int], length_m: float) -> Iterator[tupl
         yield begin_m, end_m
 
 
-def _stands_at(
+def _first_deadlock(
     path: Path,
     robot: Robot,
     mount: CameraMount,
@@ -159,7 +161,7 @@ def _stands_at(
         np.full(_BANDS, math.inf),
         np.full(_BANDS, view.range_m),
     )
-    go_mps = starts_at_mps(decision.release, braking.comfort(robot.limits))
+    go_mps = min_start_mps(decision.release, braking.comfort(robot.limits))
     # Longer from step to step than floor is remembered, so that of the floor out of view only that right
     # ahead is still known, as after a stop.
     step_ns = round((decision.sight.memory_s + 1.0) * NS_PER_S)
@@ -178,14 +180,14 @@ def _stands_at(
     return None
 
 
-def _enough_m(
+def _min_radius_m(
     bend: ArcSpec, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
 ) -> float | None:
     """The least radius that this camera sees round in a half turn, rounded up to 0.1 m; None above 20."""
     low_m, high_m = bend.radius_m, _WIDEST_BEND_M
     if low_m >= high_m or _half_turn_blind(high_m, robot, mount, view, decision):
         return None
-    while high_m - low_m > _TO_THE_CM:
+    while high_m - low_m > _RADIUS_PRECISION_M:
         middle_m = 0.5 * (low_m + high_m)
         if _half_turn_blind(middle_m, robot, mount, view, decision):
             low_m = middle_m
@@ -200,4 +202,4 @@ def _half_turn_blind(
     line = LineSpec(kind="line", length_m=_RUN_IN_M)
     turn = ArcSpec(kind="arc", radius_m=radius_m, angle_deg=180.0)
     path = Path(PathSpec(segments=(line, turn, line)), robot)
-    return _stands_at(path, robot, mount, view, decision, 0.0, path.length_m - _RUN_IN_M) is not None
+    return _first_deadlock(path, robot, mount, view, decision, 0.0, path.length_m - _RUN_IN_M) is not None

@@ -20,11 +20,11 @@ from hal.types import FloatArray
 Chain = tuple[FloatArray, ...]
 
 _SAMPLE_M = 0.25
-_ROUNDS = 2
+_NEWTON_ROUNDS = 2
 _STRAIGHT_1PM = 1e-7
 # Near the centre of a bend "along the path" has no meaning. Such a point counts as no nearer to the centre
 # than this share of the radius.
-_INNERMOST = 0.05
+_MIN_RADIUS_SHARE = 0.05
 
 
 class Projection:
@@ -142,10 +142,10 @@ def _nearest(
     starts_m = chain[0]
     s_m = starts_m[0] + nearest * _SAMPLE_M
     ahead, left, heading, bend = _seen_from(chain, s_m, x_m, y_m)
-    for _ in range(_ROUNDS):
+    for _ in range(_NEWTON_ROUNDS):
         step = ahead
         if abs(bend) >= _STRAIGHT_1PM:
-            step = math.atan2(bend * ahead, max(1.0 - bend * left, _INNERMOST)) / bend
+            step = math.atan2(bend * ahead, max(1.0 - bend * left, _MIN_RADIUS_SHARE)) / bend
         before_m, s_m = s_m, min(max(s_m + step, low_m), high_m)
         if s_m == before_m:
             break

@@ -41,7 +41,7 @@ def box(
         xy_m=np.array([[x_m, y_m]]),
         velocity_mps=np.array([[vx_mps, vy_mps]]),
         measured_mps=np.array([[vx_mps, vy_mps]]),
-        surprise_mps=np.zeros((1, 2)),
+        innovation_mps=np.zeros((1, 2)),
         covariance=np.eye(2)[None] * sigma_mps**2,
         half_view_m=np.array([half_view_m]),
         half_across_m=np.array([half_across_m]),

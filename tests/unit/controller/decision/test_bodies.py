@@ -83,6 +83,12 @@ def test_selected_bodies_keep_their_order_and_joined_ones_follow() -> None:
     assert len(bodies_of(scene(), POSE, MOUNT, 0.5)) == 0
 
 
+def test_two_obstacles_of_one_id_are_refused() -> None:
+    """What is kept of obstacles from scene to scene is kept by id."""
+    with pytest.raises(SceneError, match="several obstacles have the id 6"):
+        bodies_of(scene(seen(number=7), seen(number=6), seen(number=6)), POSE, MOUNT, 0.5)
+
+
 BAD_VECTORS: list[FloatArray] = [np.array([math.nan, 0.0, 0.0]), np.array([0.0, math.inf, 0.0])]
 
 

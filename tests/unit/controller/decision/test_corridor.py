@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.robot import Body
-from controller.decision.corridor import Corridor, course_of, place
+from controller.decision.corridor import Corridor, path_velocities, place
 from tests.support.bodies import arc_path, box, line_path
 
 BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)
@@ -42,9 +42,9 @@ def test_a_standing_body_blocks_the_robot_from_front_to_tail() -> None:
     placed = place(box(8.0, 0.9), corridor, np.array([0.0, 4.0]), 0.0, 12.0)
     assert placed.s_m.tolist() == [pytest.approx([8.0, 8.0])]
     assert placed.d_m[0, 0] == pytest.approx(0.9)
-    assert placed.lo_m[0, 0] == pytest.approx(8.0 - 0.2 - 0.5)
-    assert placed.hi_m[0, 0] == pytest.approx(8.0 + 0.2 + 0.5)
-    assert placed.clear_m[0, 0] == pytest.approx(0.9 - 0.25 - 0.4)
+    assert placed.block_from_s_m[0, 0] == pytest.approx(8.0 - 0.2 - 0.5)
+    assert placed.block_to_s_m[0, 0] == pytest.approx(8.0 + 0.2 + 0.5)
+    assert placed.clearance_m[0, 0] == pytest.approx(0.9 - 0.25 - 0.4)
 
 
 def test_a_moving_body_is_followed_in_time() -> None:
@@ -60,7 +60,7 @@ def test_a_body_beside_a_bend_is_turned_against_the_path() -> None:
     placed = place(box(4.0, 4.0, half_view_m=0.1, half_across_m=0.6), corridor, np.zeros(1), 3.0, 12.0)
     assert placed.s_m[0, 0] == pytest.approx(2.0 * math.pi)
     assert placed.half_s_m[0, 0] == pytest.approx(0.6, abs=1e-6)
-    assert placed.clear_m[0, 0] == pytest.approx(-0.1 - corridor.half_width(placed.s_m)[0, 0], abs=1e-6)
+    assert placed.clearance_m[0, 0] == pytest.approx(-0.1 - corridor.half_width(placed.s_m)[0, 0], abs=1e-6)
 
 
 def test_velocity_along_and_across_the_path() -> None:
@@ -68,6 +68,6 @@ def test_velocity_along_and_across_the_path() -> None:
     body = box(4.0, 4.0, -0.3, -1.0, sigma_mps=0.2)
     # At the end of the quarter turn the path leads to +y; its left is -x.
     heading = place(body, corridor, np.zeros(1), 3.0, 12.0).heading_rad[:, 0]
-    course = course_of(body, heading)
-    assert (course.along_mps[0], course.left_mps[0]) == pytest.approx((-1.0, 0.3), abs=1e-6)
-    assert (course.sigma_along_mps[0], course.sigma_left_mps[0]) == pytest.approx((0.2, 0.2))
+    velocities = path_velocities(body, heading)
+    assert (velocities.along_mps[0], velocities.left_mps[0]) == pytest.approx((-1.0, 0.3), abs=1e-6)
+    assert (velocities.sigma_along_mps[0], velocities.sigma_left_mps[0]) == pytest.approx((0.2, 0.2))

@@ -10,7 +10,7 @@ import pytest
 from config.robot import Body
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, place
-from controller.decision.crossing import Choice, Conflict, choices, comes_in, find_conflicts
+from controller.decision.crossing import Choice, Conflict, choices, find_conflicts, likely_enters
 from controller.profile import SpeedRamps
 from tests.support.bodies import box, line_path
 
@@ -119,5 +119,5 @@ def test_what_stays_cannot_be_waited_for() -> None:
 def test_who_may_be_nearer_than_where_it_is_placed_may_come_in() -> None:
     """Goes along the way, 0.5 m beside the swept width."""
     placed = place(box(4.0, 0.4 + 0.25 + 0.5, -0.5, 0.0), CORRIDOR, TIMES, 0.0, 12.0)
-    assert not comes_in(placed, TIMES, np.zeros(1), np.array([0.45])).any()
-    assert comes_in(placed, TIMES, np.zeros(1), np.array([0.55])).all()
+    assert not likely_enters(placed, TIMES, np.zeros(1), np.array([0.45])).any()
+    assert likely_enters(placed, TIMES, np.zeros(1), np.array([0.55])).all()

@@ -28,6 +28,15 @@ def test_a_break_starts_the_time_anew() -> None:
     assert not flags.update(ONE, YES, NO, 0.5)[0]
 
 
+def test_a_time_in_which_nothing_is_looked_at_is_a_break_too() -> None:
+    flags = Debounced(0.3)
+    flags.update(ONE, YES, YES, 0.0)
+    flags.update(ONE, NO, NO, 0.1)
+    flags.pause()
+    assert flags.update(ONE, NO, NO, 5.0)[0]
+    assert not flags.update(ONE, NO, NO, 5.31)[0]
+
+
 def test_a_yes_may_need_no_time() -> None:
     flags = Debounced(0.3)
     assert flags.update(ONE, YES, YES, 0.0)[0]

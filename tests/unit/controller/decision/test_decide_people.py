@@ -203,3 +203,15 @@ def test_who_waited_and_walks_on_is_reckoned_with_anew() -> None:
     for _ in range(400):
         bench.step(bench.scene(obstacle(5.0, left_m, age_s=6.0)), robot_mps)
     assert max(walks(age_s=14.0) for _ in range(3)) < 0.8
+
+
+def test_one_frame_after_a_time_in_which_nobody_was_watched_is_no_sign_of_going_elsewhere() -> None:
+    """It comes in, turns away in the last frames before it stops, and in the first one when it goes on."""
+    bench = Bench()
+    coming, turning = (obstacle(5.0, 1.5, vy_mps=left_mps, sigma_mps=0.01) for left_mps in (-0.5, 0.5))
+    bench.settle(coming)
+    for _ in range(10):
+        bench.step(bench.scene(turning))
+    bench.settle(obstacle(5.0, 1.5))
+    bench.step(bench.scene(turning))
+    assert bench.maker._speed_limits._enters._flags == {5: True}

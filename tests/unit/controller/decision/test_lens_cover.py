@@ -93,3 +93,12 @@ def test_beside_a_narrow_way_nobody_is_hidden(half_m: float, covered: bool) -> N
 def test_the_camera_may_sit_to_one_side(left_m: float, covered: bool) -> None:
     """From 0.3 m left of the middle, the way lies from 0.1 m to the left to 0.7 m to the right."""
     assert covered_by(without(0.42, 0.185), half_m=0.4, left_m=left_m) == covered
+
+
+@pytest.mark.parametrize(("scale", "covered"), [(2.0, False), (1.001, True)])
+def test_what_other_bands_have_shown_says_nothing_of_these(scale: float, covered: bool) -> None:
+    """Bands elsewhere, as many as before; a camera that is levelled a little otherwise has the same ones."""
+    bearing = scale * BEARING
+    blank = np.abs(bearing) <= 0.2
+    seen = FreeSpace(bearing, scale * 0.01, np.full(61, math.inf), np.where(blank, 0.0, 10.0), blank=blank)
+    assert covered_by(seen) == covered

@@ -53,7 +53,9 @@ def test_an_oncoming_obstacle_needs_more() -> None:
 def test_what_runs_ahead_gives_room() -> None:
     motion = Motion(1.0, 0.0, 0.2)
     alone = stop_before(Gap(2.0), motion, COMFORT, 0.45, 0.2, "leader", "")
-    running = stop_before(Gap(2.0, closing_mps=-1.0, runs_m=0.5), motion, COMFORT, 0.45, 0.2, "leader", "")
+    running = stop_before(
+        Gap(2.0, closing_mps=-1.0, leader_stop_m=0.5), motion, COMFORT, 0.45, 0.2, "leader", ""
+    )
     assert running.speed_mps > alone.speed_mps
     assert running.reason.distance_m == 2.0
     assert running.reason.margin_m == pytest.approx(alone.reason.margin_m + 0.5)

@@ -12,12 +12,12 @@ from config.decision import DecisionConfig
 from config.robot import Body, Robot
 from controller.decision.corridor import Corridor
 from controller.decision.decision import Decision
-from controller.decision.knowledge import Knowledge
 from controller.decision.limits import Motion
 from controller.decision.outline import Outline, outline_of
 from controller.decision.situation import Situation
-from controller.decision.standing import StandingLimits
+from controller.decision.standing_limits import StandingLimits
 from controller.decision.surfaces import Surfaces
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath, Path
 from hal.types import FloatArray, PlanarPose
 from tests.support.bodies import arc_path, box, line_path
@@ -57,7 +57,7 @@ def test_the_side_that_is_seen_decides() -> None:
     """The box's corner would be 0.176 m from the corridor."""
     found = outline(CORNER_ON, 45.0)
     assert found.whole
-    assert found.clear_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
+    assert found.clearance_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
 
 
 def test_behind_a_flat_face_the_body_goes_on() -> None:
@@ -65,14 +65,14 @@ def test_behind_a_flat_face_the_body_goes_on() -> None:
     the body may end."""
     behind_m = 0.3 * math.sin(math.radians(45.0))
     flat = np.array([NEAR_X_M - behind_m, NEAR_Y_M + behind_m]) + EDGE * [1.0, 1.0]
-    assert outline(flat, -45.0).clear_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
+    assert outline(flat, -45.0).clearance_m == pytest.approx(NEAR_Y_M - 0.4 - HALF_BAND_M, abs=1e-9)
 
 
 def test_an_outline_with_a_gap_is_not_whole() -> None:
     assert not outline(np.concatenate((CORNER_ON[:10], CORNER_ON[16:])), 45.0).whole
     front = outline(CORNER_ON[:12], 45.0)
     assert not front.whole
-    assert front.clear_m == pytest.approx(CORNER_ON[11, 1] - 0.4 - HALF_BAND_M)
+    assert front.clearance_m == pytest.approx(CORNER_ON[11, 1] - 0.4 - HALF_BAND_M)
     assert outline(CORNER_ON[:0], 45.0) == Outline(math.inf, whole=False)
     assert outline(np.add(CORNER_ON, (0.0, 1.5)), 45.0) == Outline(math.inf, whole=False)
 
@@ -202,11 +202,11 @@ def test_on_another_path_what_stands_is_placed_anew_without_a_new_scene() -> Non
     look(bench, obstacle(2.2, 1.0, size_m=(0.4, 0.8)), free_space(bands=80), line_path())
     before = bench.maker._known
     assert before is not None
-    known = Knowledge(path, Robot(), MOUNT, DecisionConfig(), 0.0)
-    known.go_on_from(before)
+    known = WorldModel(path, Robot(), MOUNT, DecisionConfig(), 0.0)
+    known.take_over(before)
     assert known.surfaces is before.surfaces
     assert known.health is before.health
-    assert known.edge_tan == before.edge_tan
+    assert known.edges == before.edges
     standing = StandingLimits(DecisionConfig(), Robot().limits, MOUNT, set())
     motion = Motion(0.4, 0.0, 0.2)
     assert standing.limits(before, 0.0, motion) == []

@@ -154,7 +154,7 @@ def test_nor_where_the_path_hardly_allows_more() -> None:
     gate = Gate(1.0)
     gate.hold(0.5, 4.0)
     for _ in range(60):
-        target = gate.gate.step(1.5, 0.5, 0.5, gate.now_ns, most_mps=0.55)
+        target = gate.gate.step(1.5, 0.5, 0.5, gate.now_ns, max_mps=0.55)
         gate.now_ns += STEP_NS
     assert target == 0.5
 

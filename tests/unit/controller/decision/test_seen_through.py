@@ -9,12 +9,14 @@ import pytest
 
 from controller.decision.bodies import Bodies
 from controller.decision.seen_through import SeenThrough
+from controller.decision.view_edges import ViewEdges
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
 from vision.scene import FreeSpace
 
 MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
-EDGE, NEAR_M, UP = 0.7, 1.3, 0.4
+EDGE = 0.7
+EDGES = ViewEdges(edge_tan=EDGE, near_m=1.3, up_tan=0.4)
 AT = PlanarPose(10.0, 0.0, 0.0)
 BANDS = np.linspace(-EDGE + 0.01, EDGE - 0.01, 70)
 ALL_FREE = FreeSpace(BANDS, 0.01, np.full(70, np.inf), np.full(70, 8.0))
@@ -35,12 +37,10 @@ def gone_in(
     """Whether it is gone, scene by scene."""
     return [
         bool(
-            seen_through.gone(
+            seen_through.seen_empty(
                 replace(body, captured_ns=round(k * PERIOD_S * 1e9)),
                 replace(AT, heading_rad=heading_rad),
-                EDGE,
-                NEAR_M,
-                UP,
+                EDGES,
                 one,
             ).all()
         )

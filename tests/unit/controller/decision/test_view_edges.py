@@ -17,8 +17,8 @@ from controller.campaign.noise_mission import drive_noise
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
 from controller.campaign.task import yardstick
-from controller.decision.knowledge import Knowledge
-from controller.decision.view_edges import beyond_edges, visible_from_m
+from controller.decision.view_edges import ViewEdges, beyond_edges, visible_from_m
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from sim.families import generate
@@ -49,9 +49,9 @@ def stops_before_it(robot: Robot, family: str, seed: int) -> bool:
     return row.contacts == 0 and not row.reached and log.s_m[-1] > 3.0
 
 
-def after_a_pallet(floor_from_m: float) -> Knowledge:
+def after_a_pallet(floor_from_m: float) -> WorldModel:
     """What is known when a pallet 1.55 m ahead of the camera is seen no longer, by a robot that drives."""
-    known = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    known = WorldModel(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
     space = replace(free_space(), floor_from_m=floor_from_m)
     pallet = obstacle(2.0, 0.1, size_m=(0.5, 0.1))
     for number, seen in enumerate([(pallet,), ()]):
@@ -64,14 +64,14 @@ def test_what_sinks_below_the_view_is_kept_however_far_ahead_the_view_begins(
     floor_from_m: float, near_m: float
 ) -> None:
     known = after_a_pallet(floor_from_m)
-    assert known.near_m == near_m
+    assert known.edges.near_m == near_m
     assert known.remembered.tolist() == ([True] if floor_from_m > 1.6 else [])
 
 
 def test_where_the_view_begins_is_known_on_the_next_path_too() -> None:
-    on = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
-    on.go_on_from(after_a_pallet(1.9))
-    assert on.near_m == 1.9
+    on = WorldModel(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    on.take_over(after_a_pallet(1.9))
+    assert on.edges.near_m == 1.9
 
 
 @pytest.mark.parametrize("seed", [6100000, 6100001, 6100003])
@@ -83,9 +83,9 @@ def test_a_long_robot_with_a_high_camera_does_not_drive_over_a_pallet(seed: int)
 LOW = Robot(limits=CONFIG.robot.limits, camera_mount=Mount(height_m=0.25, pitch_deg=0.0))
 
 
-def after_a_beam(up_tan: float, bottom_m: float = 0.65, ahead_m: float = 0.9) -> Knowledge:
+def after_a_beam(up_tan: float, bottom_m: float = 0.65, ahead_m: float = 0.9) -> WorldModel:
     """What is known when a beam as wide as somebody is seen no longer, by a robot that drives."""
-    known = Knowledge(PATH, Robot(), CameraMount(0.45, 0.0, 0.25, 0.0), DecisionConfig(), 0.0)
+    known = WorldModel(PATH, Robot(), CameraMount(0.45, 0.0, 0.25, 0.0), DecisionConfig(), 0.0)
     space = replace(free_space(), up_tan=up_tan)
     beam = obstacle(0.45 + ahead_m, 0.0, size_m=(0.5, 0.2))
     beam = replace(beam, position_m=np.array([0.0, 0.25 - bottom_m - 0.1, ahead_m]))
@@ -107,7 +107,7 @@ def test_what_rises_above_the_view_is_kept(
     up_tan: float, bottom_m: float, ahead_m: float, kept: bool
 ) -> None:
     known = after_a_beam(up_tan, bottom_m, ahead_m)
-    assert known.up_tan == up_tan
+    assert known.edges.up_tan == up_tan
     assert known.remembered.tolist() == ([True] if kept else [])
 
 
@@ -125,20 +125,20 @@ def test_a_camera_at_the_height_of_what_hangs_above_the_robot_sees_the_floor_und
 def test_what_hangs_is_stood_off_so_far_that_its_going_is_seen(up_tan: float, off_m: float) -> None:
     """Its underside at 0.65 m has to be 0.1 m below the upper edge of a camera at 0.25 m; 3 m at most."""
     beam = box(8.0, 0.0, top_m=0.85, bottom_m=0.65)
-    found = visible_from_m(beam, np.zeros(1), 0.5, 1.3, 0.25, up_tan)[0]
+    found = visible_from_m(beam, np.zeros(1), 0.25, ViewEdges(0.5, 1.3, up_tan))[0]
     assert min(found, 3.0) == pytest.approx(off_m, abs=0.01)
 
 
 def test_no_view_ends_where_the_robot_is() -> None:
     """A near_m of 0: what begins behind the camera is below its view, and nothing divides by zero."""
     pallets = box(0.0, 0.0, top_m=0.15).joined(box(1.0, 0.0, top_m=0.15))
-    found = beyond_edges(pallets, np.array([-0.01, 1.0]), 0.6, 0.0, math.inf)
+    found = beyond_edges(pallets, np.array([-0.01, 1.0]), 0.6, ViewEdges(0.5, 0.0, math.inf))
     assert found.tolist() == [True, False]
 
 
 def test_where_a_body_can_be_seen_from() -> None:
     bodies = box(5.0, 0.6, top_m=1.7).joined(box(5.0, 0.0, top_m=0.15)).joined(box(5.0, 0.0, top_m=0.7))
     bodies = bodies.joined(box(5.0, 0.0, top_m=1.2, bottom_m=0.8))
-    seen_from = visible_from_m(bodies, np.array([0.6, 0.0, 0.0, 0.0]), 0.5, 1.3, 0.6, 0.3)
+    seen_from = visible_from_m(bodies, np.array([0.6, 0.0, 0.0, 0.0]), 0.6, ViewEdges(0.5, 1.3, 0.3))
     assert seen_from.tolist() == pytest.approx([1.2, 1.3 * (1 - 0.05 / 0.6), 0.0, (0.8 + 0.1 - 0.6) / 0.3])
-    assert visible_from_m(bodies, np.zeros(4), 0.5, 1.3, 0.6, math.inf)[3] == 0.0
+    assert visible_from_m(bodies, np.zeros(4), 0.6, ViewEdges(0.5, 1.3, math.inf))[3] == 0.0

@@ -279,7 +279,7 @@ def test_who_has_left_the_view_is_remembered_through_every_new_arc() -> None:
         known = drive.governor._known
         assert known is not None
         arcs.add(id(drive.governor._path))
-        remembered.append(len(known._memory._bodies))
+        remembered.append(len(known._out_of_view._bodies))
         if step > 14.0 / PERIOD_S:
             break
     first = remembered.index(1)

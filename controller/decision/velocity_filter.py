@@ -2,8 +2,8 @@
 
 The newest velocity of something far away is mostly noise, and a prediction made from it would change with
 every frame. So a Kalman filter for each axis follows good measurements at once and averages poor ones. By how
-much the newest measurement differs beyond noise, and may go on to differ, is kept as surprise for the worst
-case. controller/decision/knowledge.py calls it once a scene.
+much the newest measurement differs beyond noise, and may go on to differ, is kept as innovation_mps for the
+worst case. controller/decision/world_model.py calls it once a scene.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from hal.types import FloatArray
 
 # Process noise: people change their velocity by this standard deviation in one second, as a random walk (it
 # grows with the square root of time).
-_CHANGES_MPS = 0.3
+_PROCESS_SIGMA_MPS = 0.3
 # Perception measures each velocity over this time, so the errors of successive measurements are correlated.
-_ALIKE_S = 0.25
+_CORRELATED_S = 0.25
 # Only this much of a difference is taken for noise, so that a body that sets off is noticed at once. The rest
 # counts twice: the body is still changing its velocity, and before the robot reacts it will have changed once
 # more by as much as the average lags behind.
-_NOISE_SIGMAS, _GOES_ON = 0.5, 2.0
+_NOISE_SIGMAS, _SURPRISE_GAIN = 0.5, 2.0
 
 
 class SteadyVelocities:
@@ -41,14 +41,14 @@ class SteadyVelocities:
         self._captured_ns = 0
 
     def update(self, seen: Bodies) -> Bodies:
-        """The bodies with averaged velocities, and with surprise_mps from the newest measurements."""
+        """The bodies with averaged velocities, and with innovation_mps from the newest measurements."""
         dt_s = max((seen.captured_ns - self._captured_ns) / NS_PER_S, 1e-3)
         self._captured_ns = seen.captured_ns
         moving = seen.moving
         if not np.count_nonzero(moving):
             self._ids = self._ids[:0]
             return seen
-        velocity, variance, surprise = _averaged(
+        velocity, variance, innovation = _averaged(
             seen.ids,
             moving,
             seen.velocity_mps,
@@ -60,7 +60,7 @@ class SteadyVelocities:
             dt_s,
         )
         self._ids, self._moved, self._velocity, self._variance = seen.ids, moving, velocity, variance
-        return replace(seen, velocity_mps=velocity, surprise_mps=surprise)
+        return replace(seen, velocity_mps=velocity, innovation_mps=innovation)
 
 
 @compiled(
@@ -78,14 +78,14 @@ def _averaged(
     before_variance: FloatArray,
     dt_s: float,
 ) -> FloatArray:
-    """(3, N, 2) velocity, its variance, and the surprise of N bodies.
+    """(3, N, 2) velocity, its variance, and the innovation of N bodies.
 
     before_ids, moved (M,), before_mps and before_variance (M, 2): the bodies of the last scene. A body that
     did not move then starts with its measurement.
     """
     result = np.zeros((3, *measured_mps.shape))
-    velocity, variance, surprise = result
-    alike = max(_ALIKE_S / dt_s, 1.0)
+    velocity, variance, innovation = result
+    correlated = max(_CORRELATED_S / dt_s, 1.0)
     for k in range(len(ids)):
         before = -1
         for m in range(len(before_ids)):
@@ -96,11 +96,11 @@ def _averaged(
             velocity[k, axis], variance[k, axis] = measured, spread
             if before < 0:
                 continue
-            expected = before_variance[before, axis] + _CHANGES_MPS**2 * dt_s
-            gain = expected / (expected + spread * alike)
+            expected = before_variance[before, axis] + _PROCESS_SIGMA_MPS**2 * dt_s
+            gain = expected / (expected + spread * correlated)
             average = before_mps[before, axis] + gain * (measured - before_mps[before, axis])
             velocity[k, axis], variance[k, axis] = average, (1.0 - gain) * expected
             differs = measured - average
             beyond_noise = max(abs(differs) - _NOISE_SIGMAS * math.sqrt(spread), 0.0)
-            surprise[k, axis] = _GOES_ON * math.copysign(beyond_noise, differs)
+            innovation[k, axis] = _SURPRISE_GAIN * math.copysign(beyond_noise, differs)
     return result

@@ -1,7 +1,7 @@
 """Bodies that have left the camera's view but are still there: below, beside or above it.
 
-controller/decision/knowledge.py calls OutOfView.leaving, then OutOfView.update, once a scene. A body of the
-last scene that is missing in this one is kept while its place is outside the view:
+controller/decision/world_model.py calls OutOfView.mark_leaving_movers, then OutOfView.update, once a scene. A
+body of the last scene that is missing in this one is kept while its place is outside the view:
 
 * Standing (seen for at least 0.5 s; the robot drives): kept where it was, until its place is in view again,
   a seen body covers it, or it lies 2 m behind the camera. If it goes missing while the robot stands, it has
@@ -11,7 +11,7 @@ last scene that is missing in this one is kept while its place is outside the vi
   along with the robot. Dropped earlier if its place is well within the view or 2 m behind the camera.
 * Judged standing (a verdict takes some frames), but clearly measured as approaching (or as moving anywhere,
   if seen for 0.5 to 1 s): counts as moving, with the velocity measured last, even if the robot stands
-  (controller/decision/going.py).
+  (controller/decision/unseen_motion.py).
 * Moving, and expected in view where the scene shows free floor: moved sideways to the edge of the free space,
   and no longer approaching (its velocity towards the axis becomes 0, its variance grows). The same 2 s or
   6 s apply. A body that clearly approached may first be some decimetres late.
@@ -30,17 +30,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.going import (
-    NOBODY_HALF_M,
-    SETTLED_S,
-    alike,
-    as_measured,
-    known_part,
-    may_come,
-    out_or_coming,
-)
 from controller.decision.seen_through import SeenThrough
-from controller.decision.view_edges import beyond_edges, out_of_view
+from controller.decision.unseen_motion import (
+    MIN_MOVER_HALF_WIDTH_M,
+    MIN_TRACKED_S,
+    may_enter_way,
+    significant_component,
+    unseen_or_approaching,
+    velocities_agree,
+    with_measured_velocity,
+)
+from controller.decision.view_edges import ViewEdges, beyond_edges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
@@ -53,61 +53,61 @@ IntArray = NDArray[np.int64]
 # A seen body covers the place of a kept one within this distance across the view.
 _SAME_PLACE_M = 0.25
 # How long a mover is kept: in general, and if it may come into the robot's way.
-_MOVING_KEPT_S, _MAY_COME_KEPT_S = 2.0, 6.0
+_MOVING_KEPT_S, _MAY_ENTER_KEPT_S = 2.0, 6.0
 # A place this far inside the side edge of the view still counts as outside; of a mover, for each second since
 # it was last seen, this much more.
-_EDGE_M, _EDGE_MPS = 0.3, 0.15
+_EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS = 0.3, 0.15
 # An approaching mover that was not seen to come in stays at least this far from the camera's axis.
-_MIDDLE_M = 0.1
+_MIN_AXIS_DISTANCE_M = 0.1
 # A body out of view may have changed its velocity by this much per second.
-_TURNS_MPS2 = 0.25
-_TOUCHING = 1e-6  # rounding
+_VELOCITY_CHANGE_MPS2 = 0.25
+_ROUNDING = 1e-6  # rounding
 # A strip this near to a kept mover may be a part of it.
-_REST_M = 0.5
+_STRIP_REACH_M = 0.5
 
 
 class OutOfView:
-    """The bodies out of view; call leaving, then update, once a scene.
+    """The bodies out of view; call mark_leaving_movers, then update, once a scene.
 
-    near_m: distance ahead of the camera from which the floor is in view. up_tan: slope of the view's upper
-    edge. Set both before the calls if the scene tells them. max_obstacle_speed_mps: measured speeds that are
-    far above it (IMPLAUSIBLE times) are mistakes.
+    max_obstacle_speed_mps: measured speeds that are far above it (IMPLAUSIBLE times) are mistakes.
     """
 
-    def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
-        self._mount, self.near_m, self.up_tan = mount, near_m, math.inf
+    def __init__(self, mount: CameraMount, max_obstacle_speed_mps: float) -> None:
+        self._mount = mount
         self._mistaken_mps = IMPLAUSIBLE * max_obstacle_speed_mps
         self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)
         # Of bodies that are judged standing but clearly approached: by id, the velocity measured last.
-        self._coming: dict[int, FloatArray] = {}
+        self._approach_velocity: dict[int, FloatArray] = {}
         self._widest_of, self._widest_half_m = np.zeros(0, np.int64), np.zeros(0)
 
-    def leaving(self, seen: Bodies, pose: PlanarPose, edge_tan: float) -> Bodies:
+    def mark_leaving_movers(self, seen: Bodies, pose: PlanarPose, edges: ViewEdges) -> Bodies:
         """The seen bodies, of which some that are judged standing are made moving.
 
         These are the ones that approached the robot's axis when last seen, which perception now only predicts
         (unseen_s > 0), and whose place is out of view. They get the velocity measured last.
         """
         if not len(seen):
-            self._widest_of, self._coming = seen.ids, {}
+            self._widest_of, self._approach_velocity = seen.ids, {}
             return seen
         # The edge of the view cuts bodies off, so the present width says little.
         self._widest_half_m = _widest(seen.ids, seen.half_across_m, self._widest_of, self._widest_half_m)
         self._widest_of = seen.ids
-        out, comes = out_or_coming(seen, self._widest_half_m, pose)
-        if not self._coming and not np.count_nonzero(comes):
+        out, comes = unseen_or_approaching(seen, self._widest_half_m, pose)
+        if not self._approach_velocity and not np.count_nonzero(comes):
             return seen
-        ids, before = seen.ids.tolist(), self._coming
-        self._coming = {ids[k]: seen.measured_mps[k] for k in np.flatnonzero(comes).tolist()}
-        self._coming |= {ids[k]: before[ids[k]] for k in np.flatnonzero(out).tolist() if ids[k] in before}
-        came = np.array([one in self._coming for one in ids], np.bool_)
-        leaves = out & came & self._hidden(seen, pose, edge_tan)
+        ids, before = seen.ids.tolist(), self._approach_velocity
+        self._approach_velocity = {ids[k]: seen.measured_mps[k] for k in np.flatnonzero(comes).tolist()}
+        self._approach_velocity |= {
+            ids[k]: before[ids[k]] for k in np.flatnonzero(out).tolist() if ids[k] in before
+        }
+        came = np.array([one in self._approach_velocity for one in ids], np.bool_)
+        leaves = out & came & self._outside_view(seen, pose, edges)
         if not leaves.any():
             return seen
         velocity = seen.velocity_mps.copy()
-        velocity[leaves] = [self._coming[ids[k]] for k in np.flatnonzero(leaves).tolist()]
+        velocity[leaves] = [self._approach_velocity[ids[k]] for k in np.flatnonzero(leaves).tolist()]
         return replace(seen, velocity_mps=velocity, moving=seen.moving | leaves)
 
     def update(
@@ -115,7 +115,7 @@ class OutOfView:
         before: Bodies,
         seen: Bodies,
         pose: PlanarPose,
-        edge_tan: float,
+        edges: ViewEdges,
         standing: bool,
         free: FreeSpace,
     ) -> Bodies:
@@ -126,45 +126,62 @@ class OutOfView:
         one that was part of a body that is still seen.
         """
         dt_s = (seen.captured_ns - before.captured_ns) / NS_PER_S
-        bodies, since = self._bodies, self._since_s + dt_s
-        missing = _missing(before.ids, seen.ids)
-        if np.count_nonzero(missing):
-            gone = as_measured(before.select(missing), self._mistaken_mps)
-            gone = gone.select(gone.moving | ((gone.age_s >= SETTLED_S) & (not standing)))
-            bodies, since = bodies.joined(gone), np.concatenate((since, np.full(len(gone), dt_s)))
+        bodies, since_s = self._with_missing(before, seen, dt_s, standing)
         if not len(bodies):
             self._seen_through.forget()
             return no_bodies(seen.captured_ns)
         some_move = np.count_nonzero(bodies.moving) > 0
-        xy_m = self._gone_on(bodies, dt_s, pose) if some_move else bodies.xy_m
-        bodies = bodies.gone_on(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
-        part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
-        kept = self._hidden(bodies, pose, edge_tan)
-        if some_move:
-            part_of &= alike(bodies, seen) | ~bodies.moving[:, None]
-            kept &= ~bodies.moving | (
-                since <= np.where(may_come(bodies, pose), _MAY_COME_KEPT_S, _MOVING_KEPT_S)
-            )
-        kept = _not_seen(kept, part_of, bodies.ids, seen.ids)
-        if some_move:
-            kept &= ~_rests(bodies, kept)
+        xy_m = self._extrapolated(bodies, dt_s, pose) if some_move else bodies.xy_m
+        bodies = bodies.moved_to(seen.captured_ns, xy_m, bodies.unseen_s + dt_s)
+        kept = self._still_out_of_view(bodies, since_s, seen, pose, edges)
         if standing:
-            edges = edge_tan, self.near_m, self.up_tan
-            kept &= ~self._seen_through.gone(bodies, pose, *edges, free)
+            kept &= ~self._seen_through.seen_empty(bodies, pose, edges, free)
         else:
             self._seen_through.forget()
         if np.count_nonzero(kept) < len(kept):
-            since, bodies = since[kept], bodies.select(kept)
-        self._since_s, self._bodies = since, bodies
-        if some_move:
-            self._bodies = self._kept_out(self._bodies, pose, free)
+            since_s, bodies = since_s[kept], bodies.select(kept)
+        self._since_s = since_s
+        self._bodies = self._pushed_out_of_view(bodies, pose, edges, free) if some_move else bodies
         return self._bodies
 
-    def _gone_on(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:
+    def _with_missing(
+        self, before: Bodies, seen: Bodies, dt_s: float, standing: bool
+    ) -> tuple[Bodies, FloatArray]:
+        """The bodies kept so far, then those of before that are missing in seen; and since when, in seconds.
+
+        The latter move, or have stood long enough to be believed and vanished while the robot drove.
+        """
+        bodies, since_s = self._bodies, self._since_s + dt_s
+        missing = _missing(before.ids, seen.ids)
+        if not np.count_nonzero(missing):
+            return bodies, since_s
+        gone = with_measured_velocity(before.select(missing), self._mistaken_mps)
+        gone = gone.select(gone.moving | ((gone.age_s >= MIN_TRACKED_S) & (not standing)))
+        return bodies.joined(gone), np.concatenate((since_s, np.full(len(gone), dt_s)))
+
+    def _still_out_of_view(
+        self, bodies: Bodies, since_s: FloatArray, seen: Bodies, pose: PlanarPose, edges: ViewEdges
+    ) -> BoolArray:
+        """(N,) which bodies, last seen since_s ago (N,), are outside the view and not part of a seen one.
+
+        Movers are kept for a limited time only.
+        """
+        part_of = seen.covers(bodies.xy_m, bodies.half_view_m, _SAME_PLACE_M)
+        outside = self._outside_view(bodies, pose, edges)
+        if not np.count_nonzero(bodies.moving):
+            return _still_kept(outside, part_of, bodies.ids, seen.ids)
+        part_of &= velocities_agree(bodies, seen) | ~bodies.moving[:, None]
+        kept_s = np.where(may_enter_way(bodies, pose), _MAY_ENTER_KEPT_S, _MOVING_KEPT_S)
+        outside &= ~bodies.moving | (since_s <= kept_s)
+        kept = _still_kept(outside, part_of, bodies.ids, seen.ids)
+        return kept & ~_leftover_strips(bodies, kept)
+
+    def _extrapolated(self, bodies: Bodies, dt_s: float, pose: PlanarPose) -> FloatArray:
         """(N, 2) the positions dt_s later at constant velocity.
 
         A mover ahead of the camera that approaches its axis (by more than one standard deviation of the
-        sideways velocity) stays at least _MIDDLE_M on its own side: had it crossed, it would have been seen.
+        sideways velocity) stays at least _MIN_AXIS_DISTANCE_M on its own side: had it crossed, it would have
+        been seen.
         """
         way = bodies.velocity_mps * dt_s
         forward = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
@@ -175,23 +192,25 @@ class OutOfView:
         ahead = offset @ forward - self._mount.forward_m - bodies.half_view_m > 0.0
         sigma_mps = np.sqrt(leftward @ bodies.covariance @ leftward)
         comes = bodies.moving & ahead & (-side * (bodies.velocity_mps @ leftward) > sigma_mps)
-        past_m = np.where(comes, np.maximum(_MIDDLE_M - side * (left + way @ leftward), 0.0), 0.0)
+        past_m = np.where(comes, np.maximum(_MIN_AXIS_DISTANCE_M - side * (left + way @ leftward), 0.0), 0.0)
         xy: FloatArray = bodies.xy_m + way + (side * past_m)[:, None] * leftward
         return xy
 
-    def _kept_out(self, bodies: Bodies, pose: PlanarPose, free: FreeSpace) -> Bodies:
+    def _pushed_out_of_view(
+        self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges, free: FreeSpace
+    ) -> Bodies:
         """The bodies, with movers whose expected place is seen to be free moved outwards, out of the view.
 
         They are moved sideways to the edge of the free space, and a velocity towards the axis is replaced by
         its forward component. A body that approaches (by more than one standard deviation) is not moved
-        until it is late by _EDGE_M plus _EDGE_MPS for each second since it was last seen.
+        until it is late by _EDGE_TOLERANCE_M plus _EDGE_TOLERANCE_MPS for each second since it was last seen.
         """
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
         forward, leftward = np.array([cos, sin]), np.array([-sin, cos])
         offset = bodies.xy_m - (pose.x_m, pose.y_m)
         ahead, left = offset @ forward - self._mount.forward_m, offset @ leftward - self._mount.left_m
         near, far = ahead - bodies.half_view_m, ahead + bodies.half_view_m
-        within = ~beyond_edges(bodies, near, self._mount.height_m, self.near_m, self.up_tan)
+        within = ~beyond_edges(bodies, near, self._mount.height_m, edges)
         side = np.where(left < 0.0, -1.0, 1.0)
         inner = side * left - bodies.half_across_m
         xy, velocity = bodies.xy_m.copy(), bodies.velocity_mps.copy()
@@ -199,26 +218,25 @@ class OutOfView:
         for k in np.flatnonzero(bodies.moving & within & (near > 0.0)).tolist():
             from_tan = float(min(inner[k] / near[k], inner[k] / far[k]))
             outside_m = _seen_through_tan(free, float(side[k]), from_tan, float(far[k])) * far[k]
-            late_m = outside_m - inner[k]
+            push_out_m = outside_m - inner[k]
             inwards_mps = -side[k] * float(velocity[k] @ leftward)
-            comes = -side[k] * known_part(velocity[k], covariance[k], leftward) > 0.0
-            if late_m < (_EDGE_M + _EDGE_MPS * unseen_s[k] if comes else -_TOUCHING):
+            comes = -side[k] * significant_component(velocity[k], covariance[k], leftward) > 0.0
+            if push_out_m < (_EDGE_TOLERANCE_M + _EDGE_TOLERANCE_MPS * unseen_s[k] if comes else -_ROUNDING):
                 continue
-            xy[k] += side[k] * late_m * leftward
+            xy[k] += side[k] * push_out_m * leftward
             if inwards_mps > 0.0:
-                velocity[k] = known_part(velocity[k], covariance[k], forward) * forward
-            turned_mps = _TURNS_MPS2 * float(self._since_s[k])
+                velocity[k] = significant_component(velocity[k], covariance[k], forward) * forward
+            turned_mps = _VELOCITY_CHANGE_MPS2 * float(self._since_s[k])
             np.fill_diagonal(covariance[k], np.maximum(np.diagonal(covariance[k]), turned_mps**2))
             unseen_s[k] = 0.0
         return replace(bodies, xy_m=xy, velocity_mps=velocity, covariance=covariance, unseen_s=unseen_s)
 
-    def _hidden(self, bodies: Bodies, pose: PlanarPose, edge_tan: float) -> BoolArray:
+    def _outside_view(self, bodies: Bodies, pose: PlanarPose, edges: ViewEdges) -> BoolArray:
         """(N,) which are beside, below or above the view, and not far behind the camera (out_of_view).
 
         The side edge has a tolerance for the uncertainty of the position, which grows for movers.
         """
-        edges = edge_tan, self.near_m, self.up_tan
-        return out_of_view(bodies, pose, self._mount, *edges, _EDGE_M, _EDGE_MPS)
+        return out_of_view(bodies, pose, self._mount, edges, _EDGE_TOLERANCE_M, _EDGE_TOLERANCE_MPS)
 
 
 def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: float) -> float:
@@ -228,24 +246,25 @@ def _seen_through_tan(free: FreeSpace, side: float, from_tan: float, far_m: floa
     """
     outwards = -side * free.bearing_tan
     order = np.argsort(outwards)
-    order = order[outwards[order] + free.half_width_tan > from_tan - _TOUCHING]
+    order = order[outwards[order] + free.half_width_tan > from_tan - _ROUNDING]
     closed = np.flatnonzero(~(free.known_m[order] >= far_m))
     opened = order[: closed[0]] if len(closed) else order
     return float(outwards[opened[-1]]) + free.half_width_tan if len(opened) else -math.inf
 
 
-def _rests(bodies: Bodies, kept: BoolArray) -> BoolArray:
+def _leftover_strips(bodies: Bodies, kept: BoolArray) -> BoolArray:
     """(N,) narrow strips that were seen to move only briefly, beside a kept mover they may be a part of.
 
     That mover was seen for longer, and the velocities agree.
     """
-    older = kept & bodies.moving & (bodies.tracked_s > SETTLED_S)
-    rests = bodies.moving & (bodies.tracked_s <= SETTLED_S) & (bodies.half_across_m < NOBODY_HALF_M)
-    if not (older.any() and rests.any()):
+    older = kept & bodies.moving & (bodies.tracked_s > MIN_TRACKED_S)
+    narrow = bodies.half_across_m < MIN_MOVER_HALF_WIDTH_M
+    strips = bodies.moving & narrow & (bodies.tracked_s <= MIN_TRACKED_S)
+    if not (older.any() and strips.any()):
         return np.zeros(len(bodies), np.bool_)
     others = bodies.select(older)
-    beside = others.covers(bodies.xy_m, bodies.half_view_m, _REST_M) & alike(bodies, others)
-    return np.asarray(rests & beside.any(axis=1))
+    beside = others.covers(bodies.xy_m, bodies.half_view_m, _STRIP_REACH_M) & velocities_agree(bodies, others)
+    return np.asarray(strips & beside.any(axis=1))
 
 
 @compiled("int64[:], int64[:]")
@@ -258,11 +277,11 @@ def _missing(ids: IntArray, seen_ids: IntArray) -> BoolArray:
 
 
 @compiled("boolean[:], boolean[:, :], int64[:], int64[:]")
-def _not_seen(hidden: BoolArray, part_of: BoolArray, ids: IntArray, seen_ids: IntArray) -> BoolArray:
-    """(N,) which bodies are hidden, not among seen_ids (M,), and not part of a seen body: part_of (N, M)."""
+def _still_kept(outside: BoolArray, part_of: BoolArray, ids: IntArray, seen_ids: IntArray) -> BoolArray:
+    """(N,) which bodies are outside, not among seen_ids (M,), and not part of a seen body: part_of (N, M)."""
     kept = np.empty(len(ids), np.bool_)
     for k in range(len(ids)):
-        kept[k] = hidden[k] and not (seen_ids == ids[k]).any() and not part_of[k].any()
+        kept[k] = outside[k] and not (seen_ids == ids[k]).any() and not part_of[k].any()
     return kept
 
 

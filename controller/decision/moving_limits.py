@@ -17,10 +17,18 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
-from controller.decision.corridor import Course, Placed
+from controller.decision.corridor import PathVelocities, Placed
 from controller.decision.crossing import Choice, Conflict, choices, find_conflicts
 from controller.decision.decision import Reason, Rule
-from controller.decision.limits import ALONGSIDE_M, STANDING_MPS, Gap, Limit, Motion, allowed, stop_before
+from controller.decision.limits import (
+    ALONGSIDE_M,
+    STANDING_MPS,
+    Gap,
+    Limit,
+    Motion,
+    allowed_text,
+    stop_before,
+)
 from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
 
@@ -29,21 +37,22 @@ _SPEEDS = 31  # how many speeds are tried
 _DRIVES_AHEAD_MPS = 0.1
 # Slowing down so as to arrive when the body leaves is worth it only above this speed; below it, stopping
 # before the body is as good.
-_WORTH_ARRIVING_MPS = 0.3
+_MIN_ARRIVAL_MPS = 0.3
 # Nor is it worth it if the body leaves later than this: most bodies change their velocity before, and the
 # robot can still stop.
-_FORESEEN_S = 4.0
-_AVERAGE = 0.2  # weight of the newest estimate in the average of a time of leaving
+_MAX_FORESEEN_LEAVE_S = 4.0
+_LEAVE_TIME_WEIGHT = 0.2  # weight of the newest estimate in the average of a time of leaving
 # A standing robot does not start until a body has passed that is beside it or will be within this time.
-_PASSES_S = 2.0
+_WAIT_FOR_PASSING_S = 2.0
 # Hysteresis: choosing to pass before a body needs this much more time than keeping that choice.
-_STICKY_S = 0.5
+_SWITCH_MARGIN_S = 0.5
 
 
 class MovingLimits:
     """Limits for moving bodies; keeps what hysteresis needs.
 
-    times_s (K,): times from now at which bodies are placed. inside: see controller/decision/standing.py.
+    times_s (K,): times from now at which bodies are placed.
+    inside: see controller/decision/standing_limits.py.
     """
 
     def __init__(self, config: DecisionConfig, limits: Limits, times_s: FloatArray, inside: set[int]) -> None:
@@ -51,19 +60,19 @@ class MovingLimits:
         self._comfort = braking.comfort(limits)
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
         self._inside = inside
-        self._goes_first: set[int] = set()
+        self._robot_passes_first: set[int] = set()
         self._leaves_s: dict[int, float] = {}
 
-    def nobody(self) -> None:
+    def forget(self) -> None:
         """Forget all choices: nothing moves."""
-        self._goes_first.clear()
+        self._robot_passes_first.clear()
         self._leaves_s.clear()
 
     def limits(
         self,
         bodies: Bodies,
         placed: Placed,
-        course: Course,
+        velocities: PathVelocities,
         enters: NDArray[np.bool_],
         s_m: float,
         motion: Motion,
@@ -80,20 +89,22 @@ class MovingLimits:
         standing = motion.v_mps <= STANDING_MPS
         behind_m = math.inf if standing else ALONGSIDE_M
         if standing:
-            passes = placed.lo_m[:, 0] - s_m <= np.maximum(-course.along_mps, 0.0) * _PASSES_S
-            enters = enters | (passes & (placed.clear_m[:, 0] <= self._config.margins.lateral_m))
+            gap_m = placed.block_from_s_m[:, 0] - s_m
+            passes = gap_m <= np.maximum(-velocities.along_mps, 0.0) * _WAIT_FOR_PASSING_S
+            enters = enters | (passes & (placed.clearance_m[:, 0] <= self._config.margins.lateral_m))
         rows = (bodies.moving & ahead & enters).nonzero()[0]
         if not len(rows):
-            self.nobody()
+            self.forget()
+            self._note_inside(bodies, placed, set())
             return [], base_mps
-        conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, course, rows, now_s)
+        conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, velocities, rows, now_s)
         if not conflicts:
             return [], base_mps
         ramps = comfortable(self._limits, motion, self._speeds)
         offers = []
         for one in conflicts:
-            along_mps = float(course.along_mps[one.row])
-            leader_mps = along_mps - float(course.sigma_along_mps[one.row])
+            along_mps = float(velocities.along_mps[one.row])
+            leader_mps = along_mps - float(velocities.sigma_along_mps[one.row])
             stays = self._when_it_stays(one, bodies, placed, s_m, motion, along_mps, leader_mps)
             offers.append((one, *self._offer(one, int(bodies.ids[one.row]), ramps, s_m, stays)))
         return self._settle(offers, bodies, base_mps)
@@ -104,35 +115,45 @@ class MovingLimits:
         placed: Placed,
         s_m: float,
         from_s_m: float,
-        course: Course,
+        velocities: PathVelocities,
         rows: NDArray[np.intp],
         now_s: float,
     ) -> list[Conflict]:
         margins = self._config.margins
-        grazes = np.array([number in self._inside for number in bodies.ids.tolist()])
+        grazes = np.array([track_id in self._inside for track_id in bodies.ids.tolist()])
         beside_m = margins.lateral_m + margins.graze_m * grazes
-        sigma_mps = course.sigma_left_mps * self._config.prediction.sigmas
+        sigma_mps = velocities.sigma_left_mps * self._config.prediction.sigmas
         found = [
             one
             for one in find_conflicts(placed, self._times_s, sigma_mps, beside_m, rows)
             if one.hi_in_m > s_m and one.lo_in_m > from_s_m
         ]
-        numbers = {int(bodies.ids[one.row]) for one in found}
-        self._inside |= numbers
-        self._goes_first &= numbers
+        track_ids = {int(bodies.ids[one.row]) for one in found}
+        self._note_inside(bodies, placed, track_ids)
+        self._robot_passes_first &= track_ids
         found = [self._steadied(one, int(bodies.ids[one.row]), now_s) for one in found]
-        self._leaves_s = {number: when for number, when in self._leaves_s.items() if number in numbers}
+        self._leaves_s = {
+            track_id: when for track_id, when in self._leaves_s.items() if track_id in track_ids
+        }
         return found
 
-    def _steadied(self, conflict: Conflict, number: int, now_s: float) -> Conflict:
+    def _note_inside(self, bodies: Bodies, placed: Placed, in_the_way: set[int]) -> None:
+        """The bodies with these ids count as in the corridor; of the others, those that moved away do not."""
+        if self._inside:
+            away_m = self._config.margins.lateral_m + self._config.margins.graze_m
+            away = bodies.moving & (placed.clearance_m[:, 0] > away_m)
+            self._inside.difference_update(bodies.ids[away].tolist())
+        self._inside |= in_the_way
+
+    def _steadied(self, conflict: Conflict, track_id: int, now_s: float) -> Conflict:
         """The conflict with its time of leaving averaged: each estimate extrapolates a noisy speed."""
         if math.isinf(conflict.out_s):
-            self._leaves_s.pop(number, None)
+            self._leaves_s.pop(track_id, None)
             return conflict
         leaves_s = now_s + conflict.out_s
-        before_s = self._leaves_s.get(number, leaves_s)
-        self._leaves_s[number] = before_s + _AVERAGE * (leaves_s - before_s)
-        return replace(conflict, out_s=max(self._leaves_s[number] - now_s, conflict.in_s))
+        before_s = self._leaves_s.get(track_id, leaves_s)
+        self._leaves_s[track_id] = before_s + _LEAVE_TIME_WEIGHT * (leaves_s - before_s)
+        return replace(conflict, out_s=max(self._leaves_s[track_id] - now_s, conflict.in_s))
 
     def _when_it_stays(
         self,
@@ -146,43 +167,43 @@ class MovingLimits:
     ) -> Limit:
         """The limit if the body does not leave the corridor: stop before it, or follow it."""
         margins = self._config.margins
-        runs_m = 0.0
+        leader_stop_m = 0.0
         rule: Rule
         rule, what = "oncoming", f"comes at {-along_mps:.1f} m/s"
         if along_mps > _DRIVES_AHEAD_MPS:
-            runs_m = max(leader_mps, 0.0) ** 2 / (2.0 * self._config.prediction.leader_decel_mps2)
+            leader_stop_m = max(leader_mps, 0.0) ** 2 / (2.0 * self._config.prediction.leader_decel_mps2)
             rule, what = "leader", f"drives ahead at {along_mps:.1f} m/s"
         elif along_mps > -_DRIVES_AHEAD_MPS:
             rule, what = "crossing", "is on the path"
         gap = Gap(
-            float(placed.lo_m[conflict.row, 0]) - s_m,
+            float(placed.block_from_s_m[conflict.row, 0]) - s_m,
             closing_mps=-along_mps,
-            runs_m=runs_m,
+            leader_stop_m=leader_stop_m,
             obstacle_id=int(bodies.ids[conflict.row]),
         )
         return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, rule, what)
 
     def _offer(
-        self, conflict: Conflict, number: int, ramps: SpeedRamps, s_m: float, stays: Limit
+        self, conflict: Conflict, track_id: int, ramps: SpeedRamps, s_m: float, stays: Limit
     ) -> tuple[Choice, Limit]:
         margins = self._config.margins
-        first = number in self._goes_first
-        enter_s = margins.crossing_s * (0.5 if first else 1.0) + (0.0 if first else _STICKY_S)
+        first = track_id in self._robot_passes_first
+        enter_s = margins.crossing_s * (0.5 if first else 1.0) + (0.0 if first else _SWITCH_MARGIN_S)
         choice = choices(conflict, ramps, self._speeds, s_m, margins.least_m, margins.crossing_s, enter_s)
         if conflict.in_s <= 0.0 or conflict.hi_in_m <= s_m:
             choice = Choice(choice.yield_mps, math.inf)
-        worth_mps = _WORTH_ARRIVING_MPS if conflict.out_s <= _FORESEEN_S else math.inf
+        worth_mps = _MIN_ARRIVAL_MPS if conflict.out_s <= _MAX_FORESEEN_LEAVE_S else math.inf
         if choice.yield_mps < min(stays.speed_mps, worth_mps):
             return Choice(stays.speed_mps, choice.first_mps), stays
 
         def why() -> Reason:
             ahead_m, waits = conflict.lo_in_m - s_m, stays.reason
             sentence = (
-                f"obstacle {number} crosses {max(ahead_m, 0.0):.1f} m ahead until "
-                f"{conflict.out_s:.1f} s from now: {allowed(choice.yield_mps)}"
+                f"obstacle {track_id} crosses {max(ahead_m, 0.0):.1f} m ahead until "
+                f"{conflict.out_s:.1f} s from now: {allowed_text(choice.yield_mps)}"
             )
             return Reason(
-                "crossing", sentence, number, ahead_m, waits.closing_mps, waits.required_m, waits.margin_m
+                "crossing", sentence, track_id, ahead_m, waits.closing_mps, waits.required_m, waits.margin_m
             )
 
         return choice, Limit(choice.yield_mps, why)
@@ -206,9 +227,9 @@ class MovingLimits:
             found.append(worst[2])
             waiting.remove(worst)
         for conflict, choice, _ in offers:
-            number = int(bodies.ids[conflict.row])
+            track_id = int(bodies.ids[conflict.row])
             if choice.yield_mps < speed and speed >= choice.first_mps:
-                self._goes_first.add(number)
+                self._robot_passes_first.add(track_id)
             else:
-                self._goes_first.discard(number)
+                self._robot_passes_first.discard(track_id)
         return found, speed

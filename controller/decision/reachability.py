@@ -1,6 +1,7 @@
 """The geometry of the worst case: what bodies could reach, and whether an emergency stop ends short of that.
 
-Called by controller/decision/worst_case.py alone, which makes a speed limit of the answers. The assumptions:
+Called by controller/decision/worst_case_limit.py alone, which makes a speed limit of the answers. What is
+assumed:
 
 * A body may stop dead anywhere on its way, so the stretch of the path that it could block only grows.
 * A body may change its velocity by a bounded acceleration, up to the greatest obstacle speed V_omax.
@@ -32,12 +33,12 @@ class Reach:
     """What N bodies could block at K times; each (N, K).
 
     inside: whether the body could be in the corridor.
-    lo_m, hi_m: it could block the robot's positions between these.
+    block_from_s_m, block_to_s_m: it could block the robot's positions between these.
     """
 
     inside: NDArray[np.bool_]
-    lo_m: FloatArray
-    hi_m: FloatArray
+    block_from_s_m: FloatArray
+    block_to_s_m: FloatArray
 
 
 def reach(
@@ -47,10 +48,10 @@ def reach(
     spread_mps: tuple[FloatArray, FloatArray],
     speed_mps: FloatArray,
     manoeuvre_mps2: tuple[FloatArray, FloatArray],
-    most_mps: float,
+    max_mps: float,
     margin_m: float,
-    unsure_m: tuple[FloatArray, FloatArray] | None = None,
-    of: NDArray[np.bool_] | None = None,
+    position_uncertainty_m: tuple[FloatArray, FloatArray] | None = None,
+    counts: NDArray[np.bool_] | None = None,
 ) -> Reach:
     """Grow N bodies by what they could do until times_s (K,) from now.
 
@@ -59,17 +60,18 @@ def reach(
     spread_mps: uncertainty of their velocities, along the path and across it, (N,) each.
     speed_mps: (N,) measured speed.
     manoeuvre_mps2: greatest change of their velocities, along the path and across it, (N,) each.
-    most_mps: top speed of any obstacle.
+    max_mps: top speed of any obstacle.
     margin_m: added before each body.
-    unsure_m: uncertainty of their positions, along the path and across it, (N,) each; None: none.
-    of: (N,) which bodies count, the others block nothing; None: all count.
+    position_uncertainty_m: of their positions, along the path and across it, (N,) each; None: 0.
+    counts: (N,) which bodies count, the others block nothing; None: all count.
     """
-    unsure_along, unsure_across = unsure_m or (np.zeros(len(since_s)), np.zeros(len(since_s)))
+    certain = np.zeros(len(since_s))
+    uncertain_along, uncertain_across = position_uncertainty_m or (certain, certain)
     return Reach(
         *_grown(
-            placed.clear_m,
-            placed.lo_m,
-            placed.hi_m,
+            placed.clearance_m,
+            placed.block_from_s_m,
+            placed.block_to_s_m,
             times_s,
             since_s,
             spread_mps[0],
@@ -77,11 +79,11 @@ def reach(
             speed_mps,
             manoeuvre_mps2[0],
             manoeuvre_mps2[1],
-            unsure_along,
-            unsure_across,
-            most_mps,
+            uncertain_along,
+            uncertain_across,
+            max_mps,
             margin_m,
-            np.ones(len(since_s), np.bool_) if of is None else of,
+            np.ones(len(since_s), np.bool_) if counts is None else counts,
         )
     )
 
@@ -105,24 +107,28 @@ def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
 
     Negative where the robot could touch something; inf where nothing is in the way.
     """
-    return _least_room(stopping.distance_m, stopping.moves, s_m, reached.inside, reached.lo_m, reached.hi_m)
+    return _min_room(
+        stopping.distance_m, stopping.moves, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m
+    )
 
 
-def how_many_stand(stopping: Stops, s_m: float, reached: Reach, of: NDArray[np.bool_]) -> int:
-    """How many of the stops, from the first one on, stay short of all bodies in the mask `of` (N,)."""
+def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:
+    """How many of the stops, from the first one on, stay short of all bodies in the mask counts (N,)."""
     moves = stopping.moves
-    return _first_too_far(stopping.distance_m, moves, s_m, reached.inside, reached.lo_m, reached.hi_m, of)
+    return _first_too_far(
+        stopping.distance_m, moves, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m, counts
+    )
 
 
-def last_in_time(stopping: Stops, reached: Reach) -> int:
+def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
     """Index of the last stop that ends before any body could be in the corridor at all; -1: none does."""
-    return _last_in_time(stopping.moves, reached.inside)
+    return _last_stop_before_entry(stopping.moves, reached.inside)
 
 
-def gets_through(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:
+def passes_clear(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:
     """Whether the robot stays clear of all that could be blocked, at all times, along a single ramp."""
     way_m = ramp.distance(times_s[None, :])[0]
-    return _gets_through(way_m, s_m, reached.inside, reached.lo_m, reached.hi_m)
+    return _passes_clear(way_m, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m)
 
 
 @compiled(
@@ -130,9 +136,9 @@ def gets_through(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Rea
     "float64[:], float64[:], float64[:], float64[:], float64, float64, boolean[:]"
 )
 def _grown(
-    clear_m: FloatArray,
-    lo_m: FloatArray,
-    hi_m: FloatArray,
+    clearance_m: FloatArray,
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
     times_s: FloatArray,
     since_s: FloatArray,
     spread_along_mps: FloatArray,
@@ -140,11 +146,11 @@ def _grown(
     speed_mps: FloatArray,
     change_along_mps2: FloatArray,
     change_across_mps2: FloatArray,
-    unsure_along_m: FloatArray,
-    unsure_across_m: FloatArray,
-    most_mps: float,
+    uncertain_along_m: FloatArray,
+    uncertain_across_m: FloatArray,
+    max_mps: float,
     margin_m: float,
-    of: NDArray[np.bool_],
+    counts: NDArray[np.bool_],
 ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
     """The fields of Reach."""
     shape = len(since_s), len(times_s)
@@ -154,34 +160,39 @@ def _grown(
         was_inside, lowest, highest = False, math.inf, -math.inf
         for j in range(shape[1]):
             t = times_s[j] + since_s[k]
-            furthest = (most_mps + speed_mps[k]) * t
+            furthest = (max_mps + speed_mps[k]) * t
             across = min(spread_across_mps[k] * t + 0.5 * change_across_mps2[k] * t * t, furthest)
-            if of[k] and clear_m[k, j] - (unsure_across_m[k] + across) <= 0.0:
+            if counts[k] and clearance_m[k, j] - (uncertain_across_m[k] + across) <= 0.0:
                 along = min(spread_along_mps[k] * t + 0.5 * change_along_mps2[k] * t * t, furthest)
-                along += unsure_along_m[k]
+                along += uncertain_along_m[k]
                 was_inside = True
-                lowest = min(lowest, lo_m[k, j] - along - margin_m)
-                highest = max(highest, hi_m[k, j] + along)
+                lowest = min(lowest, block_from_s_m[k, j] - along - margin_m)
+                highest = max(highest, block_to_s_m[k, j] + along)
             inside[k, j], lo[k, j], hi[k, j] = was_inside, lowest, highest
     return inside, lo, hi
 
 
 @inlined
 def _room(
-    at_m: float, j: int, inside: NDArray[np.bool_], lo_m: FloatArray, hi_m: FloatArray, k: int
+    at_m: float,
+    j: int,
+    inside: NDArray[np.bool_],
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
+    k: int,
 ) -> float:
     """Distance from at_m to what body k could block at time j; inf: it blocks nothing ahead of at_m."""
-    return float(lo_m[k, j] - at_m) if inside[k, j] and at_m < hi_m[k, j] else math.inf
+    return float(block_from_s_m[k, j] - at_m) if inside[k, j] and at_m < block_to_s_m[k, j] else math.inf
 
 
 @compiled("float64[:, :], boolean[:, :], float64, boolean[:, :], float64[:, :], float64[:, :]")
-def _least_room(
+def _min_room(
     distance_m: FloatArray,
     moves: NDArray[np.bool_],
     s_m: float,
     inside: NDArray[np.bool_],
-    lo_m: FloatArray,
-    hi_m: FloatArray,
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
 ) -> FloatArray:
     """room() in arrays: (R,) for R stops, K times and N bodies."""
     least = np.full(len(distance_m), math.inf)
@@ -190,7 +201,8 @@ def _least_room(
             if not moves[i, j]:
                 continue
             for k in range(len(inside)):
-                least[i] = min(least[i], _room(s_m + distance_m[i, j], j, inside, lo_m, hi_m, k))
+                room_m = _room(s_m + distance_m[i, j], j, inside, block_from_s_m, block_to_s_m, k)
+                least[i] = min(least[i], room_m)
     return least
 
 
@@ -200,24 +212,25 @@ def _first_too_far(
     moves: NDArray[np.bool_],
     s_m: float,
     inside: NDArray[np.bool_],
-    lo_m: FloatArray,
-    hi_m: FloatArray,
-    of: NDArray[np.bool_],
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
+    counts: NDArray[np.bool_],
 ) -> int:
-    """Index of the first of R stops that does not stay short of the bodies in the mask `of` (N,); R: none."""
+    """Index of the first of R stops that does not stay short of the bodies in counts (N,); R: none."""
     for i in range(len(distance_m)):
         for j in range(distance_m.shape[1]):
             if not moves[i, j]:
                 continue
             for k in range(len(inside)):
-                if of[k] and _room(s_m + distance_m[i, j], j, inside, lo_m, hi_m, k) < 0.0:
+                room_m = _room(s_m + distance_m[i, j], j, inside, block_from_s_m, block_to_s_m, k)
+                if counts[k] and room_m < 0.0:
                     return i
     return len(distance_m)
 
 
 @compiled("boolean[:, :], boolean[:, :]")
-def _last_in_time(moves: NDArray[np.bool_], inside: NDArray[np.bool_]) -> int:
-    """last_in_time() in arrays: moves (R, K) of the stops, inside (N, K) of the bodies."""
+def _last_stop_before_entry(moves: NDArray[np.bool_], inside: NDArray[np.bool_]) -> int:
+    """last_stop_before_entry() in arrays: moves (R, K) of the stops, inside (N, K) of the bodies."""
     first = 0
     for j in range(inside.shape[1] - 1, -1, -1):
         if inside[:, j].any():
@@ -229,11 +242,15 @@ def _last_in_time(moves: NDArray[np.bool_], inside: NDArray[np.bool_]) -> int:
 
 
 @compiled("float64[:], float64, boolean[:, :], float64[:, :], float64[:, :]")
-def _gets_through(
-    way_m: FloatArray, s_m: float, inside: NDArray[np.bool_], lo_m: FloatArray, hi_m: FloatArray
+def _passes_clear(
+    way_m: FloatArray,
+    s_m: float,
+    inside: NDArray[np.bool_],
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
 ) -> bool:
     for k in range(len(inside)):
         for j in range(len(way_m)):
-            if inside[k, j] and lo_m[k, j] < s_m + way_m[j] < hi_m[k, j]:
+            if inside[k, j] and block_from_s_m[k, j] < s_m + way_m[j] < block_to_s_m[k, j]:
                 return False
     return True

@@ -1,9 +1,9 @@
 """The worst case as a speed limit: how fast may the robot go and still stand before a body could touch it?
 
-controller/decision/contingency.py has the geometry: what each body could reach, and how much room a stop
+controller/decision/reachability.py has the geometry: what each body could reach, and how much room a stop
 leaves. This file decides how much each body may change its velocity, tries emergency stops from many speeds,
-and makes a Limit of the greatest speed that is safe. controller/decision/appraise.py calls it last, after the
-other advisers.
+and makes a Limit of the greatest speed that is safe. controller/decision/speed_limits.py calls it last, after
+the other advisers.
 """
 
 from __future__ import annotations
@@ -17,21 +17,29 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
-from controller.decision.contingency import (
+from controller.decision.corridor import PathVelocities, Placed
+from controller.decision.decision import Reason
+from controller.decision.limits import (
+    ALONG_TO_SIDE_RATIO,
+    ALONGSIDE_M,
+    UNSEEN_ERROR_SIGMAS,
+    Limit,
+    Motion,
+    allowed_text,
+)
+from controller.decision.reachability import (
     Reach,
     Stops,
-    gets_through,
-    how_many_stand,
-    last_in_time,
+    count_safe_stops,
+    last_stop_before_entry,
+    passes_clear,
     reach,
     room,
     stops,
 )
-from controller.decision.corridor import Course, Placed
-from controller.decision.decision import Reason
-from controller.decision.limits import ALONGSIDE_M, LEAVES_ASLANT, UNSEEN_SIGMAS, Limit, Motion, allowed
 from controller.profile import SpeedRamps, comfortable
 from hal.compiled import compiled
+from hal.records import record
 from hal.types import FloatArray
 
 # Times that are looked at: every 0.1 s up to 2 s, where stops from low speeds end, then every 0.2 s.
@@ -39,16 +47,30 @@ _STEP_S, _FINE_S, _COARSE_STEP_S = 0.1, 2.0, 0.2
 _SPEEDS = 31  # how many speeds are tried
 # Longest wait before a stop begins: the delays of the configuration plus 0.5 s, which no control period
 # exceeds; at least 1 s.
-_PERIOD_S, _LEAST_WAIT_S = 0.5, 1.0
+_PERIOD_S, _MIN_WAIT_S = 0.5, 1.0
 # The robot begins to slow for the worst case this much earlier than an emergency stop would have to, so that
 # comfortable braking suffices.
 _FORESIGHT_S = 0.1
 # Least sideways speed that is assumed when a body's direction of motion is judged.
-_GOES_MPS = 0.1
+_MIN_SIDEWAYS_MPS = 0.1
 # A body that comes towards the robot and was seen for this long has seen the robot, too.
-_SEES_S = 1.0
+_AWARE_AFTER_S = 1.0
 # The robot does not slow yet if it is faster than the worst case allows by no more than this.
-_SOFT_MPS = 0.1
+_TOLERATED_EXCESS_MPS = 0.1
+
+
+@record(frozen=True, slots=True, eq=False)
+class _MayDo:
+    """What N bodies may do: arguments of reach(), (N,) each; along the path, and sideways."""
+
+    since_s: FloatArray
+    spread_along_mps: FloatArray
+    spread_left_mps: FloatArray
+    speed_mps: FloatArray
+    change_along_mps2: FloatArray
+    change_left_mps2: FloatArray
+    uncertain_along_m: FloatArray
+    uncertain_left_m: FloatArray
 
 
 class WorstCase:
@@ -59,7 +81,7 @@ class WorstCase:
 
     def __init__(self, config: DecisionConfig, limits: Limits) -> None:
         self._config, self._limits = config, limits
-        waits_s = max(config.chassis_delay_s + config.prediction.confirm_s + _PERIOD_S, _LEAST_WAIT_S)
+        waits_s = max(config.chassis_delay_s + config.prediction.confirm_s + _PERIOD_S, _MIN_WAIT_S)
         stop = braking.stop(limits.max_speed_mps, 0.0, braking.emergency(limits))
         longest_s = stop.time_s + waits_s
         self.times_s: FloatArray = np.concatenate(
@@ -70,13 +92,14 @@ class WorstCase:
         )
         self._speeds = np.linspace(0.0, limits.max_speed_mps, _SPEEDS)
         self._latency_s = math.nan
-        self._foreseen = self._confirming = self._at_once = self._stops(self._speeds, 0.0, 0.0)
+        self._stops_early = self._stops_now = self._stops(self._speeds, 0.0, 0.0)
+        self._stops_after_confirming = self._stops_now
 
     def limit(
         self,
         bodies: Bodies,
         placed: Placed,
-        course: Course,
+        velocities: PathVelocities,
         enters: NDArray[np.bool_],
         s_m: float,
         motion: Motion,
@@ -93,35 +116,37 @@ class WorstCase:
         The limit is urgent if even an emergency stop that begins now would be too late. That may hold for a
         robot that is already slowing down to a safe chosen_mps: then it has to brake harder.
         """
-        unsure_m = UNSEEN_SIGMAS * course.sigma_along_mps * bodies.unseen_s
-        rows = placed.lo_m[:, 0] + unsure_m > s_m - ALONGSIDE_M
+        position_uncertainty_m = UNSEEN_ERROR_SIGMAS * velocities.sigma_along_mps * bodies.unseen_s
+        rows = placed.block_from_s_m[:, 0] + position_uncertainty_m > s_m - ALONGSIDE_M
         if not np.count_nonzero(rows):
             return None
-        reached = self._reach(bodies, placed, course, since_s, rows)
+        reached = self._reach(bodies, placed, velocities, since_s, rows)
         self._prepare(motion.latency_s)
-        if min(reached.lo_m[:, -1].tolist()) > s_m + self._furthest_m:
+        if min(reached.block_from_s_m[:, -1].tolist()) > s_m + self._furthest_m:
             return None
         young = bodies.age_s < self._config.prediction.confirm_s
         speed = self._speed(reached, young, enters, s_m)
         if speed >= min(chosen_mps, self._limits.max_speed_mps) and speed >= motion.v_mps:
             return None
         go = comfortable(self._limits, motion, np.array([chosen_mps]))
-        if gets_through(go, s_m, self.times_s, reached):
+        if passes_clear(go, s_m, self.times_s, reached):
             return None
         urgent = False
         if motion.v_mps > speed:
             now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
             urgent = bool(room(now, s_m, reached)[0] < 0.0)
-            if not urgent and motion.v_mps <= speed + _SOFT_MPS:
+            if not urgent and motion.v_mps <= speed + _TOLERATED_EXCESS_MPS:
                 # An emergency stop is still in time. Braking for each small fluctuation would only cost time.
                 speed = motion.v_mps
-        row = int(np.where(rows, placed.lo_m[:, 0], math.inf).argmin())
-        number = int(bodies.ids[row])
-        gap_m = float(placed.lo_m[row, 0]) - s_m
+        row = int(np.where(rows, placed.block_from_s_m[:, 0], math.inf).argmin())
+        track_id = int(bodies.ids[row])
+        gap_m = float(placed.block_from_s_m[row, 0]) - s_m
 
         def why() -> Reason:
-            ahead = f"obstacle {number}, {max(gap_m, 0.0):.1f} m ahead"
-            return Reason("worst case", f"{ahead}, could step into the way: {allowed(speed)}", number, gap_m)
+            ahead = f"obstacle {track_id}, {max(gap_m, 0.0):.1f} m ahead"
+            return Reason(
+                "worst case", f"{ahead}, could step into the way: {allowed_text(speed)}", track_id, gap_m
+            )
 
         return Limit(speed, why, urgent)
 
@@ -135,24 +160,24 @@ class WorstCase:
         confirm_s later: they may be confirmed first while there is time. Bodies that do not enter the
         corridor (not in enters) never limit the speed below beside_mps.
         """
-        speed = self._greatest(self._foreseen, reached, ~young, s_m)
+        speed = self._greatest(self._stops_early, reached, ~young, s_m)
         if math.isfinite(speed):
-            soon = last_in_time(self._at_once, reached)
+            soon = last_stop_before_entry(self._stops_now, reached)
             if soon >= 0:
                 speed = max(speed, float(self._speeds[soon]))
         if np.count_nonzero(young):
-            speed = min(speed, self._greatest(self._confirming, reached, young, s_m))
+            speed = min(speed, self._greatest(self._stops_after_confirming, reached, young, s_m))
         beside_mps = self._config.prediction.beside_mps
         if speed >= beside_mps:
             return speed
-        return max(speed, min(self._greatest(self._foreseen, reached, enters, s_m), beside_mps))
+        return max(speed, min(self._greatest(self._stops_early, reached, enters, s_m), beside_mps))
 
-    def _greatest(self, stopping: Stops, reached: Reach, of: NDArray[np.bool_], s_m: float) -> float:
-        """The greatest speed whose stop stays short of all bodies in the mask `of` (N,).
+    def _greatest(self, stopping: Stops, reached: Reach, counts: NDArray[np.bool_], s_m: float) -> float:
+        """The greatest speed whose stop stays short of all bodies in the mask counts (N,).
 
         inf: every stop does; 0: none does.
         """
-        stand = how_many_stand(stopping, s_m, reached, of)
+        stand = count_safe_stops(stopping, s_m, reached, counts)
         return float(self._speeds[max(stand - 1, 0)]) if stand < len(self._speeds) else math.inf
 
     def _prepare(self, latency_s: float) -> None:
@@ -160,25 +185,31 @@ class WorstCase:
             return
         self._latency_s = latency_s
         confirm_s = self._config.prediction.confirm_s
-        self._foreseen = self._stops(self._speeds, 0.0, latency_s + _FORESIGHT_S)
-        self._confirming = self._stops(self._speeds, 0.0, latency_s + confirm_s)
-        self._at_once = self._stops(self._speeds, 0.0, latency_s)
+        self._stops_early = self._stops(self._speeds, 0.0, latency_s + _FORESIGHT_S)
+        self._stops_after_confirming = self._stops(self._speeds, 0.0, latency_s + confirm_s)
+        self._stops_now = self._stops(self._speeds, 0.0, latency_s)
         # Which of the two waits is longer depends on the configuration.
-        self._furthest_m = float(max(self._foreseen.distance_m.max(), self._confirming.distance_m.max()))
+        waits = self._stops_early, self._stops_after_confirming
+        self._furthest_m = float(max(stop.distance_m.max() for stop in waits))
 
     def _reach(
-        self, bodies: Bodies, placed: Placed, course: Course, since_s: float, of: NDArray[np.bool_]
+        self,
+        bodies: Bodies,
+        placed: Placed,
+        velocities: PathVelocities,
+        since_s: float,
+        counts: NDArray[np.bool_],
     ) -> Reach:
         prediction = self._config.prediction
-        may_do = _may_do(
-            course.along_mps,
-            course.left_mps,
-            course.sigma_along_mps,
-            course.sigma_left_mps,
-            course.surprise_along_mps,
-            course.surprise_left_mps,
+        fields = _may_do(
+            velocities.along_mps,
+            velocities.left_mps,
+            velocities.sigma_along_mps,
+            velocities.sigma_left_mps,
+            velocities.innovation_along_mps,
+            velocities.innovation_left_mps,
             placed.d_m[:, 0],
-            placed.clear_m[:, 0],
+            placed.clearance_m[:, 0],
             bodies.moving,
             bodies.age_s,
             bodies.unseen_s,
@@ -187,20 +218,21 @@ class WorstCase:
             prediction.cut_in_mps2,
             prediction.manoeuvre_mps2,
             prediction.oncoming_mps2,
-            LEAVES_ASLANT,
-            UNSEEN_SIGMAS,
+            ALONG_TO_SIDE_RATIO,
+            UNSEEN_ERROR_SIGMAS,
         )
+        may_do = _MayDo(*fields)
         return reach(
             placed,
             self.times_s,
-            may_do[0],
-            spread_mps=(may_do[1], may_do[2]),
-            speed_mps=may_do[3],
-            manoeuvre_mps2=(may_do[4], may_do[5]),
-            most_mps=self._limits.max_obstacle_speed_mps,
+            may_do.since_s,
+            spread_mps=(may_do.spread_along_mps, may_do.spread_left_mps),
+            speed_mps=may_do.speed_mps,
+            manoeuvre_mps2=(may_do.change_along_mps2, may_do.change_left_mps2),
+            max_mps=self._limits.max_obstacle_speed_mps,
             margin_m=self._config.margins.least_m,
-            unsure_m=(may_do[6], may_do[7]),
-            of=of,
+            position_uncertainty_m=(may_do.uncertain_along_m, may_do.uncertain_left_m),
+            counts=counts,
         )
 
     def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:
@@ -225,10 +257,10 @@ def _may_do(
     left_mps: FloatArray,
     sigma_along_mps: FloatArray,
     sigma_left_mps: FloatArray,
-    surprise_along_mps: FloatArray,
-    surprise_left_mps: FloatArray,
+    innovation_along_mps: FloatArray,
+    innovation_left_mps: FloatArray,
     d_m: FloatArray,
-    clear_m: FloatArray,
+    clearance_m: FloatArray,
     moving: NDArray[np.bool_],
     age_s: FloatArray,
     unseen_s: FloatArray,
@@ -237,36 +269,32 @@ def _may_do(
     cut_in_mps2: float,
     manoeuvre_mps2: float,
     oncoming_mps2: float,
-    leaves_aslant: float,
-    unseen_sigmas: float,
+    along_to_side_ratio: float,
+    unseen_error_sigmas: float,
 ) -> FloatArray:
-    """(8, N) arguments of reach() for bodies (N,).
-
-    In this order: since_s, spread_mps along the path and to the left, speed_mps, manoeuvre_mps2 along and
-    sideways, unsure_m along and to the left.
-    """
+    """(8, N) the fields of _MayDo."""
     answers = np.zeros((8, len(along_mps)))
-    since, spread_along, spread_left, speed, along, sideways, unsure_along, unsure_left = answers
+    since, spread_along, spread_left, speed, along, sideways, uncertain_along, uncertain_left = answers
     for k in range(len(along_mps)):
         # unaware: goes in the robot's direction, so it does not see the robot coming and is beside it for
         # long. comes: comes towards the robot, sees it after a while and keeps its lane. leaves: moves away
         # from the path. All but comes and leaves may have changed their velocity since they left the view.
-        aslant_mps = max(abs(left_mps[k]), _GOES_MPS)
-        outwards, beside = left_mps[k] * d_m[k] > 0.0, clear_m[k] > 0.0
-        unaware = along_mps[k] > (leaves_aslant if outwards else 1.0) * aslant_mps
+        aslant_mps = max(abs(left_mps[k]), _MIN_SIDEWAYS_MPS)
+        outwards, beside = left_mps[k] * d_m[k] > 0.0, clearance_m[k] > 0.0
+        unaware = along_mps[k] > (along_to_side_ratio if outwards else 1.0) * aslant_mps
         comes = along_mps[k] < -aslant_mps
         leaves = outwards and beside and not unaware
         if moving[k]:
             # A body that turns into the way also slows down along the path.
             along[k] = cut_in_mps2 if unaware and beside else manoeuvre_mps2
             sideways[k] = cut_in_mps2 if unaware else manoeuvre_mps2
-            if comes and age_s[k] >= _SEES_S:
+            if comes and age_s[k] >= _AWARE_AFTER_S:
                 sideways[k] = oncoming_mps2
         since[k] = since_s + (0.0 if comes or leaves else unseen_s[k])
         speed[k] = math.hypot(along_mps[k], left_mps[k])
-        spread_along[k] = max(sigmas * sigma_along_mps[k], abs(surprise_along_mps[k]))
-        spread_left[k] = max(sigmas * sigma_left_mps[k], abs(surprise_left_mps[k]))
+        spread_along[k] = max(sigmas * sigma_along_mps[k], abs(innovation_along_mps[k]))
+        spread_left[k] = max(sigmas * sigma_left_mps[k], abs(innovation_left_mps[k]))
         if not leaves:
-            unsure_along[k] = unseen_sigmas * unseen_s[k] * sigma_along_mps[k]
-            unsure_left[k] = unseen_sigmas * unseen_s[k] * sigma_left_mps[k]
+            uncertain_along[k] = unseen_error_sigmas * unseen_s[k] * sigma_along_mps[k]
+            uncertain_left[k] = unseen_error_sigmas * unseen_s[k] * sigma_left_mps[k]
     return answers

@@ -11,9 +11,9 @@ from config.decision import DecisionConfig, Prediction
 from config.robot import Body, Limits
 from controller import braking
 from controller.decision.bodies import Bodies
-from controller.decision.corridor import Corridor, course_of, place
+from controller.decision.corridor import Corridor, path_velocities, place
 from controller.decision.limits import Limit, Motion
-from controller.decision.worst_case import WorstCase
+from controller.decision.worst_case_limit import WorstCase
 from tests.support.bodies import box, line_path
 
 LIMITS = Limits()
@@ -24,10 +24,10 @@ CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 def asked(worst: WorstCase, body: Bodies, v_mps: float, chosen_mps: float | None = None) -> Limit | None:
     """Of a robot at 0 that drives v_mps, and would go on so if nothing else is chosen."""
     placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
-    course = course_of(body, placed.heading_rad[:, 0])
+    velocities = path_velocities(body, placed.heading_rad[:, 0])
     motion = Motion(v_mps, 0.0, LATENCY_S)
     chosen_mps = v_mps if chosen_mps is None else chosen_mps
-    return worst.limit(body, placed, course, np.array([True]), 0.0, motion, 0.0, chosen_mps)
+    return worst.limit(body, placed, velocities, np.array([True]), 0.0, motion, 0.0, chosen_mps)
 
 
 def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:
@@ -35,7 +35,7 @@ def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:
     config = DecisionConfig(prediction=Prediction(confirm_s=confirm_s))
     worst = WorstCase(config, LIMITS)
     body = box(0.0, 0.0, age_s=age_s, sigma_mps=0.0)
-    at_zero_m = place(body, CORRIDOR, np.zeros(1), 0.0, 12.0).lo_m[0, 0]
+    at_zero_m = place(body, CORRIDOR, np.zeros(1), 0.0, 12.0).block_from_s_m[0, 0]
     body = box(lo_m - at_zero_m, 0.0, age_s=age_s, sigma_mps=0.0)
     return asked(worst, body, LIMITS.max_speed_mps)
 

@@ -1,7 +1,7 @@
 """Speed limits for bodies that stand in the corridor: stop before each, where it can still be seen to leave.
 
-controller/decision/appraise.py calls StandingLimits in each control step. Bodies are placed along the path
-once a scene; in bends controller/decision/outline.py tells how far beside the corridor they are.
+controller/decision/speed_limits.py calls StandingLimits in each control step. Bodies are placed along the
+path once a scene; in bends controller/decision/outline.py tells how far beside the corridor they are.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, Placed, place
-from controller.decision.knowledge import Knowledge
 from controller.decision.limits import ALONGSIDE_M, Gap, Limit, Motion, stop_before
 from controller.decision.outline import outline_of
 from controller.decision.view_edges import visible_from_m
+from controller.decision.world_model import WorldModel
 from hal.compiled import compiled
 from hal.records import record
 from hal.types import CameraMount, FloatArray
@@ -30,7 +30,7 @@ _INSIDE_BODY_M = 0.05
 # of such a body may reach into the corridor.
 _BESIDE_M = 0.5
 # Greatest distance at which the robot stands off something that hangs and would rise above the view.
-_MOST_OFF_M = 3.0
+_MAX_HANGING_STOP_M = 3.0
 _NOW = np.zeros(1)
 
 
@@ -38,16 +38,16 @@ _NOW = np.zeros(1)
 class _Near:
     """A body that may stand in the corridor.
 
-    number: its id.
-    lo_m, hi_m, clear_m: see corridor.Placed.
+    track_id: its id.
+    block_from_s_m, block_to_s_m, clearance_m: see corridor.Placed.
     age_s: since it was first seen.
     stop_m: distance from it at which the robot stands.
     """
 
-    number: int
-    lo_m: float
-    hi_m: float
-    clear_m: float
+    track_id: int
+    block_from_s_m: float
+    block_to_s_m: float
+    clearance_m: float
     age_s: float
     stop_m: float
 
@@ -63,96 +63,96 @@ class StandingLimits:
         self._config, self._limits, self._mount = config, limits, mount
         self._comfort, self._emergency = braking.comfort(limits), braking.emergency(limits)
         self._inside = inside
-        self._of: Bodies | None = None
+        self._taken_from: Bodies | None = None
         self._near: list[_Near] = []
         self._corridor: Corridor | None = None
         self._outlines_m: dict[int, float] = {}
 
-    def limits(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
+    def limits(self, known: WorldModel, s_m: float, motion: Motion) -> list[Limit]:
         """The limits for a robot at s_m."""
-        if known.bodies is not self._of or known.corridor is not self._corridor:
+        if known.bodies is not self._taken_from or known.corridor is not self._corridor:
             self._take_in(known, s_m)
         margins = self._config.margins
         found = []
         for near in self._near:
-            if near.hi_m <= s_m:
+            if near.block_to_s_m <= s_m:
                 continue
-            number, gap_m = near.number, near.lo_m - s_m
-            beside_m = margins.lateral_m + (margins.graze_m if number in self._inside else 0.0)
+            track_id, gap_m = near.track_id, near.block_from_s_m - s_m
+            beside_m = margins.lateral_m + (margins.graze_m if track_id in self._inside else 0.0)
             if gap_m < -ALONGSIDE_M:
                 # The front has passed its near side: only a body that the robot would really touch counts.
                 beside_m = -_INSIDE_BODY_M
-            if near.clear_m > beside_m:
-                self._inside.discard(number)
+            if near.clearance_m > beside_m:
+                self._inside.discard(track_id)
                 continue
-            gap = Gap(gap_m, obstacle_id=number)
+            gap = Gap(gap_m, obstacle_id=track_id)
             if self._may_wait(gap, motion, near.age_s):
                 continue
-            self._inside.add(number)
+            self._inside.add(track_id)
             what = "stands on the path"
             found.append(
                 stop_before(gap, motion, self._comfort, near.stop_m, margins.least_m, "static", what)
             )
         return found
 
-    def _take_in(self, known: Knowledge, s_m: float) -> None:
+    def _take_in(self, known: WorldModel, s_m: float) -> None:
         """Place the standing bodies of a new scene, or along a new path, and drop those too far aside.
 
         Outlines that were measured along another path are not used.
         """
         before = self._outlines_m if known.corridor is self._corridor else {}
-        self._of, self._corridor = known.bodies, known.corridor
+        self._taken_from, self._corridor = known.bodies, known.corridor
         self._near, self._outlines_m = [], {}
         bodies = known.bodies
         if np.count_nonzero(bodies.moving) == len(bodies):
             return
         sight, margins = self._config.sight, self._config.margins
         placed = place(bodies, known.corridor, _NOW, s_m, sight.range_m + 2.0)
-        clear_m = self._clear(known, placed, s_m, before)
-        near = clear_m <= margins.lateral_m + margins.graze_m
+        clearance_m = self._clear(known, placed, s_m, before)
+        near = clearance_m <= margins.lateral_m + margins.graze_m
         if self._inside:
             self._inside.difference_update(bodies.ids[~(near | bodies.moving)].tolist())
         rows = (near & ~bodies.moving).nonzero()[0]
         if len(rows):
-            stop_m = self._standing_off(known, bodies, placed)
-            near_ones = _columns(rows, placed.lo_m, placed.hi_m, clear_m, bodies.age_s, stop_m)
-            numbers = bodies.ids[rows].tolist()
-            self._near = [_Near(number, *of) for number, of in zip(numbers, near_ones.tolist(), strict=True)]
+            stop_m = self._stop_distances(known, bodies, placed)
+            fields = _columns(
+                rows, placed.block_from_s_m, placed.block_to_s_m, clearance_m, bodies.age_s, stop_m
+            ).tolist()
+            track_ids = bodies.ids[rows].tolist()
+            self._near = [_Near(one, *others) for one, others in zip(track_ids, fields, strict=True)]
 
-    def _clear(self, known: Knowledge, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
+    def _clear(self, known: WorldModel, placed: Placed, s_m: float, before: dict[int, float]) -> FloatArray:
         """(N,) free floor between the bodies and the corridor.
 
         In bends it comes from each body's outline when it was last seen whole, unless a part that is nearer
         to the corridor is seen now. before: by id, these clearances up to the last scene.
         """
         if known.corridor.straight:
-            return placed.clear_m[:, 0]
-        clear_m = placed.clear_m[:, 0].copy()
+            return placed.clearance_m[:, 0]
+        clearance_m = placed.clearance_m[:, 0].copy()
         standing, near_m = ~known.bodies.moving, self._config.margins.lateral_m + _BESIDE_M
-        beside = standing & (clear_m <= near_m) & (placed.hi_m[:, 0] > s_m)
+        beside = standing & (clearance_m <= near_m) & (placed.block_to_s_m[:, 0] > s_m)
         bodies, depth_m = known.bodies.select(beside), self._config.prediction.body_depth_m
         own = known.surfaces.of(bodies)
         for k, row in enumerate(beside.nonzero()[0].tolist()):
-            stretch_m = s_m - ALONGSIDE_M, float(placed.hi_m[row, 0]) + known.corridor.front_m
+            stretch_m = s_m - ALONGSIDE_M, float(placed.block_to_s_m[row, 0]) + known.corridor.front_m
             outline = outline_of(bodies, k, own[:, k], known.surfaces, known.corridor, stretch_m, depth_m)
-            number = int(bodies.ids[k])
-            whole_m = outline.clear_m if outline.whole else before.get(number, -math.inf)
-            self._outlines_m[number] = whole_m
-            clear_m[row] = max(clear_m[row], min(whole_m, outline.clear_m))
-        return clear_m
+            track_id = int(bodies.ids[k])
+            whole_m = outline.clearance_m if outline.whole else before.get(track_id, -math.inf)
+            self._outlines_m[track_id] = whole_m
+            clearance_m[row] = max(clearance_m[row], min(whole_m, outline.clearance_m))
+        return clearance_m
 
-    def _standing_off(self, known: Knowledge, bodies: Bodies, placed: Placed) -> FloatArray:
+    def _stop_distances(self, known: WorldModel, bodies: Bodies, placed: Placed) -> FloatArray:
         """(N,) distance at which to stand before each body, so that it is still in view and seen to leave.
 
         Never less than the configured stop_m, even if a camera that looks down steeply would see it nearer.
         """
-        visible_m = visible_from_m(
-            bodies, placed.d_m[:, 0], known.edge_tan, known.near_m, self._mount.height_m, known.up_tan
-        )
+        visible_m = visible_from_m(bodies, placed.d_m[:, 0], self._mount.height_m, known.edges)
         front_m = known.corridor.front_m - self._mount.forward_m
         stop_m = self._config.margins.stop_m
-        return _standing_off(
-            visible_m, bodies.bottom_m, self._mount.height_m, front_m, stop_m, max(known.near_m, stop_m)
+        return _stop_distances(
+            visible_m, bodies.bottom_m, self._mount.height_m, front_m, stop_m, max(known.edges.near_m, stop_m)
         )
 
     def _may_wait(self, gap: Gap, motion: Motion, age_s: float) -> bool:
@@ -177,30 +177,31 @@ class StandingLimits:
 @compiled("int64[:], float64[:, :], float64[:, :], float64[:], float64[:], float64[:]")
 def _columns(
     rows: NDArray[np.intp],
-    lo_m: FloatArray,
-    hi_m: FloatArray,
-    clear_m: FloatArray,
+    block_from_s_m: FloatArray,
+    block_to_s_m: FloatArray,
+    clearance_m: FloatArray,
     age_s: FloatArray,
     stop_m: FloatArray,
 ) -> FloatArray:
-    """(R, 5) the fields of _Near except number, for the bodies rows (R,)."""
+    """(R, 5) the fields of _Near except track_id, for the bodies rows (R,)."""
     near = np.empty((len(rows), 5))
     for i in range(len(rows)):
         k = rows[i]
-        near[i] = lo_m[k, 0], hi_m[k, 0], clear_m[k], age_s[k], stop_m[k]
+        near[i] = block_from_s_m[k, 0], block_to_s_m[k, 0], clearance_m[k], age_s[k], stop_m[k]
     return near
 
 
 @compiled("float64[:], float64[:], float64, float64, float64, float64")
-def _standing_off(
-    visible_m: FloatArray, bottom_m: FloatArray, height_m: float, front_m: float, stop_m: float, most_m: float
+def _stop_distances(
+    visible_m: FloatArray, bottom_m: FloatArray, height_m: float, front_m: float, stop_m: float, max_m: float
 ) -> FloatArray:
     """(N,) distance of the robot's front from a body at which the body is visible_m (N,) ahead of the camera.
 
-    At least stop_m. At most most_m, or _MOST_OFF_M, if that is more, for a body that hangs above the camera.
+    At least stop_m. At most max_m, or _MAX_HANGING_STOP_M, if that is more, for a body that hangs above the
+    camera.
     """
     off = np.empty(len(visible_m))
     for k in range(len(visible_m)):
         hangs = bottom_m[k] > height_m
-        off[k] = min(max(visible_m[k] - front_m, stop_m), max(most_m, _MOST_OFF_M if hangs else 0.0))
+        off[k] = min(max(visible_m[k] - front_m, stop_m), max(max_m, _MAX_HANGING_STOP_M if hangs else 0.0))
     return off

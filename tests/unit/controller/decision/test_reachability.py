@@ -7,8 +7,8 @@ import pytest
 
 from config.robot import Body
 from controller.decision.bodies import Bodies
-from controller.decision.contingency import Reach, gets_through, last_in_time, reach, room, stops
 from controller.decision.corridor import Corridor, place
+from controller.decision.reachability import Reach, last_stop_before_entry, passes_clear, reach, room, stops
 from controller.profile import SpeedRamps
 from hal.types import FloatArray
 from tests.support.bodies import box, line_path
@@ -27,7 +27,7 @@ def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, s
         (np.full(len(body), sigma_mps), np.full(len(body), sigma_mps)),
         speed,
         (np.full(len(body), manoeuvre_mps2), np.full(len(body), manoeuvre_mps2)),
-        most_mps=1.5,
+        max_mps=1.5,
         margin_m=0.2,
     )
 
@@ -53,7 +53,7 @@ def test_a_crosser_may_stop_dead_in_the_way() -> None:
     worst = reached(box(5.0, 2.0, 0.0, -1.0))
     assert not worst.inside[0, 13]
     assert worst.inside[0, 14:].all()
-    assert worst.lo_m[0, -1] == pytest.approx(5.0 - 0.2 - 0.5 - 0.2)
+    assert worst.block_from_s_m[0, -1] == pytest.approx(5.0 - 0.2 - 0.5 - 0.2)
 
 
 def test_it_may_manoeuvre_into_the_way() -> None:
@@ -62,7 +62,7 @@ def test_it_may_manoeuvre_into_the_way() -> None:
     assert not worst.inside[0, 19]
     assert worst.inside[0, 21]
     # It may also have come nearer by as much.
-    assert worst.lo_m[0, 21] == pytest.approx(4.1 - 0.25 * 2.1**2 + 0.01 * 2.1, abs=0.01)
+    assert worst.block_from_s_m[0, 21] == pytest.approx(4.1 - 0.25 * 2.1**2 + 0.01 * 2.1, abs=0.01)
 
 
 def test_it_does_not_become_faster_than_obstacles_are() -> None:
@@ -78,12 +78,14 @@ def test_how_well_its_place_was_known_counts_from_the_first_moment() -> None:
 
     def unsure(along_m: float, across_m: float) -> Reach:
         at = (np.array([along_m]), np.array([across_m]))
-        return reach(placed, TIMES, none, (none, none), none, (none, none), 1.5, 0.2, unsure_m=at)
+        return reach(
+            placed, TIMES, none, (none, none), none, (none, none), 1.5, 0.2, position_uncertainty_m=at
+        )
 
     assert not unsure(0.0, 0.9).inside.any()
     assert unsure(0.0, 1.1).inside.all()
-    assert unsure(0.5, 1.1).lo_m[0, 0] == pytest.approx(unsure(0.0, 1.1).lo_m[0, 0] - 0.5)
-    assert unsure(0.5, 1.1).hi_m[0, -1] == pytest.approx(unsure(0.0, 1.1).hi_m[0, -1] + 0.5)
+    assert unsure(0.5, 1.1).block_from_s_m[0, 0] == pytest.approx(unsure(0.0, 1.1).block_from_s_m[0, 0] - 0.5)
+    assert unsure(0.5, 1.1).block_to_s_m[0, -1] == pytest.approx(unsure(0.0, 1.1).block_to_s_m[0, -1] + 0.5)
 
 
 def test_the_age_of_the_scene_counts() -> None:
@@ -126,8 +128,8 @@ def go(v_mps: float, target_mps: float) -> SpeedRamps:
 
 def test_getting_through_before_it_comes() -> None:
     crosser = reached(box(2.0, 4.0, 0.0, -1.0))
-    assert gets_through(go(1.5, 1.5), 0.0, TIMES, crosser)
-    assert not gets_through(go(0.5, 0.5), 0.0, TIMES, crosser)
+    assert passes_clear(go(1.5, 1.5), 0.0, TIMES, crosser)
+    assert not passes_clear(go(0.5, 0.5), 0.0, TIMES, crosser)
 
 
 def test_what_may_happen_along_and_across_is_told_apart() -> None:
@@ -137,7 +139,7 @@ def test_what_may_happen_along_and_across_is_told_apart() -> None:
     none, half = np.zeros(1), np.full(1, 0.5)
 
     def worst(spread: tuple[FloatArray, FloatArray]) -> Reach:
-        return reach(placed, TIMES, none, spread, none, (none, none), most_mps=1.5, margin_m=0.2)
+        return reach(placed, TIMES, none, spread, none, (none, none), max_mps=1.5, margin_m=0.2)
 
     assert not worst((half, none)).inside.any()
     assert worst((none, half)).inside.any()
@@ -146,5 +148,5 @@ def test_what_may_happen_along_and_across_is_told_apart() -> None:
 def test_a_stop_that_is_over_in_time_needs_no_room() -> None:
     """It could be in the way after 2 s at the earliest, right before the robot's nose."""
     near = reached(box(0.9, 0.65 + 1.0, 0.01, 0.0), manoeuvre_mps2=0.5)
-    assert last_in_time(stops(stop_from(1.0), TIMES), near) == 0
-    assert last_in_time(stops(stop_from(1.5), TIMES), near) == -1
+    assert last_stop_before_entry(stops(stop_from(1.0), TIMES), near) == 0
+    assert last_stop_before_entry(stops(stop_from(1.5), TIMES), near) == -1

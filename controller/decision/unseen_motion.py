@@ -1,6 +1,6 @@
 """Which bodies that are out of view, or about to leave it, move, and with which velocity they go on.
 
-controller/decision/memory.py asks these questions once a scene. Everything is in the frame of the path.
+controller/decision/out_of_view.py asks these questions once a scene. Everything is in the frame of the path.
 """
 
 from __future__ import annotations
@@ -12,35 +12,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.bodies import Bodies
-from controller.decision.limits import LEAVES_ASLANT
+from controller.decision.limits import ALONG_TO_SIDE_RATIO
 from hal.compiled import compiled
 from hal.types import FloatArray, PlanarPose
 
 BoolArray = NDArray[np.bool_]
 
 # Minimum time for which a body must have been seen before it is remembered out of view or its velocity used.
-SETTLED_S = 0.5
+MIN_TRACKED_S = 0.5
 # A body that is judged standing counts as approaching if it is faster than both thresholds. Noise makes
 # standing things beside the view seem to creep now and then; lower thresholds would slow the robot each time.
-_CLEAR_SIGMAS, _CLEAR_MPS = 3.3, 0.2
+_APPROACH_MIN_SIGMAS, _APPROACH_MIN_MPS = 3.3, 0.2
 # No person or vehicle is as narrow as this, but ends of racks are. Half of the greatest width that was seen.
-NOBODY_HALF_M = 0.1
+MIN_MOVER_HALF_WIDTH_M = 0.1
 # A speed above this many standard deviations is certain: the body will not be found where it was last seen.
 # But perception also judges whether a track moves, which takes some frames. From this age on, its verdict
 # "standing" is trusted more than the velocity: a body that sinks below the view may well seem to move.
-_CERTAIN_SIGMAS, _NO_VERDICT_S = 5.0, 1.0
+_SURE_MOVE_SIGMAS, _VERDICT_TRUSTED_S = 5.0, 1.0
 # Velocities that differ by more standard deviations than this belong to two different bodies.
-_APART_SIGMAS = 2.0
+_SAME_VELOCITY_SIGMAS = 2.0
 
 
-def out_or_coming(bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose) -> tuple[BoolArray, BoolArray]:
+def unseen_or_approaching(
+    bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose
+) -> tuple[BoolArray, BoolArray]:
     """Two masks (N,) of the bodies judged standing: not seen in this scene; and seen, but approaching.
 
     Approaching: the measured velocity towards the axis of a robot at pose (the line straight ahead) exceeds
-    the noise. A body is in neither mask if it was tracked for SETTLED_S or less, or was never wider than
-    NOBODY_HALF_M. widest_half_m (N,): half of the greatest width that each was seen with.
+    the noise. A body is in neither mask if it was tracked for MIN_TRACKED_S or less, or was never wider than
+    MIN_MOVER_HALF_WIDTH_M. widest_half_m (N,): half of the greatest width that each was seen with.
     """
-    out, comes = _out_or_coming(
+    out, comes = _unseen_or_approaching(
         bodies.moving,
         bodies.tracked_s,
         bodies.unseen_s,
@@ -55,39 +57,40 @@ def out_or_coming(bodies: Bodies, widest_half_m: FloatArray, pose: PlanarPose) -
     return out, comes
 
 
-def known_part(velocity_mps: FloatArray, covariance: FloatArray, along: FloatArray) -> float:
+def significant_component(velocity_mps: FloatArray, covariance: FloatArray, along: FloatArray) -> float:
     """The velocity's component along a unit vector (2,); 0 if it is within one standard deviation of 0."""
     part_mps = float(velocity_mps @ along)
     return part_mps if abs(part_mps) > math.sqrt(float(along @ covariance @ along)) else 0.0
 
 
-def may_come(bodies: Bodies, pose: PlanarPose) -> BoolArray:
+def may_enter_way(bodies: Bodies, pose: PlanarPose) -> BoolArray:
     """(N,) which bodies may come into the robot's way.
 
     That is, they move towards the robot's axis from either side, or along with the robot (more than
-    LEAVES_ASLANT times as fast forward as sideways), from where one may cut in.
+    ALONG_TO_SIDE_RATIO times as fast forward as sideways), from where one may cut in.
     """
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     left = (bodies.xy_m[:, 1] - pose.y_m) * cos - (bodies.xy_m[:, 0] - pose.x_m) * sin
     leftward = bodies.velocity_mps[:, 1] * cos - bodies.velocity_mps[:, 0] * sin
     forward = bodies.velocity_mps[:, 0] * cos + bodies.velocity_mps[:, 1] * sin
-    comes: BoolArray = (left * leftward < 0.0) | (forward > LEAVES_ASLANT * np.abs(leftward))
+    comes: BoolArray = (left * leftward < 0.0) | (forward > ALONG_TO_SIDE_RATIO * np.abs(leftward))
     return comes
 
 
-def as_measured(bodies: Bodies, mistaken_mps: float) -> Bodies:
+def with_measured_velocity(bodies: Bodies, mistaken_mps: float) -> Bodies:
     """The bodies, where those that are judged standing but certainly move get their measured velocity.
 
     The verdict of perception takes some frames. A mover that leaves the view before its verdict would be
     remembered as standing where it no longer is, and the robot would wait for it without end. So bodies
-    tracked for SETTLED_S to _NO_VERDICT_S count as moving if their measured speed is above _CERTAIN_SIGMAS
-    and _CLEAR_MPS. A speed above mistaken_mps is an error of measurement and is not used.
+    tracked for MIN_TRACKED_S to _VERDICT_TRUSTED_S count as moving if their measured speed is above
+    _SURE_MOVE_SIGMAS and _APPROACH_MIN_MPS. A speed above mistaken_mps is an error of measurement and is not
+    used.
     """
     squared = np.einsum("ni,ni->n", bodies.measured_mps, bodies.measured_mps)
     # The variance of the speed along the velocity's own direction is v' C v / v'v; this is v' C v.
     variance = np.einsum("ni,nij,nj->n", bodies.measured_mps, bodies.covariance, bodies.measured_mps)
-    goes = ~bodies.moving & (bodies.tracked_s >= SETTLED_S) & (bodies.tracked_s < _NO_VERDICT_S)
-    goes &= (squared**2 > _CERTAIN_SIGMAS**2 * variance) & (squared > _CLEAR_MPS**2)
+    goes = ~bodies.moving & (bodies.tracked_s >= MIN_TRACKED_S) & (bodies.tracked_s < _VERDICT_TRUSTED_S)
+    goes &= (squared**2 > _SURE_MOVE_SIGMAS**2 * variance) & (squared > _APPROACH_MIN_MPS**2)
     goes &= squared <= mistaken_mps**2
     if not goes.any():
         return bodies
@@ -95,24 +98,24 @@ def as_measured(bodies: Bodies, mistaken_mps: float) -> Bodies:
     return replace(bodies, velocity_mps=velocity, moving=bodies.moving | goes)
 
 
-def alike(bodies: Bodies, seen: Bodies) -> BoolArray:
+def velocities_agree(bodies: Bodies, seen: Bodies) -> BoolArray:
     """(N, M) whether the measured velocity of each of M seen bodies agrees with that of each of these N.
 
-    A seen body that was tracked for SETTLED_S or less agrees with none: its velocity is hardly known and
+    A seen body that was tracked for MIN_TRACKED_S or less agrees with none: its velocity is hardly known and
     would fit any body.
     """
     spread = np.diagonal(bodies.covariance, axis1=1, axis2=2)[:, None]
     seen_spread = np.diagonal(seen.covariance, axis1=1, axis2=2)
     differs = bodies.velocity_mps[:, None] - seen.measured_mps
-    same = np.all(differs**2 <= _APART_SIGMAS**2 * (spread + seen_spread), axis=2)
-    return np.asarray(same & (seen.tracked_s > SETTLED_S))
+    same = np.all(differs**2 <= _SAME_VELOCITY_SIGMAS**2 * (spread + seen_spread), axis=2)
+    return np.asarray(same & (seen.tracked_s > MIN_TRACKED_S))
 
 
 @compiled(
     "boolean[:], float64[:], float64[:], float64[:], float64[:, :], float64[:, :], float64[:, :, :],"
     "float64, float64, float64"
 )
-def _out_or_coming(
+def _unseen_or_approaching(
     moving: BoolArray,
     tracked_s: FloatArray,
     unseen_s: FloatArray,
@@ -130,13 +133,13 @@ def _out_or_coming(
     for k in range(len(moving)):
         # tracked_s and not age_s: the velocity of a new track was hardly measured, however long something
         # has stood there.
-        if moving[k] or tracked_s[k] <= SETTLED_S or widest_half_m[k] <= NOBODY_HALF_M:
+        if moving[k] or tracked_s[k] <= MIN_TRACKED_S or widest_half_m[k] <= MIN_MOVER_HALF_WIDTH_M:
             continue
         out[k] = unseen_s[k] > 0.0
         left_m = (xy_m[k, 1] - y_m) * cos - (xy_m[k, 0] - x_m) * sin
         left_mps = measured_mps[k, 1] * cos - measured_mps[k, 0] * sin
         spread = covariance[k]
         variance = (spread[0, 0] * sin - (spread[0, 1] + spread[1, 0]) * cos) * sin + spread[1, 1] * cos * cos
-        clear_mps = max(_CLEAR_SIGMAS * math.sqrt(variance), _CLEAR_MPS)
+        clear_mps = max(_APPROACH_MIN_SIGMAS * math.sqrt(variance), _APPROACH_MIN_MPS)
         comes[k] = not out[k] and -np.sign(left_m) * left_mps > clear_mps
     return answers

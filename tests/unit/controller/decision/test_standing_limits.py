@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from config.decision import DecisionConfig, SightConfig
-from controller.decision.standing import _standing_off
+from controller.decision.standing_limits import _stop_distances
 from tests.support.closed_loop import Mission, Thing, stands, straight
 
 
@@ -21,6 +21,6 @@ def test_a_camera_that_looks_down_steeply_is_no_reason_to_stand_nearer(near_m: f
 
 def test_only_what_hangs_is_stood_off_for_the_sake_of_the_upper_edge() -> None:
     """Seen whole from 5 m on, before a camera 0.6 m high: 3 m at most, and 1.3 m before what stands."""
-    off_m = _standing_off(np.full(2, 5.0), np.array([0.0, 0.8]), 0.6, 0.1, 0.45, 1.3)
+    off_m = _stop_distances(np.full(2, 5.0), np.array([0.0, 0.8]), 0.6, 0.1, 0.45, 1.3)
     assert off_m.tolist() == [1.3, 3.0]
-    assert _standing_off(np.full(1, 0.3), np.zeros(1), 0.6, 0.1, 0.45, 1.3).tolist() == [0.45]
+    assert _stop_distances(np.full(1, 0.3), np.zeros(1), 0.6, 0.1, 0.45, 1.3).tolist() == [0.45]

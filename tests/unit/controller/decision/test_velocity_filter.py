@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.decision.bodies import Bodies
-from controller.decision.steadying import SteadyVelocities
+from controller.decision.velocity_filter import SteadyVelocities
 from tests.support.bodies import box
 
 FRAME_NS = 33_333_333
@@ -22,7 +22,7 @@ def seen(frame: int, vx_mps: float, vy_mps: float, sigma_mps: float, number: int
 def test_a_first_sight_is_taken_as_it_is() -> None:
     found = SteadyVelocities().update(seen(1, -1.0, 0.2, 0.5))
     assert found.velocity_mps.tolist() == [[-1.0, 0.2]]
-    assert found.surprise_mps.tolist() == [[0.0, 0.0]]
+    assert found.innovation_mps.tolist() == [[0.0, 0.0]]
 
 
 def test_noise_far_away_is_averaged_out() -> None:
@@ -45,7 +45,7 @@ def test_what_is_measured_well_is_followed_at_once() -> None:
     # What is not followed yet is told, but for what any measurement differs by; and that it goes on.
     left_mps = 0.5 - found.velocity_mps[0, 1]
     assert left_mps > 0.03
-    assert found.surprise_mps[0, 1] == pytest.approx(2.0 * (left_mps - 0.5 * 0.03))
+    assert found.innovation_mps[0, 1] == pytest.approx(2.0 * (left_mps - 0.5 * 0.03))
 
 
 def test_what_gathers_speed_is_reckoned_to_go_on_doing_so() -> None:
@@ -56,15 +56,15 @@ def test_what_gathers_speed_is_reckoned_to_go_on_doing_so() -> None:
         found = steady.update(seen(frame, 0.0, late_mps, 0.1))
     now_mps = 20 / 30.0 * 1.3
     assert found.velocity_mps[0, 1] < 0.8 * now_mps
-    assert late_mps + 0.05 < found.velocity_mps[0, 1] + found.surprise_mps[0, 1] < now_mps
+    assert late_mps + 0.05 < found.velocity_mps[0, 1] + found.innovation_mps[0, 1] < now_mps
 
 
 def test_noise_is_no_surprise() -> None:
     steady = SteadyVelocities()
     for frame in range(1, 60):
         steady.update(seen(frame, -1.0, 0.0, 0.1))
-    assert steady.update(seen(60, -1.0, 0.04, 0.1)).surprise_mps[0, 1] == 0.0
-    assert steady.update(seen(61, -1.0, -0.5, 0.1)).surprise_mps[0, 1] < -0.3
+    assert steady.update(seen(60, -1.0, 0.04, 0.1)).innovation_mps[0, 1] == 0.0
+    assert steady.update(seen(61, -1.0, -0.5, 0.1)).innovation_mps[0, 1] < -0.3
 
 
 def test_who_stood_begins_anew() -> None:

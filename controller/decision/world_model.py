@@ -1,10 +1,10 @@
 """What the decision knows of the way ahead: the last good scene, and the bodies out of view since then.
 
-For each new scene, Knowledge turns the obstacles into boxes (controller/decision/bodies.py), averages their
-velocities (controller/decision/steadying.py), adds bodies that have left the view
-(controller/decision/memory.py), and notes free floor and unexplained surfaces along the path
+For each new scene, WorldModel turns the obstacles into boxes (controller/decision/bodies.py), averages their
+velocities (controller/decision/velocity_filter.py), adds bodies that have left the view
+(controller/decision/out_of_view.py), and notes free floor and unexplained surfaces along the path
 (controller/decision/sight.py). In each control step it says whether the camera can be relied on (the field
-fault). controller/decision/appraise.py turns what is known into speed limits.
+fault). controller/decision/speed_limits.py turns what is known into speed limits.
 """
 
 from __future__ import annotations
@@ -21,26 +21,27 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.decision.bodies import Bodies, SceneError, bodies_of, no_bodies
 from controller.decision.corridor import Corridor
-from controller.decision.going import SETTLED_S
 from controller.decision.lens_cover import LensCover
 from controller.decision.limits import STANDING_MPS
-from controller.decision.memory import OutOfView
+from controller.decision.out_of_view import OutOfView
 from controller.decision.sight import Sight
-from controller.decision.steadying import SteadyVelocities
 from controller.decision.surfaces import NO_SURFACES, check_scan, surfaces_of
+from controller.decision.unseen_motion import MIN_TRACKED_S
+from controller.decision.velocity_filter import SteadyVelocities
+from controller.decision.view_edges import ViewEdges
 from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
-from vision.scene import CameraCondition, CameraHealth, Scene
+from vision.scene import CameraCondition, CameraHealth, FreeSpace, Scene
 
 # Half size above which a standing body is no box. The box of a wall or a rack would reach into the corridor
 # wherever the path bends; what of its surface is in the corridor, depth sees (controller/decision/sight.py).
-_SPRAWLING_M = 0.8
+_MAX_BOX_HALF_M = 0.8
 # Half width up to which a standing body is no box but a strip: along a rack there are dozens of strips a
 # centimetre or two wide, different ones in each frame. Poles are wider.
-_STRIP_M = 0.015
+_MIN_BOX_HALF_WIDTH_M = 0.015
 # A new track is no newcomer if something stood within this distance of its place, this long ago.
 _BEFORE_NS = 200_000_000
 _SAME_PLACE_M = 0.25
@@ -48,7 +49,7 @@ _FUTURE_S = 0.005  # tolerance of the scene's time stamp
 _GOOD = CameraHealth(CameraCondition.GOOD, "", float("nan"))
 
 
-class Knowledge:
+class WorldModel:
     """Takes in scenes along one path. Points are in metres, in the frame of the path.
 
     bodies: N boxes that count, those in view before those out of view (controller/decision/bodies.py).
@@ -58,9 +59,7 @@ class Knowledge:
     corridor: the floor that the robot sweeps along the path.
     sight: how much of the corridor was seen free, and the nearest unexplained surface in it.
     lens: whether something is too near to the lens to be seen.
-    edge_tan: tangent of the half angle of view.
-    near_m: distance ahead of the camera from which the floor is in view.
-    up_tan: slope of the upper edge of the view.
+    edges: of the camera's view.
     age_s: time since the newest scene was captured; inf: none yet.
     since_s: time since the scene of bodies was captured, the last one of a trustworthy camera; inf: none yet.
     health: of the camera in the newest scene.
@@ -90,9 +89,9 @@ class Knowledge:
         self._boxed = np.zeros(0, np.bool_)
         self._unboxed: Bodies | None = None
         self._boxes = no_bodies(0)
-        self._steady = SteadyVelocities()
-        self._memory = OutOfView(mount, config.sight.near_m, robot.limits.max_obstacle_speed_mps)
-        self.edge_tan, self.near_m, self.up_tan = 0.5, config.sight.near_m, math.inf
+        self._velocity_filter = SteadyVelocities()
+        self._out_of_view = OutOfView(mount, robot.limits.max_obstacle_speed_mps)
+        self.edges = ViewEdges(edge_tan=0.5, near_m=config.sight.near_m, up_tan=math.inf)
         # Of the last scenes: capture time, surface points (K, 2) and centres of bodies (M, 2).
         self._places: deque[tuple[int, FloatArray, FloatArray]] = deque()
         self._captured_ns: int | None = None
@@ -107,14 +106,17 @@ class Knowledge:
         """Whether this scene, or a later one, was already looked at."""
         return self._captured_ns is not None and scene.captured_ns <= self._captured_ns
 
-    def go_on_from(self, before: Knowledge) -> None:
+    def take_over(self, before: WorldModel) -> None:
         """Take over what does not depend on the path: bodies, velocities, surfaces, the camera's state."""
         self.bodies, self._boxes = before.bodies, before._boxes
         self._seen, self._boxed, self._unboxed = before._seen, before._boxed, before._unboxed
-        self._steady, self._memory, self._places = before._steady, before._memory, before._places
+        self._velocity_filter, self._out_of_view, self._places = (
+            before._velocity_filter,
+            before._out_of_view,
+            before._places,
+        )
         self._poses, self.surfaces, self.lens = before._poses, before.surfaces, before.lens
-        self.health, self.edge_tan = before.health, before.edge_tan
-        self.near_m, self.up_tan = before.near_m, before.up_tan
+        self.health, self.edges = before.health, before.edges
         self._captured_ns, self._scene_fault = before._captured_ns, before._scene_fault
 
     @property
@@ -179,15 +181,12 @@ class Knowledge:
             return str(error)
         free, s_m = scene.free_space, self.corridor.path.project(pose, on_path.s_m).s_m
         boxed = _boxed(seen.half_view_m, seen.half_across_m, seen.moving)
-        if len(free.bearing_tan):
-            self.edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
-        self.near_m = self._memory.near_m = max(self._config.sight.near_m, free.floor_from_m)
-        self.up_tan = self._memory.up_tan = free.up_tan
+        self.edges = edges = self._edges_of(free)
         self.surfaces = surfaces = surfaces_of(free, pose, self._mount, self._noise)
-        boxes = self._steady.update(self._recognise(seen.select(boxed)))
-        boxes = self._memory.leaving(boxes, pose, self.edge_tan)
+        boxes = self._velocity_filter.update(self._age_known_places(seen.select(boxed)))
+        boxes = self._out_of_view.mark_leaving_movers(boxes, pose, edges)
         standing = v_mps <= STANDING_MPS
-        remembered = self._memory.update(self._boxes, boxes, pose, self.edge_tan, standing, free)
+        remembered = self._out_of_view.update(self._boxes, boxes, pose, edges, standing, free)
         self.bodies = boxes.joined(remembered)
         self._boxes, self._seen, self._boxed, self._unboxed = boxes, seen, boxed, None
         self.lens.look(free, self.corridor.half_width_at(s_m), self._mount.left_m)
@@ -197,21 +196,28 @@ class Knowledge:
         self._captured_ns = scene.captured_ns
         return ""
 
-    def _recognise(self, bodies: Bodies) -> Bodies:
+    def _edges_of(self, free: FreeSpace) -> ViewEdges:
+        """The edges of the view in a scene; to the sides, the last ones if the scene does not tell."""
+        edge_tan = self.edges.edge_tan
+        if len(free.bearing_tan):
+            edge_tan = _outermost(free.bearing_tan) + free.half_width_tan
+        return ViewEdges(edge_tan, max(self._config.sight.near_m, free.floor_from_m), free.up_tan)
+
+    def _age_known_places(self, bodies: Bodies) -> Bodies:
         """The bodies, where a new track in a place that was occupied before is not taken for a newcomer.
 
-        Its age_s is raised to SETTLED_S, whatever its new number; its tracked_s stays.
+        Its age_s is raised to MIN_TRACKED_S, whatever its new number; its tracked_s stays.
         """
         while len(self._places) > 1 and self._places[1][0] <= bodies.captured_ns - _BEFORE_NS:
             self._places.popleft()
-        if not self._places or not np.count_nonzero(bodies.age_s < SETTLED_S):
+        if not self._places or not np.count_nonzero(bodies.age_s < MIN_TRACKED_S):
             return bodies
         captured_ns, *places = self._places[0]
         if captured_ns > bodies.captured_ns - _BEFORE_NS:
             return bodies
         points = np.concatenate(places)
         there = bodies.covers(points, np.full(len(points), _SAME_PLACE_M), _SAME_PLACE_M).any(axis=0)
-        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, SETTLED_S), bodies.age_s))
+        return replace(bodies, age_s=np.where(there, np.maximum(bodies.age_s, MIN_TRACKED_S), bodies.age_s))
 
 
 @compiled("float64[:], float64[:], boolean[:]")
@@ -221,8 +227,8 @@ def _boxed(
     """(N,) which bodies count as boxes: movers, and standing ones that are neither large nor mere strips."""
     boxed = np.empty(len(moving), np.bool_)
     for k in range(len(moving)):
-        sprawls = max(half_view_m[k], half_across_m[k]) > _SPRAWLING_M
-        boxed[k] = moving[k] or (half_across_m[k] > _STRIP_M and not sprawls)
+        sprawls = max(half_view_m[k], half_across_m[k]) > _MAX_BOX_HALF_M
+        boxed[k] = moving[k] or (half_across_m[k] > _MIN_BOX_HALF_WIDTH_M and not sprawls)
     return boxed
 
 

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.memory import OutOfView
+from controller.decision.out_of_view import OutOfView
+from controller.decision.view_edges import ViewEdges
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
 from vision.scene import FreeSpace
 
 MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)
-NEAR_M = 1.3
 EDGE = 0.5
+EDGES = ViewEdges(edge_tan=EDGE, near_m=1.3, up_tan=np.inf)
 FRAME_NS = 100_000_000
 BANDS = np.linspace(-EDGE + 0.025, EDGE - 0.025, 20)
 NOTHING_SEEN = FreeSpace(BANDS, 0.025, np.full(20, np.inf), np.zeros(20))
@@ -24,7 +25,7 @@ ALL_SEEN = FreeSpace(BANDS, 0.025, np.full(20, np.inf), np.full(20, 8.0))
 
 class Recall:
     def __init__(self) -> None:
-        self.memory = OutOfView(MOUNT, NEAR_M, 1.5)
+        self.memory = OutOfView(MOUNT, 1.5)
         self.before = no_bodies(0)
         self.now_ns = 0
 
@@ -36,7 +37,7 @@ class Recall:
         """The same; returns what is remembered."""
         self.now_ns += FRAME_NS
         seen = replace(bodies if bodies is not None else no_bodies(0), captured_ns=self.now_ns)
-        kept = self.memory.update(self.before, seen, PlanarPose(x_m, 0.0, 0.0), EDGE, standing, free)
+        kept = self.memory.update(self.before, seen, PlanarPose(x_m, 0.0, 0.0), EDGES, standing, free)
         self.before = seen
         return kept
 
@@ -120,7 +121,7 @@ def test_what_moves_out_of_view_goes_on_for_two_seconds() -> None:
         recall.before,
         replace(no_bodies(0), captured_ns=recall.now_ns),
         PlanarPose(3.7, 0, 0),
-        EDGE,
+        EDGES,
         False,
         NOTHING_SEEN,
     ).xy_m[0].tolist() == pytest.approx([5.0, 0.85])
@@ -163,9 +164,9 @@ def test_who_goes_along_but_leaves_aslant_is_not_either(aside_mps: float, kept: 
 
 
 def test_how_long_it_was_not_seen_is_counted() -> None:
-    memory, before = OutOfView(MOUNT, NEAR_M, 1.5), box(2.0, 2.5, 0.0, -0.3)
+    memory, before = OutOfView(MOUNT, 1.5), box(2.0, 2.5, 0.0, -0.3)
     seen = replace(no_bodies(0), captured_ns=FRAME_NS)
-    kept = memory.update(before, seen, PlanarPose(0.0, 0.0, 0.0), EDGE, False, NOTHING_SEEN)
+    kept = memory.update(before, seen, PlanarPose(0.0, 0.0, 0.0), EDGES, False, NOTHING_SEEN)
     assert kept.unseen_s.tolist() == pytest.approx([0.1])
 
 

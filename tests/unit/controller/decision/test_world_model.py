@@ -12,7 +12,7 @@ from config.decision import DecisionConfig
 from config.perception import DepthNoise, PerceptionConfig
 from config.robot import Robot
 from controller.build import build_replay_decision
-from controller.decision.knowledge import Knowledge
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import PlanarPose
 from tests.support.deciding import MOUNT, PATH, Bench, obstacle
@@ -22,10 +22,10 @@ from vision.scene import FreeSpace, Obstacle
 START = OnPath(0.0, 0.0, 0.0)
 
 
-def after(*frames: tuple[Obstacle, ...]) -> Knowledge:
+def after(*frames: tuple[Obstacle, ...]) -> WorldModel:
     """What is known after these were seen, one after the other, by a robot that drives."""
     bench = Bench()
-    known = Knowledge(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
+    known = WorldModel(PATH, Robot(), MOUNT, DecisionConfig(), 0.0)
     for shown in frames:
         bench.now_ns += 33_000_000
         known.update(bench.scene(*shown), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
@@ -91,7 +91,7 @@ def test_a_scan_that_does_not_tell_the_same_of_every_band_is_none(broken: FreeSp
 def test_depth_is_as_noisy_as_the_configuration_says() -> None:
     noise = DepthNoise(quadratic_per_m=0.002)
     config = ReplayConfig(perception=PerceptionConfig(depth_noise=noise))
-    known = build_replay_decision(config, MOUNT).knowledge(PATH, 0.0)
+    known = build_replay_decision(config, MOUNT, None).world_model(PATH, 0.0)
     bench = Bench()
     known.update(bench.scene(), PlanarPose(0.0, 0.0, 0.0), START, 0.5, bench.now_ns)
     assert known.surfaces.noise == noise
@@ -104,3 +104,9 @@ def test_a_scene_from_nobody_knows_where_tells_nothing(unknown: PlanarPose) -> N
     decision = bench.step(replace(bench.scene(), robot_pose=unknown))
     assert decision.target_speed_mps == 0.0
     assert "where the robot was when the scene was taken is not known" in decision.reason.sentence
+
+
+@pytest.mark.parametrize(("fps", "period_s"), [(15.0, 1.0 / 15.0), (None, 1.0 / 30.0)])
+def test_the_decision_of_a_replay_has_the_period_of_its_recording(fps: float | None, period_s: float) -> None:
+    maker = build_replay_decision(ReplayConfig(), MOUNT, fps)
+    assert maker._latency_s == pytest.approx(period_s + DecisionConfig().chassis_delay_s)

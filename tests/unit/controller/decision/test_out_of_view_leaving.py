@@ -10,8 +10,9 @@ import pytest
 from config.decision import DecisionConfig
 from config.robot import Limits, Robot
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.knowledge import Knowledge
-from controller.decision.memory import OutOfView
+from controller.decision.out_of_view import OutOfView
+from controller.decision.view_edges import ViewEdges
+from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from tests.support.bodies import box
@@ -19,8 +20,9 @@ from tests.support.deciding import MOUNT, PATH, obstacle
 from tests.support.scenes import GOOD, STILL, free_space
 from vision.scene import FreeSpace, Scene
 
-NEAR_M, EDGE = 1.3, 0.5
+EDGE = 0.5
 HERE = PlanarPose(0.0, 0.0, 0.0)
+EDGES = ViewEdges(edge_tan=EDGE, near_m=1.3, up_tan=np.inf)
 FRAME_NS = 100_000_000
 NOTHING_SEEN = FreeSpace(np.zeros(1), EDGE, np.full(1, np.inf), np.zeros(1))
 # On the left edge of the view, 4 m ahead of the camera.
@@ -28,7 +30,7 @@ AT_EDGE = box(4.4, 2.1, sigma_mps=0.1)
 
 
 def memory(max_obstacle_speed_mps: float = 1.5) -> OutOfView:
-    return OutOfView(CameraMount(0.4, 0.0, 0.60, 0.0), NEAR_M, max_obstacle_speed_mps)
+    return OutOfView(CameraMount(0.4, 0.0, 0.60, 0.0), max_obstacle_speed_mps)
 
 
 def measured(bodies: Bodies, left_mps: float, unseen_s: float = 0.0) -> Bodies:
@@ -44,7 +46,7 @@ def expected(bodies: Bodies, left_mps: float = 0.0) -> Bodies:
 def after(*scenes: Bodies) -> Bodies:
     """The bodies of the last of some scenes."""
     view = memory()
-    return [view.leaving(scene, HERE, EDGE) for scene in scenes][-1]
+    return [view.mark_leaving_movers(scene, HERE, EDGES) for scene in scenes][-1]
 
 
 def test_who_is_clearly_coming_when_it_leaves_the_view_moves() -> None:
@@ -108,9 +110,9 @@ def test_who_moves_keeps_its_averaged_velocity() -> None:
 def kept_beside(newcomer: Bodies, remembered: Bodies) -> list[int]:
     """The ids of who is still reckoned with, after a newcomer came into view where it was expected."""
     view = memory()
-    view.update(remembered, no_bodies(FRAME_NS), HERE, EDGE, True, NOTHING_SEEN)
+    view.update(remembered, no_bodies(FRAME_NS), HERE, EDGES, True, NOTHING_SEEN)
     newcomer = replace(newcomer, captured_ns=2 * FRAME_NS)
-    kept = view.update(no_bodies(FRAME_NS), newcomer, HERE, EDGE, True, NOTHING_SEEN)
+    kept = view.update(no_bodies(FRAME_NS), newcomer, HERE, EDGES, True, NOTHING_SEEN)
     return [int(one) for one in kept.ids]
 
 
@@ -155,7 +157,7 @@ def test_who_was_certainly_going_is_not_thought_to_stand_where_it_is_not_seen(
     before, kept = measured(pallet, left_mps), []
     for number in range(1, round(kept_s * 10) + 3):
         seen = replace(no_bodies(0), captured_ns=number * FRAME_NS)
-        kept.append(len(view.update(before, seen, HERE, EDGE, number > 1, NOTHING_SEEN)))
+        kept.append(len(view.update(before, seen, HERE, EDGES, number > 1, NOTHING_SEEN)))
         before = seen
     assert kept[: round(kept_s * 10) - 1] == [1] * (round(kept_s * 10) - 1)
     assert kept[-1] == (0 if kept_s == 2.0 else 1)
@@ -168,7 +170,7 @@ def out_of_view_after(seconds: float, left_mps: float, sigma_mps: float, fastest
     before = measured(pallet, left_mps)
     for number in range(1, round(seconds * 10) + 1):
         seen = replace(no_bodies(0), captured_ns=number * FRAME_NS)
-        found = view.update(before, seen, HERE, EDGE, number > 1, NOTHING_SEEN)
+        found = view.update(before, seen, HERE, EDGES, number > 1, NOTHING_SEEN)
         before = seen
     return found
 
@@ -188,7 +190,7 @@ def test_who_was_certainly_going_goes_on_though_the_robot_stands(
     """What stands and vanishes then has gone by itself; who was going is somewhere."""
     pallet = measured(box(1.6, 0.1, top_m=0.1, sigma_mps=0.1, age_s=age_s), left_mps)
     seen = replace(no_bodies(0), captured_ns=FRAME_NS)
-    found = memory().update(pallet, seen, HERE, EDGE, True, NOTHING_SEEN)
+    found = memory().update(pallet, seen, HERE, EDGES, True, NOTHING_SEEN)
     assert found.moving.tolist() == [True] * kept
 
 
@@ -204,7 +206,7 @@ def test_however_certainly_nobody_goes_as_fast_as_a_mistake(fastest_mps: float, 
 def test_how_fast_any_obstacle_is_the_robots_limits_say(fastest_mps: float, goes: bool) -> None:
     """Of a pallet that sinks below the view while it is measured at 2 m/s, standing by the verdict."""
     robot = Robot(limits=Limits(max_obstacle_speed_mps=fastest_mps))
-    known = Knowledge(PATH, robot, MOUNT, DecisionConfig(), 0.0)
+    known = WorldModel(PATH, robot, MOUNT, DecisionConfig(), 0.0)
     sinking = replace(
         obstacle(1.6, 0.1, size_m=(0.5, 0.1), age_s=0.9), velocity_mps=np.array([-2.0, 0.0, 0.0])
     )
@@ -220,7 +222,7 @@ def test_what_stood_where_something_stood_is_not_believed_before_it_was_measured
     renumbered = replace(pallet, tracked_s=np.array([0.4]))
     for before, goes in ((pallet, True), (renumbered, False)):
         seen = replace(no_bodies(0), captured_ns=FRAME_NS)
-        found = memory().update(before, seen, HERE, EDGE, False, NOTHING_SEEN)
+        found = memory().update(before, seen, HERE, EDGES, False, NOTHING_SEEN)
         assert found.moving.tolist() == [goes]
 
 
@@ -248,7 +250,7 @@ def left_behind(*bodies: Bodies) -> list[int]:
     view, before = memory(), bodies[0]
     for one in bodies[1:]:
         before = before.joined(one)
-    kept = view.update(before, no_bodies(FRAME_NS), HERE, EDGE, False, NOTHING_SEEN)
+    kept = view.update(before, no_bodies(FRAME_NS), HERE, EDGES, False, NOTHING_SEEN)
     return [int(one) for one in kept.ids]
 
 

@@ -1,21 +1,22 @@
 """Obstacles and depth -> speed limits with their reasons, for one control step.
 
-controller/decision/decide.py calls Appraiser.limits and takes the least of these limits and its own (path,
+controller/decision/decide.py calls SpeedLimits.limits and takes the least of these limits and its own (path,
 range, camera). The advisers, in the order in which they are called:
 
 1. Depth (controller/decision/sight.py, lens_cover.py): a blind corner, the nearest surface that no obstacle
    explains, a covered lens, and the end of the floor that was seen free.
-2. standing.StandingLimits: bodies that stand in the swept corridor.
-3. moving.MovingLimits: bodies that cross, come or drive ahead (conflicts: controller/decision/crossing.py).
-4. worst_case.WorstCase: what the watched bodies could do at worst
-   (geometry: controller/decision/contingency.py).
+2. standing_limits.StandingLimits: bodies that stand in the swept corridor.
+3. moving_limits.MovingLimits: bodies that cross, come or drive ahead
+   (conflicts: controller/decision/crossing.py).
+4. worst_case_limit.WorstCase: what the watched bodies could do at worst
+   (geometry: controller/decision/reachability.py).
 
-Words for the bodies that controller/decision/knowledge.py knows:
+Words for the bodies that controller/decision/world_model.py knows:
 
 * watched: bodies that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone.
-* enters: watched bodies that are in the swept corridor or are likely to come into it (crossing.comes_in),
-  debounced.
-* remembered: bodies out of the camera's view, kept by controller/decision/memory.py.
+* enters: watched bodies that are in the swept corridor or are likely to come into it
+  (crossing.likely_enters), debounced.
+* remembered: bodies out of the camera's view, kept by controller/decision/out_of_view.py.
 """
 
 from __future__ import annotations
@@ -29,16 +30,16 @@ from config.robot import Limits
 from controller import braking
 from controller.decision.blind_corners import BlindCorner
 from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.corridor import course_of, place
-from controller.decision.crossing import comes_in
+from controller.decision.corridor import path_velocities, place
+from controller.decision.crossing import likely_enters
 from controller.decision.debounce import Debounced
 from controller.decision.decision import Reason
-from controller.decision.knowledge import Knowledge
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import UNSEEN_SIGMAS, Gap, Limit, Motion, allowed, stop_before
-from controller.decision.moving import MovingLimits
-from controller.decision.standing import StandingLimits
-from controller.decision.worst_case import WorstCase
+from controller.decision.limits import UNSEEN_ERROR_SIGMAS, Gap, Limit, Motion, allowed_text, stop_before
+from controller.decision.moving_limits import MovingLimits
+from controller.decision.standing_limits import StandingLimits
+from controller.decision.world_model import WorldModel
+from controller.decision.worst_case_limit import WorstCase
 from hal.types import CameraMount
 
 _COARSE_S = 0.5  # step of the times beyond those of the worst case
@@ -47,10 +48,10 @@ _NONE = np.zeros(0, np.bool_)
 _SAME_SURFACE_M = 0.8
 # A body must head for the corridor for this long until it counts as coming in, and head elsewhere for as long
 # until it does not. Meanwhile the worst case covers it.
-_SETTLES_S = 0.3
+_DEBOUNCE_S = 0.3
 
 
-class Appraiser:
+class SpeedLimits:
     """Asks the advisers, in this order: depth, standing bodies, moving bodies, and the worst case."""
 
     def __init__(self, config: DecisionConfig, limits: Limits, mount: CameraMount) -> None:
@@ -62,65 +63,66 @@ class Appraiser:
         self._inside: set[int] = set()
         self._standing = StandingLimits(config, limits, mount, self._inside)
         self._moving = MovingLimits(config, limits, self._times_s, self._inside)
-        self._enters = Debounced(_SETTLES_S)
-        self._of: Bodies | None = None
+        self._enters = Debounced(_DEBOUNCE_S)
+        self._taken_from: Bodies | None = None
         self._watched = no_bodies(0)
         self._remembered = _NONE
 
     def limits(
-        self, known: Knowledge, s_m: float, motion: Motion, base_mps: float, now_s: float
+        self, known: WorldModel, s_m: float, motion: Motion, base_mps: float, now_s: float
     ) -> list[Limit]:
         """Every limit that obstacles and depth put on the speed of a robot at s_m.
 
         base_mps: what path and camera allow.
         """
-        if known.bodies is not self._of:
+        if known.bodies is not self._taken_from:
             self._take_in(known)
         found = self._depth(known, s_m, motion)
         found += self._standing.limits(known, s_m, motion)
         watched = self._watched
         if not len(watched):
-            self._moving.nobody()
+            self._moving.forget()
+            self._enters.pause()
             return found
         placed = place(
             watched, known.corridor, known.since_s + self._times_s, s_m, self._config.sight.range_m + 2.0
         )
-        course = course_of(watched, placed.heading_rad[:, 0])
-        sigma_left = course.sigma_left_mps * self._config.prediction.sigmas
-        comes = comes_in(placed, self._times_s, sigma_left)
+        velocities = path_velocities(watched, placed.heading_rad[:, 0])
+        sigma_left = velocities.sigma_left_mps * self._config.prediction.sigmas
+        comes = likely_enters(placed, self._times_s, sigma_left)
         # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
         # there is no noise.
-        at_once = np.where(comes, placed.clear_m[:, 0] <= 0.0, self._remembered)
+        at_once = np.where(comes, placed.clearance_m[:, 0] <= 0.0, self._remembered)
         enters = self._enters.update(watched.ids, comes, at_once, now_s)
         for limit in found:
             base_mps = min(base_mps, limit.speed_mps)
         in_the_way, chosen_mps = self._moving.limits(
-            watched, placed, course, enters, s_m, motion, base_mps, now_s
+            watched, placed, velocities, enters, s_m, motion, base_mps, now_s
         )
         found += in_the_way
         if self._remembered.any():
             # A body out of view that approaches the path may be nearer to it than expected.
-            unsure_mps = UNSEEN_SIGMAS * course.sigma_left_mps
-            inwards = -np.sign(placed.d_m[:, 0]) * course.left_mps > unsure_mps
-            nearer = comes_in(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
+            unsure_mps = UNSEEN_ERROR_SIGMAS * velocities.sigma_left_mps
+            inwards = -np.sign(placed.d_m[:, 0]) * velocities.left_mps > unsure_mps
+            nearer = likely_enters(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
             enters |= self._remembered & inwards & nearer
         worst = self._worst_case.limit(
-            watched, placed, course, enters, s_m, motion, known.since_s, chosen_mps
+            watched, placed, velocities, enters, s_m, motion, known.since_s, chosen_mps
         )
         if worst is not None:
             found.append(worst)
         return found
 
-    def _take_in(self, known: Knowledge) -> None:
+    def _take_in(self, known: WorldModel) -> None:
         """Once a scene: select the watched bodies, and forget those that are gone."""
-        self._of = bodies = known.bodies
+        self._taken_from = bodies = known.bodies
         watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
         self._watched = bodies.select(watched)
         self._remembered = known.remembered[watched] if len(self._watched) else _NONE
         if self._inside:
             self._inside.intersection_update(bodies.ids.tolist())
 
-    def _depth(self, known: Knowledge, s_m: float, motion: Motion) -> list[Limit]:
+    def _depth(self, known: WorldModel, s_m: float, motion: Motion) -> list[Limit]:
         """The limits from depth alone (adviser 1 of the module's list)."""
         sight = known.sight
         front_m = s_m + known.corridor.front_m
@@ -134,7 +136,7 @@ class Appraiser:
             found.append(self._unseen(Gap(sight.known_s_m - front_m), motion))
         return found
 
-    def _surface(self, known: Knowledge, surface_s_m: float, s_m: float, motion: Motion) -> Limit:
+    def _surface(self, known: WorldModel, surface_s_m: float, s_m: float, motion: Motion) -> Limit:
         """The limit for the nearest surface that no box explains.
 
         Which obstacle it belongs to is looked up for the sentence only.
@@ -160,7 +162,7 @@ class Appraiser:
             required_m, margin_m = limit.reason.required_m, limit.reason.margin_m
             return Reason(
                 "unseen",
-                beyond + allowed(limit.speed_mps),
+                beyond + allowed_text(limit.speed_mps),
                 distance_m=gap.distance_m,
                 required_m=required_m,
                 margin_m=margin_m,
@@ -181,7 +183,7 @@ class Appraiser:
         def why() -> Reason:
             left_m = max(ahead_m, 0.0)  # 0 while the opening behind it is passed
             sentence = f"a blind corner {left_m:.1f} m ahead, {corner.beside_m:.1f} m beside the way: "
-            return Reason("corner", sentence + allowed(speed), distance_m=left_m)
+            return Reason("corner", sentence + allowed_text(speed), distance_m=left_m)
 
         return [Limit(speed, why)]
 
@@ -190,7 +192,7 @@ def _covered() -> Reason:
     return Reason("unseen", f"{COVERED}: stop", distance_m=0.0)
 
 
-def _owner(known: Knowledge, surface_s_m: float, s_m: float) -> int | None:
+def _owner(known: WorldModel, surface_s_m: float, s_m: float) -> int | None:
     """Id of the obstacle whose surface this is, if an unboxed one is tracked there."""
     unboxed = known.unboxed
     if not len(unboxed):
