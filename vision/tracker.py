@@ -27,7 +27,7 @@ from vision.bodies import (
     votes,
 )
 from vision.bodies.adoption import adopt, inherited
-from vision.bodies.arrivals import Changes, FreeMemory
+from vision.bodies.arrivals import Changes, ViewMemory
 from vision.bodies.judgement import judge
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, regions
@@ -84,7 +84,7 @@ class Tracker:
         self._body_height_m = body_height_m
         self._clearance_m = clearance_m
         self._tracks = Tracks()
-        self._free = FreeMemory(config.depth_noise)
+        self._free = ViewMemory(config.depth_noise)
         self._near_floor = NearFloor(config.min_depth_m)
         self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
@@ -130,7 +130,9 @@ class Tracker:
         if detection.motion_known or detection.restarted:
             self._free.remember(grid, pose, detection.captured_ns)
         labels, whole, measured = self._label(detection, standing, changes, velocities, elapsed_s)
-        sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
+        sightings.update_from_surfaces(
+            tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise
+        )
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
         owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)
@@ -155,14 +157,18 @@ class Tracker:
         measured = regions.measure(grid, labels, len(tracks))
         known = len(tracks)
         carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
-        tracks.guessed[known:] = tracks.mover[known:]
+        tracks.border_is_guess[known:] = tracks.mover[known:]
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))
-        whole, upright = grounding.ground(grid, carved, measured, tracks.guessed, tracks.mover)
+        whole, upright = grounding.extend_to_floor(
+            grid, carved, measured, tracks.border_is_guess, tracks.mover
+        )
         labels = self._regroup(detection, carved, upright, changes)
         if labels is not carved:
             measured = regions.measure(grid, labels, len(tracks))
-            whole, upright = grounding.ground(grid, labels, measured, tracks.guessed, tracks.mover)
+            whole, upright = grounding.extend_to_floor(
+                grid, labels, measured, tracks.border_is_guess, tracks.mover
+            )
         return labels, whole, upright
 
     def _claim(self, detection: Detection, standing: BoolGrid, changes: Changes, elapsed_s: float) -> IntGrid:
@@ -177,19 +183,19 @@ class Tracker:
         ballot = votes.count_votes(parts, count, predicted, len(tracks), mover)
         sight, distance_m = tracks.sight(pose.translation_m)
         overdue = tracks.overdue(changes.stayed_s, sight, self._free.resolves_m(distance_m))
-        ballot, hidden = votes.withdraw(ballot, parts, predicted, changes.stayed, overdue, mover)
-        tracks.hide(hidden)
-        came = masks.count_cells(parts, changes.arrived_cells, count)
-        ballot = votes.release(ballot, measured.cells, came, mover)
-        tracks.guessed = votes.guessed(ballot, mover)
+        ballot, hidden = votes.drop_overdue_movers(ballot, parts, predicted, changes.stayed, overdue, mover)
+        tracks.mark_hidden(hidden)
+        newly_arrived = masks.count_cells(parts, changes.arrived_cells, count)
+        ballot = votes.drop_static_from_arrived(ballot, measured.cells, newly_arrived, mover)
+        tracks.border_is_guess = votes.border_is_guess(ballot, mover)
         bodies = sightings.expected_bodies(tracks, pose, self._config.depth_noise)
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
-        alive = mover | tracks.has_moved
+        alive = mover | tracks.ever_moved
         winner = grouping.attach((winner == 0).nonzero()[0], measured, winner, alive, expected)
         speed_mps = self._config.motion.max_speed_mps
-        winner = births.begin(
-            tracks, detection, parts, measured, came, winner, self._body_height_m, speed_mps
+        winner = births.start_tracks(
+            tracks, detection, parts, measured, newly_arrived, winner, self._body_height_m, speed_mps
         )
         return votes.divide(parts, predicted, ballot, winner)
 
@@ -199,16 +205,16 @@ class Tracker:
         if not tracks.moving.any():
             return labels
         mover = tracks.mover
-        pairs = merging.merges(
+        pairs = merging.pairs_to_merge(
             grid, measured, tracks.state[:, 3:], tracks.velocity_sigma_mps, mover, tracks.moving
         )
-        way_m = tracks.speed_mps * changes.stayed_s
-        labels, gone = merging.join(grid, labels, pairs, changes.stayed, way_m)
+        displacement_m = tracks.speed_mps * changes.stayed_s
+        labels, gone = merging.merge_labels(grid, labels, pairs, changes.stayed, displacement_m)
         tracks.seen_ns[gone] = detection.captured_ns - _LONG_AGO_NS
         for track in (tracks.moving & (measured.cells > 0)).nonzero()[0].tolist():
-            second = division.split(grid, labels, track, changes.stayed, float(way_m[track]))
+            second = division.second_body(grid, labels, track, changes.stayed, float(displacement_m[track]))
             if second is not None:
-                tracks.twin(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
+                tracks.start_from(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
                 labels = labels.copy()
                 labels.ravel()[second] = len(tracks)
         return labels
@@ -251,14 +257,14 @@ class Tracker:
                 tracks.state.take(use, axis=0), tracks.covariance.take(use, axis=0), velocity, noise, 3
             )
         longer = np.where(limbs.restless(body), detection.dt_s, -detection.dt_s)
-        tracks.unrest_s = np.maximum(tracks.unrest_s + longer, 0.0)
-        goes = tracks.follow_trails(detection.dt_s)
-        seen = evidence_of(tracks, detection, body, goes, arrivals, cells, self._config.depth_noise)
+        tracks.restless_s = np.maximum(tracks.restless_s + longer, 0.0)
+        advances = tracks.update_trailing_average(detection.dt_s)
+        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, self._config.depth_noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
-        tracks.confidence, tracks.stands = verdict.confidence, verdict.stands
-        tracks.has_moved |= verdict.moving
-        tracks.count_on(verdict.proven, detection.dt_s)
+        tracks.confidence, tracks.surely_static = verdict.confidence, verdict.surely_static
+        tracks.ever_moved |= verdict.moving
+        tracks.update_durations(verdict.proven, detection.dt_s)
 
     def _percept(
         self,

@@ -44,7 +44,7 @@ from controller.decision.view_edges import beyond_edges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
-from vision.bodies.judgement import IMPLAUSIBLE
+from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
 from vision.scene import FreeSpace
 
 BoolArray = NDArray[np.bool_]
@@ -71,12 +71,12 @@ class OutOfView:
 
     near_m: distance ahead of the camera from which the floor is in view. up_tan: slope of the view's upper
     edge. Set both before the calls if the scene tells them. max_obstacle_speed_mps: measured speeds that are
-    far above it (IMPLAUSIBLE times) are mistakes.
+    far above it (IMPLAUSIBLE_SPEED_FACTOR times) are mistakes.
     """
 
     def __init__(self, mount: CameraMount, near_m: float, max_obstacle_speed_mps: float) -> None:
         self._mount, self.near_m, self.up_tan = mount, near_m, math.inf
-        self._mistaken_mps = IMPLAUSIBLE * max_obstacle_speed_mps
+        self._mistaken_mps = IMPLAUSIBLE_SPEED_FACTOR * max_obstacle_speed_mps
         self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)

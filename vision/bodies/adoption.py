@@ -99,10 +99,10 @@ def _adopted(
     quadratic_per_m: float,
     ids: NDArray[np.int64],
     moving: NDArray[np.bool_],
-    still: NDArray[np.bool_],
+    is_long_static: NDArray[np.bool_],
     owner: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """As adopt. still (N,): fragments that have been static for a while."""
+    """As adopt. is_long_static (N,): fragments that have been static for a while."""
     height, width = labels.shape
     result = np.full(len(ends_px), -1, np.int64)
     for k in range(len(ends_px)):
@@ -123,6 +123,6 @@ def _adopted(
             off = max(gap_m - _SAME_DEPTH_M - sigma_m, 0.0) + np.float32(_NEARER) * there_m
             if off < least:
                 track, least = labels[row, column] - 1, off
-        if on_it and not (still[k] and moving[track] and ids[track] != owner[k]):
+        if on_it and not (is_long_static[k] and moving[track] and ids[track] != owner[k]):
             result[k] = ids[track]
     return result

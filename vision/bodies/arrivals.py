@@ -66,7 +66,7 @@ class Changes:
     stayed_s: float
 
 
-class FreeMemory:
+class ViewMemory:
     """Remembers the views of the last moments, and so the space that was seen free."""
 
     def __init__(self, noise: DepthNoise) -> None:
@@ -79,16 +79,16 @@ class FreeMemory:
 
     def changes(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> Changes:
         """Which of the cells of mask (h, w) have arrived and which have stayed."""
-        came, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
+        arrived, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
         for wanted_s in _LOOK_BACK_S:
             memory = self._memory_of(now_ns, wanted_s)
             if memory is None:
                 continue
             nearer, same = self._compare(grid, mask, pose, memory)
-            came |= nearer
+            arrived |= nearer
             if wanted_s == _LOOK_BACK_S[-1]:
                 stayed, stayed_s = same, (now_ns - memory.stamp_ns) * 1e-9
-        return Changes(*_in_company(came, np.flatnonzero(came)), stayed, stayed_s)
+        return Changes(*_in_company(arrived, np.flatnonzero(arrived)), stayed, stayed_s)
 
     def resolves_m(self, distance_m: FloatArray) -> FloatArray:
         """(N,) minimum difference in depth at which two surfaces at distance_m (N,) can be distinguished."""
@@ -138,7 +138,7 @@ class FreeMemory:
 
 
 @inlined
-def _put_row(
+def _project_row(
     depth_m: FloatGrid,
     ray_x: FloatGrid,
     ray_y: FloatGrid,
@@ -195,7 +195,7 @@ def _compared(
     for i in range(height):
         if not mask[i].any():
             continue
-        _put_row(depth_m, ray_x, ray_y, i, rows, cell, inverse)
+        _project_row(depth_m, ray_x, ray_y, i, rows, cell, inverse)
         for j in range(width):
             if mask[i, j] and cell[j] >= 0:
                 ahead = inverse[j] - seen[cell[j]]

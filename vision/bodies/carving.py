@@ -24,7 +24,7 @@ from config.perception import PerceptionConfig
 from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.bodies.ends import near_ends
-from vision.bodies.judgement import IMPLAUSIBLE
+from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, regions
 from vision.depth.connected import IntGrid
@@ -72,10 +72,10 @@ def carve(
     suspicious = candidates.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not arrived.any():
         return labels
-    searched, overgrown = _in_question(
+    searched, overgrown = _may_hide_mover(
         tracks.mover,
         tracks.moving,
-        tracks.stands & (tracks.calm_s >= _CALM_S),
+        tracks.stands & (tracks.no_evidence_s >= _CALM_S),
         measured.position_m,
         measured.extent_m,
         config.depth_noise.floor_m,
@@ -84,14 +84,14 @@ def carve(
     asked = searched | overgrown
     if not asked.any():
         return labels
-    looked_at = _cells_of(labels, asked)
-    shown = arrived & looked_at
-    shown |= _around_moving_fragments(detection, velocities, suspicious, looked_at, config)
-    if not shown.any():
+    search_area = _cells_of(labels, asked)
+    moving_cells = arrived & search_area
+    moving_cells |= _around_moving_fragments(detection, velocities, suspicious, search_area, config)
+    if not moving_cells.any():
         return labels
-    inside = _cells_of(labels, searched) if overgrown.any() else looked_at
-    labels = _cut_back(tracks, detection, labels, overgrown, shown, config)
-    seeds = shown & inside
+    inside = _cells_of(labels, searched) if overgrown.any() else search_area
+    labels = _cut_back(tracks, detection, labels, overgrown, moving_cells, config)
+    seeds = moving_cells & inside
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
     if np.count_nonzero(grown) < _MIN_CELLS:
@@ -111,7 +111,7 @@ def carve(
 
 
 @compiled("boolean[:], boolean[:], boolean[:], float64[:, :], float64[:, :], float64, float64")
-def _in_question(
+def _may_hide_mover(
     mover: NDArray[np.bool_],
     moving: NDArray[np.bool_],
     calm: NDArray[np.bool_],
@@ -151,16 +151,16 @@ def _cut_back(
     detection: Detection,
     labels: IntGrid,
     overgrown: NDArray[np.bool_],
-    shown: BoolGrid,
+    moving_cells: BoolGrid,
     config: PerceptionConfig,
 ) -> IntGrid:
-    """labels (h, w) with overgrown movers (T,) reduced to the cells that are shown (h, w) to move.
+    """labels (h, w) with overgrown movers (T,) reduced to the cells that move (moving_cells, (h, w)).
 
     They have grown over furniture they move along. The rest of each begins as a static track.
     """
     for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
-        widened = np.asarray(cv2.dilate((shown & own).view(np.uint8), _BLOCK), np.uint8)
+        widened = np.asarray(cv2.dilate((moving_cells & own).view(np.uint8), _BLOCK), np.uint8)
         kept = widened.view(np.bool_) & own
         rest = own & ~kept
         if min(np.count_nonzero(kept), np.count_nonzero(rest)) < _MIN_CELLS:
@@ -182,12 +182,13 @@ def _around_moving_fragments(
     detection: Detection,
     velocities: FragmentVelocities,
     chosen: NDArray[np.intp],
-    looked_at: BoolGrid,
+    search_area: BoolGrid,
     config: PerceptionConfig,
 ) -> BoolGrid:
-    """(h, w) cells of looked_at (h, w) close to moving fragments of chosen (K,), at their depth.
+    """(h, w) cells of search_area (h, w) close to moving fragments of chosen (K,), at their depth.
 
-    A fragment counts as moving if others move alike, or if its own motion is clear enough (_alone).
+    A fragment counts as moving if others move alike, or if its own motion is clear enough
+    (_believable_alone).
     """
     result = np.zeros(detection.grid.depth_m.shape, np.bool_)
     motion = detection.motion
@@ -200,11 +201,16 @@ def _around_moving_fragments(
     group = candidates.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
     seen_s = detection.age_frames.take(chosen).astype(float) * detection.dt_s
-    chosen = chosen[company | _alone(seen_s, velocity, covariance, IMPLAUSIBLE * config.motion.max_speed_mps)]
+    chosen = chosen[
+        company
+        | _believable_alone(
+            seen_s, velocity, covariance, IMPLAUSIBLE_SPEED_FACTOR * config.motion.max_speed_mps
+        )
+    ]
     if len(chosen) == 0:
         return result
     return near_ends(
-        detection.grid, looked_at, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
+        detection.grid, search_area, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
     )
 
 
@@ -226,7 +232,7 @@ def _of_chosen(
 
 
 @compiled("float64[::1], float64[:, :], float64[:, :, :], float64")
-def _alone(
+def _believable_alone(
     seen_s: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, most_mps: float
 ) -> NDArray[np.bool_]:
     """(K,) fragments whose velocity is believed without another fragment that moves alike.

@@ -19,11 +19,11 @@ from vision.depth.regions import Regions, exchanged, measure
 # square of the depth.
 _SAME_M = 0.3
 _SAME_PER_M2 = 0.015
-_HOVERS_M = 0.2  # minimum gain in height: less is only the rim of the cells that were found already
+_MIN_GAIN_M = 0.2  # minimum gain in height: less is only the rim of the cells that were found already
 _LOWEST = 4  # the lowest quarter of a mover's rows gives the depth at which it reaches down
 
 
-def ground(
+def extend_to_floor(
     grid: DepthGrid, labels: IntGrid, measured: Regions, chosen: NDArray[np.bool_], mover: NDArray[np.bool_]
 ) -> tuple[IntGrid, Regions]:
     """Give the static cells below the tracks chosen (T,) to them, at their depth and without a gap.
@@ -92,6 +92,6 @@ def _below(
                 taken[count] = i * width + j
                 count, lowest = count + 1, max(lowest, i)
     # The lowest cell of all columns counts: it may stand on one foot only.
-    if (ray_y[lowest] - ray_y[bottom]) * own_m < np.float32(_HOVERS_M):
+    if (ray_y[lowest] - ray_y[bottom]) * own_m < np.float32(_MIN_GAIN_M):
         return taken[:0]
     return taken[:count]

@@ -33,7 +33,7 @@ from vision.fragments.segments import find_segments, longest_first
 
 _FEW_FRAGMENTS = 4  # fewer are too few: a verdict along the line of sight takes 8 ends (bodies/proof.py)
 _ENOUGH_OF_A_MOVER = 2  # enough to follow a mover, together with its surface
-_MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py): less is a sliver
+_MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py): less tells too little
 _REACH_M = 9.0  # maximum distance: the depth mask's 10 m less about the noise of depth there
 _URGENT_SIGHTINGS = 45  # bodies seen in fewer frames, and suspects, are urgent
 # Minimum time between two looks at an urgent body. It is just below a whole number of frame intervals at 30,

@@ -36,14 +36,14 @@ class MotionEvidence:
     ends: number of ends that own_velocity rests on.
     agreement: share of these that agree with it.
     restless: most ends contradict standing still, whether they agree with each other or not.
-    unrest_s: for how long the track has been restless.
+    restless_s: for how long the track has been restless.
     arrived, cells: of the surface.
     size_m: largest extent of the surface.
-    clean_s: for how long the centre has measured the velocity without a break.
+    velocity_measured_s: for how long the centre has measured the velocity without a break.
     view_radps: how fast the viewing direction changes.
     growth_mps: speed of the centre that a growing or shrinking visible part can explain.
-    goes: the centre really advances about as fast as the velocity says.
-    guessed: the border to the static surface beside it is a guess.
+    advances: the centre really advances about as fast as the velocity says.
+    border_is_guess: the border to the static surface beside it is a guess.
     up: the floor's normal, (3,); None where it is not known.
     trusted: the camera's motion is known.
     reckoned: it is supported by odometry, not by the images alone.
@@ -62,15 +62,15 @@ class MotionEvidence:
     ends: NDArray[np.intp]
     agreement: FloatArray
     restless: NDArray[np.bool_]
-    unrest_s: FloatArray
+    restless_s: FloatArray
     arrived: NDArray[np.intp]
     cells: NDArray[np.intp]
     size_m: FloatArray
-    clean_s: FloatArray
+    velocity_measured_s: FloatArray
     view_radps: FloatArray
     growth_mps: FloatArray
-    goes: NDArray[np.bool_]
-    guessed: NDArray[np.bool_]
+    advances: NDArray[np.bool_]
+    border_is_guess: NDArray[np.bool_]
     up: FloatArray | None
     trusted: bool
     reckoned: bool
@@ -81,14 +81,14 @@ def evidence_of(
     tracks: Tracks,
     detection: Detection,
     body: BodyVelocities,
-    goes: NDArray[np.bool_],
+    advances: NDArray[np.bool_],
     arrived: NDArray[np.intp],
     cells: NDArray[np.intp],
     noise: DepthNoise,
 ) -> MotionEvidence:
     """Gather the evidence of this frame; the filters of tracks have to be updated before.
 
-    body: velocities of the tracks by their fragments. goes, arrived, cells (T,): see MotionEvidence.
+    body: velocities of the tracks by their fragments. advances, arrived, cells (T,): see MotionEvidence.
     """
     rotation = detection.pose.rotation
     sight, distance_m = tracks.sight(detection.pose.translation_m)
@@ -105,16 +105,16 @@ def evidence_of(
         ends=np.where(believable(body), body.ends, 0),
         agreement=body.agreement,
         restless=restless(body),
-        unrest_s=tracks.unrest_s,
+        restless_s=tracks.restless_s,
         arrived=arrived,
         cells=cells,
         size_m=tracks.extent_m.max(axis=1),
-        clean_s=tracks.clean_s,
+        velocity_measured_s=tracks.velocity_measured_s,
         growth_mps=tracks.growth_mps,
         up=sightings.up(detection),
         view_radps=sightings.view_radps(detection, sight, distance_m),
-        goes=goes,
-        guessed=tracks.guessed,
+        advances=advances,
+        border_is_guess=tracks.border_is_guess,
         trusted=detection.motion_known,
         reckoned=detection.reckoned,
         borne_out=borne_out(detection),

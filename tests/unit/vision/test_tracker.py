@@ -242,12 +242,12 @@ def test_what_has_left_the_view_is_not_shown_any_longer() -> None:
 
 def test_a_break_in_sight_begins_the_surfaces_proof_anew() -> None:
     eyes = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
-    clean_s = []
+    velocity_measured_s = []
     for k, depth_m in enumerate([walker(-0.9 + way_m(k)) for k in range(15)] + [no_depth()] * 3):
         eyes.step(detection(grid_of(depth_m, None, 1.0), k), None)
-        clean_s.append(float(eyes._tracks.clean_s.max()))
-    assert clean_s[14] > 0.2
-    assert clean_s[15:] == [0.0, 0.0, 0.0]
+        velocity_measured_s.append(float(eyes._tracks.velocity_measured_s.max()))
+    assert velocity_measured_s[14] > 0.2
+    assert velocity_measured_s[15:] == [0.0, 0.0, 0.0]
 
 
 def owner_of(left_px: float, near_m: float, before: FloatArray) -> tuple[int, Percept]:

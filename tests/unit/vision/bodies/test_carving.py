@@ -128,7 +128,7 @@ def test_nothing_is_cut_out_of_something_compact() -> None:
 
 
 @pytest.mark.parametrize(
-    ("width_m", "stands", "calm_s", "cut"),
+    ("width_m", "stands", "no_evidence_s", "cut"),
     [
         (1.4, True, np.inf, True),
         (1.4, True, 0.9, True),
@@ -139,13 +139,13 @@ def test_nothing_is_cut_out_of_something_compact() -> None:
     ],
 )
 def test_who_comes_up_to_a_table_whose_lines_stand_is_cut_out_of_it(
-    width_m: float, stands: bool, calm_s: float, cut: bool
+    width_m: float, stands: bool, no_evidence_s: float, cut: bool
 ) -> None:
     """What has come to rest a moment ago is where free space was, too: that one is left whole, and so is who
     begins to go and is no wider than a body."""
     table = plate(4.0, (-0.5 * width_m, 0.5 * width_m), (-0.8, 0.8))
     tracks = one_track()
-    tracks.stands[:], tracks.calm_s[:] = stands, calm_s
+    tracks.surely_static[:], tracks.no_evidence_s[:] = stands, no_evidence_s
     _, after = carve(tracks, PERSON & (table > 0.0), table, table > 0.0)
     assert (after == 2).any() == cut
 
