@@ -1,8 +1,8 @@
 """detect: an RGB-D frame and the odometry at its time become a Detection.
 
-The steps of a frame (_follow): the prior of the camera's motion, optical flow of the fragments, their depth,
-the camera's motion, the residuals of the ends, and new fragments. Before that the depth grid is made and the
-camera's health is checked. track (vision/tracker.py) takes the Detection.
+The steps of a frame (_next_frame): the prior of the camera's motion, optical flow of the fragments, their
+depth, the camera's motion, the residuals of the ends, and new fragments. Before that the depth grid is made
+and the camera's health is checked. track (vision/tracker.py) takes the Detection.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from vision.camera.lens import vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
-from vision.detection import LEAST_AGREEMENT, MOTION_NOT_KNOWN, Detection, camera_health, no_motion
+from vision.detection import MIN_AGREEMENT, MOTION_NOT_KNOWN, Detection, camera_health, no_motion
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
 from vision.ego_motion.rolling_shutter import ReadOut
 from vision.fragments import optical_flow
-from vision.fragments.attention import Attention, Wanted
+from vision.fragments.attention import Attention, NeedsFragments
 from vision.fragments.edges import GreyImage
 from vision.fragments.optical_flow import Pyramid, pyramid
 from vision.fragments.renewal import Renewal
 from vision.fragments.store import FragmentStore
-from vision.motion.anchor_depths import appraise, average_depth, static_points
-from vision.motion.evidence import observed_variance_scale, residuals
+from vision.motion.anchor_depths import average_depth, depths_with_sigma, static_points
 from vision.motion.expected import expected_px, known_motion
-from vision.motion.velocities import PointMotion
+from vision.motion.residuals import observed_variance_scale, residuals
+from vision.motion.velocities import EndResiduals
 from vision.percept import Percept
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
@@ -52,7 +52,7 @@ class Detector:
         self._renewal = Renewal(config)
         self._attention = Attention(config)
         self._health = HealthMonitor(config)
-        self._told = CameraHealth(CameraCondition.GOOD, "", float("nan"))
+        self._last_health = CameraHealth(CameraCondition.GOOD, "", float("nan"))
         self._floor = FloorFinder()
         self._mount_check = MountCheck()
         self._images: Pyramid = ()
@@ -69,7 +69,7 @@ class Detector:
         """Detect in one frame. odometry: the camera by dead reckoning at captured_ns, None where not known.
 
         previous: result of tracking for the frame before. By it, fragments on moving obstacles are left out
-        of the ego-motion and searched for where the obstacle moves, and wanted bodies get more fragments.
+        of the ego-motion and searched for where the obstacle moves, and bodies that need fragments get more.
         """
         if frame.gyro is not None:
             self._gyro.add(frame.gyro)
@@ -84,18 +84,18 @@ class Detector:
         known = len(self._images) > 0 and self._images[0].shape == grey.shape
         if check.continuity is Continuity.REPEATED and health.condition is CameraCondition.GOOD:
             # A repeated image cannot have a better health than it was reported with before.
-            health = replace(self._told, valid_depth_ratio=health.valid_depth_ratio)
+            health = replace(self._last_health, valid_depth_ratio=health.valid_depth_ratio)
         if not usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
-            return self._blind(frame, grid, health)
+            return self._not_usable(frame, grid, health)
         if check.continuity is not Continuity.NEXT or not known:
             return self._restart(frame, grey, grid, odometry, health)
         dt_s = (frame.captured_ns - self._last_ns) * 1e-9
         # dt_s is negative if time stepped back at a frame that was not usable.
         if not 0.0 < dt_s <= self._config.max_gap_s:
             return self._restart(frame, grey, grid, odometry, health)
-        return self._follow(frame, grey, grid, odometry, previous, dt_s, health)
+        return self._next_frame(frame, grey, grid, odometry, previous, dt_s, health)
 
-    def _follow(
+    def _next_frame(
         self,
         frame: RgbdFrame,
         grey: GreyImage,
@@ -134,21 +134,21 @@ class Detector:
         store.near_m = surface.near_m.reshape(-1, 2).astype(np.float32)
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
         anchor = store.anchors(frame.captured_ns, config.motion.window_s)
-        depths = appraise(anchor, config.depth_noise)
-        static = static_points(anchor, depths, store.pixel_cov, moving | store.witness, config.max_depth_m)
+        depths = depths_with_sigma(anchor, config.depth_noise)
+        static = static_points(anchor, depths, store.pixel_cov, moving | store.body_only, config.max_depth_m)
         pixels = store.ends_px.reshape(-1, 2).astype(float)
         result = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), camera)
         scale = self._variance_scale
         motion = residuals(store, anchor, depths, result, camera, config.depth_noise, scale)
         if result.visual:
             self._variance_scale = observed_variance_scale(
-                motion, store.age_frames, moving | store.witness, scale
+                motion, store.age_frames, moving | store.body_only, scale
             )
-        average_depth(store, store.before(frame.captured_ns), result.pose, config.depth_noise)
+        average_depth(store, store.last_entries(frame.captured_ns), result.pose, config.depth_noise)
         step = self._pose.inverse() @ result.pose
         self._read_out.learn(result, vector_from_rotation(step.rotation), dt_s)
         ego = _ego(step, dt_s, result, prior)
-        blurred = result.visual and prior.source == "none" and result.inlier_ratio < LEAST_AGREEMENT
+        blurred = result.visual and prior.source == "none" and result.inlier_ratio < MIN_AGREEMENT
         health = camera_health(health, ego, blurred)
         self._pose = result.pose
         self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
@@ -159,7 +159,7 @@ class Detector:
         )
         self._renew(frame, grey)
         if previous is not None:
-            self._look_closer(frame, grey, previous.wanted)
+            self._look_closer(frame, grey, previous.needs_fragments)
         if ego.source != "visual" or blurred:
             self._store.break_history()
         self._commit(frame, images, odometry, result.sweep_rad)
@@ -179,9 +179,9 @@ class Detector:
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
-    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: Wanted) -> None:
+    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: NeedsFragments) -> None:
         new = self._attention.find(frame, grey, self._store.ends_px, bodies)
-        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, witness=True)
+        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=True)
 
     def _commit(
         self, frame: RgbdFrame, images: Pyramid, odometry: Pose | None, sweep_rad: FloatArray
@@ -200,7 +200,7 @@ class Detector:
     ) -> Detection:
         """Begin anew: at the first frame, after a gap or a step back of time, or with another image size."""
         self._store.clear()
-        self._read_out.lose()
+        self._read_out.forget_last()
         self._motion, self._motion_dt_s = _IDENTITY, 0.0
         self._renew(frame, grey)
         motion = no_motion(2 * len(self._store))
@@ -208,9 +208,9 @@ class Detector:
         self._commit(frame, pyramid(grey, self._config.fragments), odometry, _NO_SWEEP)
         return detection
 
-    def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
+    def _not_usable(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
         """A frame in which nothing can be tracked; the fragments wait for the next usable frame."""
-        self._read_out.lose()
+        self._read_out.forget_last()
         return self._detection(frame, grid, health, no_motion(2 * len(self._store)))
 
     def _detection(
@@ -218,7 +218,7 @@ class Detector:
         frame: RgbdFrame,
         grid: DepthGrid,
         health: CameraHealth,
-        motion: PointMotion,
+        motion: EndResiduals,
         ego: EgoMotion = MOTION_NOT_KNOWN,
         *,
         dt_s: float = 0.0,
@@ -226,7 +226,7 @@ class Detector:
         motion_known: bool = False,
         reckoned: bool = False,
     ) -> Detection:
-        store, self._told = self._store, health
+        store, self._last_health = self._store, health
         return Detection(
             captured_ns=frame.captured_ns,
             sequence=frame.sequence,

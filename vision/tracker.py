@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
-from hal.compiled import compiled
-from hal.types import FloatArray, PlanarPose
+from hal.types import PlanarPose
 from vision.bodies import (
     births,
     carving,
@@ -33,11 +32,11 @@ from vision.bodies.tracks import Tracks
 from vision.depth import connected, regions
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid
-from vision.depth.depth_guard import free_space
+from vision.depth.free_space import free_space
 from vision.depth.near_floor import NearFloor
 from vision.depth.regions import Regions
 from vision.detection import Detection
-from vision.fragments.attention import wanted
+from vision.fragments.attention import bodies_needing_fragments
 from vision.motion import least_squares, limbs
 from vision.motion.least_squares import FragmentVelocities
 from vision.motion.motion_evidence import evidence_of
@@ -49,31 +48,6 @@ _ACCEL_DENSITY = 0.08  # (m/s^2)^2 s, as people start, stop and turn: a sigma of
 _FORGET_S = 0.5  # a mover behind a post is visible again by then; the decision remembers for longer
 _FORGET_YOUNG_S = 0.15  # a few frames, for a track that was hardly seen: it is taken for a speckle
 _LONG_AGO_NS = 10**9  # age of the last sighting of a track that is to be forgotten now: above _FORGET_S
-
-
-@compiled("float64[:, :], float64[:, :, :], float64[:], int64[::1], float64, float64[:, :]")
-def _measured(
-    velocity_mps: FloatArray,
-    covariance: FloatArray,
-    swing: FloatArray,
-    use: NDArray[np.intp],
-    share: float,
-    rotation: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Velocities (K, 3) of the tracks use (K,) in the fixed frame, to which rotation leads, and covariances
-    (K, 3, 3): share times the given ones, plus swing, the variance by limbs, in each direction."""
-    velocity, noise = np.zeros((len(use), 3)), np.zeros((len(use), 3, 3))
-    for k in range(len(use)):
-        t = use[k]
-        for i in range(3):
-            for m in range(3):
-                velocity[k, i] += rotation[i, m] * velocity_mps[t, m]
-            for j in range(3):
-                for m in range(3):
-                    for n in range(3):
-                        noise[k, i, j] += rotation[i, m] * covariance[t, m, n] * share * rotation[j, n]
-            noise[k, i, i] += swing[t]
-    return velocity, noise
 
 
 class Tracker:
@@ -102,36 +76,36 @@ class Tracker:
             self._free.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
         elapsed_s = min(max(elapsed_s, 0.0), self._config.max_gap_s)
-        tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.up(detection))
+        tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.floor_normal(detection))
         before_ns = detection.captured_ns if self._last_ns is None else self._last_ns
         self._last_ns = max(detection.captured_ns, before_ns)
         owner = inherited(self._fragment_ids, self._fragment_owner, detection.ids, tracks.ids)
-        standing = connected.standing(detection.grid, self._clearance_m)
+        above_floor = connected.above_floor(detection.grid, self._clearance_m)
         velocities = least_squares.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
         if detection.health.condition is not CameraCondition.UNTRUSTWORTHY or detection.restarted:
-            owner = self._follow(detection, standing, owner, velocities, elapsed_s)
+            owner = self._follow(detection, above_floor, owner, velocities, elapsed_s)
         unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
         young = tracks.sightings < report.MIN_SIGHTINGS
         tracks.keep(unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S))
         self._fragment_ids, self._fragment_owner = detection.ids, owner
-        return self._percept(detection, standing, owner, velocities, robot_pose)
+        return self._percept(detection, above_floor, owner, velocities, robot_pose)
 
     def _follow(
         self,
         detection: Detection,
-        standing: BoolGrid,
+        above_floor: BoolGrid,
         owner: NDArray[np.int64],
         velocities: FragmentVelocities,
         elapsed_s: float,
     ) -> NDArray[np.int64]:
         """Update surfaces first, then velocities, then the verdict. Returns the track id of each fragment."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
-        changes = self._free.changes(grid, standing, pose, detection.captured_ns)
+        changes = self._free.changes(grid, above_floor, pose, detection.captured_ns)
         if detection.motion_known or detection.restarted:
             self._free.remember(grid, pose, detection.captured_ns)
-        labels, whole, measured = self._label(detection, standing, changes, velocities, elapsed_s)
+        labels, whole, measured = self._label(detection, above_floor, changes, velocities, elapsed_s)
         sightings.update_from_surfaces(
-            tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise
+            tracks, detection, regions.with_occlusion(grid, labels, measured), self._config.depth_noise
         )
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
@@ -145,7 +119,7 @@ class Tracker:
     def _label(
         self,
         detection: Detection,
-        standing: BoolGrid,
+        above_floor: BoolGrid,
         changes: Changes,
         velocities: FragmentVelocities,
         elapsed_s: float,
@@ -153,7 +127,7 @@ class Tracker:
         """Assign cells to tracks: labels (h, w), track index + 1; the same with movers extended to the floor;
         and the regions of the tracks with that. The cells of the extension do not vote in the next frame."""
         tracks, grid = self._tracks, detection.grid
-        labels = self._claim(detection, standing, changes, elapsed_s)
+        labels = self._claim(detection, above_floor, changes, elapsed_s)
         measured = regions.measure(grid, labels, len(tracks))
         known = len(tracks)
         carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
@@ -171,14 +145,16 @@ class Tracker:
             )
         return labels, whole, upright
 
-    def _claim(self, detection: Detection, standing: BoolGrid, changes: Changes, elapsed_s: float) -> IntGrid:
+    def _claim(
+        self, detection: Detection, above_floor: BoolGrid, changes: Changes, elapsed_s: float
+    ) -> IntGrid:
         """(h, w) track index + 1 of each cell, by the cells of all tracks in the frame before; births."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         mover = tracks.mover
         shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
         index = tracks.index_of(self._surfaces.track_id)
         predicted = masks.predict(self._surfaces, index, shift, grid, pose)
-        count, parts = connected.components(grid, standing)
+        count, parts = connected.components(grid, above_floor)
         measured = regions.measure(grid, parts, count)
         ballot = votes.count_votes(parts, count, predicted, len(tracks), mover)
         sight, distance_m = tracks.sight(pose.translation_m)
@@ -245,7 +221,7 @@ class Tracker:
             # The time windows of successive frames overlap: a frame adds dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
             going = tracks.speed_mps * tracks.moving
-            velocity, noise = _measured(
+            velocity, noise = limbs.in_fixed_frame(
                 body.velocity_mps,
                 body.covariance,
                 limbs.variance(body, going),
@@ -269,7 +245,7 @@ class Tracker:
     def _percept(
         self,
         detection: Detection,
-        standing: BoolGrid,
+        above_floor: BoolGrid,
         owner: NDArray[np.int64],
         velocities: FragmentVelocities,
         robot_pose: PlanarPose | None,
@@ -279,7 +255,7 @@ class Tracker:
             captured_ns=detection.captured_ns,
             sequence=detection.sequence,
             obstacles=report.obstacles(tracks, detection),
-            free_space=self._free_space(detection, standing),
+            free_space=self._free_space(detection, above_floor),
             ego_motion=detection.ego_motion,
             health=detection.health,
             robot_pose=robot_pose,
@@ -290,12 +266,14 @@ class Tracker:
         return Percept(
             scene,
             report.fragments(detection, owner, moving, velocities),
-            wanted(tracks, detection, self._config),
+            bodies_needing_fragments(tracks, detection, self._config),
         )
 
-    def _free_space(self, detection: Detection, standing: BoolGrid) -> FreeSpace:
+    def _free_space(self, detection: Detection, above_floor: BoolGrid) -> FreeSpace:
         grid = detection.grid
         trusted = detection.health.condition is not CameraCondition.UNTRUSTWORTHY
-        unmeasured_m = self._near_floor.unmeasured_m(grid, trusted)
-        in_the_way = standing if grid.height_m is None else standing & (grid.height_m < self._body_height_m)
-        return free_space(grid, in_the_way, self._config.max_depth_m, unmeasured_m)
+        measurable_from_m = self._near_floor.measurable_from_m(grid, trusted)
+        in_the_way = (
+            above_floor if grid.height_m is None else above_floor & (grid.height_m < self._body_height_m)
+        )
+        return free_space(grid, in_the_way, self._config.max_depth_m, measurable_from_m)

@@ -14,7 +14,7 @@ from vision.bodies.judgement import judge
 from vision.camera.floor import FloorFinder
 from vision.camera.lens import project, rays, rotation_from_vector, vector_from_rotation
 from vision.motion.motion_evidence import MotionEvidence
-from vision.motion.velocities import PointMotion, normal_equations
+from vision.motion.velocities import EndResiduals, normal_equations
 from vision.numerics import kalman
 from vision.perception import Perception
 from vision.scene import Scene
@@ -56,11 +56,11 @@ def test_any_translation_over_ground_is_recovered_from_exact_projections(
     static = camera.inverse().apply(points)
     now = camera.inverse().apply(points + velocity * lag_s)
     ray = now[:, :2] / now[:, 2:]
-    motion = PointMotion(
+    motion = EndResiduals(
         static_m=static,
         ray=ray,
         lag_s=np.full(count, lag_s),
-        miss_m=static_miss(static, ray),
+        residual_m=static_miss(static, ray),
         covariance=np.tile([1e-6, 2e-7, 2e-6], (count, 1)),
         depth_effect=np.zeros((count, 2)),
         depth_step_m=np.full(count, np.nan),

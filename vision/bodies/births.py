@@ -48,7 +48,7 @@ def start_tracks(
         overhead &= ~reaching_down(grid, parts, len(winner), body_height_m)
         swings_in = (
             overhead
-            & ~measured.wide
+            & ~measured.sides_visible
             & (arrived_cells >= _ARRIVED_CELLS)
             & (arrived_cells >= _ARRIVED_SHARE * measured.cells)
         )

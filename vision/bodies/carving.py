@@ -75,7 +75,7 @@ def carve(
     searched, overgrown = _may_hide_mover(
         tracks.mover,
         tracks.moving,
-        tracks.stands & (tracks.no_evidence_s >= _CALM_S),
+        tracks.surely_static & (tracks.no_evidence_s >= _CALM_S),
         measured.position_m,
         measured.extent_m,
         config.depth_noise.floor_m,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.bodies.boxes import LEAST_SAMPLES, LOAD_GAP_M, SEEN_THROUGH_GAP_M, cells_between, relations
+from vision.bodies.boxes import LOAD_GAP_M, MIN_SAMPLES, SEEN_THROUGH_GAP_M, cells_between, relations
 from vision.bodies.division import NEARER_INVERSE
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
@@ -131,7 +131,7 @@ def something_nearer_between(
     inverse = grid.inverse_depth.ravel().take(cells_between(grid, parts, one, other))
     depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
     nearer = inverse > 1.0 / np.maximum(depth, 0.1) + NEARER_INVERSE
-    result: NDArray[np.bool_] = nearer.sum(axis=0) >= LEAST_SAMPLES
+    result: NDArray[np.bool_] = nearer.sum(axis=0) >= MIN_SAMPLES
     return result
 
 

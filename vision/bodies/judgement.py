@@ -50,7 +50,7 @@ _RISE_S = 0.06
 # Without odometry an error of the camera's motion lasts for some frames, so one more frame is required.
 _RISE_ALONE_S = 0.07
 _FASTEST = 2.5  # maximum factor on the rise, with overwhelming proof
-_MOST_A_FRAME = 0.5  # maximum rise per frame: no single frame proves motion, however long the interval was
+_MAX_RISE = 0.5  # maximum rise per frame: no single frame proves motion, however long the interval was
 # Times in which the score falls by 1.
 _FALL_S = 0.30  # without proof: in some frames a moving body gives none
 _HOLD_S = 2.0  # without new proof, while the motion seems to go on
@@ -98,7 +98,7 @@ def judge(
         proof.surely_static,
         proof.over,
         proof.goes_on,
-        proof.sigmas,
+        proof.squared_sigmas,
         seen.borne_out,
         dt_s / (_RISE_S if seen.reckoned else _RISE_ALONE_S),
         dt_s,
@@ -142,7 +142,7 @@ def _updated_scores(
         if proven[t] and not surely_static[t]:
             # A stronger proof raises the score faster.
             pace = np.minimum(np.maximum(strength[t], 1.0), _FASTEST)
-            change = borne_out * np.minimum(pace * rise, _MOST_A_FRAME)
+            change = borne_out * np.minimum(pace * rise, _MAX_RISE)
         else:
             change = -dt_s / (_STOP_S if over[t] else _HOLD_S if goes_on[t] else _FALL_S)
         score[t] = np.minimum(np.maximum(evidence[t] + change, 0.0), _MAX_EVIDENCE)

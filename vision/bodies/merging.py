@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
-from vision.bodies.boxes import LEAST_SAMPLES, LOAD_GAP_M, SEEN_THROUGH_GAP_M, boxes, cells_between, relations
+from vision.bodies.boxes import LOAD_GAP_M, MIN_SAMPLES, SEEN_THROUGH_GAP_M, boxes, cells_between, relations
 from vision.bodies.division import LOW_BESIDE, NEARER_INVERSE, SINGLE_WIDTH_M, second_body
 from vision.bodies.grouping import something_nearer_between
 from vision.depth.connected import IntGrid
@@ -247,7 +247,7 @@ def _seen_between(
     inverse, beyond = grid.inverse_depth.ravel().take(cells), grid.beyond.ravel().take(cells)
     depth = np.maximum(regions.position_m[one, 2], regions.position_m[other, 2])
     farther = (inverse > 0.0) & (inverse < 1.0 / np.maximum(depth, 0.1) - NEARER_INVERSE)
-    result: NDArray[np.bool_] = (farther | beyond).sum(axis=0) >= LEAST_SAMPLES
+    result: NDArray[np.bool_] = (farther | beyond).sum(axis=0) >= MIN_SAMPLES
     return result
 
 

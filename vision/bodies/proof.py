@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.motion.line_of_sight import second_opinion, split
+from vision.motion.line_of_sight import decompose, second_opinion
 from vision.motion.motion_evidence import MotionEvidence
 
 BoolArray = NDArray[np.bool_]
@@ -25,10 +25,8 @@ _LEVEL_SHARE = 0.5  # of the threshold: with less level motion across, as many e
 _MIN_AGREEMENT = 0.18  # share of agreeing ends: low, since the limbs of a body disagree
 _UNREST_SHARE = 0.5  # of the threshold, for the filtered velocity of a restless body
 _LASTING_UNREST_S = 0.4  # longer than a limb swings one way
-# Of the threshold: 2 of 4 sigmas; a slow machine on legs reaches no more than 2.5.
-_LIKELY_SHARE = 0.25
-# Squared sigmas of this frame alone, so that the proof does not rest on the past only.
-_FRAME_PROOF = 3.0
+_LIKELY_SHARE = 0.25  # of the threshold, 2 of 4 sigmas: a slow machine on legs reaches 2.5 at most
+_FRAME_PROOF = 3.0  # squared sigmas of this frame, so that the proof does not rest on the past only
 _SHARED_PROOF = 0.55  # of the threshold, where the surface confirms the velocity of the fragments
 _SPEED_PER_METRE = 0.02  # m/s more minimum speed per metre of distance, since all errors grow with it
 _ARRIVED_CELLS = 8  # fewer arrived cells come and go with noise at a rim
@@ -110,27 +108,25 @@ class _Surface(NamedTuple):
 
 @inlined
 def _by_fragments(
-    filtered: _Velocity, frame_velocity: _Velocity, second: _Opinion, ends: _Ends, threshold: float
+    filtered: _Velocity, frame: _Velocity, second: _Opinion, ends: _Ends, threshold: float
 ) -> bool:
     """Whether filter and fragments show a velocity that the surface does not contradict, or confirms."""
     many, some = ends.agreeing >= _ENDS_ALONG, ends.agreeing >= _ENDS_ACROSS
-    across = _shown_across(filtered, frame_velocity, threshold) and (some or ends.restless)
+    across = _shown_across(filtered, frame, threshold) and (some or ends.restless)
     across = across and (not second.denies_across or many)
     across = across and (filtered.level > _LEVEL_SHARE * threshold or many or ends.restless)
-    along = filtered.along > threshold and frame_velocity.along > 0.5 * threshold
+    along = filtered.along > threshold and frame.along > 0.5 * threshold
     along = along and many and not second.denies_along
     less = _SHARED_PROOF * threshold
-    shared = filtered.along > less and second.confirms_along and frame_velocity.along > _FRAME_PROOF
-    shared = shared or (
-        filtered.across > less and second.confirms_across and frame_velocity.across > _FRAME_PROOF
-    )
+    shared = filtered.along > less and second.confirms_along and frame.along > _FRAME_PROOF
+    shared = shared or (filtered.across > less and second.confirms_across and frame.across > _FRAME_PROOF)
     return across or along or (shared and (ends.agreeing >= 2 or ends.restless))
 
 
 @inlined
-def _shown_across(filtered: _Velocity, frame_velocity: _Velocity, threshold: float) -> bool:
+def _shown_across(filtered: _Velocity, frame: _Velocity, threshold: float) -> bool:
     """Whether filter and fragments show motion across the line of sight, by however few fragments."""
-    return filtered.across > threshold and frame_velocity.across > 0.5 * threshold
+    return filtered.across > threshold and frame.across > 0.5 * threshold
 
 
 @inlined
@@ -174,24 +170,20 @@ def _still_moves(filtered: _Velocity, advances: bool, arrived: bool, least_mps: 
 
 
 @inlined
-def _one_fragment_moves(
-    filtered: _Velocity, frame_velocity: _Velocity, fast: bool, agreeing: float, threshold: float
-) -> bool:
+def _one_fragment_moves(filtered: _Velocity, frame: _Velocity, agreeing: float, threshold: float) -> bool:
     """Whether one fragment alone shows motion: no proof, but a reason to keep what more of them showed."""
-    return fast and _shown_across(filtered, frame_velocity, threshold) and agreeing >= 2
+    return _shown_across(filtered, frame, threshold) and agreeing >= 2
 
 
 @inlined
-def _surely_static(frame_velocity: _Velocity, agreeing: float, least_mps: float) -> bool:
+def _surely_static(frame: _Velocity, agreeing: float, least_mps: float) -> bool:
     """Whether this frame's fragments are sure that the track stands still."""
-    slow = frame_velocity.speed_mps < _STANDING_SHARE * least_mps
-    return slow and frame_velocity.sigma_mps < 0.5 * least_mps and agreeing >= _ENDS_ACROSS
+    slow = frame.speed_mps < _STANDING_SHARE * least_mps
+    return slow and frame.sigma_mps < 0.5 * least_mps and agreeing >= _ENDS_ACROSS
 
 
 @inlined
-def _velocity_of(
-    velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: int, t: int
-) -> _Velocity:
+def _taken(velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: int, t: int) -> _Velocity:
     """Velocity k of track t with its components; for the arguments see _proofs."""
     v, c, of = velocity[k, t], covariance[k, t], parts[:, k, t]
     speed_mps = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
@@ -200,10 +192,9 @@ def _velocity_of(
 
 
 @compiled(
-    "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], boolean[:, ::1], float64[:],"
-    "int64[:], float64[:], boolean[:], float64[:], int64[:], int64[:], float64[:],"
-    "float64[:], float64[:], float64[:], boolean[:], boolean[:], boolean[:], boolean,"
-    "float64, float64, float64"
+    "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], boolean[:, ::1], float64[:], int64[:],"
+    "float64[:], boolean[:], float64[:], int64[:], int64[:], float64[:], float64[:], float64[:], float64[:],"
+    "boolean[:], boolean[:], boolean[:], boolean, float64, float64, float64"
 )
 def _proofs(
     velocity: FloatArray,
@@ -229,29 +220,27 @@ def _proofs(
     dt_s: float,
     threshold: float,
 ) -> tuple[BoolArray, FloatArray, BoolArray, BoolArray, BoolArray]:
-    """moves, strength, surely_static, over and goes_on of Proof. velocity (4, T, 3), covariance (4, T, 3, 3),
-    and
-    parts (5, 4, T), value to level of Split: of each of the four velocities. opinion (4, T): SecondOpinion.
-    threshold: squared sigmas."""
+    """moves to goes_on of Proof. velocity (4, T, 3), covariance (4, T, 3, 3), and parts (5, 4, T), value to
+    level of Split: of each of the four velocities. opinion (4, T): SecondOpinion. threshold: squared sigmas.
+    """
     count = len(moving)
     moves, surely_static = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     over, goes_on, strength = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count)
     for t in range(count):
-        filtered = _velocity_of(velocity, covariance, parts, _FILTERED, t)
-        frame_velocity = _velocity_of(velocity, covariance, parts, _FRAME, t)
-        centre = _velocity_of(velocity, covariance, parts, _SURFACE, t)
+        filtered = _taken(velocity, covariance, parts, _FILTERED, t)
+        frame = _taken(velocity, covariance, parts, _FRAME, t)
+        centre = _taken(velocity, covariance, parts, _SURFACE, t)
         second = _Opinion(opinion[0, t], opinion[1, t], opinion[2, t], opinion[3, t])
         alike = agreement[t] * ends[t]
-        track_ends = _Ends(
-            ends[t], alike if agreement[t] >= _MIN_AGREEMENT else 0.0, restless[t], restless_s[t]
-        )
+        agreeing = alike if agreement[t] >= _MIN_AGREEMENT else 0.0
+        track_ends = _Ends(ends[t], agreeing, restless[t], restless_s[t])
         seen = _Surface(cells[t], size_m[t], velocity_measured_s[t], wander_mps[t], depth_sigma_m[t])
         some = arrived[t] >= _ARRIVED_CELLS and arrived[t] >= _ARRIVED_SHARE * cells[t]
         much = arrived[t] >= _MUCH_CELLS and arrived[t] >= _MUCH_SHARE * cells[t]
         possible = filtered.speed_mps <= fastest_mps and size_m[t] <= _LARGEST_M
         fast = filtered.speed_mps > least_mps[t]
         evident = (
-            _by_fragments(filtered, frame_velocity, second, track_ends, threshold)
+            _by_fragments(filtered, frame, second, track_ends, threshold)
             or _by_unrest(filtered, track_ends, threshold)
             or _by_arrival(filtered, some, threshold)
             or _by_surface(centre, seen, least_mps[t], dt_s, threshold)
@@ -259,18 +248,15 @@ def _proofs(
         # The place where a mover has stopped was free a moment ago, so its arrival there is no proof.
         stopped = moving[t] and not fast and filtered.sigma_mps < _KNOWN_SPEED * least_mps[t]
         moves[t] = trusted and possible and ((evident and fast) or (much and not stopped))
-        shown = np.minimum(
-            np.maximum(filtered.along, filtered.across),
-            np.maximum(frame_velocity.along, frame_velocity.across),
-        )
-        strength[t] = np.minimum(shown / threshold, track_ends.agreeing / _ENDS_ACROSS)
-        surely_static[t] = _surely_static(frame_velocity, track_ends.agreeing, least_mps[t])
-        slow = filtered.speed_mps < _STANDING_SHARE * least_mps[t]
+        shown = np.minimum(np.maximum(filtered.along, filtered.across), np.maximum(frame.along, frame.across))
+        strength[t] = np.minimum(shown / threshold, agreeing / _ENDS_ACROSS)
+        surely_static[t] = _surely_static(frame, agreeing, least_mps[t])
         # Neither depth nor a fragment tells it from the static surface beside it, along which it would drift.
         lost = moving[t] and border_is_guess[t] and ends[t] == 0 and not some
+        slow = filtered.speed_mps < _STANDING_SHARE * least_mps[t]
         over[t] = surely_static[t] or (stopped and slow) or lost
         still_moves = moving[t] and _still_moves(filtered, advances[t], some, least_mps[t])
-        one_moves = possible and _one_fragment_moves(filtered, frame_velocity, fast, alike, threshold)
+        one_moves = possible and fast and _one_fragment_moves(filtered, frame, alike, threshold)
         goes_on[t] = still_moves or one_moves or (restless[t] and not moving[t])
     return moves, strength, surely_static, over, goes_on
 
@@ -285,7 +271,7 @@ def prove(
     velocity[_SURFACE], covariance[_SURFACE] = seen.surface_velocity, seen.surface_covariance
     velocity[_APART] = seen.velocity - seen.surface_velocity
     covariance[_APART] = seen.covariance + seen.surface_covariance
-    parts = split(velocity, covariance, seen.sight, seen.up)
+    parts = decompose(velocity, covariance, seen.sight, seen.up)
     second = second_opinion(parts[_FILTERED], parts[_SURFACE], parts[_APART])
     least_mps = settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m
     wander_mps = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps

@@ -53,7 +53,7 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
     kind, centre_m, change, tracks.area_m2 = _kinds(
         measured.cells,
         measured.position_m,
-        measured.wide,
+        measured.sides_visible,
         rotation,
         detection.pose.translation_m,
         tracks.state,
@@ -70,7 +70,7 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
         kind,
         measured.position_m,
         measured.extent_m,
-        measured.tall,
+        measured.top_and_bottom_visible,
         rotation,
         noise.floor_m,
         noise.quadratic_per_m,
@@ -120,7 +120,7 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
 def _kinds(
     cells: NDArray[np.intp],
     position_m: FloatArray,
-    wide: NDArray[np.bool_],
+    sides_visible: NDArray[np.bool_],
     rotation: FloatArray,
     translation_m: FloatArray,
     state: FloatArray,
@@ -157,7 +157,7 @@ def _kinds(
         expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
         # Without a known motion of the camera, its error would be taken for a motion of the tracks.
         steady = motion_known and math.sqrt(squared) <= expected_m
-        if wide[t] and change[t] <= _SAME_AREA and steady:
+        if sides_visible[t] and change[t] <= _SAME_AREA and steady:
             kind[t] = _WHOLE
         elif moving[t] and now_m2 < _NEARLY_HIDDEN_SHARE * usual_m2[t]:
             # The visible rest of a mover that is passing behind something does not show where its body is.
@@ -176,7 +176,7 @@ def _centre_covariances(
     kind: NDArray[np.intp],
     position_m: FloatArray,
     extent_m: FloatArray,
-    tall: NDArray[np.bool_],
+    top_and_bottom_visible: NDArray[np.bool_],
     rotation: FloatArray,
     floor_m: float,
     quadratic_per_m: float,
@@ -191,7 +191,7 @@ def _centre_covariances(
         along_m = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * extent_m[t, 2]
         noise_m = _CENTRE_NOISE * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
         variance[0] = across_m**2
-        variance[1] = across_m**2 if tall[t] else _CUT_SIGMA_M**2
+        variance[1] = across_m**2 if top_and_bottom_visible[t] else _CUT_SIGMA_M**2
         variance[2] = along_m**2 + noise_m**2
         if kind[t] == _PARTIAL:
             variance += (_SHIFT_SHARE * size_m) ** 2
@@ -259,7 +259,7 @@ def _expected(
 
 def floor_normal(detection: Detection) -> FloatArray | None:
     """(3,) the floor's normal in the fixed frame; None where the floor is not known."""
-    normal = detection.grid.floor_normal
+    normal = detection.grid.up
     return None if normal is None else np.asarray(detection.pose.rotation @ normal)
 
 

@@ -206,10 +206,10 @@ class Tracks:
         """As update_with_centre, but the centre tells nothing about the velocity."""
         if len(index) == 0:
             return
-        self.state[index], self.covariance[index] = kalman.place(
+        self.state[index], self.covariance[index] = kalman.reset_position(
             self.state.take(index, axis=0), self.covariance.take(index, axis=0), position_m, noise
         )
-        self.surface_state[index], self.surface_covariance[index] = kalman.place(
+        self.surface_state[index], self.surface_covariance[index] = kalman.reset_position(
             self.surface_state.take(index, axis=0),
             self.surface_covariance.take(index, axis=0),
             position_m,

@@ -27,7 +27,7 @@ from vision.depth.depth_grid import BoolGrid
 
 # A track needs this many votes in a part to claim it, in cells: fewer are strays of a prediction that is off
 # by one cell.
-_LEAST_VOTES = 4
+_MIN_VOTES = 4
 # It also needs this share of all votes in the part, or this share of all votes of the track, whichever is
 # less. Fewer are strays as well.
 _SHARE_OF_PART = 0.15
@@ -89,7 +89,7 @@ def _claims(votes: NDArray[np.intp], mover: NDArray[np.bool_]) -> NDArray[np.boo
         strongest, most = 0, 0  # of the static tracks
         for t in range(tracks):
             least = min(_SHARE_OF_PART * total[p], _SHARE_OF_TRACK * own[t])
-            claims[p, t] = votes[p, t] >= max(least, _LEAST_VOTES)
+            claims[p, t] = votes[p, t] >= max(least, _MIN_VOTES)
             if claims[p, t] and not mover[t] and votes[p, t] > most:
                 strongest, most = t, votes[p, t]
         for t in range(tracks):

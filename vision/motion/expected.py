@@ -14,7 +14,7 @@ from vision.fragments.store import FragmentStore
 from vision.scene import Fragments
 
 _UNKNOWN_M = 5.0  # assumed where depth is missing
-_LEAST_AHEAD_M = 0.1  # lower bound of depth, so that a projection stays finite
+_MIN_AHEAD_M = 0.1  # lower bound of depth, so that a projection stays finite
 
 
 def known_motion(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[np.bool_], FloatArray]:
@@ -107,6 +107,6 @@ def _expected_px(
             away_m = point[i] - translation_m[i] + way_m[fragment, i]
             for j in range(3):
                 moved[j] += rotation[i, j] * away_m
-        inverse = 1.0 / max(moved[2], _LEAST_AHEAD_M)
+        inverse = 1.0 / max(moved[2], _MIN_AHEAD_M)
         result[k, 0], result[k, 1] = moved[0] * inverse * fx + cx, moved[1] * inverse * fy + cy
     return result

@@ -12,7 +12,7 @@ from hal.types import FloatArray
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_noise import depth_sigma_m
-from vision.detection import LEAST_AGREEMENT, Detection
+from vision.detection import MIN_AGREEMENT, Detection
 from vision.motion.least_squares import BodyVelocities
 from vision.motion.limbs import believable, restless
 
@@ -20,7 +20,7 @@ from vision.motion.limbs import believable, restless
 _AGREED = 0.65
 # Minimum weight of a frame's proof, where hardly enough fragments agree: two people in front of the camera
 # may be half of what it sees.
-_LEAST_BORNE_OUT = 0.2
+_MIN_BORNE_OUT = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +111,7 @@ def evidence_of(
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,
         growth_mps=tracks.growth_mps,
-        up=sightings.up(detection),
+        up=sightings.floor_normal(detection),
         view_radps=sightings.view_radps(detection, sight, distance_m),
         advances=advances,
         border_is_guess=tracks.border_is_guess,
@@ -129,5 +129,5 @@ def borne_out(detection: Detection) -> float:
     """
     if detection.reckoned:
         return 1.0
-    spare = (detection.ego_motion.inlier_ratio - LEAST_AGREEMENT) / (_AGREED - LEAST_AGREEMENT)
-    return min(spare, 1.0) if spare > _LEAST_BORNE_OUT else _LEAST_BORNE_OUT  # NaN gives the minimum
+    spare = (detection.ego_motion.inlier_ratio - MIN_AGREEMENT) / (_AGREED - MIN_AGREEMENT)
+    return min(spare, 1.0) if spare > _MIN_BORNE_OUT else _MIN_BORNE_OUT  # NaN gives the minimum

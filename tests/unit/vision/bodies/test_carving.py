@@ -17,7 +17,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth import regions
 from vision.detection import Detection
 from vision.motion import least_squares
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 
 CONFIG = PerceptionConfig()
 FRAME = 12
@@ -176,11 +176,11 @@ def fragments(columns: list[int], speed_mps: float, chi2: float) -> Detection:
     ray = np.stack((x, y), axis=1)
     lag_s = np.full(2 * count, 0.2)
     miss = np.stack((np.full(2 * count, speed_mps * 0.2), np.zeros(2 * count)), axis=1)
-    motion = PointMotion(
+    motion = EndResiduals(
         static_m=np.column_stack((ray * 4.0 - miss, np.full(2 * count, 4.0))),
         ray=ray,
         lag_s=lag_s,
-        miss_m=miss,
+        residual_m=miss,
         covariance=np.tile([1e-5, 0.0, 1e-5], (2 * count, 1)),
         depth_effect=np.zeros((2 * count, 2)),
         depth_step_m=np.zeros(2 * count),
@@ -232,10 +232,10 @@ def test_a_single_fragment_that_has_gone_one_way_for_a_while_is_enough(
 ) -> None:
     """Somebody in plain clothes walks along a wall: depth cannot tell him from it."""
     seen = fragments([150], speed_mps, 60.0)
-    miss_m = seen.motion.miss_m.copy()
-    miss_m[:, 1] = -upwards * miss_m[:, 0]
+    residual_m = seen.motion.residual_m.copy()
+    residual_m[:, 1] = -upwards * residual_m[:, 0]
     covariance = np.tile([sigma_m**2, 0.0, sigma_m**2], (2, 1))
-    motion = replace(seen.motion, miss_m=miss_m, covariance=covariance)
+    motion = replace(seen.motion, residual_m=residual_m, covariance=covariance)
     seen = replace(seen, motion=motion, age_frames=np.full(1, frames, np.intp))
     tracks = one_track()
     before, after = carve(tracks, NOWHERE, seen=seen)

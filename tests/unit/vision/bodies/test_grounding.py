@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from hal.types import FloatArray
 from tests.support.grids import LEVEL_UP, grid_of, labelled, nearest, plate, wall
-from vision.bodies.grounding import ground
+from vision.bodies.grounding import extend_to_floor
 from vision.depth import regions
 from vision.depth.depth_grid import BoolGrid
 
@@ -28,7 +28,7 @@ def given(
     """The cells that the first track is given, and what both measure with them."""
     grid, labels = grid_of(depth_m, LEVEL_UP, 1.0), labelled(own, other)
     measured = regions.measure(grid, labels, 2)
-    whole, standing_up = ground(grid, labels, measured, np.array(chosen), mover)
+    whole, standing_up = extend_to_floor(grid, labels, measured, np.array(chosen), mover)
     return (whole == 1) & (labels != 1), standing_up
 
 
@@ -88,17 +88,19 @@ def test_only_those_chosen_and_seen_are_looked_at() -> None:
     depth_m = np.where(HEAD | BODY, 4.0, 0.0)
     grid, labels = grid_of(depth_m, LEVEL_UP, 1.0), labelled(HEAD, BODY & ~HEAD)
     measured = regions.measure(grid, labels, 2)
-    whole, standing_up = ground(grid, labels, measured, np.array([False, False]), MOVER)
+    whole, standing_up = extend_to_floor(grid, labels, measured, np.array([False, False]), MOVER)
     assert whole is labels
     assert standing_up is measured
     hidden = labelled(np.zeros_like(HEAD), BODY)
     nothing = regions.measure(grid, hidden, 2)
-    assert ground(grid, hidden, nothing, np.array([True, False]), MOVER)[0] is hidden
+    assert extend_to_floor(grid, hidden, nothing, np.array([True, False]), MOVER)[0] is hidden
 
 
 def test_where_the_floor_is_not_known_nobody_reaches_down() -> None:
     labels = labelled(HEAD, BODY & ~HEAD)
     for up, alike in ((LEVEL_UP, False), (None, True)):
         grid = grid_of(np.where(HEAD | BODY, 4.0, 0.0), up)
-        whole, _ = ground(grid, labels, regions.measure(grid, labels, 2), np.array([True, False]), MOVER)
+        whole, _ = extend_to_floor(
+            grid, labels, regions.measure(grid, labels, 2), np.array([True, False]), MOVER
+        )
         assert (whole is labels) == alike

@@ -16,7 +16,7 @@ from vision.bodies.tracks import Tracks
 from vision.camera.lens import rotation_from_vector
 from vision.detection import Detection
 from vision.motion.least_squares import FragmentVelocities
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 
 FRAME = 30
 NOW_NS = START_NS + FRAME * FRAME_NS
@@ -79,11 +79,11 @@ def test_obstacles_are_told_in_the_axes_of_the_camera() -> None:
     assert (one.moving, one.score, one.fragments) == (True, 0.8, 7)
 
 
-def ends(usable: list[bool]) -> PointMotion:
+def ends(usable: list[bool]) -> EndResiduals:
     count = len(usable)
     plain = no_ends()
-    values = {name: np.zeros((count, *getattr(plain, name).shape[1:])) for name in PointMotion.__slots__}
-    return PointMotion(**{**values, "usable": np.array(usable)})
+    values = {name: np.zeros((count, *getattr(plain, name).shape[1:])) for name in EndResiduals.__slots__}
+    return EndResiduals(**{**values, "usable": np.array(usable)})
 
 
 def two_fragments() -> Detection:

@@ -11,7 +11,7 @@ from vision.bodies.ends import near_ends
 from vision.bodies.masks import predict, surfaces
 from vision.depth.connected import components, spread_labels
 from vision.depth.depth_grid import DepthGrid
-from vision.depth.regions import measure, unhidden
+from vision.depth.regions import measure, with_occlusion
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 SHAPE = (24, 32)
@@ -98,7 +98,7 @@ def test_what_something_nearer_hides_is_not_whole() -> None:
     grid = grid_of(depth)
     measured = measure(grid, labels, 3)
     assert measured.whole.tolist() == [True, True, True]
-    assert unhidden(grid, labels, measured).whole.tolist() == [False, True, True]
+    assert with_occlusion(grid, labels, measured).whole.tolist() == [False, True, True]
 
 
 def test_a_jump_in_depth_parts_what_touches() -> None:

@@ -134,4 +134,4 @@ def test_a_gyro_gives_the_rotation_and_how_sure_it_is() -> None:
     np.testing.assert_allclose(turned.motion.translation_m, prior.motion.translation_m)
     np.testing.assert_allclose(turned.sigma[:3], 0.02 * 0.1)
     np.testing.assert_allclose(turned.sigma[3:], prior.sigma[3:])
-    assert (turned.source, turned.binding) == (prior.source, prior.binding)
+    assert (turned.source, turned.trusted) == (prior.source, prior.trusted)

@@ -5,17 +5,17 @@ import pytest
 
 from hal.types import FloatArray
 from tests.support.point_motion import static_miss
-from vision.motion.velocities import PointMotion, normal_equations
+from vision.motion.velocities import EndResiduals, normal_equations
 
 
-def points(static_m: FloatArray, ray: FloatArray, lag_s: float) -> PointMotion:
+def points(static_m: FloatArray, ray: FloatArray, lag_s: float) -> EndResiduals:
     """Points whose pixel covariance is the unit matrix (1 m^2) and whose depth is exact."""
     count = len(static_m)
-    return PointMotion(
+    return EndResiduals(
         static_m=static_m,
         ray=ray,
         lag_s=np.full(count, lag_s),
-        miss_m=static_miss(static_m, ray),
+        residual_m=static_miss(static_m, ray),
         covariance=np.tile([1.0, 0.0, 1.0], (count, 1)),
         depth_effect=np.zeros((count, 2)),
         depth_step_m=np.full(count, np.nan),
@@ -42,7 +42,7 @@ def test_length_ratio_and_lateral_speed_follow_from_the_point_equations() -> Non
 
 def test_normal_equations_of_one_point_by_hand() -> None:
     motion = points(np.array([[1.0, 0.0, 4.0]]), np.array([[0.5, 0.0]]), 2.0)
-    np.testing.assert_allclose(motion.miss_m, [[1.0, 0.0]])
+    np.testing.assert_allclose(motion.residual_m, [[1.0, 0.0]])
     equations = normal_equations(motion, np.array([3.0]))
     # Rows (2, 0, -1) and (0, 2, 0), weighted with 3.
     np.testing.assert_allclose(equations.matrix[0], [[12.0, 0.0, -6.0], [0.0, 12.0, 0.0], [-6.0, 0.0, 3.0]])
@@ -53,11 +53,11 @@ def test_normal_equations_of_one_point_by_hand() -> None:
 def test_correlated_pixels_are_weighted_by_the_inverse_of_their_covariance() -> None:
     base = points(np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, -0.2]]), 0.5)
     covariance = np.array([[2.0, 1.0], [1.0, 3.0]])
-    motion = PointMotion(
+    motion = EndResiduals(
         base.static_m,
         base.ray,
         base.lag_s,
-        base.miss_m,
+        base.residual_m,
         np.array([[2.0, 1.0, 3.0]]),
         np.array([[0.4, 0.1]]),
         base.depth_step_m,
@@ -77,7 +77,7 @@ def test_correlated_pixels_are_weighted_by_the_inverse_of_their_covariance() -> 
 def test_what_has_no_weight_says_nothing_even_if_it_is_no_number() -> None:
     static, ray = np.tile([1.0, 0.0, 4.0], (2, 1)), np.tile([0.5, 0.0], (2, 1))
     motion = points(static, ray, 2.0)
-    motion.miss_m[1] = motion.covariance[1] = np.nan
+    motion.residual_m[1] = motion.covariance[1] = np.nan
     table = normal_equations(motion, np.array([3.0, 0.0])).table
     np.testing.assert_array_equal(table[:, 0], normal_equations(motion, np.full(2, 3.0)).table[:, 0])
     assert not table[:, 1].any()
