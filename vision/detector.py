@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
@@ -30,8 +31,8 @@ from vision.fragments.attention import Attention, NeedsFragments
 from vision.fragments.edges import GreyImage
 from vision.fragments.optical_flow import Pyramid, pyramid
 from vision.fragments.renewal import Renewal
-from vision.fragments.store import FragmentStore
-from vision.motion.anchor_depths import average_depth, depths_with_sigma, static_points
+from vision.fragments.store import AnchorEnds, FragmentStore
+from vision.motion.anchor_depths import AnchorDepths, average_depth, depths_with_sigma, static_points
 from vision.motion.expected import expected_px, known_motion
 from vision.motion.residuals import observed_variance_scale, residuals
 from vision.motion.velocities import EndResiduals
@@ -105,16 +106,55 @@ class Detector:
         dt_s: float,
         health: CameraHealth,
     ) -> Detection:
-        store, config, camera = self._store, self._config, frame.intrinsics
+        """Detect in a frame that comes dt_s after the one before it and can be compared with it."""
+        config, store = self._config, self._store
         prior = self._prior(frame, odometry, dt_s)
-        moving, velocity = known_motion(store.ids, previous.fragments if previous else None)
-        guess = expected_px(store, velocity, prior.motion, dt_s, camera)
         images = pyramid(grey, config.fragments)
+        excluded = self._track_ends(frame, images, prior, previous, dt_s)
+        anchor = store.anchors(frame.captured_ns, config.motion.window_s)
+        depths = depths_with_sigma(anchor, config.depth_noise)
+        static = static_points(anchor, depths, store.pixel_cov, excluded, config.max_depth_m)
+        pixels = store.ends_px.reshape(-1, 2).astype(float)
+        found = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), frame.intrinsics)
+        motion = self._measure_residuals(frame, anchor, depths, found, excluded)
+        step = self._pose.inverse() @ found.pose
+        self._read_out.learn(found, vector_from_rotation(step.rotation), dt_s)
+        self._pose = found.pose
+        ego, reckoned = _ego(step, dt_s, found, prior), prior.source != "none"
+        self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
+        blurred = found.visual and not reckoned and found.inlier_ratio < MIN_AGREEMENT
+        detection = self._detection(
+            frame,
+            grid,
+            camera_health(health, ego, blurred),
+            motion,
+            ego,
+            dt_s=dt_s,
+            motion_known=ego.source in ("visual", "odometry") and not blurred,
+            reckoned=reckoned,
+        )
+        self._renew(frame, grey)
+        if previous is not None:
+            self._look_closer(frame, grey, previous.needs_fragments)
+        if ego.source != "visual" or blurred:
+            store.break_history()
+        self._commit(frame, images, odometry, found.sweep_rad)
+        return detection
+
+    def _track_ends(
+        self, frame: RgbdFrame, images: Pyramid, prior: MotionPrior, previous: Percept | None, dt_s: float
+    ) -> NDArray[np.bool_]:
+        """Track the fragments into images and read their depth; those that are lost are dropped.
+
+        Returns (N,) fragments that are not used for the camera's motion: moving ones, and body-only ones.
+        """
+        config, store = self._config, self._store
+        moving, velocity = known_motion(store.ids, previous.fragments if previous else None)
         flow = optical_flow.track(
             self._images,
             images,
             store.ends_px.reshape(-1, 2),
-            guess,
+            expected_px(store, velocity, prior.motion, dt_s, frame.intrinsics),
             store.pixel_cov.reshape(-1, 3),
             config.fragments,
         )
@@ -122,7 +162,6 @@ class Detector:
         both = found[:, 0] & found[:, 1]
         store.ends_px = flow.pixels.reshape(-1, 2, 2)
         store.keep(both)
-        moving = moving[both]
         surface = surface_depth(
             frame.depth,
             frame.depth_scale_m,
@@ -133,37 +172,23 @@ class Detector:
         )
         store.near_m = surface.near_m.reshape(-1, 2).astype(np.float32)
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
-        anchor = store.anchors(frame.captured_ns, config.motion.window_s)
-        depths = depths_with_sigma(anchor, config.depth_noise)
-        static = static_points(anchor, depths, store.pixel_cov, moving | store.body_only, config.max_depth_m)
-        pixels = store.ends_px.reshape(-1, 2).astype(float)
-        result = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), camera)
-        scale = self._variance_scale
-        motion = residuals(store, anchor, depths, result, camera, config.depth_noise, scale)
-        if result.visual:
-            self._variance_scale = observed_variance_scale(
-                motion, store.age_frames, moving | store.body_only, scale
-            )
-        average_depth(store, store.last_entries(frame.captured_ns), result.pose, config.depth_noise)
-        step = self._pose.inverse() @ result.pose
-        self._read_out.learn(result, vector_from_rotation(step.rotation), dt_s)
-        ego = _ego(step, dt_s, result, prior)
-        blurred = result.visual and prior.source == "none" and result.inlier_ratio < MIN_AGREEMENT
-        health = camera_health(health, ego, blurred)
-        self._pose = result.pose
-        self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
-        known = ego.source in ("visual", "odometry") and not blurred
-        reckoned = prior.source != "none"
-        detection = self._detection(
-            frame, grid, health, motion, ego, dt_s=dt_s, motion_known=known, reckoned=reckoned
-        )
-        self._renew(frame, grey)
-        if previous is not None:
-            self._look_closer(frame, grey, previous.needs_fragments)
-        if ego.source != "visual" or blurred:
-            self._store.break_history()
-        self._commit(frame, images, odometry, result.sweep_rad)
-        return detection
+        return moving[both] | store.body_only
+
+    def _measure_residuals(
+        self,
+        frame: RgbdFrame,
+        anchor: AnchorEnds,
+        depths: AnchorDepths,
+        found: CameraEstimate,
+        excluded: NDArray[np.bool_],
+    ) -> EndResiduals:
+        """Residuals of all ends; updates the scale of the noise, and the running averages of depth."""
+        store, noise, scale = self._store, self._config.depth_noise, self._variance_scale
+        motion = residuals(store, anchor, depths, found, frame.intrinsics, noise, scale)
+        if found.visual:
+            self._variance_scale = observed_variance_scale(motion, store.age_frames, excluded, scale)
+        average_depth(store, store.last_entries(frame.captured_ns), found.pose, noise)
+        return motion
 
     def _grid(self, frame: RgbdFrame) -> DepthGrid:
         grid = make_grid(frame, self._config, self._mount)
