@@ -66,10 +66,10 @@ class Detection:
     reckoned: bool
 
 
-def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> CameraHealth:
+def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool, reckoned: bool) -> CameraHealth:
     """health, worsened by what the ego-motion shows.
 
-    blurred: without odometry, too few fragments fit one motion of the camera.
+    blurred: without odometry, too few fragments fit one motion of the camera. reckoned: there is odometry.
     """
     if blurred:
         reason = (
@@ -79,6 +79,13 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> Camera
         return worsened(health, CameraCondition.DEGRADED, reason)
     if ego.source == "visual":
         return health
+    if ego.source == "disputed" and not reckoned:
+        # By the kinematics of the base (rolling_prior of vision/ego_motion/motion_prior.py).
+        reason = (
+            "the images show a motion of the camera that a tracked base hardly makes, sideways or too sudden:"
+            " is the camera loose, does the base slide, or does everything in view move?"
+        )
+        return worsened(health, CameraCondition.DEGRADED, reason)
     if ego.source == "disputed":
         reason = (
             "the images and the odometry tell of two motions of the camera:"

@@ -126,7 +126,7 @@ class Detector:
         detection = self._detection(
             frame,
             grid,
-            camera_health(health, ego, blurred),
+            camera_health(health, ego, blurred, reckoned),
             motion,
             ego,
             dt_s=dt_s,
