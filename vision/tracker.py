@@ -126,7 +126,7 @@ class Tracker:
     ) -> tuple[IntGrid, IntGrid, Regions]:
         """Assign cells to tracks: labels (h, w), track index + 1; the same with movers extended to the floor;
         and the regions of the tracks with that. The cells of the extension do not vote in the next frame."""
-        tracks, grid = self._tracks, detection.grid
+        tracks, grid, noise = self._tracks, detection.grid, self._config.depth_noise
         labels = self._claim(detection, above_floor, changes, elapsed_s)
         measured = regions.measure(grid, labels, len(tracks))
         known = len(tracks)
@@ -135,13 +135,13 @@ class Tracker:
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))
         whole, upright = grounding.extend_to_floor(
-            grid, carved, measured, tracks.border_is_guess, tracks.mover
+            grid, carved, measured, tracks.border_is_guess, tracks.mover, noise
         )
         labels = self._regroup(detection, carved, upright, changes)
         if labels is not carved:
             measured = regions.measure(grid, labels, len(tracks))
             whole, upright = grounding.extend_to_floor(
-                grid, labels, measured, tracks.border_is_guess, tracks.mover
+                grid, labels, measured, tracks.border_is_guess, tracks.mover, noise
             )
         return labels, whole, upright
 

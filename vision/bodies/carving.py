@@ -210,7 +210,12 @@ def _around_moving_fragments(
     if len(chosen) == 0:
         return result
     return near_ends(
-        detection.grid, search_area, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
+        detection.grid,
+        search_area,
+        detection.ends_px[chosen],
+        detection.near_m[chosen],
+        detection.camera.fx,
+        config.depth_noise,
     )
 
 

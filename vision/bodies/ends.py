@@ -9,16 +9,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid, nearest_cell
 
 _AROUND_M = 0.2  # cells within this distance belong to the fragment's body, which is about twice as wide
-# Gate on depth: the depth of a body, plus two sigmas of depth with the default noise, which grow with the
-# square of the depth.
+# Gate on depth: the depth of a body, plus so many sigmas of depth, as far as these grow with the square of
+# it.
 _AGREE_M = 0.3
-_AGREE_PER_M2 = 0.015
+_AGREE_SIGMAS = 2.0
 
 
 def near_ends(
@@ -27,6 +28,7 @@ def near_ends(
     ends_px: NDArray[np.float32],
     depth_m: NDArray[np.float32],
     focal_px: float,
+    noise: DepthNoise,
 ) -> BoolGrid:
     """(h, w) cells of search_area (h, w) that are close to the ends (N, 2, 2) of fragments, at their depth.
 
@@ -49,6 +51,7 @@ def near_ends(
         grid.depth_m,
         search_area,
         np.float32(grid.step_px / (_AROUND_M * focal_px)),
+        noise.quadratic_per_m,
     )
 
 
@@ -95,7 +98,7 @@ def _seeds(
 
 @compiled(
     "float32[:, ::1], int32[:, ::1], int64, int64, int64[::1], int64[::1], float64[::1], float32[:, ::1],"
-    "boolean[:, ::1], float32"
+    "boolean[:, ::1], float32, float64"
 )
 def _within_reach(
     distance: FloatGrid,
@@ -108,13 +111,14 @@ def _within_reach(
     depth_m: FloatGrid,
     search_area: BoolGrid,
     per_cell: np.float32,
+    quadratic_per_m: float,
 ) -> BoolGrid:
     """As near_ends. distance (in cells) to the nearest end, and label of that end: in the window of _seeds.
 
     per_cell: width of a cell at 1 m, as a share of _AROUND_M.
     """
     result = np.zeros(search_area.shape, np.bool_)
-    nearest_m = np.zeros(label.max() + 1)
+    nearest_m, agree_per_m = np.zeros(label.max() + 1), _AGREE_SIGMAS * quadratic_per_m
     for k in range(len(end_m)):
         nearest_m[label[rows[k], columns[k]]] = end_m[k]
     for i in range(label.shape[0]):
@@ -123,5 +127,5 @@ def _within_reach(
                 there_m = nearest_m[label[i, j]]
                 off_m = abs(depth_m[top + i, left + j] - there_m)
                 close = distance[i, j] * per_cell * there_m <= 1.0
-                result[top + i, left + j] = close and off_m <= _AGREE_M + _AGREE_PER_M2 * there_m * there_m
+                result[top + i, left + j] = close and off_m <= _AGREE_M + agree_per_m * there_m * there_m
     return result

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from hal.types import Pose
 from vision.bodies.ends import near_ends
 from vision.bodies.masks import predict, surfaces
@@ -15,6 +16,8 @@ from vision.depth.regions import measure, with_occlusion
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 SHAPE = (24, 32)
+
+NOISE = TYPICAL_DEPTH_NOISE
 
 
 def grid_of(depth_m: NDArray[np.float32]) -> DepthGrid:
@@ -176,7 +179,9 @@ def test_cells_near_an_end_are_those_within_20_cm_at_its_depth() -> None:
     depth[:, 20:] = 4.0
     grid = grid_of(depth)
     ends = np.array([[[42.0, 42.0], [np.nan, np.nan]]], np.float32)
-    found = near_ends(grid, grid.valid, np.nan_to_num(ends), np.array([[2.0, np.nan]], np.float32), 400.0)
+    found = near_ends(
+        grid, grid.valid, np.nan_to_num(ends), np.array([[2.0, np.nan]], np.float32), 400.0, NOISE
+    )
     for row, column in np.ndindex(*SHAPE):
         away_m = np.hypot(row - 10, column - 10) * 0.02
         if away_m < 0.18 and column < 20:
@@ -188,4 +193,16 @@ def test_cells_near_an_end_are_those_within_20_cm_at_its_depth() -> None:
 def test_without_depth_no_cell_is_near() -> None:
     nowhere = np.full((1, 2), np.nan, np.float32)
     grid = grid_of(flat(2.0))
-    assert not near_ends(grid, grid.valid, np.zeros((1, 2, 2), np.float32), nowhere, 400.0).any()
+    assert not near_ends(grid, grid.valid, np.zeros((1, 2, 2), np.float32), nowhere, 400.0, NOISE).any()
+
+
+@pytest.mark.parametrize(("quadratic_per_m", "near"), [(0.0075, True), (0.001, False)])
+def test_what_is_at_the_depth_of_an_end_depends_on_the_noise_of_depth(
+    quadratic_per_m: float, near: bool
+) -> None:
+    """0.5 m apart, 4 m ahead: 0.3 m and two sigmas are 0.54 m with the usual noise, 0.33 m with little."""
+    grid = grid_of(flat(4.0))
+    ends = np.full((1, 2, 2), 42.0, np.float32)
+    depth_m = np.full((1, 2), 4.5, np.float32)
+    noise = DepthNoise(quadratic_per_m=quadratic_per_m)
+    assert near_ends(grid, grid.valid, ends, depth_m, 400.0, noise).any() == near
