@@ -13,8 +13,8 @@ from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
-# About 0.1 x 0.1 m at 4 m with the camera of sim.yaml. Smaller parts come and go with noise.
-_MIN_CELLS = 12
+# Of a new track; about 0.1 x 0.1 m at 4 m with the camera of sim.yaml. Smaller parts come and go with noise.
+MIN_CELLS = 12
 _SIGMA_M = 0.2  # standard deviation of a first sighting: centre of the visible surface from that of the body
 # A part above the robot's height at the side of the image begins a track if it has arrived and reaches down
 # below the height of a person.
@@ -42,7 +42,7 @@ def start_tracks(
     arrived.
     """
     grid = detection.grid
-    large = (winner == 0) & (measured.cells >= _MIN_CELLS)
+    large = (winner == 0) & (measured.cells >= MIN_CELLS)
     overhead = large.copy()
     if large.any():
         overhead &= ~reaching_down(grid, parts, len(winner), body_height_m)
@@ -82,4 +82,4 @@ def _low(labels: IntGrid, height_m: FloatGrid, body_height_m: np.float32, count:
         for j in range(columns):
             if labels[i, j] > 0 and height_m[i, j] < body_height_m:
                 cells[labels[i, j] - 1] += 1
-    return cells >= _MIN_CELLS // 2
+    return cells >= MIN_CELLS // 2

@@ -23,6 +23,9 @@ from numpy.typing import NDArray
 from config.perception import PerceptionConfig
 from hal.compiled import compiled
 from hal.types import FloatArray
+from vision.bodies.arrivals import ARRIVED_UP_TO_S
+from vision.bodies.births import MIN_CELLS
+from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.ends import near_ends
 from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
 from vision.bodies.tracks import Tracks
@@ -38,11 +41,6 @@ from vision.motion.least_squares import FragmentVelocities
 # Score at the start. It is used up in 0.09 s where nothing speaks for motion, in 0.6 s where something does.
 SUSPECT_EVIDENCE = 0.3
 _COMPACT_M = 1.6  # a track wider or deeper than one body with its load may hide another body
-_BODY_M = 0.85  # no person is wider (SINGLE_WIDTH_M of vision/bodies/division.py)
-# For 0.9 s after something has come to rest its surface may still count as arrived (1.5 times the longer look
-# back of vision/bodies/arrivals.py).
-_CALM_S = 0.9
-_MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py)
 _MIN_FRAGMENTS = 2  # that move alike; one alone may be an end that slides
 # One fragment alone, on a person who walks along a wall, is believed if it has been seen for this long, moves
 # at this speed (a slow walk) with a certainty of this many sigmas (as a verdict needs), and moves level.
@@ -75,7 +73,7 @@ def carve(
     searched, overgrown = _may_hide_mover(
         tracks.mover,
         tracks.moving,
-        tracks.surely_static & (tracks.no_evidence_s >= _CALM_S),
+        tracks.surely_static & (tracks.no_evidence_s >= ARRIVED_UP_TO_S),
         measured.position_m,
         measured.extent_m,
         config.depth_noise.floor_m,
@@ -94,11 +92,11 @@ def carve(
     seeds = moving_cells & inside
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
-    if np.count_nonzero(grown) < _MIN_CELLS:
+    if np.count_nonzero(grown) < MIN_CELLS:
         return labels
     count, parts = connected.components(grid, grown)
     cells = np.bincount(parts.ravel(), minlength=count + 1)
-    keep = (cells[1:] >= _MIN_CELLS).nonzero()[0] + 1
+    keep = (cells[1:] >= MIN_CELLS).nonzero()[0] + 1
     if len(keep) == 0:
         return labels
     number = np.zeros(count + 1, np.int32)
@@ -128,7 +126,7 @@ def _may_hide_mover(
         compact = extent_m[t, 0] <= _COMPACT_M and extent_m[t, 2] <= deepest_m
         # If the fragments of something wider than a body stand still while part of it arrives, somebody
         # touches it.
-        touched = calm[t] and extent_m[t, 0] > _BODY_M
+        touched = calm[t] and extent_m[t, 0] > SINGLE_WIDTH_M
         searched[t] = not mover[t] and (not compact or touched)
         overgrown[t] = moving[t] and not compact
     return searched, overgrown
@@ -163,7 +161,7 @@ def _cut_back(
         widened = np.asarray(cv2.dilate((moving_cells & own).view(np.uint8), _BLOCK), np.uint8)
         kept = widened.view(np.bool_) & own
         rest = own & ~kept
-        if min(np.count_nonzero(kept), np.count_nonzero(rest)) < _MIN_CELLS:
+        if min(np.count_nonzero(kept), np.count_nonzero(rest)) < MIN_CELLS:
             continue
         one = regions.measure(detection.grid, rest.astype(np.int32), 1)
         _start(tracks, detection, one, 0.0, config)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
+from vision.bodies.births import MIN_CELLS
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.numerics.order import median, quantile, quantiles
@@ -40,7 +41,7 @@ _MIN_APART_M = 0.35  # minimum distance of two heads
 _MAX_APART_M = 0.8  # maximum distance: people farther apart leave a valley
 # Share of the image between two groups: if less shows something farther, nothing is seen there.
 _NOTHING_SEEN_SHARE = 0.2
-_MIN_CELLS = 24  # in each of two groups: twice what a track begins with, since each is judged by itself
+_MIN_GROUP = 2 * MIN_CELLS  # cells in each of two groups: twice those of a new track, as each is judged alone
 _BINS = 12  # along the line: 0.1 m each where two people walk side by side
 
 
@@ -62,7 +63,7 @@ def second_body(
       seen in the valley.
     """
     cells = (labels.ravel() == track + 1).nonzero()[0]
-    if len(cells) < 2 * _MIN_CELLS:
+    if len(cells) < 2 * _MIN_GROUP:
         return None
     points = grid.points(cells)[::2].T.astype(float)
     if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < SINGLE_WIDTH_M:
@@ -115,7 +116,7 @@ def _beyond_valley(
         return None
     cut = 0.5 * (edges[valley] + edges[valley + 1])
     smaller_group = _fewer(along > cut)
-    if np.count_nonzero(smaller_group) < _MIN_CELLS:
+    if np.count_nonzero(smaller_group) < _MIN_GROUP:
         return None
     apart_m = abs(median(along[smaller_group]) - median(along[~smaller_group]))
     return smaller_group if apart_m >= _PAIR_DISTANCE_M else None
@@ -154,7 +155,7 @@ def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] 
         if shoulders_m < width_m + _MIN_HEAD_M:
             return None
     smaller_group = _fewer(column > valley)
-    return smaller_group if np.count_nonzero(smaller_group) >= _MIN_CELLS else None
+    return smaller_group if np.count_nonzero(smaller_group) >= _MIN_GROUP else None
 
 
 def _width_below(height_m: FloatArray, head: int, drop_m: float) -> int:

@@ -17,13 +17,12 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
-from vision.numerics.relative_pose import coordinate_m, relative_row
+from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_row
 
 # The gate on depth is the sum of both: as large as a jump in depth within one part may be (in 1/m), and how
 # much nearer or farther a surface may get (in m), besides the track's velocity, as a body turns or bends.
 _DEPTH_GATE_INVERSE = 0.03
 _DEPTH_GATE_M = 0.25
-_NEAREST_M = np.float32(0.1)  # the projection of a nearer point is meaningless
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +135,7 @@ def _predicted(
             continue
         x, y, z = points_m[0, k], points_m[1, k], points_m[2, k]
         there_m = coordinate_m(to_z, x, y, z) + displacement_m[track, 2]
-        if not there_m > _NEAREST_M:
+        if not there_m > NEAREST_M:
             continue
         expected = np.float32(1.0) / there_m
         x, y = (

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from config.perception import PerceptionConfig
 from hal.compiled import compiled
 from hal.types import FloatArray, RgbdFrame
+from vision.bodies.births import MIN_CELLS
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_mask import SurfaceDepth
 from vision.depth.depth_noise import depth_sigma_of
@@ -33,7 +34,6 @@ from vision.fragments.segments import find_segments, longest_first
 
 _FEW_FRAGMENTS = 4  # fewer are too few: a verdict along the line of sight takes 8 ends (bodies/proof.py)
 _ENOUGH_OF_A_MOVER = 2  # enough to follow a mover, together with its surface
-_MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py): less tells too little
 _REACH_M = 9.0  # maximum distance: the depth mask's 10 m less about the noise of depth there
 _URGENT_SIGHTINGS = 45  # bodies seen in fewer frames, and suspects, are urgent
 # Minimum time between two looks at an urgent body. It is just below a whole number of frame intervals at 30,
@@ -129,7 +129,7 @@ def _needing_fragments(
     urgent, count = np.empty(len(state), np.bool_), 0
     for n in range(len(state)):
         few = fragments[n] < (_ENOUGH_OF_A_MOVER if moving[n] else _FEW_FRAGMENTS)
-        if not few or seen_ns[n] != now_ns or cells[n] < _MIN_CELLS:
+        if not few or seen_ns[n] != now_ns or cells[n] < MIN_CELLS:
             continue
         x, y, z = state[n, 0] - camera_m[0], state[n, 1] - camera_m[1], state[n, 2] - camera_m[2]
         if not x * x + y * y + z * z <= _REACH_M**2:

@@ -87,7 +87,15 @@ def test_labels_that_do_not_fit_into_the_sort_are_measured_alike(seed: int) -> N
     # The same cells under a label that leaves no bits for their index.
     huge = 2**22
     many = measure(grid_of(depth), np.where(labels == 4, np.int32(huge), labels), huge)
-    for name in ("cells", "rows", "bbox_px", "position_m", "extent_m", "wide", "tall"):
+    for name in (
+        "cells",
+        "rows",
+        "bbox_px",
+        "position_m",
+        "extent_m",
+        "sides_visible",
+        "top_and_bottom_visible",
+    ):
         np.testing.assert_array_equal(getattr(few, name)[3], getattr(many, name)[huge - 1])
         np.testing.assert_array_equal(getattr(few, name)[:3], getattr(many, name)[:3])
 
