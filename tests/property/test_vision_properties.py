@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from config.perception import FragmentSettings, MotionSettings, PerceptionConfig
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
 from tests.support.grids import grid_of, plane
-from tests.support.point_motion import static_miss
+from tests.support.point_motion import matrices, project, static_miss
 from vision.bodies.judgement import judge
 from vision.camera.floor import FloorFinder
-from vision.camera.lens import project, rays, rotation_from_vector, vector_from_rotation
+from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 from vision.motion.motion_evidence import MotionEvidence
 from vision.motion.velocities import EndResiduals, normal_equations
 from vision.numerics import kalman
@@ -70,7 +70,7 @@ def test_any_translation_over_ground_is_recovered_from_exact_projections(
         usable=np.ones(count, np.bool_),
     )
     equations = normal_equations(motion, rng.uniform(0.1, 1.0, count))
-    found = np.linalg.solve(equations.matrix.sum(axis=0), equations.rhs.sum(axis=0))
+    found = np.linalg.solve(matrices(equations).sum(axis=0), equations[6:9].sum(axis=1))
     np.testing.assert_allclose(found, camera.rotation.T @ velocity, atol=1e-6)
 
 

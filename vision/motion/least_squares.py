@@ -47,7 +47,7 @@ class BodyVelocities:
 class FragmentVelocities:
     """Velocities of N fragments, each from its two ends alone.
 
-    per_end (14, 2N): the equations of every end. Rows 0 to 11 as in NormalEquations; row 12: information on
+    per_end (14, 2N): the equations of every end. Rows 0 to 11 as of normal_equations; row 12: information on
     the velocity along z from the change of depth; row 13: the same times that velocity. Zero where an end is
     not usable. velocity_mps (N, 3): over ground. covariance (N, 3, 3).
     """
@@ -60,7 +60,7 @@ class FragmentVelocities:
 def fragment_velocities(motion: EndResiduals, max_speed_mps: float) -> FragmentVelocities:
     """Weighted least squares over the two ends of each fragment."""
     per_end, velocity_mps, covariance = _fragments(
-        normal_equations(motion, motion.usable.astype(float)).table,
+        normal_equations(motion, motion.usable.astype(float)),
         np.ascontiguousarray(motion.usable),
         np.ascontiguousarray(motion.depth_step_m),
         np.ascontiguousarray(motion.depth_step_sigma_m),
@@ -140,7 +140,7 @@ def _fragments(
     lag_s: FloatArray,
     max_speed_mps: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """per_end, velocity_mps and covariance of FragmentVelocities. equations (12, 2N): see NormalEquations."""
+    """The fields of FragmentVelocities. equations (12, 2N): see normal_equations."""
     ends = len(usable)
     per_end = np.zeros((14, ends))
     per_end[:12] = equations

@@ -23,8 +23,6 @@ from hal.compiled import compiled
 from hal.types import FloatArray
 
 _MIN_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
-# Row of the table for each entry of a symmetric (3, 3) matrix, of which only six differ.
-_ALL = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,35 +56,14 @@ class EndResiduals:
     usable: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NormalEquations:
-    """Normal equations of the weighted least squares for V, one column of table (12, N) per point.
+def normal_equations(motion: EndResiduals, weight: FloatArray) -> FloatArray:
+    """Normal equations of the weighted least squares for V, (12, N): one column per point.
 
-    Rows 0 to 5: entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right-hand side. Rows 9
-    to 11 (doubt): right-hand side for one sigma of a depth error common to all points of a body.
+    From the two image equations of each point, weighted by their covariance and weight (N,). Rows 0 to 5:
+    entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right-hand side. Rows 9 to 11:
+    right-hand side for one sigma of a depth error common to all points of a body.
     """
-
-    table: FloatArray
-
-    @property
-    def matrix(self) -> FloatArray:
-        """(N, 3, 3), of each point."""
-        return self.table.take(_ALL, axis=0).transpose(2, 0, 1)
-
-    @property
-    def rhs(self) -> FloatArray:
-        """(N, 3) right-hand side."""
-        return self.table[6:9].T
-
-    @property
-    def doubt(self) -> FloatArray:
-        """(N, 3) right-hand side for one sigma of a common depth error."""
-        return self.table[9:].T
-
-
-def normal_equations(motion: EndResiduals, weight: FloatArray) -> NormalEquations:
-    """The two image equations of each point, weighted by their covariance and weight (N,)."""
-    table = _equations(
+    return _equations(
         np.ascontiguousarray(motion.ray),
         np.ascontiguousarray(motion.lag_s),
         np.ascontiguousarray(motion.residual_m),
@@ -94,7 +71,6 @@ def normal_equations(motion: EndResiduals, weight: FloatArray) -> NormalEquation
         np.ascontiguousarray(motion.depth_effect),
         np.ascontiguousarray(weight),
     )
-    return NormalEquations(table)
 
 
 @compiled("float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
@@ -106,7 +82,7 @@ def _equations(
     depth_effect: FloatArray,
     weight: FloatArray,
 ) -> FloatArray:
-    """(12, N) table of NormalEquations. Zero where weight is zero, even if other inputs are NaN there."""
+    """As normal_equations. Zero where weight is zero, even if other inputs are NaN there."""
     table = np.zeros((12, len(weight)))
     for k in range(len(weight)):
         if weight[k] == 0.0:

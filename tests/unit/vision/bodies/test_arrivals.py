@@ -9,7 +9,7 @@ from config.perception import DepthNoise
 from hal.types import FloatArray, Pose
 from tests.support.detections import AT_ORIGIN
 from tests.support.grids import grid_of, nearest, no_depth, plate, wall
-from vision.bodies.arrivals import ViewMemory
+from vision.bodies.arrivals import ARRIVED_UP_TO_S, ViewMemory
 from vision.depth.depth_grid import BoolGrid
 
 NOISE = DepthNoise(floor_m=0.005, quadratic_per_m=0.0075)
@@ -44,6 +44,12 @@ def test_what_stands_where_the_wall_was_seen_has_arrived() -> None:
     found = arrived(memory((0, BACK)), nearest(BODY, BACK))
     assert found[inner(BODY)].all()
     assert not found[BODY == 0.0].any()
+
+
+@pytest.mark.parametrize(("after_s", "still"), [(0.0, True), (0.01, False)])
+def test_what_has_come_to_rest_has_arrived_for_no_longer_than_it_says(after_s: float, still: bool) -> None:
+    now_ms = round(1e3 * (ARRIVED_UP_TO_S + after_s))
+    assert arrived(memory((0, BACK)), nearest(BODY, BACK), now_ms).any() == still
 
 
 def test_what_stood_there_before_has_not() -> None:

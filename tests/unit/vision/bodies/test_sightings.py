@@ -26,14 +26,14 @@ def seen_of(left_m: float, right_m: float, moving: bool = True) -> Tracks:
     return tracks
 
 
-@pytest.mark.parametrize(("right_m", "sliver"), [(-0.2, True), (0.0, False)])
+@pytest.mark.parametrize(("right_m", "nearly_hidden"), [(-0.2, True), (0.0, False)])
 def test_a_mover_of_which_less_than_two_fifths_are_left_to_see_is_a_sliver(
     right_m: float, nearly_hidden: bool
 ) -> None:
     tracks = seen_of(-0.3, right_m)
     assert tracks.nearly_hidden.tolist() == [nearly_hidden]
     whole_m = tracks.box_m[0, 2] - tracks.box_m[0, 0]
-    assert (abs(whole_m - 0.6) < 0.1) == nearly_hidden  # a sliver says nothing of how wide its body is
+    assert (abs(whole_m - 0.6) < 0.1) == nearly_hidden  # a small rest says nothing of how wide its body is
 
 
 def test_what_stands_is_no_sliver() -> None:

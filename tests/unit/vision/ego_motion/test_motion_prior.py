@@ -9,7 +9,8 @@ import pytest
 
 from config.perception import EgoMotionSettings
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose
-from vision.camera.lens import project, rays, rotation_from_vector, vector_from_rotation
+from tests.support.point_motion import project
+from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 from vision.ego_motion.camera_motion import estimate
 from vision.ego_motion.motion_prior import (
     MotionPrior,

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.camera.lens import project, rays, rotation_from_vector, row_delays, vector_from_rotation
+from tests.support.point_motion import project
+from vision.camera.lens import rays, rotation_from_vector, row_delays, vector_from_rotation
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors

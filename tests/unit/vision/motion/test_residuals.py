@@ -9,7 +9,7 @@ import pytest
 
 from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.camera.lens import project
+from tests.support.point_motion import project
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.fragments.store import FragmentStore
 from vision.motion import residuals as module
