@@ -83,14 +83,14 @@ class Tracker:
         above_floor = connected.above_floor(detection.grid, self._clearance_m)
         velocities = least_squares.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
         if detection.health.condition is not CameraCondition.UNTRUSTWORTHY or detection.restarted:
-            owner = self._follow(detection, above_floor, owner, velocities, elapsed_s)
+            owner = self._update_tracks(detection, above_floor, owner, velocities, elapsed_s)
         unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
         young = tracks.sightings < report.MIN_SIGHTINGS
         tracks.keep(unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S))
         self._fragment_ids, self._fragment_owner = detection.ids, owner
         return self._percept(detection, above_floor, owner, velocities, robot_pose)
 
-    def _follow(
+    def _update_tracks(
         self,
         detection: Detection,
         above_floor: BoolGrid,

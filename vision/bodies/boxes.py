@@ -58,31 +58,19 @@ class Relations:
 
 def relations(regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]) -> Relations:
     """How regions one (K,) lie relative to regions other (K,), both as indices."""
-    return Relations(
-        *_relations(
-            regions.position_m,
-            regions.extent_m,
-            regions.bbox_px,
-            one,
-            other,
-            SEEN_THROUGH_HEIGHT,
-            SEEN_THROUGH_SHARE,
-        )
-    )
+    return Relations(*_relations(regions.position_m, regions.extent_m, regions.bbox_px, one, other))
 
 
-@compiled("float64[:, :], float64[:, :], float64[:, :], int64[:], int64[:], float64, float64")
+@compiled("float64[:, :], float64[:, :], float64[:, :], int64[:], int64[:]")
 def _relations(
     position_m: FloatArray,
     extent_m: FloatArray,
     bbox_px: FloatArray,
     one: NDArray[np.intp],
     other: NDArray[np.intp],
-    low: float,
-    mostly: float,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     gap_m, overlap = np.empty(len(one)), np.empty(len(one))
-    on_top, within = np.empty(len(one), np.bool_), np.empty(len(one), np.bool_)
+    stacked, within = np.empty(len(one), np.bool_), np.empty(len(one), np.bool_)
     for k in range(len(one)):
         a, b = one[k], other[k]
         squared = 0.0
@@ -95,9 +83,9 @@ def _relations(
         width, height = right - left, bottom - top
         across, down = min(right, u1) - max(left, u0), min(bottom, v1) - max(top, v0)
         overlap[k] = max(across, 0.0) * max(down, 0.0) / max(width * height, 1.0)
-        on_top[k] = across >= _STACKED_SHARE * width and abs(bottom - v0) <= _TOUCHING_PX
-        within[k] = height <= low * (v1 - v0) and overlap[k] >= mostly
-    return gap_m, overlap, on_top, within
+        stacked[k] = across >= _STACKED_SHARE * width and abs(bottom - v0) <= _TOUCHING_PX
+        within[k] = height <= SEEN_THROUGH_HEIGHT * (v1 - v0) and overlap[k] >= SEEN_THROUGH_SHARE
+    return gap_m, overlap, stacked, within
 
 
 def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -183,7 +183,7 @@ def _surely_static(frame: _Velocity, agreeing: float, least_mps: float) -> bool:
 
 
 @inlined
-def _taken(velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: int, t: int) -> _Velocity:
+def _entry(velocity: FloatArray, covariance: FloatArray, parts: FloatArray, k: int, t: int) -> _Velocity:
     """Velocity k of track t with its components; for the arguments see _proofs."""
     v, c, of = velocity[k, t], covariance[k, t], parts[:, k, t]
     speed_mps = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
@@ -221,15 +221,14 @@ def _proofs(
     threshold: float,
 ) -> tuple[BoolArray, FloatArray, BoolArray, BoolArray, BoolArray]:
     """moves to goes_on of Proof. velocity (4, T, 3), covariance (4, T, 3, 3), and parts (5, 4, T), value to
-    level of Split: of each of the four velocities. opinion (4, T): SecondOpinion. threshold: squared sigmas.
-    """
+    level of Split: of the four velocities. opinion (4, T): SecondOpinion. threshold: squared sigmas."""
     count = len(moving)
     moves, surely_static = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     over, goes_on, strength = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count)
     for t in range(count):
-        filtered = _taken(velocity, covariance, parts, _FILTERED, t)
-        frame = _taken(velocity, covariance, parts, _FRAME, t)
-        centre = _taken(velocity, covariance, parts, _SURFACE, t)
+        filtered = _entry(velocity, covariance, parts, _FILTERED, t)
+        frame = _entry(velocity, covariance, parts, _FRAME, t)
+        centre = _entry(velocity, covariance, parts, _SURFACE, t)
         second = _Opinion(opinion[0, t], opinion[1, t], opinion[2, t], opinion[3, t])
         alike = agreement[t] * ends[t]
         agreeing = alike if agreement[t] >= _MIN_AGREEMENT else 0.0
@@ -274,7 +273,6 @@ def prove(
     parts = decompose(velocity, covariance, seen.sight, seen.up)
     second = second_opinion(parts[_FILTERED], parts[_SURFACE], parts[_APART])
     least_mps = settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m
-    wander_mps = _WANDER * seen.view_radps * seen.size_m + seen.growth_mps
     proofs = _proofs(
         velocity,
         covariance,
@@ -289,7 +287,7 @@ def prove(
         seen.cells,
         seen.size_m,
         seen.velocity_measured_s,
-        wander_mps,
+        _WANDER * seen.view_radps * seen.size_m + seen.growth_mps,
         seen.depth_sigma_m,
         seen.advances,
         seen.border_is_guess,

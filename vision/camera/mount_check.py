@@ -84,11 +84,11 @@ class _Look:
 
 def _look(grid: DepthGrid, floor: Floor) -> _Look:
     assert grid.up is not None, "a camera whose mounting is known"
-    told = Floor(grid.up, grid.camera_height_m)
-    off = _apart(floor, told, _WRONG)
-    if off and cells_on(grid, told) >= _STILL_FLOOR * cells_on(grid, floor):
+    configured = Floor(grid.up, grid.camera_height_m)
+    off = _apart(floor, configured, _WRONG)
+    if off and cells_on(grid, configured) >= _STILL_FLOOR * cells_on(grid, floor):
         off = False
-    return _Look(floor, off, off and _apart(floor, told, _PLAINLY_WRONG))
+    return _Look(floor, off, off and _apart(floor, configured, _PLAINLY_WRONG))
 
 
 def _apart(one: Floor, other: Floor, bounds: _Bounds) -> bool:
