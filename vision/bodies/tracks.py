@@ -46,9 +46,8 @@ class Tracks:
         self.box_m = np.empty((0, 4))  # edges of the last box that showed all of it, from its centre
         self.area_m2 = np.empty(0)  # running average, up to a common factor
         self.growth_mps = np.empty(0)  # speed of the centre that a growing or shrinking surface can explain
-        self.velocity_measured_s = np.empty(
-            0
-        )  # for how long the centre has measured the velocity without a break
+        # For how long the centre has measured the velocity without a break.
+        self.velocity_measured_s = np.empty(0)
         self.nearly_hidden = np.empty(0, np.bool_)  # a mover of which only a small rest was visible
         # A mover without an edge in depth to the static surface beside it: where it ends there is a guess.
         self.border_is_guess = np.empty(0, np.bool_)
@@ -242,8 +241,7 @@ def _speeds(state: FloatArray) -> FloatArray:
 def _trailing_average(
     state: FloatArray, trailing_m: FloatArray, gain: float, behind_s: float
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Updated trailing_m (T, 3) and the result of update_trailing_average. behind_s: lag at a steady
-    velocity."""
+    """As Tracks.update_trailing_average, with trailing_m (T, 3). behind_s: lag at a steady velocity."""
     trails_m, advances = trailing_m.copy(), np.empty(len(state), np.bool_)
     for t in range(len(state)):
         way, squared = 0.0, 0.0

@@ -225,8 +225,7 @@ def _row(
 def _sampled(
     depth: DepthImage, step: int, scale_m: np.float32, min_m: np.float32, range_m: np.float32
 ) -> tuple[DepthImage, BoolGrid, BoolGrid]:
-    """(h, w) raw depth of each step x step block, _INVALID_RAW where not valid; valid (h, w); beyond (h,
-    w)."""
+    """(h, w) raw depth of each block of step x step, _INVALID_RAW where not valid; valid, beyond (h, w)."""
     rest = 0 if step >= _FOUR_FROM_PX else step - 1 - step // 2
     height, width = (depth.shape[0] + rest) // step, (depth.shape[1] + rest) // step
     raw = np.empty((height, width), np.uint16)

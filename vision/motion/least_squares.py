@@ -231,7 +231,7 @@ def _information(covariance: FloatArray, effect: FloatArray, result: FloatArray)
 def _chi2(
     velocity_mps: FloatArray, ray: FloatArray, lag_s: float, residual_m: FloatArray, information: FloatArray
 ) -> float:
-    """Chi-square of an end with information information (3,) under the hypothesis of velocity (3,)."""
+    """Chi-square of an end with this information (3,) under the hypothesis of velocity (3,)."""
     a = residual_m[0] - lag_s * (velocity_mps[0] - ray[0] * velocity_mps[2])
     b = residual_m[1] - lag_s * (velocity_mps[1] - ray[1] * velocity_mps[2])
     result: float = (information[0] * a + information[1] * b) * a + (
