@@ -31,7 +31,7 @@ _SHARED_PROOF = 0.55  # of the threshold, where the surface confirms the velocit
 _SPEED_PER_METRE = 0.02  # m/s more minimum speed per metre of distance, since all errors grow with it
 _ARRIVED_CELLS = 8  # fewer arrived cells come and go with noise at a rim
 _ARRIVED_SHARE = 0.05  # of the surface: a walking person arrives with one side
-_MUCH_CELLS = 20  # about a forearm 4 m away
+MUCH_ARRIVED_CELLS = 20  # about a forearm 4 m away
 _MUCH_SHARE = 0.2  # of the surface: more than a rim that noise widens
 _STANDING_SHARE = 0.6  # of the minimum speed: a slower track stands still
 _KNOWN_SPEED = 2.0  # times the minimum speed: if sigma is less, a mover below the minimum has stopped
@@ -235,7 +235,7 @@ def _proofs(
         track_ends = _Ends(ends[t], agreeing, restless[t], restless_s[t])
         seen = _Surface(cells[t], size_m[t], velocity_measured_s[t], wander_mps[t], depth_sigma_m[t])
         some = arrived[t] >= _ARRIVED_CELLS and arrived[t] >= _ARRIVED_SHARE * cells[t]
-        much = arrived[t] >= _MUCH_CELLS and arrived[t] >= _MUCH_SHARE * cells[t]
+        much = arrived[t] >= MUCH_ARRIVED_CELLS and arrived[t] >= _MUCH_SHARE * cells[t]
         possible = filtered.speed_mps <= fastest_mps and size_m[t] <= _LARGEST_M
         fast = filtered.speed_mps > least_mps[t]
         evident = (

@@ -25,12 +25,11 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
+from vision.depth.connected import MIN_PART_CELLS
 from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
-# Fewer cells than the smallest part has are no sighting (_SPECKLE_CELLS of vision/depth/connected.py).
-MIN_CELLS = 6
 # Standard deviation of the centroid of a very small surface: the width of a cell 2.3 m away.
 _CENTRE_SIGMA_M = 0.015
 _CENTRE_SHARE = 0.0125  # more of it, per metre of size across the line of sight: cells at the rim come and go
@@ -43,7 +42,7 @@ _SAME_AREA = 0.3  # a relative change of area above this means that another part
 _AREA_MEMORY_S = 0.32  # time constant of the averaged area: a gain of 0.1 per frame at 30 frames a second
 _NEARLY_HIDDEN_SHARE = 0.4  # of the usual area: a mover with a smaller surface is nearly hidden
 _JUMP_M = 0.3  # plus two sigmas of depth: a centroid farther from its prediction than this has jumped
-# How a track is visible: with fewer than MIN_CELLS cells; then the kinds of the module docstring, in order.
+# How a track is visible: with fewer cells than a part has; then the kinds of the module docstring, in order.
 _NOT_VISIBLE, _WHOLE, _PARTIAL, _POSITION_ONLY, _NEARLY_HIDDEN = range(5)
 
 
@@ -141,7 +140,7 @@ def _kinds(
     kind, change, usual_m2 = np.full(len(cells), _NOT_VISIBLE), np.zeros(len(cells)), area_m2.copy()
     centre_m = np.zeros((len(cells), 3))
     for t in range(len(cells)):
-        if cells[t] < MIN_CELLS:
+        if cells[t] < MIN_PART_CELLS:
             continue
         depth_m = position_m[t, 2]
         now_m2 = cells[t] * (depth_m * depth_m)

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from vision.bodies.proof import MUCH_ARRIVED_CELLS
 from vision.depth.connected import IntGrid, spread_labels
 from vision.depth.depth_grid import BoolGrid
 
@@ -32,9 +33,8 @@ _MIN_VOTES = 4
 # less. Fewer are strays as well.
 _SHARE_OF_PART = 0.15
 _SHARE_OF_TRACK = 0.30
-# A part has newly arrived if at least this many of its cells have (as many as an arrival that is proof by
-# itself, vision/bodies/proof.py), and this share: a person who leaves furniture emerges with one side first.
-_ARRIVED_CELLS = 20
+# A part has newly arrived if MUCH_ARRIVED_CELLS of its cells have, at least, and this share of them: a person
+# who leaves furniture emerges with one side first.
 _ARRIVED_SHARE = 0.3
 _LEAVING_SHARE = 0.75  # of a static track's cells: a larger part is the static thing itself and cannot leave
 _STAYED_SHARE = 0.7  # of a mover's votes must be for cells that have stayed; the others lie at the rims
@@ -147,7 +147,7 @@ def drop_static_from_arrived(
     Somebody who stood beside furniture, as one part with it, has left it. cells (P,): of the parts. arrived
     (P,): cells of them in space that was seen free. mover (T,): these keep their parts.
     """
-    newly_arrived = (arrived >= _ARRIVED_CELLS) & (arrived >= _ARRIVED_SHARE * cells)
+    newly_arrived = (arrived >= MUCH_ARRIVED_CELLS) & (arrived >= _ARRIVED_SHARE * cells)
     if not (newly_arrived.any() and ballot.claims.any()):
         return ballot
     whole, rest = cells @ ballot.claims, (cells * ~newly_arrived) @ ballot.claims

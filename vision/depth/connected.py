@@ -18,7 +18,7 @@ IntGrid = NDArray[np.int32]
 MIN_JUMP = 0.006  # 0.15 m at 5 m: a smaller step is noise
 MAX_JUMP = 0.03  # the depth of a body at 3 m: a larger step is a jump even on a slope
 _USUAL_STEPS = 12.0  # between the bounds, a jump is this many times the median step from cell to cell
-_SPECKLE_CELLS = 6  # parts with fewer cells are taken for wrong stereo matches
+MIN_PART_CELLS = 6  # parts with fewer cells are speckles: wrong stereo matches
 
 
 def above_floor(grid: DepthGrid, clearance_m: float) -> BoolGrid:
@@ -101,7 +101,7 @@ def _without_speckles(labels: IntGrid, count: int) -> tuple[int, IntGrid]:
         cells[part] += 1
     number, parts = np.zeros(count, np.int32), 0
     for label in range(1, len(cells)):
-        if cells[label] >= _SPECKLE_CELLS:
+        if cells[label] >= MIN_PART_CELLS:
             parts += 1
             number[label] = parts
     result = np.empty(labels.shape, np.int32)

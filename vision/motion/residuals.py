@@ -23,7 +23,7 @@ from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.rolling_shutter import straight_rays
 from vision.fragments.store import AnchorEnds, FragmentStore
 from vision.motion.anchor_depths import AnchorDepths, depth_steps
-from vision.motion.velocities import EndResiduals
+from vision.motion.velocities import STATIC_END_CHI2, EndResiduals
 from vision.numerics.order import quantile
 
 _SETTLED_FRAMES = 3  # the residuals of younger ends are hardly larger than their noise
@@ -34,7 +34,6 @@ _SCALE_GAIN = 0.15  # per frame: half of a change of floor or light is taken up 
 _MIN_SCALE = 0.3
 _MAX_SCALE = 8.0
 _STEPS_SHARE = 0.5  # of the sum of the flow variances of all frames: successive errors cancel in part
-_STATIC_CHI2 = 6.0  # 95 % of static ends lie below; 2 degrees of freedom
 _MIXED_ALONG_PX = 3.0  # minimum sigma along the fragment of an end where the edges of two surfaces cross
 _MIXED_ACROSS_PX = 0.3  # its sigma across the fragment: twice that of a clear end
 
@@ -234,6 +233,6 @@ def _residuals(
         effect[k, 0], effect[k, 1] = near_effect
         chi2[k] = min(near_chi2, far_chi2)
         # An end that is where a static far surface would have it tells nothing about the near surface.
-        behind = near_chi2 > _STATIC_CHI2 and far_chi2 <= _STATIC_CHI2
+        behind = near_chi2 > STATIC_END_CHI2 and far_chi2 <= STATIC_END_CHI2
         usable[k] = z > 0.1 and not behind and math.isfinite(near_residual[0] + near_residual[1])
     return static_m, ray, residual_m, covariance, effect, chi2, usable

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import FloatArray
 
+STATIC_END_CHI2 = 6.0  # of static_chi2: 95 % of static ends lie below; 2 degrees of freedom
 _MIN_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
 
 

@@ -11,6 +11,7 @@ from tests.support.grids import grid_of, labelled, nearest, plate
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
 from vision.depth import regions
+from vision.depth.connected import MIN_PART_CELLS
 
 
 def seen_of(left_m: float, right_m: float, moving: bool = True) -> Tracks:
@@ -85,7 +86,7 @@ def test_of_what_is_not_seen_nothing_changes_but_how_long_it_has_been_seen() -> 
     tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 0.0, 0)
     tracks.velocity_measured_s[:] = 0.4
     few = np.zeros((60, 80), np.int32)
-    few[30, 40 : 40 + sightings.MIN_CELLS - 1] = 1
+    few[30, 40 : 40 + MIN_PART_CELLS - 1] = 1
     grid = grid_of(np.where(few > 0, 2.0, 0.0))
     sightings.update_from_surfaces(tracks, detection(grid, 1), regions.measure(grid, few, 1), DepthNoise())
     assert tracks.velocity_measured_s.tolist() == [0.0]
