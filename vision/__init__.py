@@ -25,7 +25,8 @@ Terms:
 * suspect: a mover that was cut out of another track and has yet to prove that it moves.
 * surface: the cells of one track in one frame, the visible side of its body.
 * arrived cell: its surface is in space that was seen free a moment ago (vision/bodies/arrivals.py).
-* residual of an end: how far it is seen from where it would be if it were static (vision/motion/evidence.py).
+* residual of an end: how far it is seen from where it would be if it were static
+  (vision/motion/residuals.py).
 * evidence of a track: support for its motion, by the residuals of its fragments, by arrivals and by its
   surface. MotionEvidence is that of one frame; judgement adds it up over frames to a score.
 * region: measures of a labelled set of cells (a part or a surface): box, centre, extent, whether it is cut.

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from hal.types import Intrinsics, Pose
 from vision.camera.health import worsened
 from vision.depth.depth_grid import DepthGrid
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
 # Without odometry, at least this share of the fragments must fit one motion of the camera.
-LEAST_AGREEMENT = 0.45
+MIN_AGREEMENT = 0.45
 # The ego-motion of a frame that was not compared with the one before.
 MOTION_NOT_KNOWN = EgoMotion(
     motion=Pose(np.eye(3), np.zeros(3)),
@@ -57,7 +57,7 @@ class Detection:
     ends_px: NDArray[np.float32]
     near_m: NDArray[np.float32]
     age_frames: NDArray[np.intp]
-    motion: PointMotion
+    motion: EndResiduals
     pose: Pose
     ego_motion: EgoMotion
     health: CameraHealth
@@ -66,10 +66,10 @@ class Detection:
     reckoned: bool
 
 
-def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> CameraHealth:
+def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool, reckoned: bool) -> CameraHealth:
     """health, worsened by what the ego-motion shows.
 
-    blurred: without odometry, too few fragments fit one motion of the camera.
+    blurred: without odometry, too few fragments fit one motion of the camera. reckoned: there is odometry.
     """
     if blurred:
         reason = (
@@ -79,6 +79,13 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> Camera
         return worsened(health, CameraCondition.DEGRADED, reason)
     if ego.source == "visual":
         return health
+    if ego.source == "disputed" and not reckoned:
+        # By the kinematics of the base (rolling_prior of vision/ego_motion/motion_prior.py).
+        reason = (
+            "the images show a motion of the camera that a tracked base hardly makes, sideways or too sudden:"
+            " is the camera loose, does the base slide, or does everything in view move?"
+        )
+        return worsened(health, CameraCondition.DEGRADED, reason)
     if ego.source == "disputed":
         reason = (
             "the images and the odometry tell of two motions of the camera:"
@@ -92,13 +99,13 @@ def camera_health(health: CameraHealth, ego: EgoMotion, blurred: bool) -> Camera
     return worsened(health, CameraCondition.UNTRUSTWORTHY, reason)
 
 
-def no_motion(count: int) -> PointMotion:
+def no_motion(count: int) -> EndResiduals:
     """Residuals of count ends of which nothing is known: none is usable."""
-    return PointMotion(
+    return EndResiduals(
         static_m=np.tile(np.array([0.0, 0.0, 1.0]), (count, 1)),
         ray=np.zeros((count, 2)),
         lag_s=np.zeros(count),
-        miss_m=np.zeros((count, 2)),
+        residual_m=np.zeros((count, 2)),
         covariance=np.ones((count, 3)) * np.array([1.0, 0.0, 1.0]),
         depth_effect=np.zeros((count, 2)),
         depth_step_m=np.full(count, np.nan),

@@ -1,8 +1,8 @@
 """detect: an RGB-D frame and the odometry at its time become a Detection.
 
-The steps of a frame (_follow): the prior of the camera's motion, optical flow of the fragments, their depth,
-the camera's motion, the residuals of the ends, and new fragments. Before that the depth grid is made and the
-camera's health is checked. track (vision/tracker.py) takes the Detection.
+The steps of a frame (_next_frame): the prior of the camera's motion, optical flow of the fragments, their
+depth, the camera's motion, the residuals of the ends, and new fragments. Before that the depth grid is made
+and the camera's health is checked. track (vision/tracker.py) takes the Detection.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
 from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
@@ -21,20 +22,20 @@ from vision.camera.lens import vector_from_rotation
 from vision.camera.mount_check import MountCheck
 from vision.depth.depth_grid import DepthGrid, make_grid
 from vision.depth.depth_mask import surface_depth
-from vision.detection import LEAST_AGREEMENT, MOTION_NOT_KNOWN, Detection, camera_health, no_motion
+from vision.detection import MIN_AGREEMENT, MOTION_NOT_KNOWN, Detection, camera_health, no_motion
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, odometry_prior, rolling_prior, steady_prior, with_gyro
 from vision.ego_motion.rolling_shutter import ReadOut
 from vision.fragments import optical_flow
-from vision.fragments.attention import Attention, Wanted
+from vision.fragments.attention import Attention, NeedsFragments
 from vision.fragments.edges import GreyImage
 from vision.fragments.optical_flow import Pyramid, pyramid
 from vision.fragments.renewal import Renewal
-from vision.fragments.store import FragmentStore
-from vision.motion.anchor_depths import appraise, average_depth, static_points
-from vision.motion.evidence import observed_variance_scale, residuals
+from vision.fragments.store import AnchorEnds, FragmentStore
+from vision.motion.anchor_depths import AnchorDepths, average_depth, depths_with_sigma, static_points
 from vision.motion.expected import expected_px, known_motion
-from vision.motion.velocities import PointMotion
+from vision.motion.residuals import observed_variance_scale, residuals
+from vision.motion.velocities import EndResiduals
 from vision.percept import Percept
 from vision.scene import CameraCondition, CameraHealth, EgoMotion
 
@@ -52,7 +53,7 @@ class Detector:
         self._renewal = Renewal(config)
         self._attention = Attention(config)
         self._health = HealthMonitor(config)
-        self._told = CameraHealth(CameraCondition.GOOD, "", float("nan"))
+        self._last_health = CameraHealth(CameraCondition.GOOD, "", float("nan"))
         self._floor = FloorFinder()
         self._mount_check = MountCheck()
         self._images: Pyramid = ()
@@ -69,7 +70,7 @@ class Detector:
         """Detect in one frame. odometry: the camera by dead reckoning at captured_ns, None where not known.
 
         previous: result of tracking for the frame before. By it, fragments on moving obstacles are left out
-        of the ego-motion and searched for where the obstacle moves, and wanted bodies get more fragments.
+        of the ego-motion and searched for where the obstacle moves, and bodies that need fragments get more.
         """
         if frame.gyro is not None:
             self._gyro.add(frame.gyro)
@@ -84,18 +85,18 @@ class Detector:
         known = len(self._images) > 0 and self._images[0].shape == grey.shape
         if check.continuity is Continuity.REPEATED and health.condition is CameraCondition.GOOD:
             # A repeated image cannot have a better health than it was reported with before.
-            health = replace(self._told, valid_depth_ratio=health.valid_depth_ratio)
+            health = replace(self._last_health, valid_depth_ratio=health.valid_depth_ratio)
         if not usable or check.continuity in (Continuity.REPEATED, Continuity.BACKWARD):
-            return self._blind(frame, grid, health)
+            return self._not_usable(frame, grid, health)
         if check.continuity is not Continuity.NEXT or not known:
             return self._restart(frame, grey, grid, odometry, health)
         dt_s = (frame.captured_ns - self._last_ns) * 1e-9
         # dt_s is negative if time stepped back at a frame that was not usable.
         if not 0.0 < dt_s <= self._config.max_gap_s:
             return self._restart(frame, grey, grid, odometry, health)
-        return self._follow(frame, grey, grid, odometry, previous, dt_s, health)
+        return self._next_frame(frame, grey, grid, odometry, previous, dt_s, health)
 
-    def _follow(
+    def _next_frame(
         self,
         frame: RgbdFrame,
         grey: GreyImage,
@@ -105,16 +106,55 @@ class Detector:
         dt_s: float,
         health: CameraHealth,
     ) -> Detection:
-        store, config, camera = self._store, self._config, frame.intrinsics
+        """Detect in a frame that comes dt_s after the one before it and can be compared with it."""
+        config, store = self._config, self._store
         prior = self._prior(frame, odometry, dt_s)
-        moving, velocity = known_motion(store.ids, previous.fragments if previous else None)
-        guess = expected_px(store, velocity, prior.motion, dt_s, camera)
         images = pyramid(grey, config.fragments)
+        excluded = self._track_ends(frame, images, prior, previous, dt_s)
+        anchor = store.anchors(frame.captured_ns, config.motion.window_s)
+        depths = depths_with_sigma(anchor, config.depth_noise)
+        static = static_points(anchor, depths, store.pixel_cov, excluded, config.max_depth_m)
+        pixels = store.ends_px.reshape(-1, 2).astype(float)
+        found = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), frame.intrinsics)
+        motion = self._measure_residuals(frame, anchor, depths, found, excluded)
+        step = self._pose.inverse() @ found.pose
+        self._read_out.learn(found, vector_from_rotation(step.rotation), dt_s)
+        self._pose = found.pose
+        ego, reckoned = _ego(step, dt_s, found, prior), prior.source != "none"
+        self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
+        blurred = found.visual and not reckoned and found.inlier_ratio < MIN_AGREEMENT
+        detection = self._detection(
+            frame,
+            grid,
+            camera_health(health, ego, blurred, reckoned),
+            motion,
+            ego,
+            dt_s=dt_s,
+            motion_known=ego.source in ("visual", "odometry") and not blurred,
+            reckoned=reckoned,
+        )
+        self._renew(frame, grey)
+        if previous is not None:
+            self._look_closer(frame, grey, previous.needs_fragments)
+        if ego.source != "visual" or blurred:
+            store.break_history()
+        self._commit(frame, images, odometry, found.sweep_rad)
+        return detection
+
+    def _track_ends(
+        self, frame: RgbdFrame, images: Pyramid, prior: MotionPrior, previous: Percept | None, dt_s: float
+    ) -> NDArray[np.bool_]:
+        """Track the fragments into images and read their depth; those that are lost are dropped.
+
+        Returns (N,) fragments that are not used for the camera's motion: moving ones, and body-only ones.
+        """
+        config, store = self._config, self._store
+        moving, velocity = known_motion(store.ids, previous.fragments if previous else None)
         flow = optical_flow.track(
             self._images,
             images,
             store.ends_px.reshape(-1, 2),
-            guess,
+            expected_px(store, velocity, prior.motion, dt_s, frame.intrinsics),
             store.pixel_cov.reshape(-1, 3),
             config.fragments,
         )
@@ -122,7 +162,6 @@ class Detector:
         both = found[:, 0] & found[:, 1]
         store.ends_px = flow.pixels.reshape(-1, 2, 2)
         store.keep(both)
-        moving = moving[both]
         surface = surface_depth(
             frame.depth,
             frame.depth_scale_m,
@@ -133,37 +172,23 @@ class Detector:
         )
         store.near_m = surface.near_m.reshape(-1, 2).astype(np.float32)
         store.far_m = surface.far_m.reshape(-1, 2).astype(np.float32)
-        anchor = store.anchors(frame.captured_ns, config.motion.window_s)
-        depths = appraise(anchor, config.depth_noise)
-        static = static_points(anchor, depths, store.pixel_cov, moving | store.witness, config.max_depth_m)
-        pixels = store.ends_px.reshape(-1, 2).astype(float)
-        result = estimate(static, pixels, self._pose, prior, self._read_out.sweep(), camera)
-        scale = self._variance_scale
-        motion = residuals(store, anchor, depths, result, camera, config.depth_noise, scale)
-        if result.visual:
-            self._variance_scale = observed_variance_scale(
-                motion, store.age_frames, moving | store.witness, scale
-            )
-        average_depth(store, store.before(frame.captured_ns), result.pose, config.depth_noise)
-        step = self._pose.inverse() @ result.pose
-        self._read_out.learn(result, vector_from_rotation(step.rotation), dt_s)
-        ego = _ego(step, dt_s, result, prior)
-        blurred = result.visual and prior.source == "none" and result.inlier_ratio < LEAST_AGREEMENT
-        health = camera_health(health, ego, blurred)
-        self._pose = result.pose
-        self._motion, self._motion_dt_s = step, dt_s if ego.source != "none" else 0.0
-        known = ego.source in ("visual", "odometry") and not blurred
-        reckoned = prior.source != "none"
-        detection = self._detection(
-            frame, grid, health, motion, ego, dt_s=dt_s, motion_known=known, reckoned=reckoned
-        )
-        self._renew(frame, grey)
-        if previous is not None:
-            self._look_closer(frame, grey, previous.wanted)
-        if ego.source != "visual" or blurred:
-            self._store.break_history()
-        self._commit(frame, images, odometry, result.sweep_rad)
-        return detection
+        return moving[both] | store.body_only
+
+    def _measure_residuals(
+        self,
+        frame: RgbdFrame,
+        anchor: AnchorEnds,
+        depths: AnchorDepths,
+        found: CameraEstimate,
+        excluded: NDArray[np.bool_],
+    ) -> EndResiduals:
+        """Residuals of all ends; updates the scale of the noise, and the running averages of depth."""
+        store, noise, scale = self._store, self._config.depth_noise, self._variance_scale
+        motion = residuals(store, anchor, depths, found, frame.intrinsics, noise, scale)
+        if found.visual:
+            self._variance_scale = observed_variance_scale(motion, store.age_frames, excluded, scale)
+        average_depth(store, store.last_entries(frame.captured_ns), found.pose, noise)
+        return motion
 
     def _grid(self, frame: RgbdFrame) -> DepthGrid:
         grid = make_grid(frame, self._config, self._mount)
@@ -179,9 +204,9 @@ class Detector:
         new = self._renewal.find(frame, grey, self._store.ends_px, without_depth)
         self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov)
 
-    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: Wanted) -> None:
+    def _look_closer(self, frame: RgbdFrame, grey: GreyImage, bodies: NeedsFragments) -> None:
         new = self._attention.find(frame, grey, self._store.ends_px, bodies)
-        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, witness=True)
+        self._store.add(new.ends_px, new.near_m, new.far_m, new.pixel_cov, body_only=True)
 
     def _commit(
         self, frame: RgbdFrame, images: Pyramid, odometry: Pose | None, sweep_rad: FloatArray
@@ -200,7 +225,7 @@ class Detector:
     ) -> Detection:
         """Begin anew: at the first frame, after a gap or a step back of time, or with another image size."""
         self._store.clear()
-        self._read_out.lose()
+        self._read_out.forget_last()
         self._motion, self._motion_dt_s = _IDENTITY, 0.0
         self._renew(frame, grey)
         motion = no_motion(2 * len(self._store))
@@ -208,9 +233,9 @@ class Detector:
         self._commit(frame, pyramid(grey, self._config.fragments), odometry, _NO_SWEEP)
         return detection
 
-    def _blind(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
+    def _not_usable(self, frame: RgbdFrame, grid: DepthGrid, health: CameraHealth) -> Detection:
         """A frame in which nothing can be tracked; the fragments wait for the next usable frame."""
-        self._read_out.lose()
+        self._read_out.forget_last()
         return self._detection(frame, grid, health, no_motion(2 * len(self._store)))
 
     def _detection(
@@ -218,7 +243,7 @@ class Detector:
         frame: RgbdFrame,
         grid: DepthGrid,
         health: CameraHealth,
-        motion: PointMotion,
+        motion: EndResiduals,
         ego: EgoMotion = MOTION_NOT_KNOWN,
         *,
         dt_s: float = 0.0,
@@ -226,7 +251,7 @@ class Detector:
         motion_known: bool = False,
         reckoned: bool = False,
     ) -> Detection:
-        store, self._told = self._store, health
+        store, self._last_health = self._store, health
         return Detection(
             captured_ns=frame.captured_ns,
             sequence=frame.sequence,

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vision.fragments.attention import Wanted
+from vision.fragments.attention import NeedsFragments
 from vision.scene import Fragments, Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Percept:
-    """scene, fragments: of one frame. wanted: bodies on which more fragments are to be searched for."""
+    """scene, fragments: of one frame. needs_fragments: bodies on which more fragments are to be searched
+    for."""
 
     scene: Scene
     fragments: Fragments
-    wanted: Wanted
+    needs_fragments: NeedsFragments

@@ -108,8 +108,8 @@ class EgoMotion:
 
     motion: the camera now, in the camera frame before (p_before = motion.apply(p_now)).
     dt_s: between the two exposures.
-    source: what it rests on: "visual", "odometry", "none", or "disputed" (the images, which the odometry
-        contradicts).
+    source: what it rests on: "visual", "odometry", "none", or "disputed" (the images, which the prior, by
+        odometry or by the kinematics of the base, contradicts).
     inlier_ratio: share of the fragments that agree with it as static; NaN where not estimated.
     sigma_translation_m: one standard deviation over the whole interval.
     sigma_rotation_rad: one standard deviation over the whole interval.

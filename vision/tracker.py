@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.perception import PerceptionConfig
-from hal.compiled import compiled
-from hal.types import FloatArray, PlanarPose
+from hal.types import PlanarPose
 from vision.bodies import (
     births,
     carving,
@@ -27,17 +26,17 @@ from vision.bodies import (
     votes,
 )
 from vision.bodies.adoption import adopt, inherited
-from vision.bodies.arrivals import Changes, FreeMemory
+from vision.bodies.arrivals import Changes, ViewMemory
 from vision.bodies.judgement import judge
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, regions
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid
-from vision.depth.depth_guard import free_space
+from vision.depth.free_space import free_space
 from vision.depth.near_floor import NearFloor
 from vision.depth.regions import Regions
 from vision.detection import Detection
-from vision.fragments.attention import wanted
+from vision.fragments.attention import bodies_needing_fragments
 from vision.motion import least_squares, limbs
 from vision.motion.least_squares import FragmentVelocities
 from vision.motion.motion_evidence import evidence_of
@@ -51,31 +50,6 @@ _FORGET_YOUNG_S = 0.15  # a few frames, for a track that was hardly seen: it is 
 _LONG_AGO_NS = 10**9  # age of the last sighting of a track that is to be forgotten now: above _FORGET_S
 
 
-@compiled("float64[:, :], float64[:, :, :], float64[:], int64[::1], float64, float64[:, :]")
-def _measured(
-    velocity_mps: FloatArray,
-    covariance: FloatArray,
-    swing: FloatArray,
-    use: NDArray[np.intp],
-    share: float,
-    rotation: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Velocities (K, 3) of the tracks use (K,) in the fixed frame, to which rotation leads, and covariances
-    (K, 3, 3): share times the given ones, plus swing, the variance by limbs, in each direction."""
-    velocity, noise = np.zeros((len(use), 3)), np.zeros((len(use), 3, 3))
-    for k in range(len(use)):
-        t = use[k]
-        for i in range(3):
-            for m in range(3):
-                velocity[k, i] += rotation[i, m] * velocity_mps[t, m]
-            for j in range(3):
-                for m in range(3):
-                    for n in range(3):
-                        noise[k, i, j] += rotation[i, m] * covariance[t, m, n] * share * rotation[j, n]
-            noise[k, i, i] += swing[t]
-    return velocity, noise
-
-
 class Tracker:
     """Keeps the tracks, their cells and fragments of the last frame, and the memory of free space."""
 
@@ -84,7 +58,7 @@ class Tracker:
         self._body_height_m = body_height_m
         self._clearance_m = clearance_m
         self._tracks = Tracks()
-        self._free = FreeMemory(config.depth_noise)
+        self._free = ViewMemory(config.depth_noise)
         self._near_floor = NearFloor(config.min_depth_m)
         self._surfaces = masks.NO_TRACK_SURFACES
         self._fragment_ids = np.empty(0, np.int64)
@@ -102,35 +76,37 @@ class Tracker:
             self._free.clear()
         elapsed_s = 0.0 if self._last_ns is None else (detection.captured_ns - self._last_ns) * 1e-9
         elapsed_s = min(max(elapsed_s, 0.0), self._config.max_gap_s)
-        tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.up(detection))
+        tracks.predict(elapsed_s, _ACCEL_DENSITY, sightings.floor_normal(detection))
         before_ns = detection.captured_ns if self._last_ns is None else self._last_ns
         self._last_ns = max(detection.captured_ns, before_ns)
         owner = inherited(self._fragment_ids, self._fragment_owner, detection.ids, tracks.ids)
-        standing = connected.standing(detection.grid, self._clearance_m)
+        above_floor = connected.above_floor(detection.grid, self._clearance_m)
         velocities = least_squares.fragment_velocities(detection.motion, self._config.motion.max_speed_mps)
         if detection.health.condition is not CameraCondition.UNTRUSTWORTHY or detection.restarted:
-            owner = self._follow(detection, standing, owner, velocities, elapsed_s)
+            owner = self._update_tracks(detection, above_floor, owner, velocities, elapsed_s)
         unseen_s = (detection.captured_ns - tracks.seen_ns) * 1e-9
         young = tracks.sightings < report.MIN_SIGHTINGS
         tracks.keep(unseen_s <= np.where(young, _FORGET_YOUNG_S, _FORGET_S))
         self._fragment_ids, self._fragment_owner = detection.ids, owner
-        return self._percept(detection, standing, owner, velocities, robot_pose)
+        return self._percept(detection, above_floor, owner, velocities, robot_pose)
 
-    def _follow(
+    def _update_tracks(
         self,
         detection: Detection,
-        standing: BoolGrid,
+        above_floor: BoolGrid,
         owner: NDArray[np.int64],
         velocities: FragmentVelocities,
         elapsed_s: float,
     ) -> NDArray[np.int64]:
         """Update surfaces first, then velocities, then the verdict. Returns the track id of each fragment."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
-        changes = self._free.changes(grid, standing, pose, detection.captured_ns)
+        changes = self._free.changes(grid, above_floor, pose, detection.captured_ns)
         if detection.motion_known or detection.restarted:
             self._free.remember(grid, pose, detection.captured_ns)
-        labels, whole, measured = self._label(detection, standing, changes, velocities, elapsed_s)
-        sightings.see(tracks, detection, regions.unhidden(grid, labels, measured), self._config.depth_noise)
+        labels, whole, measured = self._label(detection, above_floor, changes, velocities, elapsed_s)
+        sightings.update_from_surfaces(
+            tracks, detection, regions.with_occlusion(grid, labels, measured), self._config.depth_noise
+        )
         if tracks.overhead.any():
             tracks.overhead &= ~births.reaching_down(grid, whole, len(tracks), self._body_height_m)
         owner = adopt(tracks, detection, whole, owner, self._config.depth_noise)
@@ -143,53 +119,59 @@ class Tracker:
     def _label(
         self,
         detection: Detection,
-        standing: BoolGrid,
+        above_floor: BoolGrid,
         changes: Changes,
         velocities: FragmentVelocities,
         elapsed_s: float,
     ) -> tuple[IntGrid, IntGrid, Regions]:
         """Assign cells to tracks: labels (h, w), track index + 1; the same with movers extended to the floor;
         and the regions of the tracks with that. The cells of the extension do not vote in the next frame."""
-        tracks, grid = self._tracks, detection.grid
-        labels = self._claim(detection, standing, changes, elapsed_s)
+        tracks, grid, noise = self._tracks, detection.grid, self._config.depth_noise
+        labels = self._claim(detection, above_floor, changes, elapsed_s)
         measured = regions.measure(grid, labels, len(tracks))
         known = len(tracks)
         carved = carving.carve(tracks, detection, labels, measured, changes.arrived, velocities, self._config)
-        tracks.guessed[known:] = tracks.mover[known:]
+        tracks.border_is_guess[known:] = tracks.mover[known:]
         if carved is not labels:
             measured = regions.measure(grid, carved, len(tracks))
-        whole, upright = grounding.ground(grid, carved, measured, tracks.guessed, tracks.mover)
+        whole, upright = grounding.extend_to_floor(
+            grid, carved, measured, tracks.border_is_guess, tracks.mover, noise
+        )
         labels = self._regroup(detection, carved, upright, changes)
         if labels is not carved:
             measured = regions.measure(grid, labels, len(tracks))
-            whole, upright = grounding.ground(grid, labels, measured, tracks.guessed, tracks.mover)
+            whole, upright = grounding.extend_to_floor(
+                grid, labels, measured, tracks.border_is_guess, tracks.mover, noise
+            )
         return labels, whole, upright
 
-    def _claim(self, detection: Detection, standing: BoolGrid, changes: Changes, elapsed_s: float) -> IntGrid:
+    def _claim(
+        self, detection: Detection, above_floor: BoolGrid, changes: Changes, elapsed_s: float
+    ) -> IntGrid:
         """(h, w) track index + 1 of each cell, by the cells of all tracks in the frame before; births."""
         tracks, grid, pose = self._tracks, detection.grid, detection.pose
         mover = tracks.mover
         shift = np.where(mover[:, None], tracks.state[:, 3:] * elapsed_s, 0.0)
         index = tracks.index_of(self._surfaces.track_id)
         predicted = masks.predict(self._surfaces, index, shift, grid, pose)
-        count, parts = connected.components(grid, standing)
+        count, parts = connected.components(grid, above_floor)
         measured = regions.measure(grid, parts, count)
         ballot = votes.count_votes(parts, count, predicted, len(tracks), mover)
         sight, distance_m = tracks.sight(pose.translation_m)
         overdue = tracks.overdue(changes.stayed_s, sight, self._free.resolves_m(distance_m))
-        ballot, hidden = votes.withdraw(ballot, parts, predicted, changes.stayed, overdue, mover)
-        tracks.hide(hidden)
-        came = masks.count_cells(parts, changes.arrived_cells, count)
-        ballot = votes.release(ballot, measured.cells, came, mover)
-        tracks.guessed = votes.guessed(ballot, mover)
+        ballot, hidden = votes.drop_overdue_movers(ballot, parts, predicted, changes.stayed, overdue, mover)
+        tracks.mark_hidden(hidden)
+        newly_arrived = masks.count_cells(parts, changes.arrived_cells, count)
+        ballot = votes.drop_static_from_arrived(ballot, measured.cells, newly_arrived, mover)
+        tracks.border_is_guess = votes.border_is_guess(ballot, mover)
         bodies = sightings.expected_bodies(tracks, pose, self._config.depth_noise)
         expected = grouping.expected_in(grid, measured, ballot.winner, ballot.votes, bodies, mover)
         winner = grouping.detach(ballot.winner, measured, ballot.votes, expected)
-        alive = mover | tracks.has_moved
+        alive = mover | tracks.ever_moved
         winner = grouping.attach((winner == 0).nonzero()[0], measured, winner, alive, expected)
         speed_mps = self._config.motion.max_speed_mps
-        winner = births.begin(
-            tracks, detection, parts, measured, came, winner, self._body_height_m, speed_mps
+        winner = births.start_tracks(
+            tracks, detection, parts, measured, newly_arrived, winner, self._body_height_m, speed_mps
         )
         return votes.divide(parts, predicted, ballot, winner)
 
@@ -199,16 +181,16 @@ class Tracker:
         if not tracks.moving.any():
             return labels
         mover = tracks.mover
-        pairs = merging.merges(
+        pairs = merging.pairs_to_merge(
             grid, measured, tracks.state[:, 3:], tracks.velocity_sigma_mps, mover, tracks.moving
         )
-        way_m = tracks.speed_mps * changes.stayed_s
-        labels, gone = merging.join(grid, labels, pairs, changes.stayed, way_m)
+        displacement_m = tracks.speed_mps * changes.stayed_s
+        labels, gone = merging.merge_labels(grid, labels, pairs, changes.stayed, displacement_m)
         tracks.seen_ns[gone] = detection.captured_ns - _LONG_AGO_NS
         for track in (tracks.moving & (measured.cells > 0)).nonzero()[0].tolist():
-            second = division.split(grid, labels, track, changes.stayed, float(way_m[track]))
+            second = division.second_body(grid, labels, track, changes.stayed, float(displacement_m[track]))
             if second is not None:
-                tracks.twin(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
+                tracks.start_from(track, carving.SUSPECT_EVIDENCE, detection.captured_ns)
                 labels = labels.copy()
                 labels.ravel()[second] = len(tracks)
         return labels
@@ -239,7 +221,7 @@ class Tracker:
             # The time windows of successive frames overlap: a frame adds dt / window of a new measurement.
             lag_s = max(float(detection.motion.lag_s.max()), detection.dt_s)
             going = tracks.speed_mps * tracks.moving
-            velocity, noise = _measured(
+            velocity, noise = limbs.in_fixed_frame(
                 body.velocity_mps,
                 body.covariance,
                 limbs.variance(body, going),
@@ -251,19 +233,19 @@ class Tracker:
                 tracks.state.take(use, axis=0), tracks.covariance.take(use, axis=0), velocity, noise, 3
             )
         longer = np.where(limbs.restless(body), detection.dt_s, -detection.dt_s)
-        tracks.unrest_s = np.maximum(tracks.unrest_s + longer, 0.0)
-        goes = tracks.follow_trails(detection.dt_s)
-        seen = evidence_of(tracks, detection, body, goes, arrivals, cells, self._config.depth_noise)
+        tracks.restless_s = np.maximum(tracks.restless_s + longer, 0.0)
+        advances = tracks.update_trailing_average(detection.dt_s)
+        seen = evidence_of(tracks, detection, body, advances, arrivals, cells, self._config.depth_noise)
         verdict = judge(seen, tracks.evidence, tracks.moving, detection.dt_s, settings)
         tracks.evidence, tracks.moving = verdict.evidence, verdict.moving
-        tracks.confidence, tracks.stands = verdict.confidence, verdict.stands
-        tracks.has_moved |= verdict.moving
-        tracks.count_on(verdict.proven, detection.dt_s)
+        tracks.confidence, tracks.surely_static = verdict.confidence, verdict.surely_static
+        tracks.ever_moved |= verdict.moving
+        tracks.update_durations(verdict.proven, detection.dt_s)
 
     def _percept(
         self,
         detection: Detection,
-        standing: BoolGrid,
+        above_floor: BoolGrid,
         owner: NDArray[np.int64],
         velocities: FragmentVelocities,
         robot_pose: PlanarPose | None,
@@ -273,7 +255,7 @@ class Tracker:
             captured_ns=detection.captured_ns,
             sequence=detection.sequence,
             obstacles=report.obstacles(tracks, detection),
-            free_space=self._free_space(detection, standing),
+            free_space=self._free_space(detection, above_floor),
             ego_motion=detection.ego_motion,
             health=detection.health,
             robot_pose=robot_pose,
@@ -284,12 +266,14 @@ class Tracker:
         return Percept(
             scene,
             report.fragments(detection, owner, moving, velocities),
-            wanted(tracks, detection, self._config),
+            bodies_needing_fragments(tracks, detection, self._config),
         )
 
-    def _free_space(self, detection: Detection, standing: BoolGrid) -> FreeSpace:
+    def _free_space(self, detection: Detection, above_floor: BoolGrid) -> FreeSpace:
         grid = detection.grid
         trusted = detection.health.condition is not CameraCondition.UNTRUSTWORTHY
-        unmeasured_m = self._near_floor.unmeasured_m(grid, trusted)
-        in_the_way = standing if grid.height_m is None else standing & (grid.height_m < self._body_height_m)
-        return free_space(grid, in_the_way, self._config.max_depth_m, unmeasured_m)
+        measurable_from_m = self._near_floor.measurable_from_m(grid, trusted)
+        in_the_way = (
+            above_floor if grid.height_m is None else above_floor & (grid.height_m < self._body_height_m)
+        )
+        return free_space(grid, in_the_way, self._config.max_depth_m, measurable_from_m)

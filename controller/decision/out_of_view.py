@@ -44,7 +44,7 @@ from controller.decision.view_edges import ViewEdges, beyond_edges, out_of_view
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.types import CameraMount, FloatArray, PlanarPose
-from vision.bodies.judgement import IMPLAUSIBLE
+from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
 from vision.scene import FreeSpace
 
 BoolArray = NDArray[np.bool_]
@@ -69,12 +69,12 @@ _STRIP_REACH_M = 0.5
 class OutOfView:
     """The bodies out of view; call mark_leaving_movers, then update, once a scene.
 
-    max_obstacle_speed_mps: measured speeds that are far above it (IMPLAUSIBLE times) are mistakes.
+    max_obstacle_speed_mps: measured speeds that are far above it (IMPLAUSIBLE_SPEED_FACTOR times) are mistakes.
     """
 
     def __init__(self, mount: CameraMount, max_obstacle_speed_mps: float) -> None:
         self._mount = mount
-        self._mistaken_mps = IMPLAUSIBLE * max_obstacle_speed_mps
+        self._mistaken_mps = IMPLAUSIBLE_SPEED_FACTOR * max_obstacle_speed_mps
         self._seen_through = SeenThrough(mount)
         self._bodies = no_bodies(0)
         self._since_s: FloatArray = np.zeros(0)

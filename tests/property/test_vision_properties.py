@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from config.perception import FragmentSettings, MotionSettings, PerceptionConfig
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose, RgbdFrame
 from tests.support.grids import grid_of, plane
-from tests.support.point_motion import static_miss
+from tests.support.point_motion import matrices, project, static_miss
 from vision.bodies.judgement import judge
 from vision.camera.floor import FloorFinder
-from vision.camera.lens import project, rays, rotation_from_vector, vector_from_rotation
+from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 from vision.motion.motion_evidence import MotionEvidence
-from vision.motion.velocities import PointMotion, normal_equations
+from vision.motion.velocities import EndResiduals, normal_equations
 from vision.numerics import kalman
 from vision.perception import Perception
 from vision.scene import Scene
@@ -56,11 +56,11 @@ def test_any_translation_over_ground_is_recovered_from_exact_projections(
     static = camera.inverse().apply(points)
     now = camera.inverse().apply(points + velocity * lag_s)
     ray = now[:, :2] / now[:, 2:]
-    motion = PointMotion(
+    motion = EndResiduals(
         static_m=static,
         ray=ray,
         lag_s=np.full(count, lag_s),
-        miss_m=static_miss(static, ray),
+        residual_m=static_miss(static, ray),
         covariance=np.tile([1e-6, 2e-7, 2e-6], (count, 1)),
         depth_effect=np.zeros((count, 2)),
         depth_step_m=np.full(count, np.nan),
@@ -70,7 +70,7 @@ def test_any_translation_over_ground_is_recovered_from_exact_projections(
         usable=np.ones(count, np.bool_),
     )
     equations = normal_equations(motion, rng.uniform(0.1, 1.0, count))
-    found = np.linalg.solve(equations.matrix.sum(axis=0), equations.rhs.sum(axis=0))
+    found = np.linalg.solve(matrices(equations).sum(axis=0), equations[6:9].sum(axis=1))
     np.testing.assert_allclose(found, camera.rotation.T @ velocity, atol=1e-6)
 
 
@@ -215,15 +215,15 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         ends=rng.integers(0, 40, count),
         agreement=rng.uniform(0.0, 1.0, count),
         restless=rng.random(count) < 0.5,
-        unrest_s=rng.uniform(0.0, 1.0, count),
+        restless_s=rng.uniform(0.0, 1.0, count),
         arrived=rng.integers(0, 40, count),
         cells=rng.integers(40, 200, count),
         size_m=rng.uniform(0.0, 4.0, count),
-        clean_s=rng.uniform(0.0, 1.0, count),
+        velocity_measured_s=rng.uniform(0.0, 1.0, count),
         view_radps=rng.uniform(0.0, 1.0, count),
         growth_mps=rng.uniform(0.0, 1.0, count),
-        goes=rng.random(count) < 0.5,
-        guessed=rng.random(count) < 0.5,
+        advances=rng.random(count) < 0.5,
+        border_is_guess=rng.random(count) < 0.5,
         up=np.array([0.0, -1.0, 0.0]) if rng.random() < 0.5 else None,
         trusted=trusted,
         reckoned=bool(rng.random() < 0.5),

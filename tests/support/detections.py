@@ -12,7 +12,7 @@ from tests.support.grids import CAMERA, grid_of
 from tests.support.scenes import GOOD
 from vision.depth.depth_grid import DepthGrid
 from vision.detection import Detection
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 from vision.percept import Percept
 from vision.scene import EgoMotion
 from vision.tracker import Tracker
@@ -22,14 +22,14 @@ START_NS = 1_000_000_000
 AT_ORIGIN = Pose(np.eye(3), np.zeros(3))
 
 
-def no_ends() -> PointMotion:
+def no_ends() -> EndResiduals:
     """The evidence of no fragments at all."""
     none, pair, triple = np.empty(0), np.empty((0, 2)), np.empty((0, 3))
-    return PointMotion(
+    return EndResiduals(
         static_m=triple,
         ray=pair,
         lag_s=none,
-        miss_m=pair,
+        residual_m=pair,
         covariance=triple,
         depth_effect=pair,
         depth_step_m=none,

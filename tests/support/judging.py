@@ -47,15 +47,15 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         ends=np.array([0]),
         agreement=np.array([0.0]),
         restless=np.array([False]),
-        unrest_s=np.array([0.0]),
+        restless_s=np.array([0.0]),
         arrived=np.array([0]),
         cells=np.array([100]),
         size_m=np.array([0.8]),
-        clean_s=np.array([0.0]),
+        velocity_measured_s=np.array([0.0]),
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),
-        goes=np.array([True]),
-        guessed=np.array([False]),
+        advances=np.array([True]),
+        border_is_guess=np.array([False]),
         up=LEVEL_UP,
         trusted=True,
         reckoned=True,
@@ -82,6 +82,9 @@ def rises(seen: MotionEvidence) -> bool:
     return bool(verdict(seen).evidence[0] > 0.0)
 
 
-def by_surface(velocity: Speed, clean_s: float, **changes: Any) -> MotionEvidence:
+def by_surface(velocity: Speed, velocity_measured_s: float, **changes: Any) -> MotionEvidence:
     """No fragment at all: a plain surface that goes."""
-    return one(velocity, **{**surface(velocity, SURE), "clean_s": np.array([clean_s]), **changes})
+    return one(
+        velocity,
+        **{**surface(velocity, SURE), "velocity_measured_s": np.array([velocity_measured_s]), **changes},
+    )

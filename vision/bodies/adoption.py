@@ -25,7 +25,7 @@ _ALONG = np.array([0.5, 0.15, 0.85, 0.5, 0.15, 0.85, 0.5, 0.5])
 _ABOVE_PX = np.array([0.0, 0.0, 0.0, 8.0, 8.0, 8.0, 0.0, 0.0])
 _BESIDE_PX = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -8.0, 8.0])
 _ON_IT = 6  # the first 6 places are on or above the fragment: at least one of these has to agree in depth
-_LEAST_GATE_M = 0.3  # gate on depth, plus two sigmas: an outline may be as far back as the side of the body
+_MIN_GATE_M = 0.3  # gate on depth, plus two sigmas: an outline may be as far back as the side of the body
 _SAME_DEPTH_M = 0.05  # plus one sigma: smaller differences in depth do not count, since no surface is even
 _NEARER = 0.1  # cost per metre of distance, in metres of difference in depth: prefers nearer bodies
 
@@ -99,10 +99,10 @@ def _adopted(
     quadratic_per_m: float,
     ids: NDArray[np.int64],
     moving: NDArray[np.bool_],
-    still: NDArray[np.bool_],
+    is_long_static: NDArray[np.bool_],
     owner: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """As adopt. still (N,): fragments that have been static for a while."""
+    """As adopt. is_long_static (N,): fragments that have been static for a while."""
     height, width = labels.shape
     result = np.full(len(ends_px), -1, np.int64)
     for k in range(len(ends_px)):
@@ -115,7 +115,7 @@ def _adopted(
             row = nearest_cell(v + down * _ALONG[i] - _ABOVE_PX[i], offset_px, step_px, height)
             column = nearest_cell(u + across * _ALONG[i] + _BESIDE_PX[i], offset_px, step_px, width)
             there_m, gap_m = depth_m[row, column], abs(depth_m[row, column] - own_m)
-            if labels[row, column] == 0 or not gap_m <= _LEAST_GATE_M + 2.0 * sigma_m:
+            if labels[row, column] == 0 or not gap_m <= _MIN_GATE_M + 2.0 * sigma_m:
                 continue
             on_it = on_it or i < _ON_IT
             # Of two bodies at one place in the image, take the one at the depth of the fragment. Where noise
@@ -123,6 +123,6 @@ def _adopted(
             off = max(gap_m - _SAME_DEPTH_M - sigma_m, 0.0) + np.float32(_NEARER) * there_m
             if off < least:
                 track, least = labels[row, column] - 1, off
-        if on_it and not (still[k] and moving[track] and ids[track] != owner[k]):
+        if on_it and not (is_long_static[k] and moving[track] and ids[track] != owner[k]):
             result[k] = ids[track]
     return result

@@ -22,13 +22,16 @@ from hal.compiled import compiled, inlined
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
-from vision.numerics.relative_pose import Row, coordinate_m, relative_row
+from vision.numerics.relative_pose import NEAREST_M, Row, coordinate_m, relative_row
 
 # Every second view at 30 frames a second is kept. A look back takes the view closest to the wanted time.
 _KEEP_EVERY_S = 0.06
-# In the longer time a walking person moves by more than his own width. In the shorter time less error of the
-# camera's own motion has added up.
-_LOOK_BACK_S = (0.2, 0.6)
+# Views are kept for so long. Until then, the surface of something that has come to rest may count as arrived.
+ARRIVED_UP_TO_S = 0.9
+_OLDEST = 1.5  # of the wanted time of a look back: an older view does not serve
+# In the longer time, 0.6 s, a walking person moves by more than his own width. In the shorter time less error
+# of the camera's own motion has added up.
+_LOOK_BACK_S = (0.2, ARRIVED_UP_TO_S / _OLDEST)
 _MARGIN_M = 0.10  # besides the noise: error of the camera's motion over the longer look back
 _SIGMAS = 3.5  # of the difference compared: exceeded by chance in 2 of 10000 cells; neighbours must agree too
 # Noise of a cell between two frames relative to that of a pixel, as measured over time. A cell is a median
@@ -37,7 +40,6 @@ _SIGMAS = 3.5  # of the difference compared: exceeded by chance in 2 of 10000 ce
 _CELL_NOISE_OVER_TIME = 0.55
 _NEIGHBOURS = 5  # at least this many of a cell and its eight neighbours must have arrived
 _UNKNOWN = np.float32(1e3)  # 1/m, where nothing was measured: no surface is nearer, so none can arrive there
-_NEAREST_M = np.float32(0.1)  # the projection of a nearer point is meaningless
 _BLOCK = np.ones((3, 3), np.uint8)
 
 
@@ -66,7 +68,7 @@ class Changes:
     stayed_s: float
 
 
-class FreeMemory:
+class ViewMemory:
     """Remembers the views of the last moments, and so the space that was seen free."""
 
     def __init__(self, noise: DepthNoise) -> None:
@@ -79,16 +81,16 @@ class FreeMemory:
 
     def changes(self, grid: DepthGrid, mask: BoolGrid, pose: Pose, now_ns: int) -> Changes:
         """Which of the cells of mask (h, w) have arrived and which have stayed."""
-        came, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
+        arrived, stayed, stayed_s = np.zeros(mask.shape, np.bool_), np.zeros(mask.shape, np.bool_), 0.0
         for wanted_s in _LOOK_BACK_S:
             memory = self._memory_of(now_ns, wanted_s)
             if memory is None:
                 continue
             nearer, same = self._compare(grid, mask, pose, memory)
-            came |= nearer
+            arrived |= nearer
             if wanted_s == _LOOK_BACK_S[-1]:
                 stayed, stayed_s = same, (now_ns - memory.stamp_ns) * 1e-9
-        return Changes(*_in_company(came, np.flatnonzero(came)), stayed, stayed_s)
+        return Changes(*_in_company(arrived, np.flatnonzero(arrived)), stayed, stayed_s)
 
     def resolves_m(self, distance_m: FloatArray) -> FloatArray:
         """(N,) minimum difference in depth at which two surfaces at distance_m (N,) can be distinguished."""
@@ -106,12 +108,12 @@ class FreeMemory:
         nearest[grid.beyond] = np.float32(1.0 / grid.range_m)
         cv2.dilate(nearest, _BLOCK, nearest)
         self._memories.append(_Memory(now_ns, pose, nearest))
-        horizon_ns = now_ns - int(1.5e9 * max(_LOOK_BACK_S))
+        horizon_ns = now_ns - int(1e9 * ARRIVED_UP_TO_S)
         self._memories = [m for m in self._memories if m.stamp_ns >= horizon_ns]
 
     def _memory_of(self, now_ns: int, wanted_s: float) -> _Memory | None:
         """The view closest to wanted_s ago, if there is one within 0.5 to 1.5 times of it."""
-        best, gap = None, 0.5 * wanted_s
+        best, gap = None, (_OLDEST - 1.0) * wanted_s
         for memory in self._memories:
             off = abs((now_ns - memory.stamp_ns) * 1e-9 - wanted_s)
             if off <= gap:
@@ -138,7 +140,7 @@ class FreeMemory:
 
 
 @inlined
-def _put_row(
+def _project_row(
     depth_m: FloatGrid,
     ray_x: FloatGrid,
     ray_y: FloatGrid,
@@ -163,7 +165,7 @@ def _put_row(
         inverse[j] = np.float32(1.0) / there_m
         u = (coordinate_m(to_x, x, y, z) * inverse[j] - left) * per_column + np.float32(0.5)
         v = (coordinate_m(to_y, x, y, z) * inverse[j] - top) * per_row + np.float32(0.5)
-        inside = (there_m > _NEAREST_M) & (u >= zero) & (v >= zero) & (u < width) & (v < height)
+        inside = (there_m > NEAREST_M) & (u >= zero) & (v >= zero) & (u < width) & (v < height)
         cell[j] = np.int32(v) * columns + np.int32(u) if inside else np.int32(-1)
 
 
@@ -195,7 +197,7 @@ def _compared(
     for i in range(height):
         if not mask[i].any():
             continue
-        _put_row(depth_m, ray_x, ray_y, i, rows, cell, inverse)
+        _project_row(depth_m, ray_x, ray_y, i, rows, cell, inverse)
         for j in range(width):
             if mask[i, j] and cell[j] >= 0:
                 ahead = inverse[j] - seen[cell[j]]

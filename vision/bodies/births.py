@@ -13,20 +13,22 @@ from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
-# About 0.1 x 0.1 m at 4 m with the camera of sim.yaml. Smaller parts come and go with noise.
-_MIN_CELLS = 12
+# Of a new track; about 0.1 x 0.1 m at 4 m with the camera of sim.yaml. Smaller parts come and go with noise.
+MIN_CELLS = 12
 _SIGMA_M = 0.2  # standard deviation of a first sighting: centre of the visible surface from that of the body
-# A part above the robot's height at the side of the image begins a track if at least this many of its cells,
-# and this share of them, have arrived, and it reaches down below the height of a person.
-_CAME_CELLS, _CAME_SHARE, _PERSON_M = 24, 0.5, 2.0
+# A part above the robot's height at the side of the image begins a track if it has arrived and reaches down
+# below the height of a person.
+_ARRIVED_CELLS = 24  # minimum number of its cells that have arrived
+_ARRIVED_SHARE = 0.5  # minimum share of its cells that have arrived
+_PERSON_M = 2.0
 
 
-def begin(
+def start_tracks(
     tracks: Tracks,
     detection: Detection,
     parts: IntGrid,
     measured: Regions,
-    came: NDArray[np.intp],
+    arrived_cells: NDArray[np.intp],
     winner: NDArray[np.int32],
     body_height_m: float,
     max_speed_mps: float,
@@ -36,14 +38,20 @@ def begin(
     A part begins a track if it reaches down below the robot's height, if its lower end is hidden so that it
     may reach down, or if it is an arm that swings into the view ahead of its body.
 
-    parts (h, w): labels of the parts. measured: their regions. came (P,): their cells that have arrived.
+    parts (h, w): labels of the parts. measured: their regions. arrived_cells (P,): their cells that have
+    arrived.
     """
     grid = detection.grid
-    large = (winner == 0) & (measured.cells >= _MIN_CELLS)
+    large = (winner == 0) & (measured.cells >= MIN_CELLS)
     overhead = large.copy()
     if large.any():
         overhead &= ~reaching_down(grid, parts, len(winner), body_height_m)
-        swings_in = overhead & ~measured.wide & (came >= _CAME_CELLS) & (came >= _CAME_SHARE * measured.cells)
+        swings_in = (
+            overhead
+            & ~measured.sides_visible
+            & (arrived_cells >= _ARRIVED_CELLS)
+            & (arrived_cells >= _ARRIVED_SHARE * measured.cells)
+        )
         if swings_in.any():
             swings_in &= reaching_down(grid, parts, len(winner), _PERSON_M)
         large &= ~overhead | swings_in | regions.hidden_below(grid, parts, measured)
@@ -74,4 +82,4 @@ def _low(labels: IntGrid, height_m: FloatGrid, body_height_m: np.float32, count:
         for j in range(columns):
             if labels[i, j] > 0 and height_m[i, j] < body_height_m:
                 cells[labels[i, j] - 1] += 1
-    return cells >= _MIN_CELLS // 2
+    return cells >= MIN_CELLS // 2

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.bodies.division import LOW, WITHIN
+from vision.bodies.division import SEEN_THROUGH_HEIGHT, SEEN_THROUGH_SHARE
 from vision.depth.depth_grid import DepthGrid, nearest_cell
 from vision.depth.regions import Regions
 
-LOAD_M = 0.8  # maximum gap between a load and its carrier: the load may begin farther back
-THROUGH_M = 1.5  # maximum gap between a vehicle and its own far side, seen through it
-LEAST_SAMPLES = 3  # of the cells sampled between two regions: from so many on, something is there
+LOAD_GAP_M = 0.8  # maximum gap between a load and its carrier: the load may begin farther back
+SEEN_THROUGH_GAP_M = 1.5  # maximum gap between a vehicle and its own far side, seen through it
+MIN_SAMPLES = 3  # of the cells sampled between two regions: from so many on, something is there
 _SAMPLES = 24  # cells sampled on the way from one region to another
-_MOSTLY = 0.7  # of a load's width is above its carrier at least; the rest may jut out
+_STACKED_SHARE = 0.7  # of a load's width is above its carrier at least; the rest may jut out
 _TOUCHING_PX = 16.0  # two edges in the image touch: 4 cells, since the rims at a jump in depth are of neither
 
 
@@ -58,23 +58,19 @@ class Relations:
 
 def relations(regions: Regions, one: NDArray[np.intp], other: NDArray[np.intp]) -> Relations:
     """How regions one (K,) lie relative to regions other (K,), both as indices."""
-    return Relations(
-        *_relations(regions.position_m, regions.extent_m, regions.bbox_px, one, other, LOW, WITHIN)
-    )
+    return Relations(*_relations(regions.position_m, regions.extent_m, regions.bbox_px, one, other))
 
 
-@compiled("float64[:, :], float64[:, :], float64[:, :], int64[:], int64[:], float64, float64")
+@compiled("float64[:, :], float64[:, :], float64[:, :], int64[:], int64[:]")
 def _relations(
     position_m: FloatArray,
     extent_m: FloatArray,
     bbox_px: FloatArray,
     one: NDArray[np.intp],
     other: NDArray[np.intp],
-    low: float,
-    mostly: float,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     gap_m, overlap = np.empty(len(one)), np.empty(len(one))
-    on_top, within = np.empty(len(one), np.bool_), np.empty(len(one), np.bool_)
+    stacked, within = np.empty(len(one), np.bool_), np.empty(len(one), np.bool_)
     for k in range(len(one)):
         a, b = one[k], other[k]
         squared = 0.0
@@ -87,9 +83,9 @@ def _relations(
         width, height = right - left, bottom - top
         across, down = min(right, u1) - max(left, u0), min(bottom, v1) - max(top, v0)
         overlap[k] = max(across, 0.0) * max(down, 0.0) / max(width * height, 1.0)
-        on_top[k] = across >= _MOSTLY * width and abs(bottom - v0) <= _TOUCHING_PX
-        within[k] = height <= low * (v1 - v0) and overlap[k] >= mostly
-    return gap_m, overlap, on_top, within
+        stacked[k] = across >= _STACKED_SHARE * width and abs(bottom - v0) <= _TOUCHING_PX
+        within[k] = height <= SEEN_THROUGH_HEIGHT * (v1 - v0) and overlap[k] >= SEEN_THROUGH_SHARE
+    return gap_m, overlap, stacked, within
 
 
 def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -23,8 +23,11 @@ from numpy.typing import NDArray
 from config.perception import PerceptionConfig
 from hal.compiled import compiled
 from hal.types import FloatArray
+from vision.bodies.arrivals import ARRIVED_UP_TO_S
+from vision.bodies.births import MIN_CELLS
+from vision.bodies.division import SINGLE_WIDTH_M
 from vision.bodies.ends import near_ends
-from vision.bodies.judgement import IMPLAUSIBLE
+from vision.bodies.judgement import IMPLAUSIBLE_SPEED_FACTOR
 from vision.bodies.tracks import Tracks
 from vision.depth import connected, regions
 from vision.depth.connected import IntGrid
@@ -38,11 +41,6 @@ from vision.motion.least_squares import FragmentVelocities
 # Score at the start. It is used up in 0.09 s where nothing speaks for motion, in 0.6 s where something does.
 SUSPECT_EVIDENCE = 0.3
 _COMPACT_M = 1.6  # a track wider or deeper than one body with its load may hide another body
-_BODY_M = 0.85  # no person is wider (SINGLE_WIDTH_M of vision/bodies/division.py)
-# For 0.9 s after something has come to rest its surface may still count as arrived (1.5 times the longer look
-# back of vision/bodies/arrivals.py).
-_CALM_S = 0.9
-_MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py)
 _MIN_FRAGMENTS = 2  # that move alike; one alone may be an end that slides
 # One fragment alone, on a person who walks along a wall, is believed if it has been seen for this long, moves
 # at this speed (a slow walk) with a certainty of this many sigmas (as a verdict needs), and moves level.
@@ -72,10 +70,10 @@ def carve(
     suspicious = candidates.moving_candidates(detection.motion, detection.age_frames).nonzero()[0]
     if len(suspicious) == 0 and not arrived.any():
         return labels
-    searched, overgrown = _in_question(
+    searched, overgrown = _may_hide_mover(
         tracks.mover,
         tracks.moving,
-        tracks.stands & (tracks.calm_s >= _CALM_S),
+        tracks.surely_static & (tracks.no_evidence_s >= ARRIVED_UP_TO_S),
         measured.position_m,
         measured.extent_m,
         config.depth_noise.floor_m,
@@ -84,21 +82,21 @@ def carve(
     asked = searched | overgrown
     if not asked.any():
         return labels
-    looked_at = _cells_of(labels, asked)
-    shown = arrived & looked_at
-    shown |= _around_moving_fragments(detection, velocities, suspicious, looked_at, config)
-    if not shown.any():
+    search_area = _cells_of(labels, asked)
+    moving_cells = arrived & search_area
+    moving_cells |= _around_moving_fragments(detection, velocities, suspicious, search_area, config)
+    if not moving_cells.any():
         return labels
-    inside = _cells_of(labels, searched) if overgrown.any() else looked_at
-    labels = _cut_back(tracks, detection, labels, overgrown, shown, config)
-    seeds = shown & inside
+    inside = _cells_of(labels, searched) if overgrown.any() else search_area
+    labels = _cut_back(tracks, detection, labels, overgrown, moving_cells, config)
+    seeds = moving_cells & inside
     widened = cv2.dilate(seeds.view(np.uint8), _BLOCK)
     grown: BoolGrid = np.asarray(widened, np.uint8).view(np.bool_) & inside
-    if np.count_nonzero(grown) < _MIN_CELLS:
+    if np.count_nonzero(grown) < MIN_CELLS:
         return labels
     count, parts = connected.components(grid, grown)
     cells = np.bincount(parts.ravel(), minlength=count + 1)
-    keep = (cells[1:] >= _MIN_CELLS).nonzero()[0] + 1
+    keep = (cells[1:] >= MIN_CELLS).nonzero()[0] + 1
     if len(keep) == 0:
         return labels
     number = np.zeros(count + 1, np.int32)
@@ -111,7 +109,7 @@ def carve(
 
 
 @compiled("boolean[:], boolean[:], boolean[:], float64[:, :], float64[:, :], float64, float64")
-def _in_question(
+def _may_hide_mover(
     mover: NDArray[np.bool_],
     moving: NDArray[np.bool_],
     calm: NDArray[np.bool_],
@@ -128,7 +126,7 @@ def _in_question(
         compact = extent_m[t, 0] <= _COMPACT_M and extent_m[t, 2] <= deepest_m
         # If the fragments of something wider than a body stand still while part of it arrives, somebody
         # touches it.
-        touched = calm[t] and extent_m[t, 0] > _BODY_M
+        touched = calm[t] and extent_m[t, 0] > SINGLE_WIDTH_M
         searched[t] = not mover[t] and (not compact or touched)
         overgrown[t] = moving[t] and not compact
     return searched, overgrown
@@ -151,19 +149,19 @@ def _cut_back(
     detection: Detection,
     labels: IntGrid,
     overgrown: NDArray[np.bool_],
-    shown: BoolGrid,
+    moving_cells: BoolGrid,
     config: PerceptionConfig,
 ) -> IntGrid:
-    """labels (h, w) with overgrown movers (T,) reduced to the cells that are shown (h, w) to move.
+    """labels (h, w) with overgrown movers (T,) reduced to the cells that move (moving_cells, (h, w)).
 
     They have grown over furniture they move along. The rest of each begins as a static track.
     """
     for track in overgrown.nonzero()[0].tolist():
         own = labels == track + 1
-        widened = np.asarray(cv2.dilate((shown & own).view(np.uint8), _BLOCK), np.uint8)
+        widened = np.asarray(cv2.dilate((moving_cells & own).view(np.uint8), _BLOCK), np.uint8)
         kept = widened.view(np.bool_) & own
         rest = own & ~kept
-        if min(np.count_nonzero(kept), np.count_nonzero(rest)) < _MIN_CELLS:
+        if min(np.count_nonzero(kept), np.count_nonzero(rest)) < MIN_CELLS:
             continue
         one = regions.measure(detection.grid, rest.astype(np.int32), 1)
         _start(tracks, detection, one, 0.0, config)
@@ -182,12 +180,13 @@ def _around_moving_fragments(
     detection: Detection,
     velocities: FragmentVelocities,
     chosen: NDArray[np.intp],
-    looked_at: BoolGrid,
+    search_area: BoolGrid,
     config: PerceptionConfig,
 ) -> BoolGrid:
-    """(h, w) cells of looked_at (h, w) close to moving fragments of chosen (K,), at their depth.
+    """(h, w) cells of search_area (h, w) close to moving fragments of chosen (K,), at their depth.
 
-    A fragment counts as moving if others move alike, or if its own motion is clear enough (_alone).
+    A fragment counts as moving if others move alike, or if its own motion is clear enough
+    (_believable_alone).
     """
     result = np.zeros(detection.grid.depth_m.shape, np.bool_)
     motion = detection.motion
@@ -200,11 +199,21 @@ def _around_moving_fragments(
     group = candidates.cluster(position, velocity, covariance, sigma)
     company = np.bincount(group)[group] >= _MIN_FRAGMENTS
     seen_s = detection.age_frames.take(chosen).astype(float) * detection.dt_s
-    chosen = chosen[company | _alone(seen_s, velocity, covariance, IMPLAUSIBLE * config.motion.max_speed_mps)]
+    chosen = chosen[
+        company
+        | _believable_alone(
+            seen_s, velocity, covariance, IMPLAUSIBLE_SPEED_FACTOR * config.motion.max_speed_mps
+        )
+    ]
     if len(chosen) == 0:
         return result
     return near_ends(
-        detection.grid, looked_at, detection.ends_px[chosen], detection.near_m[chosen], detection.camera.fx
+        detection.grid,
+        search_area,
+        detection.ends_px[chosen],
+        detection.near_m[chosen],
+        detection.camera.fx,
+        config.depth_noise,
     )
 
 
@@ -226,7 +235,7 @@ def _of_chosen(
 
 
 @compiled("float64[::1], float64[:, :], float64[:, :, :], float64")
-def _alone(
+def _believable_alone(
     seen_s: FloatArray, velocity_mps: FloatArray, covariance: FloatArray, most_mps: float
 ) -> NDArray[np.bool_]:
     """(K,) fragments whose velocity is believed without another fragment that moves alike.

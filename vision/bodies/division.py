@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.types import FloatArray
+from vision.bodies.births import MIN_CELLS
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 from vision.numerics.order import median, quantile, quantiles
@@ -20,26 +21,32 @@ _PAIR_DISTANCE_M = 0.5  # minimum distance of the middles of two people side by 
 # A valley between two bodies holds at most this share of the surface of the lower hill beside it. It is not
 # empty, since arms touch.
 _VALLEY = 0.35
-WITHIN = 0.9  # a group of cells is seen through another one if this share of it is within the other's box
+# A group of cells is seen through another one if this share of it is within the other's box.
+SEEN_THROUGH_SHARE = 0.9
 # A group is low beside a body if it is at most this share as tall in the image: a trolley is, a child beside
 # an adult is not.
 LOW_BESIDE = 0.6
 # A group is static if fewer of its cells have left than this share of those that would have left, had it
 # moved along.
 _STANDING = 0.5
-LOW = 0.5  # a group seen through another one is at most this share as tall; a person behind it is taller
+# A group seen through another one is at most this share as tall; a person behind it is taller.
+SEEN_THROUGH_HEIGHT = 0.5
 _DIP_M = 0.15  # minimum depth of the dip between two heads; a shoulder is lower still
-# Shape of a head: its width is measured _HEAD_M below its top and lies between the next two values. The
-# shoulders are measured _SHOULDERS_M below the top. A load is wider; a post is narrower and has no shoulders.
-_HEAD_M, _LEAST_HEAD_M, _HEAD_WIDTH_M, _SHOULDERS_M = 0.15, 0.13, 0.30, 0.36
-_LEAST_APART_M, _MOST_APART_M = 0.35, 0.8  # distance of two heads; people farther apart leave a valley
-_HARDLY = 0.2  # share of the image between two groups: if less shows something farther, nothing is seen there
-_MIN_CELLS = 24  # in each of two groups: twice what a track begins with, since each is judged by itself
+# Shape of a head: a load is wider; a post is narrower and has no shoulders.
+_HEAD_M = 0.15  # its width is measured so far below its top
+_MIN_HEAD_M = 0.13  # minimum width; the shoulders are wider than the head by this as well
+_MAX_HEAD_M = 0.30  # maximum width
+_SHOULDERS_M = 0.36  # the width of the shoulders is measured so far below the top
+_MIN_APART_M = 0.35  # minimum distance of two heads
+_MAX_APART_M = 0.8  # maximum distance: people farther apart leave a valley
+# Share of the image between two groups: if less shows something farther, nothing is seen there.
+_NOTHING_SEEN_SHARE = 0.2
+_MIN_GROUP = 2 * MIN_CELLS  # cells in each of two groups: twice those of a new track, as each is judged alone
 _BINS = 12  # along the line: 0.1 m each where two people walk side by side
 
 
-def split(
-    grid: DepthGrid, labels: IntGrid, track: int, stayed: BoolGrid, way_m: float
+def second_body(
+    grid: DepthGrid, labels: IntGrid, track: int, stayed: BoolGrid, displacement_m: float
 ) -> NDArray[np.intp] | None:
     """Flat cells of labels == track + 1 that belong to a second body, the smaller one; None: it is one body.
 
@@ -49,13 +56,14 @@ def split(
 
     * it is seen through the larger group, as the far wheels of a cart are;
     * it is low beside the larger group and moves with it, as a trolley in front of the person who pushes it.
-      It does not move with it if more of its cells are in stayed (h, w) than if it had moved by way_m;
+      It does not move with it if more of its cells are in stayed (h, w) than if it had moved by
+      displacement_m;
     * something nearer fills the valley, since that hides the middle of one body;
     * the groups were found by a valley, one of them is too wide for a person, and hardly anything farther is
       seen in the valley.
     """
     cells = (labels.ravel() == track + 1).nonzero()[0]
-    if len(cells) < 2 * _MIN_CELLS:
+    if len(cells) < 2 * _MIN_GROUP:
         return None
     points = grid.points(cells)[::2].T.astype(float)
     if np.hypot(*(points.max(axis=0) - points.min(axis=0))) < SINGLE_WIDTH_M:
@@ -67,26 +75,28 @@ def split(
     if high - low < SINGLE_WIDTH_M:
         return None
     beyond = _beyond_valley(points, along, low, high)
-    second = _second_head(grid, cells) if beyond is None else beyond
-    if second is None:
+    smaller_group = _second_head(grid, cells) if beyond is None else beyond
+    if smaller_group is None:
         return None
-    if _seen_through(cells[second], cells[~second], grid.depth_m.shape[1]):
+    if _seen_through(cells[smaller_group], cells[~smaller_group], grid.depth_m.shape[1]):
         return None
-    stays = np.count_nonzero(stayed.ravel().take(cells[second])) / np.count_nonzero(second)
-    stands = stays >= 1.0 - _STANDING * min(way_m / max(float(np.ptp(along[second])), 0.1), 1.0)
-    if not stands and _low_beside(cells[second], cells[~second], grid.depth_m.shape[1]):
+    stays = np.count_nonzero(stayed.ravel().take(cells[smaller_group])) / np.count_nonzero(smaller_group)
+    stands = stays >= 1.0 - _STANDING * min(
+        displacement_m / max(float(np.ptp(along[smaller_group])), 0.1), 1.0
+    )
+    if not stands and _low_beside(cells[smaller_group], cells[~smaller_group], grid.depth_m.shape[1]):
         return None
     # Two heads are two bodies even if nothing farther is seen between them.
-    wide = beyond is not None and _reach(along, second) > SINGLE_WIDTH_M
-    if _hidden_between(grid, cells[second], cells[~second], wide):
+    wide = beyond is not None and _reach(along, smaller_group) > SINGLE_WIDTH_M
+    if _hidden_between(grid, cells[smaller_group], cells[~smaller_group], wide):
         return None
-    cut_off: NDArray[np.intp] = cells[second]
+    cut_off: NDArray[np.intp] = cells[smaller_group]
     return cut_off
 
 
-def _reach(along: FloatArray, second: NDArray[np.bool_]) -> float:
+def _reach(along: FloatArray, smaller_group: NDArray[np.bool_]) -> float:
     """Length of the longer of the two groups along the line."""
-    return max(float(np.ptp(along[second])), float(np.ptp(along[~second])))
+    return max(float(np.ptp(along[smaller_group])), float(np.ptp(along[~smaller_group])))
 
 
 def _beyond_valley(
@@ -105,15 +115,15 @@ def _beyond_valley(
     if smooth[valley] > _VALLEY * min(left, right):
         return None
     cut = 0.5 * (edges[valley] + edges[valley + 1])
-    second = _fewer(along > cut)
-    if np.count_nonzero(second) < _MIN_CELLS:
+    smaller_group = _fewer(along > cut)
+    if np.count_nonzero(smaller_group) < _MIN_GROUP:
         return None
-    apart_m = abs(median(along[second]) - median(along[~second]))
-    return second if apart_m >= _PAIR_DISTANCE_M else None
+    apart_m = abs(median(along[smaller_group]) - median(along[~smaller_group]))
+    return smaller_group if apart_m >= _PAIR_DISTANCE_M else None
 
 
 def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] | None:
-    """(K,) the smaller group of cells on one side of the dip between two heads; None: there are no two heads.
+    """(K,) the smaller group of cells on one side of the dip between two heads; None: there are none.
 
     cells (K,): flat, in ascending order. People so close that their arms touch are still separate at the top.
     """
@@ -135,17 +145,17 @@ def _second_head(grid: DepthGrid, cells: NDArray[np.intp]) -> NDArray[np.bool_] 
     low = (dip_m >= deepest_m - cell_m).nonzero()[0]
     valley = int(low[len(low) // 2])
     one, other = int(height_m[:valley].argmax()), valley + int(height_m[valley:].argmax())
-    if not _LEAST_APART_M <= (other - one) * cell_m <= _MOST_APART_M:
+    if not _MIN_APART_M <= (other - one) * cell_m <= _MAX_APART_M:
         return None
     for head in (one, other):
         width_m = _width_below(height_m, head, _HEAD_M) * cell_m
         shoulders_m = _width_below(height_m, head, _SHOULDERS_M) * cell_m
-        if not _LEAST_HEAD_M - cell_m <= width_m <= _HEAD_WIDTH_M + cell_m:
+        if not _MIN_HEAD_M - cell_m <= width_m <= _MAX_HEAD_M + cell_m:
             return None
-        if shoulders_m < width_m + _LEAST_HEAD_M:
+        if shoulders_m < width_m + _MIN_HEAD_M:
             return None
-    second = _fewer(column > valley)
-    return second if np.count_nonzero(second) >= _MIN_CELLS else None
+    smaller_group = _fewer(column > valley)
+    return smaller_group if np.count_nonzero(smaller_group) >= _MIN_GROUP else None
 
 
 def _width_below(height_m: FloatArray, head: int, drop_m: float) -> int:
@@ -173,10 +183,10 @@ def _seen_through(small: NDArray[np.intp], large: NDArray[np.intp], width: int) 
     """
     (top, left), (bottom, right) = (edge(np.divmod(large, width), axis=1) for edge in (np.min, np.max))
     row, column = np.divmod(small, width)
-    if np.ptp(row) + 1 > LOW * (bottom - top + 1):
+    if np.ptp(row) + 1 > SEEN_THROUGH_HEIGHT * (bottom - top + 1):
         return False
     inside = (row >= top) & (row <= bottom) & (column >= left) & (column <= right)
-    return bool(np.count_nonzero(inside) >= WITHIN * len(small))
+    return bool(np.count_nonzero(inside) >= SEEN_THROUGH_SHARE * len(small))
 
 
 def _hidden_between(grid: DepthGrid, one: NDArray[np.intp], other: NDArray[np.intp], wide: bool) -> bool:
@@ -196,5 +206,5 @@ def _hidden_between(grid: DepthGrid, one: NDArray[np.intp], other: NDArray[np.in
     nearest = max(float(median(inverse.ravel()[one])), float(median(inverse.ravel()[other])))
     nearer = np.count_nonzero(between > nearest + NEARER_INVERSE)
     farther = (between > 0.0) & (between < nearest - NEARER_INVERSE)
-    unseen = np.count_nonzero(farther | grid.beyond[inside]) <= _HARDLY * between.size
+    unseen = np.count_nonzero(farther | grid.beyond[inside]) <= _NOTHING_SEEN_SHARE * between.size
     return bool(nearer >= 0.5 * between.size or (wide and unseen))

@@ -9,31 +9,32 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid, nearest_cell
 
 _AROUND_M = 0.2  # cells within this distance belong to the fragment's body, which is about twice as wide
-# Gate on depth: the depth of a body, plus two sigmas of depth with the default noise, which grow with the
-# square of the depth.
+# Gate on depth: the depth of a body, plus so many sigmas, as far as these grow with the square of the depth.
 _AGREE_M = 0.3
-_AGREE_PER_M2 = 0.015
+_AGREE_SIGMAS = 2.0
 
 
 def near_ends(
     grid: DepthGrid,
-    looked_at: BoolGrid,
+    search_area: BoolGrid,
     ends_px: NDArray[np.float32],
     depth_m: NDArray[np.float32],
     focal_px: float,
+    noise: DepthNoise,
 ) -> BoolGrid:
-    """(h, w) cells of looked_at (h, w) that are close to the ends (N, 2, 2) of fragments, at their depth.
+    """(h, w) cells of search_area (h, w) that are close to the ends (N, 2, 2) of fragments, at their depth.
 
     depth_m (N, 2): of the ends, NaN where it is not known.
     """
     seeds, top, left, rows, columns, end_m = _seeds(
-        ends_px, depth_m, looked_at, _AROUND_M * focal_px / grid.step_px, grid.offset_px, grid.step_px
+        ends_px, depth_m, search_area, _AROUND_M * focal_px / grid.step_px, grid.offset_px, grid.step_px
     )
     if len(end_m) == 0:
         return np.zeros(grid.depth_m.shape, np.bool_)
@@ -47,8 +48,9 @@ def near_ends(
         columns,
         end_m,
         grid.depth_m,
-        looked_at,
+        search_area,
         np.float32(grid.step_px / (_AROUND_M * focal_px)),
+        noise.quadratic_per_m,
     )
 
 
@@ -56,7 +58,7 @@ def near_ends(
 def _seeds(
     ends_px: NDArray[np.float32],
     depth_m: NDArray[np.float32],
-    looked_at: BoolGrid,
+    search_area: BoolGrid,
     reach_at_1m: float,
     offset_px: float,
     step_px: float,
@@ -64,10 +66,10 @@ def _seeds(
     """The window of the grid that holds all cells which can be close to an end.
 
     Returns an image of the window, 0 at the ends and 1 elsewhere; its top row and left column; row and column
-    of the ends within it, and their depths. No ends are returned if no cell of the window is looked_at.
+    of the ends within it, and their depths. No ends are returned if no cell of the window is search_area.
     reach_at_1m: _AROUND_M in cells at a distance of 1 m; it is less farther away.
     """
-    height, width = looked_at.shape
+    height, width = search_area.shape
     rows, columns = np.empty(depth_m.size, np.intp), np.empty(depth_m.size, np.intp)
     end_m, count = np.empty(depth_m.size), 0
     for n in range(len(depth_m)):
@@ -83,7 +85,7 @@ def _seeds(
     reach = int(reach_at_1m / end_m.min()) + 2
     top, bottom = max(rows.min() - reach, 0), min(rows.max() + reach + 1, height)
     left, right = max(columns.min() - reach, 0), min(columns.max() + reach + 1, width)
-    if not looked_at[top:bottom, left:right].any():
+    if not search_area[top:bottom, left:right].any():
         count = 0
     seeds = np.ones((bottom - top, right - left), np.uint8)
     for k in range(count):
@@ -95,7 +97,7 @@ def _seeds(
 
 @compiled(
     "float32[:, ::1], int32[:, ::1], int64, int64, int64[::1], int64[::1], float64[::1], float32[:, ::1],"
-    "boolean[:, ::1], float32"
+    "boolean[:, ::1], float32, float64"
 )
 def _within_reach(
     distance: FloatGrid,
@@ -106,22 +108,23 @@ def _within_reach(
     columns: NDArray[np.intp],
     end_m: FloatArray,
     depth_m: FloatGrid,
-    looked_at: BoolGrid,
+    search_area: BoolGrid,
     per_cell: np.float32,
+    quadratic_per_m: float,
 ) -> BoolGrid:
     """As near_ends. distance (in cells) to the nearest end, and label of that end: in the window of _seeds.
 
     per_cell: width of a cell at 1 m, as a share of _AROUND_M.
     """
-    result = np.zeros(looked_at.shape, np.bool_)
-    nearest_m = np.zeros(label.max() + 1)
+    result = np.zeros(search_area.shape, np.bool_)
+    nearest_m, agree_per_m = np.zeros(label.max() + 1), _AGREE_SIGMAS * quadratic_per_m
     for k in range(len(end_m)):
         nearest_m[label[rows[k], columns[k]]] = end_m[k]
     for i in range(label.shape[0]):
         for j in range(label.shape[1]):
-            if looked_at[top + i, left + j]:
+            if search_area[top + i, left + j]:
                 there_m = nearest_m[label[i, j]]
                 off_m = abs(depth_m[top + i, left + j] - there_m)
                 close = distance[i, j] * per_cell * there_m <= 1.0
-                result[top + i, left + j] = close and off_m <= _AGREE_M + _AGREE_PER_M2 * there_m * there_m
+                result[top + i, left + j] = close and off_m <= _AGREE_M + agree_per_m * there_m * there_m
     return result

@@ -10,21 +10,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from config.perception import DepthNoise
 from hal.compiled import compiled, inlined
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 from vision.depth.regions import Regions, exchanged, measure
 
-# Gate on depth: the depth of a body, plus two sigmas of depth with the default noise, which grow with the
-# square of the depth.
+# Gate on depth: the depth of a body, plus so many sigmas, as far as these grow with the square of the depth.
 _SAME_M = 0.3
-_SAME_PER_M2 = 0.015
-_HOVERS_M = 0.2  # minimum gain in height: less is only the rim of the cells that were found already
+_SAME_SIGMAS = 2.0
+_MIN_GAIN_M = 0.2  # minimum gain in height: less is only the rim of the cells that were found already
 _LOWEST = 4  # the lowest quarter of a mover's rows gives the depth at which it reaches down
 
 
-def ground(
-    grid: DepthGrid, labels: IntGrid, measured: Regions, chosen: NDArray[np.bool_], mover: NDArray[np.bool_]
+def extend_to_floor(
+    grid: DepthGrid,
+    labels: IntGrid,
+    measured: Regions,
+    chosen: NDArray[np.bool_],
+    mover: NDArray[np.bool_],
+    noise: DepthNoise,
 ) -> tuple[IntGrid, Regions]:
     """Give the static cells below the tracks chosen (T,) to them, at their depth and without a gap.
 
@@ -40,7 +45,7 @@ def ground(
     standing = np.concatenate(([False], ~mover))
     result, grown = labels, np.zeros(len(mover), np.bool_)
     for track in (chosen & (measured.cells > 0)).nonzero()[0].tolist():
-        below = _below(grid.depth_m, grid.y, labels, track + 1, standing)
+        below = _below(grid.depth_m, grid.y, labels, track + 1, standing, noise.quadratic_per_m)
         if len(below):
             result = labels.copy() if result is labels else result
             result.ravel()[below] = track + 1
@@ -60,9 +65,14 @@ def _median_depth_m(depth_m: FloatGrid, labels: IntGrid, label: int, first: int,
     return result
 
 
-@compiled("float32[:, ::1], float32[::1], int32[:, ::1], int64, boolean[::1]")
+@compiled("float32[:, ::1], float32[::1], int32[:, ::1], int64, boolean[::1], float64")
 def _below(
-    depth_m: FloatGrid, ray_y: FloatGrid, labels: IntGrid, label: int, standing: NDArray[np.bool_]
+    depth_m: FloatGrid,
+    ray_y: FloatGrid,
+    labels: IntGrid,
+    label: int,
+    standing: NDArray[np.bool_],
+    quadratic_per_m: float,
 ) -> NDArray[np.intp]:
     """Flat cells below those with label that belong to it, column by column.
 
@@ -79,7 +89,7 @@ def _below(
     if bottom < 0:
         return taken[:0]
     own_m = _median_depth_m(depth_m, labels, label, bottom - (bottom - top + 1) // _LOWEST, bottom)
-    same_m = np.float32(_SAME_M + _SAME_PER_M2 * own_m * own_m)
+    same_m = np.float32(_SAME_M + _SAME_SIGMAS * quadratic_per_m * own_m * own_m)
     count, lowest = 0, 0
     for j in range(width):
         for i in range(foot[j] + 1, height):
@@ -92,6 +102,6 @@ def _below(
                 taken[count] = i * width + j
                 count, lowest = count + 1, max(lowest, i)
     # The lowest cell of all columns counts: it may stand on one foot only.
-    if (ray_y[lowest] - ray_y[bottom]) * own_m < np.float32(_HOVERS_M):
+    if (ray_y[lowest] - ray_y[bottom]) * own_m < np.float32(_MIN_GAIN_M):
         return taken[:0]
     return taken[:count]

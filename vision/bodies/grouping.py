@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled
 from hal.types import FloatArray
-from vision.bodies.boxes import LEAST_SAMPLES, LOAD_M, THROUGH_M, cells_between, relations
+from vision.bodies.boxes import LOAD_GAP_M, MIN_SAMPLES, SEEN_THROUGH_GAP_M, cells_between, relations
 from vision.bodies.division import NEARER_INVERSE
 from vision.depth.depth_grid import DepthGrid
 from vision.depth.regions import Regions
@@ -29,7 +29,8 @@ _APART_M = 0.40  # parts farther than this from the main part belong to somethin
 _CLOSE_M = 0.25  # gap that missing depth at a shoe or under an arm leaves: about the length of a hand
 _SAME_DEPTH_M = 0.30  # besides the noise, the visible surface may lie this far from the centre in depth
 _SMALL_SHARE = 0.5  # of the larger part's cells: a new part with more is a body of its own
-_MOSTLY = 0.7  # share of a part's cells that voted for the track: from here on it stays, as a load does
+# Share of a part's cells that voted for the track: from here on it stays, as a load does.
+_OWN_VOTE_SHARE = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +66,7 @@ def expected_in(
     result = np.zeros((len(parts.cells), len(mover)), np.bool_)
     if not mover.any():
         return result
-    result, main = _with_room(
+    result, main = _within_expected_box(
         parts.position_m,
         parts.cells,
         winner,
@@ -86,7 +87,7 @@ def expected_in(
     "float64[:, :], int64[:], int32[::1], int64[:], float64[:, :], float64[:, :], float64[:, :],"
     "float64[::1], boolean[::1]"
 )
-def _with_room(
+def _within_expected_box(
     position_m: FloatArray,
     cells: NDArray[np.intp],
     winner: NDArray[np.int32],
@@ -130,7 +131,7 @@ def something_nearer_between(
     inverse = grid.inverse_depth.ravel().take(cells_between(grid, parts, one, other))
     depth = np.minimum(parts.position_m[one, 2], parts.position_m[other, 2])
     nearer = inverse > 1.0 / np.maximum(depth, 0.1) + NEARER_INVERSE
-    result: NDArray[np.bool_] = nearer.sum(axis=0) >= LEAST_SAMPLES
+    result: NDArray[np.bool_] = nearer.sum(axis=0) >= MIN_SAMPLES
     return result
 
 
@@ -146,10 +147,12 @@ def detach(
     beside = (main != np.arange(len(main))).nonzero()[0]
     if len(beside) == 0:
         return winner
-    lie = relations(parts, beside, main[beside])
-    carried = ((lie.gap_m <= LOAD_M) & lie.stacked) | ((lie.gap_m <= THROUGH_M) & lie.within)
-    carried &= votes[beside] >= _MOSTLY * parts.cells[beside]
-    far = (lie.gap_m > _APART_M) & ~expected[beside, winner[beside] - 1] & ~carried
+    relation = relations(parts, beside, main[beside])
+    carried = ((relation.gap_m <= LOAD_GAP_M) & relation.stacked) | (
+        (relation.gap_m <= SEEN_THROUGH_GAP_M) & relation.within
+    )
+    carried &= votes[beside] >= _OWN_VOTE_SHARE * parts.cells[beside]
+    far = (relation.gap_m > _APART_M) & ~expected[beside, winner[beside] - 1] & ~carried
     result = winner.copy()
     result[beside[far]] = 0
     return result

@@ -50,13 +50,13 @@ _RISE_S = 0.06
 # Without odometry an error of the camera's motion lasts for some frames, so one more frame is required.
 _RISE_ALONE_S = 0.07
 _FASTEST = 2.5  # maximum factor on the rise, with overwhelming proof
-_MOST_A_FRAME = 0.5  # maximum rise per frame: no single frame proves motion, however long the interval was
+_MAX_RISE = 0.5  # maximum rise per frame: no single frame proves motion, however long the interval was
 # Times in which the score falls by 1.
 _FALL_S = 0.30  # without proof: in some frames a moving body gives none
 _HOLD_S = 2.0  # without new proof, while the motion seems to go on
 _STOP_S = 0.12  # with proof that the motion is over
 _MAX_EVIDENCE = 1.5  # 1.5 times what a verdict needs, so that no mover is held for much longer
-IMPLAUSIBLE = 1.6  # times the maximum speed: faster things are mistakes
+IMPLAUSIBLE_SPEED_FACTOR = 1.6  # times the maximum speed: faster things are mistakes
 _SURE_SQUARED_SIGMAS = 30.0  # 5.5 sigmas give a confidence of 0.63; the weakest proof gives 0.4
 
 
@@ -67,14 +67,14 @@ class Verdict:
     evidence: the score.
     moving: the verdict.
     confidence: in that it moves, 0..1.
-    stands: this frame's fragments are sure that it stands still.
+    surely_static: this frame's fragments are sure that it stands still.
     proven: this frame proved that it moves.
     """
 
     evidence: FloatArray
     moving: NDArray[np.bool_]
     confidence: FloatArray
-    stands: NDArray[np.bool_]
+    surely_static: NDArray[np.bool_]
     proven: NDArray[np.bool_]
 
 
@@ -89,16 +89,16 @@ def judge(
 
     seen: evidence of this frame. evidence, moving (T,): score and verdict of the frame before, dt_s ago.
     """
-    proof = prove(seen, moving, IMPLAUSIBLE * settings.max_speed_mps, dt_s, settings)
-    new_evidence, new_moving, confidence = _added_up(
+    proof = prove(seen, moving, IMPLAUSIBLE_SPEED_FACTOR * settings.max_speed_mps, dt_s, settings)
+    new_evidence, new_moving, confidence = _updated_scores(
         evidence,
         moving,
         proof.moves,
         proof.strength,
-        proof.stands,
+        proof.surely_static,
         proof.over,
         proof.goes_on,
-        proof.sigmas,
+        proof.squared_sigmas,
         seen.borne_out,
         dt_s / (_RISE_S if seen.reckoned else _RISE_ALONE_S),
         dt_s,
@@ -107,7 +107,7 @@ def judge(
         evidence=new_evidence,
         moving=new_moving,
         confidence=confidence,
-        stands=proof.stands,
+        surely_static=proof.surely_static,
         proven=proof.moves,
     )
 
@@ -116,15 +116,15 @@ def judge(
     "float64[::1], boolean[::1], boolean[::1], float64[::1], boolean[::1], boolean[::1], boolean[::1],"
     "float64[::1], float64, float64, float64"
 )
-def _added_up(
+def _updated_scores(
     evidence: FloatArray,
     moving: NDArray[np.bool_],
     proven: NDArray[np.bool_],
     strength: FloatArray,
-    stands: NDArray[np.bool_],
+    surely_static: NDArray[np.bool_],
     over: NDArray[np.bool_],
     goes_on: NDArray[np.bool_],
-    sigmas: FloatArray,
+    squared_sigmas: FloatArray,
     borne_out: float,
     rise: float,
     dt_s: float,
@@ -133,15 +133,19 @@ def _added_up(
 
     rise: how much the weakest proof raises the score, before it is multiplied by borne_out (0..1).
     """
-    score, goes, confidence = np.empty(len(moving)), np.empty(len(moving), np.bool_), np.empty(len(moving))
+    score, now_moving, confidence = (
+        np.empty(len(moving)),
+        np.empty(len(moving), np.bool_),
+        np.empty(len(moving)),
+    )
     for t in range(len(moving)):
-        if proven[t] and not stands[t]:
+        if proven[t] and not surely_static[t]:
             # A stronger proof raises the score faster.
             pace = np.minimum(np.maximum(strength[t], 1.0), _FASTEST)
-            change = borne_out * np.minimum(pace * rise, _MOST_A_FRAME)
+            change = borne_out * np.minimum(pace * rise, _MAX_RISE)
         else:
             change = -dt_s / (_STOP_S if over[t] else _HOLD_S if goes_on[t] else _FALL_S)
         score[t] = np.minimum(np.maximum(evidence[t] + change, 0.0), _MAX_EVIDENCE)
-        goes[t] = score[t] > 0.0 if moving[t] else score[t] >= 1.0
-        confidence[t] = 1.0 - math.exp(-sigmas[t] / _SURE_SQUARED_SIGMAS)
-    return score, goes, confidence
+        now_moving[t] = score[t] > 0.0 if moving[t] else score[t] >= 1.0
+        confidence[t] = 1.0 - math.exp(-squared_sigmas[t] / _SURE_SQUARED_SIGMAS)
+    return score, now_moving, confidence

@@ -17,13 +17,12 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.depth.connected import IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
-from vision.numerics.relative_pose import coordinate_m, relative_row
+from vision.numerics.relative_pose import NEAREST_M, coordinate_m, relative_row
 
 # The gate on depth is the sum of both: as large as a jump in depth within one part may be (in 1/m), and how
 # much nearer or farther a surface may get (in m), besides the track's velocity, as a body turns or bends.
 _DEPTH_GATE_INVERSE = 0.03
 _DEPTH_GATE_M = 0.25
-_NEAREST_M = np.float32(0.1)  # the projection of a nearer point is meaningless
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,10 +121,10 @@ def _predicted(
     to_x = relative_row(rotation, origin_m, old_rotation, old_origin_m, 0)
     to_y = relative_row(rotation, origin_m, old_rotation, old_origin_m, 1)
     to_z = relative_row(rotation, origin_m, old_rotation, old_origin_m, 2)
-    way_m = np.zeros(shift_m.shape, np.float32)  # in the camera's axes now
+    displacement_m = np.zeros(shift_m.shape, np.float32)  # in the camera's axes now
     for track in range(len(shift_m)):
         for i in range(3):
-            way_m[track, i] = (
+            displacement_m[track, i] = (
                 shift_m[track, 0] * rotation[0, i]
                 + shift_m[track, 1] * rotation[1, i]
                 + shift_m[track, 2] * rotation[2, i]
@@ -135,11 +134,14 @@ def _predicted(
         if track < 0:
             continue
         x, y, z = points_m[0, k], points_m[1, k], points_m[2, k]
-        there_m = coordinate_m(to_z, x, y, z) + way_m[track, 2]
-        if not there_m > _NEAREST_M:
+        there_m = coordinate_m(to_z, x, y, z) + displacement_m[track, 2]
+        if not there_m > NEAREST_M:
             continue
         expected = np.float32(1.0) / there_m
-        x, y = coordinate_m(to_x, x, y, z) + way_m[track, 0], coordinate_m(to_y, x, y, z) + way_m[track, 1]
+        x, y = (
+            coordinate_m(to_x, x, y, z) + displacement_m[track, 0],
+            coordinate_m(to_y, x, y, z) + displacement_m[track, 1],
+        )
         column = (x * expected - left) * per_column + np.float32(0.5)
         row = (y * expected - top) * per_row + np.float32(0.5)
         if not (0.0 <= column < width and 0.0 <= row < height):

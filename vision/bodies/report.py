@@ -19,7 +19,8 @@ MIN_SIGHTINGS = 3  # frames: a track seen in one or two is taken for a speckle
 _LISTED_UNSEEN_S = 0.15  # maximum time unseen for a listed track; tracks themselves are kept for longer
 _WAY_SIGMA_M = 0.06  # maximum standard deviation of an unseen mover's displacement for it to be listed
 _STATIC_SCORE = 0.5  # score of static obstacles, for which no confidence is estimated
-_LAST_CELLS = 12  # minimum cells of a sliver: with fewer, the mover's position is not known well enough
+# Minimum cells of a nearly hidden mover: with fewer, the mover's position is not known well enough.
+_LAST_CELLS = 12
 _OVERHEAD_CELLS = 24  # half of a head, 6 m away
 # For some time a new mover may be a piece of another one and is not reported as moving: a wheel of a cart, or
 # a leg of a person close to a static surface.
@@ -27,7 +28,7 @@ _PIECE_S = 0.3  # duration of that time
 _PIECE_M = 1.5  # maximum difference in depth between the piece and the mover
 _PIECE_OF = 2.0  # wheel: the mover's area in the image is larger than the piece's by at least this factor
 _PIECE_SHARE = 0.3  # wheel: minimum share of the piece that the mover's box covers
-_PIECE_M2 = 0.5  # leg: maximum area of the piece, less than half of a body; it has to be guessed (Tracks) too
+_PIECE_M2 = 0.5  # leg: maximum area of the piece, less than half of a body; its border has to be a guess too
 
 
 def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
@@ -45,16 +46,16 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
         tracks.sightings,
         tracks.cells,
         moving,
-        tracks.sliver,
+        tracks.nearly_hidden,
         tracks.overhead,
         tracks.box_m,
         tracks.bbox_px,
         *lens,
     )
-    told = moving & ~_pieces(tracks, listed, bbox, local[:, 2], camera.fx)
+    reported_moving = moving & ~_pieces(tracks, listed, bbox, local[:, 2], camera.fx)
     result = []
     ids, born_ns, fragments_on = tracks.ids.tolist(), tracks.born_ns.tolist(), tracks.fragments.tolist()
-    score, unseen, goes = tracks.confidence.tolist(), unseen_s.tolist(), told.tolist()
+    score, unseen, is_moving = tracks.confidence.tolist(), unseen_s.tolist(), reported_moving.tolist()
     for t in listed.nonzero()[0].tolist():
         u0, v0, u1, v1 = bbox[t].tolist()
         result.append(
@@ -65,8 +66,8 @@ def obstacles(tracks: Tracks, detection: Detection) -> tuple[Obstacle, ...]:
                 extent_m=tracks.extent_m[t].copy(),
                 velocity_mps=velocity[t],
                 velocity_cov=covariance[t],
-                moving=goes[t],
-                score=score[t] if goes[t] else _STATIC_SCORE,
+                moving=is_moving[t],
+                score=score[t] if is_moving[t] else _STATIC_SCORE,
                 fragments=fragments_on[t],
                 age_s=(detection.captured_ns - born_ns[t]) * 1e-9,
                 unseen_s=unseen[t],
@@ -98,12 +99,12 @@ def _in_camera(
 
 
 @inlined
-def _known(unseen_s: float, cells: int, moving: bool, sliver: bool, sigma_mps: float) -> bool:
+def _position_known(unseen_s: float, cells: int, moving: bool, nearly_hidden: bool, sigma_mps: float) -> bool:
     """Whether the present position of a track is known well enough, unseen_s after it was last seen."""
     if unseen_s > _LISTED_UNSEEN_S or (moving and not sigma_mps * unseen_s <= _WAY_SIGMA_M):
         return False
-    # The last sliver of a mover that went behind something tells little about its present position.
-    return not (moving and sliver) or cells >= _LAST_CELLS
+    # The last visible rest of a mover that went behind something tells little about its present position.
+    return not (moving and nearly_hidden) or cells >= _LAST_CELLS
 
 
 @compiled(
@@ -117,7 +118,7 @@ def _listed(
     sightings: NDArray[np.intp],
     cells: NDArray[np.intp],
     moving: NDArray[np.bool_],
-    sliver: NDArray[np.bool_],
+    nearly_hidden: NDArray[np.bool_],
     overhead: NDArray[np.bool_],
     box_m: FloatArray,
     bbox_px: FloatArray,
@@ -134,18 +135,20 @@ def _listed(
         x, y, z = local[t, 0], local[t, 1], max(local[t, 2], 0.1)
         sigma_mps = math.sqrt(covariance[t, 3, 3] + covariance[t, 4, 4] + covariance[t, 5, 5])
         listed[t] = sightings[t] >= MIN_SIGHTINGS and local[t, 2] > 0.0
-        listed[t] = listed[t] and _known(unseen_s[t], cells[t], moving[t], sliver[t], sigma_mps)
+        listed[t] = listed[t] and _position_known(
+            unseen_s[t], cells[t], moving[t], nearly_hidden[t], sigma_mps
+        )
         # Something seen only above the robot may hang there. But a mover has legs, which something hides; a
-        # sliver is too small to tell.
+        # nearly hidden one shows too little to tell.
         legs = moving[t] and cells[t] >= _OVERHEAD_CELLS
         listed[t] = listed[t] and (not overhead[t] or legs)
         unseen = unseen_s[t] != 0.0
         if unseen:
             u, v = x / z * fx + cx, y / z * fy + cy
             listed[t] = listed[t] and 0.0 <= u < width and 0.0 <= v < height
-        # The box of a mover that is hidden, or visible as a sliver only, is that of the whole body at its
+        # The box of a mover that is hidden, or nearly hidden, is that of the whole body at its
         # predicted position, not that of the visible rest.
-        if moving[t] and (unseen or sliver[t]):
+        if moving[t] and (unseen or nearly_hidden[t]):
             left, right = (x + box_m[t, 0]) / z * fx + cx, (x + box_m[t, 2]) / z * fx + cx
             top, bottom = (y + box_m[t, 1]) / z * fy + cy, (y + box_m[t, 3]) / z * fy + cy
             bbox[t, 0], bbox[t, 2] = min(max(left, 0.0), width), min(max(right, 0.0), width)
@@ -167,7 +170,7 @@ def _pieces(
         small = area_px * np.square(depth_m / focal_px) < _PIECE_M2
         covered, own_px = overlaps(bbox_px[new, None], bbox_px), area_px[new, None]
         piece = tracks.moving & (area_px >= _PIECE_OF * own_px) & (covered >= _PIECE_SHARE)
-        piece |= (small & tracks.guessed)[new, None] & (area_px > own_px) & (covered > 0.0)
+        piece |= (small & tracks.border_is_guess)[new, None] & (area_px > own_px) & (covered > 0.0)
         piece &= listed & (np.abs(depth_m - depth_m[new, None]) <= _PIECE_M)
         result[new] = piece.any(axis=1)
     return result

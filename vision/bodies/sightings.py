@@ -3,14 +3,14 @@
 What the centroid is used to measure depends on how much of the surface is visible. In each case the name of
 the kind in the code is given:
 
-* _SMOOTH: position and velocity (Tracks.locate). The whole surface is visible, as before: its left and right
-  sides are neither cut by the image border nor hidden, its area is about the usual one, and its centroid has
-  not jumped.
-* _ROUGH: position and velocity, but with a larger variance. Any other surface of a track that is known to
+* _WHOLE: position and velocity (Tracks.update_with_centre). The whole surface is visible, as before: its left
+  and right sides are neither cut by the image border nor hidden, its area is about the usual one, and its
+  centroid has not jumped.
+* _PARTIAL: position and velocity, but with a larger variance. Any other surface of a track that is known to
   move. A body cannot be far from its visible part.
-* _CUT: position only (Tracks.relocate). A surface of a static track that is cut, partly hidden or changed in
-  area; also any surface after a jump, or while the camera's own motion is not known.
-* _SLIVER: nothing. The small rest that is visible of a mover that is passing behind something.
+* _POSITION_ONLY: position only (Tracks.reset_position). A surface of a static track that is cut, partly
+  hidden or changed in area; also any surface after a jump, or while the camera's own motion is not known.
+* _NEARLY_HIDDEN: nothing. The small rest that is visible of a mover that is passing behind something.
 """
 
 from __future__ import annotations
@@ -25,12 +25,11 @@ from hal.compiled import compiled
 from hal.types import FloatArray, Pose
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
+from vision.depth.connected import MIN_PART_CELLS
 from vision.depth.depth_noise import depth_sigma_of
 from vision.depth.regions import Regions
 from vision.detection import Detection
 
-# Fewer cells than the smallest part has are no sighting (_SPECKLE_CELLS of vision/depth/connected.py).
-MIN_CELLS = 6
 # Standard deviation of the centroid of a very small surface: the width of a cell 2.3 m away.
 _CENTRE_SIGMA_M = 0.015
 _CENTRE_SHARE = 0.0125  # more of it, per metre of size across the line of sight: cells at the rim come and go
@@ -41,19 +40,19 @@ _CUT_SIGMA_M = 1.0  # standard deviation in height of a surface that the upper o
 _CENTRE_NOISE = 0.2  # share of a pixel's depth noise: neighbours share it, so it does not average out fully
 _SAME_AREA = 0.3  # a relative change of area above this means that another part of the body is visible
 _AREA_MEMORY_S = 0.32  # time constant of the averaged area: a gain of 0.1 per frame at 30 frames a second
-_SLIVER_SHARE = 0.4  # of the usual area: a mover's surface smaller than this is a sliver
+_NEARLY_HIDDEN_SHARE = 0.4  # of the usual area: a mover with a smaller surface is nearly hidden
 _JUMP_M = 0.3  # plus two sigmas of depth: a centroid farther from its prediction than this has jumped
-# How a track is visible: with fewer than MIN_CELLS cells; then the kinds of the module docstring, in order.
-_UNSEEN, _SMOOTH, _ROUGH, _CUT, _SLIVER = range(5)
+# How a track is visible: with fewer cells than a part has; then the kinds of the module docstring, in order.
+_NOT_VISIBLE, _WHOLE, _PARTIAL, _POSITION_ONLY, _NEARLY_HIDDEN = range(5)
 
 
-def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
+def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
     """Update tracks with the surfaces measured, entry k for track k; one without cells stays predicted."""
     dt_s, rotation = detection.dt_s, detection.pose.rotation
     kind, centre_m, change, tracks.area_m2 = _kinds(
         measured.cells,
         measured.position_m,
-        measured.wide,
+        measured.sides_visible,
         rotation,
         detection.pose.translation_m,
         tracks.state,
@@ -65,31 +64,42 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
         noise.floor_m,
         noise.quadratic_per_m,
     )
-    visible, smooth, sliver = kind != _UNSEEN, kind == _SMOOTH, kind == _SLIVER
-    doubt_m2 = _centre_covariances(
+    visible, smooth, nearly_hidden = kind != _NOT_VISIBLE, kind == _WHOLE, kind == _NEARLY_HIDDEN
+    centre_covariance = _centre_covariances(
         kind,
         measured.position_m,
         measured.extent_m,
-        measured.tall,
+        measured.top_and_bottom_visible,
         rotation,
         noise.floor_m,
         noise.quadratic_per_m,
     )
-    located, cut = (smooth | (kind == _ROUGH)).nonzero()[0], (kind == _CUT).nonzero()[0]
-    tracks.locate(located, centre_m.take(located, axis=0), doubt_m2.take(located, axis=0))
-    tracks.relocate(cut, centre_m.take(cut, axis=0), doubt_m2.take(cut, axis=0))
+    measured_centre, position_only = (
+        (smooth | (kind == _PARTIAL)).nonzero()[0],
+        (kind == _POSITION_ONLY).nonzero()[0],
+    )
+    tracks.update_with_centre(
+        measured_centre,
+        centre_m.take(measured_centre, axis=0),
+        centre_covariance.take(measured_centre, axis=0),
+    )
+    tracks.reset_position(
+        position_only, centre_m.take(position_only, axis=0), centre_covariance.take(position_only, axis=0)
+    )
     whole = measured.whole
-    tracks.sliver = np.where(visible, sliver & ~_at_border(measured.bbox_px, detection), tracks.sliver)
-    tracks.clean_s = np.where(smooth & whole, tracks.clean_s + dt_s, 0.0)
+    tracks.nearly_hidden = np.where(
+        visible, nearly_hidden & ~_at_border(measured.bbox_px, detection), tracks.nearly_hidden
+    )
+    tracks.velocity_measured_s = np.where(smooth & whole, tracks.velocity_measured_s + dt_s, 0.0)
     growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
     tracks.growth_mps = np.where(visible, growth_mps, tracks.growth_mps)
     tracks.seen_ns[visible] = detection.captured_ns
     tracks.sightings += visible
-    shown = visible & ((whole & ~sliver) | (tracks.sightings == 1))
+    box_is_whole = visible & ((whole & ~nearly_hidden) | (tracks.sightings == 1))
     camera = detection.camera
     tracks.box_m = _boxes_m(
         tracks.box_m,
-        shown,
+        box_is_whole,
         measured.bbox_px,
         measured.position_m,
         camera.fx,
@@ -109,7 +119,7 @@ def see(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoi
 def _kinds(
     cells: NDArray[np.intp],
     position_m: FloatArray,
-    wide: NDArray[np.bool_],
+    sides_visible: NDArray[np.bool_],
     rotation: FloatArray,
     translation_m: FloatArray,
     state: FloatArray,
@@ -127,10 +137,10 @@ def _kinds(
     (T,), and the usual area (T,), updated with gain. moving (T,): verdict of the frame before. gain: of the
     running average. floor_m, quadratic_per_m: depth noise.
     """
-    kind, change, usual_m2 = np.full(len(cells), _UNSEEN), np.zeros(len(cells)), area_m2.copy()
+    kind, change, usual_m2 = np.full(len(cells), _NOT_VISIBLE), np.zeros(len(cells)), area_m2.copy()
     centre_m = np.zeros((len(cells), 3))
     for t in range(len(cells)):
-        if cells[t] < MIN_CELLS:
+        if cells[t] < MIN_PART_CELLS:
             continue
         depth_m = position_m[t, 2]
         now_m2 = cells[t] * (depth_m * depth_m)
@@ -146,16 +156,16 @@ def _kinds(
         expected_m = _JUMP_M + 2.0 * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
         # Without a known motion of the camera, its error would be taken for a motion of the tracks.
         steady = motion_known and math.sqrt(squared) <= expected_m
-        if wide[t] and change[t] <= _SAME_AREA and steady:
-            kind[t] = _SMOOTH
-        elif moving[t] and now_m2 < _SLIVER_SHARE * usual_m2[t]:
+        if sides_visible[t] and change[t] <= _SAME_AREA and steady:
+            kind[t] = _WHOLE
+        elif moving[t] and now_m2 < _NEARLY_HIDDEN_SHARE * usual_m2[t]:
             # The visible rest of a mover that is passing behind something does not show where its body is.
-            kind[t] = _SLIVER
+            kind[t] = _NEARLY_HIDDEN
             continue
         elif moving[t] and steady:
-            kind[t] = _ROUGH
+            kind[t] = _PARTIAL
         else:
-            kind[t] = _CUT
+            kind[t] = _POSITION_ONLY
         usual_m2[t] += gain * (now_m2 - usual_m2[t])
     return kind, centre_m, change, usual_m2
 
@@ -165,7 +175,7 @@ def _centre_covariances(
     kind: NDArray[np.intp],
     position_m: FloatArray,
     extent_m: FloatArray,
-    tall: NDArray[np.bool_],
+    top_and_bottom_visible: NDArray[np.bool_],
     rotation: FloatArray,
     floor_m: float,
     quadratic_per_m: float,
@@ -173,16 +183,16 @@ def _centre_covariances(
     """(T, 3, 3) covariance of the centroids in the fixed frame. rotation: camera axes to fixed frame."""
     covariance, variance = np.zeros((len(kind), 3, 3)), np.empty(3)
     for t in range(len(kind)):
-        if kind[t] == _UNSEEN:
+        if kind[t] == _NOT_VISIBLE:
             continue
         size_m, depth_m = max(extent_m[t, 0], extent_m[t, 1]), position_m[t, 2]
         across_m = _CENTRE_SIGMA_M + _CENTRE_SHARE * size_m
         along_m = _CENTRE_SIGMA_M + _CENTRE_DEPTH_SHARE * extent_m[t, 2]
         noise_m = _CENTRE_NOISE * depth_sigma_of(depth_m, floor_m, quadratic_per_m)
         variance[0] = across_m**2
-        variance[1] = across_m**2 if tall[t] else _CUT_SIGMA_M**2
+        variance[1] = across_m**2 if top_and_bottom_visible[t] else _CUT_SIGMA_M**2
         variance[2] = along_m**2 + noise_m**2
-        if kind[t] == _ROUGH:
+        if kind[t] == _PARTIAL:
             variance += (_SHIFT_SHARE * size_m) ** 2
         for i in range(3):
             for j in range(3):
@@ -194,7 +204,7 @@ def _centre_covariances(
 @compiled("float64[:, ::1], boolean[::1], float64[:, :], float64[:, :], float64, float64, float64, float64")
 def _boxes_m(
     box_m: FloatArray,
-    shown: NDArray[np.bool_],
+    box_is_whole: NDArray[np.bool_],
     bbox_px: FloatArray,
     position_m: FloatArray,
     fx: float,
@@ -202,13 +212,13 @@ def _boxes_m(
     cx: float,
     cy: float,
 ) -> FloatArray:
-    """box_m (T, 4) with the entries of the tracks shown (T,) renewed.
+    """box_m (T, 4) with the entries of the tracks with box_is_whole (T,) renewed.
 
     Left, upper, right and lower edge of the image box as offsets from the centroid, in metres at its depth.
     """
     result = box_m.copy()
-    for t in range(len(shown)):
-        if shown[t]:
+    for t in range(len(box_is_whole)):
+        if box_is_whole[t]:
             x, y, z = position_m[t, 0], position_m[t, 1], position_m[t, 2]
             result[t, 0], result[t, 2] = (bbox_px[t, 0] - cx) / fx * z - x, (bbox_px[t, 2] - cx) / fx * z - x
             result[t, 1], result[t, 3] = (bbox_px[t, 1] - cy) / fy * z - y, (bbox_px[t, 3] - cy) / fy * z - y
@@ -246,7 +256,7 @@ def _expected(
     return centre_m, sigma_m
 
 
-def up(detection: Detection) -> FloatArray | None:
+def floor_normal(detection: Detection) -> FloatArray | None:
     """(3,) the floor's normal in the fixed frame; None where the floor is not known."""
     normal = detection.grid.up
     return None if normal is None else np.asarray(detection.pose.rotation @ normal)

@@ -16,11 +16,11 @@ from hal.types import FloatArray
 from vision.numerics import kalman
 
 _TRAIL_S = 0.3  # time constant of the trailing average of a centre: several frames, less than a step lasts
-# A track really goes if its centre advances at this share of the filtered velocity at least. The centre of
-# something static does not advance; its filtered velocity is noise.
-_GOING_SHARE = 0.4
+# A track really advances if its centre advances at this share of the filtered velocity at least. The centre
+# of something static does not advance; its filtered velocity is noise.
+_MIN_ADVANCE_SHARE = 0.4
 _UNPROVEN_S = 0.05  # a frame or two: for that long proof may be missing by chance
-_GONE_SHARE = 0.6  # of its width: a track displaced by more has clearly left its former place
+_LEFT_SHARE = 0.6  # of its width: a track displaced by more has clearly left its former place
 
 
 class Tracks:
@@ -46,22 +46,23 @@ class Tracks:
         self.box_m = np.empty((0, 4))  # edges of the last box that showed all of it, from its centre
         self.area_m2 = np.empty(0)  # running average, up to a common factor
         self.growth_mps = np.empty(0)  # speed of the centre that a growing or shrinking surface can explain
-        self.clean_s = np.empty(0)  # for how long the centre has measured the velocity without a break
-        self.sliver = np.empty(0, np.bool_)  # a mover of which only a small rest was visible
+        # For how long the centre has measured the velocity without a break.
+        self.velocity_measured_s = np.empty(0)
+        self.nearly_hidden = np.empty(0, np.bool_)  # a mover of which only a small rest was visible
         # A mover without an edge in depth to the static surface beside it: where it ends there is a guess.
-        self.guessed = np.empty(0, np.bool_)
+        self.border_is_guess = np.empty(0, np.bool_)
         self.overhead = np.empty(0, np.bool_)  # seen only above the robot's height; the rest is out of sight
         # The verdict (vision/bodies/judgement.py).
         self.evidence = np.empty(0)  # the score it rests on
         self.moving = np.empty(0, np.bool_)  # now
-        self.has_moved = np.empty(0, np.bool_)  # at any time
+        self.ever_moved = np.empty(0, np.bool_)  # at any time
         self.confidence = np.empty(0)  # 0..1
-        self.stands = np.empty(0, np.bool_)  # its fragments are sure that it stands still
-        self.calm_s = np.empty(0)  # time without evidence; inf: there never was any
+        self.surely_static = np.empty(0, np.bool_)  # its fragments are sure that it stands still
+        self.no_evidence_s = np.empty(0)  # time without evidence; inf: there never was any
         self.moving_s = np.empty(0)  # for how long the verdict has been that it moves
         self.unproven_s = np.empty(0)  # since a frame last proved that it moves, or since its birth
         # Time in which nearly all ends contradicted standing still, less the time in which they did not.
-        self.unrest_s = np.empty(0)
+        self.restless_s = np.empty(0)
         self._fields = tuple(vars(self))
         self._next_id = 1
 
@@ -98,7 +99,7 @@ class Tracks:
 
     def index_of(self, ids: NDArray[np.int64]) -> NDArray[np.intp]:
         """(N,) index of each track id; -1 where there is no such track, or no longer."""
-        return _places(self.ids, ids)
+        return _indices(self.ids, ids)
 
     def start(
         self, position_m: FloatArray, sigma_m: float, max_speed_mps: float, evidence: float, now_ns: int
@@ -114,7 +115,7 @@ class Tracks:
             "seen_ns": now_ns,
             "evidence": evidence,
             "trailing_m": position_m,
-            "calm_s": np.inf,
+            "no_evidence_s": np.inf,
         }
         given["state"] = given["surface_state"] = np.concatenate((position_m, np.zeros((count, 3))), axis=1)
         spread = np.diag([sigma_m**2] * 3 + [max_speed_mps**2] * 3)
@@ -127,7 +128,7 @@ class Tracks:
                 new[...] = given[name]
             setattr(self, name, np.concatenate((old, new)))
 
-    def twin(self, track: int, evidence: float, now_ns: int) -> None:
+    def start_from(self, track: int, evidence: float, now_ns: int) -> None:
         """Begin a track that was part of another one, with that one's velocity.
 
         It has to prove its motion by itself: it may be something static that the mover passes.
@@ -147,14 +148,14 @@ class Tracks:
                 self.surface_state, self.surface_covariance, dt_s, accel_density, up
             )
 
-    def follow_trails(self, dt_s: float) -> NDArray[np.bool_]:
+    def update_trailing_average(self, dt_s: float) -> NDArray[np.bool_]:
         """Update the trailing averages; (T,) whether the centres advance about as fast as the velocities say.
 
         Call once a frame, dt_s after the frame before.
         """
         gain, behind_s = -math.expm1(-dt_s / _TRAIL_S), dt_s / math.expm1(dt_s / _TRAIL_S)
-        self.trailing_m, goes = _followed(self.state, self.trailing_m, gain, behind_s)
-        return goes
+        self.trailing_m, advances = _trailing_average(self.state, self.trailing_m, gain, behind_s)
+        return advances
 
     def sight(self, camera_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(T, 3) unit vectors from a camera at camera_m (3,) to the centres, and (T,) their distances."""
@@ -169,20 +170,20 @@ class Tracks:
         if elapsed_s <= 0.0:
             return np.zeros(len(self), np.bool_)
         asked = self.moving & (self.unproven_s >= _UNPROVEN_S)
-        return _gone(asked, self.state, self.extent_m, sight, resolves_m, elapsed_s)
+        return _must_have_left(asked, self.state, self.extent_m, sight, resolves_m, elapsed_s)
 
-    def count_on(self, proven: NDArray[np.bool_], dt_s: float) -> None:
+    def update_durations(self, proven: NDArray[np.bool_], dt_s: float) -> None:
         """Update the durations after a verdict, dt_s after the last. proven (T,): motion, by this frame."""
         self.unproven_s = np.where(proven, 0.0, self.unproven_s + dt_s)
         self.moving_s = np.where(self.moving, self.moving_s + dt_s, 0.0)
-        self.calm_s = np.where(self.evidence > 0.0, 0.0, self.calm_s + dt_s)
+        self.no_evidence_s = np.where(self.evidence > 0.0, 0.0, self.no_evidence_s + dt_s)
 
-    def hide(self, chosen: NDArray[np.bool_]) -> None:
+    def mark_hidden(self, chosen: NDArray[np.bool_]) -> None:
         """Mark the chosen tracks as hidden: nothing of them is visible behind a static surface."""
-        self.sliver |= chosen
+        self.nearly_hidden |= chosen
         self.cells[chosen] = 0
 
-    def locate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
+    def update_with_centre(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
         """Update both filters of tracks index (K,) with measured centres.
 
         position_m (K, 3): in the fixed frame. noise (K, 3, 3): their covariance.
@@ -200,14 +201,14 @@ class Tracks:
             0,
         )
 
-    def relocate(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
-        """As locate, but the centre tells nothing about the velocity."""
+    def reset_position(self, index: NDArray[np.intp], position_m: FloatArray, noise: FloatArray) -> None:
+        """As update_with_centre, but the centre tells nothing about the velocity."""
         if len(index) == 0:
             return
-        self.state[index], self.covariance[index] = kalman.place(
+        self.state[index], self.covariance[index] = kalman.reset_position(
             self.state.take(index, axis=0), self.covariance.take(index, axis=0), position_m, noise
         )
-        self.surface_state[index], self.surface_covariance[index] = kalman.place(
+        self.surface_state[index], self.surface_covariance[index] = kalman.reset_position(
             self.surface_state.take(index, axis=0),
             self.surface_covariance.take(index, axis=0),
             position_m,
@@ -216,7 +217,7 @@ class Tracks:
 
 
 @compiled("int64[::1], int64[::1]")
-def _places(known: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.intp]:
+def _indices(known: NDArray[np.int64], ids: NDArray[np.int64]) -> NDArray[np.intp]:
     """(N,) position of each of ids (N,) among known, which is in ascending order; -1 where it is not."""
     result = np.full(len(ids), -1, np.intp)
     for k in range(len(ids)):
@@ -237,11 +238,11 @@ def _speeds(state: FloatArray) -> FloatArray:
 
 
 @compiled("float64[:, ::1], float64[:, ::1], float64, float64")
-def _followed(
+def _trailing_average(
     state: FloatArray, trailing_m: FloatArray, gain: float, behind_s: float
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Updated trailing_m (T, 3) and the result of follow_trails. behind_s: lag at a steady velocity."""
-    trails_m, goes = trailing_m.copy(), np.empty(len(state), np.bool_)
+    """As Tracks.update_trailing_average, with trailing_m (T, 3). behind_s: lag at a steady velocity."""
+    trails_m, advances = trailing_m.copy(), np.empty(len(state), np.bool_)
     for t in range(len(state)):
         way, squared = 0.0, 0.0
         for i in range(3):
@@ -249,8 +250,8 @@ def _followed(
             trails_m[t, i] += gain * (state[t, i] - trails_m[t, i])
             way += (state[t, i] - trails_m[t, i]) * speed
             squared += speed * speed
-        goes[t] = way / behind_s > _GOING_SHARE * squared
-    return trails_m, goes
+        advances[t] = way / behind_s > _MIN_ADVANCE_SHARE * squared
+    return trails_m, advances
 
 
 @compiled("float64[:, ::1], float64[:]")
@@ -268,7 +269,7 @@ def _sight(state: FloatArray, camera_m: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 @compiled("boolean[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64")
-def _gone(
+def _must_have_left(
     asked: NDArray[np.bool_],
     state: FloatArray,
     extent_m: FloatArray,
@@ -281,11 +282,11 @@ def _gone(
     for t in range(len(asked)):
         along_m, squared = 0.0, 0.0
         for i in range(3):
-            way_m = elapsed_s * state[t, 3 + i]
-            along_m += way_m * sight[t, i]
-            squared += way_m * way_m
+            displacement_m = elapsed_s * state[t, 3 + i]
+            along_m += displacement_m * sight[t, i]
+            squared += displacement_m * displacement_m
         across_m = math.sqrt(max(squared - along_m * along_m, 0.0))
         width_m, depth_m = max(extent_m[t, 0], extent_m[t, 2]), extent_m[t, 2]
-        far = across_m >= _GONE_SHARE * width_m or abs(along_m) >= max(resolves_m[t], _GONE_SHARE * depth_m)
+        far = across_m >= _LEFT_SHARE * width_m or abs(along_m) >= max(resolves_m[t], _LEFT_SHARE * depth_m)
         gone[t] = asked[t] and far
     return gone

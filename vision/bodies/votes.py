@@ -4,10 +4,10 @@ The cells that each track is predicted to cover (predict of vision/bodies/masks.
 
 1. count_votes: each predicted cell is one vote of its track for the connected part in which it lies. A few
    stray votes do not count, and of several static tracks in a part only the one with the most votes stays.
-2. withdraw, an exception: a mover that must have moved on loses a part that was there before and that a
-   static track claims as well. The mover has gone behind the static surface, at about its depth.
-3. release, another exception: a static track loses a part that has newly arrived if the rest of the track was
-   there before. Somebody who stood beside furniture, as one part with it, has left it.
+2. drop_overdue_movers, an exception: a mover that must have moved on loses a part that was there before and
+   that a static track claims as well. The mover has gone behind the static surface, at about its depth.
+3. drop_static_from_arrived, another exception: a static track loses a part that has newly arrived if the rest
+   of the track was there before. Somebody who stood beside furniture, as one part with it, has left it.
 4. divide: a part that one track claims goes to that track as a whole. A part that several tracks claim (at
    most one of them static) is divided: each cell goes to the track of the nearest vote.
 
@@ -22,20 +22,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hal.compiled import compiled
+from vision.bodies.proof import MUCH_ARRIVED_CELLS
 from vision.depth.connected import IntGrid, spread_labels
 from vision.depth.depth_grid import BoolGrid
 
 # A track needs this many votes in a part to claim it, in cells: fewer are strays of a prediction that is off
 # by one cell.
-_LEAST_VOTES = 4
+_MIN_VOTES = 4
 # It also needs this share of all votes in the part, or this share of all votes of the track, whichever is
 # less. Fewer are strays as well.
 _SHARE_OF_PART = 0.15
 _SHARE_OF_TRACK = 0.30
-# A part has newly arrived if at least this many of its cells have (as many as an arrival that is proof by
-# itself, vision/bodies/proof.py), and this share: a person who leaves furniture emerges with one side first.
-_CAME_CELLS = 20
-_CAME_SHARE = 0.3
+# A part has newly arrived if MUCH_ARRIVED_CELLS of its cells have, at least, and this share of them: a person
+# who leaves furniture emerges with one side first.
+_ARRIVED_SHARE = 0.3
 _LEAVING_SHARE = 0.75  # of a static track's cells: a larger part is the static thing itself and cannot leave
 _STAYED_SHARE = 0.7  # of a mover's votes must be for cells that have stayed; the others lie at the rims
 
@@ -44,14 +44,14 @@ _STAYED_SHARE = 0.7  # of a mover's votes must be for cells that have stayed; th
 class Ballot:
     """The votes of T tracks in P parts.
 
-    present: the tracks that claim a part, to which it may belong, (P, T).
-    cast: votes of each track in each part, (P, T).
+    claims: the tracks that claim a part, to which it may belong, (P, T).
+    votes_of: votes of each track in each part, (P, T).
     winner: index + 1 of the claiming track with the most votes, 0 for none, (P,).
     votes: the winner's votes, (P,).
     """
 
-    present: NDArray[np.bool_]
-    cast: NDArray[np.intp]
+    claims: NDArray[np.bool_]
+    votes_of: NDArray[np.intp]
     winner: NDArray[np.int32]
     votes: NDArray[np.intp]
 
@@ -83,63 +83,63 @@ def _votes(parts: IntGrid, predicted: IntGrid, count: int, tracks: int) -> NDArr
 def _claims(votes: NDArray[np.intp], mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(P, T) which tracks have enough votes in a part to claim it."""
     parts, tracks = votes.shape
-    present = np.zeros((parts, tracks), np.bool_)
+    claims = np.zeros((parts, tracks), np.bool_)
     total, own = votes.sum(axis=1), votes.sum(axis=0)
     for p in range(parts):
         strongest, most = 0, 0  # of the static tracks
         for t in range(tracks):
             least = min(_SHARE_OF_PART * total[p], _SHARE_OF_TRACK * own[t])
-            present[p, t] = votes[p, t] >= max(least, _LEAST_VOTES)
-            if present[p, t] and not mover[t] and votes[p, t] > most:
+            claims[p, t] = votes[p, t] >= max(least, _MIN_VOTES)
+            if claims[p, t] and not mover[t] and votes[p, t] > most:
                 strongest, most = t, votes[p, t]
         for t in range(tracks):
-            present[p, t] = present[p, t] and (mover[t] or t == strongest)
-    return present
+            claims[p, t] = claims[p, t] and (mover[t] or t == strongest)
+    return claims
 
 
-def elect(present: NDArray[np.bool_], cast: NDArray[np.intp]) -> Ballot:
-    """The ballot in which each part goes to the track with the most votes, cast (P, T), of those present."""
-    return Ballot(present, cast, *_elected(present, cast))
+def elect(claims: NDArray[np.bool_], votes_of: NDArray[np.intp]) -> Ballot:
+    """The ballot in which each part goes to the track with the most votes of those that claim it."""
+    return Ballot(claims, votes_of, *_winners(claims, votes_of))
 
 
 @compiled("boolean[:, ::1], int64[:, ::1]")
-def _elected(
-    present: NDArray[np.bool_], cast: NDArray[np.intp]
+def _winners(
+    claims: NDArray[np.bool_], votes_of: NDArray[np.intp]
 ) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
     """winner and votes of Ballot. Of tracks with equally many votes the first one wins."""
-    parts, tracks = cast.shape
+    parts, tracks = votes_of.shape
     winner, votes = np.zeros(parts, np.int32), np.zeros(parts, np.intp)
     for p in range(parts):
         for t in range(tracks):
-            if present[p, t] and (winner[p] == 0 or cast[p, t] > votes[p]):
-                winner[p], votes[p] = t + 1, cast[p, t]
+            if claims[p, t] and (winner[p] == 0 or votes_of[p, t] > votes[p]):
+                winner[p], votes[p] = t + 1, votes_of[p, t]
     return winner, votes
 
 
-def guessed(ballot: Ballot, mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def border_is_guess(ballot: Ballot, mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(T,) movers, of mover (T,), all of whose parts are claimed by a static track as well.
 
     The border between the two within such a part is a guess.
     """
-    return _guessed(ballot.present, mover)
+    return _border_is_guess(ballot.claims, mover)
 
 
 @compiled("boolean[:, ::1], boolean[::1]")
-def _guessed(present: NDArray[np.bool_], mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    parts, tracks = present.shape
+def _border_is_guess(claims: NDArray[np.bool_], mover: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    parts, tracks = claims.shape
     somewhere, alone = np.zeros(tracks, np.bool_), np.zeros(tracks, np.bool_)
     for p in range(parts):
         shared = False
         for t in range(tracks):
-            shared = shared or (present[p, t] and not mover[t])
+            shared = shared or (claims[p, t] and not mover[t])
         for t in range(tracks):
-            if present[p, t]:
+            if claims[p, t]:
                 somewhere[t] = True
                 alone[t] = alone[t] or not shared
     return mover & somewhere & ~alone
 
 
-def release(
+def drop_static_from_arrived(
     ballot: Ballot, cells: NDArray[np.intp], arrived: NDArray[np.intp], mover: NDArray[np.bool_]
 ) -> Ballot:
     """ballot without static tracks in parts that have newly arrived while the rest of the track was there.
@@ -147,16 +147,16 @@ def release(
     Somebody who stood beside furniture, as one part with it, has left it. cells (P,): of the parts. arrived
     (P,): cells of them in space that was seen free. mover (T,): these keep their parts.
     """
-    came = (arrived >= _CAME_CELLS) & (arrived >= _CAME_SHARE * cells)
-    if not (came.any() and ballot.present.any()):
+    newly_arrived = (arrived >= MUCH_ARRIVED_CELLS) & (arrived >= _ARRIVED_SHARE * cells)
+    if not (newly_arrived.any() and ballot.claims.any()):
         return ballot
-    whole, rest = cells @ ballot.present, (cells * ~came) @ ballot.present
+    whole, rest = cells @ ballot.claims, (cells * ~newly_arrived) @ ballot.claims
     leaves = ~mover & (rest > 0)
-    left = ballot.present & leaves & came[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
-    return elect(ballot.present & ~left, ballot.cast)
+    left = ballot.claims & leaves & newly_arrived[:, None] & (cells[:, None] <= _LEAVING_SHARE * whole)
+    return elect(ballot.claims & ~left, ballot.votes_of)
 
 
-def withdraw(
+def drop_overdue_movers(
     ballot: Ballot,
     parts: IntGrid,
     predicted: IntGrid,
@@ -174,39 +174,39 @@ def withdraw(
     """
     if not overdue.any():
         return ballot, np.zeros(len(mover), np.bool_)
-    present = ballot.present
-    doubtful = present & overdue & np.any(present & ~mover, axis=1, keepdims=True)
+    claims = ballot.claims
+    doubtful = claims & overdue & np.any(claims & ~mover, axis=1, keepdims=True)
     if not doubtful.any():
         return ballot, np.zeros(len(mover), np.bool_)
-    votes = _votes(parts, np.where(stayed, predicted, np.int32(0)), *present.shape)
-    left = present & ~(doubtful & (votes >= _STAYED_SHARE * ballot.cast))
-    hidden: NDArray[np.bool_] = np.any(present, axis=0) & ~np.any(left, axis=0)
-    return elect(left, ballot.cast), hidden
+    votes = _votes(parts, np.where(stayed, predicted, np.int32(0)), *claims.shape)
+    left = claims & ~(doubtful & (votes >= _STAYED_SHARE * ballot.votes_of))
+    hidden: NDArray[np.bool_] = np.any(claims, axis=0) & ~np.any(left, axis=0)
+    return elect(left, ballot.votes_of), hidden
 
 
 def divide(parts: IntGrid, predicted: IntGrid, ballot: Ballot, winner: NDArray[np.int32]) -> IntGrid:
     """(h, w) track index + 1: whole parts go to their winner (P,), cells of shared ones to the nearest."""
-    present, filled = ballot.present, predicted
-    shared = _shared(present, winner)
+    claims, filled = ballot.claims, predicted
+    shared = _shared(claims, winner)
     if shared.any():
-        seeds, inside = _seeds(parts, predicted, present, shared)
+        seeds, inside = _seeds(parts, predicted, claims, shared)
         filled = spread_labels(seeds, inside)
-    return _divided(parts, filled, present, shared, winner)
+    return _divided(parts, filled, claims, shared, winner)
 
 
 @compiled("boolean[:, ::1], int32[::1]")
-def _shared(present: NDArray[np.bool_], winner: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _shared(claims: NDArray[np.bool_], winner: NDArray[np.int32]) -> NDArray[np.bool_]:
     """(P,) parts that several tracks claim. A part whose winner is born in this frame is never shared."""
-    parts, tracks = present.shape
+    parts, tracks = claims.shape
     result = np.zeros(parts, np.bool_)
     for p in range(parts):
-        result[p] = 0 < winner[p] <= tracks and np.count_nonzero(present[p]) > 1
+        result[p] = 0 < winner[p] <= tracks and np.count_nonzero(claims[p]) > 1
     return result
 
 
 @compiled("int32[:, ::1], int32[:, ::1], boolean[:, ::1], boolean[::1]")
 def _seeds(
-    parts: IntGrid, predicted: IntGrid, present: NDArray[np.bool_], shared: NDArray[np.bool_]
+    parts: IntGrid, predicted: IntGrid, claims: NDArray[np.bool_], shared: NDArray[np.bool_]
 ) -> tuple[IntGrid, BoolGrid]:
     """(h, w) votes in shared parts (P,) of the tracks that claim them; and (h, w) cells of these parts."""
     height, width = parts.shape
@@ -216,7 +216,7 @@ def _seeds(
             part, vote = parts[i, j] - 1, predicted[i, j]
             if part >= 0 and shared[part]:
                 inside[i, j] = True
-                if vote > 0 and present[part, vote - 1]:
+                if vote > 0 and claims[part, vote - 1]:
                     seeds[i, j] = vote
     return seeds, inside
 
@@ -225,7 +225,7 @@ def _seeds(
 def _divided(
     parts: IntGrid,
     filled: IntGrid,
-    present: NDArray[np.bool_],
+    claims: NDArray[np.bool_],
     shared: NDArray[np.bool_],
     winner: NDArray[np.int32],
 ) -> IntGrid:
@@ -237,6 +237,6 @@ def _divided(
             part, vote = parts[i, j] - 1, filled[i, j]
             if part < 0:
                 continue
-            own = shared[part] and vote > 0 and present[part, vote - 1]
+            own = shared[part] and vote > 0 and claims[part, vote - 1]
             labels[i, j] = vote if own else winner[part]
     return labels

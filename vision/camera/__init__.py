@@ -6,5 +6,5 @@ Files, in the order in which they come into play within one frame:
 * floor - finds the floor in the depth, for a camera without a known mounting.
 * health - how far a frame can be trusted.
 * mount_check - whether the floor is where the mounting puts it.
-* lens - pixels to rays and back; used throughout.
+* lens - pixels to rays, rotation vectors; used throughout.
 """

@@ -21,10 +21,10 @@ from vision.depth.depth_noise import depth_sigma_m
 
 _EVERY = 3  # every third cell is used, in both directions
 _TRIES = 96  # random planes: if half of the cells are floor, one try in eight has all three on the floor
-_LEAST_SHARE = 0.06  # minimum share of the cells that lie on the floor
+_MIN_SHARE = 0.06  # minimum share of the cells that lie on the floor
 _BELOW_COSTS = 3.0  # a cell below a plane counts against it three times as much as a cell on it counts for it
 _TOLERANCE = 0.012  # 1/m, of a cell on a plane: four standard deviations of a cell
-_LEAST_UPRIGHT = 0.7  # cosine: a camera held more than 45 degrees off is not expected
+_MIN_UPRIGHT = 0.7  # cosine: a camera held more than 45 degrees off is not expected
 _HELD_M = (0.15, 2.5)  # height range: from a small robot's camera to one held above the head
 _REFINEMENTS = 3  # repeated fits, each to the cells on the plane before
 _KEEP_FRAMES = 5  # the last floor is kept for this many frames; then the camera may have turned too far
@@ -63,7 +63,7 @@ class FloorFinder:
             cells = np.ones((3, len(rows)))
             cells[0], cells[1] = grid.x[::_EVERY].take(columns), grid.y[::_EVERY].take(rows)
             inverse = grid.inverse_depth[::_EVERY, ::_EVERY][rows, columns].astype(float)
-            least = _LEAST_SHARE * grid.valid.size / _EVERY**2
+            least = _MIN_SHARE * grid.valid.size / _EVERY**2
             plane = self._plane_in(cells, inverse, least)
         self._missed = 0 if plane is not None else self._missed + 1
         if plane is not None or self._missed > _KEEP_FRAMES:
@@ -166,7 +166,7 @@ def _possible(planes: FloatArray, heights_m: tuple[float, float]) -> NDArray[np.
     low_m, high_m = heights_m
     size = np.sqrt(np.square(planes).sum(axis=1))
     result: NDArray[np.bool_] = (
-        (planes[:, 1] >= _LEAST_UPRIGHT * size) & (size >= 1.0 / high_m) & (size <= 1.0 / low_m)
+        (planes[:, 1] >= _MIN_UPRIGHT * size) & (size >= 1.0 / high_m) & (size <= 1.0 / low_m)
     )
     return result
 

@@ -22,10 +22,6 @@ class GyroMemory:
     """Takes the samples of every frame, including frames that are not followed."""
 
     def __init__(self) -> None:
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget all samples."""
         self._stamps_ns = np.empty(0, np.int64)
         self._rates_radps = np.empty((0, 3))
 

@@ -1,4 +1,4 @@
-"""Pixels to rays and back (eqs. 3 and 4 of Daeef 2020, with cx, cy instead of w/2, h/2)."""
+"""Pixels to rays (eqs. 3 and 4 of Daeef 2020, with cx, cy instead of w/2, h/2), and rotation vectors."""
 
 from __future__ import annotations
 
@@ -27,15 +27,6 @@ def rays(pixels: RealArray, camera: Intrinsics) -> FloatArray:
 def row_delays(v_px: RealArray, camera: Intrinsics) -> FloatArray:
     """(N,) when rows v_px (N,) are read, in read-out times: -0.5 for the first row, 0.5 for the last one."""
     return v_px.astype(np.float64) / camera.height - 0.5
-
-
-def project(points_m: FloatArray, camera: Intrinsics) -> FloatArray:
-    """(N, 2) pixels of points (N, 3) in the optical frame; the caller ensures z > 0."""
-    inverse_z = 1.0 / points_m[:, 2]
-    result = np.empty((len(points_m), 2))
-    result[:, 0] = points_m[:, 0] * inverse_z * camera.fx + camera.cx
-    result[:, 1] = points_m[:, 1] * inverse_z * camera.fy + camera.cy
-    return result
 
 
 def rotation_from_vector(vector_rad: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from vision.scene import CameraCondition, CameraHealth
 # Interval of the looks at the floor; the longer one once all of the last looks have found it in its place.
 _OFTEN_NS, _RARELY_NS = 500_000_000, 5_000_000_000
 _LOOKS = 5  # one look may take a ramp or a table for the floor; five in a row do not agree on one
-_MOST_WRONG = 2  # of these may be plainly wrong: the majority decides
+_MAX_WRONG = 2  # of these may be plainly wrong: the majority decides
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class MountCheck:
             settled = len(self._looks) == _LOOKS and not any(look.off for look in self._looks)
             self._next_ns = captured_ns + (_RARELY_NS if settled else _OFTEN_NS)
         plain = [look for look in self._looks if look.plainly_off]
-        if len(plain) > _MOST_WRONG:
+        if len(plain) > _MAX_WRONG:
             return worsened(health, CameraCondition.DEGRADED, _sentence(plain[-1].floor, grid))
         if len(self._looks) == _LOOKS and all(look.off for look in self._looks) and self._agree():
             return worsened(health, CameraCondition.DEGRADED, _sentence(self._looks[-1].floor, grid))
@@ -84,11 +84,11 @@ class _Look:
 
 def _look(grid: DepthGrid, floor: Floor) -> _Look:
     assert grid.up is not None, "a camera whose mounting is known"
-    told = Floor(grid.up, grid.camera_height_m)
-    off = _apart(floor, told, _WRONG)
-    if off and cells_on(grid, told) >= _STILL_FLOOR * cells_on(grid, floor):
+    configured = Floor(grid.up, grid.camera_height_m)
+    off = _apart(floor, configured, _WRONG)
+    if off and cells_on(grid, configured) >= _STILL_FLOOR * cells_on(grid, floor):
         off = False
-    return _Look(floor, off, off and _apart(floor, told, _PLAINLY_WRONG))
+    return _Look(floor, off, off and _apart(floor, configured, _PLAINLY_WRONG))
 
 
 def _apart(one: Floor, other: Floor, bounds: _Bounds) -> bool:

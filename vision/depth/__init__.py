@@ -9,5 +9,5 @@ Files, in the order in which they come into play:
 * regions - box, centre, size and occlusion of each part.
 * level_bands - the upright bands of the view in which free space is given.
 * near_floor - learns how near to the camera the floor can be measured.
-* depth_guard - the nearest surface and the known distance in each band: FreeSpace.
+* free_space - the nearest surface and the known distance in each band: FreeSpace.
 """

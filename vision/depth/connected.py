@@ -1,6 +1,6 @@
 """Parts: connected components of the cells that stand out of the floor, separated at jumps in depth.
 
-standing selects the cells, components labels the parts. Terms: vision/__init__.py.
+above_floor selects the cells, components labels the parts. Terms: vision/__init__.py.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from vision.depth.depth_grid import BoolGrid, DepthGrid, FloatGrid
 IntGrid = NDArray[np.int32]
 
 # Bounds of the step in inverse depth (1/m) between two cells that counts as a jump.
-LEAST_JUMP = 0.006  # 0.15 m at 5 m: a smaller step is noise
-MOST_JUMP = 0.03  # the depth of a body at 3 m: a larger step is a jump even on a slope
+MIN_JUMP = 0.006  # 0.15 m at 5 m: a smaller step is noise
+MAX_JUMP = 0.03  # the depth of a body at 3 m: a larger step is a jump even on a slope
 _USUAL_STEPS = 12.0  # between the bounds, a jump is this many times the median step from cell to cell
-_SPECKLE_CELLS = 6  # parts with fewer cells are taken for wrong stereo matches
+MIN_PART_CELLS = 6  # parts with fewer cells are speckles: wrong stereo matches
 
 
-def standing(grid: DepthGrid, clearance_m: float) -> BoolGrid:
+def above_floor(grid: DepthGrid, clearance_m: float) -> BoolGrid:
     """(h, w) cells higher above the floor than clearance_m plus the noise of height and the error of tilt.
 
     Every valid cell where the floor is not known.
@@ -77,7 +77,7 @@ def _usual_step(inverse: FloatGrid, mask: BoolGrid) -> float:
 def _without_jumps(inverse: FloatGrid, mask: BoolGrid) -> NDArray[np.uint8]:
     """(h, w) 1 in the cells of mask, except for those on the far side of a jump."""
     usual = _USUAL_STEPS * _usual_step(inverse, mask)
-    jump = np.float32(min(max(usual, LEAST_JUMP), MOST_JUMP))
+    jump = np.float32(min(max(usual, MIN_JUMP), MAX_JUMP))
     height, width = inverse.shape
     kept = np.zeros((height, width), np.uint8)
     for i in range(height):
@@ -101,7 +101,7 @@ def _without_speckles(labels: IntGrid, count: int) -> tuple[int, IntGrid]:
         cells[part] += 1
     number, parts = np.zeros(count, np.int32), 0
     for label in range(1, len(cells)):
-        if cells[label] >= _SPECKLE_CELLS:
+        if cells[label] >= MIN_PART_CELLS:
             parts += 1
             number[label] = parts
     result = np.empty(labels.shape, np.int32)

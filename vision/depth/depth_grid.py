@@ -25,11 +25,11 @@ BoolGrid = NDArray[np.bool_]
 
 # Noise of a cell's height relative to the noise that one pixel's depth would cause. A cell is the median of
 # many pixels, but these are neighbours and share noise, so the factor is larger than their number suggests.
-# The value is an estimate; standing() in vision/depth/connected.py adds a margin. The noise between two
+# The value is an estimate; above_floor() in vision/depth/connected.py adds a margin. The noise between two
 # frames has been measured and is larger: _CELL_NOISE_OVER_TIME in vision/bodies/arrivals.py.
 CELL_HEIGHT_NOISE = 0.4
-_FARTHEST = np.uint16(65535)  # raw depth of an invalid cell: it sorts behind all valid ones
-_LEAST_SIDE_PX = 32  # as config/recording.py and config/camera.py require
+_INVALID_RAW = np.uint16(65535)  # raw depth of an invalid cell: it sorts behind all valid ones
+_MIN_SIDE_PX = 32  # as config/recording.py and config/camera.py require
 _FOUR_FROM_PX = 4  # from this cell size on a cell takes four samples, below it the middle pixel
 _AGREE_INVERSE = 0.03  # 1/m: samples of a cell that differ by more lie on two surfaces
 
@@ -94,9 +94,9 @@ def make_grid(frame: RgbdFrame, config: PerceptionConfig, mount: CameraMount | N
     is cut off. Raises ValueError for an image of less than 32 x 32 pixels: the neighbourhoods of pixels that
     later steps read do not fit into it.
     """
-    if min(frame.depth.shape) < _LEAST_SIDE_PX:
+    if min(frame.depth.shape) < _MIN_SIDE_PX:
         sides = f"{frame.depth.shape[1]}x{frame.depth.shape[0]}"
-        raise ValueError(f"depth of {sides} pixels, where at least {_LEAST_SIDE_PX} are needed each way")
+        raise ValueError(f"depth of {sides} pixels, where at least {_MIN_SIDE_PX} are needed each way")
     step, scale_m = config.grid_step_px, np.float32(frame.depth_scale_m)
     range_m = measurable_m(config.max_depth_m, frame.depth_scale_m)
     offset = step // 4 + 0.5 * (step // 2) if step >= _FOUR_FROM_PX else float(step // 2)
@@ -188,7 +188,7 @@ def _view(
 
 
 @inlined
-def _of_four(depth: DepthImage, row: int, column: int, low: int, high: int, agree: np.float32) -> int:
+def _robust_of_four(depth: DepthImage, row: int, column: int, low: int, high: int, agree: np.float32) -> int:
     """One raw depth from four samples of the block at row and column.
 
     The mean of the middle two, or the nearer of these where they lie on two surfaces. A block with more than
@@ -216,7 +216,7 @@ def _row(
     """Put the raw depth of the blocks whose uppermost pixel row is row into into."""
     for j in range(len(into)):
         if step >= _FOUR_FROM_PX:
-            into[j] = _of_four(depth, row, step * j, step // 4, step // 4 + step // 2, agree)
+            into[j] = _robust_of_four(depth, row, step * j, step // 4, step // 4 + step // 2, agree)
         else:
             into[j] = depth[row + step // 2, step * j + step // 2]
 
@@ -225,7 +225,7 @@ def _row(
 def _sampled(
     depth: DepthImage, step: int, scale_m: np.float32, min_m: np.float32, range_m: np.float32
 ) -> tuple[DepthImage, BoolGrid, BoolGrid]:
-    """(h, w) raw depth of each step x step block, _FARTHEST where not valid; valid (h, w); beyond (h, w)."""
+    """(h, w) raw depth of each block of step x step, _INVALID_RAW where not valid; valid, beyond (h, w)."""
     rest = 0 if step >= _FOUR_FROM_PX else step - 1 - step // 2
     height, width = (depth.shape[0] + rest) // step, (depth.shape[1] + rest) // step
     raw = np.empty((height, width), np.uint16)
@@ -241,7 +241,7 @@ def _sampled(
             depth_m = np.float32(raw[i, j]) * scale_m
             beyond[i, j] = depth_m > range_m
             valid[i, j] = min_m <= depth_m <= range_m
-            raw[i, j] = raw[i, j] if valid[i, j] else _FARTHEST
+            raw[i, j] = raw[i, j] if valid[i, j] else _INVALID_RAW
     return raw, valid, beyond
 
 
@@ -256,10 +256,10 @@ def _smoothed(raw: DepthImage, middle: DepthImage, scale_m: np.float32) -> tuple
     inverse, depth_m = np.zeros(raw.shape, np.float32), np.zeros(raw.shape, np.float32)
     for i in range(raw.shape[0]):
         for j in range(raw.shape[1]):
-            if raw[i, j] == _FARTHEST:
+            if raw[i, j] == _INVALID_RAW:
                 continue
             own = one / (np.float32(raw[i, j]) * scale_m)
-            median = one / (np.float32(middle[i, j]) * scale_m) if middle[i, j] < _FARTHEST else zero
+            median = one / (np.float32(middle[i, j]) * scale_m) if middle[i, j] < _INVALID_RAW else zero
             inverse[i, j] = median if abs(own - median) <= np.float32(_AGREE_INVERSE) else own
             depth_m[i, j] = one / inverse[i, j]
     return inverse, depth_m

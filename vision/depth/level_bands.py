@@ -21,7 +21,7 @@ from vision.depth.depth_grid import DepthGrid
 BANDS = 80  # maximum number: over 60 degrees a band is 8 cm wide 6 m ahead
 _FAN_BANDS = 1.5  # columns are used as bands where this puts no cell off by more than this many bands
 _PITCH_RAD = math.radians(0.1)  # the pitch is rounded to this: less moves no cell into another band
-_LEAST_AHEAD = 0.05  # minimum metres along the floor per metre of depth: rays straight down have less
+_MIN_AHEAD = 0.05  # minimum metres along the floor per metre of depth: rays straight down have less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +70,7 @@ def _bands(
         tilt = cosine - 0.5 * (y0 + y1) * sine
         middle /= tilt
         half_width /= tilt
-        ahead = np.maximum(cosine - np.linspace(y0, y1, rows) * sine, _LEAST_AHEAD)[:, None]
+        ahead = np.maximum(cosine - np.linspace(y0, y1, rows) * sine, _MIN_AHEAD)[:, None]
         x = x0 + step * column
         off = max(abs(x0), abs(float(x[-1]))) * float(np.abs(1.0 / ahead - 1.0 / tilt).max())
         if off > _FAN_BANDS * 2.0 * half_width:

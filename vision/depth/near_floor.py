@@ -7,7 +7,7 @@ where the floor begins to be measurable.
 
 Fail closed: missing data is excused only close in front of the camera, only in rows that have hardly ever
 shown floor, and only in cells without any data. A drop that is measured is always a hole
-(vision/depth/depth_guard.py).
+(vision/depth/free_space.py).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class NearFloor:
         self._shown: NDArray[np.int64] = np.empty(0, np.int64)
         self._frames = 0
 
-    def unmeasured_m(self, grid: DepthGrid, trusted: bool) -> float:
+    def measurable_from_m(self, grid: DepthGrid, trusted: bool) -> float:
         """Depth up to which the floor may have no data; 0.0 if the lowest row has shown floor.
 
         trusted: the frame is used for learning.

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.depth.connected import LEAST_JUMP, MOST_JUMP, IntGrid
+from vision.depth.connected import MAX_JUMP, MIN_JUMP, IntGrid
 from vision.depth.depth_grid import DepthGrid, FloatGrid
 
 _UNIFORM = 3.46  # the length of a uniform distribution in standard deviations: square root of 12
 # A part this close to the floor, in metres and per metre of depth, stands on it: the lowest part of a body is
-# taken for floor because of the clearance and the margins of standing().
+# taken for floor because of the clearance and the margins of above_floor().
 _FOOT_M, _FOOT_PER_METRE = 0.12, 0.015
 _OCCLUDED_SHARE = 0.15  # of its rows: at fewer rims, a nearer neighbour is noise
 _GAP_CELLS = 3  # a stereo camera measures nothing in some cells beside a nearer surface
@@ -36,8 +36,8 @@ class Regions:
     bbox_px: box in the image, u0, v0, u1, v1, (R, 4).
     position_m: centre of the visible surface in the camera axes, (R, 3).
     extent_m: size along the camera axes, (R, 3).
-    wide: not cut by the left or right border of the image, (R,). See also unhidden.
-    tall: not cut by its upper or lower border, (R,).
+    sides_visible: not cut by the left or right border of the image, (R,). See also with_occlusion.
+    top_and_bottom_visible: not cut by its upper or lower border, (R,).
     overlapped: something nearer begins at its left or right rim, (R,).
     """
 
@@ -46,14 +46,14 @@ class Regions:
     bbox_px: FloatArray
     position_m: FloatArray
     extent_m: FloatArray
-    wide: NDArray[np.bool_]
-    tall: NDArray[np.bool_]
+    sides_visible: NDArray[np.bool_]
+    top_and_bottom_visible: NDArray[np.bool_]
     overlapped: NDArray[np.bool_]
 
     @property
     def whole(self) -> NDArray[np.bool_]:
         """(R,) parts that are cut on no side and not hidden in part by something nearer."""
-        return self.wide & self.tall & ~self.overlapped
+        return self.sides_visible & self.top_and_bottom_visible & ~self.overlapped
 
 
 def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> Regions:
@@ -64,8 +64,10 @@ def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> R
         bbox_px=np.where(chosen[:, None], others.bbox_px, regions.bbox_px),
         position_m=np.where(chosen[:, None], others.position_m, regions.position_m),
         extent_m=np.where(chosen[:, None], others.extent_m, regions.extent_m),
-        wide=np.where(chosen, others.wide, regions.wide),
-        tall=np.where(chosen, others.tall, regions.tall),
+        sides_visible=np.where(chosen, others.sides_visible, regions.sides_visible),
+        top_and_bottom_visible=np.where(
+            chosen, others.top_and_bottom_visible, regions.top_and_bottom_visible
+        ),
         overlapped=np.where(chosen, others.overlapped, regions.overlapped),
     )
 
@@ -73,10 +75,10 @@ def exchanged(regions: Regions, others: Regions, chosen: NDArray[np.bool_]) -> R
 def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
     """Regions of the parts 1..count of labels (h, w); entry k - 1 is part k.
 
-    wide accounts for the image border only, and overlapped is False; unhidden adds occlusion.
+    sides_visible accounts for the image border only, and overlapped is False; with_occlusion adds occlusion.
     """
     on_floor = grid.up is not None
-    cells, rows, bbox_px, position_m, extent_m, wide, tall = _measured(
+    cells, rows, bbox_px, position_m, extent_m, sides_visible, top_and_bottom_visible = _measured(
         grid.inverse_depth,
         labels,
         count,
@@ -88,7 +90,9 @@ def measure(grid: DepthGrid, labels: IntGrid, count: int) -> Regions:
         grid.camera_height_m if on_floor else np.nan,
     )
     overlapped = np.zeros(count, np.bool_)
-    return Regions(cells, rows, bbox_px, position_m, extent_m, wide, tall, overlapped)
+    return Regions(
+        cells, rows, bbox_px, position_m, extent_m, sides_visible, top_and_bottom_visible, overlapped
+    )
 
 
 @inlined
@@ -160,12 +164,13 @@ def _measured(
     NDArray[np.bool_],
     NDArray[np.bool_],
 ]:
-    """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), wide and tall (R,) of the parts.
+    """cells and rows (R,), bbox_px (R, 4), position_m and extent_m (R, 3), sides_visible and
+    top_and_bottom_visible (R,) of the parts.
 
     height_m: of the camera, NaN where the floor is not known. up (3,): the floor's normal.
     """
     (cells, edges), rows = _edges(labels, count), np.zeros(count, np.intp)
-    wide, tall = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    sides_visible, top_and_bottom_visible = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     # Sums over each part: inverse depth, its square, x, y. Sums over its left and over its right rim: cells,
     # inverse depth. The width is measured with each rim at its own depth, since a body seen along one of its
     # sides would seem too wide at the depth of its middle.
@@ -193,8 +198,8 @@ def _measured(
             continue
         left, top, right, bottom = edges[part]
         rows[part] = bottom - top + 1
-        wide[part] = left > 0 and right < labels.shape[1] - 1
-        tall[part] = top > 0 and bottom < labels.shape[0] - 1
+        sides_visible[part] = left > 0 and right < labels.shape[1] - 1
+        top_and_bottom_visible[part] = top > 0 and bottom < labels.shape[0] - 1
         mean, mean_square, mean_x, mean_y = sums[part] / cells[part]
         depth_m = 1.0 / mean
         bbox_px[part, 0] = left * step_px + (offset_px - 0.5 * step_px)
@@ -211,18 +216,21 @@ def _measured(
         )
         extent_m[part, 1] = (y[bottom] - y[top]) * depth_m
         extent_m[part, 2] = _UNIFORM * np.sqrt(max(mean_square - mean * mean, 0.0)) * depth_m * depth_m
-    return cells, rows, bbox_px, position_m, extent_m, wide, tall
+    return cells, rows, bbox_px, position_m, extent_m, sides_visible, top_and_bottom_visible
 
 
-def unhidden(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
-    """regions with occlusion taken into account: wide is restricted, overlapped is set.
+def with_occlusion(grid: DepthGrid, labels: IntGrid, regions: Regions) -> Regions:
+    """regions with occlusion taken into account: sides_visible is restricted, overlapped is set.
 
-    A part stays wide only if no nearer surface hides its left or right side, and if it ends there at an edge
-    in depth. Where a part was divided from its surroundings by a guess, its centre depends on the guess.
+    The sides of a part stay visible only if no nearer surface hides its left or right side, and if it ends
+    there at an edge in depth. Where a part was divided from its surroundings by a guess, its centre depends
+    on the guess.
     """
-    hidden, overlapped = _hidden_cells(grid.inverse_depth, labels, len(regions.cells), np.float32(LEAST_JUMP))
+    hidden, overlapped = _hidden_cells(grid.inverse_depth, labels, len(regions.cells), np.float32(MIN_JUMP))
     least = _OCCLUDED_SHARE * regions.rows
-    return replace(regions, wide=regions.wide & (hidden <= least), overlapped=overlapped > least)
+    return replace(
+        regions, sides_visible=regions.sides_visible & (hidden <= least), overlapped=overlapped > least
+    )
 
 
 @compiled("float32[:, ::1], int32[:, ::1], int64, float32")
@@ -272,7 +280,7 @@ def hidden_below(grid: DepthGrid, labels: IntGrid, regions: Regions) -> NDArray[
     below = np.zeros(len(rims), inverse.dtype)
     for step in range(1, _GAP_CELLS + 1):
         below = np.maximum(below, inverse.take(np.minimum(rims + step * width, len(flat) - 1)))
-    nearer = below - inverse.take(rims) > np.float32(MOST_JUMP)
+    nearer = below - inverse.take(rims) > np.float32(MAX_JUMP)
     cells = np.bincount(flat.take(rims[nearer]), minlength=len(regions.cells) + 1)[1:]
     across = (regions.bbox_px[:, 2] - regions.bbox_px[:, 0]) / grid.step_px
     tall = regions.extent_m[:, 1] >= _HEAD_M

@@ -14,7 +14,7 @@ Gate: a point is used only if its error at the start has a chi-square of at most
 widened by the uncertainty of the prior. Therefore a person who fills half of the view cannot outvote the
 odometry.
 
-Conflict with a binding prior (from odometry, or from the kinematics of a tracked robot):
+Conflict with a trusted prior (from odometry, or from the kinematics of a tracked robot):
 
 * If nearly all points agree on a motion that contradicts the prior, the estimate is theirs, but it is marked
   as disputed: the robot's tracks may slip, or everything in view may move.
@@ -39,7 +39,7 @@ _MIN_INLIER_RATIO = 0.25  # with fewer inliers, something other than the static 
 _MIN_BACKGROUND_RATIO = 0.10  # the same with a tightened prior: the ground that agrees may be a small rest
 _UNANIMOUS_RATIO = 0.9  # inliers for a disputed estimate: a large mover leaves more than 10 % of the ground
 _LOOSE_SHARE = np.array([5.0] * 6 + [1.0] * 2)  # of the prior's sigma, for a fit that may contradict it
-_YAW_AND_WAY = np.array([1, 3, 4, 5])  # the unknowns that are compared with the prior
+_YAW_AND_TRANSLATION = np.array([1, 3, 4, 5])  # the unknowns that are compared with the prior
 _CONFLICT_CHI2 = 13.3  # 99 %, 4 degrees of freedom
 _TRUSTED_SHARE = np.array([1.0, 0.3, 1.0, 0.2, 0.2, 0.2, 1.0, 1.0])  # of the prior's sigma, tightened
 _BENT_CHI2 = 16.0  # four sigmas: the image alone shows another sweep than the fit
@@ -85,21 +85,21 @@ def estimate(
     start, sigma = before @ prior.motion, np.concatenate((prior.sigma, sweep.sigma_rad))
     use = anchors.usable.nonzero()[0]
     if len(use) < _MIN_POINTS:
-        return _unseen(start, sigma, float("nan"))
+        return _prior_only(start, sigma, float("nan"))
     view = view_of(anchors, pixels, use, camera)
     found = fit(view, start, sigma)
     bend_rad, bend_variance = _bend(found)
     if (np.square(bend_rad - found.sweep_rad) > _BENT_CHI2 * bend_variance).any():
         # Before the read-out time is known, a larger sweep than is certain may be plain in the image.
-        possible = np.concatenate((prior.sigma, sweep.most_rad))
+        possible = np.concatenate((prior.sigma, sweep.max_rad))
         straightened = fit(view, start, possible)
         if straightened.inliers >= found.inliers + _STRAIGHTENED_SHARE * len(use):
             found, sigma = straightened, possible
             bend_rad, bend_variance = _bend(found)
     least = max(_MIN_POINTS, _MIN_INLIER_RATIO * len(use))
-    torn = prior.binding and _conflict(found, prior.sigma)
+    conflicts = prior.trusted and _conflict(found, prior.sigma)
     disputed = False
-    if torn:
+    if conflicts:
         # If the prior is far off, its gate excludes the points that contradict it. Fit with a wide one.
         freely = fit(view, start, sigma * _LOOSE_SHARE)
         disputed = freely.inliers >= _UNANIMOUS_RATIO * len(use)
@@ -110,13 +110,13 @@ def estimate(
             found = fit(view, start, sigma * _TRUSTED_SHARE)
             least = max(_MIN_POINTS, _MIN_BACKGROUND_RATIO * len(use))
             # If it is still far from the prior, too little of the ground is in view to correct the prior.
-            torn = _conflict(found, prior.sigma)
+            conflicts = _conflict(found, prior.sigma)
         bend_rad, bend_variance = _bend(found)
     ratio = found.inliers / len(use)
     # Without an inverse OpenCV returns zeros, which would mean perfect knowledge: check regular below.
     regular, covariance = cv2.invert(found.information, flags=cv2.DECOMP_CHOLESKY)
-    if found.inliers < least or (torn and not disputed) or not regular:
-        return _unseen(start, sigma, ratio)
+    if found.inliers < least or (conflicts and not disputed) or not regular:
+        return _prior_only(start, sigma, ratio)
     spread = np.asarray(covariance, np.float64)
     return CameraEstimate(
         pose=found.pose,
@@ -130,7 +130,7 @@ def estimate(
     )
 
 
-def _unseen(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:
+def _prior_only(start: Pose, sigma: FloatArray, inlier_ratio: float) -> CameraEstimate:
     """The estimate from the prior alone."""
     nothing, unknown = np.zeros(2), np.full(2, np.inf)
     return CameraEstimate(
@@ -155,5 +155,5 @@ def _bend(found: Fit) -> tuple[FloatArray, FloatArray]:
 
 def _conflict(found: Fit, sigma: FloatArray) -> bool:
     """Whether yaw and translation differ from the prior by more than its sigma (6,) allows."""
-    off = (found.back / sigma)[_YAW_AND_WAY]
+    off = (found.back / sigma)[_YAW_AND_TRANSLATION]
     return float(off @ off) > _CONFLICT_CHI2

@@ -21,7 +21,7 @@ from config.perception import EgoMotionSettings
 from hal.types import CameraMount, FloatArray, Pose
 from vision.camera.lens import rotation_from_vector, vector_from_rotation
 
-_ASIDE_MPS = 0.10  # one sigma across the direction of travel: vibration, and slip while turning
+_SIDEWAYS_MPS = 0.10  # one sigma across the direction of travel: vibration, and slip while turning
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,34 +32,34 @@ class MotionPrior:
     sigma: standard deviations of a small motion of the camera now: rotation about x, y, z, then translation
         along x, y, z, (6,).
     source: "odometry" or "none"; see EgoMotion.
-    binding: so reliable that image data which contradict it must have followed something large that moves.
+    trusted: so reliable that image data which contradict it must have followed something large that moves.
     """
 
     motion: Pose
     sigma: FloatArray
     source: str
-    binding: bool = False
+    trusted: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SweepPrior:
     """Prior of how far the camera turns about x and y while an image is read; its mean is 0.
 
-    sigma_rad (2,): one sigma of the sweep that is certain. most_rad (2,): one sigma of the sweep that is
+    sigma_rad (2,): one sigma of the sweep that is certain. max_rad (2,): one sigma of the sweep that is
     possible.
     """
 
     sigma_rad: FloatArray
-    most_rad: FloatArray
+    max_rad: FloatArray
 
 
 def odometry_prior(motion: Pose, dt_s: float, settings: EgoMotionSettings) -> MotionPrior:
     """A prior from dead reckoning: good in translation, subject to slip in yaw, blind to vibration."""
     turn_rad = math.hypot(*vector_from_rotation(motion.rotation).tolist())
-    way_m = math.hypot(*motion.translation_m.tolist())
+    displacement_m = math.hypot(*motion.translation_m.tolist())
     yaw = settings.odometry_yaw_ratio * turn_rad + settings.odometry_rotation_radps * dt_s
     tilt = settings.vibration_radps * dt_s + 0.1 * turn_rad
-    way = settings.odometry_speed_ratio * way_m + settings.odometry_speed_mps * dt_s
+    way = settings.odometry_speed_ratio * displacement_m + settings.odometry_speed_mps * dt_s
     return MotionPrior(motion, np.array([tilt, yaw, tilt, way, way, way]), "odometry", True)
 
 
@@ -91,9 +91,9 @@ def rolling_prior(
     ahead = np.array([0.0, -math.sin(mount.pitch_rad), math.cos(mount.pitch_rad)])
     down = np.array([0.0, math.cos(mount.pitch_rad), math.sin(mount.pitch_rad)])
     turn_rad = share * float(vector_from_rotation(last.rotation) @ down)
-    way_m = share * float(last.translation_m @ ahead)
+    displacement_m = share * float(last.translation_m @ ahead)
     motion = Pose(
-        rotation_from_vector(turn_rad * down), way_m * ahead + [mount.forward_m * turn_rad, 0.0, 0.0]
+        rotation_from_vector(turn_rad * down), displacement_m * ahead + [mount.forward_m * turn_rad, 0.0, 0.0]
     )
     factor = 1.0 if known else settings.unknown_factor
     turn = settings.steady_rotation_radps * factor
@@ -104,8 +104,8 @@ def rolling_prior(
             settings.vibration_radps,
             turn,
             settings.vibration_radps,
-            math.hypot(_ASIDE_MPS, swing),
-            math.hypot(_ASIDE_MPS, speed * math.sin(mount.pitch_rad)),
+            math.hypot(_SIDEWAYS_MPS, swing),
+            math.hypot(_SIDEWAYS_MPS, speed * math.sin(mount.pitch_rad)),
             speed,
         ]
     )
@@ -119,4 +119,4 @@ def with_gyro(
     sigma = prior.sigma.copy()
     sigma[:3] = settings.gyro_radps * dt_s
     motion = Pose(rotation_from_vector(turn_rad), prior.motion.translation_m)
-    return MotionPrior(motion, sigma, prior.source, prior.binding)
+    return MotionPrior(motion, sigma, prior.source, prior.trusted)

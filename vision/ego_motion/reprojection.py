@@ -37,13 +37,13 @@ class View:
 
     lines: each point and its derivative by depth, (N, 2, 3).
     seen: its position on the plane z = 1, and when its row was read (row_delays), (N, 3).
-    doubt: w0, w1, w2, which whiten an error (a, b) on that plane to (w0 a, w1 a + w2 b), of unit variance;
-        then the variance of its depth, (N, 4).
+    whitening: w0, w1, w2, which whiten an error (a, b) on that plane to (w0 a, w1 a + w2 b), of unit
+        variance; then the variance of its depth, (N, 4).
     """
 
     lines: FloatArray
     seen: FloatArray
-    doubt: FloatArray
+    whitening: FloatArray
 
 
 def view_of(anchors: Anchors, pixels: FloatArray, use: NDArray[np.intp], camera: Intrinsics) -> View:
@@ -84,7 +84,7 @@ def _view(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The fields of View."""
     count = len(use)
-    lines, seen, doubt = np.empty((count, 2, 3)), np.empty((count, 3)), np.empty((count, 4))
+    lines, seen, whitening = np.empty((count, 2, 3)), np.empty((count, 3)), np.empty((count, 4))
     for k in range(count):
         one = use[k]
         for i in range(3):
@@ -95,6 +95,10 @@ def _view(
         first = math.sqrt(pixel_cov[one, 0])
         low = pixel_cov[one, 1] / first
         second = math.sqrt(max(pixel_cov[one, 2] - low * low, 1e-6))
-        doubt[k, 0], doubt[k, 1], doubt[k, 2] = fx / first, -fx * low / (first * second), fy / second
-        doubt[k, 3] = depth_sigma_m[one] * depth_sigma_m[one]
-    return lines, seen, doubt
+        whitening[k, 0], whitening[k, 1], whitening[k, 2] = (
+            fx / first,
+            -fx * low / (first * second),
+            fy / second,
+        )
+        whitening[k, 3] = depth_sigma_m[one] * depth_sigma_m[one]
+    return lines, seen, whitening

@@ -24,7 +24,7 @@ _ITERATIONS = 6  # maximum: two that anneal, the others until convergence
 _ANNEAL = (32.0, 4.0)  # scale of the robust weights in the first iterations; 1 after them
 _CONVERGED_SIGMAS = 0.2  # a smaller step is negligible beside the uncertainty of the pose
 _STRAIGHT = 1e-3  # maximum motion (rad, m) for which the linearisation is exact to 0.01 px
-_LEAST_AHEAD_M = 0.1  # nearer points do not count as in front of the camera
+_MIN_AHEAD_M = 0.1  # nearer points do not count as in front of the camera
 _UNKNOWNS = 8  # rotation and translation (3 each), sweep about x and y
 _SWEEP = 6  # index of the first unknown of the sweep
 _RESIDUAL = _UNKNOWNS  # column of the residual, after those of the derivatives
@@ -58,7 +58,7 @@ def fit(view: View, start: Pose, sigma: FloatArray) -> Fit:
     began = np.empty((3, 4))
     began[:, :3], began[:, 3] = start.rotation, start.translation_m
     pose, sweep_rad, back, information, inliers, free, free_side, free_from_rad = _fitted(
-        view.lines, view.seen, view.doubt, began, np.ascontiguousarray(sigma)
+        view.lines, view.seen, view.whitening, began, np.ascontiguousarray(sigma)
     )
     return Fit(
         pose=Pose(pose[:, :3].copy(), pose[:, 3].copy()),
@@ -133,7 +133,7 @@ def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: Floa
     across, down, turn = np.empty(len(seen)), np.empty(len(seen)), np.zeros(6)
     for k in range(len(seen)):
         x, y, z = _in_camera(start, lines[k, 0])
-        ahead = max(z, _LEAST_AHEAD_M)
+        ahead = max(z, _MIN_AHEAD_M)
         across[k], down[k] = seen[k, 0] - x / ahead, seen[k, 1] - y / ahead
     turn[0] = min(max(np.median(down), -3.0 * sigma[0]), 3.0 * sigma[0])
     turn[1] = min(max(-np.median(across), -3.0 * sigma[1]), 3.0 * sigma[1])
@@ -142,22 +142,23 @@ def _shifted(lines: FloatArray, seen: FloatArray, start: FloatArray, sigma: Floa
 
 @inlined
 def _linearised(
-    lines: FloatArray, seen: FloatArray, doubt: FloatArray, pose: FloatArray, sweep_rad: FloatArray
+    lines: FloatArray, seen: FloatArray, whitening: FloatArray, pose: FloatArray, sweep_rad: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """Linearise the residuals at a pose and sweep.
 
     table (N, 2, 9): derivatives by the unknowns, then the residual; across and down the image, in sigmas.
-    by_depth (N, 2): derivative by depth. shrink (N,): the factor by which the variance of depth reduces the
+    by_depth (N, 2): derivative by depth. depth_downweight (N,): the factor by which the variance of depth
+    reduces the
     weight of an error along by_depth (Sherman-Morrison). in_front (N,): in front of the camera.
     """
     count = len(seen)
     table, by_depth = np.empty((count, 2, _UNKNOWNS + 1)), np.empty((count, 2))
-    shrink, in_front = np.empty(count), np.empty(count, np.bool_)
+    depth_downweight, in_front = np.empty(count), np.empty(count, np.bool_)
     for k in range(count):
         x, y, z = _in_camera(pose, lines[k, 0])
         dx, dy, dz = _turned_back(pose, lines[k, 1, 0], lines[k, 1, 1], lines[k, 1, 2])
-        in_front[k] = z > _LEAST_AHEAD_M
-        inverse = 1.0 / max(z, _LEAST_AHEAD_M)
+        in_front[k] = z > _MIN_AHEAD_M
+        inverse = 1.0 / max(z, _MIN_AHEAD_M)
         x, y = x * inverse, y * inverse
         # If the camera turns by w and moves by v, a point p moves by -(w x p) - v in its frame.
         across, down = table[k, 0], table[k, 1]
@@ -172,7 +173,7 @@ def _linearised(
             across[_SWEEP + i], down[_SWEEP + i] = across[i] * seen[k, 2], down[i] * seen[k, 2]
             across[_RESIDUAL] -= across[_SWEEP + i] * sweep_rad[i]
             down[_RESIDUAL] -= down[_SWEEP + i] * sweep_rad[i]
-        own, mixed, other = doubt[k, 0], doubt[k, 1], doubt[k, 2]
+        own, mixed, other = whitening[k, 0], whitening[k, 1], whitening[k, 2]
         for i in range(_UNKNOWNS + 1):
             down[i] = down[i] * other + across[i] * mixed
             across[i] *= own
@@ -180,16 +181,16 @@ def _linearised(
         dx, dy = dx * own, dy * other + dx * mixed
         by_depth[k, 0], by_depth[k, 1] = dx, dy
         # Depth's share of the covariance: only along the epipolar line.
-        shrink[k] = doubt[k, 3] / (1.0 + doubt[k, 3] * (dx * dx + dy * dy))
-    return table, by_depth, shrink, in_front
+        depth_downweight[k] = whitening[k, 3] / (1.0 + whitening[k, 3] * (dx * dx + dy * dy))
+    return table, by_depth, depth_downweight, in_front
 
 
 @inlined
-def _chi2(rows: FloatArray, by_depth: FloatArray, shrink: float) -> float:
+def _chi2(rows: FloatArray, by_depth: FloatArray, depth_downweight: float) -> float:
     """Chi-square of a point with rows (2, 9) of table."""
     a, b = rows[0, _RESIDUAL], rows[1, _RESIDUAL]
     along = a * by_depth[0] + b * by_depth[1]
-    result: float = a * a + b * b - shrink * along * along
+    result: float = a * a + b * b - depth_downweight * along * along
     return result
 
 
@@ -203,10 +204,12 @@ def _assumed_variance(rows: FloatArray, sigma: FloatArray) -> float:
 
 
 @inlined
-def _add(rows: FloatArray, by_depth: FloatArray, shrink: float, weight: float, normal: FloatArray) -> None:
+def _add(
+    rows: FloatArray, by_depth: FloatArray, depth_downweight: float, weight: float, normal: FloatArray
+) -> None:
     """Add a point to the upper half of normal (8, 9): normal matrix and, in the last column, right side."""
     for j in range(_UNKNOWNS + 1):
-        along = shrink * (rows[0, j] * by_depth[0] + rows[1, j] * by_depth[1])
+        along = depth_downweight * (rows[0, j] * by_depth[0] + rows[1, j] * by_depth[1])
         a, b = weight * (rows[0, j] - along * by_depth[0]), weight * (rows[1, j] - along * by_depth[1])
         for i in range(min(j + 1, _UNKNOWNS)):
             normal[i, j] += rows[0, i] * a + rows[1, i] * b
@@ -234,56 +237,57 @@ def _solved(matrix: FloatArray, side: FloatArray) -> FloatArray:
 
 @compiled("float64[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
 def _fitted(
-    lines: FloatArray, seen: FloatArray, doubt: FloatArray, start: FloatArray, sigma: FloatArray
+    lines: FloatArray, seen: FloatArray, whitening: FloatArray, start: FloatArray, sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, int, FloatArray, FloatArray, FloatArray]:
     """The fields of Fit. Poses are (3, 4): rotation and translation."""
     prior, pose, sweep_rad = 1.0 / np.square(sigma), _shifted(lines, seen, start, sigma), np.zeros(2)
-    table, by_depth, shrink, in_front = _linearised(lines, seen, doubt, pose, sweep_rad)
-    # missing: from the present estimate to the prior mean. gone: the sum of steps since the linearisation.
-    missing, gone = np.zeros(_UNKNOWNS), np.zeros(_UNKNOWNS)
-    missing[:_SWEEP] = _back(pose, start)
+    table, by_depth, depth_downweight, in_front = _linearised(lines, seen, whitening, pose, sweep_rad)
+    # to_prior: from the present estimate to the prior mean. since_linearised: the sum of steps since the
+    # linearisation.
+    to_prior, since_linearised = np.zeros(_UNKNOWNS), np.zeros(_UNKNOWNS)
+    to_prior[:_SWEEP] = _back(pose, start)
     chi2, allowed = np.empty(len(seen)), np.zeros(len(seen), np.bool_)
     for iteration in range(_ITERATIONS):
         scale = _ANNEAL[iteration] if iteration < len(_ANNEAL) else 1.0
         normal = np.zeros((_UNKNOWNS, _UNKNOWNS + 1))
         for k in range(len(seen)):
-            chi2[k] = _chi2(table[k], by_depth[k], shrink[k])
+            chi2[k] = _chi2(table[k], by_depth[k], depth_downweight[k])
             if iteration == 0:
                 gate = _GATE_CHI2 * (1.0 + _assumed_variance(table[k], sigma))
                 allowed[k] = in_front[k] and chi2[k] <= gate
             if allowed[k] and in_front[k]:
                 weight = 1.0 / (scale * (1.0 + chi2[k] / (_GATE_CHI2 * scale)) ** 2)
-                _add(table[k], by_depth[k], shrink[k], weight, normal)
+                _add(table[k], by_depth[k], depth_downweight[k], weight, normal)
         for i in range(_UNKNOWNS):
             normal[i:, i] = normal[i, i:_UNKNOWNS]
         # First with the prior of the motion alone (free), then with that of the sweep as well.
         free, free_side = normal[:, :_UNKNOWNS].copy(), normal[:, _RESIDUAL].copy()
-        free_from_rad = -missing[_SWEEP:]
+        free_from_rad = -to_prior[_SWEEP:]
         for i in range(_SWEEP):
             free[i, i] += prior[i]
-            free_side[i] += prior[i] * missing[i]
+            free_side[i] += prior[i] * to_prior[i]
         information, side = free.copy(), free_side.copy()
         for i in range(_SWEEP, _UNKNOWNS):
             information[i, i] += prior[i]
-            side[i] += prior[i] * missing[i]
+            side[i] += prior[i] * to_prior[i]
         step = _solved(information, side)
-        gone += step
+        since_linearised += step
         # step * side is the squared length of the step in standard deviations.
         if iteration >= len(_ANNEAL) and (step * side).sum() < _CONVERGED_SIGMAS**2:
             break
-        if np.abs(gone).max() > _STRAIGHT:
-            pose, sweep_rad = _moved(pose, gone), sweep_rad + gone[_SWEEP:]
-            gone[:] = 0.0
-            table, by_depth, shrink, in_front = _linearised(lines, seen, doubt, pose, sweep_rad)
-            missing[:_SWEEP], missing[_SWEEP:] = _back(pose, start), -sweep_rad
+        if np.abs(since_linearised).max() > _STRAIGHT:
+            pose, sweep_rad = _moved(pose, since_linearised), sweep_rad + since_linearised[_SWEEP:]
+            since_linearised[:] = 0.0
+            table, by_depth, depth_downweight, in_front = _linearised(lines, seen, whitening, pose, sweep_rad)
+            to_prior[:_SWEEP], to_prior[_SWEEP:] = _back(pose, start), -sweep_rad
         else:
-            missing -= step
+            to_prior -= step
             for k in range(len(seen)):
                 for i in range(_UNKNOWNS):
                     table[k, 0, _RESIDUAL] -= step[i] * table[k, 0, i]
                     table[k, 1, _RESIDUAL] -= step[i] * table[k, 1, i]
-    pose, inliers = _moved(pose, gone), 0
+    pose, inliers = _moved(pose, since_linearised), 0
     for k in range(len(seen)):
         inliers += allowed[k] and chi2[k] <= _GATE_CHI2
-    sweep_rad = sweep_rad + gone[_SWEEP:]
+    sweep_rad = sweep_rad + since_linearised[_SWEEP:]
     return pose, sweep_rad, _back(pose, start), information, inliers, free, free_side, free_from_rad

@@ -24,10 +24,10 @@ from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.motion_prior import SweepPrior
 
 _UNKNOWN_S = 0.015  # one sigma of the read-out time before anything is learned
-_MOST_S = 0.035  # maximum read-out time: about the interval of frames
+_MAX_READ_OUT_S = 0.035  # maximum read-out time: about the interval of frames
 _MEMORY = 0.98  # per frame: old information decays, so that mistakes made at the start fade
 _OTHER_BENDS_RAD = 0.7e-3  # one sigma of distortions of the image by other causes
-_LEAST_RAD = 1e-9  # practically 0, but avoids a division by 0
+_MIN_SWEEP_RAD = 1e-9  # practically 0, but avoids a division by 0
 _RATE_MEMORY = 0.9  # per frame: decay of the fastest rate of turn, since vibration varies between frames
 
 
@@ -63,21 +63,23 @@ class ReadOut:
         """vibration_radps: assumed rate of turn before any is observed."""
         self._rates_radps = np.full(2, vibration_radps)
         self._information = 0.0
-        self._told = 0.0
+        self._weighted_sum = 0.0
         self._bend: tuple[float, float, float, float] | None = None
 
     @property
     def seconds(self) -> float:
         """From the first row to the last: the estimate less one sigma, 0 for a global shutter."""
         information = self._information + 1.0 / _UNKNOWN_S**2
-        return min(max(self._told / information - 1.0 / math.sqrt(information), 0.0), _MOST_S)
+        return min(max(self._weighted_sum / information - 1.0 / math.sqrt(information), 0.0), _MAX_READ_OUT_S)
 
     def sweep(self) -> SweepPrior:
         """The prior of how far the camera turns about x and y while the next image is read."""
         information = self._information + 1.0 / _UNKNOWN_S**2
-        most_s = min(max(self._told / information, 0.0) + 1.0 / math.sqrt(information), _MOST_S)
+        max_s = min(
+            max(self._weighted_sum / information, 0.0) + 1.0 / math.sqrt(information), _MAX_READ_OUT_S
+        )
         return SweepPrior(
-            _LEAST_RAD + self.seconds * self._rates_radps, _LEAST_RAD + most_s * self._rates_radps
+            _MIN_SWEEP_RAD + self.seconds * self._rates_radps, _MIN_SWEEP_RAD + max_s * self._rates_radps
         )
 
     def learn(self, found: CameraEstimate, turn_rad: FloatArray, dt_s: float) -> None:
@@ -90,13 +92,13 @@ class ReadOut:
             bend_rad, variance, before_rad, before_s = self._bend
             rate = (before_rad + float(turn_rad[0])) / (before_s + dt_s)
             weight = 1.0 / (variance + _OTHER_BENDS_RAD**2)
-            self._told = _MEMORY * self._told + weight * bend_rad * rate
+            self._weighted_sum = _MEMORY * self._weighted_sum + weight * bend_rad * rate
             self._information = _MEMORY * self._information + weight * rate * rate
         self._bend = None
         if found.visual:
             self._bend = float(found.bend_rad[0]), float(found.bend_variance[0]), float(turn_rad[0]), dt_s
         self._rates_radps = np.maximum(_RATE_MEMORY * self._rates_radps, np.abs(turn_rad[:2]) / dt_s)
 
-    def lose(self) -> None:
+    def forget_last(self) -> None:
         """Forget the bend of the last image: the next image does not follow it."""
         self._bend = None

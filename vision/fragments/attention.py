@@ -1,9 +1,9 @@
 """A closer look at bodies with too few fragments to measure their motion.
 
 The fragments are spread over the whole image, long ones first, so a small, plain or partly hidden body gets
-none. wanted lists such bodies at the end of tracking. In the next frame Attention searches the image box of
-one of them, for shorter segments as well. The fragments that it finds are witnesses: they measure the motion
-of that body only. The camera's motion is not estimated from them, since the body may move.
+none. bodies_needing_fragments lists such bodies at the end of tracking. In the next frame Attention searches
+the image box of one of them, for shorter segments as well. The fragments that it finds are body-only: they
+measure the motion of that body only. The camera's motion is not estimated from them, since the body may move.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from config.perception import PerceptionConfig
 from hal.compiled import compiled
 from hal.types import FloatArray, RgbdFrame
+from vision.bodies.births import MIN_CELLS
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_mask import SurfaceDepth
 from vision.depth.depth_noise import depth_sigma_of
@@ -24,16 +25,15 @@ from vision.fragments.candidates import (
     NOTHING_NEW,
     NewFragments,
     depth_along,
-    held_ends,
     new_fragments,
     on_one_surface,
+    trackable_segments,
 )
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
 _FEW_FRAGMENTS = 4  # fewer are too few: a verdict along the line of sight takes 8 ends (bodies/proof.py)
 _ENOUGH_OF_A_MOVER = 2  # enough to follow a mover, together with its surface
-_MIN_CELLS = 12  # what a track begins with (vision/bodies/births.py): less is a sliver
 _REACH_M = 9.0  # maximum distance: the depth mask's 10 m less about the noise of depth there
 _URGENT_SIGHTINGS = 45  # bodies seen in fewer frames, and suspects, are urgent
 # Minimum time between two looks at an urgent body. It is just below a whole number of frame intervals at 30,
@@ -46,7 +46,7 @@ _MIN_LENGTH = 0.5  # minimum length of a segment here, relative to that of other
 _MIN_END_DISTANCE_PX = 8.0  # after the ends were moved to corners: half of the minimum length of a segment
 # Minimum of the smaller eigenvalue of the structure tensor at both ends: on a short edge without corners both
 # ends slide alike. Noise alone makes 220.
-_LEAST_HELD = 600.0
+_MIN_EIGENVALUE = 600.0
 # Contrast of an edge. The threshold that vision/fragments/renewal.py has adapted to there is mostly higher;
 # with it the velocities were not known any better.
 _CONTRAST = 60.0
@@ -62,7 +62,7 @@ _HOLES = 0.2  # of the 25 samples around an end: from 0.25 on there may be anoth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Wanted:
+class NeedsFragments:
     """K bodies with too few fragments.
 
     ids: of their tracks, (K,).
@@ -79,10 +79,12 @@ class Wanted:
     urgent: NDArray[np.bool_]
 
 
-def wanted(tracks: Tracks, detection: Detection, config: PerceptionConfig) -> Wanted:
+def bodies_needing_fragments(
+    tracks: Tracks, detection: Detection, config: PerceptionConfig
+) -> NeedsFragments:
     """The tracks seen in this frame that have too few fragments."""
     noise = config.depth_noise
-    chosen, depth_m, gate_m, urgent = _told_of_by_too_few(
+    chosen, depth_m, gate_m, urgent = _needing_fragments(
         tracks.state,
         tracks.extent_m,
         tracks.moving,
@@ -97,14 +99,14 @@ def wanted(tracks: Tracks, detection: Detection, config: PerceptionConfig) -> Wa
         noise.floor_m,
         noise.quadratic_per_m,
     )
-    return Wanted(tracks.ids[chosen], tracks.bbox_px[chosen], depth_m, gate_m, urgent)
+    return NeedsFragments(tracks.ids[chosen], tracks.bbox_px[chosen], depth_m, gate_m, urgent)
 
 
 @compiled(
     "float64[:, :], float64[:, :], bool_[:], float64[:], int64[:], int64[:], int64[:], int64[:], int64, "
     "float64[:, :], float64[:], float64, float64"
 )
-def _told_of_by_too_few(
+def _needing_fragments(
     state: FloatArray,
     extent_m: FloatArray,
     moving: NDArray[np.bool_],
@@ -119,7 +121,7 @@ def _told_of_by_too_few(
     floor_m: float,
     quadratic_per_m: float,
 ) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Indices of the wanted tracks, and their depth_m, gate_m and urgent.
+    """Indices of the tracks that need fragments, and their depth_m, gate_m and urgent.
 
     rotation, camera_m: pose of the camera. floor_m, quadratic_per_m: depth noise.
     """
@@ -127,7 +129,7 @@ def _told_of_by_too_few(
     urgent, count = np.empty(len(state), np.bool_), 0
     for n in range(len(state)):
         few = fragments[n] < (_ENOUGH_OF_A_MOVER if moving[n] else _FEW_FRAGMENTS)
-        if not few or seen_ns[n] != now_ns or cells[n] < _MIN_CELLS:
+        if not few or seen_ns[n] != now_ns or cells[n] < MIN_CELLS:
             continue
         x, y, z = state[n, 0] - camera_m[0], state[n, 1] - camera_m[1], state[n, 2] - camera_m[2]
         if not x * x + y * y + z * z <= _REACH_M**2:
@@ -150,7 +152,7 @@ class Attention:
         self._began_ns: int | None = None
 
     def find(
-        self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], bodies: Wanted
+        self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], bodies: NeedsFragments
     ) -> NewFragments:
         """New fragments on the body whose turn it is, away from the present ones, ends_px (K, 2, 2)."""
         settings = self._config.fragments
@@ -167,7 +169,7 @@ class Attention:
         edges = find_edges(grey[top:bottom, left:right], _CONTRAST)
         segments_px = find_segments(edges, _MIN_LENGTH * settings.min_length_px, (left, top))
         longest_px = longest_first(segments_px)[:_CANDIDATES]
-        ends, tensor = held_ends(grey, longest_px, ends_px, _MIN_END_DISTANCE_PX, _LEAST_HELD)
+        ends, tensor = trackable_segments(grey, longest_px, ends_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE)
         surface = depth_along(ends, frame, self._config)
         picked = self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]).nonzero()[0]
         return new_fragments(picked[: min(room, _AT_ONCE)], ends, tensor, surface, settings)
@@ -183,7 +185,7 @@ class Attention:
         result: NDArray[np.bool_] = on_one_surface(surface.near_m, self._config)
         return result & (here & alone).all(axis=1)
 
-    def _next(self, bodies: Wanted, now_ns: int) -> int | None:
+    def _next(self, bodies: NeedsFragments, now_ns: int) -> int | None:
         """Index of the body whose turn it is: urgent ones first, of these the one that has waited longest."""
         # A body that was never looked at has waited since the first call.
         self._began_ns = now_ns if self._began_ns is None else min(self._began_ns, now_ns)

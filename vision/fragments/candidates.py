@@ -21,7 +21,7 @@ from vision.fragments.segments import snap_to_corners
 _TAKEN_PX = 6  # size of a place: about half a search window, since closer ends would track the same pixels
 # Image noise of 3 grey levels adds this to both eigenvalues of the structure tensor over 7x7 px.
 _NOISE_STRUCTURE = np.float32(220.0)
-_LEAST_STRUCTURE = np.float32(3.0)  # minimum of either eigenvalue, at which an end is known to 3.5 px
+_MIN_STRUCTURE = np.float32(3.0)  # minimum of either eigenvalue, at which an end is known to 3.5 px
 _STAIRS = np.float32(0.05)  # share of the larger eigenvalue that a coarsely sampled edge adds to the smaller
 _MATCH_VARIANCE = np.float32(6.0**2)  # of grey levels between two images of the same patch
 _HALF = np.float32(0.5)
@@ -51,24 +51,24 @@ NOTHING_NEW = NewFragments(
 )
 
 
-def held_ends(
+def trackable_segments(
     grey: GreyImage,
     segments_px: NDArray[np.float32],
     ends_px: NDArray[np.float32],
     min_distance_px: float,
-    least_held: float = 0.0,
+    min_eigenvalue: float = 0.0,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """The trackable segments among segments_px (N, 2, 2), with their ends moved to corners.
 
     A segment is kept if its ends are at least min_distance_px apart, if no present fragment, ends_px
     (K, 2, 2), and no better segment has an end in the same place, and if the smaller eigenvalue of the
-    structure tensor is at least least_held at both ends. Returns the segments (M, 2, 2), those with the
+    structure tensor is at least min_eigenvalue at both ends. Returns the segments (M, 2, 2), those with the
     largest such eigenvalue first, and the structure tensor at their ends (M, 2, 3).
     """
     snapped, tensor = snap_to_corners(grey, segments_px)
     height, width = grey.shape
     present = np.ascontiguousarray(ends_px)
-    return _best_held(snapped, tensor, present, height, width, min_distance_px, least_held)
+    return _best_trackable(snapped, tensor, present, height, width, min_distance_px, min_eigenvalue)
 
 
 def depth_along(segments_px: NDArray[np.float32], frame: RgbdFrame, config: PerceptionConfig) -> SurfaceDepth:
@@ -100,7 +100,7 @@ def new_fragments(
     surface: SurfaceDepth,
     settings: FragmentSettings,
 ) -> NewFragments:
-    """The fragments of the segments picked (M,), from the results of held_ends and depth_along."""
+    """The fragments of the segments picked (M,), from the results of trackable_segments and depth_along."""
     floor_px2 = np.float32(settings.pixel_sigma_px**2)
     return NewFragments(*_fragments(picked, segments_px, tensor, surface.near_m, surface.far_m, floor_px2))
 
@@ -124,32 +124,32 @@ def _take(taken: NDArray[np.bool_], end_px: NDArray[np.float32]) -> bool:
 
 
 @compiled("float32[:, :, ::1], float32[:, :, ::1], float32[:, :, ::1], int64, int64, float64, float64")
-def _best_held(
+def _best_trackable(
     segments_px: NDArray[np.float32],
     tensor: NDArray[np.float32],
     ends_px: NDArray[np.float32],
     height: int,
     width: int,
     min_distance_px: float,
-    least_held: float,
+    min_eigenvalue: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """As held_ends, for segments whose ends have been moved to corners already."""
+    """As trackable_segments, for segments whose ends have been moved to corners already."""
     taken = np.zeros((height // _TAKEN_PX + 1, width // _TAKEN_PX + 1), np.bool_)
     for n in range(len(ends_px)):
         _take(taken, ends_px[n, 0])
         _take(taken, ends_px[n, 1])
-    held = np.full(len(segments_px), np.float32(np.inf))
+    eigenvalue = np.full(len(segments_px), np.float32(np.inf))
     for n in range(len(segments_px)):
         for end in range(2):
             middle, radius = _eigenvalues(tensor[n, end, 0], tensor[n, end, 1], tensor[n, end, 2])
-            held[n] = min(held[n], middle - radius)
+            eigenvalue[n] = min(eigenvalue[n], middle - radius)
     wanted, count = np.empty(len(segments_px), np.intp), 0
-    for n in np.argsort(-held, kind="mergesort"):  # mergesort is stable
+    for n in np.argsort(-eigenvalue, kind="mergesort"):  # mergesort is stable
         first, second = _take(taken, segments_px[n, 0]), _take(taken, segments_px[n, 1])
         du = segments_px[n, 0, 0] - segments_px[n, 1, 0]
         dv = segments_px[n, 0, 1] - segments_px[n, 1, 1]
         apart = np.sqrt(du * du + dv * dv) >= min_distance_px
-        if first and second and apart and held[n] >= least_held:
+        if first and second and apart and eigenvalue[n] >= min_eigenvalue:
             wanted[count] = n
             count += 1
     return segments_px[wanted[:count]], tensor[wanted[:count]]
@@ -197,8 +197,8 @@ def _flow_covariance(
     end on a straight edge would seem as well held along the edge as across it.
     """
     middle, radius = _eigenvalues(uu, uv, vv)
-    larger = max(middle + radius - _NOISE_STRUCTURE, _LEAST_STRUCTURE)
-    smaller = max(middle - radius - _NOISE_STRUCTURE - _STAIRS * larger, _LEAST_STRUCTURE)
+    larger = max(middle + radius - _NOISE_STRUCTURE, _MIN_STRUCTURE)
+    smaller = max(middle - radius - _NOISE_STRUCTURE - _STAIRS * larger, _MIN_STRUCTURE)
     # The inverse has the same axes and the inverse eigenvalues.
     across, along = _MATCH_VARIANCE / larger, _MATCH_VARIANCE / smaller
     mean, spread = _HALF * (across + along), _HALF * (across - along)

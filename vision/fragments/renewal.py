@@ -16,9 +16,9 @@ from vision.fragments.candidates import (
     NOTHING_NEW,
     NewFragments,
     depth_along,
-    held_ends,
     new_fragments,
     on_one_surface,
+    trackable_segments,
 )
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
@@ -124,7 +124,7 @@ class Renewal:
         settings, config = self._config.fragments, self._config
         tile_px, per_tile = settings.tile_px, settings.fragments_per_tile
         wanted = _wanted(longest_first(candidates), counts, tile_px, per_tile)
-        snapped, tensor = held_ends(grey, wanted, ends_px, _MIN_END_DISTANCE_PX)
+        snapped, tensor = trackable_segments(grey, wanted, ends_px, _MIN_END_DISTANCE_PX)
         surface = depth_along(snapped, frame, config)
         whole = on_one_surface(surface.near_m, config)
         picked = _picked(snapped, surface.near_m, whole, counts, tile_px, per_tile, *room)

@@ -24,7 +24,7 @@ class AnchorEnds:
     """Where the 2N ends of N fragments were some frames ago; the two ends of a fragment are adjacent.
 
     direction, origin: an end of depth d was at d * direction + origin in the fixed frame, (3, 2N).
-    depth_m, far_m, looks: as in FragmentStore, (2N,).
+    depth_m, far_m, depth_samples: as in FragmentStore, (2N,).
     lag_frames, lag_s: how long ago, (N,).
     """
 
@@ -32,7 +32,7 @@ class AnchorEnds:
     origin: FloatArray
     depth_m: FloatArray
     far_m: FloatArray
-    looks: FloatArray
+    depth_samples: FloatArray
     lag_frames: NDArray[np.intp]
     lag_s: FloatArray
 
@@ -43,10 +43,10 @@ class FragmentStore:
     ids: in ascending order, (N,).
     ends_px: the two end points (u, v), (N, 2, 2).
     near_m, far_m: depth of the near and the far surface measured in this frame, (N, 2).
-    depth_m: depth of the near surface averaged over looks frames, as for a static point, (N, 2).
+    depth_m: depth of the near surface averaged over depth_samples frames, as for a static point, (N, 2).
     age_frames: frames since it was found, (N,).
     pixel_cov: xx, xy, yy of one flow step at each end, px^2, (N, 2, 3).
-    witness: found on a body that may move (vision/fragments/attention.py), so not used for the camera's
+    body_only: found on a body that may move (vision/fragments/attention.py), so not used for the camera's
         motion, (N,).
 
     The history is a ring buffer of frames. Each fragment keeps its place in it for life, so that nothing has
@@ -64,11 +64,11 @@ class FragmentStore:
         self.near_m = np.empty((0, 2), np.float32)
         self.far_m = np.empty((0, 2), np.float32)
         self.depth_m = np.empty((0, 2), np.float32)
-        self.looks = np.empty((0, 2), np.float32)
+        self.depth_samples = np.empty((0, 2), np.float32)
         self.age_frames = np.empty(0, np.intp)
         self.pixel_cov = np.empty((0, 2, 3), np.float32)
-        self.witness = np.empty(0, np.bool_)
-        # [frame, place, end]: direction (3), depth, far depth, looks.
+        self.body_only = np.empty(0, np.bool_)
+        # [frame, place, end]: direction (3), depth, far depth, depth_samples.
         self._history = np.full((HISTORY, _FEWEST_PLACES, 2, 6), np.nan)
         self._place = np.empty(0, np.intp)
         self._stamps_ns = np.zeros(HISTORY, np.int64)
@@ -89,10 +89,10 @@ class FragmentStore:
         self.near_m = self.near_m.take(kept, axis=0)
         self.far_m = self.far_m.take(kept, axis=0)
         self.depth_m = self.depth_m.take(kept, axis=0)
-        self.looks = self.looks.take(kept, axis=0)
+        self.depth_samples = self.depth_samples.take(kept, axis=0)
         self.age_frames = self.age_frames.take(kept)
         self.pixel_cov = self.pixel_cov.take(kept, axis=0)
-        self.witness = self.witness.take(kept)
+        self.body_only = self.body_only.take(kept)
         self._place = self._place.take(kept)
 
     def add(
@@ -101,7 +101,7 @@ class FragmentStore:
         near_m: NDArray[np.float32],
         far_m: NDArray[np.float32],
         pixel_cov: NDArray[np.float32],
-        witness: bool = False,
+        body_only: bool = False,
     ) -> None:
         """Add new fragments, seen for the first time in the frame that is committed next."""
         count = len(ends_px)
@@ -113,10 +113,10 @@ class FragmentStore:
         self.near_m = np.concatenate((self.near_m, near_m))
         self.far_m = np.concatenate((self.far_m, far_m))
         self.depth_m = np.concatenate((self.depth_m, near_m))
-        self.looks = np.concatenate((self.looks, np.ones((count, 2), np.float32)))
+        self.depth_samples = np.concatenate((self.depth_samples, np.ones((count, 2), np.float32)))
         self.age_frames = np.concatenate((self.age_frames, np.zeros(count, np.intp)))
         self.pixel_cov = np.concatenate((self.pixel_cov, pixel_cov))
-        self.witness = np.concatenate((self.witness, np.full(count, witness)))
+        self.body_only = np.concatenate((self.body_only, np.full(count, body_only)))
         self._place = np.concatenate((self._place, self._free_places(count)))
 
     def _free_places(self, count: int) -> NDArray[np.intp]:
@@ -142,7 +142,7 @@ class FragmentStore:
         direction = pose.rotation @ straight_rays(self.ends_px.reshape(-1, 2), camera, sweep_rad).T
         ends = np.empty((len(self), 2, 6))
         ends[..., :3] = direction.T.reshape(-1, 2, 3)
-        ends[..., 3], ends[..., 4], ends[..., 5] = self.depth_m, self.far_m, self.looks
+        ends[..., 3], ends[..., 4], ends[..., 5] = self.depth_m, self.far_m, self.depth_samples
         self._history[self._head, self._place] = ends
         self._stamps_ns[self._head] = stamp_ns
         self._origins[self._head] = pose.translation_m
@@ -159,12 +159,12 @@ class FragmentStore:
         """
         return self._look_back(now_ns, self._comparable, window_s)
 
-    def before(self, now_ns: int) -> AnchorEnds:
+    def last_entries(self, now_ns: int) -> AnchorEnds:
         """The last entry of each fragment: that of the frame before."""
         return self._look_back(now_ns, 1, np.inf)
 
-    def _look_back(self, now_ns: int, most_frames: int, window_s: float) -> AnchorEnds:
-        """As anchors, looking back by most_frames at most."""
+    def _look_back(self, now_ns: int, max_frames: int, window_s: float) -> AnchorEnds:
+        """As anchors, looking back by max_frames at most."""
         ends, origin, lag, lag_s = _sights(
             self._history,
             self._origins,
@@ -173,7 +173,7 @@ class FragmentStore:
             self._place,
             self.age_frames,
             now_ns,
-            most_frames,
+            max_frames,
             window_s,
         )
         return AnchorEnds(
@@ -181,7 +181,7 @@ class FragmentStore:
             origin=origin,
             depth_m=ends[3],
             far_m=ends[4],
-            looks=ends[5],
+            depth_samples=ends[5],
             lag_frames=lag,
             lag_s=lag_s,
         )
@@ -198,7 +198,7 @@ def _sights(
     place: NDArray[np.intp],
     age_frames: NDArray[np.intp],
     now_ns: int,
-    most_frames: int,
+    max_frames: int,
     window_s: float,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.intp], FloatArray]:
     """The oldest entry of each fragment within window_s, or else the last one.
@@ -207,7 +207,7 @@ def _sights(
     each. head: the last frame in the ring buffers history, origins and stamps_ns.
     """
     within = 0
-    for back in range(most_frames):
+    for back in range(max_frames):
         if (now_ns - stamps_ns[(head - back) % HISTORY]) * 1e-9 <= window_s:
             within += 1
     count = len(place)

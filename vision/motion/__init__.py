@@ -4,7 +4,7 @@ Files, in the order in which they come into play. In detect (vision/detector.py)
 
 * expected - where the ends of fragments are expected in the next image.
 * anchor_depths - what the depth of each anchored end is worth; running averages of depth.
-* evidence - residual of each end against the prediction that it is static.
+* residuals - residual of each end against the prediction that it is static.
 
 In track (vision/tracker.py):
 

@@ -1,9 +1,9 @@
 """The depth of anchored ends: its uncertainty, and its running average from frame to frame.
 
-appraise gives the depth of each anchor with its standard deviation. static_points makes of this the points
-from which the camera's motion is estimated; the residuals use it too (vision/motion/evidence.py). depth_steps
-gives the change of depth since the anchor. Once the camera's new pose is known, average_depth updates the
-running average of each end's depth, as if the end were static.
+depths_with_sigma gives the depth of each anchor with its standard deviation. static_points makes of this the
+points from which the camera's motion is estimated; the residuals use it too (vision/motion/residuals.py).
+depth_steps gives the change of depth since the anchor. Once the camera's new pose is known, average_depth
+updates the running average of each end's depth, as if the end were static.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from vision.fragments.store import AnchorEnds, FragmentStore
 # Missing depth is most likely large. With this standard deviation the reprojection error counts across the
 # epipolar line only.
 _UNSEEN_SIGMA_M = 10.0
-_MOST_LOOKS = 6.0  # length of the running mean in frames; _COMMON_NOISE is why a longer one would not help
+_MAX_SAMPLES = 6.0  # length of the running mean in frames; _COMMON_NOISE is why a longer one would not help
 # Mean age in frames of the depths in a full running mean: between 2.5 (plain mean of the first 6 frames) and
 # 5 (running mean in the long run).
 _SETTLED_LATE_FRAMES = 4.0
@@ -51,13 +51,13 @@ class AnchorDepths:
     mixed: NDArray[np.bool_]
 
 
-def appraise(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
+def depths_with_sigma(anchor: AnchorEnds, noise: DepthNoise) -> AnchorDepths:
     """AnchorDepths of anchor. An end without depth is taken for a distant one whose depth is hardly known."""
     return AnchorDepths(
-        *_appraised(
+        *_with_sigma(
             np.ascontiguousarray(anchor.depth_m),
             np.ascontiguousarray(anchor.far_m),
-            np.ascontiguousarray(anchor.looks),
+            np.ascontiguousarray(anchor.depth_samples),
             UNSEEN_M,
             noise.floor_m,
             noise.quadratic_per_m,
@@ -102,14 +102,14 @@ def average_depth(store: FragmentStore, before: AnchorEnds, pose: Pose, noise: D
     """Predict the depth of every end as if it were static, and average it with the measured depth.
 
     If the two do not agree, the average begins anew: the end is on another surface, or it moves in depth.
-    before: the ends in the frame before. pose: the camera now. Changes depth_m and looks of store.
+    before: the ends in the frame before. pose: the camera now. Changes depth_m and depth_samples of store.
     """
-    store.depth_m, store.looks = _averaged(
+    store.depth_m, store.depth_samples = _averaged(
         np.ascontiguousarray(before.direction),
         np.ascontiguousarray(before.origin),
         np.ascontiguousarray(before.depth_m),
         np.ascontiguousarray(store.near_m),
-        np.ascontiguousarray(store.looks),
+        np.ascontiguousarray(store.depth_samples),
         np.ascontiguousarray(pose.rotation),
         np.ascontiguousarray(pose.translation_m),
         noise.floor_m,
@@ -120,7 +120,7 @@ def average_depth(store: FragmentStore, before: AnchorEnds, pose: Pose, noise: D
 def depth_steps(
     store: FragmentStore, anchor: AnchorEnds, depths: AnchorDepths, static_m: FloatArray, noise: DepthNoise
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """depth_step_m, depth_step_sigma_m and depth_lag_s of PointMotion (vision/motion/velocities.py).
+    """depth_step_m, depth_step_sigma_m and depth_lag_s of EndResiduals (vision/motion/velocities.py).
 
     static_m (2N, 3): where the ends would be if they were static, in the camera's axes.
     """
@@ -128,7 +128,7 @@ def depth_steps(
         static_m,
         depths.sigma_m,
         np.ascontiguousarray(store.near_m),
-        np.ascontiguousarray(anchor.looks),
+        np.ascontiguousarray(anchor.depth_samples),
         anchor.lag_frames,
         np.ascontiguousarray(anchor.lag_s),
         noise.floor_m,
@@ -137,10 +137,10 @@ def depth_steps(
 
 
 @compiled("float64[::1], float64[::1], float64[::1], float64, float64, float64")
-def _appraised(
+def _with_sigma(
     depth_m: FloatArray,
     far_m: FloatArray,
-    looks: FloatArray,
+    depth_samples: FloatArray,
     unseen_m: float,
     floor_m: float,
     quadratic_per_m: float,
@@ -154,7 +154,7 @@ def _appraised(
             near[k], far[k] = depth_m[k], far_m[k]
             single = depth_sigma_of(depth_m[k], floor_m, quadratic_per_m)
             # The noise of a mean over these frames, part of which they have in common.
-            sigma[k] = single * max(1.0 / math.sqrt(max(looks[k], 1.0)), _COMMON_NOISE)
+            sigma[k] = single * max(1.0 / math.sqrt(max(depth_samples[k], 1.0)), _COMMON_NOISE)
             mixed[k] = far[k] - near[k] > 0.1 + _MIXED_SIGMAS * single
     return near, sigma, far, known, mixed
 
@@ -175,15 +175,15 @@ def _static(
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """points_m, depth_sigma_m and usable of Anchors."""
     count = len(near_m)
-    points_m, doubt_m, usable = np.empty((count, 3)), sigma_m.copy(), np.empty(count, np.bool_)
+    points_m, depth_sigma_m, usable = np.empty((count, 3)), sigma_m.copy(), np.empty(count, np.bool_)
     for k in range(count):
         for i in range(3):
             points_m[k, i] = direction[i, k] * near_m[k] + origin[i, k]
         distant = mixed[k] and far_m[k] > distant_m
         if distant:
-            doubt_m[k] = max(sigma_m[k], far_m[k] - near_m[k])
+            depth_sigma_m[k] = max(sigma_m[k], far_m[k] - near_m[k])
         usable[k] = (distant or not mixed[k]) and not moving[k // 2]
-    return points_m, doubt_m, usable
+    return points_m, depth_sigma_m, usable
 
 
 @compiled(
@@ -195,25 +195,25 @@ def _averaged(
     origin: FloatArray,
     depth_m: FloatArray,
     near_m: NDArray[np.float32],
-    looks: NDArray[np.float32],
+    depth_samples: NDArray[np.float32],
     rotation: FloatArray,
     translation_m: FloatArray,
     floor_m: float,
     quadratic_per_m: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """depth_m and looks (N, 2) of the store after average_depth."""
-    mean_m, new_looks = near_m.copy(), np.ones_like(looks)
+    """depth_m and depth_samples (N, 2) of the store after average_depth."""
+    mean_m, new_samples = near_m.copy(), np.ones_like(depth_samples)
     for k in range(len(depth_m)):
-        carried_m = 0.0
+        predicted_m = 0.0
         for i in range(3):
-            carried_m += rotation[i, 2] * (direction[i, k] * depth_m[k] + origin[i, k] - translation_m[i])
+            predicted_m += rotation[i, 2] * (direction[i, k] * depth_m[k] + origin[i, k] - translation_m[i])
         fragment, end = k // 2, k % 2
-        off_m = near_m[fragment, end] - carried_m
+        off_m = near_m[fragment, end] - predicted_m
         # False where either depth is missing (NaN).
-        if abs(off_m) <= 0.05 + 3.0 * depth_sigma_of(carried_m, floor_m, quadratic_per_m):
-            new_looks[fragment, end] = min(looks[fragment, end] + 1.0, _MOST_LOOKS)
-            mean_m[fragment, end] = carried_m + off_m / new_looks[fragment, end]
-    return mean_m, new_looks
+        if abs(off_m) <= 0.05 + 3.0 * depth_sigma_of(predicted_m, floor_m, quadratic_per_m):
+            new_samples[fragment, end] = min(depth_samples[fragment, end] + 1.0, _MAX_SAMPLES)
+            mean_m[fragment, end] = predicted_m + off_m / new_samples[fragment, end]
+    return mean_m, new_samples
 
 
 @compiled(
@@ -223,13 +223,13 @@ def _steps(
     static_m: FloatArray,
     sigma_m: FloatArray,
     near_m: NDArray[np.float32],
-    looks: FloatArray,
+    depth_samples: FloatArray,
     lag_frames: NDArray[np.intp],
     lag_s: FloatArray,
     floor_m: float,
     quadratic_per_m: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """depth_step_m, depth_step_sigma_m and depth_lag_s of PointMotion."""
+    """depth_step_m, depth_step_sigma_m and depth_lag_s of EndResiduals."""
     count = len(static_m)
     step_m, step_sigma_m, step_lag_s = np.empty(count), np.empty(count), np.empty(count)
     for k in range(count):
@@ -239,6 +239,8 @@ def _steps(
         sigma_now_m = depth_sigma_of(1.0 if math.isnan(now_m) else now_m, floor_m, quadratic_per_m)
         step_sigma_m[k] = math.sqrt(sigma_m[k] * sigma_m[k] + sigma_now_m * sigma_now_m)
         # The averaged depth of the anchor was measured before the anchor's time, on average.
-        late_frames = 0.5 * (looks[k] - 1.0) if looks[k] < _MOST_LOOKS else _SETTLED_LATE_FRAMES
+        late_frames = (
+            0.5 * (depth_samples[k] - 1.0) if depth_samples[k] < _MAX_SAMPLES else _SETTLED_LATE_FRAMES
+        )
         step_lag_s[k] = lag_s[fragment] + late_frames * (lag_s[fragment] / lag_frames[fragment])
     return step_m, step_sigma_m, step_lag_s

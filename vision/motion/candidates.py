@@ -12,30 +12,29 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import STATIC_END_CHI2, EndResiduals
 
-_STATIC_END_CHI2 = 6.0  # 95 % of static ends, 2 degrees of freedom
 _STATIC_FRAGMENT_CHI2 = 18.5  # 99.9 % of static fragments, 4 degrees of freedom
 _LONG_S = 0.26  # about the time window over which motion is measured
 _NEAR_M = 0.5  # maximum distance of neighbours; a chain of neighbours makes a group
 _VELOCITY_GATE_MPS = 0.5  # plus two sigmas: allows for limbs, which move differently from their body
 
 
-def moving_candidates(motion: PointMotion, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
+def moving_candidates(motion: EndResiduals, age_frames: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(N,) fragments that no static surface explains.
 
     Both ends contradict it, at the near and at the far depth of a silhouette.
     """
     chi2 = np.where(motion.usable, motion.static_chi2, 0.0)
     one, other = chi2[0::2], chi2[1::2]
-    both = (one > _STATIC_END_CHI2) & (other > _STATIC_END_CHI2)
+    both = (one > STATIC_END_CHI2) & (other > STATIC_END_CHI2)
     result: NDArray[np.bool_] = both & (one + other > _STATIC_FRAGMENT_CHI2) & (age_frames >= 2)
     return result
 
 
-def long_static(motion: PointMotion, age_s: FloatArray) -> NDArray[np.bool_]:
+def long_static(motion: EndResiduals, age_s: FloatArray) -> NDArray[np.bool_]:
     """(N,) fragments of some age, age_s (N,), both of whose ends are static by their residuals."""
-    still = (motion.usable & (motion.static_chi2 <= _STATIC_END_CHI2)).reshape(-1, 2)
+    still = (motion.usable & (motion.static_chi2 <= STATIC_END_CHI2)).reshape(-1, 2)
     result: NDArray[np.bool_] = still[:, 0] & still[:, 1] & (age_s >= _LONG_S)
     return result
 

@@ -14,7 +14,7 @@ from vision.fragments.store import FragmentStore
 from vision.scene import Fragments
 
 _UNKNOWN_M = 5.0  # assumed where depth is missing
-_LEAST_AHEAD_M = 0.1  # lower bound of depth, so that a projection stays finite
+_MIN_AHEAD_M = 0.1  # lower bound of depth, so that a projection stays finite
 
 
 def known_motion(ids: NDArray[np.int64], previous: Fragments | None) -> tuple[NDArray[np.bool_], FloatArray]:
@@ -83,7 +83,7 @@ def _known_motion(
 def _expected_px(
     ends_px: NDArray[np.float32],
     near_m: NDArray[np.float32],
-    way_m: FloatArray,
+    displacement_m: FloatArray,
     rotation: FloatArray,
     translation_m: FloatArray,
     fx: float,
@@ -91,7 +91,7 @@ def _expected_px(
     cx: float,
     cy: float,
 ) -> NDArray[np.float32]:
-    """As expected_px. way_m (N, 3): displacement of the fragments; rotation, translation_m: of the camera."""
+    """As expected_px. displacement_m (N, 3): of the fragments; rotation, translation_m: of the camera."""
     result = np.empty((2 * len(ends_px), 2), np.float32)
     point, moved = np.empty(3), np.empty(3)
     for k in range(2 * len(ends_px)):
@@ -104,9 +104,9 @@ def _expected_px(
         point[2] = depth_m
         moved[:] = 0.0
         for i in range(3):
-            away_m = point[i] - translation_m[i] + way_m[fragment, i]
+            away_m = point[i] - translation_m[i] + displacement_m[fragment, i]
             for j in range(3):
                 moved[j] += rotation[i, j] * away_m
-        inverse = 1.0 / max(moved[2], _LEAST_AHEAD_M)
+        inverse = 1.0 / max(moved[2], _MIN_AHEAD_M)
         result[k, 0], result[k, 1] = moved[0] * inverse * fx + cx, moved[1] * inverse * fy + cy
     return result

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.motion.velocities import PointMotion, normal_equations
+from vision.motion.velocities import EndResiduals, normal_equations
 
 _ROBUST_CHI2 = 9.0  # 99 % of ends that move with the body, 2 degrees of freedom; others lose their weight
 _MEDIAN_CHI2 = 1.386  # median for 2 degrees of freedom
@@ -33,21 +33,21 @@ class BodyVelocities:
     covariance: (G, 3, 3).
     ends: number of usable ends, (G,).
     agreement: share of them that agree with the velocity, (G,).
-    unexplained: share of them that contradict a static body, (G,).
+    contradicts_static: share of them that contradict a static body, (G,).
     """
 
     velocity_mps: FloatArray
     covariance: FloatArray
     ends: NDArray[np.intp]
     agreement: FloatArray
-    unexplained: FloatArray
+    contradicts_static: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FragmentVelocities:
     """Velocities of N fragments, each from its two ends alone.
 
-    per_end (14, 2N): the equations of every end. Rows 0 to 11 as in NormalEquations; row 12: information on
+    per_end (14, 2N): the equations of every end. Rows 0 to 11 as of normal_equations; row 12: information on
     the velocity along z from the change of depth; row 13: the same times that velocity. Zero where an end is
     not usable. velocity_mps (N, 3): over ground. covariance (N, 3, 3).
     """
@@ -57,10 +57,10 @@ class FragmentVelocities:
     covariance: FloatArray
 
 
-def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> FragmentVelocities:
+def fragment_velocities(motion: EndResiduals, max_speed_mps: float) -> FragmentVelocities:
     """Weighted least squares over the two ends of each fragment."""
     per_end, velocity_mps, covariance = _fragments(
-        normal_equations(motion, motion.usable.astype(float)).table,
+        normal_equations(motion, motion.usable.astype(float)),
         np.ascontiguousarray(motion.usable),
         np.ascontiguousarray(motion.depth_step_m),
         np.ascontiguousarray(motion.depth_step_sigma_m),
@@ -71,7 +71,7 @@ def fragment_velocities(motion: PointMotion, max_speed_mps: float) -> FragmentVe
 
 
 def body_velocities(
-    motion: PointMotion,
+    motion: EndResiduals,
     per_end: FloatArray,
     owner: NDArray[np.intp],
     bodies: int,
@@ -86,12 +86,12 @@ def body_velocities(
     first, members = _grouped(
         np.ascontiguousarray(owner, np.int64), np.ascontiguousarray(motion.usable), bodies
     )
-    velocity_mps, covariance, agreement, unexplained = _bodies(
+    velocity_mps, covariance, agreement, contradicts_static = _bodies(
         first,
         members,
         np.ascontiguousarray(motion.ray),
         np.ascontiguousarray(motion.lag_s),
-        np.ascontiguousarray(motion.miss_m),
+        np.ascontiguousarray(motion.residual_m),
         np.ascontiguousarray(motion.covariance),
         np.ascontiguousarray(motion.depth_effect),
         np.ascontiguousarray(motion.static_chi2),
@@ -99,7 +99,7 @@ def body_velocities(
         np.ascontiguousarray(start_mps),
         max_speed_mps,
     )
-    return BodyVelocities(velocity_mps, covariance, np.diff(first), agreement, unexplained)
+    return BodyVelocities(velocity_mps, covariance, np.diff(first), agreement, contradicts_static)
 
 
 @inlined
@@ -140,7 +140,7 @@ def _fragments(
     lag_s: FloatArray,
     max_speed_mps: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """per_end, velocity_mps and covariance of FragmentVelocities. equations (12, 2N): see NormalEquations."""
+    """The fields of FragmentVelocities. equations (12, 2N): see normal_equations."""
     ends = len(usable)
     per_end = np.zeros((14, ends))
     per_end[:12] = equations
@@ -178,7 +178,7 @@ def _grouped(
 
 
 @inlined
-def _middle(values: FloatArray) -> float:
+def _upper_median(values: FloatArray) -> float:
     """The value that would be at M // 2 if values (M,) were sorted (quickselect)."""
     values, middle = values.copy(), len(values) // 2
     low, high = 0, len(values) - 1
@@ -210,7 +210,7 @@ def _spread(chi2: FloatArray) -> float:
     """
     if len(chi2) < _SPREAD_ENDS:
         return 1.0
-    result: float = max(1.0, _middle(chi2) / _MEDIAN_CHI2)
+    result: float = max(1.0, _upper_median(chi2) / _MEDIAN_CHI2)
     return result
 
 
@@ -229,12 +229,14 @@ def _information(covariance: FloatArray, effect: FloatArray, result: FloatArray)
 
 @inlined
 def _chi2(
-    velocity_mps: FloatArray, ray: FloatArray, lag_s: float, miss_m: FloatArray, trust: FloatArray
+    velocity_mps: FloatArray, ray: FloatArray, lag_s: float, residual_m: FloatArray, information: FloatArray
 ) -> float:
-    """Chi-square of an end with information trust (3,) under the hypothesis of velocity (3,)."""
-    a = miss_m[0] - lag_s * (velocity_mps[0] - ray[0] * velocity_mps[2])
-    b = miss_m[1] - lag_s * (velocity_mps[1] - ray[1] * velocity_mps[2])
-    result: float = (trust[0] * a + trust[1] * b) * a + (trust[1] * a + trust[2] * b) * b
+    """Chi-square of an end with this information (3,) under the hypothesis of velocity (3,)."""
+    a = residual_m[0] - lag_s * (velocity_mps[0] - ray[0] * velocity_mps[2])
+    b = residual_m[1] - lag_s * (velocity_mps[1] - ray[1] * velocity_mps[2])
+    result: float = (information[0] * a + information[1] * b) * a + (
+        information[1] * a + information[2] * b
+    ) * b
     return result
 
 
@@ -247,7 +249,7 @@ def _bodies(
     members: NDArray[np.intp],
     ray: FloatArray,
     lag_s: FloatArray,
-    miss_m: FloatArray,
+    residual_m: FloatArray,
     covariance: FloatArray,
     depth_effect: FloatArray,
     static_chi2: FloatArray,
@@ -255,17 +257,17 @@ def _bodies(
     start_mps: FloatArray,
     max_speed_mps: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """velocity_mps, covariance, agreement and unexplained of BodyVelocities.
+    """velocity_mps, covariance, agreement and contradicts_static of BodyVelocities.
 
     first, members: see _grouped. per_end, start_mps, max_speed_mps: see body_velocities. The others: see
-    PointMotion.
+    EndResiduals.
     """
     bodies = len(first) - 1
     velocity_mps, spread_out = start_mps.copy(), np.empty((bodies, 3, 3))
-    agreement, unexplained = np.zeros(bodies), np.zeros(bodies)
-    trust, sums = np.empty((len(lag_s), 3)), np.empty(14)
+    agreement, contradicts_static = np.zeros(bodies), np.zeros(bodies)
+    information, sums = np.empty((len(lag_s), 3)), np.empty(14)
     for k in members:
-        _information(covariance[k], depth_effect[k], trust[k])
+        _information(covariance[k], depth_effect[k], information[k])
     for g in range(bodies):
         own = members[first[g] : first[g + 1]]
         ends = len(own)
@@ -274,7 +276,7 @@ def _bodies(
         for scale in _ANNEAL:
             for j in range(ends):
                 k = own[j]
-                chi2[j] = _chi2(velocity_mps[g], ray[k], lag_s[k], miss_m[k], trust[k])
+                chi2[j] = _chi2(velocity_mps[g], ray[k], lag_s[k], residual_m[k], information[k])
             admitted = scale * _ROBUST_CHI2 * _spread(chi2)
             sums[:] = 0.0
             for j in range(ends):
@@ -285,12 +287,12 @@ def _bodies(
             _solve(sums, max_speed_mps, velocity_mps[g], spread_out[g])
         for j in range(ends):
             k = own[j]
-            chi2[j] = _chi2(velocity_mps[g], ray[k], lag_s[k], miss_m[k], trust[k])
+            chi2[j] = _chi2(velocity_mps[g], ray[k], lag_s[k], residual_m[k], information[k])
             agreement[g] += chi2[j] <= _ROBUST_CHI2
-            unexplained[g] += static_chi2[k] > _MOVED_CHI2
+            contradicts_static[g] += static_chi2[k] > _MOVED_CHI2
         agreement[g] /= max(ends, 1)
-        unexplained[g] /= max(ends, 1)
+        contradicts_static[g] /= max(ends, 1)
         # Motion that the model does not explain (limbs, rotation, sliding) increases the covariance.
         excess = np.minimum(chi2, _ROBUST_CHI2 * _spread(chi2)).sum() / max(2.0 * ends - 3.0, 1.0)
         spread_out[g] *= max(1.0, excess)
-    return velocity_mps, spread_out, agreement, unexplained
+    return velocity_mps, spread_out, agreement, contradicts_static

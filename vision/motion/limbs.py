@@ -6,6 +6,7 @@ Therefore:
 * believable: whether the fragments of a body give its velocity. Either some agree, or the body is restless.
 * variance: how far the velocity of the fragments may be from that of the body. It is large for one or two
   fragments of a mover, however precise they are, and where many fragments disagree, since some are on limbs.
+* in_fixed_frame: the velocities as measurements for the filters of the tracks.
 * restless: of 6 ends or more, 70 % contradict that the body is static, whether they agree with each other or
   not. A walking person is restless most of the time.
 """
@@ -15,13 +16,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hal.compiled import compiled
 from hal.types import FloatArray
 from vision.motion.least_squares import BodyVelocities
 
-_FEW_ENDS = 2  # one fragment: enough agreeing ends if they are at least _LEAST_AGREEMENT of all
+_FEW_ENDS = 2  # one fragment: enough agreeing ends if they are at least _MIN_AGREEMENT of all
 _SOME_ENDS = 4  # two fragments: enough agreeing ends, however many others there are
 _MANY_ENDS = 6  # three fragments: fewer contradicting ends may all be on one sliding edge
-_LEAST_AGREEMENT = 0.2  # share of the ends
+_MIN_AGREEMENT = 0.2  # share of the ends
 _RESTLESS = 0.7  # share of the ends that must contradict standing still
 # Standard deviation if no ends agree. Limbs swing about as fast as their body moves. The same ones disagree
 # for half a step, so this does not average out from frame to frame as noise does.
@@ -33,14 +35,14 @@ _GAIT = 0.6  # share of the body's speed by which one limb differs from the body
 
 def restless(body: BodyVelocities) -> NDArray[np.bool_]:
     """(G,) bodies most of whose ends contradict standing still, whether they agree with each other or not."""
-    result: NDArray[np.bool_] = (body.ends >= _MANY_ENDS) & (body.unexplained >= _RESTLESS)
+    result: NDArray[np.bool_] = (body.ends >= _MANY_ENDS) & (body.contradicts_static >= _RESTLESS)
     return result
 
 
 def believable(body: BodyVelocities) -> NDArray[np.bool_]:
     """(G,) bodies whose velocity by their fragments can be believed."""
     agreeing = body.agreement * body.ends
-    alike = (agreeing >= _FEW_ENDS) & ((body.agreement >= _LEAST_AGREEMENT) | (agreeing >= _SOME_ENDS))
+    alike = (agreeing >= _FEW_ENDS) & ((body.agreement >= _MIN_AGREEMENT) | (agreeing >= _SOME_ENDS))
     result: NDArray[np.bool_] = alike | restless(body)
     return result
 
@@ -58,3 +60,28 @@ def variance(body: BodyVelocities, speed_mps: FloatArray) -> FloatArray:
         + np.square(_GAIT * speed_mps) / agreeing
     )
     return result
+
+
+@compiled("float64[:, :], float64[:, :, :], float64[:], int64[::1], float64, float64[:, :]")
+def in_fixed_frame(
+    velocity_mps: FloatArray,
+    covariance: FloatArray,
+    swing: FloatArray,
+    use: NDArray[np.intp],
+    share: float,
+    rotation: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Velocities (K, 3) of the tracks use (K,) in the fixed frame, to which rotation leads, and covariances
+    (K, 3, 3): share times the given ones, plus swing, the variance by limbs, in each direction."""
+    velocity, noise = np.zeros((len(use), 3)), np.zeros((len(use), 3, 3))
+    for k in range(len(use)):
+        t = use[k]
+        for i in range(3):
+            for m in range(3):
+                velocity[k, i] += rotation[i, m] * velocity_mps[t, m]
+            for j in range(3):
+                for m in range(3):
+                    for n in range(3):
+                        noise[k, i, j] += rotation[i, m] * covariance[t, m, n] * share * rotation[j, n]
+            noise[k, i, i] += swing[t]
+    return velocity, noise

@@ -19,7 +19,7 @@ from hal.types import FloatArray
 _FLOOR_SIGMA_MPS = 0.03  # added sigma: error of the camera's own motion, which no filter models
 _CONTRADICTION_SIGMAS = 2.5  # 99 % of equal velocities differ by less
 _CONFIRMING_SIGMAS = 2.5  # as clear as a contradiction has to be
-_LEAST_LEVEL = 1e-6  # lower bound of a length: in a vertical line of sight no direction is level
+_MIN_LEVEL = 1e-6  # lower bound of a length: in a vertical line of sight no direction is level
 _FLOOR = _FLOOR_SIGMA_MPS**2
 _AXES = 3
 _NOWHERE = np.zeros(3)
@@ -57,7 +57,9 @@ class Split:
         )
 
 
-def split(velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray | None) -> Split:
+def decompose(
+    velocity: FloatArray, covariance: FloatArray, sight: FloatArray, up: FloatArray | None
+) -> Split:
     """Split velocity (..., T, 3) with covariance (..., T, 3, 3).
 
     sight (T, 3): unit vectors along the lines of sight. up (3,): the floor's normal, None if not known.
@@ -109,28 +111,32 @@ def _squared_sigmas(vector: FloatArray, covariance: FloatArray) -> float:
 
 
 @inlined
-def _put_across(covariance: FloatArray, variance: float, sight: FloatArray, doubt: FloatArray) -> None:
-    """Put the covariance across sight s (3,), (I - s s') C (I - s s'), into doubt (3, 3).
+def _put_across(covariance: FloatArray, variance: float, sight: FloatArray, regularised: FloatArray) -> None:
+    """Put the covariance across sight s (3,), (I - s s') C (I - s s'), into regularised (3, 3).
 
-    variance: s' C s. Along s the entry is set to 1, so that doubt has an inverse.
+    variance: s' C s. Along s the entry is set to 1, so that regularised has an inverse.
     """
     for i in range(_AXES):
         for j in range(_AXES):
             mixed = 0.0
             for k in range(_AXES):
                 mixed += sight[i] * sight[k] * covariance[k, j] + covariance[i, k] * sight[k] * sight[j]
-            doubt[i, j] = covariance[i, j] - mixed + (variance + 1.0) * sight[i] * sight[j]
+            regularised[i, j] = covariance[i, j] - mixed + (variance + 1.0) * sight[i] * sight[j]
 
 
 @inlined
-def _put_aside(sight: FloatArray, up: FloatArray, aside: FloatArray) -> None:
-    """Put the unit vector perpendicular to sight and up into aside (3,)."""
-    aside[0] = sight[1] * up[2] - sight[2] * up[1]
-    aside[1] = sight[2] * up[0] - sight[0] * up[2]
-    aside[2] = sight[0] * up[1] - sight[1] * up[0]
-    length = math.sqrt(aside[0] * aside[0] + aside[1] * aside[1] + aside[2] * aside[2])
+def _put_level_direction(sight: FloatArray, up: FloatArray, level_direction: FloatArray) -> None:
+    """Put the unit vector perpendicular to sight and up into level_direction (3,)."""
+    level_direction[0] = sight[1] * up[2] - sight[2] * up[1]
+    level_direction[1] = sight[2] * up[0] - sight[0] * up[2]
+    level_direction[2] = sight[0] * up[1] - sight[1] * up[0]
+    length = math.sqrt(
+        level_direction[0] * level_direction[0]
+        + level_direction[1] * level_direction[1]
+        + level_direction[2] * level_direction[2]
+    )
     for i in range(_AXES):
-        aside[i] /= max(length, _LEAST_LEVEL)
+        level_direction[i] /= max(length, _MIN_LEVEL)
 
 
 @compiled("float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[::1]")
@@ -144,23 +150,23 @@ def _parts(
     count = len(velocity)
     value, variance, rest = np.empty(count), np.empty(count), np.empty((count, _AXES))
     along, across, total, level = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
-    doubt, aside = np.empty((_AXES, _AXES)), np.empty(_AXES)
+    regularised, level_direction = np.empty((_AXES, _AXES)), np.empty(_AXES)
     for k in range(count):
         own, spread, towards = velocity[k], covariance[k], sight[k % len(sight)]
         value[k], variance[k] = _component(own, spread, towards)
         along[k] = value[k] * value[k] / (variance[k] + _FLOOR)
         for i in range(_AXES):
             rest[k, i] = own[i] - value[k] * towards[i]
-        _put_across(spread, variance[k], towards, doubt)
+        _put_across(spread, variance[k], towards, regularised)
         for i in range(_AXES):
-            doubt[i, i] += _FLOOR
-        across[k] = _squared_sigmas(rest[k], doubt)
-        doubt[:] = spread
+            regularised[i, i] += _FLOOR
+        across[k] = _squared_sigmas(rest[k], regularised)
+        regularised[:] = spread
         for i in range(_AXES):
-            doubt[i, i] += _FLOOR
-        total[k] = _squared_sigmas(own, doubt)
-        _put_aside(towards, up, aside)
-        sideways, sideways_variance = _component(own, spread, aside)
+            regularised[i, i] += _FLOOR
+        total[k] = _squared_sigmas(own, regularised)
+        _put_level_direction(towards, up, level_direction)
+        sideways, sideways_variance = _component(own, spread, level_direction)
         level[k] = sideways * sideways / (sideways_variance + _FLOOR)
     return value, variance, rest, along, across, total, level
 

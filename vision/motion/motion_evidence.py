@@ -12,7 +12,7 @@ from hal.types import FloatArray
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
 from vision.depth.depth_noise import depth_sigma_m
-from vision.detection import LEAST_AGREEMENT, Detection
+from vision.detection import MIN_AGREEMENT, Detection
 from vision.motion.least_squares import BodyVelocities
 from vision.motion.limbs import believable, restless
 
@@ -20,7 +20,7 @@ from vision.motion.limbs import believable, restless
 _AGREED = 0.65
 # Minimum weight of a frame's proof, where hardly enough fragments agree: two people in front of the camera
 # may be half of what it sees.
-_LEAST_BORNE_OUT = 0.2
+_MIN_BORNE_OUT = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,14 +36,14 @@ class MotionEvidence:
     ends: number of ends that own_velocity rests on.
     agreement: share of these that agree with it.
     restless: most ends contradict standing still, whether they agree with each other or not.
-    unrest_s: for how long the track has been restless.
+    restless_s: for how long the track has been restless.
     arrived, cells: of the surface.
     size_m: largest extent of the surface.
-    clean_s: for how long the centre has measured the velocity without a break.
+    velocity_measured_s: for how long the centre has measured the velocity without a break.
     view_radps: how fast the viewing direction changes.
     growth_mps: speed of the centre that a growing or shrinking visible part can explain.
-    goes: the centre really advances about as fast as the velocity says.
-    guessed: the border to the static surface beside it is a guess.
+    advances: the centre really advances about as fast as the velocity says.
+    border_is_guess: the border to the static surface beside it is a guess.
     up: the floor's normal, (3,); None where it is not known.
     trusted: the camera's motion is known.
     reckoned: it is supported by odometry, not by the images alone.
@@ -62,15 +62,15 @@ class MotionEvidence:
     ends: NDArray[np.intp]
     agreement: FloatArray
     restless: NDArray[np.bool_]
-    unrest_s: FloatArray
+    restless_s: FloatArray
     arrived: NDArray[np.intp]
     cells: NDArray[np.intp]
     size_m: FloatArray
-    clean_s: FloatArray
+    velocity_measured_s: FloatArray
     view_radps: FloatArray
     growth_mps: FloatArray
-    goes: NDArray[np.bool_]
-    guessed: NDArray[np.bool_]
+    advances: NDArray[np.bool_]
+    border_is_guess: NDArray[np.bool_]
     up: FloatArray | None
     trusted: bool
     reckoned: bool
@@ -81,14 +81,14 @@ def evidence_of(
     tracks: Tracks,
     detection: Detection,
     body: BodyVelocities,
-    goes: NDArray[np.bool_],
+    advances: NDArray[np.bool_],
     arrived: NDArray[np.intp],
     cells: NDArray[np.intp],
     noise: DepthNoise,
 ) -> MotionEvidence:
     """Gather the evidence of this frame; the filters of tracks have to be updated before.
 
-    body: velocities of the tracks by their fragments. goes, arrived, cells (T,): see MotionEvidence.
+    body: velocities of the tracks by their fragments. advances, arrived, cells (T,): see MotionEvidence.
     """
     rotation = detection.pose.rotation
     sight, distance_m = tracks.sight(detection.pose.translation_m)
@@ -105,16 +105,16 @@ def evidence_of(
         ends=np.where(believable(body), body.ends, 0),
         agreement=body.agreement,
         restless=restless(body),
-        unrest_s=tracks.unrest_s,
+        restless_s=tracks.restless_s,
         arrived=arrived,
         cells=cells,
         size_m=tracks.extent_m.max(axis=1),
-        clean_s=tracks.clean_s,
+        velocity_measured_s=tracks.velocity_measured_s,
         growth_mps=tracks.growth_mps,
-        up=sightings.up(detection),
+        up=sightings.floor_normal(detection),
         view_radps=sightings.view_radps(detection, sight, distance_m),
-        goes=goes,
-        guessed=tracks.guessed,
+        advances=advances,
+        border_is_guess=tracks.border_is_guess,
         trusted=detection.motion_known,
         reckoned=detection.reckoned,
         borne_out=borne_out(detection),
@@ -129,5 +129,5 @@ def borne_out(detection: Detection) -> float:
     """
     if detection.reckoned:
         return 1.0
-    spare = (detection.ego_motion.inlier_ratio - LEAST_AGREEMENT) / (_AGREED - LEAST_AGREEMENT)
-    return min(spare, 1.0) if spare > _LEAST_BORNE_OUT else _LEAST_BORNE_OUT  # NaN gives the minimum
+    spare = (detection.ego_motion.inlier_ratio - MIN_AGREEMENT) / (_AGREED - MIN_AGREEMENT)
+    return min(spare, 1.0) if spare > _MIN_BORNE_OUT else _MIN_BORNE_OUT  # NaN gives the minimum

@@ -22,21 +22,20 @@ from numpy.typing import NDArray
 from hal.compiled import compiled
 from hal.types import FloatArray
 
-_LEAST_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
-# Row of the table for each entry of a symmetric (3, 3) matrix, of which only six differ.
-_ALL = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+STATIC_END_CHI2 = 6.0  # of static_chi2: 95 % of static ends lie below; 2 degrees of freedom
+_MIN_DETERMINANT = 1e-18  # m^4, of a covariance: a lower bound that avoids a division by 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PointMotion:
+class EndResiduals:
     """Residuals of N tracked points, in the present camera axes. Symbols: see the module docstring.
 
     static_m: S, where the point would be if it were static, (N, 3).
     ray: x', y', (N, 2).
     lag_s: T, (N,).
-    miss_m: x' Z - X, y' Z - Y; zero for a static point, (N, 2).
-    covariance: xx, xy, yy of miss_m in m^2, from pixels and the camera's pose, (N, 3).
-    depth_effect: change of miss_m by one sigma of the anchor's depth, (N, 2).
+    residual_m: x' Z - X, y' Z - Y; zero for a static point, (N, 2).
+    covariance: xx, xy, yy of residual_m in m^2, from pixels and the camera's pose, (N, 3).
+    depth_effect: change of residual_m by one sigma of the anchor's depth, (N, 2).
     depth_step_m: z' - Z, NaN where depth is missing, (N,).
     depth_step_sigma_m: its standard deviation, (N,).
     depth_lag_s: time in which it came about, (N,). It is longer than T, since Z is an average over the frames
@@ -48,7 +47,7 @@ class PointMotion:
     static_m: FloatArray
     ray: FloatArray
     lag_s: FloatArray
-    miss_m: FloatArray
+    residual_m: FloatArray
     covariance: FloatArray
     depth_effect: FloatArray
     depth_step_m: FloatArray
@@ -58,61 +57,39 @@ class PointMotion:
     usable: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NormalEquations:
-    """Normal equations of the weighted least squares for V, one column of table (12, N) per point.
+def normal_equations(motion: EndResiduals, weight: FloatArray) -> FloatArray:
+    """Normal equations of the weighted least squares for V, (12, N): one column per point.
 
-    Rows 0 to 5: entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right-hand side. Rows 9
-    to 11 (doubt): right-hand side for one sigma of a depth error common to all points of a body.
+    From the two image equations of each point, weighted by their covariance and weight (N,). Rows 0 to 5:
+    entries 00, 01, 02, 11, 12, 22 of the symmetric matrix. Rows 6 to 8: right-hand side. Rows 9 to 11:
+    right-hand side for one sigma of a depth error common to all points of a body.
     """
-
-    table: FloatArray
-
-    @property
-    def matrix(self) -> FloatArray:
-        """(N, 3, 3), of each point."""
-        return self.table.take(_ALL, axis=0).transpose(2, 0, 1)
-
-    @property
-    def rhs(self) -> FloatArray:
-        """(N, 3) right-hand side."""
-        return self.table[6:9].T
-
-    @property
-    def doubt(self) -> FloatArray:
-        """(N, 3) right-hand side for one sigma of a common depth error."""
-        return self.table[9:].T
-
-
-def normal_equations(motion: PointMotion, weight: FloatArray) -> NormalEquations:
-    """The two image equations of each point, weighted by their covariance and weight (N,)."""
-    table = _equations(
+    return _equations(
         np.ascontiguousarray(motion.ray),
         np.ascontiguousarray(motion.lag_s),
-        np.ascontiguousarray(motion.miss_m),
+        np.ascontiguousarray(motion.residual_m),
         np.ascontiguousarray(motion.covariance),
         np.ascontiguousarray(motion.depth_effect),
         np.ascontiguousarray(weight),
     )
-    return NormalEquations(table)
 
 
 @compiled("float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1]")
 def _equations(
     ray: FloatArray,
     lag_s: FloatArray,
-    miss_m: FloatArray,
+    residual_m: FloatArray,
     covariance: FloatArray,
     depth_effect: FloatArray,
     weight: FloatArray,
 ) -> FloatArray:
-    """(12, N) table of NormalEquations. Zero where weight is zero, even if other inputs are NaN there."""
+    """As normal_equations. Zero where weight is zero, even if other inputs are NaN there."""
     table = np.zeros((12, len(weight)))
     for k in range(len(weight)):
         if weight[k] == 0.0:
             continue
         xx, xy, yy = covariance[k]
-        scale = weight[k] * lag_s[k] / max(xx * yy - xy * xy, _LEAST_DETERMINANT)
+        scale = weight[k] * lag_s[k] / max(xx * yy - xy * xy, _MIN_DETERMINANT)
         pxx, pxy, pyy = yy * scale, -xy * scale, xx * scale
         x, y = ray[k]
         # Rows (1, 0, -x') T and (0, 1, -y') T with information [[pxx, pxy], [pxy, pyy]].
@@ -123,7 +100,7 @@ def _equations(
         table[3, k] = pyy * lag_s[k]
         table[4, k] = qy * lag_s[k]
         table[5, k] = -(qx * x + qy * y) * lag_s[k]
-        for row, vector in ((6, miss_m[k]), (9, depth_effect[k])):
+        for row, vector in ((6, residual_m[k]), (9, depth_effect[k])):
             a, b = vector
             table[row, k] = pxx * a + pxy * b
             table[row + 1, k] = pxy * a + pyy * b

@@ -28,7 +28,7 @@ def predict(
     which a velocity decays, since bodies stay on the floor; None where the floor is not known.
     """
     lost, along = (0.0, _NOWHERE) if up is None else (1.0 - math.exp(-dt_s / _VERTICAL_S), up)
-    return _carried(
+    return _predicted(
         np.ascontiguousarray(state),
         np.ascontiguousarray(covariance),
         np.ascontiguousarray(along),
@@ -50,7 +50,7 @@ def update(
     measured (T, 3), noise (T, 3, 3): the measurement and its covariance. first: index of the first entry
     measured, 0 for position and 3 for velocity.
     """
-    return _corrected(
+    return _updated(
         np.ascontiguousarray(state),
         np.ascontiguousarray(covariance),
         np.ascontiguousarray(measured),
@@ -59,7 +59,7 @@ def update(
     )
 
 
-def place(
+def reset_position(
     state: FloatArray, covariance: FloatArray, position: FloatArray, noise: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Set the positions of states (T, 6) to position (T, 3) with covariance noise (T, 3, 3).
@@ -75,7 +75,7 @@ def place(
 
 
 @inlined
-def _carry(vector: FloatArray, up: FloatArray, lost: float, dt_s: float) -> None:
+def _propagate(vector: FloatArray, up: FloatArray, lost: float, dt_s: float) -> None:
     """Move a vector (6,), position then velocity, dt_s ahead.
 
     lost: the share of its velocity along up (3,) that decays in this time.
@@ -87,7 +87,7 @@ def _carry(vector: FloatArray, up: FloatArray, lost: float, dt_s: float) -> None
 
 
 @compiled("float64[:, ::1], float64[:, :, ::1], float64[::1], float64, float64, float64")
-def _carried(
+def _predicted(
     state: FloatArray,
     covariance: FloatArray,
     up: FloatArray,
@@ -98,12 +98,12 @@ def _carried(
     """As predict. The linear map is applied to each column of a covariance, then to each row."""
     new_state, new_covariance = state.copy(), covariance.copy()
     for t in range(len(state)):
-        _carry(new_state[t], up, lost, dt_s)
+        _propagate(new_state[t], up, lost, dt_s)
         spread = new_covariance[t]
         for j in range(_UNKNOWNS):
-            _carry(spread[:, j], up, lost, dt_s)
+            _propagate(spread[:, j], up, lost, dt_s)
         for i in range(_UNKNOWNS):
-            _carry(spread[i], up, lost, dt_s)
+            _propagate(spread[i], up, lost, dt_s)
         for i in range(3):
             spread[i, i] += accel_density * dt_s**3 / 3.0
             spread[i, i + 3] += accel_density * dt_s**2 / 2.0
@@ -129,7 +129,7 @@ def _invert(matrix: FloatArray, result: FloatArray) -> None:
 
 
 @inlined
-def _add_carried(change: FloatArray, covariance: FloatArray, result: FloatArray) -> None:
+def _add_propagated(change: FloatArray, covariance: FloatArray, result: FloatArray) -> None:
     """Add change C change^T to result (6, 6), for a covariance C (K, K) and change (6, K)."""
     for i in range(_UNKNOWNS):
         for j in range(len(covariance)):
@@ -141,28 +141,28 @@ def _add_carried(change: FloatArray, covariance: FloatArray, result: FloatArray)
 
 
 @compiled("float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], int64")
-def _corrected(
+def _updated(
     state: FloatArray, covariance: FloatArray, measured: FloatArray, noise: FloatArray, first: int
 ) -> tuple[FloatArray, FloatArray]:
     """As update."""
     new_state, new_covariance = state.copy(), np.zeros_like(covariance)
-    doubt, trust = np.empty((_MEASURED, _MEASURED)), np.empty((_MEASURED, _MEASURED))
+    innovation_covariance, information = np.empty((_MEASURED, _MEASURED)), np.empty((_MEASURED, _MEASURED))
     gain, keep = np.empty((_UNKNOWNS, _MEASURED)), np.empty((_UNKNOWNS, _UNKNOWNS))
     for t in range(len(state)):
         for i in range(_MEASURED):
             for j in range(_MEASURED):
-                doubt[i, j] = covariance[t, first + i, first + j] + noise[t, i, j]
-        _invert(doubt, trust)
+                innovation_covariance[i, j] = covariance[t, first + i, first + j] + noise[t, i, j]
+        _invert(innovation_covariance, information)
         for i in range(_UNKNOWNS):
             for j in range(_UNKNOWNS):
                 keep[i, j] = 1.0 if i == j else 0.0
             for j in range(_MEASURED):
                 gain[i, j] = 0.0
                 for m in range(_MEASURED):
-                    gain[i, j] += covariance[t, i, first + m] * trust[m, j]
+                    gain[i, j] += covariance[t, i, first + m] * information[m, j]
                 keep[i, first + j] -= gain[i, j]
                 new_state[t, i] += gain[i, j] * (measured[t, j] - state[t, first + j])
         # Joseph form: stays symmetric and positive definite despite rounding.
-        _add_carried(keep, covariance[t], new_covariance[t])
-        _add_carried(gain, noise[t], new_covariance[t])
+        _add_propagated(keep, covariance[t], new_covariance[t])
+        _add_propagated(gain, noise[t], new_covariance[t])
     return new_state, new_covariance

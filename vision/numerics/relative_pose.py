@@ -7,6 +7,7 @@ import numpy as np
 from hal.compiled import inlined
 from hal.types import FloatArray
 
+NEAREST_M = np.float32(0.1)  # the projection of a nearer point is meaningless
 # One row of the relative transform: three entries of the rotation, and the translation in metres.
 Row = tuple[np.float32, np.float32, np.float32, np.float32]
 

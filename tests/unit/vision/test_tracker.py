@@ -12,7 +12,7 @@ from hal.types import FloatArray, Pose
 from tests.support.detections import AT_ORIGIN, FRAME_NS, detection, no_ends, track
 from tests.support.grids import CAMERA, grid_of, nearest, no_depth, plate, wall
 from vision.detection import no_motion
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 from vision.percept import Percept
 from vision.scene import Obstacle
 from vision.tracker import Tracker
@@ -242,12 +242,12 @@ def test_what_has_left_the_view_is_not_shown_any_longer() -> None:
 
 def test_a_break_in_sight_begins_the_surfaces_proof_anew() -> None:
     eyes = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
-    clean_s = []
+    velocity_measured_s = []
     for k, depth_m in enumerate([walker(-0.9 + way_m(k)) for k in range(15)] + [no_depth()] * 3):
         eyes.step(detection(grid_of(depth_m, None, 1.0), k), None)
-        clean_s.append(float(eyes._tracks.clean_s.max()))
-    assert clean_s[14] > 0.2
-    assert clean_s[15:] == [0.0, 0.0, 0.0]
+        velocity_measured_s.append(float(eyes._tracks.velocity_measured_s.max()))
+    assert velocity_measured_s[14] > 0.2
+    assert velocity_measured_s[15:] == [0.0, 0.0, 0.0]
 
 
 def owner_of(left_px: float, near_m: float, before: FloatArray) -> tuple[int, Percept]:
@@ -255,7 +255,7 @@ def owner_of(left_px: float, near_m: float, before: FloatArray) -> tuple[int, Pe
     tracker = Tracker(PerceptionConfig(), 0.8, 0.05)
     ends = np.array([[[left_px, 60.0], [left_px, 110.0]]], np.float32)
     motion = no_ends()
-    two = {name: np.ones((2, *getattr(motion, name).shape[1:])) for name in PointMotion.__slots__}
+    two = {name: np.ones((2, *getattr(motion, name).shape[1:])) for name in EndResiduals.__slots__}
     for frame in range(3):
         seen = replace(
             detection(grid_of(before), frame),
@@ -263,7 +263,7 @@ def owner_of(left_px: float, near_m: float, before: FloatArray) -> tuple[int, Pe
             ends_px=ends,
             near_m=np.full((1, 2), near_m, np.float32),
             age_frames=np.array([frame]),
-            motion=PointMotion(**{**two, "usable": np.zeros(2, np.bool_)}),
+            motion=EndResiduals(**{**two, "usable": np.zeros(2, np.bool_)}),
         )
         percept = tracker.step(seen, None)
     return int(percept.fragments.obstacle_id[0]), percept

@@ -23,15 +23,15 @@ def test_a_mover_that_lost_all_of_its_parts_is_not_shown_a_frame_longer(
 ) -> None:
     """Nor does it get them back by another way; what is merely not seen is shown for a moment."""
 
-    def withdraw(ballot: votes.Ballot, *_: object) -> tuple[votes.Ballot, NDArray[np.bool_]]:
-        nobody = np.zeros_like(ballot.present)
-        return votes.elect(nobody, ballot.cast), np.full(nobody.shape[1], hides)
+    def drop_overdue_movers(ballot: votes.Ballot, *_: object) -> tuple[votes.Ballot, NDArray[np.bool_]]:
+        nobody = np.zeros_like(ballot.claims)
+        return votes.elect(nobody, ballot.votes_of), np.full(nobody.shape[1], hides)
 
     tracker = Tracker(PerceptionConfig(), body_height_m=1.5, clearance_m=0.05)
     for k in range(30):
         percept = tracker.step(detection(grid_of(nearest(walker(-0.7 + way_m(k)), _BACK)), k), None)
     (before,) = moving(percept)
-    monkeypatch.setattr(votes, "withdraw", withdraw)
+    monkeypatch.setattr(votes, "drop_overdue_movers", drop_overdue_movers)
     percept = tracker.step(detection(grid_of(nearest(walker(-0.7 + way_m(30)), _BACK)), 30), None)
     assert [one.id for one in moving(percept)] == ([] if hides else [before.id])
 

@@ -9,7 +9,7 @@ from config.perception import DepthNoise
 from hal.types import FloatArray, Pose
 from tests.support.detections import AT_ORIGIN
 from tests.support.grids import grid_of, nearest, no_depth, plate, wall
-from vision.bodies.arrivals import FreeMemory
+from vision.bodies.arrivals import ARRIVED_UP_TO_S, ViewMemory
 from vision.depth.depth_grid import BoolGrid
 
 NOISE = DepthNoise(floor_m=0.005, quadratic_per_m=0.0075)
@@ -18,15 +18,15 @@ BODY = plate(3.0, (-0.3, 0.3), (-0.5, 0.5))
 MS = 1_000_000
 
 
-def memory(*views: tuple[int, FloatArray], pose: Pose = AT_ORIGIN) -> FreeMemory:
+def memory(*views: tuple[int, FloatArray], pose: Pose = AT_ORIGIN) -> ViewMemory:
     """Has seen the views: (milliseconds, depth)."""
-    kept = FreeMemory(NOISE)
+    kept = ViewMemory(NOISE)
     for stamp_ms, depth_m in views:
         kept.remember(grid_of(depth_m), pose, stamp_ms * MS)
     return kept
 
 
-def arrived(kept: FreeMemory, depth_m: FloatArray, now_ms: int = 200, pose: Pose = AT_ORIGIN) -> BoolGrid:
+def arrived(kept: ViewMemory, depth_m: FloatArray, now_ms: int = 200, pose: Pose = AT_ORIGIN) -> BoolGrid:
     grid = grid_of(depth_m)
     return kept.changes(grid, grid.valid, pose, now_ms * MS).arrived
 
@@ -44,6 +44,12 @@ def test_what_stands_where_the_wall_was_seen_has_arrived() -> None:
     found = arrived(memory((0, BACK)), nearest(BODY, BACK))
     assert found[inner(BODY)].all()
     assert not found[BODY == 0.0].any()
+
+
+@pytest.mark.parametrize(("after_s", "still"), [(-0.01, True), (0.01, False)])
+def test_what_has_come_to_rest_has_arrived_for_no_longer_than_it_says(after_s: float, still: bool) -> None:
+    now_ms = round(1e3 * (ARRIVED_UP_TO_S + after_s))
+    assert arrived(memory((0, BACK)), nearest(BODY, BACK), now_ms).any() == still
 
 
 def test_what_stood_there_before_has_not() -> None:
@@ -92,7 +98,7 @@ def test_a_wall_that_comes_into_range_has_not_arrived() -> None:
 
 def test_nor_has_one_that_comes_to_where_16_bits_end() -> None:
     """With units of 0.1 mm a wall 6.9 m away was cut off to 6.55 m, and was not seen through up to 10 m."""
-    ahead, kept = Pose(np.eye(3), np.array([0.0, 0.0, 0.6])), FreeMemory(NOISE)
+    ahead, kept = Pose(np.eye(3), np.array([0.0, 0.0, 0.6])), ViewMemory(NOISE)
     kept.remember(grid_of(wall(6.9), most_m=6.55), AT_ORIGIN, 0)
     assert not arrived(kept, wall(6.3), pose=ahead).any()
 
@@ -185,5 +191,5 @@ def test_what_has_arrived_is_told_as_flat_cells_too() -> None:
     grid = grid_of(nearest(BODY, BACK))
     changes = memory((0, BACK)).changes(grid, grid.valid, AT_ORIGIN, 200 * MS)
     np.testing.assert_array_equal(changes.arrived_cells, np.flatnonzero(changes.arrived))
-    nothing = FreeMemory(NOISE).changes(grid, grid.valid, AT_ORIGIN, 200 * MS)
+    nothing = ViewMemory(NOISE).changes(grid, grid.valid, AT_ORIGIN, 200 * MS)
     assert len(nothing.arrived_cells) == 0

@@ -17,7 +17,7 @@ from vision.bodies.tracks import Tracks
 from vision.depth import regions
 from vision.detection import Detection
 from vision.motion import least_squares
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 
 CONFIG = PerceptionConfig()
 FRAME = 12
@@ -128,7 +128,7 @@ def test_nothing_is_cut_out_of_something_compact() -> None:
 
 
 @pytest.mark.parametrize(
-    ("width_m", "stands", "calm_s", "cut"),
+    ("width_m", "stands", "no_evidence_s", "cut"),
     [
         (1.4, True, np.inf, True),
         (1.4, True, 0.9, True),
@@ -139,13 +139,13 @@ def test_nothing_is_cut_out_of_something_compact() -> None:
     ],
 )
 def test_who_comes_up_to_a_table_whose_lines_stand_is_cut_out_of_it(
-    width_m: float, stands: bool, calm_s: float, cut: bool
+    width_m: float, stands: bool, no_evidence_s: float, cut: bool
 ) -> None:
     """What has come to rest a moment ago is where free space was, too: that one is left whole, and so is who
     begins to go and is no wider than a body."""
     table = plate(4.0, (-0.5 * width_m, 0.5 * width_m), (-0.8, 0.8))
     tracks = one_track()
-    tracks.stands[:], tracks.calm_s[:] = stands, calm_s
+    tracks.surely_static[:], tracks.no_evidence_s[:] = stands, no_evidence_s
     _, after = carve(tracks, PERSON & (table > 0.0), table, table > 0.0)
     assert (after == 2).any() == cut
 
@@ -176,11 +176,11 @@ def fragments(columns: list[int], speed_mps: float, chi2: float) -> Detection:
     ray = np.stack((x, y), axis=1)
     lag_s = np.full(2 * count, 0.2)
     miss = np.stack((np.full(2 * count, speed_mps * 0.2), np.zeros(2 * count)), axis=1)
-    motion = PointMotion(
+    motion = EndResiduals(
         static_m=np.column_stack((ray * 4.0 - miss, np.full(2 * count, 4.0))),
         ray=ray,
         lag_s=lag_s,
-        miss_m=miss,
+        residual_m=miss,
         covariance=np.tile([1e-5, 0.0, 1e-5], (2 * count, 1)),
         depth_effect=np.zeros((2 * count, 2)),
         depth_step_m=np.zeros(2 * count),
@@ -232,10 +232,10 @@ def test_a_single_fragment_that_has_gone_one_way_for_a_while_is_enough(
 ) -> None:
     """Somebody in plain clothes walks along a wall: depth cannot tell him from it."""
     seen = fragments([150], speed_mps, 60.0)
-    miss_m = seen.motion.miss_m.copy()
-    miss_m[:, 1] = -upwards * miss_m[:, 0]
+    residual_m = seen.motion.residual_m.copy()
+    residual_m[:, 1] = -upwards * residual_m[:, 0]
     covariance = np.tile([sigma_m**2, 0.0, sigma_m**2], (2, 1))
-    motion = replace(seen.motion, miss_m=miss_m, covariance=covariance)
+    motion = replace(seen.motion, residual_m=residual_m, covariance=covariance)
     seen = replace(seen, motion=motion, age_frames=np.full(1, frames, np.intp))
     tracks = one_track()
     before, after = carve(tracks, NOWHERE, seen=seen)

@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 from hal.types import FloatArray
 from tests.support.grids import LEVEL_UP, X, grid_of, labelled, nearest, plate
 from vision.bodies import division
-from vision.bodies.merging import join
+from vision.bodies.merging import merge_labels
 from vision.depth.depth_grid import BoolGrid, DepthGrid
 
 
-def split(
+def second_of(
     grid: DepthGrid, labels: NDArray[np.int32], track: int, stayed: BoolGrid | None = None, way_m: float = 1.0
 ) -> NDArray[np.intp] | None:
     """Nothing has stayed where it was, unless said otherwise."""
-    return division.split(grid, labels, track, nothing(labels) if stayed is None else stayed, way_m)
+    return division.second_body(grid, labels, track, nothing(labels) if stayed is None else stayed, way_m)
 
 
 def nothing(labels: NDArray[np.int32]) -> BoolGrid:
@@ -36,7 +36,7 @@ def two_people(gap_m: float, bridge: bool = True) -> tuple[DepthGrid, NDArray[np
 
 def test_two_people_hand_in_hand_are_divided_between_them() -> None:
     grid, labels = two_people(0.4)
-    second = split(grid, labels, 0)
+    second = second_of(grid, labels, 0)
     assert second is not None
     columns = second % labels.shape[1]
     side = np.sign(X[columns])
@@ -50,37 +50,37 @@ def test_two_people_hand_in_hand_are_divided_between_them() -> None:
 def test_a_valley_is_lower_than_a_third_of_both_sides(share: float, divided: bool) -> None:
     left, right = plate(3.0, (-0.7, -0.25), (-0.7, 0.9)), plate(3.0, (0.25, 0.7), (-0.7, 0.9))
     depth_m = nearest(left, right, plate(3.0, (-0.25, 0.25), (0.9 - 1.6 * share, 0.9)))
-    assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is not None) == divided
+    assert (second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0) is not None) == divided
 
 
 def test_a_part_that_would_be_divided_from_one_goes_to_the_next() -> None:
     grid, labels = two_people(0.4)
     labels = np.where(labels == 0, 0, np.where(X < 0.0, 1, 2)[None, :]).astype(np.int32)
     labels[-labels.shape[0] // 2 :][labels[-labels.shape[0] // 2 :] == 2] = 3  # the right one's legs
-    joined, gone = join(grid, labels, [(1, 0), (2, 1)], labels > 0, np.ones(3))
+    joined, gone = merge_labels(grid, labels, [(1, 0), (2, 1)], labels > 0, np.ones(3))
     assert gone == [2]
     np.testing.assert_array_equal(joined, np.where(labels == 3, 2, labels))
     # Nothing goes where nothing is left.
-    assert join(grid, labels, [(2, 1), (2, 0), (1, 2)], labels > 0, np.ones(3))[1] == [2]
+    assert merge_labels(grid, labels, [(2, 1), (2, 0), (1, 2)], labels > 0, np.ones(3))[1] == [2]
 
 
 def test_only_the_cells_of_that_track_are_divided() -> None:
     grid, labels = two_people(0.4)
     both = np.where(labels == 1, np.int32(2), np.int32(0)).astype(np.int32)
-    assert split(grid, both, 0) is None
-    assert split(grid, both, 1) is not None
+    assert second_of(grid, both, 0) is None
+    assert second_of(grid, both, 1) is not None
 
 
 @pytest.mark.parametrize("width_m", [0.6, 1.4, 2.0])
 def test_a_crate_is_one_however_wide(width_m: float) -> None:
     depth_m = plate(3.0, (-width_m / 2, width_m / 2), (-0.4, 0.6))
-    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+    assert second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
 
 
 def test_one_person_with_arms_stretched_out_is_one() -> None:
     body, arms = plate(3.0, (-0.2, 0.2), (-0.7, 0.9)), plate(3.0, (-0.55, 0.55), (-0.4, -0.25))
     depth_m = nearest(body, arms)
-    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+    assert second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
 
 
 def test_a_few_cells_are_not_divided() -> None:
@@ -89,7 +89,7 @@ def test_a_few_cells_are_not_divided() -> None:
     chosen = np.flatnonzero(labels)[::40]
     assert len(chosen) < 48
     sparse.ravel()[chosen] = 1
-    assert split(grid, sparse, 0) is None
+    assert second_of(grid, sparse, 0) is None
 
 
 def test_what_is_seen_through_a_body_is_not_divided_from_it() -> None:
@@ -99,7 +99,7 @@ def test_what_is_seen_through_a_body_is_not_divided_from_it() -> None:
     beside = plate(3.2, (0.9, 1.3), (0.6, 1.0))
     for far, one in ((wheel, True), (beside, False)):
         depth_m = nearest(front, far)
-        assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0, depth_m > 0.0) is None) == one
+        assert (second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0, depth_m > 0.0) is None) == one
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_what_is_low_beside_a_body_is_divided_from_it_if_it_stands(
     person, trolley = plate(3.0, (0.3, 0.7), (-0.7, 0.9)), plate(3.0, (-0.7, -0.1), (0.9 - low_m, 0.9))
     depth_m = nearest(person, trolley, plate(3.0, (-0.1, 0.3), (0.2, 0.35)))
     stayed = plate(3.0, (-0.7, -0.7 + stayed_m), (-0.7, 0.9)) > 0.0
-    assert (split(grid_of(depth_m), labelled(depth_m > 0.0), 0, stayed, way_m) is not None) == divided
+    assert (second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0, stayed, way_m) is not None) == divided
 
 
 def test_one_body_behind_somebody_is_not_divided() -> None:
@@ -128,8 +128,8 @@ def test_one_body_behind_somebody_is_not_divided() -> None:
     somebody = plate(2.0, (-0.15, 0.15), (-0.5, 0.35))
     two = nearest(plate(4.0, (-0.65, -0.3), (-0.6, 0.8)), plate(4.0, (0.3, 0.65), (-0.6, 0.8)), foot)
     hidden = nearest(whole, somebody)
-    assert split(grid_of(two), labelled(two > 0.0), 0) is not None
-    assert split(grid_of(hidden), labelled(hidden == 4.0), 0) is None
+    assert second_of(grid_of(two), labelled(two > 0.0), 0) is not None
+    assert second_of(grid_of(hidden), labelled(hidden == 4.0), 0) is None
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_between_a_piece_wider_than_anybody_and_another_something_has_to_be_seen
     left, right = plate(3.0, (-0.3 - wide_m, -0.3), (-0.7, 0.9)), plate(3.0, (0.3, 0.8), (-0.7, 0.9))
     body = nearest(left, right, plate(3.0, (-0.3, 0.3), (-0.7, -0.6)))
     depth_m = np.where(body > 0.0, body, behind_m)
-    assert (split(grid_of(depth_m), labelled(body > 0.0), 0) is not None) == divided
+    assert (second_of(grid_of(depth_m), labelled(body > 0.0), 0) is not None) == divided
 
 
 def people(apart_m: float, tall_m: tuple[float, float] = (1.7, 1.7), head_m: float = 0.2) -> FloatArray:
@@ -170,7 +170,7 @@ def test_two_heads_are_two_people_however_close_they_walk(
     apart_m: float, tall_m: tuple[float, float], head_m: float, divided: bool
 ) -> None:
     depth_m = people(apart_m, tall_m, head_m)
-    second = split(grid_of(depth_m), labelled(depth_m > 0.0), 0)
+    second = second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0)
     assert (second is not None) == divided
     if second is not None:
         columns = second % depth_m.shape[1]
@@ -184,7 +184,7 @@ def test_an_arm_raised_is_no_second_head() -> None:
     arms = plate(3.0, (0.225, 0.7), (-0.5, -0.4))
     for hand in (plate(3.0, (0.6, 0.7), (-0.6, -0.4)), plate(3.0, (0.55, 0.7), (-0.8, -0.4))):
         depth_m = nearest(body, head, arms, hand)
-        assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+        assert second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
 
 
 @pytest.mark.parametrize("post_m", [0.04, 0.10, 0.15])
@@ -194,4 +194,4 @@ def test_two_posts_on_a_cart_are_no_heads(post_m: float, tall_m: float) -> None:
     cart = plate(3.0, (-0.5, 0.5), (0.0, 0.9))
     posts = [plate(3.0, (x_m - post_m / 2, x_m + post_m / 2), (-tall_m, 0.0)) for x_m in (-0.3, 0.3)]
     depth_m = nearest(cart, *posts)
-    assert split(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None
+    assert second_of(grid_of(depth_m), labelled(depth_m > 0.0), 0) is None

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from hal.types import FloatArray
 from tests.support.grids import LEVEL_UP, grid_of, labelled, nearest, plate, wall
-from vision.bodies.grounding import ground
+from vision.bodies.grounding import extend_to_floor
 from vision.depth import regions
 from vision.depth.depth_grid import BoolGrid
 
@@ -16,6 +17,7 @@ HEAD = plate(4.0, (-0.2, 0.2), (-0.7, -0.3)) > 0.0
 BODY = plate(4.0, (-0.3, 0.3), (-0.3, 0.9)) > 0.0
 UNDER_HEAD = plate(4.0, (-0.2, 0.2), (-0.3, 0.9)) > 0.0
 MOVER = np.array([True, False])
+NOISE = TYPICAL_DEPTH_NOISE
 
 
 def given(
@@ -24,12 +26,21 @@ def given(
     other: BoolGrid,
     chosen: tuple[bool, bool] = (True, False),
     mover: NDArray[np.bool_] = MOVER,
+    noise: DepthNoise = NOISE,
 ) -> tuple[BoolGrid, regions.Regions]:
     """The cells that the first track is given, and what both measure with them."""
     grid, labels = grid_of(depth_m, LEVEL_UP, 1.0), labelled(own, other)
     measured = regions.measure(grid, labels, 2)
-    whole, standing_up = ground(grid, labels, measured, np.array(chosen), mover)
+    whole, standing_up = extend_to_floor(grid, labels, measured, np.array(chosen), mover, noise)
     return (whole == 1) & (labels != 1), standing_up
+
+
+@pytest.mark.parametrize(("quadratic_per_m", "taken"), [(0.0075, True), (0.001, False)])
+def test_how_far_behind_it_goes_on_depends_on_the_noise_of_depth(quadratic_per_m: float, taken: bool) -> None:
+    """0.5 m behind, 4 m ahead: 0.3 m and two sigmas are 0.54 m with the usual noise, 0.33 m with little."""
+    depth_m = nearest(np.where(HEAD, 4.0, 0.0), np.where(BODY | UNDER_HEAD, 4.5, 0.0))
+    cells, _ = given(depth_m, HEAD, ~HEAD, noise=DepthNoise(quadratic_per_m=quadratic_per_m))
+    assert cells.any() == taken
 
 
 def test_a_head_cut_out_of_a_wall_reaches_down_to_the_floor() -> None:
@@ -88,17 +99,19 @@ def test_only_those_chosen_and_seen_are_looked_at() -> None:
     depth_m = np.where(HEAD | BODY, 4.0, 0.0)
     grid, labels = grid_of(depth_m, LEVEL_UP, 1.0), labelled(HEAD, BODY & ~HEAD)
     measured = regions.measure(grid, labels, 2)
-    whole, standing_up = ground(grid, labels, measured, np.array([False, False]), MOVER)
+    whole, standing_up = extend_to_floor(grid, labels, measured, np.array([False, False]), MOVER, NOISE)
     assert whole is labels
     assert standing_up is measured
     hidden = labelled(np.zeros_like(HEAD), BODY)
     nothing = regions.measure(grid, hidden, 2)
-    assert ground(grid, hidden, nothing, np.array([True, False]), MOVER)[0] is hidden
+    assert extend_to_floor(grid, hidden, nothing, np.array([True, False]), MOVER, NOISE)[0] is hidden
 
 
 def test_where_the_floor_is_not_known_nobody_reaches_down() -> None:
     labels = labelled(HEAD, BODY & ~HEAD)
     for up, alike in ((LEVEL_UP, False), (None, True)):
         grid = grid_of(np.where(HEAD | BODY, 4.0, 0.0), up)
-        whole, _ = ground(grid, labels, regions.measure(grid, labels, 2), np.array([True, False]), MOVER)
+        whole, _ = extend_to_floor(
+            grid, labels, regions.measure(grid, labels, 2), np.array([True, False]), MOVER, NOISE
+        )
         assert (whole is labels) == alike

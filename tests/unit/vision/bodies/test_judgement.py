@@ -228,11 +228,11 @@ def test_unrest_of_many_ends_proves_what_the_filter_says_by_half() -> None:
 
 def test_many_ends_that_deny_for_long_bear_out_a_velocity_that_is_only_likely() -> None:
     slow = {"covariance": covariance(0.14), "ends": np.array([8]), "restless": np.array([True])}  # 4.5
-    assert not rises(one(ACROSS, **slow, unrest_s=np.array([0.35])))
-    assert rises(one(ACROSS, **slow, unrest_s=np.array([0.45])))
+    assert not rises(one(ACROSS, **slow, restless_s=np.array([0.35])))
+    assert rises(one(ACROSS, **slow, restless_s=np.array([0.45])))
     unlikely = {**slow, "covariance": covariance(0.17)}  # 3.7
-    assert not rises(one(ACROSS, **unlikely, unrest_s=np.array([0.45])))
-    assert not rises(one(ACROSS, **{**slow, "ends": np.array([7])}, unrest_s=np.array([0.45])))
+    assert not rises(one(ACROSS, **unlikely, restless_s=np.array([0.45])))
+    assert not rises(one(ACROSS, **{**slow, "ends": np.array([7])}, restless_s=np.array([0.45])))
 
 
 def test_tracks_are_judged_each_by_itself() -> None:

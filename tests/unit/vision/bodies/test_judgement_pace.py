@@ -116,7 +116,7 @@ def test_a_mover_that_is_slow_or_doubtful_is_not_held(seen: MotionEvidence) -> N
 
 def test_a_mover_whose_centre_does_not_go_is_not_held() -> None:
     """Its place in the grid has fallen to the wall that it went by, its velocity goes on."""
-    stays = one(ACROSS, goes=np.array([False]))
+    stays = one(ACROSS, advances=np.array([False]))
     assert verdict(stays, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 0.3)
     came = replace(stays, arrived=np.array([10]), covariance=covariance(0.2))
     assert verdict(came, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 2.0)
@@ -162,7 +162,7 @@ def test_a_filter_that_knows_that_it_stands_ends_a_motion_as_fast() -> None:
 
 def test_nothing_holds_a_mover_that_nothing_tells_from_what_stands_around_it() -> None:
     """Its cells would go on over the wall that it went by, and bear out the velocity that has them go."""
-    ghost = one(ACROSS, guessed=np.array([True]))
+    ghost = one(ACROSS, border_is_guess=np.array([True]))
     assert verdict(ghost, 1.0, True).evidence[0] == pytest.approx(1.0 - DT_S / 0.12)
     told = replace(ghost, ends=np.array([2]), agreement=np.array([1.0]))
     for seen in (told, replace(ghost, arrived=np.array([10])), one(ACROSS)):
@@ -173,8 +173,8 @@ def test_nothing_holds_a_mover_that_nothing_tells_from_what_stands_around_it() -
 def test_a_verdict_tells_who_stands_for_sure() -> None:
     stands = {"own_velocity": np.zeros((1, 3)), "own_covariance": covariance(0.0025)}
     seen = one(STILL, **stands, ends=np.array([4]), agreement=np.array([1.0]))
-    assert verdict(seen).stands[0]
-    assert not verdict(replace(seen, ends=np.array([3]))).stands[0]
+    assert verdict(seen).surely_static[0]
+    assert not verdict(replace(seen, ends=np.array([3]))).surely_static[0]
 
 
 def test_fragments_that_stand_still_overrule_every_other_proof() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.support.grids import grid_of, wall
 from tests.support.parts import ARM, CART, FAR_WHEEL, MAST, PERSON, Body, regions
-from vision.bodies.merging import merges
+from vision.bodies.merging import pairs_to_merge
 
 
 def merged(
@@ -24,7 +24,7 @@ def merged(
     count = len(bodies)
     speeds = velocity or [(0.8, 0.0, 0.0)] * count
     known = moving or [True] * count
-    return merges(
+    return pairs_to_merge(
         grid_of(wall(behind_m)),
         regions(*bodies),
         np.array(speeds),

@@ -16,7 +16,7 @@ from vision.bodies.tracks import Tracks
 from vision.camera.lens import rotation_from_vector
 from vision.detection import Detection
 from vision.motion.least_squares import FragmentVelocities
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 
 FRAME = 30
 NOW_NS = START_NS + FRAME * FRAME_NS
@@ -79,11 +79,11 @@ def test_obstacles_are_told_in_the_axes_of_the_camera() -> None:
     assert (one.moving, one.score, one.fragments) == (True, 0.8, 7)
 
 
-def ends(usable: list[bool]) -> PointMotion:
+def ends(usable: list[bool]) -> EndResiduals:
     count = len(usable)
     plain = no_ends()
-    values = {name: np.zeros((count, *getattr(plain, name).shape[1:])) for name in PointMotion.__slots__}
-    return PointMotion(**{**values, "usable": np.array(usable)})
+    values = {name: np.zeros((count, *getattr(plain, name).shape[1:])) for name in EndResiduals.__slots__}
+    return EndResiduals(**{**values, "usable": np.array(usable)})
 
 
 def two_fragments() -> Detection:
@@ -144,7 +144,7 @@ def test_a_mover_out_of_sight_is_listed_while_it_is_known_where_it_goes() -> Non
 
 def test_a_mover_of_which_a_sliver_is_left_to_see_has_its_whole_box_and_the_sliver() -> None:
     made = tracks((0.5, 0.0, 3.0))
-    made.moving[:], made.sliver[:] = True, True
+    made.moving[:], made.nearly_hidden[:] = True, True
     made.bbox_px[:] = [170.0, 40.0, 190.0, 60.0]
     made.box_m[:] = [-0.3, -0.9, 0.3, 0.9]
     made.cells[:] = 12
@@ -155,7 +155,7 @@ def test_a_mover_of_which_a_sliver_is_left_to_see_has_its_whole_box_and_the_sliv
 @pytest.mark.parametrize("unseen_s", [0.0, 0.1])
 def test_of_whom_hardly_anything_is_left_to_see_is_not_listed(unseen_s: float) -> None:
     made = tracks((0.5, 0.0, 3.0), unseen_s=unseen_s)
-    made.moving[:], made.sliver[:] = True, True
+    made.moving[:], made.nearly_hidden[:] = True, True
     made.covariance[:] = 0.01 * np.eye(6)
     for cells, listed in ((11, 0), (12, 1)):
         made.cells[:] = cells
@@ -225,7 +225,7 @@ def test_a_new_mover_that_is_no_piece_of_a_larger_one_is_told_at_once(apart: dic
 def beside_what_stands(**new: Any) -> Tracks:
     """As large_and_new, but that the large one stands, and where the new one ends in it is a guess."""
     made = large_and_new(**new)
-    made.moving[0], made.guessed[1] = False, True
+    made.moving[0], made.border_is_guess[1] = False, True
     return made
 
 
@@ -250,7 +250,7 @@ def test_who_is_no_piece_beside_what_stands_is_told_at_once(apart: dict[str, Any
 
 def test_who_ends_at_edges_in_depth_beside_what_stands_is_told_at_once() -> None:
     made = beside_what_stands()
-    made.guessed[1] = False
+    made.border_is_guess[1] = False
     assert told_moving(made) == [False, True]
 
 

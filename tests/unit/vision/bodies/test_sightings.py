@@ -11,6 +11,7 @@ from tests.support.grids import grid_of, labelled, nearest, plate
 from vision.bodies import sightings
 from vision.bodies.tracks import Tracks
 from vision.depth import regions
+from vision.depth.connected import MIN_PART_CELLS
 
 
 def seen_of(left_m: float, right_m: float, moving: bool = True) -> Tracks:
@@ -21,28 +22,28 @@ def seen_of(left_m: float, right_m: float, moving: bool = True) -> Tracks:
     for frame, (low, high) in enumerate(((-0.3, 0.3), (left_m, right_m))):
         depth_m = plate(3.0, (low, high), (-0.6, 0.6))
         grid, labels = grid_of(depth_m), labelled(depth_m > 0.0)
-        measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
-        sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
+        measured = regions.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
+        sightings.update_from_surfaces(tracks, detection(grid, frame), measured, DepthNoise())
     return tracks
 
 
-@pytest.mark.parametrize(("right_m", "sliver"), [(-0.2, True), (0.0, False)])
+@pytest.mark.parametrize(("right_m", "nearly_hidden"), [(-0.2, True), (0.0, False)])
 def test_a_mover_of_which_less_than_two_fifths_are_left_to_see_is_a_sliver(
-    right_m: float, sliver: bool
+    right_m: float, nearly_hidden: bool
 ) -> None:
     tracks = seen_of(-0.3, right_m)
-    assert tracks.sliver.tolist() == [sliver]
+    assert tracks.nearly_hidden.tolist() == [nearly_hidden]
     whole_m = tracks.box_m[0, 2] - tracks.box_m[0, 0]
-    assert (abs(whole_m - 0.6) < 0.1) == sliver  # a sliver says nothing of how wide its body is
+    assert (abs(whole_m - 0.6) < 0.1) == nearly_hidden  # a small rest says nothing of how wide its body is
 
 
 def test_what_stands_is_no_sliver() -> None:
-    assert not seen_of(-0.3, -0.2, moving=False).sliver.any()
+    assert not seen_of(-0.3, -0.2, moving=False).nearly_hidden.any()
 
 
 def test_who_leaves_the_image_is_no_sliver() -> None:
     """Its rest is where it is seen to be, and the others are outside."""
-    assert not seen_of(-1.6, -1.5).sliver.any()
+    assert not seen_of(-1.6, -1.5).nearly_hidden.any()
 
 
 def reaching_in(moving: bool) -> float:
@@ -54,8 +55,8 @@ def reaching_in(moving: bool) -> float:
         tracks.predict(1.0 / 30.0, 0.12, None)
         depth_m = plate(3.0, (-2.0, -1.2 + 0.04 * frame), (-0.6, 0.6))
         grid, labels = grid_of(depth_m), labelled(depth_m > 0.0)
-        measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
-        sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
+        measured = regions.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
+        sightings.update_from_surfaces(tracks, detection(grid, frame), measured, DepthNoise())
     return float(tracks.state[0, 3])
 
 
@@ -75,25 +76,27 @@ def test_a_surface_that_something_nearer_reaches_over_tells_nothing_of_its_motio
         crate, board = plate(3.0, (-0.3, 0.3), (-0.3, 0.3)), plate(board_m, (0.12, 1.0), (-1.0, 1.0))
         depth_m = nearest(crate, board)
         grid, labels = grid_of(depth_m), labelled(depth_m == 3.0)
-        measured = regions.unhidden(grid, labels, regions.measure(grid, labels, 1))
-        sightings.see(tracks, detection(grid, frame), measured, DepthNoise())
-    assert (tracks.clean_s[0] > 0.1) == whole
+        measured = regions.with_occlusion(grid, labels, regions.measure(grid, labels, 1))
+        sightings.update_from_surfaces(tracks, detection(grid, frame), measured, DepthNoise())
+    assert (tracks.velocity_measured_s[0] > 0.1) == whole
 
 
 def test_of_what_is_not_seen_nothing_changes_but_how_long_it_has_been_seen() -> None:
     tracks = Tracks()
     tracks.start(np.array([[0.0, 0.0, 3.0]]), 0.2, 1.5, 0.0, 0)
-    tracks.clean_s[:] = 0.4
+    tracks.velocity_measured_s[:] = 0.4
     few = np.zeros((60, 80), np.int32)
-    few[30, 40 : 40 + sightings.MIN_CELLS - 1] = 1
+    few[30, 40 : 40 + MIN_PART_CELLS - 1] = 1
     grid = grid_of(np.where(few > 0, 2.0, 0.0))
-    sightings.see(tracks, detection(grid, 1), regions.measure(grid, few, 1), DepthNoise())
-    assert tracks.clean_s.tolist() == [0.0]
+    sightings.update_from_surfaces(tracks, detection(grid, 1), regions.measure(grid, few, 1), DepthNoise())
+    assert tracks.velocity_measured_s.tolist() == [0.0]
     assert tracks.sightings.tolist() == [0]
     assert tracks.seen_ns.tolist() == [0]
     assert tracks.cells.tolist() == [0]
     np.testing.assert_array_equal(tracks.state[0], [0.0, 0.0, 3.0, 0.0, 0.0, 0.0])
     assert not tracks.box_m.any()
     nobody = Tracks()
-    sightings.see(nobody, detection(grid, 1), regions.measure(grid, np.zeros_like(few), 0), DepthNoise())
+    sightings.update_from_surfaces(
+        nobody, detection(grid, 1), regions.measure(grid, np.zeros_like(few), 0), DepthNoise()
+    )
     assert len(nobody) == 0

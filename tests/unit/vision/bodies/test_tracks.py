@@ -17,8 +17,8 @@ def test_a_centre_goes_that_has_gone_about_as_fast_as_its_velocity_says(dt_s: fl
     tracks.state[:, 3] = 1.0
     for _ in range(round(1.0 / dt_s)):
         tracks.state[:, 0] += speeds_mps * dt_s
-        goes = tracks.follow_trails(dt_s)
-    np.testing.assert_array_equal(goes, [True, True, False, False])
+        advances = tracks.update_trailing_average(dt_s)
+    np.testing.assert_array_equal(advances, [True, True, False, False])
 
 
 def test_what_the_trail_knows_goes_with_its_track() -> None:
@@ -27,9 +27,9 @@ def test_what_the_trail_knows_goes_with_its_track() -> None:
     tracks.state[:, 3] = [0.0, 1.0]
     for _ in range(10):
         tracks.state[1, 0] += 0.05
-        tracks.follow_trails(0.05)
+        tracks.update_trailing_average(0.05)
     tracks.keep(np.array([False, True]))
-    assert tracks.follow_trails(0.05).tolist() == [True]
+    assert tracks.update_trailing_average(0.05).tolist() == [True]
 
 
 AHEAD = np.array([0.0, 0.0, 1.0])
@@ -75,8 +75,8 @@ def test_what_is_hidden_is_known_as_a_sliver_without_cells() -> None:
     tracks = Tracks()
     tracks.start(np.zeros((2, 3)), 0.1, 1.5, 1.0, 0)
     tracks.cells[:] = 100
-    tracks.hide(np.array([False, True]))
-    assert tracks.sliver.tolist() == [False, True]
+    tracks.mark_hidden(np.array([False, True]))
+    assert tracks.nearly_hidden.tolist() == [False, True]
     assert tracks.cells.tolist() == [100, 0]
 
 

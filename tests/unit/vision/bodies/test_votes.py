@@ -29,7 +29,7 @@ def test_a_part_goes_to_whom_most_cells_speak_for() -> None:
     ballot = vote(block((10, 30), (10, 20)), block((10, 30), (20, 50)), mover=(True, True))
     assert ballot.winner.tolist() == [2]
     assert ballot.votes.tolist() == [600]
-    assert ballot.present.tolist() == [[True, True]]
+    assert ballot.claims.tolist() == [[True, True]]
 
 
 def test_cells_outside_of_a_part_have_no_vote() -> None:
@@ -58,15 +58,15 @@ def test_a_claim_needs_a_share_of_the_part_or_of_the_track(
     other = block((40, 50), (10, 10 + elsewhere))
     parts = np.where(other, np.int32(2), PART).astype(np.int32)
     most, some = block((10, 30), (10, 50 - columns)), block((10, 30), (50 - columns, 50))
-    present = vote(most, some | other, mover=(True, True), parts=parts).present
+    present = vote(most, some | other, mover=(True, True), parts=parts).claims
     assert present[0].tolist() == [True, claims]
 
 
 def test_of_static_tracks_the_strongest_alone_stays_beside_the_movers() -> None:
     thirds = [block((10, 30), (10, 20)), block((10, 30), (20, 35)), block((10, 30), (35, 50))]
-    assert vote(*thirds, mover=(False, False, True)).present.tolist() == [[False, True, True]]
-    assert vote(*thirds, mover=(True, True, True)).present.tolist() == [[True, True, True]]
-    assert vote(*thirds, mover=(False, False, False)).present.tolist() == [[False, True, False]]
+    assert vote(*thirds, mover=(False, False, True)).claims.tolist() == [[False, True, True]]
+    assert vote(*thirds, mover=(True, True, True)).claims.tolist() == [[True, True, True]]
+    assert vote(*thirds, mover=(False, False, False)).claims.tolist() == [[False, True, False]]
 
 
 def test_no_tracks_or_no_parts() -> None:
@@ -118,51 +118,57 @@ def ballot(*present: tuple[bool, bool]) -> votes.Ballot:
 @pytest.mark.parametrize(("came", "winner"), [(60, 0), (59, 1)])
 def test_a_part_that_came_leaves_the_track_of_what_was_there(came: int, winner: int) -> None:
     """Three tenths of it."""
-    left = votes.release(ballot((True, False), (True, False)), CELLS, np.array([came, 0]), MOVES)
+    left = votes.drop_static_from_arrived(
+        ballot((True, False), (True, False)), CELLS, np.array([came, 0]), MOVES
+    )
     np.testing.assert_array_equal(left.winner, [winner, 1])
-    np.testing.assert_array_equal(left.present, [[winner == 1, False], [True, False]])
+    np.testing.assert_array_equal(left.claims, [[winner == 1, False], [True, False]])
 
 
 @pytest.mark.parametrize(("came", "winner"), [(20, 0), (19, 1)])
 def test_a_few_cells_that_came_prove_nothing(came: int, winner: int) -> None:
-    left = votes.release(
+    left = votes.drop_static_from_arrived(
         ballot((True, False), (True, False)), np.array([30, 300]), np.array([came, 0]), MOVES
     )
     np.testing.assert_array_equal(left.winner, [winner, 1])
 
 
 def test_a_part_that_came_is_the_movers_alone_who_has_a_claim_to_it() -> None:
-    left = votes.release(ballot((True, True), (True, False)), CELLS, np.array([60, 0]), MOVES)
+    left = votes.drop_static_from_arrived(
+        ballot((True, True), (True, False)), CELLS, np.array([60, 0]), MOVES
+    )
     np.testing.assert_array_equal(left.winner, [2, 1])
-    np.testing.assert_array_equal(left.present, [[False, True], [True, False]])
+    np.testing.assert_array_equal(left.claims, [[False, True], [True, False]])
 
 
 @pytest.mark.parametrize(("cells", "winner"), [(301, 1), (300, 0)])
 def test_what_came_almost_whole_is_that_track_itself(cells: int, winner: int) -> None:
     """Three quarters of it, and more, may have come."""
     sizes = np.array([cells, 100])
-    left = votes.release(ballot((True, False), (True, False)), sizes, np.array([290, 0]), MOVES)
+    left = votes.drop_static_from_arrived(
+        ballot((True, False), (True, False)), sizes, np.array([290, 0]), MOVES
+    )
     np.testing.assert_array_equal(left.winner, [winner, 1])
 
 
 def test_a_mover_keeps_what_came() -> None:
     before = ballot((False, True), (False, True))
-    left = votes.release(before, CELLS, np.array([200, 0]), MOVES)
-    np.testing.assert_array_equal(left.present, before.present)
+    left = votes.drop_static_from_arrived(before, CELLS, np.array([200, 0]), MOVES)
+    np.testing.assert_array_equal(left.claims, before.claims)
     np.testing.assert_array_equal(left.winner, before.winner)
 
 
 def test_what_came_in_two_parts_has_left_nothing_behind() -> None:
     """Nothing of the track stood there before: it is the track itself."""
     before = ballot((True, False), (True, False))
-    left = votes.release(before, np.array([200, 200]), np.array([150, 150]), MOVES)
-    np.testing.assert_array_equal(left.present, before.present)
+    left = votes.drop_static_from_arrived(before, np.array([200, 200]), np.array([150, 150]), MOVES)
+    np.testing.assert_array_equal(left.claims, before.claims)
     np.testing.assert_array_equal(left.winner, [1, 1])
 
 
 def test_a_mover_who_had_won_the_part_keeps_its_votes() -> None:
     before = votes.elect(np.array([[True, True], [True, False]]), np.array([[140, 150], [290, 0]]))
-    left = votes.release(before, CELLS, np.array([60, 0]), MOVES)
+    left = votes.drop_static_from_arrived(before, CELLS, np.array([60, 0]), MOVES)
     np.testing.assert_array_equal(left.winner, [2, 1])
     np.testing.assert_array_equal(left.votes, [150, 290])
 
@@ -170,7 +176,7 @@ def test_a_mover_who_had_won_the_part_keeps_its_votes() -> None:
 def test_a_part_that_came_goes_to_the_mover_with_the_most_votes_for_it() -> None:
     present = np.array([[True, True, True], [True, False, False]])
     before = votes.elect(present, np.array([[150, 20, 40], [290, 0, 0]]))
-    left = votes.release(before, CELLS, np.array([60, 0]), np.array([False, True, True]))
+    left = votes.drop_static_from_arrived(before, CELLS, np.array([60, 0]), np.array([False, True, True]))
     np.testing.assert_array_equal(left.winner, [3, 1])
     np.testing.assert_array_equal(left.votes, [40, 290])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hal.types import Intrinsics
-from vision.camera.lens import project, rays, rotation_from_vector, vector_from_rotation
+from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 
 CAMERA = Intrinsics(640, 480, 600.0, 500.0, 320.0, 240.0)
 
@@ -12,12 +12,6 @@ CAMERA = Intrinsics(640, 480, 600.0, 500.0, 320.0, 240.0)
 def test_rays_by_numbers() -> None:
     result = rays(np.array([[320.0, 240.0], [620.0, 140.0]]), CAMERA)
     np.testing.assert_allclose(result, [[0.0, 0.0, 1.0], [0.5, -0.2, 1.0]])
-
-
-def test_projection_by_numbers() -> None:
-    # Equation 4: u = fx x / z + cx.
-    result = project(np.array([[1.0, -0.4, 2.0], [0.0, 0.0, 7.0]]), CAMERA)
-    np.testing.assert_allclose(result, [[620.0, 140.0], [320.0, 240.0]])
 
 
 def test_a_quarter_turn_about_each_axis() -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hal.types import CameraMount
 from tests.support.painted import VGA, floor, wall
-from tests.unit.vision.depth.test_depth_guard import CENTRE, frame_of, inside, outside, space_of, with_depth
+from tests.unit.vision.depth.test_free_space import CENTRE, frame_of, inside, outside, space_of, with_depth
 from vision.scene import FreeSpace
 
 DOWN = CameraMount(0.0, 0.0, 0.9, math.radians(25.0))

@@ -107,7 +107,7 @@ def test_a_bump_teaches_no_least_depth() -> None:
 
     def told(frame: RgbdFrame, times: int, trusted: bool = True) -> float:
         grid = make_grid(frame, CONFIG, LOW)
-        return [learner.unmeasured_m(grid, trusted) for _ in range(times)][-1]
+        return [learner.measurable_from_m(grid, trusted) for _ in range(times)][-1]
 
     level, up = measured_from(0.45), measured_from(0.39)
     at_first = told(level, 100)
@@ -122,10 +122,10 @@ def test_a_bump_teaches_no_least_depth() -> None:
 
 def test_where_the_lowest_row_shows_floor_there_is_nothing_to_excuse() -> None:
     learner = NearFloor(CONFIG.min_depth_m)
-    assert learner.unmeasured_m(make_grid(seen_by(LOW), CONFIG, LOW), True) == 0.0
+    assert learner.measurable_from_m(make_grid(seen_by(LOW), CONFIG, LOW), True) == 0.0
     high = CameraMount(0.45, 0.0, 0.6, 0.07)
-    assert learner.unmeasured_m(make_grid(seen_by(high), CONFIG, high), True) == 0.0
-    assert learner.unmeasured_m(make_grid(seen_by(high), CONFIG, None), True) == 0.0
+    assert learner.measurable_from_m(make_grid(seen_by(high), CONFIG, high), True) == 0.0
+    assert learner.measurable_from_m(make_grid(seen_by(high), CONFIG, None), True) == 0.0
 
 
 def test_how_near_the_floor_was_too_near_is_told() -> None:
@@ -141,7 +141,7 @@ def test_hours_before_a_pallet_are_not_counted_against_the_floor_behind_it() -> 
     nothing = make_grid(measured_from(0.9), CONFIG, LOW)
     near = NearFloor(CONFIG.min_depth_m)
     for _ in range(20_000):
-        near.unmeasured_m(nothing, trusted=True)
-    assert near.unmeasured_m(nothing, trusted=True) == 0.6
-    told = [near.unmeasured_m(grid, trusted=True) for _ in range(120)]
+        near.measurable_from_m(nothing, trusted=True)
+    assert near.measurable_from_m(nothing, trusted=True) == 0.6
+    told = [near.measurable_from_m(grid, trusted=True) for _ in range(120)]
     assert told[-1] == 0.0

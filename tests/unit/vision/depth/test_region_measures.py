@@ -67,15 +67,15 @@ def test_what_is_cut_above_or_below_still_has_its_width_and_the_other_way_round(
     wide = np.zeros((ROWS, COLUMNS), np.bool_)
     wide[45:50, 0:40] = True
     measured = regions.measure(grid_of(wall(3.0)), labelled(tall, wide), 2)
-    assert measured.wide.tolist() == [True, False]
-    assert measured.tall.tolist() == [False, True]
+    assert measured.sides_visible.tolist() == [True, False]
+    assert measured.top_and_bottom_visible.tolist() == [False, True]
 
 
 def test_what_ends_where_no_edge_in_depth_is_was_divided_by_guess() -> None:
     """Two halves of one plate, and the same two 0.6 m apart in depth."""
     left, right = plate(4.0, (-0.4, 0.0), (-0.6, 0.8)), plate(4.0, (0.0, 0.4), (-0.6, 0.8))
-    assert beside(left, right).wide.tolist() == [False, False]
-    assert beside(left, plate(3.4, (0.0, 0.4), (-0.6, 0.8))).wide.tolist() == [False, True]
+    assert beside(left, right).sides_visible.tolist() == [False, False]
+    assert beside(left, plate(3.4, (0.0, 0.4), (-0.6, 0.8))).sides_visible.tolist() == [False, True]
 
 
 def test_the_box_reaches_down_to_the_floor_that_a_body_stands_on() -> None:
@@ -127,7 +127,7 @@ def beside(far_m: FloatArray, near_m: FloatArray) -> regions.Regions:
     depth_m = nearest(far_m, near_m)
     labels = labelled((far_m > 0.0) & (depth_m == far_m), near_m > 0.0)
     grid = grid_of(depth_m)
-    return regions.unhidden(grid, labels, regions.measure(grid, labels, 2))
+    return regions.with_occlusion(grid, labels, regions.measure(grid, labels, 2))
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -159,7 +159,7 @@ def test_what_a_stereo_camera_does_not_see_beside_something_nearer_is_hidden_by_
         first = int(np.flatnonzero(near.any(axis=0))[0])
         seen[:, max(first - gap, 0) : last + 1] = 0.0
         measured = beside(seen, near)
-        assert measured.wide.tolist() == [True, True]
+        assert measured.sides_visible.tolist() == [True, True]
         assert measured.whole.tolist() == [whole, True]
 
 
@@ -182,7 +182,7 @@ def test_the_end_of_a_row_does_not_hide_the_beginning_of_the_next() -> None:
         np.ones(2, np.bool_),
         np.zeros(2, np.bool_),
     )
-    assert regions.unhidden(grid, labels, inside).whole.tolist() == [True, True]
+    assert regions.with_occlusion(grid, labels, inside).whole.tolist() == [True, True]
 
 
 def test_parts_are_parted_where_depth_jumps_and_speckles_left_out() -> None:
@@ -221,13 +221,13 @@ def test_only_what_stands_out_of_the_floor_is_standing() -> None:
     body = plate(3.0, (-0.3, 0.3), (-0.2, 1.0))
     depth_m = nearest(np.where(floor_m < 8.0, floor_m, 0.0), body)
     grid = grid_of(depth_m, LEVEL_UP, 1.0)
-    standing = connected.standing(grid, 0.05)
+    standing = connected.above_floor(grid, 0.05)
     assert grid.height_m is not None
     # Margin at 3 m: 0.05 + 3 * 0.01 + 0.008 * 3 = 0.104.
     np.testing.assert_array_equal(standing[body > 0.0], grid.height_m[body > 0.0] > 0.104)
     assert not standing[body == 0.0].any()
     unknown = grid_of(depth_m)
-    np.testing.assert_array_equal(connected.standing(unknown, 0.05), unknown.valid)
+    np.testing.assert_array_equal(connected.above_floor(unknown, 0.05), unknown.valid)
 
 
 def test_labels_spread_to_the_nearest_cells_of_the_mask_only() -> None:

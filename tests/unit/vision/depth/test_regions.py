@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from hal.types import Pose
 from vision.bodies.ends import near_ends
 from vision.bodies.masks import predict, surfaces
 from vision.depth.connected import components, spread_labels
 from vision.depth.depth_grid import DepthGrid
-from vision.depth.regions import measure, unhidden
+from vision.depth.regions import measure, with_occlusion
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 SHAPE = (24, 32)
+
+NOISE = TYPICAL_DEPTH_NOISE
 
 
 def grid_of(depth_m: NDArray[np.float32]) -> DepthGrid:
@@ -84,7 +87,15 @@ def test_labels_that_do_not_fit_into_the_sort_are_measured_alike(seed: int) -> N
     # The same cells under a label that leaves no bits for their index.
     huge = 2**22
     many = measure(grid_of(depth), np.where(labels == 4, np.int32(huge), labels), huge)
-    for name in ("cells", "rows", "bbox_px", "position_m", "extent_m", "wide", "tall"):
+    for name in (
+        "cells",
+        "rows",
+        "bbox_px",
+        "position_m",
+        "extent_m",
+        "sides_visible",
+        "top_and_bottom_visible",
+    ):
         np.testing.assert_array_equal(getattr(few, name)[3], getattr(many, name)[huge - 1])
         np.testing.assert_array_equal(getattr(few, name)[:3], getattr(many, name)[:3])
 
@@ -98,7 +109,7 @@ def test_what_something_nearer_hides_is_not_whole() -> None:
     grid = grid_of(depth)
     measured = measure(grid, labels, 3)
     assert measured.whole.tolist() == [True, True, True]
-    assert unhidden(grid, labels, measured).whole.tolist() == [False, True, True]
+    assert with_occlusion(grid, labels, measured).whole.tolist() == [False, True, True]
 
 
 def test_a_jump_in_depth_parts_what_touches() -> None:
@@ -176,7 +187,9 @@ def test_cells_near_an_end_are_those_within_20_cm_at_its_depth() -> None:
     depth[:, 20:] = 4.0
     grid = grid_of(depth)
     ends = np.array([[[42.0, 42.0], [np.nan, np.nan]]], np.float32)
-    found = near_ends(grid, grid.valid, np.nan_to_num(ends), np.array([[2.0, np.nan]], np.float32), 400.0)
+    found = near_ends(
+        grid, grid.valid, np.nan_to_num(ends), np.array([[2.0, np.nan]], np.float32), 400.0, NOISE
+    )
     for row, column in np.ndindex(*SHAPE):
         away_m = np.hypot(row - 10, column - 10) * 0.02
         if away_m < 0.18 and column < 20:
@@ -188,4 +201,16 @@ def test_cells_near_an_end_are_those_within_20_cm_at_its_depth() -> None:
 def test_without_depth_no_cell_is_near() -> None:
     nowhere = np.full((1, 2), np.nan, np.float32)
     grid = grid_of(flat(2.0))
-    assert not near_ends(grid, grid.valid, np.zeros((1, 2, 2), np.float32), nowhere, 400.0).any()
+    assert not near_ends(grid, grid.valid, np.zeros((1, 2, 2), np.float32), nowhere, 400.0, NOISE).any()
+
+
+@pytest.mark.parametrize(("quadratic_per_m", "near"), [(0.0075, True), (0.001, False)])
+def test_what_is_at_the_depth_of_an_end_depends_on_the_noise_of_depth(
+    quadratic_per_m: float, near: bool
+) -> None:
+    """0.5 m apart, 4 m ahead: 0.3 m and two sigmas are 0.54 m with the usual noise, 0.33 m with little."""
+    grid = grid_of(flat(4.0))
+    ends = np.full((1, 2, 2), 42.0, np.float32)
+    depth_m = np.full((1, 2), 4.5, np.float32)
+    noise = DepthNoise(quadratic_per_m=quadratic_per_m)
+    assert near_ends(grid, grid.valid, ends, depth_m, 400.0, noise).any() == near

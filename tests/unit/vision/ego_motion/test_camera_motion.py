@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from config.perception import EgoMotionSettings
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.camera.lens import project, rays, rotation_from_vector, vector_from_rotation
+from tests.support.point_motion import project
+from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 from vision.ego_motion import camera_motion
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior, odometry_prior, steady_prior

@@ -61,6 +61,20 @@ def test_what_nearly_all_fragments_deny_makes_nothing_move(true_mps: float, reck
     assert np.median(ways_m) == pytest.approx(true_mps / 30.0, abs=3e-3)
 
 
+def test_what_no_tracked_base_does_is_disputed_without_odometry_too_and_not_called_its_fault() -> None:
+    """The base slides to the left, as on a slope of ice; the images are all that there is."""
+    shown = record(room(), lambda time_s: PlanarPose(0.0, 0.6 * time_s, 0.0), COUNT, QVGA)
+    eyes = perception()
+    scenes = [eyes.perceive(frame, None, None).scene for frame in shown.frames]
+    assert movers(scenes) == 0
+    disputed = [scene for scene in scenes if scene.ego_motion.source == "disputed"]
+    assert len(disputed) >= 5
+    for scene in disputed:
+        assert scene.health.condition is CameraCondition.DEGRADED
+        assert "a tracked base hardly makes" in scene.health.reason
+        assert "odometry" not in scene.health.reason
+
+
 def test_after_a_jump_of_the_odometry_nothing_moves() -> None:
     def jumps(time_s: float) -> PlanarPose:
         return PlanarPose(0.5 * time_s + (0.2 if time_s > 0.5 else 0.0), 0.0, 0.0)

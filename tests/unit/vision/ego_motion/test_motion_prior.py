@@ -9,7 +9,8 @@ import pytest
 
 from config.perception import EgoMotionSettings
 from hal.types import CameraMount, FloatArray, Intrinsics, Pose
-from vision.camera.lens import project, rays, rotation_from_vector, vector_from_rotation
+from tests.support.point_motion import project
+from vision.camera.lens import rays, rotation_from_vector, vector_from_rotation
 from vision.ego_motion.camera_motion import estimate
 from vision.ego_motion.motion_prior import (
     MotionPrior,
@@ -134,4 +135,4 @@ def test_a_gyro_gives_the_rotation_and_how_sure_it_is() -> None:
     np.testing.assert_allclose(turned.motion.translation_m, prior.motion.translation_m)
     np.testing.assert_allclose(turned.sigma[:3], 0.02 * 0.1)
     np.testing.assert_allclose(turned.sigma[3:], prior.sigma[3:])
-    assert (turned.source, turned.binding) == (prior.source, prior.binding)
+    assert (turned.source, turned.trusted) == (prior.source, prior.trusted)

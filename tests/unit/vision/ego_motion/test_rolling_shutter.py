@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.camera.lens import project, rays, rotation_from_vector, row_delays, vector_from_rotation
+from tests.support.point_motion import project
+from vision.camera.lens import rays, rotation_from_vector, row_delays, vector_from_rotation
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.motion_prior import MotionPrior, SweepPrior
 from vision.ego_motion.reprojection import Anchors
@@ -68,7 +69,7 @@ def test_what_turning_bends_is_straightened_to_a_hundredth_of_a_pixel(about_x: f
 
 
 def found_from(
-    sweep_rad: FloatArray, sigma_rad: float, most_rad: float | None = None
+    sweep_rad: FloatArray, sigma_rad: float, max_rad: float | None = None
 ) -> tuple[CameraEstimate, Pose]:
     """What is estimated of a camera that pitches, yaws and goes on, with 0.1 px of noise; and the truth."""
     truth = Pose(rotation_from_vector(np.array([0.004, 0.01, -0.001])), np.array([0.001, -0.002, 0.03]))
@@ -82,7 +83,7 @@ def found_from(
         np.ones(len(world), np.bool_),
     )
     pixels = bent(world, truth, sweep_rad) + noise
-    sweep = SweepPrior(np.full(2, sigma_rad), np.full(2, most_rad or sigma_rad))
+    sweep = SweepPrior(np.full(2, sigma_rad), np.full(2, max_rad or sigma_rad))
     return estimate(static, pixels, HERE, NOTHING_KNOWN, sweep, CAMERA), truth
 
 
@@ -162,7 +163,7 @@ def shaken(
         )
         learned.learn(found, np.array([turn, 0.0, 0.0]), DT_S)
         if gaps:
-            learned.lose()
+            learned.forget_last()
     return learned
 
 
@@ -176,7 +177,7 @@ def test_a_global_shutter_is_found_out() -> None:
     assert shaken(0.0).seconds < 0.001
     # One sigma of a sweep then is far below a pixel: 0.001 s of 0.1 rad/s and hardly more.
     assert shaken(0.0).sweep().sigma_rad[0] * CAMERA.fy < 0.1
-    assert shaken(0.0).sweep().most_rad[0] < 0.1 * ReadOut(0.25).sweep().most_rad[0]
+    assert shaken(0.0).sweep().max_rad[0] < 0.1 * ReadOut(0.25).sweep().max_rad[0]
 
 
 def test_before_anything_is_seen_nothing_is_bent() -> None:
@@ -184,7 +185,7 @@ def test_before_anything_is_seen_nothing_is_bent() -> None:
     assert fresh.seconds == 0.0
     assert fresh.sweep().sigma_rad.max() < 1e-4
     # Possible it is: 15 ms of 0.25 rad/s.
-    np.testing.assert_allclose(fresh.sweep().most_rad, 0.00375, rtol=1e-3)
+    np.testing.assert_allclose(fresh.sweep().max_rad, 0.00375, rtol=1e-3)
     assert shaken(0.02, amplitude_rad=0.0).seconds == 0.0
     assert shaken(0.02, visual=False).seconds == 0.0
 

@@ -20,7 +20,7 @@ from vision import detector
 from vision.bodies.tracks import Tracks
 from vision.ego_motion.camera_motion import CameraEstimate, estimate
 from vision.ego_motion.reprojection import Anchors
-from vision.fragments.attention import Attention, Wanted, wanted
+from vision.fragments.attention import Attention, NeedsFragments, bodies_needing_fragments
 from vision.fragments.candidates import NewFragments
 from vision.perception import Perception
 
@@ -29,12 +29,14 @@ NO_ENDS = np.empty((0, 2, 2), np.float32)
 BODY_M = vector(0.3, 0.5, 0.9)  # 76 px by 137 px at 4 m
 FRONT_M = 4.0
 FRAME_S = 1.0 / 30.0
-NOBODY = Wanted(np.empty(0, np.int64), np.empty((0, 4)), np.empty(0), np.empty(0), np.empty(0, np.bool_))
+NOBODY = NeedsFragments(
+    np.empty(0, np.int64), np.empty((0, 4)), np.empty(0), np.empty(0), np.empty(0, np.bool_)
+)
 
 
-def one_body(depth_m: float = FRONT_M, number: int = 7, urgent: bool = True) -> Wanted:
+def one_body(depth_m: float = FRONT_M, number: int = 7, urgent: bool = True) -> NeedsFragments:
     """A box in the image around what stands 4 m ahead on the floor."""
-    return Wanted(
+    return NeedsFragments(
         np.array([number]),
         np.array([[281.0, 178.0, 358.0, 316.0]]),
         np.array([depth_m]),
@@ -52,7 +54,9 @@ def grey_of(frame: RgbdFrame) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(frame.colour, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
-def look(frame: RgbdFrame, body: Wanted, attention: Attention | None = None, after_s: float = 0.0) -> int:
+def look(
+    frame: RgbdFrame, body: NeedsFragments, attention: Attention | None = None, after_s: float = 0.0
+) -> int:
     """How many fragments are found after_s later."""
     later = replace(frame, captured_ns=frame.captured_ns + round(after_s * 1e9))
     return len((attention or awake(frame)).find(later, grey_of(frame), NO_ENDS, body).ends_px)
@@ -155,10 +159,10 @@ def test_the_urgent_one_comes_first_then_who_has_waited_for_longest(frame: RgbdF
     """Only one of them stands where something is to be found: it is seen when its turn comes."""
     here, away = one_body(number=7), one_body(number=9, depth_m=1.5)
 
-    def both(first: Wanted, second: Wanted, urgent: tuple[bool, bool]) -> Wanted:
+    def both(first: NeedsFragments, second: NeedsFragments, urgent: tuple[bool, bool]) -> NeedsFragments:
         parts = zip(*((one.ids, one.box_px, one.depth_m, one.gate_m) for one in (first, second)), strict=True)
         ids, box_px, depth_m, gate_m = (np.concatenate(part) for part in parts)
-        return Wanted(ids, box_px, depth_m, gate_m, np.array(urgent))
+        return NeedsFragments(ids, box_px, depth_m, gate_m, np.array(urgent))
 
     assert look(frame, both(away, here, (False, True))) > 0
     assert look(frame, both(away, here, (True, False))) == 0
@@ -176,8 +180,8 @@ def tracks(places: list[tuple[float, float, float]]) -> Tracks:
     return made
 
 
-def asked_for(made: Tracks) -> Wanted:
-    return wanted(made, detection(grid_of(no_depth())), CONFIG)
+def asked_for(made: Tracks) -> NeedsFragments:
+    return bodies_needing_fragments(made, detection(grid_of(no_depth())), CONFIG)
 
 
 @pytest.mark.parametrize(
@@ -224,8 +228,8 @@ def witnesses(config: PerceptionConfig, monkeypatch: pytest.MonkeyPatch) -> list
     found: list[tuple[int, int]] = []
 
     def noted(anchors: Anchors, *rest: Any) -> CameraEstimate:
-        witness = eyes._detector._store.witness.repeat(2)
-        found.append((int(witness.sum()), int((anchors.usable & witness).sum())))
+        body_only = eyes._detector._store.body_only.repeat(2)
+        found.append((int(body_only.sum()), int((anchors.usable & body_only).sum())))
         return estimate(anchors, *rest)
 
     monkeypatch.setattr(detector, "estimate", noted)

@@ -10,7 +10,7 @@ from config.perception import FragmentSettings, PerceptionConfig
 from hal.types import RgbdFrame
 from tests.support.painted import VGA
 from vision.depth.depth_mask import SurfaceDepth
-from vision.fragments.candidates import depth_along, held_ends, new_fragments, on_one_surface
+from vision.fragments.candidates import depth_along, new_fragments, on_one_surface, trackable_segments
 
 CONFIG = PerceptionConfig()
 NOBODY = np.empty((0, 2, 2), np.float32)
@@ -33,7 +33,7 @@ def found(
     segments_px: Ends, present_px: Ends = NOBODY, min_distance_px: float = 12.0, least: float = 0.0
 ) -> Ends:
     """Ends of those that are left, as numbers of cells."""
-    ends, tensor = held_ends(chequers(), segments_px, present_px, min_distance_px, least)
+    ends, tensor = trackable_segments(chequers(), segments_px, present_px, min_distance_px, least)
     assert tensor.shape == (len(ends), 2, 3)
     result: Ends = np.rint(ends / 40.0)
     return result
@@ -55,7 +55,7 @@ def test_of_two_at_one_place_the_better_held_one_stays() -> None:
 
 def test_where_a_fragment_is_there_is_no_second_one() -> None:
     segments = between((2, 2), (3, 2), (8, 8), (9, 8))
-    ends, _ = held_ends(chequers(), segments, NOBODY, 12.0)
+    ends, _ = trackable_segments(chequers(), segments, NOBODY, 12.0)
     for place in ends.reshape(-1, 2):
         present = np.array([[[400.0, 20.0], place]], np.float32)
         assert len(found(segments, present)) == 1
@@ -68,7 +68,7 @@ def test_both_ends_at_one_place_are_no_segment() -> None:
 
 def test_ends_too_near_to_each_other_are_no_segment() -> None:
     level = between((4, 4), (5, 4))
-    (ends,), _ = held_ends(chequers(), level, NOBODY, 0.0)
+    (ends,), _ = trackable_segments(chequers(), level, NOBODY, 0.0)
     distance_px = float(np.linalg.norm(ends[0] - ends[1]))
     assert 30.0 < distance_px < 50.0
     assert len(found(level, min_distance_px=distance_px - 0.01)) == 1
@@ -76,7 +76,7 @@ def test_ends_too_near_to_each_other_are_no_segment() -> None:
 
 
 def test_weakly_held_ones_are_left_out_where_that_is_asked_for() -> None:
-    weak = held_ends(chequers(), between((2, 2), (3, 2)), NOBODY, 12.0)[1][0]
+    weak = trackable_segments(chequers(), between((2, 2), (3, 2)), NOBODY, 12.0)[1][0]
     smaller = np.linalg.eigvalsh([[[uu, uv], [uv, vv]] for uu, uv, vv in weak.astype(float)])[:, 0].min()
     both = between((2, 2), (3, 2), (8, 8), (9, 8))
     assert len(found(both, least=0.99 * smaller)) == 2
@@ -84,7 +84,7 @@ def test_weakly_held_ones_are_left_out_where_that_is_asked_for() -> None:
 
 
 def test_nothing_comes_of_nothing() -> None:
-    ends, tensor = held_ends(chequers(), NOBODY, between((2, 2), (3, 2)), 12.0)
+    ends, tensor = trackable_segments(chequers(), NOBODY, between((2, 2), (3, 2)), 12.0)
     assert ends.shape == (0, 2, 2)
     assert tensor.shape == (0, 2, 3)
     assert on_one_surface(np.empty((0, 5)), CONFIG).shape == (0,)

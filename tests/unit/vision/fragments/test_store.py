@@ -77,7 +77,7 @@ def test_before_is_the_frame_before() -> None:
     add(store, 3)
     for frame in range(6):
         commit(store, frame)
-    last = store.before(6 * FRAME_NS)
+    last = store.last_entries(6 * FRAME_NS)
     np.testing.assert_array_equal(last.lag_frames, [1, 1, 1])
     np.testing.assert_allclose(last.lag_s, FRAME_NS * 1e-9)
     np.testing.assert_allclose(last.origin[0], 0.5)
@@ -111,8 +111,8 @@ def test_who_is_a_witness_stays_one() -> None:
     store = FragmentStore()
     add(store, 3)
     ends, depth = np.zeros((2, 2, 2), np.float32), np.ones((2, 2), np.float32)
-    store.add(ends, depth, depth, np.ones((2, 2, 3), np.float32), witness=True)
+    store.add(ends, depth, depth, np.ones((2, 2, 3), np.float32), body_only=True)
     store.keep(np.array([False, True, True, False, True]))
-    assert store.witness.tolist() == [False, False, True]
+    assert store.body_only.tolist() == [False, False, True]
     store.clear()
-    assert len(store.witness) == 0
+    assert len(store.body_only) == 0

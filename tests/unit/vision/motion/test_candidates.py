@@ -10,10 +10,10 @@ import pytest
 from hal.types import FloatArray
 from vision.detection import no_motion
 from vision.motion.candidates import cluster, long_static, moving_candidates
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 
 
-def seen(static_chi2: tuple[float, float], usable: tuple[bool, bool] = (True, True)) -> PointMotion:
+def seen(static_chi2: tuple[float, float], usable: tuple[bool, bool] = (True, True)) -> EndResiduals:
     """Two ends of one fragment."""
     return replace(no_motion(2), static_chi2=np.array(static_chi2), usable=np.array(usable))
 

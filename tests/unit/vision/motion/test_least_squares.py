@@ -11,20 +11,20 @@ from hal.types import FloatArray
 from tests.support.point_motion import static_miss
 from vision.motion import least_squares
 from vision.motion.least_squares import BodyVelocities, body_velocities, fragment_velocities
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import EndResiduals
 
 NAN = float("nan")
 
 
-def two_ends(depth_step_m: tuple[float, float], usable: tuple[bool, bool]) -> PointMotion:
+def two_ends(depth_step_m: tuple[float, float], usable: tuple[bool, bool]) -> EndResiduals:
     """Of one fragment at 4 m that went 0.2 m to the right in 0.5 s, known to a millimetre."""
     static = np.array([[0.0, -0.4, 4.0], [0.0, 0.4, 4.0]])
     ray = (static[:, :2] + np.array([0.2, 0.0])) / 4.0
-    return PointMotion(
+    return EndResiduals(
         static_m=static,
         ray=ray,
         lag_s=np.full(2, 0.5),
-        miss_m=static_miss(static, ray),
+        residual_m=static_miss(static, ray),
         covariance=np.tile([1e-6, 0.0, 1e-6], (2, 1)),
         depth_effect=np.zeros((2, 2)),
         depth_step_m=np.array(depth_step_m),
@@ -49,7 +49,7 @@ def test_depth_says_how_fast_along_the_line_of_sight() -> None:
 
 def test_an_end_that_is_not_usable_says_nothing() -> None:
     both = two_ends((0.1, NAN), (True, False))
-    other = replace(both, miss_m=both.miss_m + np.array([[0.0, 0.0], [5.0, -3.0]]))
+    other = replace(both, residual_m=both.residual_m + np.array([[0.0, 0.0], [5.0, -3.0]]))
     found, same = fragment_velocities(both, 1.5), fragment_velocities(other, 1.5)
     assert not found.per_end[:, 1].any()
     np.testing.assert_array_equal(found.velocity_mps, same.velocity_mps)
@@ -64,11 +64,11 @@ def swinging(speeds_mps: list[float]) -> BodyVelocities:
     static = np.stack((np.zeros(count), np.linspace(-0.4, 0.4, count), np.full(count, 4.0)), axis=1)
     went = np.array(speeds_mps)[:, None] * [0.25, 0.0]
     ray = (static[:, :2] + went) / 4.0
-    motion = PointMotion(
+    motion = EndResiduals(
         static_m=static,
         ray=ray,
         lag_s=np.full(count, 0.25),
-        miss_m=static_miss(static, ray),
+        residual_m=static_miss(static, ray),
         covariance=np.tile([4e-6, 0.0, 4e-6], (count, 1)),
         depth_effect=np.zeros((count, 2)),
         depth_step_m=np.full(count, NAN),
@@ -87,7 +87,7 @@ def test_limbs_that_swing_about_their_body_widen_its_velocity() -> None:
     assert found.velocity_mps[0, 0] == pytest.approx(1.0, abs=0.25)
     assert 0.08 < np.sqrt(found.covariance[0, 0, 0]) < 0.3
     assert found.agreement[0] < 0.2
-    assert found.unexplained[0] == 1.0
+    assert found.contradicts_static[0] == 1.0
 
 
 def test_an_outlier_does_not_widen_a_rigid_body() -> None:
@@ -98,17 +98,17 @@ def test_an_outlier_does_not_widen_a_rigid_body() -> None:
 
 
 def test_what_stands_is_explained() -> None:
-    assert swinging([0.0] * 8).unexplained[0] == 0.0
+    assert swinging([0.0] * 8).contradicts_static[0] == 0.0
 
 
-def nothing_seen(count: int) -> PointMotion:
+def nothing_seen(count: int) -> EndResiduals:
     """Ends whose miss is hardly known: whatever is said of them, none is an outlier."""
     static = np.tile([0.0, 0.0, 4.0], (count, 1))
-    return PointMotion(
+    return EndResiduals(
         static_m=static,
         ray=np.zeros((count, 2)),
         lag_s=np.full(count, 0.5),
-        miss_m=np.zeros((count, 2)),
+        residual_m=np.zeros((count, 2)),
         covariance=np.tile([1e20, 0.0, 1e20], (count, 1)),
         depth_effect=np.zeros((count, 2)),
         depth_step_m=np.full(count, NAN),
@@ -175,7 +175,7 @@ def test_information_of_an_end_is_the_inverse_of_its_covariance() -> None:
 def test_ends_go_to_their_own_body_and_some_to_none() -> None:
     """Of three bodies the middle one has no end; one end is nobody's, one not usable, and says no number."""
     motion = nothing_seen(6)
-    motion.usable[4], motion.miss_m[4], motion.static_chi2[4] = False, NAN, NAN
+    motion.usable[4], motion.residual_m[4], motion.static_chi2[4] = False, NAN, NAN
     motion.static_chi2[[0, 5]] = 13.9
     per_end = np.zeros((14, 6))
     per_end[[0, 3, 5]] = 1.0
@@ -185,7 +185,7 @@ def test_ends_go_to_their_own_body_and_some_to_none() -> None:
     np.testing.assert_array_equal(found.ends, [2, 0, 2])
     np.testing.assert_allclose(found.velocity_mps[:, 0], [5.0 / 3.0, 0.0, 7.0 / 3.0])
     np.testing.assert_array_equal(found.agreement, [1.0, 0.0, 1.0])
-    np.testing.assert_array_equal(found.unexplained, [0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(found.contradicts_static, [0.0, 0.0, 1.0])
     np.testing.assert_allclose(found.covariance[1], np.eye(3))
 
 
@@ -204,7 +204,7 @@ def test_the_middle_is_where_sorting_has_it(count: int) -> None:
     rng = np.random.default_rng(count)
     plain = rng.normal(size=count)
     for values in (plain, np.sort(plain), -np.sort(plain), np.round(plain), np.zeros(count)):
-        assert least_squares._middle(values) == np.sort(values)[count // 2]
+        assert least_squares._upper_median(values) == np.sort(values)[count // 2]
 
 
 def test_without_ends_or_bodies_there_is_nothing() -> None:

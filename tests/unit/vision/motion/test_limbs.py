@@ -9,13 +9,13 @@ from vision.motion import limbs
 from vision.motion.least_squares import BodyVelocities
 
 
-def body(ends: int, agreement: float, unexplained: float = 1.0) -> BodyVelocities:
+def body(ends: int, agreement: float, contradicts_static: float = 1.0) -> BodyVelocities:
     return BodyVelocities(
         velocity_mps=np.array([[1.0, 0.0, 0.0]]),
         covariance=1e-4 * np.eye(3)[None],
         ends=np.array([ends], np.intp),
         agreement=np.array([agreement]),
-        unexplained=np.array([unexplained]),
+        contradicts_static=np.array([contradicts_static]),
     )
 
 
@@ -25,15 +25,15 @@ def body(ends: int, agreement: float, unexplained: float = 1.0) -> BodyVelocitie
 )
 def test_ends_that_agree_are_believed(ends: int, agreement: float, believed: bool) -> None:
     """Two of them at least, and a fifth of all or four."""
-    assert limbs.believable(body(ends, agreement, unexplained=0.0)).tolist() == [believed]
+    assert limbs.believable(body(ends, agreement, contradicts_static=0.0)).tolist() == [believed]
 
 
 def test_ends_that_disagree_are_believed_if_many_deny_that_it_stands() -> None:
-    assert limbs.believable(body(6, 0.0, unexplained=0.7)).all()
+    assert limbs.believable(body(6, 0.0, contradicts_static=0.7)).all()
     assert not limbs.believable(body(5, 0.0)).any()
-    assert not limbs.believable(body(12, 0.0, unexplained=0.65)).any()
-    assert limbs.restless(body(6, 1.0, unexplained=0.7)).all()
-    assert not limbs.restless(body(6, 1.0, unexplained=0.65)).any()
+    assert not limbs.believable(body(12, 0.0, contradicts_static=0.65)).any()
+    assert limbs.restless(body(6, 1.0, contradicts_static=0.7)).all()
+    assert not limbs.restless(body(6, 1.0, contradicts_static=0.65)).any()
 
 
 def test_a_rigid_body_that_stands_has_no_limbs() -> None:
@@ -42,13 +42,13 @@ def test_a_rigid_body_that_stands_has_no_limbs() -> None:
 
 def test_what_disagrees_widens_the_velocity() -> None:
     """Half of them: 0.5 m/s, however many, where the others stand."""
-    assert limbs.variance(body(12, 0.5, unexplained=0.5), np.zeros(1))[0] == pytest.approx(0.25)
+    assert limbs.variance(body(12, 0.5, contradicts_static=0.5), np.zeros(1))[0] == pytest.approx(0.25)
 
 
 def test_what_several_limbs_say_is_less_uncertain_than_what_one_says() -> None:
     """All deny that they stand and disagree, as when somebody starts to walk: 1 m/s over their root."""
-    assert limbs.variance(body(8, 0.0, unexplained=1.0), np.zeros(1))[0] == pytest.approx(1.0)
-    assert limbs.variance(body(40, 0.0, unexplained=1.0), np.zeros(1))[0] == pytest.approx(0.2)
+    assert limbs.variance(body(8, 0.0, contradicts_static=1.0), np.zeros(1))[0] == pytest.approx(1.0)
+    assert limbs.variance(body(40, 0.0, contradicts_static=1.0), np.zeros(1))[0] == pytest.approx(0.2)
 
 
 def test_one_fragment_on_a_walker_may_be_a_shank() -> None:

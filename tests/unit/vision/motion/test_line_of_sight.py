@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vision.motion.line_of_sight import split
+from vision.motion.line_of_sight import decompose
 
 UP = np.array([0.0, -1.0, 0.0])
 
@@ -15,11 +15,11 @@ def test_split_by_hand() -> None:
     velocity = np.array([[0.3, 0.4, 0.5]])
     doubt = np.diag([0.0091, 0.0391, 0.2491])[None]
     # 0.09 / 0.01 + 0.16 / 0.04 + 0.25 / 0.25
-    ahead = split(velocity, doubt, np.array([[0.0, 0.0, 1.0]]), None)
+    ahead = decompose(velocity, doubt, np.array([[0.0, 0.0, 1.0]]), None)
     assert ahead.total[0] == pytest.approx(14.0)
     assert ahead.along[0] == pytest.approx(1.0)
     assert ahead.across[0] == pytest.approx(13.0)
-    aside = split(velocity, doubt, np.array([[1.0, 0.0, 0.0]]), None)
+    aside = decompose(velocity, doubt, np.array([[1.0, 0.0, 0.0]]), None)
     assert aside.along[0] == pytest.approx(9.0)
     assert aside.across[0] == pytest.approx(5.0)
 
@@ -28,10 +28,10 @@ def test_of_what_goes_across_the_level_part_by_hand() -> None:
     """Along z, level or obliquely downwards, that is x. Straight down nothing is."""
     velocity, doubt = np.array([[0.3, 0.4, 0.5]]), np.diag([0.0091, 0.0391, 0.2491])[None]
     for sight in ([0.0, 0.0, 1.0], [0.0, 0.6, 0.8]):
-        assert split(velocity, doubt, np.array([sight]), UP).level[0] == pytest.approx(9.0)
-    assert split(velocity, doubt, np.array([[1.0, 0.0, 0.0]]), UP).level[0] == pytest.approx(1.0)
-    assert split(velocity, doubt, np.array([[0.0, 1.0, 0.0]]), UP).level[0] == 0.0
-    ahead = split(velocity, doubt, np.array([[0.0, 0.0, 1.0]]), None)
+        assert decompose(velocity, doubt, np.array([sight]), UP).level[0] == pytest.approx(9.0)
+    assert decompose(velocity, doubt, np.array([[1.0, 0.0, 0.0]]), UP).level[0] == pytest.approx(1.0)
+    assert decompose(velocity, doubt, np.array([[0.0, 1.0, 0.0]]), UP).level[0] == 0.0
+    ahead = decompose(velocity, doubt, np.array([[0.0, 0.0, 1.0]]), None)
     assert ahead.level[0] == ahead.across[0]  # without a floor nothing is level
 
 
@@ -40,12 +40,12 @@ def test_many_velocities_are_split_at_once_as_one_by_one() -> None:
     velocity = np.array([[[0.3, 0.4, 0.5], [0.0, 0.0, 1.0]], [[-0.1, 0.2, 0.0], [1.0, 2.0, 2.0]]])
     doubt = np.array([[0.04 * np.eye(3), 0.09 * np.eye(3)], [0.01 * np.eye(3), 0.25 * np.eye(3)]])
     sight = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-    together = split(velocity, doubt, sight, UP)
+    together = decompose(velocity, doubt, sight, UP)
     np.testing.assert_allclose(together.value, [[0.5, 0.0], [0.0, 1.0]])
     np.testing.assert_allclose(together.variance, [[0.04, 0.09], [0.01, 0.25]])
     np.testing.assert_allclose(together.rest[1], [[-0.1, 0.2, 0.0], [0.0, 2.0, 2.0]])
     for k in range(2):
-        alone = split(velocity[k], doubt[k], sight, UP)
+        alone = decompose(velocity[k], doubt[k], sight, UP)
         np.testing.assert_allclose(together[k].along, alone.along)
         np.testing.assert_allclose(together[k].across, alone.across)
         np.testing.assert_allclose(together[k].total, alone.total)
@@ -58,7 +58,7 @@ def test_squared_sigmas_are_those_of_a_general_solver() -> None:
     root = rng.normal(size=(5, 3, 3))
     doubt, velocity, sight = root @ root.transpose(0, 2, 1), rng.normal(size=(5, 3)), rng.normal(size=(5, 3))
     sight /= np.linalg.norm(sight, axis=1)[:, None]
-    found = split(velocity, doubt, sight, UP)
+    found = decompose(velocity, doubt, sight, UP)
     floor = 0.0009 * np.eye(3)
     for k in range(5):
         total = velocity[k] @ np.linalg.solve(doubt[k] + floor, velocity[k])
@@ -72,6 +72,6 @@ def test_squared_sigmas_are_those_of_a_general_solver() -> None:
 
 
 def test_of_no_tracks_there_is_nothing_to_split() -> None:
-    found = split(np.empty((4, 0, 3)), np.empty((4, 0, 3, 3)), np.empty((0, 3)), UP)
+    found = decompose(np.empty((4, 0, 3)), np.empty((4, 0, 3, 3)), np.empty((0, 3)), UP)
     assert found.level.shape == (4, 0)
     assert found[0].rest.shape == (0, 3)

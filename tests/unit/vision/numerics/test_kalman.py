@@ -46,7 +46,9 @@ def test_a_measured_velocity_moves_the_position_with_it() -> None:
 def test_putting_a_track_elsewhere_says_nothing_about_its_velocity() -> None:
     before = np.array([[1.0, 2.0, 3.0, 0.4, 0.5, 0.6]])
     noise = 0.2 * np.eye(3)[None]
-    state, covariance = kalman.place(before, coupled_covariance(), np.array([[2.0, 0.0, 5.0]]), noise)
+    state, covariance = kalman.reset_position(
+        before, coupled_covariance(), np.array([[2.0, 0.0, 5.0]]), noise
+    )
     np.testing.assert_allclose(state, [[2.0, 0.0, 5.0, 0.4, 0.5, 0.6]])
     np.testing.assert_allclose(covariance[0], np.diag([0.2] * 3 + [1.0] * 3))
     np.testing.assert_allclose(before[0, :3], [1.0, 2.0, 3.0])

@@ -12,9 +12,9 @@ from hal.types import FloatArray, Intrinsics, Pose
 from vision.depth.depth_mask import UNSEEN_M
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.fragments.store import FragmentStore
-from vision.motion.anchor_depths import appraise
-from vision.motion.evidence import residuals
-from vision.motion.velocities import PointMotion
+from vision.motion.anchor_depths import depths_with_sigma
+from vision.motion.residuals import residuals
+from vision.motion.velocities import EndResiduals
 
 CAMERA = Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0)
 NOISE = DepthNoise(floor_m=0.005, quadratic_per_m=0.0075)
@@ -31,7 +31,7 @@ UPRIGHT = np.array([[320.0, 200.0], [320.0, 240.0]])
 
 def seen(
     first_px: FloatArray, step_px: tuple[float, float], far_m: float, right: float, down: float
-) -> PointMotion:
+) -> EndResiduals:
     """Of a fragment whose ends (2, 2) go by step_px a frame, while the camera goes STEP_M times right, down;
     measured at NEAR_M, with far_m behind."""
     store = FragmentStore()
@@ -47,7 +47,7 @@ def seen(
             store.ends_px, store.near_m, store.far_m = pixels, near, far
             anchor = store.anchors(stamp_ns, 0.25)
             now = replace(STILL, pose=pose)
-            motion = residuals(store, anchor, appraise(anchor, NOISE), now, CAMERA, NOISE, 1.0)
+            motion = residuals(store, anchor, depths_with_sigma(anchor, NOISE), now, CAMERA, NOISE, 1.0)
         store.commit(stamp_ns, pose, CAMERA, np.zeros(2))
     assert motion is not None
     return motion

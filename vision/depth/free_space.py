@@ -24,19 +24,19 @@ _LEVEL_RAD, _UPRIGHT_RAD = 1e-6, 1.5  # bounds of a ray's angle, so that its tan
 
 
 def free_space(
-    grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float, unmeasured_m: float = 0.0
+    grid: DepthGrid, obstacle: BoolGrid, max_depth_m: float, measurable_from_m: float = 0.0
 ) -> FreeSpace:
     """Nearest obstacle surface and known distance for each of at most 80 upright bands.
 
     obstacle (h, w): cells between clearance and the robot's height; all valid cells where the floor is not
-    known. unmeasured_m: floor nearer than this depth cannot be measured (vision/depth/near_floor.py), so that
-    missing data there is no hole; 0.0: all floor can be measured. Without a known mounting, space is known up
-    to the nearest surface only.
+    known. measurable_from_m: floor nearer than this depth cannot be measured (vision/depth/near_floor.py), so
+    that missing data there is no hole; 0.0: all floor can be measured. Without a known mounting, space is
+    known up to the nearest surface only.
     """
     bands, blind_m = level_bands(grid), 0.0
     nearest = _nearest_m(grid.forward_m, obstacle, bands.band, len(bands))
     if math.isfinite(grid.pitch_rad):
-        known, blind_m = _known_m(grid, bands, max_depth_m, unmeasured_m)
+        known, blind_m = _known_m(grid, bands, max_depth_m, measurable_from_m)
         # A surface hides everything behind it.
         known = np.where(np.isfinite(nearest), nearest, known)
     else:
@@ -107,7 +107,7 @@ def _nearest_m(forward_m: FloatGrid, obstacle: BoolGrid, band: NDArray[np.int32]
 
 
 def _known_m(
-    grid: DepthGrid, bands: LevelBands, max_depth_m: float, unmeasured_m: float
+    grid: DepthGrid, bands: LevelBands, max_depth_m: float, measurable_from_m: float
 ) -> tuple[FloatArray, float]:
     """(B,) forward distance up to which the floor is seen without a hole; and FreeSpace.blind_m."""
     cos_pitch, sin_pitch = math.cos(grid.pitch_rad), math.sin(grid.pitch_rad)
@@ -120,7 +120,7 @@ def _known_m(
     floor_depth = grid.camera_height_m / drop[rows]
     floor_forward = floor_depth * (cos_pitch - y[rows] * sin_pitch)
     limit_m = (FLOOR_EXCESS * floor_depth).astype(np.float32)
-    unmeasured = int(np.count_nonzero(floor_depth < unmeasured_m))
+    unmeasured = int(np.count_nonzero(floor_depth < measurable_from_m))
     # If even the uppermost row meets the floor, nothing beyond that is in view.
     horizon_m = max_depth_m if len(rows) < len(grid.y) else floor_forward[-1]
     reach_m = np.minimum(np.concatenate((floor_forward, (horizon_m,))), max_depth_m)

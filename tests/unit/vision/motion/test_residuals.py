@@ -9,13 +9,13 @@ import pytest
 
 from config.perception import DepthNoise
 from hal.types import FloatArray, Intrinsics, Pose
-from vision.camera.lens import project
+from tests.support.point_motion import project
 from vision.ego_motion.camera_motion import CameraEstimate
 from vision.fragments.store import FragmentStore
-from vision.motion import evidence
-from vision.motion.anchor_depths import appraise, average_depth, static_points
-from vision.motion.evidence import observed_variance_scale, residuals
-from vision.motion.velocities import PointMotion
+from vision.motion import residuals as module
+from vision.motion.anchor_depths import average_depth, depths_with_sigma, static_points
+from vision.motion.residuals import observed_variance_scale, residuals
+from vision.motion.velocities import EndResiduals
 
 CAMERA = Intrinsics(640, 480, 600.0, 600.0, 320.0, 240.0)
 NOISE = DepthNoise(floor_m=0.005, quadratic_per_m=0.0075)
@@ -32,7 +32,7 @@ class Way:
     """One fragment, frame by frame. motions: the residuals of every frame but the first."""
 
     store: FragmentStore
-    motions: list[PointMotion]
+    motions: list[EndResiduals]
 
 
 def follow(ends_m: list[FloatArray], far_m: float | None = None, scale: float = 1.0) -> Way:
@@ -50,8 +50,10 @@ def follow(ends_m: list[FloatArray], far_m: float | None = None, scale: float = 
         else:
             store.ends_px, store.near_m, store.far_m = pixels, near, far
             anchor = store.anchors(stamp_ns, WINDOW_S)
-            way.motions.append(residuals(store, anchor, appraise(anchor, NOISE), HERE, CAMERA, NOISE, scale))
-            average_depth(store, store.before(stamp_ns), STILL, NOISE)
+            way.motions.append(
+                residuals(store, anchor, depths_with_sigma(anchor, NOISE), HERE, CAMERA, NOISE, scale)
+            )
+            average_depth(store, store.last_entries(stamp_ns), STILL, NOISE)
         store.commit(stamp_ns, STILL, CAMERA, np.zeros(2))
     return way
 
@@ -76,7 +78,7 @@ def test_averaged_depth_of_a_mover_gives_its_speed_along_the_axis_without_bias(s
 def test_of_what_stands_depth_and_image_say_nothing_else() -> None:
     for motion in follow(going((0.0, 0.0, 0.0), 12)).motions:
         np.testing.assert_allclose(motion.depth_step_m, 0.0, atol=1e-5)
-        np.testing.assert_allclose(motion.miss_m, 0.0, atol=1e-4)
+        np.testing.assert_allclose(motion.residual_m, 0.0, atol=1e-4)
         assert (motion.static_chi2 < 0.01).all()
         assert motion.usable.all()
 
@@ -98,8 +100,8 @@ def test_depth_lag_by_hand() -> None:
 
 def test_a_step_across_is_seen_as_a_miss_in_metres() -> None:
     motion = follow(going((0.6, 0.0, 0.0), 6)).motions[-1]
-    np.testing.assert_allclose(motion.miss_m[:, 0], 0.6 * motion.lag_s, rtol=1e-3)
-    np.testing.assert_allclose(motion.miss_m[:, 1], 0.0, atol=1e-4)
+    np.testing.assert_allclose(motion.residual_m[:, 0], 0.6 * motion.lag_s, rtol=1e-3)
+    np.testing.assert_allclose(motion.residual_m[:, 1], 0.0, atol=1e-4)
     assert (motion.static_chi2 > 50.0).all()
 
 
@@ -107,11 +109,11 @@ def test_a_leap_in_depth_begins_the_average_anew() -> None:
     leap = going((0.0, 0.0, 0.0), 8) + [ENDS_M - np.array([0.0, 0.0, 2.0])] * 2
     store = follow(leap).store
     np.testing.assert_allclose(store.depth_m, 3.0, atol=1e-5)
-    np.testing.assert_allclose(store.looks, 2.0)
+    np.testing.assert_allclose(store.depth_samples, 2.0)
 
 
 def test_an_average_is_of_six_looks_at_most() -> None:
-    np.testing.assert_allclose(follow(going((0.0, 0.0, 0.0), 20)).store.looks, 6.0)
+    np.testing.assert_allclose(follow(going((0.0, 0.0, 0.0), 20)).store.depth_samples, 6.0)
 
 
 def test_missing_depth_is_a_distant_point_hardly_known_and_not_used() -> None:
@@ -121,7 +123,7 @@ def test_missing_depth_is_a_distant_point_hardly_known_and_not_used() -> None:
     store.add(pixels, nothing, nothing, np.ones((1, 2, 3), np.float32))
     store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
     anchor = store.anchors(2 * FRAME_NS, WINDOW_S)
-    depths = appraise(anchor, NOISE)
+    depths = depths_with_sigma(anchor, NOISE)
     np.testing.assert_array_equal(depths.near_m, 12.0)
     np.testing.assert_array_equal(depths.sigma_m, 10.0)
     assert not depths.known.any()
@@ -138,7 +140,7 @@ def test_before_something_distant_an_end_tells_of_the_cameras_turn_whichever_of_
     store.add(pixels, near, far, np.ones((1, 2, 3), np.float32))
     store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
     anchor = store.anchors(2 * FRAME_NS, WINDOW_S)
-    points = static_points(anchor, appraise(anchor, NOISE), store.pixel_cov, np.array([False]), 10.0)
+    points = static_points(anchor, depths_with_sigma(anchor, NOISE), store.pixel_cov, np.array([False]), 10.0)
     assert points.usable.tolist() == [True, False]
     assert points.depth_sigma_m[0] == pytest.approx(9.0)
 
@@ -147,21 +149,21 @@ def test_looks_make_depth_surer_but_never_more_than_twice() -> None:
     """Of neighbouring pixels noise is alike in part."""
     store = follow(going((0.0, 0.0, 0.0), 20)).store
     single = 0.005 + 0.0075 * 25.0
-    settled = appraise(store.before(21 * FRAME_NS), NOISE)
+    settled = depths_with_sigma(store.last_entries(21 * FRAME_NS), NOISE)
     np.testing.assert_allclose(settled.sigma_m, 0.5 * single, rtol=1e-4)
-    young = appraise(follow(going((0.0, 0.0, 0.0), 2)).store.before(3 * FRAME_NS), NOISE)
+    young = depths_with_sigma(follow(going((0.0, 0.0, 0.0), 2)).store.last_entries(3 * FRAME_NS), NOISE)
     np.testing.assert_allclose(young.sigma_m, single / np.sqrt(2.0), rtol=1e-4)
 
 
 def test_ends_on_two_surfaces_and_ends_of_movers_are_no_static_points() -> None:
     store = follow(going((0.0, 0.0, 0.0), 3), far_m=8.0).store
     anchor = store.anchors(4 * FRAME_NS, WINDOW_S)
-    depths = appraise(anchor, NOISE)
+    depths = depths_with_sigma(anchor, NOISE)
     assert depths.mixed.all()
     assert not static_points(anchor, depths, store.pixel_cov, np.array([False]), 10.0).usable.any()
     store = follow(going((0.0, 0.0, 0.0), 3)).store
     anchor = store.anchors(4 * FRAME_NS, WINDOW_S)
-    depths = appraise(anchor, NOISE)
+    depths = depths_with_sigma(anchor, NOISE)
     assert not depths.mixed.any()
     assert not static_points(anchor, depths, store.pixel_cov, np.array([True]), 10.0).usable.any()
     points = static_points(anchor, depths, store.pixel_cov, np.array([False]), 10.0)
@@ -177,14 +179,14 @@ def test_an_end_at_the_rim_of_something_slides_along_its_fragment_only() -> None
     np.testing.assert_allclose(more, [[9.09, 0.0, 0.09]] * 2, rtol=1e-3, atol=1e-6)
 
 
-def some(chi2: FloatArray, usable: bool = True) -> PointMotion:
+def some(chi2: FloatArray, usable: bool = True) -> EndResiduals:
     count = len(chi2)
     pair = np.zeros((count, 2))
-    return PointMotion(
+    return EndResiduals(
         static_m=np.zeros((count, 3)),
         ray=pair,
         lag_s=np.zeros(count),
-        miss_m=pair,
+        residual_m=pair,
         covariance=np.ones((count, 3)),
         depth_effect=pair,
         depth_step_m=np.zeros(count),
@@ -237,28 +239,28 @@ def test_chi2_by_numbers(
     effect: tuple[float, float],
     expected: float,
 ) -> None:
-    assert evidence._squared_sigmas(miss, covariance, effect) == pytest.approx(expected)
+    assert module._squared_sigmas(miss, covariance, effect) == pytest.approx(expected)
 
 
 def test_of_no_fragments_there_are_no_residuals() -> None:
     store = FragmentStore()
     store.commit(FRAME_NS, STILL, CAMERA, np.zeros(2))
     anchor = store.anchors(2 * FRAME_NS, WINDOW_S)
-    depths = appraise(anchor, NOISE)
+    depths = depths_with_sigma(anchor, NOISE)
     motion = residuals(store, anchor, depths, HERE, CAMERA, NOISE, 1.0)
     assert motion.static_m.shape == (0, 3)
     assert len(motion.usable) == len(motion.depth_step_m) == 0
     moving = np.empty(0, np.bool_)
     assert len(static_points(anchor, depths, store.pixel_cov, moving, 10.0).usable) == 0
-    average_depth(store, store.before(2 * FRAME_NS), STILL, NOISE)
-    assert store.depth_m.shape == store.looks.shape == (0, 2)
+    average_depth(store, store.last_entries(2 * FRAME_NS), STILL, NOISE)
+    assert store.depth_m.shape == store.depth_samples.shape == (0, 2)
 
 
 def test_a_camera_that_went_past_an_end_does_not_use_it() -> None:
     """Nor one whose way is no number."""
     store = follow(going((0.0, 0.0, 0.0), 3)).store
     anchor = store.anchors(4 * FRAME_NS, WINDOW_S)
-    depths = appraise(anchor, NOISE)
+    depths = depths_with_sigma(anchor, NOISE)
     for beyond_m in (4.95, 6.0, np.nan):
         now = replace(HERE, pose=Pose(np.eye(3), np.array([0.0, 0.0, beyond_m])))
         assert not residuals(store, anchor, depths, now, CAMERA, NOISE, 1.0).usable.any()

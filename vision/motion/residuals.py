@@ -1,7 +1,7 @@
 """Residual of every fragment end (end point of a fragment) against the prediction that it is static.
 
 The prediction is where the end would be now, by the camera's own motion, if it had stayed at its anchor. The
-residual (innovation) is how far from there it is seen, with its covariance and chi-square (PointMotion). The
+residual (innovation) is how far from there it is seen, with its covariance and chi-square (EndResiduals). The
 ends that are not known to move also give the scale of the noise (observed_variance_scale).
 
 vision/detector.py calls this after the camera's motion has been estimated. The evidence of tracks, which
@@ -23,18 +23,17 @@ from vision.ego_motion.camera_motion import CameraEstimate
 from vision.ego_motion.rolling_shutter import straight_rays
 from vision.fragments.store import AnchorEnds, FragmentStore
 from vision.motion.anchor_depths import AnchorDepths, depth_steps
-from vision.motion.velocities import PointMotion
+from vision.motion.velocities import STATIC_END_CHI2, EndResiduals
 from vision.numerics.order import quantile
 
 _SETTLED_FRAMES = 3  # the residuals of younger ends are hardly larger than their noise
-_LEAST_ENDS = 16  # minimum for a scale: it is taken from the lower third
+_MIN_ENDS = 16  # minimum for a scale: it is taken from the lower third
 _CHI2_THIRD = 0.811  # one third of static ends lies below; 2 degrees of freedom
 _SCALE_GAIN = 0.15  # per frame: half of a change of floor or light is taken up in four frames
 # Bounds: sigmas of 0.55 to 2.8 times the assumed ones. Anything beyond is not noise.
-_LEAST_SCALE = 0.3
-_MOST_SCALE = 8.0
+_MIN_SCALE = 0.3
+_MAX_SCALE = 8.0
 _STEPS_SHARE = 0.5  # of the sum of the flow variances of all frames: successive errors cancel in part
-_STATIC_CHI2 = 6.0  # 95 % of static ends lie below; 2 degrees of freedom
 _MIXED_ALONG_PX = 3.0  # minimum sigma along the fragment of an end where the edges of two surfaces cross
 _MIXED_ACROSS_PX = 0.3  # its sigma across the fragment: twice that of a clear end
 
@@ -47,13 +46,13 @@ def residuals(
     camera: Intrinsics,
     noise: DepthNoise,
     variance_scale: float,
-) -> PointMotion:
+) -> EndResiduals:
     """Residuals of the 2N ends in store, from their anchors and the camera's pose now.
 
     variance_scale: ratio of the observed variance of static ends to the assumed one.
     """
     variance = now.covariance.diagonal().tolist()
-    static_m, ray, miss_m, covariance, depth_effect, static_chi2, told = _missed(
+    static_m, ray, residual_m, covariance, depth_effect, static_chi2, usable = _residuals(
         np.ascontiguousarray(anchor.direction),
         np.ascontiguousarray(anchor.origin),
         depths.near_m,
@@ -75,23 +74,23 @@ def residuals(
         variance_scale,
     )
     step_m, step_sigma_m, step_lag_s = depth_steps(store, anchor, depths, static_m, noise)
-    return PointMotion(
+    return EndResiduals(
         static_m=static_m,
         ray=ray,
         lag_s=anchor.lag_s.repeat(2),
-        miss_m=miss_m,
+        residual_m=residual_m,
         covariance=covariance,
         depth_effect=depth_effect,
         depth_step_m=step_m,
         depth_step_sigma_m=step_sigma_m,
         depth_lag_s=step_lag_s,
         static_chi2=static_chi2,
-        usable=depths.known & told,
+        usable=depths.known & usable,
     )
 
 
 def observed_variance_scale(
-    motion: PointMotion, age_frames: NDArray[np.intp], moving: NDArray[np.bool_], before: float
+    motion: EndResiduals, age_frames: NDArray[np.intp], moving: NDArray[np.bool_], before: float
 ) -> float:
     """The variance scale for the next frame, from the scatter of static ends in this one.
 
@@ -101,18 +100,18 @@ def observed_variance_scale(
     """
     settled = motion.usable & ((age_frames >= _SETTLED_FRAMES) & ~moving).repeat(2)
     chi2 = motion.static_chi2[settled]
-    if len(chi2) < _LEAST_ENDS:
+    if len(chi2) < _MIN_ENDS:
         return before
     seen = before * quantile(chi2, 1.0 / 3.0) / _CHI2_THIRD
-    return min(max(before + _SCALE_GAIN * (seen - before), _LEAST_SCALE), _MOST_SCALE)
+    return min(max(before + _SCALE_GAIN * (seen - before), _MIN_SCALE), _MAX_SCALE)
 
 
 @inlined
 def _squared_sigmas(
-    miss: tuple[float, float], covariance: tuple[float, float, float], effect: tuple[float, float]
+    residual: tuple[float, float], covariance: tuple[float, float, float], effect: tuple[float, float]
 ) -> float:
-    """Squared Mahalanobis length of miss under covariance (xx, xy, yy) plus effect * effect'."""
-    a, b = miss
+    """Squared Mahalanobis length of residual under covariance (xx, xy, yy) plus effect * effect'."""
+    a, b = residual
     xx = covariance[0] + effect[0] * effect[0]
     xy = covariance[1] + effect[0] * effect[1]
     yy = covariance[2] + effect[1] * effect[1]
@@ -121,7 +120,9 @@ def _squared_sigmas(
 
 
 @inlined
-def _slide(ends_px: NDArray[np.float32], passing: tuple[float, float]) -> tuple[float, float, float]:
+def _sliding_covariance(
+    ends_px: NDArray[np.float32], passing: tuple[float, float]
+) -> tuple[float, float, float]:
     """Additional covariance uu, uv, vv (px^2) of a mixed end of the fragment with ends_px (2, 2).
 
     An end whose surroundings lie on two surfaces is often not a corner of a body, but the place where the
@@ -162,7 +163,7 @@ def _camera_axes(
     " float32[:, :, ::1], float32[:, :, ::1], int64[::1], float64[:, ::1], float64[::1], float64, float64,"
     " float64, float64, float64, float64, float64"
 )
-def _missed(
+def _residuals(
     direction: FloatArray,
     origin: FloatArray,
     near_m: FloatArray,
@@ -183,15 +184,16 @@ def _missed(
     quadratic_per_m: float,
     variance_scale: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-    """static_m, ray, miss_m, covariance, depth_effect and static_chi2 of PointMotion, and which are usable.
+    """static_m, ray, residual_m, covariance, depth_effect and static_chi2 of EndResiduals, and which are
+    usable.
 
     straight (3, 2N): rays to the ends as seen now. turn_variance, way_variance: of the camera's rotation
     (rad^2) and translation (m^2).
     """
     count = len(near_m)
-    static_m, ray, miss_m = np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2))
+    static_m, ray, residual_m = np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2))
     covariance, effect, chi2 = np.empty((count, 3)), np.empty((count, 2)), np.empty(count)
-    tells, noise = np.empty(count, np.bool_), math.sqrt(variance_scale)
+    usable, noise = np.empty(count, np.bool_), math.sqrt(variance_scale)
     for k in range(count):
         dx, dy, dz, x0, y0, z0 = _camera_axes(rotation, translation_m, direction[:, k], origin[:, k])
         u, v = straight[0, k], straight[1, k]
@@ -204,7 +206,7 @@ def _missed(
         uu, uv, vv = uu * steps, uv * steps, vv * steps
         if mixed[k]:
             passing = (far_x / far_ahead - x / ahead) * fx, (far_y / far_ahead - y / ahead) * fy
-            more_uu, more_uv, more_vv = _slide(ends_px[k // 2], passing)
+            more_uu, more_uv, more_vv = _sliding_covariance(ends_px[k // 2], passing)
             uu, uv, vv = uu + more_uu, uv + more_uv, vv + more_vv
         scaled = variance_scale * z * z
         pose_variance = way_variance + turn_variance * z * z
@@ -215,8 +217,8 @@ def _missed(
         )
         turn_u, turn_v = (u * dz - dx) * noise, (v * dz - dy) * noise
         near_effect = turn_u * sigma_m[k], turn_v * sigma_m[k]
-        near_miss = u * z - x, v * z - y
-        near_chi2 = _squared_sigmas(near_miss, (xx, xy, yy), near_effect)
+        near_residual = u * z - x, v * z - y
+        near_chi2 = _squared_sigmas(near_residual, (xx, xy, yy), near_effect)
         far_sigma_m = depth_sigma_of(far_m[k], floor_m, quadratic_per_m)
         more = (far_z / ahead) ** 2
         far_chi2 = _squared_sigmas(
@@ -226,11 +228,11 @@ def _missed(
         )
         static_m[k, 0], static_m[k, 1], static_m[k, 2] = x, y, z
         ray[k, 0], ray[k, 1] = u, v
-        miss_m[k, 0], miss_m[k, 1] = near_miss
+        residual_m[k, 0], residual_m[k, 1] = near_residual
         covariance[k, 0], covariance[k, 1], covariance[k, 2] = xx, xy, yy
         effect[k, 0], effect[k, 1] = near_effect
         chi2[k] = min(near_chi2, far_chi2)
         # An end that is where a static far surface would have it tells nothing about the near surface.
-        behind = near_chi2 > _STATIC_CHI2 and far_chi2 <= _STATIC_CHI2
-        tells[k] = z > 0.1 and not behind and math.isfinite(near_miss[0] + near_miss[1])
-    return static_m, ray, miss_m, covariance, effect, chi2, tells
+        behind = near_chi2 > STATIC_END_CHI2 and far_chi2 <= STATIC_END_CHI2
+        usable[k] = z > 0.1 and not behind and math.isfinite(near_residual[0] + near_residual[1])
+    return static_m, ray, residual_m, covariance, effect, chi2, usable

@@ -20,8 +20,8 @@ def test_a_mover_that_must_have_gone_on_loses_what_was_there_before(
     """Seven tenths of what speaks for it."""
     expected = (PART > 0) & ~HALF, HALF
     before, stayed = vote(*expected, mover=(False, True)), block((10, 30), (10, 10 + stayed_columns))
-    left, lost = votes.withdraw(before, PART, labelled(*expected), stayed, OVERDUE, MOVES)
-    np.testing.assert_array_equal(left.present, [[True, not hidden]])
+    left, lost = votes.drop_overdue_movers(before, PART, labelled(*expected), stayed, OVERDUE, MOVES)
+    np.testing.assert_array_equal(left.claims, [[True, not hidden]])
     np.testing.assert_array_equal(lost, [False, hidden])
     labels = votes.divide(PART, labelled(*expected), left, left.winner)
     assert (labels[HALF] == (1 if hidden else 2)).all()
@@ -35,7 +35,7 @@ def test_it_keeps_what_nothing_that_stands_claims_and_where_it_may_be_still(
 ) -> None:
     expected = (PART > 0) & ~HALF, HALF
     before = vote(*expected, mover=mover)
-    left, lost = votes.withdraw(
+    left, lost = votes.drop_overdue_movers(
         before, PART, labelled(*expected), PART > 0, np.array(overdue), np.array(mover)
     )
     assert left is before
@@ -46,20 +46,20 @@ def test_who_is_in_sight_somewhere_else_is_not_hidden() -> None:
     parts = labelled(block((10, 30), (10, 50)), block((35, 45), (10, 20)))
     expected = (parts == 1) & ~HALF, HALF | (parts == 2)
     before = vote(*expected, mover=(False, True), parts=parts)
-    left, lost = votes.withdraw(before, parts, labelled(*expected), parts > 0, OVERDUE, MOVES)
-    np.testing.assert_array_equal(left.present, [[True, False], [False, True]])
+    left, lost = votes.drop_overdue_movers(before, parts, labelled(*expected), parts > 0, OVERDUE, MOVES)
+    np.testing.assert_array_equal(left.claims, [[True, False], [False, True]])
     assert not lost.any()
 
 
 def test_a_mover_ends_where_a_guess_has_it_if_what_stands_claims_all_of_its_parts() -> None:
     expected = (PART > 0) & ~HALF, HALF
     both = vote(*expected, mover=(False, True))
-    np.testing.assert_array_equal(votes.guessed(both, MOVES), [False, True])
-    np.testing.assert_array_equal(votes.guessed(both, np.array([True, True])), [False, False])
+    np.testing.assert_array_equal(votes.border_is_guess(both, MOVES), [False, True])
+    np.testing.assert_array_equal(votes.border_is_guess(both, np.array([True, True])), [False, False])
     # Some of it is seen by itself.
     parts = labelled(block((10, 30), (10, 50)), block((35, 45), (10, 20)))
     seen = vote((parts == 1) & ~HALF, HALF | (parts == 2), mover=(False, True), parts=parts)
-    np.testing.assert_array_equal(votes.guessed(seen, MOVES), [False, False])
+    np.testing.assert_array_equal(votes.border_is_guess(seen, MOVES), [False, False])
     # Who claims nothing ends nowhere.
     alone = vote(PART > 0, np.zeros_like(HALF), mover=(False, True))
-    np.testing.assert_array_equal(votes.guessed(alone, MOVES), [False, False])
+    np.testing.assert_array_equal(votes.border_is_guess(alone, MOVES), [False, False])
