@@ -69,7 +69,7 @@ _STRIP_REACH_M = 0.5
 class OutOfView:
     """The bodies out of view; call mark_leaving_movers, then update, once a scene.
 
-    max_obstacle_speed_mps: measured speeds that are far above it (IMPLAUSIBLE_SPEED_FACTOR times) are mistakes.
+    max_obstacle_speed_mps: measured speeds far above it (IMPLAUSIBLE_SPEED_FACTOR times) are mistakes.
     """
 
     def __init__(self, mount: CameraMount, max_obstacle_speed_mps: float) -> None:
