@@ -2,8 +2,8 @@
 
 One motion command 0x111 is sent every command period: zero in every mode except armed. 0x421 takes the base
 out of standby while arming, and puts it back afterwards. Where somebody else commands the base over CAN, the
-driver does not arm, and latches if it is armed. Before it has begun to arm it then sends nothing at all, since
-a zero would stop a drive that is not its own.
+driver does not arm, and latches if it is armed. Before it has begun to arm it then sends nothing at all,
+since a zero would stop a drive that is not its own.
 """
 
 from __future__ import annotations

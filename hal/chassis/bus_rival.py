@@ -1,7 +1,7 @@
 """Does somebody else command the base on the same CAN bus?
 
-A computer never receives its own frames, so one frame of this kind is proof: a second program, another computer,
-a tool that somebody left running. The base would follow both, one command after the other.
+A computer never receives its own frames, so one frame of this kind is proof: a second program, another
+computer, a tool that somebody left running. The base would follow both, one command after the other.
 """
 
 from __future__ import annotations
