@@ -97,6 +97,12 @@ class SpeedShaper:
         self._active, self._to_end_m = self._comfort, math.inf
         self._lag.restart()
 
+    def begin_anew(self) -> None:
+        """Start again from rest, after a while in which the chassis did not answer. Of its lag nothing counts
+        that was learnt lately."""
+        self._lag.take_back()
+        self.reset()
+
     def step(
         self, target_speed_mps: float, *, emergency: bool = False, distance_to_end_m: float = math.inf
     ) -> ShapedSpeed:
