@@ -43,7 +43,8 @@ class Answer:
     zero: str = ""
 
 
-_ANSWERS = Answer()
+# It does what it is told.
+ANSWERS = Answer()
 
 
 class BaseAnswer:
@@ -61,7 +62,7 @@ class BaseAnswer:
         self._since_ns: int | None = None
         self._fell = self._behind = self._runs = self._back = 0
         self._followed = False
-        self._answer = _ANSWERS
+        self._answer = ANSWERS
 
     def restart(self) -> None:
         """The base does not obey now: what it does is no answer."""
@@ -69,7 +70,7 @@ class BaseAnswer:
         self._since_ns = None
         self._fell = self._behind = self._runs = self._back = 0
         self._followed = False
-        self._answer = _ANSWERS
+        self._answer = ANSWERS
 
     def step(self, commanded_mps: float, measured_mps: float, feedback_ns: int | None, now_ns: int) -> Answer:
         """commanded_mps: commanded until now_ns. measured_mps: by the report of feedback_ns."""
@@ -83,7 +84,7 @@ class BaseAnswer:
         since_long = now_ns - self._since_ns >= self._window_ns
         least_mps = self._least.value if since_long else 0.0
         self._count(commanded_mps, measured_mps, least_mps)
-        self._answer = _ANSWERS
+        self._answer = ANSWERS
         if self._back >= _REPORTS:
             return self._begin_anew(f"the base goes back at {-measured_mps:.2f} m/s while told to go ahead")
         if self._fell >= _REPORTS and self._followed:

@@ -89,6 +89,11 @@ class Console:
         for complaint in new:
             self.event(f"{stamp_s:7.2f} s  the base says: {complaint}")
 
+    def unanswered(self, stamp_s: float, why: str) -> None:
+        """One line where the base was told zero because it did not answer; nothing for ""."""
+        if why:
+            self.event(f"{stamp_s:7.2f} s  {why}")
+
     def event(self, line: str) -> None:
         """Write a line that stays, unless quiet."""
         if not self._quiet:
