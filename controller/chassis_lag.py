@@ -24,6 +24,8 @@ _OUTLIER_M = 0.25  # a larger residual starts the measurement anew
 # What was known is kept every so many steps, so often: at 50 a second the oldest is 1.5 to 2 s old. That is
 # longer than any base goes on at its last command when it hears nothing.
 _KEPT_EVERY, _KEPT = 25, 4
+# Then it may still coast for so many steps, by nobody's command.
+_COASTS = 50
 # Greatest lag and drift that are used.
 _LONGEST_S = 0.6
 _MOST_DRIFT = 0.1
@@ -40,6 +42,7 @@ class ChassisLag:
         self._started_at_m: float | None = None
         self._kept = deque([self._known], maxlen=_KEPT)
         self._until_kept = _KEPT_EVERY
+        self._skipped = 0
 
     @property
     def seconds(self) -> float:
@@ -55,9 +58,11 @@ class ChassisLag:
         self._commanded_m, self._started_at_m = 0.0, None
 
     def take_back(self) -> None:
-        """Forget what was learnt in the last two seconds: the chassis did not follow then."""
+        """Forget what was learnt in the last two seconds, and learn nothing in the next: the chassis does not
+        follow then."""
         self._lag_s, self._drift_share, self._spread = self._kept[0]
         self._kept = deque([self._known], maxlen=_KEPT)
+        self._skipped = _COASTS
         self.restart()
 
     @property
@@ -71,8 +76,12 @@ class ChassisLag:
         v_mps, a_mps2: commanded now.
         to_end_m: distance to the end of the path now, by odometry.
         """
+        if self._skipped > 0:
+            self._skipped -= 1
+            return
         if self._started_at_m is None:
-            self._started_at_m = to_end_m + self.seconds * v_mps
+            # Measured from where it will have followed what was commanded before.
+            self._started_at_m = to_end_m - self.seconds * max(v_mps - self.seconds * a_mps2, 0.0)
             return
         self._until_kept -= 1
         if self._until_kept <= 0:

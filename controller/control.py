@@ -143,9 +143,13 @@ class ControlLoop:
             self._answer.restart()
             return Setpoint(now_ns, 0.0, 0.0, 0.0), "", ""
         answer = self._answer.step(self._shape.v_mps, state.v_mps, state.feedback_ns, now_ns)
+        if answer.ends:
+            self.request_stop(answer.zero, Outcome.BROKEN_OFF)
         if answer.zero:
             self._shape.begin_anew()
             return Setpoint(now_ns, 0.0, 0.0, 0.0), "", answer.zero
+        if answer.dips:
+            self._shape.unlearn_lag()
         target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps
         shaped = self._shape.step(
             min(target_mps, answer.cap_mps),

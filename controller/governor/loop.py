@@ -82,6 +82,8 @@ class GovernorLoop:
             self._governor.rest()
             asked = Asked(None, f"the chassis is not armed ({self._mode})")
         answer = self._answered(now_ns)
+        if answer.ends:
+            self.request_stop(answer.zero, Outcome.BROKEN_OFF)
         if answer.zero:
             self._governor.rest()
         measured_mps = np.nan if self._state is None else self._state.v_mps

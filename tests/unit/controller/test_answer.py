@@ -48,6 +48,28 @@ def test_a_base_that_hears_again_begins_gently_and_ends_at_the_target(
     assert tally.violations == 0
 
 
+@pytest.mark.parametrize("deaf_for_s", [0.53, 0.55, 0.57])
+@pytest.mark.parametrize("from_s", [3.0, 4.0])
+def test_after_a_dip_nothing_wrong_was_learnt_and_it_ends_at_the_target(
+    deaf_for_s: float, from_s: float
+) -> None:
+    """It hears again before it has fallen by half. The lag and drift learnt of that made it go past."""
+    base = DeafBase(deaf_s=(from_s, from_s + deaf_for_s))
+    taken, outcome = driven(base, 8.0)
+    assert outcome is Outcome.REACHED
+    assert taken[-1].progress_m == pytest.approx(8.0, abs=0.03)
+
+
+@pytest.mark.parametrize("gain", [-1.0, -2.0])
+def test_a_base_that_goes_back_again_ends_the_drive(gain: float) -> None:
+    """It would twitch back for ever, each time too briefly for hal/chassis/rolling_back.py."""
+    taken, outcome = driven(DeafBase(gain=gain))
+    assert outcome is Outcome.BROKEN_OFF
+    assert len([step for step in taken if step.unanswered]) == 2
+    assert "again; do its motors turn the right way?" in "".join(step.unanswered for step in taken)
+    assert taken[-1].progress_m > -0.15
+
+
 def test_a_base_that_never_hears_is_not_asked_for_more_and_more() -> None:
     """hal/chassis/following.py latches it; the command waits at what may break it loose."""
     base = DeafBase(deaf_s=(0.0, math.inf))

@@ -81,3 +81,13 @@ def test_taken_back_at_once_it_is_as_configured() -> None:
     assert lag.seconds != 0.2
     lag.take_back()
     assert lag.seconds == 0.2
+
+
+def test_measured_anew_while_it_drives_it_stays_right() -> None:
+    """At 1 m/s, 0.1 s behind: where the measurement begins the chassis is behind, and not ahead."""
+    lag = ChassisLag(0.1)
+    lag.update(0.0, 1.0, 0.0, 20.1)
+    for step in range(1, 200):
+        lag.update(0.02, 1.0, 0.0, 20.1 - 0.02 * step)
+    assert lag.seconds == pytest.approx(0.1, abs=1e-6)
+    assert lag.to_command_m(1.0, 1.0, 0.0) == pytest.approx(0.9, abs=1e-6)
