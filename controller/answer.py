@@ -23,8 +23,8 @@ _CLEAR_MPS = 0.1
 _FOLLOWS, _FELL, _CONTRADICTS = 0.6, 0.5, 0.4
 # A base that has not yet followed is asked for this much all the same: it may need that to break loose.
 _BREAKS_LOOSE_MPS = 0.2
-# A base that hears again before it has fallen so far dips: by so much in so long, while nothing less than what
-# it does now was commanded.
+# A base that hears again before it has fallen so far dips: by so much in so long, while nothing less than
+# what it does now was commanded.
 _DIPS_MPS, _DIPS_NS = 0.1, 400_000_000
 # Faster than what was commanded in the last seconds, whatever its lag: as in hal/chassis/following.py.
 _LAG_NS = 6 * NS_PER_S
@@ -39,8 +39,8 @@ _REPORTS = 2
 @record(frozen=True, slots=True)
 class Answer:
     """cap_mps: no command beyond it (inf: the base answers). hard: get there with the jerk of an emergency.
-    dips: nothing can be learnt of the base's lag now. zero: why zero is said now and the profile begun anew; ""
-    if it is not. ends: that is no help, and the drive has to end.
+    dips: nothing can be learnt of the base's lag now. zero: why zero is said now and the profile begun anew;
+    "" if it is not. ends: that is no help, and the drive has to end.
     """
 
     cap_mps: float = math.inf
