@@ -35,7 +35,7 @@ def report(console: Console, result: MissionResult, step: ControlStep) -> None:
     else:
         console.stopping(seconds, step.setpoint.v_mps, stops)
     console.unanswered(seconds, step.unanswered)
-    console.complaints(seconds, result.complaints.add(step.chassis.faults))
+    console.complaints(seconds, result.complaints.add(step.chassis.faults), step.chassis.battery_v)
 
 
 def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, str]]:

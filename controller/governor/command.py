@@ -95,7 +95,7 @@ def _report(console: Console, governing: Governing, step: ControlStep) -> None:
     console.decision(seconds, step.decision, step.setpoint.v_mps)
     console.standing(seconds, governing.standstill.lasted_s(step.now_ns), step.decision)
     console.unanswered(seconds, step.unanswered)
-    console.complaints(seconds, governing.complaints.add(step.chassis.faults))
+    console.complaints(seconds, governing.complaints.add(step.chassis.faults), step.chassis.battery_v)
 
 
 def _summary_rows(config: AppConfig, governing: Governing) -> list[tuple[str, str]]:
