@@ -25,6 +25,7 @@ from config.loader import resolve
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import Scenario, load_scenario
+from controller.answer import BaseAnswer
 from controller.control import ControlLoop
 from controller.decision.decide import DecisionMaker
 from controller.follow import PathFollower
@@ -127,6 +128,7 @@ def build_control(config: AppConfig, config_path: FilePath, chassis: Chassis) ->
         follow=PathFollower(path, robot.limits, decision.chassis_delay_s),
         localiser=Localiser(path.start, mount),
         chassis=chassis,
+        answer=BaseAnswer(decision.chassis_delay_s, robot.limits.max_speed_mps),
     )
 
 

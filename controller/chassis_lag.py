@@ -11,6 +11,8 @@ target point needs the lag to a few hundredths of a second. controller/shape.py 
 
 from __future__ import annotations
 
+from collections import deque
+
 from hal.compiled import compiled, inlined
 
 # Standard deviations before anything is learnt.
@@ -19,6 +21,11 @@ _DRIFT_SIGMA = 0.03
 # Errors of odometry are correlated from step to step, so this is far more than the noise of one reading.
 _NOISE_M = 0.03
 _OUTLIER_M = 0.25  # a larger residual starts the measurement anew
+# What was known is kept every so many steps, so often: at 50 a second the oldest is 1.5 to 2 s old. That is
+# longer than any base goes on at its last command when it hears nothing.
+_KEPT_EVERY, _KEPT = 25, 4
+# Then it may still coast for so many steps, by nobody's command.
+_COASTS = 50
 # Greatest lag and drift that are used.
 _LONGEST_S = 0.6
 _MOST_DRIFT = 0.1
@@ -33,6 +40,9 @@ class ChassisLag:
         self._spread = _LAG_SIGMA_S**2, 0.0, _DRIFT_SIGMA**2
         self._commanded_m = 0.0
         self._started_at_m: float | None = None
+        self._kept = deque([self._known], maxlen=_KEPT)
+        self._until_kept = _KEPT_EVERY
+        self._skipped = 0
 
     @property
     def seconds(self) -> float:
@@ -47,6 +57,18 @@ class ChassisLag:
         """Measure anew after another path or motion that was not commanded here; keep what was learnt."""
         self._commanded_m, self._started_at_m = 0.0, None
 
+    def take_back(self) -> None:
+        """Forget what was learnt in the last two seconds, and learn nothing in the next: the chassis does not
+        follow then."""
+        self._lag_s, self._drift_share, self._spread = self._kept[0]
+        self._kept = deque([self._known], maxlen=_KEPT)
+        self._skipped = _COASTS
+        self.restart()
+
+    @property
+    def _known(self) -> tuple[float, float, tuple[float, float, float]]:
+        return self._lag_s, self._drift_share, self._spread
+
     def update(self, commanded_m: float, v_mps: float, a_mps2: float, to_end_m: float) -> None:
         """Learn from one step.
 
@@ -54,9 +76,17 @@ class ChassisLag:
         v_mps, a_mps2: commanded now.
         to_end_m: distance to the end of the path now, by odometry.
         """
-        if self._started_at_m is None:
-            self._started_at_m = to_end_m + self.seconds * v_mps
+        if self._skipped > 0:
+            self._skipped -= 1
             return
+        if self._started_at_m is None:
+            # Measured from where it will have followed what was commanded before.
+            self._started_at_m = to_end_m - self.seconds * max(v_mps - self.seconds * a_mps2, 0.0)
+            return
+        self._until_kept -= 1
+        if self._until_kept <= 0:
+            self._kept.append(self._known)
+            self._until_kept = _KEPT_EVERY
         self._commanded_m += commanded_m
         behind_m = self._commanded_m - (self._started_at_m - to_end_m)
         outlier, self._lag_s, self._drift_share, self._spread = _learnt(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -84,10 +85,17 @@ class Console:
                 f"{decision.reason.sentence}"
             )
 
-    def complaints(self, stamp_s: float, new: Sequence[str]) -> None:
-        """One line for each new fault that the base reports without stopping."""
+    def complaints(self, stamp_s: float, new: Sequence[str], battery_v: float = math.nan) -> None:
+        """One line for each new fault that the base reports without stopping, with the voltage where it is
+        known: not every base has a bit that says that its battery is low."""
+        battery = f" (battery {battery_v:.1f} V)" if math.isfinite(battery_v) else ""
         for complaint in new:
-            self.event(f"{stamp_s:7.2f} s  the base says: {complaint}")
+            self.event(f"{stamp_s:7.2f} s  the base says: {complaint}{battery}")
+
+    def unanswered(self, stamp_s: float, why: str) -> None:
+        """One line where the base was told zero because it did not answer; nothing for ""."""
+        if why:
+            self.event(f"{stamp_s:7.2f} s  {why}")
 
     def event(self, line: str) -> None:
         """Write a line that stays, unless quiet."""

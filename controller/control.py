@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from controller.answer import BaseAnswer
 from controller.decision.decision import Decision
 from controller.decision.limits import speed_to_decide_by
 from controller.decision.situation import Situation
@@ -31,7 +32,8 @@ class ControlStep:
     pose: the body in the path's frame; progress_m along the path, lateral_m to its left.
     scene_ns: when the frame was taken that the decision used, None if there was none yet. ahead_m: (N, 2) the
     way ahead in the body frame, where it is not the path that the runner knows. fault: why the shaper had to
-    brake by the stop profile, "" if it had not.
+    brake by the stop profile, "" if it had not. unanswered: why the base was told zero at once instead of the
+    profile, "" if it was not.
     """
 
     now_ns: int
@@ -44,6 +46,7 @@ class ControlStep:
     chassis: ChassisState
     ahead_m: FloatArray | None = field(default=None, compare=False)
     fault: str = ""
+    unanswered: str = ""
 
 
 class Drive(Protocol):
@@ -74,6 +77,7 @@ class ControlLoop:
         follow: PathFollower,
         localiser: Localiser,
         chassis: Chassis,
+        answer: BaseAnswer,
     ) -> None:
         self.path = path
         self.localiser = localiser
@@ -81,6 +85,7 @@ class ControlLoop:
         self._shape = shape
         self._follow = follow
         self._chassis = chassis
+        self._answer = answer
         self.ending = Ending(chassis)
         self._state: ChassisState | None = None
         self._progress_m = 0.0
@@ -108,8 +113,9 @@ class ControlLoop:
         decision = self._decide.step(
             Situation(scene, self.path, pose, on_path, speed_mps, self._shape.a_mps2, now_ns)
         )
-        setpoint, fault = self._setpoint(decision, on_path, now_ns)
-        self._state = self._chassis.exchange(setpoint, now_ns)
+        setpoint, fault, unanswered = self._setpoint(decision, on_path, now_ns)
+        # None asks for zero at once; as a setpoint it would be a step that the output guard refuses.
+        self._state = self._chassis.exchange(None if unanswered else setpoint, now_ns)
         self.localiser.add_odometry(self._state.stamp_ns, self._state.pose)
         to_go_m = self.path.length_m - on_path.s_m
         if to_go_m < -PASSED_M:
@@ -118,8 +124,9 @@ class ControlLoop:
         self.ending.conclude(self._state, setpoint, now_ns, arrived=arrived)
         scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
-            now_ns, pose, on_path.s_m, on_path.d_m, scene_ns, decision, setpoint, self._state, fault=fault
-        )
+            now_ns, pose, on_path.s_m, on_path.d_m, scene_ns, decision, setpoint, self._state,
+            fault=fault, unanswered=unanswered,
+        )  # fmt: skip
 
     def _learn(self, scene: Scene | None) -> None:
         """Each scene's ego-motion corrects the yaw once."""
@@ -127,17 +134,27 @@ class ControlLoop:
             self._scene_ns = scene.captured_ns
             self.localiser.add_ego_motion(scene.captured_ns, scene.ego_motion)
 
-    def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> tuple[Setpoint, str]:
-        """What to send, and the shaper's fault."""
-        if self._state is None or self._state.mode is not ChassisMode.ARMED:
+    def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> tuple[Setpoint, str, str]:
+        """What to send, the shaper's fault, and why zero is said instead of the profile."""
+        state = self._state
+        if state is None or state.mode is not ChassisMode.ARMED:
             # What the chassis does now is not ours to shape; whenever it obeys again, begin at rest.
             self._shape.reset()
-            return Setpoint(now_ns, 0.0, 0.0, 0.0), ""
+            self._answer.restart()
+            return Setpoint(now_ns, 0.0, 0.0, 0.0), "", ""
+        answer = self._answer.step(self._shape.v_mps, state.v_mps, state.feedback_ns, now_ns)
+        if answer.ends:
+            self.request_stop(answer.zero, Outcome.BROKEN_OFF)
+        if answer.zero:
+            self._shape.begin_anew()
+            return Setpoint(now_ns, 0.0, 0.0, 0.0), "", answer.zero
+        if answer.dips:
+            self._shape.unlearn_lag()
         target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps
         shaped = self._shape.step(
-            target_mps,
-            emergency=decision.emergency,
+            min(target_mps, answer.cap_mps),
+            emergency=decision.emergency or answer.hard,
             distance_to_end_m=self.path.length_m - self._progress_m,
         )
         w_radps = self._follow.step(on_path, shaped.v_mps)
-        return Setpoint(now_ns, shaped.v_mps, shaped.a_mps2, w_radps), shaped.fault
+        return Setpoint(now_ns, shaped.v_mps, shaped.a_mps2, w_radps), shaped.fault, ""

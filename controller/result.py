@@ -75,9 +75,11 @@ class DriveResult:
         """Account for one control step."""
         self.first = self.first or step
         self.last = step
-        self.setpoints.add(step.chassis.sent, step.chassis.mode)
+        self.setpoints.add(step.chassis.sent, step.chassis.mode, stands=step.unanswered != "")
         self.standstill.add(step.setpoint)
         self.shaper_faults.add(step.fault)
+        if step.unanswered:
+            self.complaints.add((step.unanswered,))
 
     def take_message(self, message: SceneMessage) -> None:
         """Account for one frame, as the perception process reports it."""

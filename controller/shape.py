@@ -97,6 +97,15 @@ class SpeedShaper:
         self._active, self._to_end_m = self._comfort, math.inf
         self._lag.restart()
 
+    def unlearn_lag(self) -> None:
+        """The chassis does not follow now: of its lag nothing counts that was learnt lately."""
+        self._lag.take_back()
+
+    def begin_anew(self) -> None:
+        """Start again from rest, after a while in which the chassis did not answer."""
+        self.unlearn_lag()
+        self.reset()
+
     def step(
         self, target_speed_mps: float, *, emergency: bool = False, distance_to_end_m: float = math.inf
     ) -> ShapedSpeed:

@@ -34,7 +34,8 @@ def report(console: Console, result: MissionResult, step: ControlStep) -> None:
         console.standing(seconds, result.standstill.lasted_s(step.now_ns), step.decision)
     else:
         console.stopping(seconds, step.setpoint.v_mps, stops)
-    console.complaints(seconds, result.complaints.add(step.chassis.faults))
+    console.unanswered(seconds, step.unanswered)
+    console.complaints(seconds, result.complaints.add(step.chassis.faults), step.chassis.battery_v)
 
 
 def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, str]]:

@@ -18,6 +18,7 @@ import numpy as np
 import yaml
 
 from config.app import AppConfig, LockstepRunner, SimulationConfig
+from controller.answer import BaseAnswer
 from controller.build import (
     build_path,
     build_perceiver,
@@ -176,6 +177,7 @@ def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chas
         follow=PathFollower(path, limits, delay_s),
         localiser=Localiser(path.start, mount_of(config)),
         chassis=chassis,
+        answer=BaseAnswer(delay_s, limits.max_speed_mps),
     )
 
 

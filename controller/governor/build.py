@@ -7,6 +7,7 @@ from pathlib import Path as FilePath
 
 from config.app import AppConfig
 from config.governor import GovernorConfig
+from controller.answer import BaseAnswer
 from controller.build import build_path, mount_of
 from controller.governor.governor import SpeedGovernor
 from controller.governor.inbox import Inbox
@@ -32,7 +33,8 @@ def build_governor_loop(
 ) -> GovernorLoop:
     """A governor's control loop. chassis: opened elsewhere. Raises ConfigError, PathError."""
     start = build_path(config, config_path).start
-    return GovernorLoop(build_governor(config), commands, Localiser(start, mount_of(config)), chassis)
+    answer = BaseAnswer(config.decision.chassis_delay_s, config.robot.limits.max_speed_mps)
+    return GovernorLoop(build_governor(config), commands, Localiser(start, mount_of(config)), chassis, answer)
 
 
 def build_inbox(link: DatagramLink, config: GovernorConfig, warn: Callable[[str], None]) -> Inbox:

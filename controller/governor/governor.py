@@ -16,6 +16,7 @@ from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
+from controller.answer import ANSWERS, Answer
 from controller.decision.bodies import SceneError, bodies_of
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
@@ -113,12 +114,13 @@ class SpeedGovernor:
         pose: PlanarPose,
         measured_mps: float = math.nan,
         silence: str = "no command",
+        answer: Answer = ANSWERS,
     ) -> Governed:
         """What to command for one period from now_ns on.
 
         scene: the newest there is, in every step until a newer one comes. requested: what is asked for now;
         None: nothing, which means a jerk-limited stop, and silence says why. pose: of the body, by odometry.
-        measured_mps: by the chassis.
+        measured_mps: by the chassis. answer: whether it does what it is told.
         """
         wish = Wish(Kind.REFUSED, why=silence) if requested is None else understand(requested, self._robot)
         if pose.finite:
@@ -126,7 +128,7 @@ class SpeedGovernor:
         self._choose_motion(wish)
         decision = self._decided(scene, pose, measured_mps, now_ns)
         decision = self._as_asked(decision, wish, requested)
-        return self._command(decision)
+        return self._command(decision, answer)
 
     def _look(self, scene: Scene | None, pose: PlanarPose, now_ns: int) -> None:
         """Every scene is remembered once; one without a pose gets the one that the robot had then."""
@@ -284,10 +286,12 @@ class SpeedGovernor:
         stuck_ns = decision.stuck_since_ns if reason is decision.reason else None
         return Decision(action, target_mps, reason, emergency and v > _STANDING_MPS, stuck_ns)
 
-    def _command(self, decision: Decision) -> Governed:
-        shaped = self._shape.step(decision.target_speed_mps, emergency=decision.emergency)
+    def _command(self, decision: Decision, answer: Answer) -> Governed:
+        turns = self._motion.kind is Kind.TURN
+        target_mps = decision.target_speed_mps if turns else min(decision.target_speed_mps, answer.cap_mps)
+        shaped = self._shape.step(target_mps, emergency=decision.emergency or answer.hard)
         self._has_moved = self._has_moved or shaped.v_mps > 0.0
-        if self._motion.kind is Kind.TURN:
+        if turns:
             w_radps = self._motion.left * shaped.v_mps / corner_m(self._robot)
             return Governed(0.0, 0.0, w_radps, decision, shaped.fault)
         w_radps = self._motion.curvature_1pm * shaped.v_mps

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from controller.answer import Answer, BaseAnswer
 from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.ending import Ending, Outcome
@@ -37,12 +38,19 @@ class GovernorLoop:
     """
 
     def __init__(
-        self, governor: SpeedGovernor, commands: Commands, localiser: Localiser, chassis: Chassis
+        self,
+        governor: SpeedGovernor,
+        commands: Commands,
+        localiser: Localiser,
+        chassis: Chassis,
+        answer: BaseAnswer,
     ) -> None:
         self.localiser = localiser
         self._governor = governor
         self._commands = commands
         self._chassis = chassis
+        self._answer = answer
+        self._commanded_mps = 0.0
         self.ending = Ending(chassis)
         self._state: ChassisState | None = None
         self._scene_ns: int | None = None
@@ -73,10 +81,20 @@ class GovernorLoop:
             # The chassis does not follow setpoints now. When it does again, shaping begins from standstill.
             self._governor.rest()
             asked = Asked(None, f"the chassis is not armed ({self._mode})")
+        answer = self._answered(now_ns)
+        if answer.ends:
+            self.request_stop(answer.zero, Outcome.BROKEN_OFF)
+        if answer.zero:
+            self._governor.rest()
         measured_mps = np.nan if self._state is None else self._state.v_mps
-        governed = self._governor.step(now_ns, scene, asked.twist, pose, measured_mps, asked.silence)
+        governed = self._governor.step(
+            now_ns, scene, None if answer.zero else asked.twist, pose, measured_mps,
+            answer.zero or asked.silence, answer,
+        )  # fmt: skip
         setpoint = Setpoint(now_ns, governed.v_mps, governed.a_mps2, governed.w_radps)
-        self._state = self._chassis.exchange(setpoint, now_ns)
+        # None asks for zero at once; as a setpoint it would be a step that the output guard refuses.
+        self._state = self._chassis.exchange(None if answer.zero else setpoint, now_ns)
+        self._commanded_mps = governed.v_mps
         self.localiser.add_odometry(self._state.stamp_ns, self._state.pose)
         if pose.finite:
             self._came_from = pose
@@ -90,8 +108,15 @@ class GovernorLoop:
         scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
             now_ns, pose, self._travelled_m, on_path.d_m, scene_ns, governed.decision, setpoint,
-            self._state, self._ahead(), governed.fault,
+            self._state, self._ahead(), governed.fault, answer.zero,
         )  # fmt: skip
+
+    def _answered(self, now_ns: int) -> Answer:
+        state = self._state
+        if state is None or state.mode is not ChassisMode.ARMED:
+            self._answer.restart()
+            return Answer()
+        return self._answer.step(self._commanded_mps, state.v_mps, state.feedback_ns, now_ns)
 
     @property
     def _mode(self) -> str:

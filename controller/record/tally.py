@@ -40,14 +40,17 @@ class SetpointTally:
     _last: Setpoint | None = None
     _steps: int = 0
 
-    def add(self, sent: Setpoint | None, mode: ChassisMode = ChassisMode.ARMED) -> None:
+    def add(
+        self, sent: Setpoint | None, mode: ChassisMode = ChassisMode.ARMED, *, stands: bool = False
+    ) -> None:
         """Add what one control step sent, as the driver reports it. None, and repeats of the last, do not
         count.
 
         Nor does the zero of a latched driver, which is not part of a profile: the base stops by itself then.
+        The same holds for the zero that a base is told which stands though it was told to go (stands).
         """
         self._steps += 1
-        if mode in LATCHED_MODES and (sent is None or sent.v_mps == 0.0):
+        if (stands or mode in LATCHED_MODES) and (sent is None or sent.v_mps == 0.0):
             self._last, self._steps = sent or self._last, 0
             return
         if sent is None or (self._last is not None and sent.stamp_ns == self._last.stamp_ns):

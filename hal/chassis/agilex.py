@@ -1,7 +1,9 @@
 """Driver for AgileX tracked and skid-steer bases: protocol V2 over CAN or RS-232.
 
 One motion command 0x111 is sent every command period: zero in every mode except armed. 0x421 takes the base
-out of standby while arming, and puts it back afterwards.
+out of standby while arming, and puts it back afterwards. Where somebody else commands the base over CAN, the
+driver does not arm, and latches if it is armed. Before it has begun to arm it then sends nothing at all,
+since a zero would stop a drive that is not its own.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from hal.chassis.agilex_messages import (
 )
 from hal.chassis.agilex_models import model_of, over_serial
 from hal.chassis.arming import ArmingLimits
+from hal.chassis.bus_rival import HOST_FRAMES, BusRival
 from hal.chassis.command import CommandLimits, due, is_zero, zero
 from hal.chassis.driver import ChassisDriver
 from hal.clocks import NS_PER_MS
@@ -56,7 +59,8 @@ class AgilexChassis(ChassisDriver):
         self, link: CanLink, config: AgilexChassisConfig, no_frames: Callable[[], str] = no_can_frames
     ) -> None:
         model = model_of(config)
-        feedback = AgilexFeedback(config, model, no_frames)
+        rival = BusRival()
+        feedback = AgilexFeedback(config, model, no_frames, rival)
         # The model's limit applies to the commanded yaw rate, which is slip_factor times the real one.
         commands = CommandLimits(
             max_speed_mps=model.max_speed_mps,
@@ -73,6 +77,9 @@ class AgilexChassis(ChassisDriver):
         self._link = link
         self._model = model
         self._obeying = model.obeying_mode(over_serial(config))
+        # A serial line has one computer at its end; a command that comes from there is an echo.
+        self._rival = None if over_serial(config) else rival
+        self._began = False
         self._feedback = feedback
         self._slip_factor = config.slip_factor
         self._period_ns = config.command_period_ms * NS_PER_MS
@@ -93,16 +100,22 @@ class AgilexChassis(ChassisDriver):
                     self._feedback.note_actuator(frame.arbitration_id - _FIRST_ACTUATOR)
                     continue
                 message = decode(frame)
-                if message is None:
+                if self._rival is not None and frame.arbitration_id in HOST_FRAMES:
+                    self._rival.hear(frame.arbitration_id, now_ns)
+                elif message is None:
                     self._feedback.note_foreign(frame.arbitration_id)
                 else:
                     messages.append(message)
         finally:
             # What arrived before the link was lost is still valid.
+            if self._rival is not None:
+                self._rival.step(now_ns)
             self._feedback.update(messages, now_ns)
         return heard
 
     def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        if self._others_drive:
+            return None
         goes_out = due(self._motion_sent_ns, self._period_ns, now_ns) or (self._moving and is_zero(command))
         if goes_out:
             self._send_motion(command, now_ns)
@@ -112,6 +125,8 @@ class AgilexChassis(ChassisDriver):
         return command if goes_out else None
 
     def _speak_stop(self, now_ns: int) -> None:
+        if self._others_drive:
+            return
         self._send_motion(zero(now_ns), now_ns)
         self._send_mode(self._model.mode_standby, now_ns)
 
@@ -120,9 +135,15 @@ class AgilexChassis(ChassisDriver):
         # 0x421 at once.
         self._feedback.await_setup()
         self._mode_sent_ns = None
+        self._began = True
 
     def _no_feedback(self) -> str:
         return self._feedback.no_feedback
+
+    @property
+    def _others_drive(self) -> bool:
+        """Whether somebody else commands a base that this driver never asked to obey."""
+        return not self._began and self._rival is not None and self._rival.sentence != ""
 
     def _mode_to_send(self, now_ns: int) -> int | None:
         """The mode of the 0x421 that is due, or None.

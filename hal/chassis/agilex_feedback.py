@@ -21,6 +21,7 @@ from hal.chassis.agilex_models import (
     over_serial,
     track_width_of,
 )
+from hal.chassis.bus_rival import BusRival
 from hal.chassis.disagreement import Disagreement
 from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
 from hal.clocks import NS_PER_MS, NS_PER_S
@@ -64,11 +65,19 @@ class AgilexFeedback:
     command mode before the base reports standby. Then the restart shows in a jump of the odometer that no
     track can make, or in the count of 0x211 (byte 7, 0..255), which begins anew.
 
-    no_frames: what came and what to check, for the case that not one frame was understood.
+    no_frames: what came and what to check, for the case that not one frame was understood. rival: whether
+    somebody else commands the base.
     """
 
-    def __init__(self, config: AgilexChassisConfig, model: AgilexModel, no_frames: Callable[[], str]) -> None:
+    def __init__(
+        self,
+        config: AgilexChassisConfig,
+        model: AgilexModel,
+        no_frames: Callable[[], str],
+        rival: BusRival,
+    ) -> None:
         self._model = model
+        self._rival = rival
         self._obeying = model.obeying_mode(over_serial(config))
         self._others = (model.modes_remote | {model.mode_can, model.mode_serial}) - {self._obeying}
         self._actuators = config.actuators or model.actuators
@@ -188,6 +197,8 @@ class AgilexFeedback:
                 f"motor {self._highest_actuator + 1} reports, but model {self._model.name} has "
                 f"{self._actuators}; check chassis.model, or set chassis.actuators if your base has more"
             )
+        if self._rival.sentence:
+            return self._rival.sentence
         state = self._state
         if state is None:
             return ""

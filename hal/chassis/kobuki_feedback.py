@@ -40,6 +40,9 @@ _JUMP_SLACK_M = 0.02
 _DISAGREEMENT_RAD = 0.3
 _DISAGREEMENT_RATIO = 0.4
 
+# The vendor's driver calls the battery low and dangerously low below these (kobuki_core, battery.cpp).
+_BATTERY_LOW_V, _BATTERY_DANGEROUS_V = 14.0, 13.2
+
 # How much more time may have passed between two frames by the base's clock than by ours. Frames wait in
 # buffers: less may have passed for the base (but not less than none), and more only by the time that the
 # earlier frame had waited, which is always less than this.
@@ -135,8 +138,12 @@ class KobukiFeedback:
     @property
     def faults(self) -> tuple[str, ...]:
         """Faults that are not a reason to stop at once."""
-        over_current = 0 if self._core is None else self._core.over_current
-        return _named("error: motor over-current", over_current, _MOTORS)
+        core = self._core
+        if core is None:
+            return ()
+        return _battery_faults(core.battery_v) + _named(
+            "error: motor over-current", core.over_current, _MOTORS
+        )
 
     def await_setup(self) -> None:
         """Arming begins: what is reported from now on need not continue what waited in buffers before."""
@@ -210,3 +217,9 @@ def _named(what: str, bits: int, names: tuple[str, ...]) -> tuple[str, ...]:
         for bit in range(8)
         if bits >> bit & 1
     )
+
+
+def _battery_faults(battery_v: float) -> tuple[str, ...]:
+    if battery_v < _BATTERY_DANGEROUS_V:
+        return (f"error: battery below {_BATTERY_DANGEROUS_V:g} V",)
+    return (f"warning: battery below {_BATTERY_LOW_V:g} V",) if battery_v < _BATTERY_LOW_V else ()

@@ -54,6 +54,9 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         self._echoes: deque[CanFrame] | None = (
             deque(maxlen=_MAX_FOREIGN) if config.interface == "udp_multicast" else None
         )
+        # gs_usb gives back what it has sent. SocketCAN marks what other programs of this computer send in the
+        # same way, and that must be heard.
+        self._own_are_marked = config.interface == "gs_usb"
         self._send_timeout_s = _SERIAL_SEND_TIMEOUT_S if config.interface == "slcan" else _SEND_TIMEOUT_S
 
     def send(self, frame: CanFrame) -> None:
@@ -89,6 +92,8 @@ class CanBusLink(ReopeningLink[can.BusABC]):
             if message.is_error_frame:
                 if message.arbitration_id & _ERROR_BUS_OFF:
                     raise self._lost("receiving", can.CanOperationError(_BUS_OFF))
+                continue
+            if self._own_are_marked and not message.is_rx:
                 continue
             if message.is_extended_id or message.is_remote_frame or message.is_fd:
                 continue

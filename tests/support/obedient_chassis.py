@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from hal.geometry import advance_pose
 from hal.types import ChassisMode, ChassisState, Setpoint
 from tests.support.scenes import ORIGIN, chassis_state
@@ -24,7 +26,7 @@ class ObedientChassis:
         self.stopped_at_ns: list[int] = []
         self.sent: list[Setpoint] = []
 
-    def __enter__(self) -> ObedientChassis:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -40,7 +42,7 @@ class ObedientChassis:
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """Drive exactly so for a control period."""
-        assert setpoint is not None
+        setpoint = setpoint or Setpoint(now_ns, 0.0, 0.0, 0.0)
         self.sent.append(setpoint)
         mode = ChassisMode.ARMED if len(self.sent) > self._arms_after else ChassisMode.ARMING
         mode = self.fault or mode

@@ -57,3 +57,37 @@ def test_the_estimate_stays_within_reason() -> None:
     lag = ChassisLag(0.5)
     drive(lag, 0.9, 0.0)
     assert lag.seconds <= 0.6
+
+
+def test_what_was_learnt_while_the_chassis_did_not_follow_is_taken_back() -> None:
+    """Of the last two seconds; what was learnt before stays."""
+    lag = ChassisLag(0.2)
+    drive(lag, 0.1, 0.0)
+    learnt = lag.seconds, lag.to_command_m(1.0, 1.0, 0.0)
+    to_go_m = 35.9
+    for step in range(60):
+        to_go_m -= 0.03 if step < 50 else 0.012
+        lag.update(0.03, 1.5, 0.0, to_go_m)
+    assert lag.to_command_m(1.0, 1.0, 0.0) != pytest.approx(learnt[1], abs=1e-3)
+    lag.take_back()
+    assert (lag.seconds, lag.to_command_m(1.0, 1.0, 0.0)) == pytest.approx(learnt, abs=2e-3)
+    assert lag.seconds == pytest.approx(0.1, abs=0.02)
+
+
+def test_taken_back_at_once_it_is_as_configured() -> None:
+    lag = ChassisLag(0.2)
+    lag.update(0.0, 0.0, 0.0, 50.0)
+    lag.update(0.03, 0.3, 0.0, 49.98)
+    assert lag.seconds != 0.2
+    lag.take_back()
+    assert lag.seconds == 0.2
+
+
+def test_measured_anew_while_it_drives_it_stays_right() -> None:
+    """At 1 m/s, 0.1 s behind: where the measurement begins the chassis is behind, and not ahead."""
+    lag = ChassisLag(0.1)
+    lag.update(0.0, 1.0, 0.0, 20.1)
+    for step in range(1, 200):
+        lag.update(0.02, 1.0, 0.0, 20.1 - 0.02 * step)
+    assert lag.seconds == pytest.approx(0.1, abs=1e-6)
+    assert lag.to_command_m(1.0, 1.0, 0.0) == pytest.approx(0.9, abs=1e-6)

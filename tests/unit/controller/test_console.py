@@ -49,6 +49,14 @@ def test_what_the_base_complains_of_is_told(capsys: pytest.CaptureFixture[str]) 
     ]
 
 
+def test_the_voltage_stands_beside_a_complaint(capsys: pytest.CaptureFixture[str]) -> None:
+    """A bit of a table that nobody has may mean an empty battery."""
+    Console(quiet=False).complaints(12.5, ["system fault: unknown bit 0x0001"], 21.5)
+    assert capsys.readouterr().out == (
+        "  12.50 s  the base says: system fault: unknown bit 0x0001 (battery 21.5 V)\n"
+    )
+
+
 def test_quiet_leaves_only_the_summary(capsys: pytest.CaptureFixture[str]) -> None:
     console = Console(quiet=True)
     console.event("something")

@@ -251,3 +251,15 @@ def test_how_long_a_send_waits_for_room(bus: FaultyBus, interface: str, timeout_
     """pyserial counts the time until there is room for more: 2 ms are over when another process runs."""
     CanBusLink(config(interface, "x")).send(FRAME)
     assert bus.timeouts_s == [timeout_s]
+
+
+@pytest.mark.parametrize(("interface", "heard"), [("gs_usb", None), ("socketcan", FRAME)])
+def test_gs_usb_gives_back_its_own_frames_and_socketcan_those_of_other_programs(
+    bus: FaultyBus, interface: str, heard: CanFrame | None
+) -> None:
+    """Marked alike; a frame of one's own would count as one of somebody who also drives."""
+    bus.messages.append(
+        can.Message(arbitration_id=FRAME.arbitration_id, data=FRAME.data, is_extended_id=False, is_rx=False)
+    )
+    with CanBusLink(config(interface, "can0")) as link:
+        assert link.receive() == heard

@@ -96,6 +96,23 @@ def test_over_current_is_told() -> None:
     assert (state.mode, state.faults) == (ChassisMode.ARMED, ("error: motor over-current (left)",))
 
 
+@pytest.mark.parametrize(
+    ("battery_v", "faults"),
+    [
+        (14.0, ()),
+        (13.9, ("warning: battery below 14 V",)),
+        (13.2, ("warning: battery below 14 V",)),
+        (12.5, ("error: battery below 13.2 V",)),
+    ],
+)
+def test_a_low_battery_is_told(battery_v: float, faults: tuple[str, ...]) -> None:
+    bench = Bench()
+    bench.arm()
+    bench.emulator.battery_v = battery_v
+    state = bench.run(2, 0.3)
+    assert (state.mode, state.faults) == (ChassisMode.ARMED, faults)
+
+
 def test_ticks_and_clock_wrap() -> None:
     """65 536 ticks are 5.59 m, the clock wraps after 65.5 s: 80 s at 0.3 m/s pass both."""
     bench = Bench()

@@ -12,6 +12,7 @@ import pytest
 from config.decision import DecisionConfig
 from config.governor import GovernorConfig
 from config.robot import Robot
+from controller.answer import BaseAnswer
 from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.ending import ARM_TIMEOUT_S, Outcome
@@ -21,6 +22,7 @@ from controller.governor.loop import GovernorLoop
 from controller.governor.request import Twist
 from controller.localise import Localiser
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
+from tests.support.deaf_base import DeafBase
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
 from tests.support.scenes import ORIGIN, free_space, scene
 
@@ -53,7 +55,13 @@ class Rig:
     ) -> None:
         self.chassis, self.planner = chassis or ObedientChassis(arms_after), Planner(asks)
         governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)
-        self.loop = GovernorLoop(governor, self.planner, Localiser(ORIGIN, MOUNT), self.chassis)
+        self.loop = GovernorLoop(
+            governor,
+            self.planner,
+            Localiser(ORIGIN, MOUNT),
+            self.chassis,
+            BaseAnswer(0.2, ROBOT.limits.max_speed_mps),
+        )
         self.steps: list[ControlStep] = []
 
     def run(self, seconds: float) -> list[ControlStep]:
@@ -95,6 +103,18 @@ class LosingChassis(ObedientChassis):
         state = super().exchange(setpoint, now_ns)
         lost = 60 <= len(self.sent) < 63
         return replace(state, pose=PlanarPose(math.nan, 0.0, 0.0)) if lost else state
+
+
+class RunningAway(ObedientChassis):
+    """Tells of going faster than it was told."""
+
+    def __init__(self, gain: float) -> None:
+        super().__init__()
+        self._gain = gain
+
+    def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
+        state = super().exchange(setpoint, now_ns)
+        return replace(state, v_mps=self._gain * state.v_mps)
 
 
 def test_a_base_that_does_not_say_for_a_moment_where_it_is_is_governed_on() -> None:
@@ -163,3 +183,32 @@ def test_the_way_ahead_is_the_arc_for_pictures() -> None:
     # Six metres round: curvature 1/6 to the left.
     assert (ahead[:, 0] ** 2 + (ahead[:, 1] - 6.0) ** 2) ** 0.5 == pytest.approx(6.0, abs=1e-6)
     assert ahead[0] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_a_base_that_fell_behind_is_told_zero_and_begins_again_gently() -> None:
+    """controller/answer.py, as in a drive along a path."""
+    base = DeafBase(deaf_s=(3.0, 3.8))
+    planner = Planner(lambda _: GO)
+    governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)
+    answer = BaseAnswer(0.2, ROBOT.limits.max_speed_mps)
+    loop = GovernorLoop(governor, planner, Localiser(ORIGIN, MOUNT), base, answer)
+    steps = []
+    for k in range(500):
+        seen = scene(k * PERIOD_NS, k, space=free_space(), pose=loop.localiser.pose)
+        steps.append(loop.step(seen, k * PERIOD_NS))
+    told = [index for index, one in enumerate(steps) if one.unanswered]
+    assert len(told) == 1
+    at = steps[told[0]]
+    assert (at.setpoint.v_mps, at.setpoint.w_radps) == (0.0, 0.0)
+    assert at.unanswered in at.decision.reason.sentence
+    rises_mps = [base.speeds[k + 10] - base.speeds[k] for k in range(told[0] + 5, 480)]
+    assert max(rises_mps) < 0.1, "in 0.2 s; comfort is 0.06"
+    assert steps[-1].setpoint.v_mps == pytest.approx(0.6), "and goes on as asked"
+
+
+@pytest.mark.parametrize("gain", [2.0, 6.0])
+def test_a_base_that_runs_away_is_not_told_to_go_faster(gain: float) -> None:
+    rig = Rig(lambda _: Asked(Twist(1.0, 0.0)), chassis=RunningAway(gain))
+    held = [one.setpoint.v_mps for one in rig.run(6.0)][-100:]
+    assert max(held) - min(held) < 0.01
+    assert 0.0 < held[-1] < 0.45

@@ -151,3 +151,12 @@ def test_frames_that_were_not_looked_at_are_told_and_a_camera_that_begins_anew_l
     assert (frames.looked_at, frames.counted, frames.line()) == (5, 5, "")
     frames.add(4)
     assert frames.line().startswith("6 of the camera's 8 were looked at: perception did not keep up")
+
+
+def test_zero_to_a_base_that_stands_though_it_was_told_to_go_breaks_no_limit() -> None:
+    tally = tally_of((0.5, 0.3))
+    tally.add(Setpoint(20 * MS, 0.0, 0.0, 0.0), stands=True)
+    tally.add(Setpoint(40 * MS, 0.00012, 0.012, 0.0))
+    assert tally.violations == 0
+    tally.add(Setpoint(60 * MS, 0.02, 0.0, 0.0), stands=True)
+    assert tally.violations == 1, "only zero is free"

@@ -1,0 +1,163 @@
+"""Does the base answer its commands, as the speed that it measures says? If not, none may get faster.
+
+A base that does not hear for a while is stopped by its own time-out. Were the command to go on rising, the
+base would jump to it as soon as it hears again. So it is told zero and the profile begins anew from rest.
+That zero is a step of the command and no jolt: the base stands, or is about to. The driver latches what lasts
+(hal/chassis/following.py, rolling_back.py); this is what happens until then.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from hal.clocks import NS_PER_S
+from hal.records import record
+
+# A base has to do something of what was commanded all the time since this long ago, beyond its lag.
+_ANSWERS_S = 0.4
+# Less is told of by bases that have just begun to move.
+_CLEAR_MPS = 0.1
+# Shares of that command: who did so much follows it; who followed and does less no longer hears; who never
+# followed and does less does not get faster. A base with a lag of two seconds does 0.45 on its first ramp.
+_FOLLOWS, _FELL, _CONTRADICTS = 0.6, 0.5, 0.4
+# A base that has not yet followed is asked for this much all the same: it may need that to break loose.
+_BREAKS_LOOSE_MPS = 0.2
+# A base that hears again before it has fallen so far dips: by so much in so long, while nothing less than
+# what it does now was commanded.
+_DIPS_MPS, _DIPS_NS = 0.1, 400_000_000
+# Faster than what was commanded in the last seconds, whatever its lag: as in hal/chassis/following.py.
+_LAG_NS = 6 * NS_PER_S
+_FASTEST_SHARE, _FASTEST_MPS = 1.5, 0.15
+# Faster than the robot ever may.
+_ABOVE_TOP_SHARE, _ABOVE_TOP_MPS = 1.1, 0.1
+_BACKWARDS_MPS = -0.05
+# So many reports in a row have to say so.
+_REPORTS = 2
+
+
+@record(frozen=True, slots=True)
+class Answer:
+    """cap_mps: no command beyond it (inf: the base answers). hard: get there with the jerk of an emergency.
+    dips: nothing can be learnt of the base's lag now. zero: why zero is said now and the profile begun anew;
+    "" if it is not. ends: that is no help, and the drive has to end.
+    """
+
+    cap_mps: float = math.inf
+    hard: bool = False
+    zero: str = ""
+    ends: bool = False
+    dips: bool = False
+
+
+# It does what it is told.
+ANSWERS = Answer()
+
+
+class BaseAnswer:
+    """Compares commanded and measured speed, once for each report of the base.
+
+    lag_s: configured lag of the base. top_mps: the robot's greatest speed.
+    """
+
+    def __init__(self, lag_s: float, top_mps: float) -> None:
+        self._window_ns = round((_ANSWERS_S + lag_s) * NS_PER_S)
+        self._least = _Extreme(self._window_ns, sign=-1.0)
+        self._most = _Extreme(_LAG_NS, sign=1.0)
+        self._did = _Extreme(_DIPS_NS, sign=1.0)
+        self._too_fast_mps = _ABOVE_TOP_SHARE * top_mps + _ABOVE_TOP_MPS
+        self._report_ns: int | None = None
+        self._since_ns: int | None = None
+        self._fell = self._behind = self._dips = self._runs = self._back = 0
+        self._followed = self._went_back = False
+        self._answer = ANSWERS
+
+    def restart(self) -> None:
+        """The base does not obey now: what it does is no answer."""
+        self._forget()
+        self._went_back = False
+
+    def step(self, commanded_mps: float, measured_mps: float, feedback_ns: int | None, now_ns: int) -> Answer:
+        """commanded_mps: commanded until now_ns. measured_mps: by the report of feedback_ns."""
+        if self._since_ns is None:
+            self._since_ns = now_ns
+        self._least.add(commanded_mps, now_ns)
+        self._most.add(commanded_mps, now_ns)
+        if feedback_ns is None or feedback_ns == self._report_ns or not math.isfinite(measured_mps):
+            return self._answer
+        self._report_ns = feedback_ns
+        since_long = now_ns - self._since_ns >= self._window_ns
+        least_mps = self._least.value if since_long else 0.0
+        self._did.add(measured_mps, now_ns)
+        self._count(commanded_mps, measured_mps, least_mps)
+        self._answer = ANSWERS
+        if self._back >= _REPORTS:
+            return self._goes_back(measured_mps)
+        if self._fell >= _REPORTS and self._followed:
+            return self._begin_anew(
+                f"the base fell to {measured_mps:.2f} m/s while at least {least_mps:.2f} m/s was commanded"
+            )
+        if self._runs >= _REPORTS:
+            # No less than now: where it runs away the driver sees that best, and latches it.
+            self._answer = Answer(commanded_mps, hard=True)
+        elif self._behind >= _REPORTS:
+            self._answer = Answer(max(measured_mps, _BREAKS_LOOSE_MPS))
+        elif self._dips >= _REPORTS and self._followed:
+            self._answer = Answer(commanded_mps, dips=True)
+        return self._answer
+
+    def _count(self, commanded_mps: float, measured_mps: float, least_mps: float) -> None:
+        clear = least_mps >= _CLEAR_MPS
+        runs = measured_mps > min(_FASTEST_SHARE * self._most.value + _FASTEST_MPS, self._too_fast_mps)
+        self._followed = self._followed or (clear and measured_mps >= _FOLLOWS * least_mps)
+        self._went_back = self._went_back and not self._followed
+        self._fell = self._fell + 1 if clear and measured_mps < _FELL * least_mps else 0
+        self._behind = self._behind + 1 if clear and measured_mps < _CONTRADICTS * least_mps else 0
+        dips = clear and measured_mps < min(least_mps, self._did.value - _DIPS_MPS)
+        self._dips = self._dips + 1 if dips else 0
+        self._runs = self._runs + 1 if runs else 0
+        self._back = self._back + 1 if measured_mps < _BACKWARDS_MPS and commanded_mps > 0.0 else 0
+
+    def _goes_back(self, measured_mps: float) -> Answer:
+        """Once it may have rolled back. One that goes back again before it has followed would do so for ever,
+        each time too briefly for rolling_back.py."""
+        why = f"the base goes back at {-measured_mps:.2f} m/s while told to go ahead"
+        again, self._went_back = self._went_back, True
+        if not again:
+            return self._begin_anew(why)
+        self._forget()
+        return Answer(zero=f"{why}, again; do its motors turn the right way?", ends=True)
+
+    def _begin_anew(self, why: str) -> Answer:
+        self._forget()
+        return Answer(zero=f"{why}; it was told zero, and begins again gently")
+
+    def _forget(self) -> None:
+        self._least.clear()
+        self._since_ns = None
+        self._fell = self._behind = self._dips = self._runs = self._back = 0
+        self._followed = False
+        self._answer = ANSWERS
+
+
+class _Extreme:
+    """The greatest value (sign 1) or the least (sign -1) of the last span_ns."""
+
+    def __init__(self, span_ns: int, sign: float) -> None:
+        self._span_ns, self._sign = span_ns, sign
+        self._values: deque[tuple[int, float]] = deque()
+
+    @property
+    def value(self) -> float:
+        return self._sign * self._values[0][1]
+
+    def add(self, value: float, now_ns: int) -> None:
+        signed, values = self._sign * value, self._values
+        while values and values[-1][1] <= signed:
+            values.pop()
+        values.append((now_ns, signed))
+        while values[0][0] < now_ns - self._span_ns:
+            values.popleft()
+
+    def clear(self) -> None:
+        self._values.clear()

@@ -1,0 +1,41 @@
+"""Does somebody else command the base on the same CAN bus?
+
+A computer never receives its own frames, so one frame of this kind is proof: a second program, another
+computer, a tool that somebody left running. The base would follow both, one command after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from hal.clocks import NS_PER_S
+
+# What only a host sends, and what it does to the base. Not in here is what moves nothing: light, version.
+HOST_FRAMES: Mapping[int, str] = MappingProxyType(
+    {0x111: "motion commands", 0x421: "the control mode", 0x441: "clearing of errors"}
+)
+
+# So long after its last frame the bus counts as free again. The base stops half a second after it.
+_GONE_NS = NS_PER_S
+
+
+class BusRival:
+    """sentence: "" while nobody else commands the base."""
+
+    def __init__(self) -> None:
+        self.sentence = ""
+        self._heard_ns: int | None = None
+
+    def hear(self, arbitration_id: int, now_ns: int) -> None:
+        """A frame of a host came. The first kind of it is told until the bus is free again."""
+        self._heard_ns = now_ns
+        self.sentence = self.sentence or (
+            f"somebody else sends {HOST_FRAMES[arbitration_id]} (0x{arbitration_id:X}) on this bus; stop the "
+            "other program or computer first: a base has one master"
+        )
+
+    def step(self, now_ns: int) -> None:
+        """The time goes on."""
+        if self._heard_ns is not None and now_ns - self._heard_ns > _GONE_NS:
+            self.sentence, self._heard_ns = "", None
