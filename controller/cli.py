@@ -41,7 +41,7 @@ def run(options: MissionOptions) -> None:
     """Drive the path.
 
     Exit code 0 if the target was reached, or the robot came to rest before it because a signal (Ctrl-C,
-    SIGTERM) asked for that, and nothing was touched and the limits were kept; else 1.
+    SIGTERM) asked for that, and nothing was touched, the limits were kept and all files were written; else 1.
     """
     from controller.mission import run_mission
 
@@ -57,8 +57,8 @@ def govern(options: MissionOptions) -> None:
     """Slow another planner's commands down to what is safe.
 
     It sends (v, w), until SIGTERM. The messages, and a client in thirty lines: docs/governor.md.
-    Exit code 0 if the robot came to rest as the signal asked, nothing was touched and the limits were kept;
-    else 1.
+    Exit code 0 if the robot came to rest as the signal asked, nothing was touched, the limits were kept and
+    all files were written; else 1.
     """
     from controller.governor.command import run_governor
 

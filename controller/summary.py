@@ -69,6 +69,7 @@ def drive_rows(config: AppConfig, result: DriveResult) -> list[tuple[str, str]]:
     rows.append(("perception", result.timing.line()))
     if result.frames.line():
         rows.append(("frames", result.frames.line()))
+    rows.extend(("cut off", reason) for reason in result.cut_off)
     if result.punctuality is not None and result.punctuality.late_ns:
         rows.append(("control", _punctuality_text(result.punctuality)))
     return rows
