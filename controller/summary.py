@@ -137,5 +137,12 @@ def _limits_text(config: AppConfig, tally: SetpointTally) -> str:
         f"{kept} in {tally.count} setpoints sent: v <= {tally.max_speed_mps:.3f} m/s, "
         f"|a| <= {tally.max_accel_mps2:.3f} m/s^2, |jerk| <= {tally.max_jerk_mps3:.3f} m/s^3 "
         f"(comfort {limits.max_accel_mps2:g}, {limits.max_jerk_mps3:g}; "
-        f"{tally.emergency_count} setpoints braked harder), {tally.reversals} reversals"
+        f"{_beyond_comfort(tally)}), {tally.reversals} reversals"
     )
+
+
+def _beyond_comfort(tally: SetpointTally) -> str:
+    if not tally.emergency_count:
+        return "kept by all"
+    by = f"{tally.harder_count} braked harder, {tally.sharper_count} had more jerk"
+    return f"{tally.emergency_count} setpoints beyond: {by}"
