@@ -157,6 +157,7 @@ def sleeps_for_ever(*_: object) -> None:
 def tells_late(_config: object, _path: object, end: socket.socket, *_: object) -> None:
     """In place of a perception process that cannot finish a file after the drive."""
     channel = Channel(end)
+    channel.send(CutOff("it runs"))
     with suppress(PeerGone):
         while True:
             channel.receive()
@@ -182,5 +183,8 @@ def test_what_perception_tells_after_the_drive_is_heard(monkeypatch: pytest.Monk
     monkeypatch.setattr(realtime_rig, "perceive_forever", tells_late)
     path = CONFIG_DIR / "sim-realtime.yaml"
     with perception_beside(load_app(path), Path(path), 0, RecordingOptions()) as link:
-        pass
-    assert link.cut_off == ["drive.mp4: full"]
+        began_s = time.monotonic()
+        while not link.cut_off and time.monotonic() - began_s < 60.0:
+            link.receive()
+            time.sleep(0.01)
+    assert link.cut_off == ["it runs", "drive.mp4: full"]
