@@ -87,7 +87,8 @@ def replay(
 ) -> None:
     """Look at a recording as the robot would.
 
-    A TUM RGB-D folder, or a ROS bag (.bag, .db3, .mcap), also that of a RealSense viewer.
+    A TUM RGB-D folder, or a ROS bag (.bag, .db3, .mcap), also that of a RealSense viewer. Where it does not
+    tell the camera's mounting, that of a robot's FILE is used; without one the floor is looked for.
     """
     from controller.replay import ReplayOptions, run_replay
     from hal.cameras.bag_topics import WantedTopics
