@@ -251,8 +251,8 @@ def load_app(path: Path) -> AppConfig:
 class ReplayConfig(Section):
     """What `treadwatch replay --config FILE` reads: how a recording is looked at.
 
-    The camera's mounting is taken from the recording if it says so, from here with assume_mount, and is
-    unknown otherwise (a hand-held camera has none).
+    The camera's mounting is taken from the recording if it says so, from here with assume_mount or where this
+    is the YAML of a robot, and is unknown otherwise (a hand-held camera has none).
     """
 
     robot: Robot = Robot()
@@ -268,9 +268,14 @@ class ReplayConfig(Section):
 
 
 def load_replay(path: Path) -> ReplayConfig:
-    """Read and check a replay's YAML, or that of a robot, which says more. Raises ConfigError."""
+    """Read and check a replay's YAML, or that of a robot, which says more: it knows where its camera is.
+
+    Raises ConfigError.
+    """
     content = read_yaml(path)
     if isinstance(content, dict) and "chassis" in content:
         robot = load_app(path)
-        return ReplayConfig(robot=robot.robot, perception=robot.perception, decision=robot.decision)
+        return ReplayConfig(
+            robot=robot.robot, perception=robot.perception, decision=robot.decision, assume_mount=True
+        )
     return load(path, ReplayConfig)

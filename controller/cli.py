@@ -41,7 +41,7 @@ def run(options: MissionOptions) -> None:
     """Drive the path.
 
     Exit code 0 if the target was reached, or the robot came to rest before it because a signal (Ctrl-C,
-    SIGTERM) asked for that, and nothing was touched and the limits were kept; else 1.
+    SIGTERM) asked for that, and nothing was touched, the limits were kept and all files were written; else 1.
     """
     from controller.mission import run_mission
 
@@ -57,8 +57,8 @@ def govern(options: MissionOptions) -> None:
     """Slow another planner's commands down to what is safe.
 
     It sends (v, w), until SIGTERM. The messages, and a client in thirty lines: docs/governor.md.
-    Exit code 0 if the robot came to rest as the signal asked, nothing was touched and the limits were kept;
-    else 1.
+    Exit code 0 if the robot came to rest as the signal asked, nothing was touched, the limits were kept and
+    all files were written; else 1.
     """
     from controller.governor.command import run_governor
 
@@ -87,7 +87,8 @@ def replay(
 ) -> None:
     """Look at a recording as the robot would.
 
-    A TUM RGB-D folder, or a ROS bag (.bag, .db3, .mcap), also that of a RealSense viewer.
+    A TUM RGB-D folder, or a ROS bag (.bag, .db3, .mcap), also that of a RealSense viewer. Where it does not
+    tell the camera's mounting, that of a robot's FILE is used; without one the floor is looked for.
     """
     from controller.replay import ReplayOptions, run_replay
     from hal.cameras.bag_topics import WantedTopics

@@ -23,7 +23,7 @@ from controller.lockstep import run_lockstep
 from controller.path.blind_bends import blind_bend_warning
 from controller.possible_world import require_possible_world
 from controller.realtime.mission import drive_realtime
-from controller.realtime.service import stop_on_signals
+from controller.realtime.service import StopRequest
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.record.tally import SetpointTally
@@ -95,7 +95,8 @@ def drive_lockstep(
         devices.enter_context(chassis)
         devices.enter_context(camera)
         recorder = devices.enter_context(open_recorder(recording, surroundings(config)))
-        stop = devices.enter_context(stop_on_signals())
+        stop = StopRequest().listen()
+        devices.callback(stop.closing)
         loop = build_control(config, options.config_path, chassis)
         setpoints = SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz)
         result = MissionResult(loop=loop, setpoints=setpoints, simulation=simulation)

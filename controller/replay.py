@@ -188,9 +188,12 @@ def _counts(tally: ReplayTally) -> str:
 
 
 def _mount_notes(options: ReplayOptions, config: ReplayConfig, recorded: CameraMount | None) -> Iterator[str]:
-    """A note if the recording's mounting is used and not the one that was configured."""
+    """What is used where the recording tells no mounting, or another one than was configured."""
     given = config.robot.camera_mount
-    if recorded is None or "camera_mount" not in config.robot.model_fields_set:
+    if recorded is None:
+        yield _assumed(options, config)
+        return
+    if "camera_mount" not in config.robot.model_fields_set:
         return
     if not np.allclose(
         (recorded.height_m, recorded.pitch_rad), (given.height_m, given.pitch_rad), atol=0.002
@@ -200,6 +203,16 @@ def _mount_notes(options: ReplayOptions, config: ReplayConfig, recorded: CameraM
             f"{math.degrees(recorded.pitch_rad):.1f} degrees, not where {options.config_path} does: "
             f"{given.height_m:.2f} m, {math.degrees(given.pitch_rad):.1f} degrees"
         )
+
+
+def _assumed(options: ReplayOptions, config: ReplayConfig) -> str:
+    if not config.assume_mount:
+        return "the recording does not tell the camera's mounting: the floor is looked for in the depth"
+    given = config.robot.camera_mount
+    return (
+        f"the recording does not tell the camera's mounting: it is that of {options.config_path}, "
+        f"{given.height_m:.2f} m high and tipped by {math.degrees(given.pitch_rad):.1f} degrees"
+    )
 
 
 def _summary(

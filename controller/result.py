@@ -38,7 +38,8 @@ class MissionOptions:
 class DriveResult:
     """The result of any drive, along a path or behind another planner.
 
-    punctuality: None in lock-step. first, last: the first and last control step so far.
+    punctuality: None in lock-step. first, last: the first and last control step so far. cut_off: why outputs
+    are not whole.
     """
 
     setpoints: SetpointTally
@@ -51,6 +52,7 @@ class DriveResult:
     shaper_faults: ShaperFaults = field(default_factory=ShaperFaults)
     complaints: Complaints = field(default_factory=Complaints)
     frames: FrameTally = field(default_factory=FrameTally)
+    cut_off: list[str] = field(default_factory=list)
 
     @property
     def duration_s(self) -> float:
@@ -64,8 +66,8 @@ class DriveResult:
 
     @property
     def clean(self) -> bool:
-        """Whether nothing was touched and all limits were kept."""
-        return not self.contacts and self.setpoints.violations == 0
+        """Whether nothing was touched, all limits were kept, and all is written that was to be."""
+        return not self.contacts and self.setpoints.violations == 0 and not self.cut_off
 
     def seconds(self, step: ControlStep) -> float:
         """Time from the first control step to this one."""

@@ -70,6 +70,7 @@ def drive_rows(config: AppConfig, result: DriveResult) -> list[tuple[str, str]]:
     rows.append(("perception", result.timing.line()))
     if result.frames.line():
         rows.append(("frames", result.frames.line()))
+    rows.extend(("cut off", reason) for reason in result.cut_off)
     if result.punctuality is not None and result.punctuality.late_ns:
         rows.append(("control", _punctuality_text(result.punctuality)))
     return rows
@@ -137,5 +138,12 @@ def _limits_text(config: AppConfig, tally: SetpointTally) -> str:
         f"{kept} in {tally.count} setpoints sent: v <= {tally.max_speed_mps:.3f} m/s, "
         f"|a| <= {tally.max_accel_mps2:.3f} m/s^2, |jerk| <= {tally.max_jerk_mps3:.3f} m/s^3 "
         f"(comfort {limits.max_accel_mps2:g}, {limits.max_jerk_mps3:g}; "
-        f"{tally.emergency_count} setpoints braked harder), {tally.reversals} reversals"
+        f"{_beyond_comfort(tally)}), {tally.reversals} reversals"
     )
+
+
+def _beyond_comfort(tally: SetpointTally) -> str:
+    if not tally.emergency_count:
+        return "kept by all"
+    by = f"{tally.harder_count} braked harder, {tally.sharper_count} had more jerk"
+    return f"{tally.emergency_count} setpoints beyond: {by}"

@@ -23,8 +23,9 @@ class DeviceNotFound(HalError):
 
 
 class DeviceRefused(HalError):
-    """Raised when opening: permission missing, port in use, another protocol answers, a setting
-    that the device did not accept when read back."""
+    """Raised when opening: permission missing, port in use, another protocol answers, a setting that the
+    device did not accept when read back. Also by a use that it refuses: a device that is not open, a frame
+    that cannot be written."""
 
 
 class LinkLost(HalError):
@@ -40,4 +41,5 @@ class EndOfStream(HalError):
 
 
 class BadRecording(HalError):
-    """Raised when opening a recording: missing folder, no index, no calibration, no usable pair."""
+    """Raised when opening a recording: missing folder, no index, no calibration, no usable pair. Also by its
+    read() where not one frame turns out to be usable."""

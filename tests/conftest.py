@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
+
+from controller.realtime.service import handlers_kept
 
 # How long an example takes tells of the machine and its other work, not of the code.
 settings.register_profile("treadwatch", deadline=None)
@@ -15,6 +18,13 @@ settings.load_profile("treadwatch")
 # Whoever starts the tests in the background of a script has them ignore Ctrl-C, and all their children.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def _signals() -> Iterator[None]:
+    """A drive keeps its handlers until the process ends."""
+    with handlers_kept():
+        yield
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -27,6 +27,7 @@ from controller.console import Console
 from controller.errors import UserError
 from controller.outlet import say
 from controller.realtime.mission import drive_realtime
+from controller.realtime.service import handlers_kept
 from controller.result import MissionOptions
 from hal.api import Clock
 from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
@@ -126,7 +127,7 @@ def measure_period(priority: int, seconds: float) -> PeriodFigures:
     config, runner = _flooded(load_app(_CONFIG), priority, seconds + _SETTLE_S + _BEFORE_DRIVING_S)
     link = config.chassis.link
     assert isinstance(link, CanLinkConfig), "the bench drives over CAN"
-    with _emulator(link):
+    with _emulator(link), handlers_kept():
         result = drive_realtime(config, runner, MissionOptions(_CONFIG, quiet=True), Console(quiet=True))
     assert result.punctuality is not None, "a real-time drive has one"
     commanded_ns = result.punctuality.commanded_ns

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -27,19 +28,23 @@ _FIGURES = (
     "found-by-distance.png",
     "table1-measured.png",
 )
+# As recording_report.py names them.
+_RECORDING = re.compile(r"recording-.+-(file|none|groundtruth)(-\d+)?\.png")
 
 
 def prepare_folder(folder: Path) -> None:
     """Make the folder before the run, so that a long run does not fail at its end.
 
-    Deletes what an earlier run left there, except the pictures of recordings.
-    Raises UserError.
+    Deletes what an earlier run left there, and nothing else. Raises UserError.
     """
     ours = {one.name for one in sequences()}
     try:
         (folder / "failures").mkdir(parents=True, exist_ok=True)
         for name in (*_FIGURES, "summary.json"):
             (folder / name).unlink(missing_ok=True)
+        for old in folder.glob("recording-*.png"):
+            if _RECORDING.fullmatch(old.name):
+                old.unlink()
         for old in (folder / "failures").glob("*-[0-9][0-9][0-9].png"):
             if old.stem[:-4] in ours:
                 old.unlink()

@@ -93,8 +93,9 @@ def write_section(path: Path, section: str) -> None:
     """Write the section into a page, in place of an earlier one. Raises UserError."""
     try:
         page = path.read_text(encoding="utf-8") if os.path.exists(path) else "# Measured results\n"
-        before, found, after = page.partition(f"{HEADING}\n")
-        if found:
+        found = re.search(rf"^{HEADING}\n", page, re.MULTILINE)
+        if found is not None:
+            before, after = page[: found.start()], page[found.end() :]
             following = re.search(r"^## ", after, re.MULTILINE)
             rest = after[following.start() :] if following else ""
             page = before + section + ("\n" + rest if rest else "")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import queue
 import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -48,17 +50,29 @@ class Trio:
         drive = [*python, "run", "--config", str(config_path), "--quiet"]
         pipe = subprocess.PIPE
         self.base = subprocess.Popen(emulate, stdin=pipe, stdout=pipe, stderr=pipe, text=True, bufsize=1)
-        assert self.base.stderr is not None
-        ready = self.base.stderr.readline()
-        if not ready.startswith("emulating"):
-            raise UserError(f"the emulator did not start: {ready.strip()}")
-        self.drive = subprocess.Popen(drive, stdout=pipe, stderr=pipe, text=True)
+        try:
+            assert self.base.stderr is not None
+            ready = self.base.stderr.readline()
+            if not ready.startswith("emulating"):
+                raise UserError(f"the emulator did not start: {ready.strip()}")
+            self.drive = subprocess.Popen(drive, stdout=pipe, stderr=pipe, text=True)
+        except BaseException:
+            _end(self.base)
+            raise
+        self._told: queue.Queue[str | None] = queue.Queue()
+        threading.Thread(target=self._listen, name="emulator", daemon=True).start()
+
+    def _listen(self) -> None:
+        """The lines of the base; None when there will be no more."""
+        assert self.base.stdout is not None
+        for line in self.base.stdout:
+            self._told.put(line)
+        self._told.put(None)
 
     def close(self) -> None:
         """Kill the processes that still run."""
         for process in (self.drive, self.base):
-            process.kill()
-            process.communicate()
+            _end(process)
 
     @property
     def perception(self) -> int:
@@ -80,14 +94,25 @@ class Trio:
         Raises UserError if it takes longer than within_s.
         """
         began_s = time.monotonic()
-        assert self.base.stdout is not None
-        for line in self.base.stdout:
-            match = _TOLD.match(line)
-            if match is not None and reached(abs(float(match[1]))):
-                return time.monotonic() - began_s
-            if time.monotonic() - began_s > within_s:
-                break
+        with suppress(queue.Empty):  # it may tell nothing at all
+            while (left_s := began_s + within_s - time.monotonic()) > 0.0:
+                line = self._told.get(timeout=left_s)
+                if line is None:
+                    break
+                match = _TOLD.match(line)
+                if match is not None and reached(abs(float(match[1]))):
+                    return time.monotonic() - began_s
         raise UserError(f"the emulated base was not so within {within_s:g} s")
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    process.kill()
+    process.wait()
+    for pipe in (process.stdin, process.stdout, process.stderr):
+        # The reader of the emulator's lines may hold its pipe for a moment longer.
+        if pipe is not None:
+            with suppress(OSError, ValueError):
+                pipe.close()
 
 
 @contextmanager

@@ -70,6 +70,7 @@ def _govern(
             setpoints=setpoints,
             simulation=rig.simulation,
             punctuality=rig.punctuality,
+            cut_off=rig.cut_off,
         )
 
         def ready(service: ServiceManager) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import pickle
 import socket
+from contextlib import suppress
 
 BUFFER_BYTES = 1 << 20
 
@@ -45,6 +46,11 @@ class Channel:
             raise PeerGone("the other process has closed its end")
         message: object = pickle.loads(data)
         return message
+
+    def end_sending(self) -> None:
+        """The peer's next receive raises PeerGone; what it still sends arrives."""
+        with suppress(OSError):
+            self._end.shutdown(socket.SHUT_WR)
 
     def close(self) -> None:
         """Close this end; the peer's next call raises PeerGone."""

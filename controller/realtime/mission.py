@@ -26,6 +26,7 @@ def drive_realtime(
             setpoints=SetpointTally(config.robot.limits, 1.0 / runner.control_rate_hz),
             simulation=rig.simulation,
             punctuality=rig.punctuality,
+            cut_off=rig.cut_off,
         )
         was_armed = False
         with rig.under_way(loop, console, lambda service: service.ready("driving")) as moments:

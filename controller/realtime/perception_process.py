@@ -8,6 +8,7 @@ from __future__ import annotations
 import socket
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path as FilePath
 
 from config.app import AppConfig, RealtimeRunner
@@ -15,8 +16,9 @@ from controller.build import build_path, build_perceiver, mount_of, open_camera,
 from controller.control import ControlStep
 from controller.errors import UserError
 from controller.localise import PoseHistory
+from controller.outlet import say
 from controller.realtime.channel import Channel, PeerGone
-from controller.realtime.runner import Farewell, SceneMessage, StepMessage
+from controller.realtime.runner import CutOff, Farewell, SceneMessage, StepMessage
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import EndOfStream, FrameTimeout, HalError
@@ -132,7 +134,7 @@ def perceive_forever(
     except HalError as error:
         _say_farewell(channel, f"camera: {error}")
     except UserError as error:
-        # The recording cannot be written. The control process reports this as the reason of the stop.
+        # An output cannot be opened. The control process reports this as the reason of the stop.
         _say_farewell(channel, str(error))
 
 
@@ -145,7 +147,7 @@ def _look_until_the_end(
     body = RemoteBody(channel, mount_of(config), path.start)
     with (
         open_camera(config, config_path, MonotonicClock(), body.true_pose, start_ns) as camera,
-        open_recorder(recording, surroundings(config)) as recorder,
+        open_recorder(recording, surroundings(config), partial(_say_cut_off, channel)) as recorder,
     ):
         perceiver = build_perceiver(config, body, body.body_pose, time.perf_counter_ns)
         run_recorder = RunRecorder(recorder, path)
@@ -168,3 +170,11 @@ def _say_farewell(channel: Channel, reason: str) -> None:
         channel.send(Farewell(reason))
     except PeerGone:
         return
+
+
+def _say_cut_off(channel: Channel, reason: str) -> None:
+    """The control process tells the user; where it cannot, this one does."""
+    with suppress(PeerGone):
+        if channel.send(CutOff(reason)):
+            return
+    say(f"treadwatch: {reason}", to_stderr=True)

@@ -7,7 +7,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Protocol
@@ -23,7 +23,7 @@ from controller.realtime.perception_process import perceive_forever
 from controller.realtime.punctual import PunctualChassis
 from controller.realtime.runner import PerceptionLink, Punctuality, RealtimeMoment, run_realtime
 from controller.realtime.scheduling import become_realtime
-from controller.realtime.service import ServiceManager, stop_on_signals
+from controller.realtime.service import ServiceManager, StopRequest
 from controller.record.recorder import RecordingOptions, require_writable
 from controller.result import MissionOptions
 from controller.workers import held
@@ -51,6 +51,7 @@ class RealtimeRig:
     chassis: open; sends each command at a fixed time within its period.
     simulation: the world of a simulated camera; None with a real one.
     punctuality: filled while it drives.
+    cut_off: why outputs are not whole; filled until perception has ended.
     """
 
     config: AppConfig
@@ -61,6 +62,7 @@ class RealtimeRig:
     chassis: PunctualChassis
     simulation: Simulation | None
     punctuality: Punctuality
+    cut_off: list[str] = field(default_factory=list)
 
     @contextmanager
     def under_way(
@@ -68,13 +70,14 @@ class RealtimeRig:
     ) -> Iterator[Iterator[RealtimeMoment]]:
         """The control steps of a drive with this loop, until it has finished. Perception ends with the block.
 
+        Signals are wishes to stop from now on, and stay so after the block: see StopRequest.
         on_ready: called once, when the first scene has arrived.
         """
         service = ServiceManager(os.environ, os.getpid())
+        stop = StopRequest().listen()
         recording = _recording(self.options)
         with (
             perception_beside(self.config, self.options.config_path, self.start_ns, recording) as link,
-            stop_on_signals() as stop,
             console.beside_a_drive(),
         ):
             # After all else, so that processes and threads started before keep ordinary scheduling.
@@ -84,7 +87,7 @@ class RealtimeRig:
                 self.runner, self.clock, self.simulation, link, loop, service, stop, self.punctuality
             )
             try:
-                yield _told(moments, loop.ending, link, service, on_ready)
+                yield self._told(moments, loop.ending, link, service, console, on_ready)
             except BaseException:
                 # Ending the perception process takes seconds; the base must not drive on meanwhile.
                 self.chassis.stop(self.clock.now_ns())
@@ -92,29 +95,39 @@ class RealtimeRig:
             finally:
                 # The watchdog is no longer fed, and perception takes seconds to end and to close its files.
                 service.stopping(_why_over(loop.ending))
+                stop.closing()
+        self._take_cut_off(link, console, "")
 
+    def _take_cut_off(self, link: PerceptionLink, console: Console, more: str) -> None:
+        """Tells of the outputs that have ended since the last call."""
+        while link.cut_off:
+            self.cut_off.append(link.cut_off.pop(0))
+            console.warning(self.cut_off[-1] + more)
 
-def _told(
-    moments: Iterator[RealtimeMoment],
-    ending: Ending,
-    link: PerceptionLink,
-    service: ServiceManager,
-    on_ready: Callable[[ServiceManager], None],
-) -> Iterator[RealtimeMoment]:
-    """Passes the moments on, and tells the service manager when the drive is ready and when it is stopping.
+    def _told(
+        self,
+        moments: Iterator[RealtimeMoment],
+        ending: Ending,
+        link: PerceptionLink,
+        service: ServiceManager,
+        console: Console,
+        on_ready: Callable[[ServiceManager], None],
+    ) -> Iterator[RealtimeMoment]:
+        """Passes the moments on; tells the service manager when the drive is ready and when it is stopping.
 
-    Raises DeviceRefused at the end if perception could not start: without a scene nothing has moved.
-    """
-    told_ready = False
-    for moment in moments:
-        if link.newest is not None and not told_ready:
-            told_ready = True
-            on_ready(service)
-        if ending.stop_reason is not None:
-            service.stopping(ending.stop_reason)
-        yield moment
-    if link.refused_reason is not None and ending.outcome is Outcome.BROKEN_OFF:
-        raise DeviceRefused(f"{link.refused_reason}; nothing has moved")
+        Raises DeviceRefused at the end if perception could not start: without a scene nothing has moved.
+        """
+        told_ready = False
+        for moment in moments:
+            if link.newest is not None and not told_ready:
+                told_ready = True
+                on_ready(service)
+            self._take_cut_off(link, console, "; the drive goes on without it")
+            if ending.stop_reason is not None:
+                service.stopping(ending.stop_reason)
+            yield moment
+        if link.refused_reason is not None and ending.outcome is Outcome.BROKEN_OFF:
+            raise DeviceRefused(f"{link.refused_reason}; nothing has moved")
 
 
 def _why_over(ending: Ending) -> str:
@@ -151,7 +164,8 @@ def _recording(options: MissionOptions) -> RecordingOptions:
 def perception_beside(
     config: AppConfig, config_path: Path, start_ns: int, recording: RecordingOptions
 ) -> Iterator[PerceptionLink]:
-    """Run the perception process. At the end of the block its channel is closed, which makes it end.
+    """Run the perception process. At the end of the block it hears nothing more, which makes it end; what it
+    tells of its files until then is in the link.
 
     start_ns: time zero of a simulated world.
     """
@@ -169,11 +183,18 @@ def perception_beside(
     # Only the perception process may hold its end open, or this process would not notice its death.
     there.close()
     channel = Channel(here)
+    link = PerceptionLink(channel)
     try:
-        yield PerceptionLink(channel)
+        yield link
     finally:
-        channel.close()
+        channel.end_sending()
         process.join(GOODBYE_S)
+        link.receive()
         if process.is_alive():
             process.kill()
             process.join()
+            if recording.wanted:
+                names = ", ".join(map(str, recording.wanted))
+                why = f"they were not closed within {GOODBYE_S:g} s; is the disk too slow?"
+                link.cut_off.append(f"{names}: may not be whole: {why}")
+        channel.close()

@@ -50,6 +50,13 @@ class Farewell:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class CutOff:
+    """Perception to control: an output of the drive has ended, with the reason. Perception goes on."""
+
+    reason: str
+
+
 @dataclass
 class Punctuality:
     """How punctual the control steps are.
@@ -80,10 +87,12 @@ class PerceptionLink:
     newest: the newest scene.
     lost_reason: why the link is lost; None if it is not.
     refused_reason: the same, if perception said farewell before its first scene.
+    cut_off: why outputs of the drive (observations, video, recording) are not whole.
     """
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
+        self.cut_off: list[str] = []
         self.newest: SceneMessage | None = None
         self.lost_reason: str | None = None
         self.refused_reason: str | None = None
@@ -97,6 +106,8 @@ class PerceptionLink:
             while self.lost_reason is None and (message := self._channel.receive()) is not None:
                 if isinstance(message, SceneMessage):
                     arrived.append(message)
+                elif isinstance(message, CutOff):
+                    self.cut_off.append(message.reason)
                 else:
                     assert isinstance(message, Farewell), f"perception sent {type(message).__name__}"
                     self.lost_reason = message.reason

@@ -5,17 +5,23 @@ The notify protocol is the one of sd_notify(3): datagrams to the socket named in
 
 from __future__ import annotations
 
+import atexit
 import re
 import signal
 import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
+from typing import Self
 
 from hal.clocks import NS_PER_S
 
 # What systemd writes. str.isdigit() is also true of what int() does not take: superscripts, or 5000 digits.
 _UINT64 = re.compile("[0-9]{1,20}")
+
+_STOPPING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+# The first Ctrl-C while a drive closes, and the second of somebody who is impatient, lose no files.
+_MOST_PATIENT = 3
 
 
 class ServiceManager:
@@ -71,29 +77,62 @@ def _watchdog_interval_ns(environment: Mapping[str, str], pid: int) -> int | Non
 
 
 class StopRequest:
-    """Set by SIGTERM, SIGINT or SIGHUP; read by the runner once per control step."""
+    """Set by SIGTERM, SIGINT or SIGHUP; read by the runner once per control step.
+
+    While a drive closes (its files, perception, the summary), signals change nothing: the drive has ended,
+    and closing takes seconds at most. Only the _MOST_PATIENT-th of them ends the process at once, for whoever
+    waits for a disk or a terminal that hangs.
+    """
 
     def __init__(self) -> None:
         self.reason: str | None = None
+        self._closing = False
+        self._while_closing = 0
 
     def __bool__(self) -> bool:
         return self.reason is not None
 
+    def listen(self) -> Self:
+        """From now on until the process ends, its last moments included; not to SIGHUP under nohup."""
+        for number in _STOPPING:
+            if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, self.handle)
+        atexit.register(_ignore_once_over, self)
+        return self
+
+    def closing(self) -> None:
+        """The drive has ended: nothing is left to be stopped."""
+        self._closing = True
+
     def handle(self, number: int, _frame: FrameType | None) -> None:
         """A signal handler: it only notes the wish, the loop does the stopping."""
         self.reason = signal.Signals(number).name
+        self._while_closing += self._closing
+        if self._while_closing >= _MOST_PATIENT:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(signal.Signals(number))
+
+
+def _ignore_once_over(request: StopRequest) -> None:
+    """The interpreter takes Python's handlers away while it ends: the exit code is decided by then."""
+    for number in _STOPPING:
+        if signal.getsignal(number) == request.handle:
+            signal.signal(number, signal.SIG_IGN)
+
+
+@contextmanager
+def handlers_kept() -> Iterator[None]:
+    """The handlers of the stopping signals are the same after the block as before."""
+    before = {number: signal.getsignal(number) for number in _STOPPING}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager
 def stop_on_signals() -> Iterator[StopRequest]:
     """Turn SIGTERM, SIGINT and SIGHUP into a StopRequest while the body runs; SIGHUP not under nohup."""
-    request = StopRequest()
-    numbers = [signal.SIGTERM, signal.SIGINT]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        numbers.append(signal.SIGHUP)
-    before = {number: signal.signal(number, request.handle) for number in numbers}
-    try:
-        yield request
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with handlers_kept():
+        yield StopRequest().listen()

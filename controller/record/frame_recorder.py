@@ -29,6 +29,7 @@ class FrameRecorder:
         self._waiting: deque[Future[None]] = deque()
         self._thread: ThreadPoolExecutor | None = None
         self._last_ns: int | None = None
+        self._failed = False
         self.dropped = 0
 
     def __enter__(self) -> Self:
@@ -64,7 +65,16 @@ class FrameRecorder:
         if len(self._waiting) >= _MOST_WAITING:
             self.dropped += 1
             return
-        self._waiting.append(self._thread.submit(self._writer.write, frame, odometry))
+        self._waiting.append(self._thread.submit(self._write, frame, odometry))
+
+    def _write(self, frame: RgbdFrame, odometry: Pose | None) -> None:
+        if self._failed:  # a recording ends, rather than have a gap
+            return
+        try:
+            self._writer.write(frame, odometry)
+        except DeviceRefused:
+            self._failed = True
+            raise
 
     def _collect(self, most: int) -> None:
         """Wait until at most `most` frames are waiting. Raises DeviceRefused if one could not be written."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
+from contextlib import suppress
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TextIO
+from typing import Any, Self
 
 from controller.decision.decision import Decision
 from controller.errors import UserError
@@ -69,17 +72,18 @@ class ObservationFile:
     """Writes JSON lines to a file. A context manager.
 
     An existing file is emptied only before the first line is written, so that nothing is lost if there is
-    none.
+    none. Each line is written at once, as a whole: whatever ends the program, or a full disk, cuts none off.
 
-    path: the file, or STANDARD_OUTPUT, where each line is flushed for the program at the other end of a pipe.
+    path: the file, or STANDARD_OUTPUT.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._streams = path == STANDARD_OUTPUT
         self._name = "standard output" if self._streams else str(path)
-        self._file: TextIO | None = None
+        self._file: FileIO | None = None
         self._has_written = False
+        self._length = 0
 
     def __enter__(self) -> Self:
         """Open or create the file. Raises UserError if that fails."""
@@ -87,7 +91,7 @@ class ObservationFile:
             # A separate file object, so that data left over after the reader has gone is not written by
             # sys.stdout.
             where = os.dup(_STDOUT_FD) if self._streams else self._path
-            self._file = open(where, "a", encoding="utf-8")
+            self._file = open(where, "ab", buffering=0)
         except OSError as error:
             raise UserError(
                 f"{self._name}: observations cannot be written there ({error.strerror}); "
@@ -111,15 +115,18 @@ class ObservationFile:
         """Append one line. Raises UserError, for example if the disk is full."""
         assert self._file is not None, "ObservationFile is used inside its with block"
         line = json.dumps(observation(scene, decision, timing_ms), separators=(", ", ": "), allow_nan=False)
+        data = f"{line}\n".encode()
         try:
             if not (self._has_written or self._streams) and self._path.is_file():
                 self._file.truncate(0)
             self._has_written = True
-            self._file.write(line + "\n")
-            if self._streams:
-                self._file.flush()
+            _write_whole(self._file, data)
         except OSError as error:
+            if not self._streams and self._path.is_file():
+                with suppress(OSError):
+                    self._file.truncate(self._length)
             raise self._failed(error) from error
+        self._length += len(data)
 
     def _failed(self, error: OSError) -> UserError:
         if isinstance(error, BrokenPipeError):
@@ -127,3 +134,12 @@ class ObservationFile:
         return UserError(
             f"{self._name}: nothing more can be written ({error.strerror}); make room or name another file"
         )
+
+
+def _write_whole(file: FileIO, data: bytes) -> None:
+    """Raises OSError; a part of the data may have been written then."""
+    while data:  # a disk that is nearly full takes a part
+        written = file.write(data)
+        if written is None:  # a pipe that somebody has made non-blocking
+            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+        data = data[written:]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from os.path import realpath
@@ -18,6 +18,7 @@ from controller.errors import UserError
 from controller.outlet import say
 from controller.path.path import Path
 from controller.perceive import Look
+from controller.record.apart import Apart
 from controller.record.frame_recorder import FrameRecorder
 from controller.record.observations import ObservationFile
 from controller.video.compose import Composer
@@ -44,6 +45,11 @@ class RecordingOptions:
     frames: FilePath | None = None
     timed: bool = True
 
+    @property
+    def wanted(self) -> list[FilePath]:
+        """All that is to be written."""
+        return [path for path in (self.observations, self.video, self.frames) if path is not None]
+
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
@@ -67,7 +73,9 @@ class Recorder:
         frames: FrameRecorder | None,
         surroundings: Surroundings,
         timed: bool,
+        apart: Apart | None = None,
     ) -> None:
+        self._apart = apart or Apart()
         self._observations = observations
         self._video = video
         self._frames = frames
@@ -77,8 +85,8 @@ class Recorder:
 
     @property
     def records(self) -> bool:
-        """Anything is wanted at all."""
-        return any(sink is not None for sink in (self._observations, self._frames, self._video))
+        """Anything is wanted at all, and can still be written."""
+        return any(map(self._apart.goes_on, (self._observations, self._frames, self._video)))
 
     def record(
         self,
@@ -89,11 +97,14 @@ class Recorder:
         path_ahead_m: FloatArray | None = None,
     ) -> None:
         """One frame. path_ahead_m: (N, 2) in the body frame."""
-        if self._observations is not None:
-            self._observations.write(look.scene, decision, look.timing_ms if self._timed else {})
-        if self._frames is not None:
-            self._frames.write(look.frame, look.camera_pose)
-        if self._video is not None:
+        observations, frames, video = self._observations, self._frames, self._video
+        if observations is not None and self._apart.goes_on(observations):
+            with self._apart.attempt(observations):
+                observations.write(look.scene, decision, look.timing_ms if self._timed else {})
+        if frames is not None and self._apart.goes_on(frames):
+            with self._apart.attempt(frames):
+                frames.write(look.frame, look.camera_pose)
+        if video is not None and self._apart.goes_on(video):
             around = self._surroundings
             moment = VideoMoment(
                 look.frame,
@@ -107,7 +118,8 @@ class Recorder:
                 path_ahead_m,
                 around.corridor_half_width_m,
             )
-            self._video.write(self._composer.compose(moment))
+            with self._apart.attempt(video):
+                video.write(self._composer.compose(moment))
 
 
 def require_two_files(observations: FilePath | None, video: FilePath | None) -> None:
@@ -129,19 +141,26 @@ def require_writable(options: RecordingOptions) -> None:
 
 
 @contextmanager
-def open_recorder(options: RecordingOptions, surroundings: Surroundings) -> Iterator[Recorder]:
-    """A recorder whose files are complete when the block ends. Raises VideoError, UserError, HalError."""
+def open_recorder(
+    options: RecordingOptions, surroundings: Surroundings, cut_off: Callable[[str], None] | None = None
+) -> Iterator[Recorder]:
+    """A recorder whose files are complete when the block ends. cut_off: see Apart.
+
+    Raises VideoError, UserError, HalError: where cut_off is given, only if a file cannot be opened.
+    """
     require_two_files(options.observations, options.video)
+    apart = Apart(cut_off)
     with ExitStack() as files:
         observations = video = frames = None
         if options.observations is not None:
-            observations = files.enter_context(ObservationFile(options.observations))
+            observations = files.enter_context(apart.closing(ObservationFile(options.observations)))
         if options.video is not None:
-            video = files.enter_context(VideoWriter(options.video, surroundings.fps))
+            video = files.enter_context(apart.closing(VideoWriter(options.video, surroundings.fps)))
         if options.frames is not None:
             writer = files.enter_context(TumWriter(options.frames, surroundings.mount))
-            frames = files.enter_context(FrameRecorder(writer, options.frames, may_drop=options.timed))
-        yield Recorder(observations, video, frames, surroundings, options.timed)
+            recorder = FrameRecorder(writer, options.frames, may_drop=options.timed)
+            frames = files.enter_context(apart.closing(recorder))
+        yield Recorder(observations, video, frames, surroundings, options.timed, apart)
 
 
 class RunRecorder:

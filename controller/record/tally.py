@@ -25,7 +25,10 @@ class SetpointTally:
     Acceleration and jerk are the differences of consecutive sent speeds and accelerations, divided by the
     number of control steps between them times the period. So they judge the commands themselves, not what the
     profile claims, nor how late a step began by the clock. Drivers do not send at every step. The emergency
-    limits are the bounds for violations; emergency_count counts how often braking exceeded comfort.
+    limits are the bounds for violations.
+
+    emergency_count: setpoints beyond the comfort limits; harder_count and sharper_count: by their braking, by
+    their jerk. One may be both.
     """
 
     limits: Limits
@@ -36,6 +39,8 @@ class SetpointTally:
     max_jerk_mps3: float = 0.0
     reversals: int = 0
     emergency_count: int = 0
+    harder_count: int = 0
+    sharper_count: int = 0
     violations: int = 0
     _last: Setpoint | None = None
     _steps: int = 0
@@ -61,7 +66,11 @@ class SetpointTally:
         accel_mps2, jerk_mps3 = self._differences(sent)
         self.max_accel_mps2 = max(self.max_accel_mps2, abs(accel_mps2))
         self.max_jerk_mps3 = max(self.max_jerk_mps3, abs(jerk_mps3))
-        self.emergency_count += sent.a_mps2 < -self.limits.max_accel_mps2 - TOLERANCE
+        harder = sent.a_mps2 < -self.limits.max_accel_mps2 - TOLERANCE
+        sharper = abs(jerk_mps3) > self.limits.max_jerk_mps3 + TOLERANCE
+        self.harder_count += harder
+        self.sharper_count += sharper
+        self.emergency_count += harder or sharper
         limits = self.limits
         self.violations += (
             sent.v_mps > limits.max_speed_mps + TOLERANCE

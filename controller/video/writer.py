@@ -13,6 +13,7 @@ from typing import Self
 import cv2
 
 from controller.errors import UserError
+from controller.video.room import Room
 from controller.video.style import Image
 
 # Codecs that OpenCV's wheel really encodes (it has no H.264 encoder). Browsers play VP8 in WebM, which takes
@@ -38,7 +39,9 @@ class VideoWriter:
     """A video file, as a context manager. The first picture creates the file; all others must have its size.
 
     Raises VideoError: at once if the suffix is unknown or the file cannot be written, so that a long run does
-    not fail at its end; from write() if no encoder opens, or if a picture has another size than the first.
+    not fail at its end; from write() if no encoder opens, if a picture has another size than the first, or if
+    the disk is full. OpenCV does not tell that, so the room is claimed before each picture. What was written
+    before can be seen.
     """
 
     def __init__(self, path: Path, fps: float) -> None:
@@ -51,6 +54,7 @@ class VideoWriter:
         self._fps = fps
         self._size: tuple[int, int] | None = None
         self._writer: cv2.VideoWriter | None = None
+        self._room: Room | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -58,7 +62,12 @@ class VideoWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except VideoError:
+            # The error that ended the block is more important than this one.
+            if error is None:
+                raise
 
     def write(self, picture: Image) -> None:
         """Append one picture, (H, W, 3) uint8 BGR."""
@@ -66,19 +75,46 @@ class VideoWriter:
         if self._writer is None:
             self._writer = self._open((width, height))
             self._size = (width, height)
+            with self._told():
+                self._room = Room(self._path).__enter__()
         if (width, height) != self._size:
             raise VideoError(
                 f"{self._path}: a picture of {width}x{height} after others of another size; "
                 "write one video for each size"
             )
+        assert self._room is not None, "opened with the writer"
+        with self._told():
+            self._room.claim()
         self._writer.write(picture)
 
     def close(self) -> None:
-        """Finish the file. Idempotent. If there was no picture, there is no file."""
-        if self._writer is not None:
-            with _native_stderr_silenced():
-                self._writer.release()
-            self._writer = None
+        """Finish the file. Idempotent. If there was no picture, there is no file.
+
+        Raises VideoError if what was written is no video.
+        """
+        writer, self._writer = self._writer, None
+        room, self._room = self._room, None
+        if writer is None:
+            return
+        with _native_stderr_silenced():
+            writer.release()
+        if room is not None:
+            with self._told():
+                room.__exit__(None, None, None)
+            if not _readable(self._path):
+                raise self._cut_off("its end could not be written")
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise self._cut_off(str(error.strerror)) from error
+
+    def _cut_off(self, why: str) -> VideoError:
+        return VideoError(
+            f"{self._path}: nothing more can be written ({why}); make room or name another file"
+        )
 
     def _open(self, size: tuple[int, int]) -> cv2.VideoWriter:
         fourcc = cv2.VideoWriter.fourcc(*self._codec)
@@ -112,6 +148,14 @@ def _check_writable(path: Path) -> None:
             f"{path}: the video cannot be written there ({error.strerror}); name a file in a folder that "
             "exists and that you may write to"
         ) from error
+
+
+def _readable(path: Path) -> bool:
+    with _native_stderr_silenced():
+        video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+        opened = video.isOpened()
+        video.release()
+    return opened
 
 
 @contextmanager

@@ -113,7 +113,7 @@ def _notes(camera: RecordingCamera) -> tuple[str, ...]:
     if not camera.depth_registered and camera.depth_intrinsics is None:
         notes.append(_UNREGISTERED_NOTE)
     if camera.camera_height_m is None:
-        notes.append("camera.yaml does not give camera_height_m: the floor is looked for in the depth")
+        notes.append("camera.yaml does not give camera_height_m")
     if camera.ignored_keys:
         notes.append(f"camera.yaml: keys without a meaning here: {', '.join(camera.ignored_keys)}")
     return tuple(notes)

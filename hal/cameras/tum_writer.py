@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TextIO
+from typing import Self
 
 import cv2
 import yaml
@@ -22,6 +22,39 @@ from hal.types import CameraMount, Pose, RgbdFrame
 _PNG_FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 
 
+class _Lines:
+    """A text file to which whole lines are added. They are on their way to the disk at once, so that a
+    recording that ends abruptly can still be read.
+
+    length: in bytes.
+    """
+
+    def __init__(self, path: Path, heading: str) -> None:
+        self.name = path.name
+        self.length = 0
+        self._file = path.open("wb", buffering=0)
+        self.add(heading)
+
+    def add(self, line: str) -> None:
+        """Raises OSError; a part of the line may have been written then."""
+        rest = f"{line}\n".encode()
+        while rest:  # a disk that is nearly full takes a part
+            rest = rest[self._file.write(rest) :]
+        self.length = self._file.tell()
+
+    def take_back(self, length: int) -> None:
+        """Forget what was added since the file was this long."""
+        with suppress(OSError):
+            self._file.truncate(length)
+            self._file.seek(length)
+            self.length = length
+
+    def close(self) -> None:
+        """Nothing is kept back that could fail here."""
+        with suppress(OSError):
+            self._file.close()
+
+
 class TumWriter:
     """One open recording. Its frames must have the same intrinsics and depth scale, and increasing times."""
 
@@ -30,7 +63,7 @@ class TumWriter:
         self._mount = mount
         self._first: RgbdFrame | None = None
         self._last_ns = -1
-        self._odometry: TextIO | None = None
+        self._odometry: _Lines | None = None
 
     def prepare(self) -> None:
         """Make the folders. Raises DeviceRefused if that fails or if there is a recording already."""
@@ -43,10 +76,8 @@ class TumWriter:
     def __enter__(self) -> Self:
         """Open the files. Raises DeviceRefused as prepare() does, and if the files cannot be made."""
         self.prepare()
-        with self._told("rgb.txt"):
-            self._colour_index = self._index("rgb.txt", "# time of the colour image in seconds, file")
-        with self._told("depth.txt"):
-            self._depth_index = self._index("depth.txt", "# time of the depth image in seconds, file")
+        self._colour_index = self._index("rgb.txt", "# time of the colour image in seconds, file")
+        self._depth_index = self._index("depth.txt", "# time of the depth image in seconds, file")
         return self
 
     def __exit__(
@@ -61,29 +92,44 @@ class TumWriter:
         """Add one frame. odometry: the camera's pose by dead reckoning at captured_ns, for odometry.txt.
 
         Raises ValueError if the frame does not fit the earlier ones, DeviceRefused if it cannot be written.
+        Nothing of it is left then: the indexes name whole files only.
         """
         if self._first is None:
-            self._first = frame
             with self._told("camera.yaml"):
                 self._write_calibration(frame)
+            self._first = frame
         if (frame.intrinsics, frame.depth_scale_m) != (self._first.intrinsics, self._first.depth_scale_m):
             raise ValueError("a recording has one camera: intrinsics or depth scale changed")
         if frame.captured_ns <= self._last_ns:
             raise ValueError(f"frame {frame.sequence} is not later than the one before it")
         self._last_ns = frame.captured_ns
         stamp = format_stamp(frame.captured_ns)
-        self._image(self._colour_index, f"rgb/{stamp}.png", frame.colour, stamp)
-        self._image(self._depth_index, f"depth/{stamp}.png", frame.depth, stamp)
-        if odometry is not None:
-            with self._told("odometry.txt"):
-                self._pose(odometry, stamp)
+        colour, depth = f"rgb/{stamp}.png", f"depth/{stamp}.png"
+        with ExitStack() as undone:
+            self._image(colour, frame.colour, undone)
+            self._image(depth, frame.depth, undone)
+            if odometry is not None:
+                self._add(self._poses(), _pose_line(stamp, odometry), undone)
+            self._add(self._colour_index, f"{stamp} {colour}", undone)
+            self._add(self._depth_index, f"{stamp} {depth}", undone)
+            undone.pop_all()
 
-    def _image(self, index: TextIO, file: str, image: cv2.typing.MatLike, stamp: str) -> None:
+    def _image(self, file: str, image: cv2.typing.MatLike, undone: ExitStack) -> None:
         # Not written by OpenCV, which reports success even if the last bytes did not fit on the disk.
         data = cv2.imencode(".png", image, _PNG_FAST)[1]
+        undone.callback(_remove, self._folder / file)
         with self._told(file):
             (self._folder / file).write_bytes(data.tobytes())
-            index.write(f"{stamp} {file}\n")
+
+    def _add(self, lines: _Lines, line: str, undone: ExitStack) -> None:
+        undone.callback(lines.take_back, lines.length)
+        with self._told(lines.name):
+            lines.add(line)
+
+    def _poses(self) -> _Lines:
+        if self._odometry is None:
+            self._odometry = self._index("odometry.txt", "# camera: time tx ty tz qx qy qz qw")
+        return self._odometry
 
     @contextmanager
     def _told(self, file: str) -> Iterator[None]:
@@ -91,19 +137,12 @@ class TumWriter:
         try:
             yield
         except OSError as error:
-            raise DeviceRefused(f"{self._folder / file}: cannot be written ({error.strerror})") from error
+            why = f"cannot be written ({error.strerror}); make room or choose another folder"
+            raise DeviceRefused(f"{self._folder / file}: {why}") from error
 
-    def _pose(self, pose: Pose, stamp: str) -> None:
-        if self._odometry is None:
-            self._odometry = self._index("odometry.txt", "# camera: time tx ty tz qx qy qz qw")
-        values = (*pose.translation_m.tolist(), *quaternion_of(pose.rotation).tolist())
-        self._odometry.write(f"{stamp} {' '.join(f'{value:.12f}' for value in values)}\n")
-
-    def _index(self, name: str, heading: str) -> TextIO:
-        # Written to disk line by line, so that a recording that ends abruptly can still be read.
-        index = (self._folder / name).open("w", encoding="utf-8", buffering=1)
-        index.write(f"{heading}\n")
-        return index
+    def _index(self, name: str, heading: str) -> _Lines:
+        with self._told(name):
+            return _Lines(self._folder / name, heading)
 
     def _write_calibration(self, frame: RgbdFrame) -> None:
         k = frame.intrinsics
@@ -122,4 +161,20 @@ class TumWriter:
             content["camera_pitch_deg"] = math.degrees(self._mount.pitch_rad)
             content["camera_forward_m"] = self._mount.forward_m
             content["camera_left_m"] = self._mount.left_m
-        (self._folder / "camera.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+        path = self._folder / "camera.yaml"
+        try:
+            path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+        except OSError:
+            _remove(path)
+            raise
+
+
+def _pose_line(stamp: str, pose: Pose) -> str:
+    """A line of odometry.txt."""
+    values = (*pose.translation_m.tolist(), *quaternion_of(pose.rotation).tolist())
+    return f"{stamp} {' '.join(f'{value:.12f}' for value in values)}"
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):
+        path.unlink(missing_ok=True)

@@ -42,6 +42,7 @@ def test_who_is_reckoned_with_must_be_believed(tmp_path: Path, base: dict[str, o
 def test_a_recording_may_be_looked_at_with_the_yaml_of_its_robot(path: Path) -> None:
     replay = load_replay(path)
     if path.stem == "replay":
+        assert not replay.assume_mount
         return
     robot = load_app(path)
     assert (replay.robot, replay.perception, replay.decision) == (
@@ -49,7 +50,7 @@ def test_a_recording_may_be_looked_at_with_the_yaml_of_its_robot(path: Path) -> 
         robot.perception,
         robot.decision,
     )
-    assert not replay.assume_mount
+    assert replay.assume_mount
 
 
 @pytest.mark.parametrize("base", [SIM, {}], ids=["robot", "replay"])

@@ -37,6 +37,9 @@ def test_a_drive_succeeds_where_it_ended_as_asked_touched_nothing_and_kept_its_l
     for outcome in good:
         assert not ended(kind, outcome, violations=1).succeeded
         assert not ended(kind, outcome, contacts=("a crate",)).succeeded
+        cut_off = ended(kind, outcome)
+        cut_off.cut_off.append("the disk is full")
+        assert not cut_off.succeeded
 
 
 @pytest.mark.parametrize("command", ["run", "govern"])
@@ -44,10 +47,12 @@ def test_the_help_says_so(command: str) -> None:
     shown = " ".join(CliRunner().invoke(cli, [command, "--help"]).output.split())
     assert "Exit code 0 if" in shown
     assert "came to rest" in shown
-    assert "nothing was touched and the limits were kept; else 1." in shown
+    assert "nothing was touched, the limits were kept and all files were written; else 1." in shown
 
 
 def test_the_readme_says_so() -> None:
     text = " ".join((ROOT / "README.md").read_text().split())
-    assert "exit code of `treadwatch run` is 0 if the robot reached its target, or came to rest" in text
-    assert "touched nothing and kept its limits; 1 if not; 2 for a mistake" in text
+    assert "exit code of `treadwatch run` is - 0 if the robot reached its target, or came to rest" in text
+    assert (
+        "touched nothing, kept its limits and wrote all that it was to write; - 1 if not; - 2 for a" in text
+    )

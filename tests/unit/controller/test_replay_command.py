@@ -11,9 +11,10 @@ import cv2
 import numpy as np
 import pytest
 
+from config.app import load_app, load_replay
 from config.loader import CONFIG_DIR
 from controller.errors import UserError
-from controller.replay import EgoSpeed, ReplayOptions, run_replay
+from controller.replay import EgoSpeed, ReplayOptions, recorded_mount, run_replay
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
 from hal.types import Pose
@@ -190,3 +191,20 @@ def test_a_mounting_that_the_recording_knows_better_is_told(
     summary = capsys.readouterr().out
     assert ("0.60 m high and tipped by 4.0 degrees, not where" in summary) is told
     assert re.search(r"decisions   10 keep; of a robot that goes straight ahead", summary)
+
+
+@pytest.mark.parametrize("robots", [True, False])
+def test_a_robot_s_yaml_knows_the_mounting_that_a_recording_does_not_tell(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], robots: bool
+) -> None:
+    with TumWriter(tmp_path) as writer:
+        writer.write(small_frame(0))
+    path = CONFIG_DIR / ("robot-bunker.yaml" if robots else "replay.yaml")
+    mount, config = load_app(CONFIG_DIR / "robot-bunker.yaml").robot.camera_mount, load_replay(path)
+    used = recorded_mount(config, None)
+    assert (None if used is None else used.height_m) == (mount.height_m if robots else None)
+    run_replay(ReplayOptions(tmp_path, "auto", path, quiet=True))
+    said = (
+        f"it is that of {path}, {mount.height_m:.2f} m high" if robots else "the floor is looked for in the"
+    )
+    assert f"note        the recording does not tell the camera's mounting: {said}" in capsys.readouterr().out

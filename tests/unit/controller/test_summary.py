@@ -55,6 +55,15 @@ def test_a_mission_that_gets_nowhere_tells_why(capsys: pytest.CaptureFixture[str
     assert rows["target"].startswith(f"+{left_m:.2f} m to go by odometry, 0.0 cm beside the path")
 
 
+def test_the_limits_line_tells_of_braking_and_of_jerk_beyond_comfort() -> None:
+    result, config = drive(0.1, sees=False), load_app(CONFIG_PATH)
+    assert "(comfort 0.3, 0.6; kept by all), 0 reversals" in dict(summary_rows(config, result))["limits"]
+    tally = result.setpoints
+    tally.emergency_count, tally.harder_count, tally.sharper_count = 3, 1, 2
+    told = dict(summary_rows(config, result))["limits"]
+    assert "(comfort 0.3, 0.6; 3 setpoints beyond: 1 braked harder, 2 had more jerk), 0 reversals" in told
+
+
 def test_far_is_told_in_metres_and_near_in_centimetres() -> None:
     assert length_text(5.023, "+") == "+5.02 m"
     assert length_text(-1.0, "+") == "-1.00 m"

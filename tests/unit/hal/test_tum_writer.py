@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import math
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hal.cameras.tum_replay import TumReplay
-from hal.cameras.tum_writer import TumWriter
+from hal.cameras.tum_writer import TumWriter, _Lines
 from hal.errors import DeviceRefused
-from hal.types import CameraMount
+from hal.types import CameraMount, Pose
 from tests.support.recordings import small_frame, write_recording
 
 
@@ -85,3 +87,57 @@ def test_time_must_go_on_and_the_camera_stay_the_same(tmp_path: Path) -> None:
             writer.write(small_frame(1))
         with pytest.raises(ValueError, match="one camera"):
             writer.write(dataclasses.replace(small_frame(2), depth_scale_m=0.0002))
+
+
+@pytest.mark.parametrize("fails", ["rgb/", "depth/", "depth.txt", "odometry.txt"])
+def test_a_full_disk_leaves_whole_frames_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: str
+) -> None:
+    """Half of an image, or of a line of an index, was written when the disk was full."""
+    whole, full = Path.write_bytes, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def half_an_image(path: Path, data: bytes) -> int:
+        if fails in str(path):
+            whole(path, data[: len(data) // 2])
+            raise full
+        return whole(path, data)
+
+    add = _Lines.add
+
+    def half_a_line(lines: _Lines, line: str) -> None:
+        if lines.name == fails:
+            lines._file.write(line.encode()[:7])
+            raise full
+        add(lines, line)
+
+    pose = Pose(np.eye(3), np.zeros(3))
+    with TumWriter(tmp_path) as writer:
+        writer.write(small_frame(0), pose)
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "write_bytes", half_an_image)
+            patched.setattr(_Lines, "add", half_a_line)
+            with pytest.raises(DeviceRefused, match=f"{fails}.*No space left on device.; make room"):
+                writer.write(small_frame(1), pose)
+        assert len(list((tmp_path / "rgb").iterdir())) == len(list((tmp_path / "depth").iterdir())) == 1
+        writer.write(small_frame(2), pose)  # somebody has made room
+    kept = TumReplay(tmp_path)
+    assert (kept.frame_count, kept.skipped) == (2, ())
+    for name in ("rgb.txt", "depth.txt", "odometry.txt"):
+        assert (tmp_path / name).read_text().count("\n") == 3
+
+
+def test_a_calibration_that_did_not_fit_is_written_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def half(path: Path, text: str, encoding: str) -> int:
+        path.write_bytes(text.encode(encoding)[:9])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with TumWriter(tmp_path) as writer:
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "write_text", half)
+            with pytest.raises(DeviceRefused, match=r"camera\.yaml: cannot be written"):
+                writer.write(small_frame(0))
+        assert not (tmp_path / "camera.yaml").exists()
+        writer.write(small_frame(1))
+    assert TumReplay(tmp_path).frame_count == 1

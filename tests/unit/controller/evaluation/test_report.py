@@ -155,11 +155,18 @@ def test_the_report_has_its_sections_figures_and_json(
 
 def test_preparing_removes_what_an_earlier_run_left_and_nothing_else(tmp_path: Path) -> None:
     prepare_folder(tmp_path)
-    for name in ("failures/slow-crossing-012.png", "latency.png", "holiday.png", "failures/mine-012.png"):
+    old = (
+        "failures/slow-crossing-012.png",
+        "latency.png",
+        "recording-desk-none.png",
+        "recording-a-file-2.png",
+    )
+    mine = ("holiday.png", "failures/mine-012.png", "recording-session.png")
+    for name in (*old, *mine):
         (tmp_path / name).write_bytes(b"x")
     prepare_folder(tmp_path)
-    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.*"))
-    assert left == ["failures/mine-012.png", "holiday.png", "report.md"]
+    left = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.*")}
+    assert left == {*mine, "report.md"}
 
 
 def test_a_folder_that_cannot_be_made_is_told_at_once(tmp_path: Path) -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from controller.errors import UserError
 from controller.faults.command import describe, write_section
-from controller.faults.kills import KillResult
+from controller.faults.kills import KillResult, Trio
 from controller.faults.trials import FAULTS, KINDS, Fault, TrialResult, run_trial
 from hal.types import ChassisMode
 
@@ -69,3 +73,48 @@ def test_a_page_that_is_no_text_is_told_and_left_alone(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no text in UTF-8"):
         write_section(page, "## Faults\n")
     assert page.read_bytes() == b"# Mine \xff\n"
+
+
+def test_a_deeper_heading_of_the_same_name_is_another_one(tmp_path: Path) -> None:
+    page = tmp_path / "results.md"
+    page.write_text("# Mine\n\n### Faults\n\nof mine\n")
+    write_section(page, "## Faults\n\nnew\n")
+    assert page.read_text() == "# Mine\n\n### Faults\n\nof mine\n\n## Faults\n\nnew\n"
+
+
+def processes(monkeypatch: pytest.MonkeyPatch, emulator: str) -> list[subprocess.Popen[str]]:
+    """What a trio starts from now on: this program in place of the emulator, and one that waits."""
+    started: list[subprocess.Popen[str]] = []
+    popen = subprocess.Popen
+
+    def start(arguments: list[str], **pipes: Any) -> subprocess.Popen[str]:
+        program = emulator if "emulate" in arguments else "import time; time.sleep(600)"
+        started.append(popen([sys.executable, "-c", program], **pipes))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    return started
+
+
+def test_an_emulator_that_does_not_start_is_not_left_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = "import sys, time; print('no port', file=sys.stderr, flush=True); time.sleep(600)"
+    started = processes(monkeypatch, program)
+    with pytest.raises(UserError, match="the emulator did not start: no port"):
+        Trio("agilex", Path("robot.yaml"))
+    assert [one.poll() is not None for one in started] == [True]
+
+
+def test_a_base_that_tells_nothing_is_not_waited_for_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = "print('v 0.1 m/s, w 0 rad/s, x 0 m, y 0 m', flush=True)"
+    program = f"import sys, time; print('emulating', file=sys.stderr, flush=True); {told}; time.sleep(600)"
+    started = processes(monkeypatch, program)
+    trio = Trio("agilex", Path("robot.yaml"))
+    try:
+        assert trio.await_speed(lambda v_mps: v_mps == 0.1, 30.0) < 30.0
+        began_s = time.monotonic()
+        with pytest.raises(UserError, match=r"was not so within 0\.3 s"):
+            trio.await_speed(lambda v_mps: v_mps == 0.1, 0.3)
+        assert time.monotonic() - began_s < 30.0
+    finally:
+        trio.close()
+    assert all(one.poll() is not None for one in started)

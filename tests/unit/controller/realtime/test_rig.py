@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -16,10 +17,11 @@ from controller.console import Console
 from controller.control import ControlLoop
 from controller.ending import Outcome
 from controller.realtime import rig as realtime_rig
-from controller.realtime.channel import Channel, channel_sockets
+from controller.realtime.channel import Channel, PeerGone, channel_sockets
 from controller.realtime.punctual import PunctualChassis
-from controller.realtime.rig import RealtimeRig
-from controller.realtime.runner import PerceptionLink, Punctuality
+from controller.realtime.rig import RealtimeRig, perception_beside
+from controller.realtime.runner import CutOff, PerceptionLink, Punctuality
+from controller.record.recorder import RecordingOptions
 from controller.result import MissionOptions
 from hal.clocks import MonotonicClock
 from hal.types import ChassisMode
@@ -118,3 +120,71 @@ def test_the_service_manager_is_told_of_every_end_before_perception_is_waited_fo
             drive()
     told = [message for message in said if message.startswith(b"STOPPING=1")]
     assert told == [b"STOPPING=1\nSTATUS=" + why]
+
+
+def test_what_ends_during_the_drive_and_after_it_is_told_once_each(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    link: list[PerceptionLink] = []
+
+    @contextmanager
+    def perception(*_: object) -> Iterator[PerceptionLink]:
+        here, there = channel_sockets()
+        with here, there:
+            link.append(PerceptionLink(Channel(here)))
+            yield link[0]
+            link[0].cut_off.append("drive.mp4: its end is missing")
+
+    monkeypatch.setattr(realtime_rig, "perception_beside", perception)
+    monkeypatch.setattr(realtime_rig, "become_realtime", lambda _priority: [])
+    rig, loop = rig_of(ObedientChassis())
+    with rig.under_way(loop, Console(quiet=True), lambda _service: None) as moments:
+        link[0].cut_off.append("seen.jsonl: full")
+        for _ in range(3):
+            next(moments)
+    assert rig.cut_off == ["seen.jsonl: full", "drive.mp4: its end is missing"]
+    assert capsys.readouterr().err.splitlines() == [
+        "treadwatch: warning: seen.jsonl: full; the drive goes on without it",
+        "treadwatch: warning: drive.mp4: its end is missing",
+    ]
+
+
+def sleeps_for_ever(*_: object) -> None:
+    """In place of a perception process whose disk hangs."""
+    time.sleep(600.0)
+
+
+def tells_late(_config: object, _path: object, end: socket.socket, *_: object) -> None:
+    """In place of a perception process that cannot finish a file after the drive."""
+    channel = Channel(end)
+    channel.send(CutOff("it runs"))
+    with suppress(PeerGone):
+        while True:
+            channel.receive()
+            time.sleep(0.01)
+    channel.send(CutOff("drive.mp4: full"))
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_files_that_a_killed_perception_may_not_have_closed_are_named(
+    monkeypatch: pytest.MonkeyPatch, recorded: bool
+) -> None:
+    monkeypatch.setattr(realtime_rig, "perceive_forever", sleeps_for_ever)
+    monkeypatch.setattr(realtime_rig, "GOODBYE_S", 0.1)
+    path = CONFIG_DIR / "sim-realtime.yaml"
+    recording = RecordingOptions(video=Path("drive.mp4") if recorded else None)
+    with perception_beside(load_app(path), Path(path), 0, recording) as link:
+        pass
+    why = ["drive.mp4: may not be whole: they were not closed within 0.1 s; is the disk too slow?"]
+    assert link.cut_off == (why if recorded else [])
+
+
+def test_what_perception_tells_after_the_drive_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(realtime_rig, "perceive_forever", tells_late)
+    path = CONFIG_DIR / "sim-realtime.yaml"
+    with perception_beside(load_app(path), Path(path), 0, RecordingOptions()) as link:
+        began_s = time.monotonic()
+        while not link.cut_off and time.monotonic() - began_s < 60.0:
+            link.receive()
+            time.sleep(0.01)
+    assert link.cut_off == ["it runs", "drive.mp4: full"]

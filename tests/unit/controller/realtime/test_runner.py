@@ -6,6 +6,7 @@ from config.app import RealtimeRunner
 from controller.ending import Outcome
 from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.runner import (
+    CutOff,
     Farewell,
     PerceptionLink,
     Punctuality,
@@ -102,6 +103,15 @@ def test_perception_that_has_seen_something_did_not_refuse(ends: Ends, received_
     there.send(Farewell("camera: unplugged"))
     link.receive()
     assert (link.lost_reason, link.refused_reason) == ("camera: unplugged", None)
+
+
+def test_an_output_that_ends_is_no_loss_of_perception(ends: Ends) -> None:
+    link, there = ends
+    there.send(CutOff("rgb/1.png: cannot be written"))
+    there.send(SceneMessage(scene(), {}))
+    assert len(link.receive()) == 1
+    assert link.cut_off == ["rgb/1.png: cannot be written"]
+    assert link.lost_reason is None
 
 
 def test_perception_that_dies_without_a_word_stops_the_robot_too(ends: Ends) -> None:

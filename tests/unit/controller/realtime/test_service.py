@@ -1,12 +1,14 @@
 import os
 import signal
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from controller.realtime.service import ServiceManager, stop_on_signals
+from controller.realtime.service import ServiceManager, StopRequest, stop_on_signals
 
 
 @pytest.fixture
@@ -108,3 +110,43 @@ def test_under_nohup_a_terminal_may_go() -> None:
             assert not request
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize("closes", [True, False])
+def test_only_the_third_signal_while_a_drive_closes_ends_it_hard(closes: bool) -> None:
+    """As long as the robot moves none does."""
+    script = (
+        "import os, signal, sys\n"
+        "from controller.realtime.service import StopRequest\n"
+        "stop = StopRequest().listen()\n"
+        "os.kill(os.getpid(), signal.SIGINT)\n"
+        "if sys.argv[1] == 'True': stop.closing()\n"
+        "for left in range(3):\n"
+        "    print(left, flush=True)\n"
+        "    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "print('summary')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script, str(closes)], capture_output=True, text=True)
+    assert done.stdout.split() == (["0", "1", "2"] if closes else ["0", "1", "2", "summary"])
+    assert done.returncode == (-signal.SIGTERM if closes else 0)
+
+
+def test_the_exit_code_is_safe_until_the_process_has_gone() -> None:
+    """The interpreter takes handlers of Python away while it ends."""
+    script = (
+        "import atexit, os, signal\n"
+        "from controller.realtime.service import StopRequest\n"
+        "class Last:\n"
+        "    def __del__(self, kill=os.kill, pid=os.getpid(), number=signal.SIGTERM): kill(pid, number)\n"
+        "signal.last = Last()\n"
+        "StopRequest().listen()\n"
+        "raise SystemExit(2)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 2
+
+
+def test_a_drive_leaves_its_handlers_in_place() -> None:
+    stop = StopRequest().listen()
+    os.kill(os.getpid(), signal.SIGTERM)
+    assert stop.reason == "SIGTERM"
+    assert signal.getsignal(signal.SIGINT) == stop.handle

@@ -1,6 +1,7 @@
 import json
 import math
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -88,22 +89,13 @@ def test_a_place_that_cannot_be_written_is_one_clear_line(tmp_path: Path) -> Non
         pytest.fail("must not open")
 
 
-def test_a_full_disk_is_told_in_one_line_while_writing() -> None:
-    with pytest.raises(UserError, match=r"/dev/full: .*No space left") as caught:
-        write_frames(10_000)
+def test_a_full_disk_is_told_in_one_line() -> None:
+    with (
+        pytest.raises(UserError, match=r"/dev/full: .*No space left") as caught,
+        ObservationFile(Path("/dev/full")) as sink,
+    ):
+        sink.write(scene(), SLOW, {})
     assert "\n" not in str(caught.value)
-
-
-def test_a_full_disk_is_told_in_one_line_at_the_end() -> None:
-    with pytest.raises(UserError, match=r"/dev/full: .*No space left"):
-        write_frames(1)
-
-
-def write_frames(count: int) -> None:
-    """To a disk on which there is no room; a frame or two still fit into the buffer."""
-    with ObservationFile(Path("/dev/full")) as sink:
-        for number in range(count):
-            sink.write(scene(sequence=number), SLOW, {})
 
 
 def test_standard_output_gets_each_line_at_once(
@@ -152,3 +144,21 @@ def test_a_reader_that_leaves_is_told_in_one_line() -> None:
     assert told == (
         "treadwatch: standard output: whoever read the observations has gone; name a file for them\n"
     )
+
+
+def test_a_full_disk_cuts_no_line_off(tmp_path: Path) -> None:
+    path = tmp_path / "o.jsonl"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with ObservationFile(path) as sink:
+        sink.write(scene(), None, {})
+        whole = path.read_text()  # at once
+        assert whole.endswith("\n")
+        resource.setrlimit(resource.RLIMIT_FSIZE, (len(whole) + 20, limits[1]))
+        try:
+            with pytest.raises(UserError, match=r"o\.jsonl: nothing more can be written \(File too large\)"):
+                sink.write(scene(), None, {})
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert path.read_text() == whole
+        sink.write(scene(), None, {})
+    assert path.read_text() == whole * 2

@@ -117,8 +117,16 @@ def test_the_first_command_after_a_latch_is_judged() -> None:
     assert tally.violations == 1
 
 
-def test_braking_beyond_comfort_is_told_apart() -> None:
-    assert tally_of((1.0, -0.3), (0.99, -0.31)).emergency_count == 1
+def test_what_is_beyond_comfort_is_told_apart() -> None:
+    def beyond(*sent: tuple[float, float]) -> tuple[int, int, int]:
+        tally = tally_of(*sent)
+        return tally.emergency_count, tally.harder_count, tally.sharper_count
+
+    comfort = LIMITS.max_jerk_mps3 * 0.02
+    assert beyond((1.0, 0.0), (1.0, -comfort)) == (0, 0, 0)
+    assert beyond((1.0, 0.0), (1.0, -1.5 * comfort)) == (1, 0, 1)  # an emergency's jerk, while still gentle
+    assert beyond((1.0, -0.3), (0.994, -0.3 - 0.5 * comfort)) == (1, 1, 0)
+    assert beyond((1.0, -0.3), (0.994, -0.3 - 1.5 * comfort)) == (1, 1, 1)
 
 
 def test_timing_gives_the_median_of_the_sum() -> None:

@@ -1,11 +1,15 @@
+import errno
 import os
+import resource
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 
 from controller.errors import UserError
+from controller.video import room
 from controller.video.style import Image
 from controller.video.writer import CODECS, VideoError, VideoWriter
 
@@ -169,3 +173,75 @@ def test_a_name_like_a_protocol_is_a_file(tmp_path: Path, monkeypatch: pytest.Mo
     with VideoWriter(Path("pipe:7.mp4"), 30.0) as writer:
         writer.write(picture(90))
     assert len(read_back(tmp_path / "pipe:7.mp4")) == 1
+
+
+def refuse_after(count: int, code: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The disk gives room so many times."""
+    given: list[int] = []
+
+    def fallocate(_fd: int, offset: int, _length: int) -> int:
+        given.append(offset)
+        return 0 if len(given) <= count else code
+
+    monkeypatch.setattr(room, "fallocate", fallocate)
+
+
+@pytest.mark.parametrize("suffix", CODECS)
+def test_a_full_disk_is_told_before_a_picture_is_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """What was written before can be seen: there is room for the end of the file."""
+    path = tmp_path / f"drive{suffix}"
+    refuse_after(12, errno.ENOSPC, monkeypatch)
+    noise = np.random.default_rng(1)
+    written = 0
+
+    def write() -> None:
+        nonlocal written
+        with VideoWriter(path, 30.0) as writer:
+            for _ in range(2000):
+                writer.write(noise.integers(0, 256, (360, 640, 3), np.uint8))
+                written += 1
+
+    with pytest.raises(
+        VideoError, match=r"nothing more can be written \(No space left on device\); make room"
+    ):
+        write()
+    assert 10 < written < 2000
+    assert len(read_back(path)) == written
+    assert capfd.readouterr().err == ""
+
+
+def test_a_file_system_that_reserves_nothing_is_asked_for_its_free_space(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "drive.mp4"
+    refuse_after(0, errno.EOPNOTSUPP, monkeypatch)
+    with VideoWriter(path, 30.0) as writer:
+        writer.write(picture(10))
+        full = SimpleNamespace(f_bavail=1000, f_frsize=4096)
+        monkeypatch.setattr(os, "fstatvfs", lambda _fd: full)
+        with pytest.raises(VideoError, match="No space left on device"):
+            writer.write(picture(20))
+    assert len(read_back(path)) == 1
+
+
+def test_what_was_reserved_and_not_needed_is_given_back(tmp_path: Path) -> None:
+    path = tmp_path / "drive.mp4"
+    with VideoWriter(path, 30.0) as writer:
+        writer.write(picture(10))
+    assert path.stat().st_blocks * 512 < 100_000
+
+
+def test_an_end_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    """As where another limit than the disk's room is reached."""
+    path = tmp_path / "drive.mp4"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    writer = VideoWriter(path, 30.0)
+    writer.write(picture(10))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, limits[1]))
+    try:
+        with pytest.raises(VideoError, match=r"drive\.mp4: nothing more can be written"):
+            writer.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)

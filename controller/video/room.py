@@ -1,0 +1,71 @@
+"""Room on the disk for a file that somebody else writes and does not tell whether it succeeds."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+# Ahead of the file's end. A muxer keeps up to 5 MB (WebM) in memory before it writes them, and a table of all
+# pictures for the end: without it the whole file cannot be read.
+_AHEAD_BYTES = 8_000_000
+_BYTES_A_PICTURE = 40
+_STEP_BYTES = 1_000_000
+
+_KEEP_SIZE = 1  # FALLOC_FL_KEEP_SIZE
+_NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+
+
+class Room:
+    """Reserves the blocks that the file will need, beyond its end, while the file is open in the block.
+
+    Where the file system reserves nothing (NFS, vfat), its free space is looked at.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._fd = -1
+        self._reserved = 0
+        self._pictures = 0
+
+    def __enter__(self) -> Self:
+        """Raises OSError."""
+        self._fd = os.open(self._path, os.O_WRONLY)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Gives back what was not needed: the file must be complete."""
+        try:
+            os.ftruncate(self._fd, os.fstat(self._fd).st_size)
+        finally:
+            os.close(self._fd)
+
+    def claim(self) -> None:
+        """Before each picture. Raises OSError if there is no room for it and for the end of the file."""
+        self._pictures += 1
+        needed = os.fstat(self._fd).st_size + _AHEAD_BYTES + self._pictures * _BYTES_A_PICTURE
+        while self._reserved < needed:
+            code = fallocate(self._fd, self._reserved, _STEP_BYTES)
+            if code in _NO_ROOM:
+                raise OSError(code, os.strerror(code))
+            if code:
+                self._look(needed)
+                return
+            self._reserved += _STEP_BYTES
+
+    def _look(self, needed: int) -> None:
+        disk = os.fstatvfs(self._fd)
+        if disk.f_bavail * disk.f_frsize < needed - os.fstat(self._fd).st_size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def fallocate(fd: int, offset: int, length: int) -> int:
+    """fallocate(2) that keeps the file's size: 0, or an error number."""
+    call = ctypes.CDLL(None, use_errno=True).fallocate
+    call.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64]
+    return 0 if call(fd, _KEEP_SIZE, offset, length) == 0 else ctypes.get_errno()
