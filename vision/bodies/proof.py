@@ -299,4 +299,7 @@ def prove(
         dt_s,
         settings.sigmas**2,
     )
-    return Proof(*proofs, parts.total[_FILTERED])
+    moves, *others = proofs
+    left = seen.displaced & (parts.across[_FILTERED] > 0.5 * settings.sigmas**2) & (seen.size_m <= _COMPACT_M)
+    left &= seen.trusted & (np.linalg.norm(seen.velocity, axis=1) > least_mps)
+    return Proof(moves | left, *others, parts.total[_FILTERED])
