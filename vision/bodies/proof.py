@@ -300,6 +300,6 @@ def prove(
         settings.sigmas**2,
     )
     moves, *others = proofs
-    left = seen.displaced & (parts.across[_FILTERED] > 0.5 * settings.sigmas**2) & (seen.size_m <= _COMPACT_M)
-    left &= seen.trusted & (np.linalg.norm(seen.velocity, axis=1) > least_mps)
+    left = seen.displaced & (parts.across[_SURFACE] > settings.sigmas**2) & (seen.size_m <= _COMPACT_M)
+    left &= seen.trusted & (np.linalg.norm(seen.surface_velocity, axis=1) > least_mps)
     return Proof(moves | left, *others, parts.total[_FILTERED])

@@ -101,7 +101,7 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
         free,
         centre_m,
         measured.extent_m,
-        tracks.state,
+        tracks.surface_state,
         tracks.origin_m,
         tracks.origin_width_m,
         tracks.origin_ns,
@@ -180,7 +180,7 @@ def _kinds(
             # The visible rest of a mover that is passing behind something does not show where its body is.
             kind[t] = _NEARLY_HIDDEN
             continue
-        elif moving[t] and steady:
+        elif (moving[t] or sides_visible[t]) and steady:
             kind[t] = _PARTIAL
         else:
             kind[t] = _POSITION_ONLY
