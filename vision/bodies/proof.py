@@ -297,4 +297,7 @@ def prove(
         dt_s,
         settings.sigmas**2,
     )
-    return Proof(*proofs, parts.total[_FILTERED])
+    moves, *others = proofs
+    left = seen.displaced & (parts.across[_SURFACE] > settings.sigmas**2) & (seen.size_m <= _COMPACT_M)
+    left &= seen.trusted & (np.linalg.norm(seen.surface_velocity, axis=1) > least_mps)
+    return Proof(moves | left, *others, parts.total[_FILTERED])

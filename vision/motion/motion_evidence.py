@@ -69,6 +69,7 @@ class MotionEvidence:
     velocity_measured_s: FloatArray
     view_radps: FloatArray
     growth_mps: FloatArray
+    displaced: NDArray[np.bool_]
     advances: NDArray[np.bool_]
     border_is_guess: NDArray[np.bool_]
     up: FloatArray | None
@@ -111,6 +112,7 @@ def evidence_of(
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,
         growth_mps=tracks.growth_mps,
+        displaced=tracks.displaced,
         up=sightings.floor_normal(detection),
         view_radps=sightings.view_radps(detection, sight, distance_m),
         advances=advances,
