@@ -8,8 +8,10 @@ the kind in the code is given:
   centroid has not jumped.
 * _PARTIAL: position and velocity, but with a larger variance. Any other surface of a track that is known to
   move. A body cannot be far from its visible part.
-* _POSITION_ONLY: position only (Tracks.reset_position). A surface of a static track that is cut, partly
-  hidden or changed in area; also any surface after a jump, or while the camera's own motion is not known.
+* _SIDES: the same, but across the line of sight only. A surface of a static track that has changed in area,
+  but whose left and right sides are visible.
+* _POSITION_ONLY: position only (Tracks.reset_position). A surface of a static track that is cut or partly
+  hidden; also any surface after a jump, or while the camera's own motion is not known.
 * _NEARLY_HIDDEN: nothing. The small rest that is visible of a mover that is passing behind something.
 """
 
@@ -23,6 +25,7 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray, Pose
+from vision.bodies import displacement
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import MIN_PART_CELLS
@@ -41,11 +44,10 @@ _CENTRE_NOISE = 0.2  # share of a pixel's depth noise: neighbours share it, so i
 _SAME_AREA = 0.3  # a relative change of area above this means that another part of the body is visible
 _AREA_MEMORY_S = 0.32  # time constant of the averaged area: a gain of 0.1 per frame at 30 frames a second
 _NEARLY_HIDDEN_SHARE = 0.4  # of the usual area: a mover with a smaller surface is nearly hidden
-_DISPLACED_M = 0.2
-_ORIGIN_S = 1.5
+_ANY_DEPTH_M = 3.0  # standard deviation of a depth that is to tell nothing
 _JUMP_M = 0.3  # plus two sigmas of depth: a centroid farther from its prediction than this has jumped
 # How a track is visible: with fewer cells than a part has; then the kinds of the module docstring, in order.
-_NOT_VISIBLE, _WHOLE, _PARTIAL, _POSITION_ONLY, _NEARLY_HIDDEN = range(5)
+_NOT_VISIBLE, _WHOLE, _PARTIAL, _SIDES, _POSITION_ONLY, _NEARLY_HIDDEN = range(6)
 
 
 def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
@@ -77,7 +79,7 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
         noise.quadratic_per_m,
     )
     measured_centre, position_only = (
-        (smooth | (kind == _PARTIAL)).nonzero()[0],
+        (smooth | (kind == _PARTIAL) | (kind == _SIDES)).nonzero()[0],
         (kind == _POSITION_ONLY).nonzero()[0],
     )
     tracks.update_with_centre(
@@ -95,21 +97,7 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
     tracks.velocity_measured_s = np.where(smooth & whole, tracks.velocity_measured_s + dt_s, 0.0)
     growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
     tracks.growth_mps = np.where(visible, growth_mps, tracks.growth_mps)
-    free = visible & measured.sides_visible & ~measured.overlapped & detection.motion_known
-    tracks.origin_m, tracks.origin_width_m, tracks.origin_ns, tracks.displaced = _displaced(
-        free,
-        centre_m,
-        measured.extent_m,
-        tracks.surface_state,
-        tracks.origin_m,
-        tracks.origin_width_m,
-        tracks.origin_ns,
-        tracks.displaced,
-        detection.captured_ns,
-        detection.pose.translation_m,
-        noise.floor_m,
-        noise.quadratic_per_m,
-    )
+    displacement.update(tracks, centre_m, visible, measured, detection)
     tracks.seen_ns[visible] = detection.captured_ns
     tracks.sightings += visible
     box_is_whole = visible & ((whole & ~nearly_hidden) | (tracks.sightings == 1))
@@ -179,8 +167,10 @@ def _kinds(
             # The visible rest of a mover that is passing behind something does not show where its body is.
             kind[t] = _NEARLY_HIDDEN
             continue
-        elif (moving[t] or sides_visible[t]) and steady:
+        elif moving[t] and steady:
             kind[t] = _PARTIAL
+        elif sides_visible[t] and steady:
+            kind[t] = _SIDES
         else:
             kind[t] = _POSITION_ONLY
         usual_m2[t] += gain * (now_m2 - usual_m2[t])
@@ -209,68 +199,15 @@ def _centre_covariances(
         variance[0] = across_m**2
         variance[1] = across_m**2 if top_and_bottom_visible[t] else _CUT_SIGMA_M**2
         variance[2] = along_m**2 + noise_m**2
-        if kind[t] == _PARTIAL:
+        if kind[t] == _PARTIAL or kind[t] == _SIDES:
             variance += (_SHIFT_SHARE * size_m) ** 2
+        if kind[t] == _SIDES:
+            variance[2] += _ANY_DEPTH_M**2
         for i in range(3):
             for j in range(3):
                 for k in range(3):
                     covariance[t, i, j] += rotation[i, k] * variance[k] * rotation[j, k]
     return covariance
-
-
-@compiled(
-    "boolean[:], float64[:, :], float64[:, :], float64[:, ::1], float64[:, ::1], float64[:], int64[:],"
-    "boolean[:], int64, float64[:], float64, float64"
-)
-def _displaced(
-    free: NDArray[np.bool_],
-    centre_m: FloatArray,
-    extent_m: FloatArray,
-    state: FloatArray,
-    origin_m: FloatArray,
-    origin_width_m: FloatArray,
-    origin_ns: NDArray[np.int64],
-    displaced: NDArray[np.bool_],
-    now_ns: int,
-    camera_m: FloatArray,
-    floor_m: float,
-    quadratic_per_m: float,
-) -> tuple[FloatArray, FloatArray, NDArray[np.int64], NDArray[np.bool_]]:
-    """origin_m, origin_width_m, origin_ns and displaced of Tracks after a frame.
-
-    free (T,): whose left and right sides both end before something farther away, not behind something nearer.
-    """
-    place_m, width_m, since_ns, left = origin_m.copy(), origin_width_m.copy(), origin_ns.copy(), displaced.copy()
-    for t in range(len(free)):
-        if not free[t]:
-            continue
-        left[t] = False
-        if since_ns[t] > 0:
-            squared, along_m, then_m, turned = 0.0, 0.0, 0.0, 0.0
-            distance_m, speed_along, speed_squared, way_speed = 0.0, 0.0, 0.0, 0.0
-            for i in range(3):
-                distance_m += (centre_m[t, i] - camera_m[i]) ** 2
-                then_m += (place_m[t, i] - camera_m[i]) ** 2
-            distance_m, then_m = math.sqrt(distance_m), math.sqrt(then_m)
-            for i in range(3):
-                sight = (centre_m[t, i] - camera_m[i]) / max(distance_m, 0.1)
-                moved = centre_m[t, i] - place_m[t, i]
-                squared += moved * moved
-                along_m += moved * sight
-                speed_along += state[t, 3 + i] * sight
-                speed_squared += state[t, 3 + i] ** 2
-                way_speed += moved * state[t, 3 + i]
-            across_m = math.sqrt(max(squared - along_m * along_m, 0.0))
-            across_mps = math.sqrt(max(speed_squared - speed_along * speed_along, 0.0))
-            agrees = way_speed - along_m * speed_along > 0.0
-            elapsed_s = (now_ns - since_ns[t]) * 1e-9
-            sure_m = 0.5 * (width_m[t] + extent_m[t, 0]) + _DISPLACED_M
-            pace = across_m / max(across_mps * elapsed_s, 1e-3)
-            left[t] = agrees and across_m > sure_m and 0.5 < pace < 2.0
-            if elapsed_s < _ORIGIN_S:
-                continue
-        place_m[t], width_m[t], since_ns[t] = centre_m[t], extent_m[t, 0], now_ns
-    return place_m, width_m, since_ns, left
 
 
 @compiled("float64[:, ::1], boolean[::1], float64[:, :], float64[:, :], float64, float64, float64, float64")

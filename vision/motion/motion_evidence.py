@@ -42,6 +42,7 @@ class MotionEvidence:
     velocity_measured_s: for how long the centre has measured the velocity without a break.
     view_radps: how fast the viewing direction changes.
     growth_mps: speed of the centre that a growing or shrinking visible part can explain.
+    displaced: it has left its former place, across the line of sight (vision/bodies/displacement.py).
     advances: the centre really advances about as fast as the velocity says.
     border_is_guess: the border to the static surface beside it is a guess.
     up: the floor's normal, (3,); None where it is not known.
