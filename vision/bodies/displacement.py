@@ -24,8 +24,7 @@ from vision.motion.motion_evidence import MotionEvidence
 
 _BESIDE_M = 0.2  # beyond its own width: the centre of a part is no better known far away
 _RENEWED_S = 1.5  # after this time the place is taken anew: errors of ego-motion add up
-# The displacement, over displacement as the velocity of the surface has it: another ratio is a jump to
-# something else.
+# Displacement over that by the velocity of the surface: at another ratio the track jumped to something else.
 _MIN_PACE, _MAX_PACE = 0.5, 2.0
 _LARGEST_M = 2.2  # a tall person; of larger things only a part is visible, and its centre wanders
 
@@ -48,6 +47,7 @@ def update(
         tracks.origin_ns,
         tracks.displaced,
         detection.captured_ns,
+        detection.pose.rotation,
         detection.pose.translation_m,
     )
 
@@ -68,7 +68,7 @@ def proves(
 
 @compiled(
     "boolean[:], float64[:, :], float64[:, :], float64[:, ::1], float64[:, ::1], float64[:], int64[:],"
-    "boolean[:], int64, float64[:]"
+    "boolean[:], int64, float64[:, :], float64[:]"
 )
 def _displaced(
     sides_free: NDArray[np.bool_],
@@ -80,11 +80,14 @@ def _displaced(
     origin_ns: NDArray[np.int64],
     displaced: NDArray[np.bool_],
     now_ns: int,
+    rotation: FloatArray,
     camera_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int64], NDArray[np.bool_]]:
     """origin_m, origin_width_m, origin_ns and displaced of Tracks after a frame.
 
-    state (T, 6): position and velocity by the surface. A track whose sides are not free keeps its entries.
+    state (T, 6): position and velocity by the surface. rotation, camera_m: pose of the camera; up and down in
+    its image does not count, where parts come into view and go. A track whose sides are not free keeps its
+    entries.
     """
     places_m, widths_m, since_ns = origin_m.copy(), origin_width_m.copy(), origin_ns.copy()
     left = displaced.copy()
@@ -94,24 +97,19 @@ def _displaced(
         left[t] = False
         if since_ns[t] > 0:
             elapsed_s = (now_ns - since_ns[t]) / NS_PER_S
-            squared_m2, along_m, range_m2 = 0.0, 0.0, 0.0
-            squared_mps2, along_mps, product = 0.0, 0.0, 0.0
+            x_m, z_m, moved_x, moved_z, speed_x, speed_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for i in range(3):
-                range_m2 += (centre_m[t, i] - camera_m[i]) ** 2
-            for i in range(3):
-                sight = (centre_m[t, i] - camera_m[i]) / math.sqrt(max(range_m2, 0.01))
-                moved_m, speed_mps = centre_m[t, i] - places_m[t, i], state[t, 3 + i]
-                squared_m2 += moved_m * moved_m
-                squared_mps2 += speed_mps * speed_mps
-                along_m += moved_m * sight
-                along_mps += speed_mps * sight
-                product += moved_m * speed_mps
-            across_m = math.sqrt(max(squared_m2 - along_m * along_m, 0.0))
-            across_mps = math.sqrt(max(squared_mps2 - along_mps * along_mps, 0.0))
-            pace = across_m / max(across_mps * elapsed_s, 1e-3)
-            same_way = product - along_m * along_mps > 0.0
-            beside = across_m > 0.5 * (widths_m[t] + extent_m[t, 0]) + _BESIDE_M
-            left[t] = same_way and beside and _MIN_PACE < pace < _MAX_PACE
+                ahead_m, moved_m = centre_m[t, i] - camera_m[i], centre_m[t, i] - places_m[t, i]
+                x_m, z_m = x_m + rotation[i, 0] * ahead_m, z_m + rotation[i, 2] * ahead_m
+                moved_x, moved_z = moved_x + rotation[i, 0] * moved_m, moved_z + rotation[i, 2] * moved_m
+                speed_x += rotation[i, 0] * state[t, 3 + i]
+                speed_z += rotation[i, 2] * state[t, 3 + i]
+            range_m = max(math.hypot(x_m, z_m), 0.1)
+            across_m = (moved_x * z_m - moved_z * x_m) / range_m
+            going_m = elapsed_s * (speed_x * z_m - speed_z * x_m) / range_m
+            beside = abs(across_m) > 0.5 * (widths_m[t] + extent_m[t, 0]) + _BESIDE_M
+            pace = across_m / going_m if going_m != 0.0 else 0.0
+            left[t] = beside and _MIN_PACE < pace < _MAX_PACE
             if elapsed_s < _RENEWED_S:
                 continue
         places_m[t], widths_m[t], since_ns[t] = centre_m[t], extent_m[t, 0], now_ns
