@@ -22,10 +22,11 @@ from vision.depth.regions import Regions
 from vision.detection import Detection
 from vision.motion.motion_evidence import MotionEvidence
 
-_BESIDE_M = 0.2  # beyond its own width: the centre of a part is no better known far away
+_BESIDE_M = 0.3  # beyond its own width: the centre of a part is no better known far away
 _RENEWED_S = 1.5  # after this time the place is taken anew: errors of ego-motion add up
 # Displacement over that by the velocity of the surface: at another ratio the track jumped to something else.
 _MIN_PACE, _MAX_PACE = 0.5, 2.0
+_DENYING_ENDS = 4  # two fragments
 _LARGEST_M = 2.2  # a tall person; of larger things only a part is visible, and its centre wanders
 
 
@@ -53,15 +54,22 @@ def update(
 
 
 def proves(
-    seen: MotionEvidence, across: FloatArray, least_mps: FloatArray, settings: MotionSettings
+    seen: MotionEvidence,
+    across: FloatArray,
+    frame_across: FloatArray,
+    least_mps: FloatArray,
+    settings: MotionSettings,
 ) -> NDArray[np.bool_]:
     """(T,) whether the displacement, with a velocity of the surface that is clear by itself, proves motion.
 
-    across (T,): squared sigmas of the surface's velocity across the line of sight. least_mps (T,): slower
-    than this counts as static.
+    across, frame_across (T,): squared sigmas of the velocity across the line of sight, of the surface and of
+    this frame's fragments. least_mps (T,): slower than this counts as static. Fragments that agree on no
+    motion overrule it: a part of clutter came into view while another one went.
     """
+    threshold = settings.sigmas**2
+    denied = (seen.ends * seen.agreement >= _DENYING_ENDS) & (frame_across < 0.5 * threshold)
     speed_mps = np.linalg.norm(seen.surface_velocity, axis=1)
-    clear = (across > settings.sigmas**2) & (speed_mps > least_mps)
+    clear = (across > threshold) & (speed_mps > least_mps) & ~denied
     result: NDArray[np.bool_] = seen.displaced & clear & (seen.size_m <= _LARGEST_M) & seen.trusted
     return result
 

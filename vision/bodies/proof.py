@@ -298,5 +298,5 @@ def prove(
         dt_s,
         settings.sigmas**2,
     )
-    moves |= displacement.proves(seen, parts.across[_SURFACE], least_mps, settings)
+    moves |= displacement.proves(seen, parts.across[_SURFACE], parts.across[_FRAME], least_mps, settings)
     return Proof(moves, strength, static, over, goes_on, parts.total[_FILTERED])

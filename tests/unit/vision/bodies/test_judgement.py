@@ -171,6 +171,10 @@ def test_a_body_beside_its_former_place_moves_though_its_centre_was_not_measured
     unsure = {"surface_covariance": covariance(0.1)}
     assert not rises(by_surface(ACROSS, 0.0, displaced=left, **unsure))
     assert not rises(by_surface(ALONG, 0.0, displaced=left))
+    # Nor where two fragments agree that it stands.
+    still = {"own_covariance": covariance(0.01), "agreement": np.array([1.0])}
+    assert rises(by_surface(ACROSS, 0.0, displaced=left, ends=np.array([3]), **still))
+    assert not rises(by_surface(ACROSS, 0.0, displaced=left, ends=np.array([4]), **still))
 
 
 def test_what_stands_where_space_was_free_has_come() -> None:
