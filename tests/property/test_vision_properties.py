@@ -222,7 +222,6 @@ def any_evidence(seed: int, count: int, trusted: bool) -> MotionEvidence:
         velocity_measured_s=rng.uniform(0.0, 1.0, count),
         view_radps=rng.uniform(0.0, 1.0, count),
         growth_mps=rng.uniform(0.0, 1.0, count),
-        displaced=rng.random(count) < 0.5,
         advances=rng.random(count) < 0.5,
         border_is_guess=rng.random(count) < 0.5,
         up=np.array([0.0, -1.0, 0.0]) if rng.random() < 0.5 else None,

@@ -54,7 +54,6 @@ def one(velocity: Speed = STILL, **changes: Any) -> MotionEvidence:
         velocity_measured_s=np.array([0.0]),
         view_radps=np.array([0.0]),
         growth_mps=np.array([0.0]),
-        displaced=np.array([False]),
         advances=np.array([True]),
         border_is_guess=np.array([False]),
         up=LEVEL_UP,

@@ -1,5 +1,5 @@
-"""What one frame proves of each track: that it moves, that it stands still, or neither, by one rule for each
-kind of proof. vision/bodies/judgement.py lists them and adds them up."""
+"""What one frame proves of each track: that it moves, that it stands still, or neither. There is one rule for
+each kind of proof; vision/bodies/judgement.py lists them and adds them up over frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from config.perception import MotionSettings
 from hal.compiled import compiled, inlined
 from hal.types import FloatArray
-from vision.bodies import displacement
 from vision.motion.line_of_sight import decompose, second_opinion
 from vision.motion.motion_evidence import MotionEvidence
 
@@ -274,7 +273,7 @@ def prove(
     parts = decompose(velocity, covariance, seen.sight, seen.up)
     second = second_opinion(parts[_FILTERED], parts[_SURFACE], parts[_APART])
     least_mps = settings.min_speed_mps + _SPEED_PER_METRE * seen.distance_m
-    moves, strength, static, over, goes_on = _proofs(
+    proofs = _proofs(
         velocity,
         covariance,
         np.array((parts.value, parts.along, parts.across, parts.total, parts.level)),
@@ -298,5 +297,4 @@ def prove(
         dt_s,
         settings.sigmas**2,
     )
-    moves |= displacement.proves(seen, parts.across[_SURFACE], parts.across[_FRAME], least_mps, settings)
-    return Proof(moves, strength, static, over, goes_on, parts.total[_FILTERED])
+    return Proof(*proofs, parts.total[_FILTERED])

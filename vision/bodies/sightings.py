@@ -8,10 +8,8 @@ the kind in the code is given:
   centroid has not jumped.
 * _PARTIAL: position and velocity, but with a larger variance. Any other surface of a track that is known to
   move. A body cannot be far from its visible part.
-* _SIDES: the same, but across the line of sight only. A surface of a static track that has changed in area,
-  but whose left and right sides are visible.
-* _POSITION_ONLY: position only (Tracks.reset_position). A surface of a static track that is cut or partly
-  hidden; also any surface after a jump, or while the camera's own motion is not known.
+* _POSITION_ONLY: position only (Tracks.reset_position). A surface of a static track that is cut, partly
+  hidden or changed in area; also any surface after a jump, or while the camera's own motion is not known.
 * _NEARLY_HIDDEN: nothing. The small rest that is visible of a mover that is passing behind something.
 """
 
@@ -25,7 +23,6 @@ from numpy.typing import NDArray
 from config.perception import DepthNoise
 from hal.compiled import compiled
 from hal.types import FloatArray, Pose
-from vision.bodies import displacement
 from vision.bodies.grouping import ExpectedBodies
 from vision.bodies.tracks import Tracks
 from vision.depth.connected import MIN_PART_CELLS
@@ -44,10 +41,9 @@ _CENTRE_NOISE = 0.2  # share of a pixel's depth noise: neighbours share it, so i
 _SAME_AREA = 0.3  # a relative change of area above this means that another part of the body is visible
 _AREA_MEMORY_S = 0.32  # time constant of the averaged area: a gain of 0.1 per frame at 30 frames a second
 _NEARLY_HIDDEN_SHARE = 0.4  # of the usual area: a mover with a smaller surface is nearly hidden
-_ANY_DEPTH_M = 3.0  # standard deviation of a depth that is to tell nothing
 _JUMP_M = 0.3  # plus two sigmas of depth: a centroid farther from its prediction than this has jumped
 # How a track is visible: with fewer cells than a part has; then the kinds of the module docstring, in order.
-_NOT_VISIBLE, _WHOLE, _PARTIAL, _SIDES, _POSITION_ONLY, _NEARLY_HIDDEN = range(6)
+_NOT_VISIBLE, _WHOLE, _PARTIAL, _POSITION_ONLY, _NEARLY_HIDDEN = range(5)
 
 
 def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions, noise: DepthNoise) -> None:
@@ -79,7 +75,7 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
         noise.quadratic_per_m,
     )
     measured_centre, position_only = (
-        (smooth | (kind == _PARTIAL) | (kind == _SIDES)).nonzero()[0],
+        (smooth | (kind == _PARTIAL)).nonzero()[0],
         (kind == _POSITION_ONLY).nonzero()[0],
     )
     tracks.update_with_centre(
@@ -97,7 +93,6 @@ def update_from_surfaces(tracks: Tracks, detection: Detection, measured: Regions
     tracks.velocity_measured_s = np.where(smooth & whole, tracks.velocity_measured_s + dt_s, 0.0)
     growth_mps = change * measured.extent_m[:, 0] / _AREA_MEMORY_S
     tracks.growth_mps = np.where(visible, growth_mps, tracks.growth_mps)
-    displacement.update(tracks, centre_m, visible, measured, detection)
     tracks.seen_ns[visible] = detection.captured_ns
     tracks.sightings += visible
     box_is_whole = visible & ((whole & ~nearly_hidden) | (tracks.sightings == 1))
@@ -169,8 +164,6 @@ def _kinds(
             continue
         elif moving[t] and steady:
             kind[t] = _PARTIAL
-        elif sides_visible[t] and steady:
-            kind[t] = _SIDES
         else:
             kind[t] = _POSITION_ONLY
         usual_m2[t] += gain * (now_m2 - usual_m2[t])
@@ -199,10 +192,8 @@ def _centre_covariances(
         variance[0] = across_m**2
         variance[1] = across_m**2 if top_and_bottom_visible[t] else _CUT_SIGMA_M**2
         variance[2] = along_m**2 + noise_m**2
-        if kind[t] == _PARTIAL or kind[t] == _SIDES:
+        if kind[t] == _PARTIAL:
             variance += (_SHIFT_SHARE * size_m) ** 2
-        if kind[t] == _SIDES:
-            variance[2] += _ANY_DEPTH_M**2
         for i in range(3):
             for j in range(3):
                 for k in range(3):

@@ -48,11 +48,6 @@ class Tracks:
         self.growth_mps = np.empty(0)  # speed of the centre that a growing or shrinking surface can explain
         # For how long the centre has measured the velocity without a break.
         self.velocity_measured_s = np.empty(0)
-        # When both of its sides were first visible: centre, width, time (vision/bodies/displacement.py).
-        self.origin_m = np.empty((0, 3))
-        self.origin_width_m = np.empty(0)
-        self.origin_ns = np.empty(0, np.int64)  # 0: they never were
-        self.displaced = np.empty(0, np.bool_)  # it has left that place, across the line of sight
         self.nearly_hidden = np.empty(0, np.bool_)  # a mover of which only a small rest was visible
         # A mover without an edge in depth to the static surface beside it: where it ends there is a guess.
         self.border_is_guess = np.empty(0, np.bool_)

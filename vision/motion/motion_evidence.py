@@ -42,7 +42,6 @@ class MotionEvidence:
     velocity_measured_s: for how long the centre has measured the velocity without a break.
     view_radps: how fast the viewing direction changes.
     growth_mps: speed of the centre that a growing or shrinking visible part can explain.
-    displaced: it has left its former place, across the line of sight (vision/bodies/displacement.py).
     advances: the centre really advances about as fast as the velocity says.
     border_is_guess: the border to the static surface beside it is a guess.
     up: the floor's normal, (3,); None where it is not known.
@@ -70,7 +69,6 @@ class MotionEvidence:
     velocity_measured_s: FloatArray
     view_radps: FloatArray
     growth_mps: FloatArray
-    displaced: NDArray[np.bool_]
     advances: NDArray[np.bool_]
     border_is_guess: NDArray[np.bool_]
     up: FloatArray | None
@@ -113,7 +111,6 @@ def evidence_of(
         size_m=tracks.extent_m.max(axis=1),
         velocity_measured_s=tracks.velocity_measured_s,
         growth_mps=tracks.growth_mps,
-        displaced=tracks.displaced,
         up=sightings.floor_normal(detection),
         view_radps=sightings.view_radps(detection, sight, distance_m),
         advances=advances,

@@ -160,23 +160,6 @@ def test_a_surface_that_comes_to_be_seen_makes_its_middle_wander_too() -> None:
     assert not rises(by_surface(ACROSS, 1.0, growth_mps=np.array([0.62])))
 
 
-def test_a_body_beside_its_former_place_moves_though_its_centre_was_not_measured_for_long() -> None:
-    left = np.array([True])
-    assert rises(by_surface(ACROSS, 0.0, displaced=left))
-    assert not rises(by_surface(ACROSS, 0.0))
-    # Not what is too large to be seen whole, nor while the camera's motion is not known.
-    assert not rises(by_surface(ACROSS, 0.0, displaced=left, size_m=np.array([2.5])))
-    assert not rises(by_surface(ACROSS, 0.0, displaced=left, trusted=False))
-    # Nor by a velocity that is not clear by itself, or one along the line of sight.
-    unsure = {"surface_covariance": covariance(0.1)}
-    assert not rises(by_surface(ACROSS, 0.0, displaced=left, **unsure))
-    assert not rises(by_surface(ALONG, 0.0, displaced=left))
-    # Nor where two fragments agree that it stands.
-    still = {"own_covariance": covariance(0.01), "agreement": np.array([1.0])}
-    assert rises(by_surface(ACROSS, 0.0, displaced=left, ends=np.array([3]), **still))
-    assert not rises(by_surface(ACROSS, 0.0, displaced=left, ends=np.array([4]), **still))
-
-
 def test_what_stands_where_space_was_free_has_come() -> None:
     """Eight cells, a twentieth of all, and a speed of half the squared sigmas."""
     assert rises(one(ACROSS, arrived=np.array([8])))
