@@ -15,7 +15,6 @@ Files, in the order in which they come into play within one frame (vision/tracke
 * division - one track that holds two bodies is divided.
 * boxes - geometry of boxes; used by grouping, merging and report.
 * sightings - the Kalman filters are updated by the centroids of the visible surfaces.
-* displacement - which bodies have left the place where they were first seen.
 * adoption - each fragment is assigned to a track.
 * proof - what one frame proves of each track: moving, standing still or neither.
 * judgement - the proofs are added up over frames to a verdict with hysteresis.

@@ -15,8 +15,6 @@ squared; ends: end points of the track's fragments):
   Where much of the surface has arrived, that alone is proof, except for a mover that has just stopped.
 * Surface (_by_surface): the centre of a whole, compact surface moves for longer and more clearly than a
   change of viewpoint or a growing surface explains.
-* Displacement (vision/bodies/displacement.py): the body lies beside the place where it was first seen with
-  both of its sides visible, and the velocity of its surface says so, too.
 
 All kinds need a known motion of the camera and, except for much arrival, more than the minimum speed. Bodies
 that are implausibly fast or wide prove nothing.
