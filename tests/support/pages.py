@@ -13,6 +13,9 @@ from config.loader import CONFIG_DIR
 
 ROOT = CONFIG_DIR.parent
 PROGRAM = ("config", "controller", "hal", "sim", "vision")
+# What is compiled (hal/compiled.py) is copied, too: it is of the text, and making it anew takes minutes. Not
+# what is just being written.
+LEFT_OUT = shutil.ignore_patterns("*.pyc", "*.tmp.*")
 
 
 class Page:
@@ -40,7 +43,7 @@ class Page:
     def paste(self, project: Path, folders: tuple[str, ...] = PROGRAM) -> None:
         """A copy of these folders into project, with all that the page says in it."""
         for folder in folders:
-            shutil.copytree(ROOT / folder, project / folder, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(ROOT / folder, project / folder, ignore=LEFT_OUT)
         shutil.copy(ROOT / "pyproject.toml", project)
         for name, text in self.files:
             assert not (project / name).exists(), name
