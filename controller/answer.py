@@ -1,9 +1,9 @@
-"""Does the base answer its commands, as the speed that it measures says? If not, none may get faster.
+"""Whether the base answers its commands, judged by its measured speed. If not, no command may get faster.
 
-A base that does not hear for a while is stopped by its own time-out. Were the command to go on rising, the
-base would jump to it as soon as it hears again. So it is told zero and the profile begins anew from rest.
-That zero is a step of the command and no jolt: the base stands, or is about to. The driver latches what lasts
-(hal/chassis/following.py, rolling_back.py); this is what happens until then.
+A base that receives nothing for a while is stopped by its own time-out. If the command went on rising
+meanwhile, the base would jump to it as soon as it receives again. So it is commanded to zero, and the profile
+begins anew from rest. That zero is a step of the command but no jolt: the base stands, or is about to. The
+driver latches what lasts (hal/chassis/following.py, rolling_back.py); this file covers the time until then.
 """
 
 from __future__ import annotations
@@ -14,17 +14,18 @@ from collections import deque
 from hal.clocks import NS_PER_S
 from hal.records import record
 
-# A base has to do something of what was commanded all the time since this long ago, beyond its lag.
+# Window beyond the base's lag in which it has to do part of the least speed that was commanded.
 _ANSWERS_S = 0.4
-# Less is told of by bases that have just begun to move.
+# Minimum command that is judged: bases that have just begun to move report less.
 _CLEAR_MPS = 0.1
-# Shares of that command: who did so much follows it; who followed and does less no longer hears; who never
-# followed and does less does not get faster. A base with a lag of two seconds does 0.45 on its first ramp.
+# Shares of that command. From the first one on the base follows. A base that had followed and falls below the
+# second no longer receives. One that never followed and stays below the third is not commanded any faster. A
+# base with a lag of two seconds reaches 0.45 on its first ramp.
 _FOLLOWS, _FELL, _CONTRADICTS = 0.6, 0.5, 0.4
-# A base that has not yet followed is asked for this much all the same: it may need that to break loose.
+# A base that has not followed yet is still commanded up to this: it may need that to overcome stiction.
 _BREAKS_LOOSE_MPS = 0.2
-# A base that hears again before it has fallen so far dips: by so much in so long, while nothing less than
-# what it does now was commanded.
+# A dip: the base receives again before it has fallen that far. Its speed drops by this much within this time,
+# although no lower speed was commanded.
 _DIPS_MPS, _DIPS_NS = 0.1, 400_000_000
 # Faster than what was commanded in the last seconds, whatever its lag: as in hal/chassis/following.py.
 _LAG_NS = 6 * NS_PER_S
@@ -32,7 +33,7 @@ _FASTEST_SHARE, _FASTEST_MPS = 1.5, 0.15
 # Faster than the robot ever may.
 _ABOVE_TOP_SHARE, _ABOVE_TOP_MPS = 1.1, 0.1
 _BACKWARDS_MPS = -0.05
-# So many reports in a row have to say so.
+# Consecutive reports that have to agree.
 _REPORTS = 2
 
 

@@ -1,7 +1,7 @@
-"""Does somebody else command the base on the same CAN bus?
+"""Detects a second master that commands the base on the same CAN bus.
 
-A computer never receives its own frames, so one frame of this kind is proof: a second program, another
-computer, a tool that somebody left running. The base would follow both, one command after the other.
+A computer never receives its own frames. So one received frame that only a host sends is proof of another
+program, another computer, or a tool that was left running. The base would follow both in turn.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from types import MappingProxyType
 
 from hal.clocks import NS_PER_S
 
-# What only a host sends, and what it does to the base. Not in here is what moves nothing: light, version.
+# Identifiers that only a host sends, and what they do. Frames that move nothing (light, version) do not
+# count.
 HOST_FRAMES: Mapping[int, str] = MappingProxyType(
     {0x111: "motion commands", 0x421: "the control mode", 0x441: "clearing of errors"}
 )
 
-# So long after its last frame the bus counts as free again. The base stops half a second after it.
+# The bus counts as free again this long after the last such frame. The base stops half a second after it.
 _GONE_NS = NS_PER_S
 
 
