@@ -6,7 +6,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from config.robot import Body
-from hal.api import Closing
+from hal.api import Device
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 from sim.contact import Clearance, nearest_body
@@ -17,7 +17,7 @@ from sim.world import World
 CHECK_PERIOD_NS = NS_PER_S // 200
 
 
-class Emulator(Closing, Protocol):
+class Emulator(Device, Protocol):
     """A chassis emulator: answers on its link as the real base would."""
 
     @property

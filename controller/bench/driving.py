@@ -10,9 +10,9 @@ from controller.bench.busy_scene import OBSTACLES, busy_scene
 from controller.bench.figures import Durations
 from controller.bench.reel import Tick
 from controller.control import ControlLoop
-from hal.api import Chassis, Closing
+from hal.api import Chassis, Device
 from hal.clocks import NS_PER_S
-from hal.enclosing import Enclosing
+from hal.device_wrapper import DeviceWrapper
 from hal.types import ChassisMode, ChassisState, Setpoint
 from sim.simulation import Emulator
 
@@ -22,7 +22,7 @@ _LATENCY_NS = NS_PER_S * 60 // 1000  # from the exposure of a frame to its scene
 _ARM_STEPS = 250  # a base that takes more steps to arm will never arm, so the bench gives up
 
 
-class TimedChassis(Enclosing):
+class TimedChassis(DeviceWrapper):
     """A chassis whose exchanges are timed. spent_ns: duration of the last one."""
 
     def __init__(self, chassis: Chassis, stopwatch_ns: Callable[[], int]) -> None:
@@ -91,7 +91,7 @@ def measure_control(
     raise RuntimeError(f"the emulated base obeyed in {len(spent_ns)} of {steps + _ARM_STEPS} control steps")
 
 
-class Answering(Closing, Protocol):
+class Answering(Device, Protocol):
     """The base at the other end of the link."""
 
     def advance_to(self, now_ns: int) -> None:

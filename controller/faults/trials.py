@@ -120,7 +120,7 @@ FAULTS = (
     Fault("base restarts", lambda bench: bench.emulator.restart()),
     Fault("base frozen", lambda bench: bench.emulator.freeze(), lambda bench: bench.emulator.thaw()),
     Fault("unplugged", lambda bench: bench.link.unplug(), lambda bench: bench.link.plug()),
-    Fault("nothing comes back", lambda bench: bench.link.hear_nothing(), lambda bench: bench.link.hear_all()),
+    Fault("nothing comes back", lambda bench: bench.link.cut_wire(), lambda bench: bench.link.restore_wire()),
     Fault("control hangs or is killed", live=lambda bench: bench.coast()),
     Fault("command is no number", live=lambda bench: bench.step(math.nan)),
 )

@@ -57,7 +57,7 @@ class KobukiEmulator(SerialEmulator):
 
     def advance_to(self, now_ns: int) -> None:
         """Follow what has arrived, move, and stream what is due up to and including now_ns."""
-        self._listen()
+        self._handle_received()
         while (event_ns := self._next_event_ns()) <= now_ns:
             self._move_to(event_ns)
             if self._stream_ns <= event_ns:
@@ -85,8 +85,8 @@ class KobukiEmulator(SerialEmulator):
         self._heading_zero_rad = self._plant.pose.heading_rad
         self._plant.command_tracks(0.0, 0.0)
 
-    def _listen(self) -> None:
-        self._received += self._hear()
+    def _handle_received(self) -> None:
+        self._received += self._receive()
         while self._take_frame():
             pass
 
@@ -161,7 +161,7 @@ class KobukiEmulator(SerialEmulator):
         payload = self._core() + (self._inertia() if self.gyro else b"") + bytes((6, 2, 8, 8)) + self._extra
         self._extra = b""
         body = bytes((len(payload),)) + payload
-        self._say(_HEADER + body + bytes((reduce(xor, body),)))
+        self._transmit(_HEADER + body + bytes((reduce(xor, body),)))
 
     def _core(self) -> bytes:
         left, right = (round(travel_m * _TICKS_PER_M) % (1 << 16) for travel_m in self._travel_m)

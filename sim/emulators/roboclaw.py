@@ -80,8 +80,8 @@ class RoboclawEmulator(MotorController):
         self.timeout_ms = 0
         self._stop_motors()
 
-    def _listen(self) -> None:
-        arrived = self._hear()
+    def _handle_received(self) -> None:
+        arrived = self._receive()
         if self._silent:
             return
         if self._now_ns - self._heard_ns > _GAP_NS:
@@ -104,7 +104,7 @@ class RoboclawEmulator(MotorController):
             del buffer[:2]
             self._valid_ns = self._now_ns
             data = self._read(command)
-            self._say(data + self._crc(bytes((self._address, command)) + data))
+            self._transmit(data + self._crc(bytes((self._address, command)) + data))
             return True
         if command not in _WRITES:
             buffer.clear()
@@ -122,7 +122,7 @@ class RoboclawEmulator(MotorController):
             return False
         self._valid_ns = self._now_ns
         self._write(command, packet[2:-2])
-        self._say(_ACK)
+        self._transmit(_ACK)
         return True
 
     @staticmethod

@@ -85,8 +85,8 @@ class RoboteqEmulator(MotorController):
         self.fault_flags |= _ESTOP_FLAG
         self._stop_motors()
 
-    def _listen(self) -> None:
-        for character in self._hear().decode("latin-1"):
+    def _handle_received(self) -> None:
+        for character in self._receive().decode("latin-1"):
             if self.echo:
                 self._tell(character)
             if character not in "\r_":
@@ -98,7 +98,7 @@ class RoboteqEmulator(MotorController):
                 self._tell(self._answer(line) + "\r")
 
     def _tell(self, text: str) -> None:
-        self._say(text.encode("latin-1"))
+        self._transmit(text.encode("latin-1"))
 
     def _answer(self, line: str) -> str:
         try:

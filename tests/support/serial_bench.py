@@ -60,7 +60,7 @@ class SerialBench(Generic[EmulatorT]):
 
 
 def every(nth: int, change: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
-    """For ScriptedSerialLink.hear_through: each nth message is changed, the others pass."""
+    """For ScriptedSerialLink.set_filter: each nth message is changed, the others pass."""
     numbers = count(1)
     return lambda data: change(data) if next(numbers) % nth == 0 else data
 

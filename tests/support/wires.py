@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from config.chassis import CanLinkConfig, SerialLinkConfig
-from hal.api import CanLink, Closing, SerialLink
-from hal.enclosing import Enclosing
+from hal.api import CanLink, Device, SerialLink
+from hal.device_wrapper import DeviceWrapper
 from hal.errors import LinkLost
 from hal.links.can_bus import CanBusLink
 from hal.links.pseudo_terminal import PseudoTerminal
@@ -36,10 +36,10 @@ def open_can_link(config: CanLinkConfig) -> CanBusLink:
     return CanBusLink(config).__enter__()
 
 
-class _Plug(Enclosing):
+class _Plug(DeviceWrapper):
     """A plug in front of any link: out, every use raises LinkLost and nothing reaches it."""
 
-    def __init__(self, link: Closing) -> None:
+    def __init__(self, link: Device) -> None:
         super().__init__(link)
         self.out = False
 

@@ -13,7 +13,7 @@ from config.chassis import CHASSIS_KINDS, AnyChassisConfig
 from config.loader import CONFIG_DIR
 from controller.emulate import FAULTS
 from controller.faults.trials import KINDS as EVERY_BASE
-from hal.chassis.driver import ChassisDriver, Told
+from hal.chassis.driver import ChassisDriver, ChassisFeedback
 from hal.links.scripted import serial_pair
 from hal.types import Setpoint
 from tests.support.chassis_rig import MS
@@ -40,7 +40,7 @@ def test_every_method_it_names_is_the_driver_s(method: str) -> None:
 @pytest.mark.parametrize("word", ["disobeys", "stop_cause", "silence"])
 def test_what_told_asks_for(word: str) -> None:
     assert word in PAGE.quoted
-    assert hasattr(Told, word)
+    assert hasattr(ChassisFeedback, word)
 
 
 def test_the_faults_to_type() -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from hal.chassis.arming import Arming, ArmingLimits, Evidence, consent, release, step
+from hal.chassis.arming import Arming, ArmingLimits, Evidence, consent, disarm, step
 from hal.types import ChassisMode
 
 MS = 1_000_000
@@ -171,7 +171,7 @@ def test_a_link_that_works_again_is_no_base_that_answers(heard: dict[str, object
 
 
 def test_stop_ends_in_standby_once_the_base_stands_and_has_let_go() -> None:
-    state = release(armed(), 60 * MS)
+    state = disarm(armed(), 60 * MS)
     assert state.mode is ChassisMode.STOPPING
     assert not state.may_move
     state = consent(state, at(70), LIMITS)
@@ -186,8 +186,8 @@ def test_stop_ends_in_standby_once_the_base_stands_and_has_let_go() -> None:
 
 def test_stop_does_not_open_a_latch_and_arms_nothing() -> None:
     latched = step(armed(), at(60, stop_cause="pressed"), LIMITS)
-    assert release(latched, 80 * MS) == latched
-    assert release(Arming(), 0) == Arming()
+    assert disarm(latched, 80 * MS) == latched
+    assert disarm(Arming(), 0) == Arming()
 
 
 def test_arming_twice_changes_nothing() -> None:
@@ -255,7 +255,7 @@ class ArmingLife(RuleBasedStateMachine):
     @rule()
     def stop(self) -> None:
         was_latched = self.state.latched
-        self.state = release(self.state, self.now_ms * MS)
+        self.state = disarm(self.state, self.now_ms * MS)
         assert self.state.latched == was_latched
         if not was_latched:
             self.consented = False

@@ -37,7 +37,7 @@ def test_the_stop_goes_out_when_nothing_comes_back() -> None:
     bench = Bench()
     bench.arm()
     bench.run(50, 0.4)
-    bench.near.hear_nothing()
+    bench.near.cut_wire()
     state = bench.run(15, 0.4)
     assert (state.mode, bench.near.written) == (ChassisMode.LOST, [STOP])
     bench.emulator.advance_to(bench.now_ns + 100 * MS)
@@ -180,7 +180,7 @@ def test_a_restart_shows_in_clock_or_ticks() -> None:
 def test_wrong_checksums_on_the_line_are_survived() -> None:
     bench = Bench()
     bench.arm()
-    bench.near.hear_through(every(4, lambda data: data[:9] + bytes((data[9] ^ 0x40,)) + data[10:]))
+    bench.near.set_filter(every(4, lambda data: data[:9] + bytes((data[9] ^ 0x40,)) + data[10:]))
     states = [bench.step(0.4) for _ in range(300)]
     assert {state.mode for state in states} == {ChassisMode.ARMED}
     assert states[-1].pose.x_m == pytest.approx(bench.plant.pose.x_m, abs=0.01)
