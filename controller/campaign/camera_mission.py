@@ -69,7 +69,7 @@ class SpoiledCamera:
     def next_capture_ns(self) -> int:
         """The time of the next frame that is not lost."""
         silent = self._faults.silent
-        while silent is not None and silent.holds(self._camera.next_capture_ns / NS_PER_S):
+        while silent is not None and silent.contains(self._camera.next_capture_ns / NS_PER_S):
             self._camera.lose_frame()
         return self._camera.next_capture_ns
 
@@ -77,7 +77,7 @@ class SpoiledCamera:
         """The next frame, with faults, as perception gets it. Raises FrameTimeout."""
         frame = self._camera.read(timeout_s)
         frozen = self._faults.frozen
-        if frozen is not None and self._last is not None and frozen.holds(frame.captured_ns / NS_PER_S):
+        if frozen is not None and self._last is not None and frozen.contains(frame.captured_ns / NS_PER_S):
             frame = replace(frame, colour=self._last.colour, depth=self._last.depth)
         elif self._glass_ids:
             frame = self._blinded(frame)

@@ -81,7 +81,7 @@ class DriveClearance:
 
     def _around(self, body: int, times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The body's polygons (T, K, 2), and the distances (T,) between circles around it and the robot."""
-        polygons = self._stage.world.over(times, body)
+        polygons = self._stage.world.sample(times, body)
         x, y, radius = circles_around(polygons).T
         reach = reach_of(self._stage.robot.body)
         return polygons, np.hypot(x - poses[:, 0], y - poses[:, 1]) - radius - reach

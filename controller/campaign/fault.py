@@ -59,11 +59,11 @@ def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -
     """
     body, first, before = contact.body, None, None
     moves = bool(stage.world.moves[body])
-    stage.world.foresee(np.array(log.times_s[::_SIGHT_STEPS]))
+    stage.world.precompute(np.array(log.times_s[::_SIGHT_STEPS]))
     for k in range(0, len(log.times_s), _SIGHT_STEPS):
         if log.times_s[k] >= contact.t_s:
             break
-        polygons, velocity = stage.world.look(log.times_s[k])
+        polygons, velocity = stage.world.snapshot(log.times_s[k])
         if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
             first = before = None
             continue
@@ -113,5 +113,5 @@ def _touches(
     if not moving.any():
         return False
     poses = stage.path_poses(s[moving])
-    polygons = stage.world.over(log.times_s[start] + t[moving], body)
+    polygons = stage.world.sample(log.times_s[start] + t[moving], body)
     return bool(overlap(stage.robots(poses), polygons).any())

@@ -127,7 +127,7 @@ def false_stops(stage: Stage, log: DriveLog) -> list[float]:
         if log.reached_s is not None and end >= len(v) - 1:
             continue
         t0, t1 = log.times_s[start] - _BEFORE_STOP_S, log.times_s[end] + _AFTER_STOP_S
-        if stage.case.faults.strikes(log.times_s[start], _AFTER_FAULT_S):
+        if stage.case.faults.demands_stop(log.times_s[start], _AFTER_FAULT_S):
             continue
         if stage.case.faults.glass and stage.case.scenario.outcome == "blocked":
             continue

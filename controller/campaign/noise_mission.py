@@ -86,9 +86,9 @@ class _Eyes:
         """Expose one frame. known_pose: the pose by odometry."""
         faults = self._faults
         self._frame += 1
-        if faults.silent is not None and faults.silent.holds(t_s):
+        if faults.silent is not None and faults.silent.contains(t_s):
             return
-        if faults.frozen is not None and faults.frozen.holds(t_s) and self._last is not None:
+        if faults.frozen is not None and faults.frozen.contains(t_s) and self._last is not None:
             scene = self._frozen(self._last, t_s)
         else:
             self._same = 0
@@ -138,7 +138,7 @@ class _NoiseDrive:
         self._shaper = SpeedShaper(config.robot.limits, self._dt_s, config.decision.chassis_delay_s)
         self._log = DriveLog(SetpointTally(config.robot.limits, self._dt_s))
         self._standing_s = 0.0
-        stage.world.foresee(_exposures(steps, self._dt_s, fps))
+        stage.world.precompute(_exposures(steps, self._dt_s, fps))
 
     def run(self) -> DriveLog:
         """Run control steps until the drive is over."""

@@ -60,7 +60,7 @@ class NoisyCamera:
 
     def look(self, t_s: float, sequence: int, true_pose: PlanarPose, known_pose: PlanarPose) -> Scene:
         """The scene of an exposure at t_s. known_pose: the robot's pose by odometry."""
-        polygons, velocity = self._stage.world.look(t_s)
+        polygons, velocity = self._stage.world.snapshot(t_s)
         view = self.eye.look(polygons, true_pose)
         self._tracks.advance(velocity, t_s, self._random)
         self._tracks.sight(view, t_s, self._random)

@@ -48,7 +48,7 @@ class PlanarScanner:
         return _seen_from(pose, _on_floor(self._taken_at, self._points))
 
     def _scan(self, pose: PlanarPose, t_s: float) -> FloatArray:
-        polygons = self._world.look(t_s)[0][self._at_height]
+        polygons = self._world.snapshot(t_s)[0][self._at_height]
         shift = pose.x_m, pose.y_m, pose.heading_rad, self._front_m
         nearest = _nearest(_NOTHING, self._world.room_polygon()[None], self._cos, self._sin, *shift)
         nearest = _nearest(nearest, polygons, self._cos, self._sin, *shift)

@@ -54,7 +54,7 @@ class Stage:
         reach_m = reach_of(self.robot.body)
         for k in np.flatnonzero(self.in_height).tolist():
             moves = bool(self.world.moves[k])
-            polygons = self.world.over(times_s if moves else times_s[:1], k)
+            polygons = self.world.sample(times_s if moves else times_s[:1], k)
             when, where = _near(circles_around(polygons), poses, reach_m)
             if not len(when):
                 continue

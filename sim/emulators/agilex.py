@@ -67,7 +67,7 @@ class AgilexEmulator(ChassisEmulator):
         self._command_timeout_ns = model.base_timeout_ms * NS_PER_MS
         # A mode that must be repeated times out as fast as the motion command.
         self._mode_timeout_ns = None if model.mode_period_ms is None else self._command_timeout_ns
-        self._mode_heard_ns = plant.now_ns
+        self._mode_received_ns = plant.now_ns
         start_ns = plant.now_ns
         self._broadcasts = (
             _Broadcast(20 * NS_PER_MS, start_ns, self._motion),
@@ -156,7 +156,7 @@ class AgilexEmulator(ChassisEmulator):
     def _obey(self, message: AgilexMessage) -> None:
         if isinstance(message, ControlModeCommand):
             if self.mode != _REMOTE and message.mode in (_STANDBY, _CAN, _SERIAL):
-                self._mode_heard_ns = self._now_ns
+                self._mode_received_ns = self._now_ns
                 self._enter(message.mode)
         elif (
             isinstance(message, MotionCommand)
@@ -182,8 +182,8 @@ class AgilexEmulator(ChassisEmulator):
     def _move_to(self, now_ns: int) -> None:
         self._plant.advance_to(now_ns)
         self._now_ns = max(self._now_ns, now_ns)
-        waits_ns, commanded = self._mode_timeout_ns, self.mode in (_CAN, _SERIAL)
-        if commanded and waits_ns is not None and self._now_ns - self._mode_heard_ns >= waits_ns:
+        timeout_ns, commanded = self._mode_timeout_ns, self.mode in (_CAN, _SERIAL)
+        if commanded and timeout_ns is not None and self._now_ns - self._mode_received_ns >= timeout_ns:
             self._enter(_STANDBY)
         if self._command_ns is not None and self._now_ns - self._command_ns >= self._command_timeout_ns:
             self._command_ns = None

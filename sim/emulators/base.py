@@ -118,12 +118,12 @@ class MotorController(SerialEmulator):
             self._plant.advance_to(self._now_ns)
 
     @property
-    def _turned_m(self) -> tuple[float, float]:
+    def _motor_travel_m(self) -> tuple[float, float]:
         """Travel of the tracks since power-up, with the signs of the motors."""
         return self._signed(*self._travel_m)
 
     @property
-    def _turning_mps(self) -> tuple[float, float]:
+    def _motor_speeds_mps(self) -> tuple[float, float]:
         """Speeds of the tracks, with the signs of the motors."""
         return self._signed(*self._plant.track_speeds_mps)
 
@@ -138,7 +138,7 @@ class MotorController(SerialEmulator):
     def _ramp(self, step_s: float) -> None:
         """Move the targets towards the goals."""
 
-    def _towards(self, track: int, goal_mps: float, ramp_mps2: float, step_s: float) -> None:
+    def _ramp_towards(self, track: int, goal_mps: float, ramp_mps2: float, step_s: float) -> None:
         limit_mps = ramp_mps2 * step_s
         change_mps = goal_mps - self._target_mps[track]
         self._target_mps[track] += min(max(change_mps, -limit_mps), limit_mps)

@@ -116,7 +116,7 @@ class KobukiEmulator(SerialEmulator):
             if kind == 1 and len(data) == 4:
                 self._drive(*struct.unpack("<hh", data))
             elif kind == 9 and len(data) == 2:
-                self._extra += self._about(int.from_bytes(data, "little"))
+                self._extra += self._version_payload(int.from_bytes(data, "little"))
 
     def _drive(self, speed: int, radius: int) -> None:
         """Drive with this speed of the outer wheel (mm/s) and radius (mm; 0: straight on, 1: turn on the
@@ -135,7 +135,7 @@ class KobukiEmulator(SerialEmulator):
             left, right = float(speed), w * (radius + _HALF_BASE_MM)
         self._plant.command_tracks(left / 1000.0, right / 1000.0)
 
-    def _about(self, flags: int) -> bytes:
+    def _version_payload(self, flags: int) -> bytes:
         """Sub-payloads with hardware version, firmware version and unique id, as far as flags ask for
         them."""
         hardware = bytes((10, 4, 4, 0, 1, 0)) if flags & 1 else b""

@@ -21,7 +21,7 @@ def test_missions_start_clear_and_are_solvable_unless_they_are_blocked(family: s
         scenario = made.case.scenario
         robot = made.robots(made.path_poses(np.zeros(1)))
         for t_s in (0.0, 1.0):
-            polygons, _ = made.world.look(t_s)
+            polygons, _ = made.world.snapshot(t_s)
             gaps = separation(np.repeat(robot, len(polygons), axis=0), polygons)[made.in_height]
             assert gaps.min(initial=math.inf) > 0.15, (seed, t_s)
         best = oracle.solve(made, TOP_MPS, scenario.duration_s)
@@ -35,9 +35,9 @@ def test_nobody_walks_through_racks(family: str) -> None:
         world = Stage(generate(family, seed), CONFIG.robot).world
         times = np.arange(0.0, 25.0, 0.25)
         for mover in np.flatnonzero(world.moves).tolist():
-            way = world.over(times, mover)
+            way = world.sample(times, mover)
             for still in np.flatnonzero(~world.moves).tolist():
-                assert separation(way, world.over(times, still)).min() > -0.05, (seed, world.names[still])
+                assert separation(way, world.sample(times, still)).min() > -0.05, (seed, world.names[still])
 
 
 def test_the_envelope_never_exceeds_the_robots_top_speed() -> None:

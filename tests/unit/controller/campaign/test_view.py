@@ -20,7 +20,7 @@ ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 def look(*bodies: BodySpec, mount: Mount = LEVEL, pose: PlanarPose = ORIGIN) -> tuple[PlanarEye, PlanarView]:
     made = stage(*bodies)
     eye = PlanarEye(made.world, SimulatedCameraConfig(), mount)
-    return eye, eye.look(made.world.look(0.0)[0], pose)
+    return eye, eye.look(made.world.snapshot(0.0)[0], pose)
 
 
 def distances(view: PlanarView, body: int = 0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
