@@ -11,12 +11,12 @@ import pytest
 
 from config.decision import DecisionConfig
 from config.robot import Body, Mount, Robot
-from controller.campaign.drive import DriveLog
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.judge import Row, judge
 from controller.campaign.noise_mission import drive_noise
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
-from controller.campaign.task import yardstick
+from controller.campaign.task import judge_reference
 from controller.decision.view_edges import ViewEdges, beyond_edges, visible_from_m
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
@@ -41,7 +41,7 @@ def driven(robot: Robot, family: str, seed: int) -> tuple[Row, DriveLog]:
     config = CONFIG.model_copy(update={"robot": robot})
     stage = Stage(generate(family, seed), robot)
     log = drive_noise(stage, config, build_policy("ours", config, stage))
-    return judge(stage, log, "ours", "noise", yardstick(stage, config)), log
+    return judge(stage, log, "ours", "noise", judge_reference(stage, config)), log
 
 
 def stops_before_it(robot: Robot, family: str, seed: int) -> bool:
