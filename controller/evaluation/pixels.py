@@ -25,7 +25,7 @@ _DEPTH_MARGIN_M = 0.15
 _DEPTH_MARGIN_PER_M2 = 0.015
 
 
-def claimed(frame: RgbdFrame, detections: Sequence[DetectedObject]) -> NDArray[np.uint8]:
+def claimed_levels(frame: RgbdFrame, detections: Sequence[DetectedObject]) -> NDArray[np.uint8]:
     """(H / 2, W / 2) levels 0..255: the greatest confidence of the detections that claim the pixel."""
     depth_m = frame.depth[::STEP_PX, ::STEP_PX].astype(np.float32) * np.float32(frame.depth_scale_m)
     levels = np.zeros(depth_m.shape, np.uint8)
@@ -61,9 +61,9 @@ def count_pixels(
     moving, excused: ids of bodies that move, and of those whose pixels do not count.
     """
     judged = (depth_m > 0.0) & (depth_m <= MAX_DISTANCE_M)
-    moves = judged & np.isin(instances, list(moving))
-    rests = judged & ~moves & ~np.isin(instances, list(excused))
+    moving_pixels = judged & np.isin(instances, list(moving))
+    static_pixels = judged & ~moving_pixels & ~np.isin(instances, list(excused))
     return PixelCounts(
-        np.bincount(levels[moves], minlength=256).astype(np.int64),
-        np.bincount(levels[rests], minlength=256).astype(np.int64),
+        np.bincount(levels[moving_pixels], minlength=256).astype(np.int64),
+        np.bincount(levels[static_pixels], minlength=256).astype(np.int64),
     )

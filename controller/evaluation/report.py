@@ -12,13 +12,13 @@ import cv2
 
 from controller.errors import UserError
 from controller.evaluation import figures, pictures
-from controller.evaluation.contestants import OURS
 from controller.evaluation.run_sequence import SequenceRecord, Snapshot
 from controller.evaluation.sequences import sequences
 from controller.evaluation.summary import Summary
+from controller.evaluation.timed_methods import OURS
 from controller.video.style import Image
 
-MOST_FAILURES = 24
+MAX_FAILURES = 24
 _FIGURES = (
     "fig4-precision-recall.png",
     "fig5-endpoint-error.png",
@@ -77,9 +77,9 @@ def write_failures(folder: Path, records: Sequence[SequenceRecord]) -> list[tupl
 
     Raises UserError.
     """
-    every = [snapshot for record in records for snapshot in record.failures]
-    every.sort(key=lambda snapshot: (-snapshot.score.faults, snapshot.sequence, snapshot.index))
-    worst = sorted(every[:MOST_FAILURES], key=lambda snapshot: (snapshot.sequence, snapshot.index))
+    failing = [snapshot for record in records for snapshot in record.failures]
+    failing.sort(key=lambda snapshot: (-snapshot.score.error_count, snapshot.sequence, snapshot.index))
+    worst = sorted(failing[:MAX_FAILURES], key=lambda snapshot: (snapshot.sequence, snapshot.index))
     named = [(snapshot, f"failures/{snapshot.sequence}-{snapshot.index:03d}.png") for snapshot in worst]
     for snapshot, file in named:
         write_picture(folder / file, pictures.failure_picture(snapshot))

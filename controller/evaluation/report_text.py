@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 
 from controller.evaluation import pictures
-from controller.evaluation.contestants import LIDAR, OURS, OURS_ALONE
 from controller.evaluation.figures import TARGET_ENDPOINT_PX
 from controller.evaluation.markdown import fixed, picture, section, table
 from controller.evaluation.paper import PAPER_LIDAR, PAPER_OURS
 from controller.evaluation.run_sequence import SequenceRecord, Snapshot
 from controller.evaluation.summary import MethodSummary, Summary
 from controller.evaluation.targets import TARGETS, Target
+from controller.evaluation.timed_methods import LIDAR, OURS, OURS_ALONE
 from controller.evaluation.totals import Counts
 
 _RULES = """A moving object is found when it is matched (IoU >= 0.3, or middles within 0.5 m, one to one) in
@@ -64,8 +64,8 @@ def _targets(reporting: dict[str, MethodSummary]) -> list[str]:
     rows = [
         (
             f"{target.name}{f' ({target.unit})' if target.unit else ''}",
-            *_verdict(target, reporting.get(OURS), alone=False),
-            *_verdict(target, reporting.get(OURS_ALONE), alone=True),
+            *_verdict(target, reporting.get(OURS), without_odometry=False),
+            *_verdict(target, reporting.get(OURS_ALONE), without_odometry=True),
         )
         for target in TARGETS
     ]
@@ -73,17 +73,21 @@ def _targets(reporting: dict[str, MethodSummary]) -> list[str]:
     return section("Targets") + table(head, rows)
 
 
-def _verdict(target: Target, one: MethodSummary | None, alone: bool) -> tuple[str, str, str]:
+def _verdict(target: Target, one: MethodSummary | None, without_odometry: bool) -> tuple[str, str, str]:
     value = math.nan if one is None else target.value(one.figures)
-    return fixed(value), target.bound(alone), "reached" if target.reached(value, alone) else "**missed**"
+    return (
+        fixed(value),
+        target.bound(without_odometry),
+        "reached" if target.reached(value, without_odometry) else "**missed**",
+    )
 
 
 def _table_two(reporting: dict[str, MethodSummary]) -> list[str]:
-    told = (("the paper's lidar [20]", PAPER_LIDAR), ("the paper's method", PAPER_OURS))
+    reported = (("the paper's lidar [20]", PAPER_LIDAR), ("the paper's method", PAPER_OURS))
     rows = [
         (name, str(one.objects), str(one.correct), str(one.wrong), fixed(one.precision), fixed(one.recall),
          f"{one.seconds_per_frame:.2f}")
-        for name, one in told
+        for name, one in reported
     ]  # fmt: skip
     names = (("our lidar baseline", LIDAR), ("treadwatch", OURS), ("treadwatch, no odometry", OURS_ALONE))
     for label, name in names:
@@ -194,14 +198,14 @@ def _failing(failures: Sequence[tuple[Snapshot, str]]) -> list[str]:
         return section("Failing frames", "None.")
     lines = section("Failing frames", "The worst frames of the sequences (treadwatch, with odometry).")
     for snapshot, file in failures:
-        words = f"{snapshot.sequence}, frame {snapshot.index}: {pictures.describe_faults(snapshot)}"
+        words = f"{snapshot.sequence}, frame {snapshot.index}: {pictures.describe_errors(snapshot)}"
         lines += [words, "", *picture(snapshot.sequence, file)]
     return lines
 
 
 def _objects(counts: Counts) -> tuple[str, str, str, str, str]:
-    whole = counts.correct + counts.missed
-    return str(whole), str(counts.correct), str(counts.wrong), *_shares(counts)
+    total = counts.correct + counts.missed
+    return str(total), str(counts.correct), str(counts.wrong), *_shares(counts)
 
 
 def _shares(counts: Counts) -> tuple[str, str]:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from controller.evaluation import endpoint_error
-from controller.evaluation.contestants import ALWAYS, BASELINES, OURS
 from controller.evaluation.endpoint_error import EndpointErrors
 from controller.evaluation.run_sequence import SequenceRecord
 from controller.evaluation.scoring import SequenceScore, score
+from controller.evaluation.timed_methods import ALWAYS, BASELINES, OURS
 from controller.evaluation.totals import (
     DISTANCE_BINS_M,
     PIXEL_LEVEL,
@@ -21,8 +21,8 @@ from controller.evaluation.totals import (
     Counts,
     Curve,
     Figures,
+    MethodAnswers,
     PixelCounts,
-    Recorded,
     bin_by_distance,
     object_curves,
     pixel_curve,
@@ -85,11 +85,11 @@ def summarise(records: Sequence[SequenceRecord]) -> Summary:
             [record for record in records if BASELINES[0] in record.methods], scores, ALWAYS + BASELINES
         ),
     }
-    shown = [record for record in reporting if OURS in record.methods]
+    scored_records = [record for record in reporting if OURS in record.methods]
     per_object, per_frame = object_curves(
-        [Recorded(record.truths, record.methods[OURS].answers) for record in shown]
+        [MethodAnswers(record.truths, record.methods[OURS].answers) for record in scored_records]
     )
-    pixels = sum((record.methods[OURS].pixels for record in shown), PixelCounts.none())
+    pixels = sum((record.methods[OURS].pixels for record in scored_records), PixelCounts.none())
     endpoint = sum((record.endpoint for record in records), EndpointErrors.none())
     beyond = endpoint.error_px[endpoint.distance_m >= BEYOND_M]
     return Summary(
@@ -109,13 +109,13 @@ def _by_method(
 ) -> dict[str, MethodSummary]:
     result = {}
     for name in names:
-        seen = [record for record in records if name in record.methods]
-        if not seen:
+        used_records = [record for record in records if name in record.methods]
+        if not used_records:
             continue
-        durations = [answer.duration_ms for record in seen for answer in record.methods[name].answers]
-        figures = total([scores[record.name][name] for record in seen], durations)
-        pixels = sum((record.methods[name].pixels for record in seen), PixelCounts.none())
-        result[name] = MethodSummary(figures, pixels, len(seen))
+        durations = [answer.duration_ms for record in used_records for answer in record.methods[name].answers]
+        figures = total([scores[record.name][name] for record in used_records], durations)
+        pixels = sum((record.methods[name].pixels for record in used_records), PixelCounts.none())
+        result[name] = MethodSummary(figures, pixels, len(used_records))
     return result
 
 

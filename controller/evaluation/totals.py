@@ -92,8 +92,8 @@ def bin_by_distance(
     distance_m: FloatArray, values: FloatArray, edges_m: tuple[float, ...] = DISTANCE_BINS_M
 ) -> ByDistance:
     """Median, mean and 90th percentile of values (N,) in bins of distance (N,)."""
-    which = np.digitize(distance_m, edges_m) - 1
-    groups = [values[which == index] for index in range(len(edges_m) - 1)]
+    bin_index = np.digitize(distance_m, edges_m) - 1
+    groups = [values[bin_index == index] for index in range(len(edges_m) - 1)]
     return ByDistance(
         edges_m,
         tuple(len(group) for group in groups),
@@ -169,7 +169,7 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recorded:
+class MethodAnswers:
     """One method's answers on one sequence."""
 
     truths: Sequence[FrameTruth]
@@ -179,11 +179,11 @@ class Recorded:
 THRESHOLDS = tuple(float(value) for value in np.round(np.linspace(1.0, 0.0, 41), 3))
 
 
-def object_curves(recorded: Sequence[Recorded]) -> tuple[Curve, Curve]:
+def object_curves(method_answers: Sequence[MethodAnswers]) -> tuple[Curve, Curve]:
     """Precision-recall curves per object and per frame, over the threshold of confidence."""
     per_object, per_frame = [], []
     for threshold in THRESHOLDS:
-        figures = total([score(one.truths, one.answers, threshold) for one in recorded], ())
+        figures = total([score(one.truths, one.answers, threshold) for one in method_answers], ())
         per_object.append(figures.objects)
         per_frame.append(figures.settled)
     return _curve(THRESHOLDS, per_object), _curve(THRESHOLDS, per_frame)
