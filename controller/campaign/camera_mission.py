@@ -149,8 +149,8 @@ def _drive(
             config.runner, clock, simulation, camera, perceiver, loop, stage.case.faults.late_by
         ):
             for look in moment.looks:
-                recorder.saw(look)
-            recorder.decided(moment.control)
+                recorder.add_look(look)
+            recorder.add_step(moment.control)
             t_s = moment.control.now_ns / NS_PER_S
             lost_s = stage.case.faults.feedback_lost_s
             if lost_s is not None and t_s >= lost_s and isinstance(emulator, _Freezable):

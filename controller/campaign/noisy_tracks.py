@@ -58,11 +58,9 @@ class NoisyTracks:
         """Advance by one frame: errors change slowly, measured velocities follow the true ones (N, 2), and
         bodies that are not seen keep their last measured velocity."""
         new_errors = random.standard_normal((len(self._tracks), _COLUMNS - _ERRORS))
-        since_s = t_s - _MAX_UNSEEN_FRAMES * self._period_s
+        since_s, dt_s = t_s - _MAX_UNSEEN_FRAMES * self._period_s, self._period_s
         decay, gain = self._error_decay, self._velocity_gain
-        self._tracks = _predicted(
-            self._tracks, velocity_mps, new_errors, since_s, decay, gain, self._period_s
-        )
+        self._tracks = _predicted(self._tracks, velocity_mps, new_errors, since_s, decay, gain, dt_s)
         self._error_decay = math.exp(-self._period_s / self._noise.correlation_s)
 
     def update(self, view: PlanarView, t_s: float, random: np.random.Generator) -> None:
@@ -161,8 +159,7 @@ def _predicted(
 def _visible_extent(
     forward_m: FloatArray, bearing_tan: FloatArray, half_width_tan: float, min_depth_m: float
 ) -> tuple[float, float, float, float]:
-    """The extent (near, far, left, right) of a body by the bands (B,) that show it; near: inf if none
-    does."""
+    """The extent (near, far, left, right) of a body by the bands (B,) that show it; near: inf if none."""
     near, far, left, right = math.inf, -math.inf, math.inf, -math.inf
     for b in range(len(bearing_tan)):
         z = forward_m[b]

@@ -10,8 +10,8 @@ from controller.video import draw, text
 from controller.video.corridor import DrawnCorridor
 from controller.video.labels import draw_labels
 from controller.video.moment import VideoMoment
-from controller.video.picture import Placement, placement
-from controller.video.seen import Seen
+from controller.video.placement import Placement, placement
+from controller.video.seen_obstacles import SeenObstacle
 from controller.video.style import (
     DARK_TEXT,
     HEALTH,
@@ -29,7 +29,7 @@ from vision.scene import CameraCondition, Fragments
 
 # The image is drawn a little darker, so that lines and labels stand out against bright floors.
 _BRIGHTNESS = 0.82
-_NEAREST_FLOOR_M = 0.25
+_MIN_FLOOR_DISTANCE_M = 0.25
 _BANNER_PX = 24
 
 
@@ -44,7 +44,7 @@ class ColourView:
         text.caption(canvas, self._panel, "COLOUR")
 
     def draw(
-        self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: DrawnCorridor | None
+        self, canvas: Image, moment: VideoMoment, seen: list[SeenObstacle], corridor: DrawnCorridor | None
     ) -> None:
         """Draw the image, then what lies on the floor, the fragments, the obstacles and their labels."""
         view = self._panel.of(canvas)
@@ -118,7 +118,7 @@ def _floor_to_image(points_m: FloatArray, mount: CameraMount, intrinsics: Intrin
     it."""
     on_floor_m = np.column_stack([points_m, np.zeros(len(points_m))])
     x, y, z = camera_in_body(mount).inverse().apply(on_floor_m).T
-    z = np.where(z > _NEAREST_FLOOR_M, z, np.nan)
+    z = np.where(z > _MIN_FLOOR_DISTANCE_M, z, np.nan)
     return np.column_stack(
         [intrinsics.fx * x / z + intrinsics.cx, intrinsics.fy * y / z + intrinsics.cy],
     )
@@ -134,8 +134,8 @@ def _draw_fragments(
     draw.lines(inside, ends[fragments.moving], MOVING)
 
 
-def _draw_box(inside: Image, one: Seen, corners: FloatArray) -> None:
-    if one.decides:
+def _draw_box(inside: Image, one: SeenObstacle, corners: FloatArray) -> None:
+    if one.is_deciding:
         draw.line(inside, corners, OWN, one.thickness + 4, closed=True)
     if one.predicted:
         draw.dashed(inside, np.concatenate([corners, corners[:1]]), one.colour, one.thickness)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from controller.video import draw, text
 from controller.video.moment import VideoMoment
-from controller.video.picture import placement
-from controller.video.seen import Seen
+from controller.video.placement import placement
+from controller.video.seen_obstacles import SeenObstacle
 from controller.video.style import FAINT_TEXT, NO_DEPTH, OWN, Image, Rect
 
 _BAR_PX = 10
@@ -38,13 +38,13 @@ class DepthView:
         view = self._scale.of(canvas)
         levels = np.linspace(1, 255, self._scale.width).astype(np.intp)
         view[:_BAR_PX] = self._table[levels]
-        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-            label = f"{share * self._range_m:g}" + (" m" if share == 1.0 else "")
-            centred = round(share * self._scale.width) - text.width(label, 12) // 2
+        for fraction in (0.0, 0.25, 0.5, 0.75, 1.0):
+            label = f"{fraction * self._range_m:g}" + (" m" if fraction == 1.0 else "")
+            centred = round(fraction * self._scale.width) - text.width(label, 12) // 2
             x = max(0, min(centred, self._scale.width - text.width(label, 12)))
             text.put(view, label, x, _BAR_PX + 13, FAINT_TEXT, 12)
 
-    def draw(self, canvas: Image, moment: VideoMoment, seen: list[Seen]) -> None:
+    def draw(self, canvas: Image, moment: VideoMoment, seen: list[SeenObstacle]) -> None:
         """Draw the depth image with the outlines of the obstacles."""
         view = self._panel.of(canvas)
         height, width = moment.frame.depth.shape

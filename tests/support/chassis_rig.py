@@ -97,7 +97,7 @@ class Rig:
             self.step(v_mps, w_radps)
         return self.state
 
-    def coast(self, seconds: float) -> None:
+    def run_emulator_only(self, seconds: float) -> None:
         """The host is gone: only the emulator goes on."""
         self.now_ns += round(seconds * 1e9)
         self.emulator.advance_to(self.now_ns)
@@ -110,12 +110,12 @@ class Rig:
                 return
         raise AssertionError(f"did not arm: {self.state.reason}")
 
-    def stands(self) -> bool:
+    def is_standing(self) -> bool:
         """The true body does not move."""
         v_mps, w_radps = self.plant.twist
         return abs(v_mps) < 0.5 * self.tolerance_mps and abs(w_radps) < self.tolerance_radps
 
-    def needs_emulator(self, why: str) -> None:
+    def require_emulator(self, reason: str) -> None:
         """Skips the test on a real base."""
 
 

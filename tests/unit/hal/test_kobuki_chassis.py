@@ -12,7 +12,7 @@ from hal.chassis.kobuki_packets import TICK_M, base_control
 from hal.types import ChassisMode
 from tests.support.chassis_rig import KOBUKI_PLANT, MS, kobuki_config
 from tests.support.kobuki_bench import STOP, Bench
-from tests.support.serial_bench import every, reason_for_giving_up
+from tests.support.serial_bench import arming_failure_reason, every
 
 
 def test_standby_says_zero_every_period() -> None:
@@ -201,7 +201,7 @@ def test_nothing_is_known_before_the_second_frame() -> None:
     ],
 )
 def test_a_device_that_is_no_kobuki_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    assert hint in reason_for_giving_up(lambda link: KobukiChassis(link, kobuki_config()), babble)
+    assert hint in arming_failure_reason(lambda link: KobukiChassis(link, kobuki_config()), babble)
 
 
 def test_the_fastest_is_the_wire_s_too() -> None:

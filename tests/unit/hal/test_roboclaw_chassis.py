@@ -12,7 +12,7 @@ from hal.chassis.roboclaw import RoboclawChassis
 from hal.types import ChassisMode
 from sim.emulators.roboclaw import RoboclawEmulator
 from tests.support.chassis_rig import COUNTS_PER_M, PLANT, roboclaw_config
-from tests.support.serial_bench import SerialBench, every, first_known, reason_for_giving_up
+from tests.support.serial_bench import SerialBench, arming_failure_reason, every, first_with_speed
 
 
 class Bench(SerialBench[RoboclawEmulator]):
@@ -224,7 +224,7 @@ def test_errors_latch_and_warnings_are_told(bits: int, mode: ChassisMode, faults
 def test_nothing_is_known_before_the_second_encoder_answer() -> None:
     """One reading of an encoder is no speed."""
     bench = Bench()
-    assert first_known([bench.step() for _ in range(20)]) > 3
+    assert first_with_speed([bench.step() for _ in range(20)]) > 3
 
 
 @pytest.mark.parametrize(
@@ -238,7 +238,7 @@ def test_nothing_is_known_before_the_second_encoder_answer() -> None:
     ],
 )
 def test_a_device_that_is_no_roboclaw_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    assert hint in reason_for_giving_up(lambda link: RoboclawChassis(link, roboclaw_config()), babble)
+    assert hint in arming_failure_reason(lambda link: RoboclawChassis(link, roboclaw_config()), babble)
 
 
 def test_a_controller_that_takes_questions_but_no_commands_is_left_to_its_time_out() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from hal.types import ChassisMode
 from tests.support.roboteq_bench import Bench
-from tests.support.serial_bench import every, first_known
+from tests.support.serial_bench import every, first_with_speed
 
 
 def test_echo_off_watchdog_and_release_are_sent_with_consent_and_read_back() -> None:
@@ -180,4 +180,4 @@ def test_the_fastest_speed_holds_for_each_track() -> None:
 
 def test_nothing_is_known_before_the_second_counter_answer() -> None:
     bench = Bench()
-    assert first_known([bench.step() for _ in range(20)]) >= 3
+    assert first_with_speed([bench.step() for _ in range(20)]) >= 3

@@ -10,7 +10,7 @@ from hal.chassis.roboteq import RoboteqChassis
 from hal.types import ChassisMode
 from tests.support.chassis_rig import roboteq_config
 from tests.support.roboteq_bench import Bench
-from tests.support.serial_bench import reason_for_giving_up
+from tests.support.serial_bench import arming_failure_reason
 
 
 def test_a_watchdog_that_does_not_hold_is_told() -> None:
@@ -202,4 +202,4 @@ def test_a_restart_soon_after_setting_off_is_no_travel_backwards(periods: int) -
     ],
 )
 def test_a_device_that_is_no_roboteq_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    assert hint in reason_for_giving_up(lambda link: RoboteqChassis(link, roboteq_config()), babble)
+    assert hint in arming_failure_reason(lambda link: RoboteqChassis(link, roboteq_config()), babble)

@@ -22,9 +22,9 @@ from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from sim.families import generate
-from tests.support.bodies import box
 from tests.support.campaign import CONFIG
-from tests.support.deciding import MOUNT, PATH, obstacle
+from tests.support.decision_bench import MOUNT, PATH, obstacle
+from tests.support.floor_bodies import box
 from tests.support.scenes import free_space, scene
 
 FRAME_NS = 100_000_000
