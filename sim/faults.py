@@ -53,8 +53,10 @@ class Faults:
 
     def demands_stop(self, t_s: float, after_s: float) -> bool:
         """Whether a fault that must lead to a stop holds at t_s, or did within after_s before t_s."""
-        windows = [one for one in (self.silent, self.frozen, self.late) if one is not None]
-        if any(one.start_s <= t_s < one.end_s + after_s for one in windows):
+        windows = [
+            fault_window for fault_window in (self.silent, self.frozen, self.late) if fault_window is not None
+        ]
+        if any(fault_window.start_s <= t_s < fault_window.end_s + after_s for fault_window in windows):
             return True
         return self.feedback_lost_s is not None and t_s >= self.feedback_lost_s
 

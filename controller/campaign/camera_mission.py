@@ -152,9 +152,7 @@ def _drive(
                 recorder.add_look(look)
             recorder.add_step(moment.control)
             t_s = moment.control.now_ns / NS_PER_S
-            lost_s = stage.case.faults.feedback_lost_s
-            if lost_s is not None and t_s >= lost_s and isinstance(emulator, _Freezable):
-                emulator.freeze()
+            _freeze_if_feedback_lost(emulator, stage, t_s)
             armed = moment.control.chassis.mode is ChassisMode.ARMED
             monitor.step(t_s, armed)
             log.add(t_s, simulation.body_pose, monitor.s_m, monitor.v_mps, moment.control.decision)
@@ -165,6 +163,13 @@ def _drive(
     if loop.ending.outcome is Outcome.REACHED:
         log.reached_s = log.times_s[-1] - SETTLE_S - monitor.armed_s
     return log
+
+
+def _freeze_if_feedback_lost(emulator: object, stage: Stage, t_s: float) -> None:
+    """Freeze the emulator, so that it reports nothing, once the mission's fault takes its feedback away."""
+    lost_s = stage.case.faults.feedback_lost_s
+    if lost_s is not None and t_s >= lost_s and isinstance(emulator, _Freezable):
+        emulator.freeze()
 
 
 def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chassis: Chassis) -> ControlLoop:

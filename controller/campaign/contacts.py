@@ -66,7 +66,7 @@ class DriveClearance:
 
     def contacts(self) -> list[Contact]:
         """All contacts in the order of time."""
-        return sorted(self._contacts, key=lambda one: (one.t_s, one.body))
+        return sorted(self._contacts, key=lambda contact: (contact.t_s, contact.body))
 
     def _check_body(self, body: int, polygons: FloatArray, gap: FloatArray) -> None:
         gap = self._refine_gaps(polygons, gap, self._poses, _MAX_APPROACH_M)

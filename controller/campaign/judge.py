@@ -75,7 +75,9 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, reference: JudgeR
     contacts = clearance.contacts()
     case, tally = stage.case, log.setpoints
     faulty = [
-        one for one in contacts if at_fault(one, stage, log, reference.planar_camera, reference.reaction_s)
+        contact
+        for contact in contacts
+        if at_fault(contact, stage, log, reference.planar_camera, reference.reaction_s)
     ]
     return Row(
         family=case.family,
@@ -86,7 +88,7 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, reference: JudgeR
         expected=case.scenario.outcome == "target" and not case.halts,
         contacts=len(contacts),
         contacts_at_fault=len(faulty),
-        touched=tuple(stage.world.names[one.body] for one in faulty),
+        touched=tuple(stage.world.names[contact.body] for contact in faulty),
         time_s=None if log.reached_s is None else round(log.reached_s, 4),
         oracle_time_s=round(reference.oracle.total_s, 4) if math.isfinite(reference.oracle.total_s) else None,
         min_clearance_m=round(clearance.min_distance_m, 4),
@@ -135,7 +137,7 @@ def false_stops(stage: Stage, log: DriveLog) -> list[float]:
             continue
         times = np.arange(max(t0, 0.0), t1, 0.2)
         s_m = log.s_m[start]
-        ahead = any(high >= s_m for stretches in stage.blocked(times) for _, high in stretches)
+        ahead = any(high >= s_m for intervals in stage.blocked(times) for _, high in intervals)
         if not ahead:
             found.append(log.times_s[start])
     return found

@@ -64,11 +64,11 @@ class Lattice:
         blocked: for each step, the intervals of s that are blocked.
         """
         states = [1] + [0] * _LEVELS
-        for step, stretches in enumerate(blocked):
+        for step, intervals in enumerate(blocked):
             if step:
                 states = self._step(states)
             free_positions = self._all_positions
-            for low_m, high_m in stretches:
+            for low_m, high_m in intervals:
                 low = max(math.ceil(low_m / self.step_m), 0)
                 high = min(math.floor(high_m / self.step_m), self.end)
                 if high >= low:

@@ -61,8 +61,8 @@ class Stage:
             touching = overlap(robot_polygons[pose_index], polygons[time_index])
             for t, (low, high) in _runs(time_index[touching], pose_index[touching]):
                 interval = (s_m[low] - 0.5 * _SWEEP_STEP_M, s_m[high] + 0.5 * _SWEEP_STEP_M)
-                for one in [intervals[t]] if moves else intervals:
-                    one.append(interval)
+                for step_intervals in [intervals[t]] if moves else intervals:
+                    step_intervals.append(interval)
         return intervals
 
 

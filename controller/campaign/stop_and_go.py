@@ -78,8 +78,8 @@ def record(stage: Stage, log: DriveLog) -> DriveRecording:
     """The recording of a drive, with the true free way."""
     times, s = np.array(log.times_s), np.array(log.s_m)
     free = np.full(len(times), np.inf)
-    for k, stretches in enumerate(stage.blocked(times)):
-        ahead = [low - s[k] for low, high in stretches if high >= s[k]]
+    for k, intervals in enumerate(stage.blocked(times)):
+        ahead = [low - s[k] for low, high in intervals if high >= s[k]]
         free[k] = max(min(ahead), 0.0) if ahead else np.inf
     faster = np.array([action is Action.INCREASE for action in log.actions], np.bool_)
     return DriveRecording(times, s, np.array(log.v_mps), faster, free)
@@ -122,14 +122,7 @@ def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -
     comfort = braking.comfort(robot.limits)
     recording = _without_final_rest(recording)
     times, v, free = recording.times_s, recording.v_mps, recording.free_m
-    needed_m = np.array(
-        [
-            braking.required_distance(
-                max(speed, 0.0), 0.0, 0.0, decision.chassis_delay_s, comfort, decision.margins.stop_m
-            )
-            for speed in v
-        ]
-    )
+    needed_m = _stopping_distances_m(v, comfort, decision)
     starting_s = math.sqrt(2.0 * DRIVING_MPS / robot.limits.max_jerk_mps3)
     driving = _first_index(v >= DRIVING_MPS, 0)
     stop_due = _stop_due_step(free, needed_m, v, driving)
@@ -159,6 +152,20 @@ def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -
     )
 
 
+def _stopping_distances_m(
+    v_mps: FloatArray, limits: braking.BrakeLimits, decision: DecisionConfig
+) -> FloatArray:
+    """The free way that a stop from each speed needs, margin included."""
+    return np.array(
+        [
+            braking.required_distance(
+                max(speed, 0.0), 0.0, 0.0, decision.chassis_delay_s, limits, decision.margins.stop_m
+            )
+            for speed in v_mps
+        ]
+    )
+
+
 def _stop_due_step(free_m: FloatArray, needed_m: FloatArray, v_mps: FloatArray, driving: int) -> int:
     """The last step before the robot stands from which the free way is no longer than a comfortable stop
     needs. A robot that slowed down in time has room again, and need not stop yet."""
@@ -178,7 +185,7 @@ def _without_final_rest(recording: DriveRecording) -> DriveRecording:
     if not len(moving) or np.isfinite(recording.free_m[-1]):
         return recording
     end = int(moving[-1]) + 1
-    return DriveRecording(*(getattr(recording, one.name)[:end] for one in fields(recording)))
+    return DriveRecording(*(getattr(recording, field.name)[:end] for field in fields(recording)))
 
 
 def _first_index(condition: NDArray[np.bool_], start: int, min_run: int = MIN_SAMPLES) -> int:

@@ -76,7 +76,9 @@ def run_evaluation(options: EvaluationOptions) -> None:
         lines.extend(simulated_lines(summary, records, failures, command_of(options)))
         _print_figures(summary)
     if options.recordings:
-        recording_records = [_recording(options, *one) for one in zip(options.recordings, names, strict=True)]
+        recording_records = [
+            _recording(options, path, name) for path, name in zip(options.recordings, names, strict=True)
+        ]
         write_recording_pictures(options.report, recording_records)
         result["recordings"] = recordings_json(recording_records)
         lines.extend(recording_lines(recording_records, command_of(options)))
@@ -88,11 +90,11 @@ def run_evaluation(options: EvaluationOptions) -> None:
 def choose(names: tuple[str, ...]) -> tuple[Sequence, ...]:
     """The named sequences, or all if there are no names. Raises UserError for an unknown name."""
     available = sequences()
-    unknown = sorted(set(names) - {one.name for one in available})
+    unknown = sorted(set(names) - {sequence.name for sequence in available})
     if unknown:
-        known = ", ".join(one.name for one in available)
+        known = ", ".join(sequence.name for sequence in available)
         raise UserError(f"--only {unknown[0]}: there is no such sequence; choose among {known}")
-    return tuple(one for one in available if not names or one.name in names)
+    return tuple(sequence for sequence in available if not names or sequence.name in names)
 
 
 def _simulated(options: EvaluationOptions, selected: tuple[Sequence, ...]) -> tuple[SequenceRecord, ...]:

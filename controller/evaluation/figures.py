@@ -139,11 +139,11 @@ def latency(methods: dict[str, MethodSummary]) -> Image:
     return image
 
 
-def found_by_distance(one: MethodSummary) -> Image:
+def found_by_distance(method: MethodSummary) -> Image:
     """The number of objects at each distance, and how many of them were found."""
     width, height = _PANEL
     image = blank(width + 200, height)
-    counts = one.figures.found_by_distance
+    counts = method.figures.found_by_distance
     object_counts = [count.correct + count.missed for count in counts]
     edges = np.array(DISTANCE_BINS_M)
     chart = Chart(
@@ -201,16 +201,16 @@ def _middles(edges_m: Sequence[float]) -> list[float]:
     return [0.5 * (low + high) for low, high in itertools.pairwise(edges_m)]
 
 
-def _medians(one: ByDistance) -> tuple[float, ...]:
-    return one.median
+def _medians(bins: ByDistance) -> tuple[float, ...]:
+    return bins.median
 
 
-def _p90s(one: ByDistance) -> tuple[float, ...]:
-    return one.p90
+def _p90s(bins: ByDistance) -> tuple[float, ...]:
+    return bins.p90
 
 
-def _measures_speed(one: MethodSummary) -> bool:
-    return math.isfinite(one.figures.speed_error_median_mps)
+def _measures_speed(method: MethodSummary) -> bool:
+    return math.isfinite(method.figures.speed_error_median_mps)
 
 
 def _round_up(value: float) -> float:

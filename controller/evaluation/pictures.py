@@ -56,10 +56,14 @@ def result_picture(snapshot: Snapshot) -> Image:
     image = np.asarray(cv2.convertScaleAbs(snapshot.colour, alpha=_BRIGHTNESS), np.uint8)
     if snapshot.fragments is not None:
         _draw_fragments(image, snapshot.fragments)
-    moving = [one for one in snapshot.detections if one.confidence >= CALLED_MOVING and _has_box(one.box)]
-    for one in moving:
-        draw.line(image, draw.box(one.box), MOVING, 3, closed=True)
-    draw_labels(image, [_label(one, MOVING) for one in moving], size=17)
+    moving = [
+        detection
+        for detection in snapshot.detections
+        if detection.confidence >= CALLED_MOVING and _has_box(detection.box)
+    ]
+    for detection in moving:
+        draw.line(image, draw.box(detection.box), MOVING, 3, closed=True)
+    draw_labels(image, [_label(detection, MOVING) for detection in moving], size=17)
     return image
 
 
@@ -73,10 +77,10 @@ def failure_picture(snapshot: Snapshot) -> Image:
             draw.dashed(image, _closed_outline(true.box), colour, 2, 7.0)
             words = f"{true.kind} {true.distance_m:.1f} m, {true.speed_mps:.1f} m/s"
             labels.append(_box_label(words, true.box, colour))
-    for one in snapshot.detections:
-        if one.confidence >= CALLED_MOVING and _has_box(one.box):
-            draw.line(image, draw.box(one.box), _DETECTED, 2, closed=True)
-            labels.append(_label(one, _DETECTED))
+    for detection in snapshot.detections:
+        if detection.confidence >= CALLED_MOVING and _has_box(detection.box):
+            draw.line(image, draw.box(detection.box), _DETECTED, 2, closed=True)
+            labels.append(_label(detection, _DETECTED))
     draw_labels(image, labels, size=14)
     return _with_caption(image, f"{snapshot.sequence}, frame {snapshot.index}", describe_errors(snapshot))
 
@@ -91,10 +95,11 @@ def describe_errors(snapshot: Snapshot) -> str:
     """The errors in the frame, in words."""
     by_id = {true.id: true for true in snapshot.truth.objects}
     parts = [
-        f"missed: {by_id[one].kind} at {by_id[one].distance_m:.1f} m" for one in snapshot.score.missed_settled
+        f"missed: {by_id[object_id].kind} at {by_id[object_id].distance_m:.1f} m"
+        for object_id in snapshot.score.missed_settled
     ]
-    parts.extend(f"false: #{one}" for one in snapshot.score.wrong)
-    parts.extend(f"second box for one object: #{one}" for one in snapshot.score.duplicates)
+    parts.extend(f"false: #{track_id}" for track_id in snapshot.score.wrong)
+    parts.extend(f"second box for one object: #{track_id}" for track_id in snapshot.score.duplicates)
     return "; ".join(parts)
 
 
@@ -125,10 +130,10 @@ def _draw_fragments(image: Image, fragments: Fragments) -> None:
     draw.lines(image, ends[fragments.moving], MOVING, 3)
 
 
-def _label(one: DetectedObject, colour: Colour) -> Label:
-    speed_mps = float(np.linalg.norm(one.velocity_mps))
-    words = f"#{one.id}  {speed_mps:.1f} m/s" if np.isfinite(speed_mps) else f"#{one.id}"
-    return _box_label(words, one.box, colour)
+def _label(detection: DetectedObject, colour: Colour) -> Label:
+    speed_mps = float(np.linalg.norm(detection.velocity_mps))
+    words = f"#{detection.id}  {speed_mps:.1f} m/s" if np.isfinite(speed_mps) else f"#{detection.id}"
+    return _box_label(words, detection.box, colour)
 
 
 def _box_label(words: str, box: Box, colour: Colour) -> Label:

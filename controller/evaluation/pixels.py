@@ -30,16 +30,20 @@ def claimed_levels(frame: RgbdFrame, detections: Sequence[DetectedObject]) -> ND
     depth_m = frame.depth[::STEP_PX, ::STEP_PX].astype(np.float32) * np.float32(frame.depth_scale_m)
     levels = np.zeros(depth_m.shape, np.uint8)
     height, width = depth_m.shape
-    for one in sorted(detections, key=lambda detection: detection.confidence):
-        if not np.isfinite(one.box).all() or not np.isfinite(one.position_m[2]):
+    for detection in sorted(detections, key=lambda detection: detection.confidence):
+        if not np.isfinite(detection.box).all() or not np.isfinite(detection.position_m[2]):
             continue
-        u0, v0, u1, v1 = one.box
+        u0, v0, u1, v1 = detection.box
         left, right = _span(u0, u1, width)
         top, bottom = _span(v0, v1, height)
-        z_m = float(one.position_m[2])
-        half_m = 0.5 * float(np.nan_to_num(one.extent_m[2])) + _DEPTH_MARGIN_M + _DEPTH_MARGIN_PER_M2 * z_m**2
+        z_m = float(detection.position_m[2])
+        half_m = (
+            0.5 * float(np.nan_to_num(detection.extent_m[2]))
+            + _DEPTH_MARGIN_M
+            + _DEPTH_MARGIN_PER_M2 * z_m**2
+        )
         inside = np.abs(depth_m[top:bottom, left:right] - z_m) <= half_m
-        levels[top:bottom, left:right][inside] = round(255 * min(max(one.confidence, 0.0), 1.0))
+        levels[top:bottom, left:right][inside] = round(255 * min(max(detection.confidence, 0.0), 1.0))
     return levels
 
 

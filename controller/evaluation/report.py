@@ -37,7 +37,7 @@ def prepare_folder(folder: Path) -> None:
 
     Deletes what an earlier run left there, and nothing else. Raises UserError.
     """
-    ours = {one.name for one in sequences()}
+    simulated_names = {sequence.name for sequence in sequences()}
     try:
         (folder / "failures").mkdir(parents=True, exist_ok=True)
         for name in (*_FIGURES, "summary.json"):
@@ -46,7 +46,7 @@ def prepare_folder(folder: Path) -> None:
             if _RECORDING.fullmatch(old.name):
                 old.unlink()
         for old in (folder / "failures").glob("*-[0-9][0-9][0-9].png"):
-            if old.stem[:-4] in ours:
+            if old.stem[:-4] in simulated_names:
                 old.unlink()
         (folder / "report.md").write_text("The evaluation is still running, or was broken off.\n", "utf-8")
     except OSError as error:

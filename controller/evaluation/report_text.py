@@ -40,7 +40,7 @@ def simulated_lines(
 ) -> list[str]:
     """The lines of report.md. command: the one that made it. failures: frames with their picture files."""
     reporting = summary.splits["reporting"]
-    count = {split: sum(one.split == split for one in records) for split in ("reporting", "tuning")}
+    count = {split: sum(record.split == split for record in records) for split in ("reporting", "tuning")}
     lines = ["# Evaluation on the simulated set", ""]
     lines.append(
         f"Made by `{command}`. {len(records)} sequences with fixed seeds, 640x480 at 30 frames a second: "
@@ -73,8 +73,10 @@ def _targets(reporting: dict[str, MethodSummary]) -> list[str]:
     return section("Targets") + table(head, rows)
 
 
-def _verdict(target: Target, one: MethodSummary | None, without_odometry: bool) -> tuple[str, str, str]:
-    value = math.nan if one is None else target.value(one.figures)
+def _verdict(
+    target: Target, method_summary: MethodSummary | None, without_odometry: bool
+) -> tuple[str, str, str]:
+    value = math.nan if method_summary is None else target.value(method_summary.figures)
     return (
         fixed(value),
         target.bound(without_odometry),
@@ -85,9 +87,9 @@ def _verdict(target: Target, one: MethodSummary | None, without_odometry: bool) 
 def _table_two(reporting: dict[str, MethodSummary]) -> list[str]:
     reported = (("the paper's lidar [20]", PAPER_LIDAR), ("the paper's method", PAPER_OURS))
     rows = [
-        (name, str(one.objects), str(one.correct), str(one.wrong), fixed(one.precision), fixed(one.recall),
-         f"{one.seconds_per_frame:.2f}")
-        for name, one in reported
+        (name, str(paper.objects), str(paper.correct), str(paper.wrong), fixed(paper.precision),
+         fixed(paper.recall), f"{paper.seconds_per_frame:.2f}")
+        for name, paper in reported
     ]  # fmt: skip
     names = (("our lidar baseline", LIDAR), ("treadwatch", OURS), ("treadwatch, no odometry", OURS_ALONE))
     for label, name in names:
@@ -103,15 +105,15 @@ def _table_one(methods: dict[str, MethodSummary]) -> list[str]:
     rows = [
         (
             name,
-            *_objects(one.figures.objects),
-            *_shares(one.figures.settled),
-            *_shares(one.pixel_counts),
-            fixed(one.figures.wrong_per_minute, 1),
-            fixed(one.figures.ms_per_frame, 1),
+            *_objects(method_summary.figures.objects),
+            *_shares(method_summary.figures.settled),
+            *_shares(method_summary.pixel_counts),
+            fixed(method_summary.figures.wrong_per_minute, 1),
+            fixed(method_summary.figures.ms_per_frame, 1),
         )
-        for name, one in methods.items()
+        for name, method_summary in methods.items()
     ]
-    sequences = max(one.sequences for one in methods.values())
+    sequences = max(method_summary.sequences for method_summary in methods.values())
     head = ("method", *_OBJECT_HEAD, "per frame P", "R", "pixel P", "R", "false a minute", "ms a frame")
     return (
         section("Table 1, measured", _TABLE_ONE.format(sequences))
@@ -147,8 +149,8 @@ def _figures(summary: Summary, shown: bool) -> list[str]:
 def _by_split(summary: Summary) -> list[str]:
     rows = []
     for split in ("reporting", "tuning"):
-        for name, one in summary.splits[split].items():
-            f = one.figures
+        for name, method_summary in summary.splits[split].items():
+            f = method_summary.figures
             error = f"{fixed(f.speed_error_median_mps)} / {fixed(f.speed_error_p90_mps)}"
             rows.append(
                 (split, name, *_objects(f.objects), *_shares(f.settled), fixed(f.frames.recall),
@@ -167,17 +169,17 @@ def _by_sequence(summary: Summary) -> list[str]:
         for method in (OURS, OURS_ALONE):
             if method not in methods:
                 continue
-            one = methods[method]
+            sequence_score = methods[method]
             rows.append(
                 (
                     name,
                     summary.split_of[name],
                     method,
-                    f"{sum(true.found for true in one.objects)} of {len(one.objects)}",
-                    str(len(one.wrong_objects)),
-                    str(sum(len(frame.wrong) for frame in one.frames)),
-                    str(sum(len(frame.duplicates) for frame in one.frames)),
-                    str(sum(len(frame.missed_settled) for frame in one.frames)),
+                    f"{sum(true.found for true in sequence_score.objects)} of {len(sequence_score.objects)}",
+                    str(len(sequence_score.wrong_objects)),
+                    str(sum(len(frame.wrong) for frame in sequence_score.frames)),
+                    str(sum(len(frame.duplicates) for frame in sequence_score.frames)),
+                    str(sum(len(frame.missed_settled) for frame in sequence_score.frames)),
                 )
             )
     head = (

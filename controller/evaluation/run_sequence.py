@@ -142,8 +142,12 @@ class _Recorder:
             levels,
             simulated.images.instances[judged_pixels],
             simulated.images.depth_m[judged_pixels],
-            moving=[one.id for one in objects if one.speed_mps >= MOVING_MPS],
-            excused=[one.id for one in objects if one.turning or STANDING_MPS <= one.speed_mps < MOVING_MPS],
+            moving=[true_object.id for true_object in objects if true_object.speed_mps >= MOVING_MPS],
+            excused=[
+                true_object.id
+                for true_object in objects
+                if true_object.turning or STANDING_MPS <= true_object.speed_mps < MOVING_MPS
+            ],
         )
 
     def _measure_endpoints(self, simulated: SimulatedFrame, fragments: Fragments | None) -> None:

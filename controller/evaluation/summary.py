@@ -152,15 +152,15 @@ def number(value: float, digits: int = 4) -> float | None:
     return round(float(value), digits) if math.isfinite(value) else None
 
 
-def _method(one: MethodSummary) -> dict[str, Any]:
-    figures = one.figures
+def _method(summary: MethodSummary) -> dict[str, Any]:
+    figures = summary.figures
     return {
-        "sequences": one.sequences,
+        "sequences": summary.sequences,
         "minutes": number(figures.minutes),
         "object": _counts(figures.objects),
         "frame": _counts(figures.settled),
         "frame_with_first_half_second": _counts(figures.frames),
-        "pixel": _counts(one.pixel_counts),
+        "pixel": _counts(summary.pixel_counts),
         "false_moving_per_minute": number(figures.wrong_per_minute, 3),
         "speed_error_mps": {
             "median": number(figures.speed_error_median_mps),
@@ -190,13 +190,13 @@ def _counts(counts: Counts) -> dict[str, Any]:
     }
 
 
-def _by_distance(one: ByDistance) -> dict[str, Any]:
+def _by_distance(by_distance: ByDistance) -> dict[str, Any]:
     return {
-        "edges_m": list(one.edges_m),
-        "count": list(one.count),
-        "median_by_distance": [number(value) for value in one.median],
-        "mean_by_distance": [number(value) for value in one.mean],
-        "p90_by_distance": [number(value) for value in one.p90],
+        "edges_m": list(by_distance.edges_m),
+        "count": list(by_distance.count),
+        "median_by_distance": [number(value) for value in by_distance.median],
+        "mean_by_distance": [number(value) for value in by_distance.mean],
+        "p90_by_distance": [number(value) for value in by_distance.p90],
     }
 
 
@@ -208,7 +208,7 @@ def _curve(curve: Curve) -> dict[str, Any]:
     }
 
 
-def _sequence(one: SequenceScore) -> dict[str, Any]:
+def _sequence(score: SequenceScore) -> dict[str, Any]:
     return {
         "objects": [
             {
@@ -220,10 +220,10 @@ def _sequence(one: SequenceScore) -> dict[str, Any]:
                 "first_detection_s": number(true.latency_s),
                 "distance_m": number(true.distance_m, 2),
             }
-            for true in one.objects
+            for true in score.objects
         ],
-        "wrong_objects": list(one.wrong_objects),
-        "false_detections": sum(len(frame.wrong) for frame in one.frames),
-        "duplicate_detections": sum(len(frame.duplicates) for frame in one.frames),
-        "missed_frames": sum(len(frame.missed_settled) for frame in one.frames),
+        "wrong_objects": list(score.wrong_objects),
+        "false_detections": sum(len(frame.wrong) for frame in score.frames),
+        "duplicate_detections": sum(len(frame.duplicates) for frame in score.frames),
+        "missed_frames": sum(len(frame.missed_settled) for frame in score.frames),
     }

@@ -56,14 +56,16 @@ class ColourView:
         if corridor is not None and moment.mount is not None:
             _draw_corridor(inside, corridor, moment.mount, moment.frame.intrinsics, placed, origin)
         _draw_fragments(inside, moment.fragments, placed, origin)
-        boxes_px = [(one, one.box_px(moment.frame.intrinsics)) for one in seen]
+        boxes_px = [(obstacle, obstacle.box_px(moment.frame.intrinsics)) for obstacle in seen]
         boxes = [
-            (one, placed.to_panel(box_px) - origin) for one, box_px in boxes_px if np.isfinite(box_px).all()
+            (obstacle, placed.to_panel(box_px) - origin)
+            for obstacle, box_px in boxes_px
+            if np.isfinite(box_px).all()
         ]
-        for one, corners in reversed(boxes):
-            _draw_box(inside, one, draw.box(corners))
+        for obstacle, corners in reversed(boxes):
+            _draw_box(inside, obstacle, draw.box(corners))
         banner = _draw_health(inside, moment)
-        labels = [one.label(one.describe(), corners) for one, corners in boxes]
+        labels = [obstacle.label(obstacle.describe(), corners) for obstacle, corners in boxes]
         draw_labels(inside, labels, banner)
         text.caption_note(canvas, self._panel, _count(moment))
 
@@ -134,14 +136,14 @@ def _draw_fragments(
     draw.lines(inside, ends[fragments.moving], MOVING)
 
 
-def _draw_box(inside: Image, one: SeenObstacle, corners: FloatArray) -> None:
-    if one.is_deciding:
-        draw.line(inside, corners, OWN, one.thickness + 4, closed=True)
-    if one.predicted:
-        draw.dashed(inside, np.concatenate([corners, corners[:1]]), one.colour, one.thickness)
+def _draw_box(inside: Image, obstacle: SeenObstacle, corners: FloatArray) -> None:
+    if obstacle.is_deciding:
+        draw.line(inside, corners, OWN, obstacle.thickness + 4, closed=True)
+    if obstacle.predicted:
+        draw.dashed(inside, np.concatenate([corners, corners[:1]]), obstacle.colour, obstacle.thickness)
     else:
-        draw.line(inside, corners, DARK_TEXT, one.thickness + 2, closed=True)
-        draw.line(inside, corners, one.colour, one.thickness, closed=True)
+        draw.line(inside, corners, DARK_TEXT, obstacle.thickness + 2, closed=True)
+        draw.line(inside, corners, obstacle.colour, obstacle.thickness, closed=True)
 
 
 def _draw_health(inside: Image, moment: VideoMoment) -> list[Rect]:

@@ -58,11 +58,11 @@ class DepthView:
         if place.width < self._panel.width or place.height < self._panel.height:
             view[:] = NO_DEPTH
         np.take(self._table, levels, axis=0, out=(inside := place.of(view)))
-        for one in reversed(seen):
-            corners = placed.to_panel(one.box_px(moment.frame.intrinsics)) - (place.x, place.y)
+        for obstacle in reversed(seen):
+            corners = placed.to_panel(obstacle.box_px(moment.frame.intrinsics)) - (place.x, place.y)
             # An obstacle that is not seen in this frame has no depth here.
-            if np.isfinite(corners).all() and not one.predicted:
-                draw.line(inside, draw.box(corners), OWN, one.thickness - 1, closed=True)
+            if np.isfinite(corners).all() and not obstacle.predicted:
+                draw.line(inside, draw.box(corners), OWN, obstacle.thickness - 1, closed=True)
         valid = moment.scene.health.valid_depth_ratio
         if np.isfinite(valid):
             text.caption_note(canvas, self._panel, f"{100.0 * valid:.0f} % valid")

@@ -107,7 +107,14 @@ def seen_obstacles(moment: VideoMoment) -> list[SeenObstacle]:
                 is_deciding=obstacle.id == deciding_id,
             )
         )
-    return sorted(seen, key=lambda one: (not one.is_deciding, not one.obstacle.moving, one.distance_m))
+    return sorted(
+        seen,
+        key=lambda seen_obstacle: (
+            not seen_obstacle.is_deciding,
+            not seen_obstacle.obstacle.moving,
+            seen_obstacle.distance_m,
+        ),
+    )
 
 
 def _known(values: FloatArray) -> FloatArray:

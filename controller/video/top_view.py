@@ -131,29 +131,29 @@ class TopView:
         camera = self.to_pixels(np.array([mount.forward_m, mount.left_m]))
         draw.disc(view, camera, 3.5, OWN)
 
-    def _draw_obstacle(self, view: Image, one: SeenObstacle) -> None:
-        centre, corners = self.to_pixels(one.centre_m), self.to_pixels(one.corners_m)
-        draw.tint(view, corners, one.colour, 0.45 if one.obstacle.moving else 0.25)
-        if one.is_deciding:
+    def _draw_obstacle(self, view: Image, seen_obstacle: SeenObstacle) -> None:
+        centre, corners = self.to_pixels(seen_obstacle.centre_m), self.to_pixels(seen_obstacle.corners_m)
+        draw.tint(view, corners, seen_obstacle.colour, 0.45 if seen_obstacle.obstacle.moving else 0.25)
+        if seen_obstacle.is_deciding:
             draw.line(view, corners, OWN, 6, closed=True)
-        if one.predicted:
-            draw.dashed(view, np.concatenate([corners, corners[:1]]), one.colour, 2, dash_px=4.0)
+        if seen_obstacle.predicted:
+            draw.dashed(view, np.concatenate([corners, corners[:1]]), seen_obstacle.colour, 2, dash_px=4.0)
         else:
-            draw.line(view, corners, one.colour, 2, closed=True)
-        if one.obstacle.moving and np.isfinite(one.velocity_mps).all():
-            self._draw_velocity(view, one, centre)
+            draw.line(view, corners, seen_obstacle.colour, 2, closed=True)
+        if seen_obstacle.obstacle.moving and np.isfinite(seen_obstacle.velocity_mps).all():
+            self._draw_velocity(view, seen_obstacle, centre)
 
-    def _draw_velocity(self, view: Image, one: SeenObstacle, centre: NDArray[np.float64]) -> None:
-        tip = self.to_pixels(one.centre_m + _ARROW_S * one.velocity_mps)
-        draw.arrow(view, centre, tip, one.colour)
-        spread_m2 = _ARROW_S**2 * one.velocity_cov
+    def _draw_velocity(self, view: Image, seen_obstacle: SeenObstacle, centre: NDArray[np.float64]) -> None:
+        tip = self.to_pixels(seen_obstacle.centre_m + _ARROW_S * seen_obstacle.velocity_mps)
+        draw.arrow(view, centre, tip, seen_obstacle.colour)
+        spread_m2 = _ARROW_S**2 * seen_obstacle.velocity_cov
         if np.isfinite(spread_m2).all() and np.trace(spread_m2) < _MAX_SIGMA_M**2:
             # From (forward, left) to (right, down): both axes are swapped and negated, so only their order
             # changes.
-            draw.ellipse(view, tip, spread_m2[::-1, ::-1] * self._px_per_m**2, one.colour)
+            draw.ellipse(view, tip, spread_m2[::-1, ::-1] * self._px_per_m**2, seen_obstacle.colour)
 
-    def _label_box(self, one: SeenObstacle) -> FloatArray:
-        corners = self.to_pixels(one.corners_m)
+    def _label_box(self, seen_obstacle: SeenObstacle) -> FloatArray:
+        corners = self.to_pixels(seen_obstacle.corners_m)
         return np.stack([corners.min(axis=0) - 2.0, corners.max(axis=0) + 2.0])
 
 

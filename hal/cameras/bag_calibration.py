@@ -66,7 +66,9 @@ def read_calibration(
     try:
         return RecordingCamera(**values), frame, notes
     except ValidationError as error:
-        details = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+        details = "; ".join(
+            f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors()
+        )
         raise BadRecording(
             f"{bag.path}: the calibration in {topics.colour_info} is impossible ({details})"
         ) from error

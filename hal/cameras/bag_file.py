@@ -26,7 +26,7 @@ def is_bag(path: Path) -> bool:
     # os.path, not Path: a path without permission is not a bag, and must not raise.
     if os.path.isdir(path):
         has_bag_files = os.path.isfile(path / _METADATA) or any(
-            one.suffix in _ROS_2 for one in path.glob("*")
+            file.suffix in _ROS_2 for file in path.glob("*")
         )
         return has_bag_files and not os.path.exists(path / "rgb.txt")
     return path.suffix in _SUFFIXES
@@ -75,15 +75,15 @@ class BagFile:
     def topics(self) -> tuple[Topic, ...]:
         """The topics that have messages, sorted by name."""
         counts: dict[tuple[str, str], int] = {}
-        for one in self._reader.connections:
-            key = (one.topic, one.msgtype)
-            counts[key] = counts.get(key, 0) + one.msgcount
+        for connection in self._reader.connections:
+            key = (connection.topic, connection.msgtype)
+            counts[key] = counts.get(key, 0) + connection.msgcount
         return tuple(Topic(*key, count) for key, count in sorted(counts.items()) if count)
 
     def messages(self, names: Collection[str]) -> Iterator[tuple[str, Any]]:
         """(topic, message) of these topics, in the order of the recording. Raises BadRecording where the bag
         is damaged; all messages before that are valid."""
-        selected = [one for one in self._reader.connections if one.topic in names]
+        selected = [connection for connection in self._reader.connections if connection.topic in names]
         if not selected:
             return
         records = self._reader.messages(connections=selected)

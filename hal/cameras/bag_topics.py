@@ -60,13 +60,13 @@ def choose_topics(
 ) -> BagTopics:
     """Choose the topics. Raises BadRecording if there is none, or if several are equally good, with their
     names."""
-    images = [one for one in topics if one.kind in _IMAGES]
+    images = [topic for topic in topics if topic.kind in _IMAGES]
     colour = _choose(path, images, wanted.colour, "colour", _colour_rank)
     depth = _choose(path, images, wanted.depth, "depth", _depth_rank)
     if colour == depth:
         raise BadRecording(f"{path}: {colour.name} cannot be both colour and depth; choose another topic")
-    infos = {one.name for one in topics if one.kind == _CAMERA_INFO}
-    odometry_topics = [one for one in topics if one.kind == _ODOMETRY]
+    infos = {topic.name for topic in topics if topic.kind == _CAMERA_INFO}
+    odometry_topics = [topic for topic in topics if topic.kind == _ODOMETRY]
     odometry = None
     if with_odometry and (odometry_topics or wanted.odometry is not None):
         odometry = _choose(path, odometry_topics, wanted.odometry, "odometry", lambda _: 0).name
@@ -94,24 +94,24 @@ def _choose(
 ) -> Topic:
     """The wanted topic, or the one with the lowest rank. A rank of None excludes a topic."""
     if wanted is not None:
-        named = [one for one in topics if one.name == wanted]
+        named = [topic for topic in topics if topic.name == wanted]
         if named:
             return named[0]
         raise BadRecording(f"{path}: {kind} topic {wanted}: there is none; there are {_list_names(topics)}")
-    ranked = {one: rank_value for one in topics if (rank_value := rank(one)) is not None}
+    ranked = {topic: rank_value for topic in topics if (rank_value := rank(topic)) is not None}
     if not ranked:
         raise BadRecording(
             f"{path}: no topic with {kind} images was found; choose one with {_option(kind)}; "
             f"there are {_list_names(topics)}"
         )
-    best = [one for one in topics if ranked.get(one) == min(ranked.values())]
+    best = [topic for topic in topics if ranked.get(topic) == min(ranked.values())]
     # The same images in several transports: uncompressed ones sort first, by their shorter name.
-    if len({base_name(one.name) for one in best}) > 1:
+    if len({base_name(topic.name) for topic in best}) > 1:
         raise BadRecording(
             f"{path}: several topics could be the {kind}: {_list_names(best)}; "
             f"choose one with {_option(kind)}"
         )
-    return min(best, key=lambda one: len(one.name))
+    return min(best, key=lambda topic: len(topic.name))
 
 
 def _colour_rank(topic: Topic) -> int | None:
@@ -145,4 +145,4 @@ def _option(what: str) -> str:
 
 
 def _list_names(topics: Sequence[Topic]) -> str:
-    return ", ".join(one.name for one in topics) or "none of that kind"
+    return ", ".join(topic.name for topic in topics) or "none of that kind"

@@ -98,6 +98,6 @@ class StampPairing(Generic[Item]):
     def _first_partner(self) -> int | None:
         """Index of the waiting depth image that is paired with the first colour image; None if there is
         none."""
-        colour_ns = [one.stamp_ns for one in self.colour.waiting]
-        depth_ns = [one.stamp_ns for one in self.depth.waiting]
+        colour_ns = [frame.stamp_ns for frame in self.colour.waiting]
+        depth_ns = [frame.stamp_ns for frame in self.depth.waiting]
         return dict(associate(colour_ns, depth_ns, self._max_gap_ns)).get(0)

@@ -44,7 +44,7 @@ _UNUSED_IDS = frozenset(range(_FIRST_ACTUATOR, _FIRST_ACTUATOR + ACTUATORS))
 _MODE_RETRY_NS = 40 * NS_PER_MS
 
 
-def no_can_frames() -> str:
+def no_can_frames_hint() -> str:
     """What to check if the bus is silent."""
     return "not one frame came; check power, wiring, termination and 500 kbit/s"
 
@@ -52,15 +52,19 @@ def no_can_frames() -> str:
 class AgilexChassis(ChassisDriver):
     """hal.api.Chassis for AgileX V2.
 
-    link: over RS-232, a hal.chassis.agilex_serial.AgilexSerialBus. no_frames: over RS-232, its silence().
+    link: over RS-232, a hal.chassis.agilex_serial.AgilexSerialBus. no_frames_hint: over RS-232, its
+    silence_hint().
     """
 
     def __init__(
-        self, link: CanLink, config: AgilexChassisConfig, no_frames: Callable[[], str] = no_can_frames
+        self,
+        link: CanLink,
+        config: AgilexChassisConfig,
+        no_frames_hint: Callable[[], str] = no_can_frames_hint,
     ) -> None:
         model = model_of(config)
         other_master = OtherMaster()
-        feedback = AgilexFeedback(config, model, no_frames, other_master)
+        feedback = AgilexFeedback(config, model, no_frames_hint, other_master)
         # The model's limit applies to the commanded yaw rate, which is slip_factor times the real one.
         commands = CommandLimits(
             max_speed_mps=model.max_speed_mps,
@@ -71,7 +75,7 @@ class AgilexChassis(ChassisDriver):
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             status_timeout_ns=config.status_timeout_ms * NS_PER_MS,
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
-            stall_ns=model.base_timeout_ms * NS_PER_MS,
+            max_step_gap_ns=model.base_timeout_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits)
         self._link = link

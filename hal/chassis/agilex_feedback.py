@@ -65,7 +65,7 @@ class AgilexFeedback:
     command mode before the base reports standby. Then the restart shows in a jump of the odometer that no
     track can make, or in the count of 0x211 (byte 7, 0..255), which begins anew.
 
-    no_frames: what came and what to check, for the case that not one frame was understood. other_master:
+    no_frames_hint: what came and what to check, for the case that not one frame was understood. other_master:
     whether somebody else commands the base.
     """
 
@@ -73,7 +73,7 @@ class AgilexFeedback:
         self,
         config: AgilexChassisConfig,
         model: AgilexModel,
-        no_frames: Callable[[], str],
+        no_frames_hint: Callable[[], str],
         other_master: OtherMaster,
     ) -> None:
         self._model = model
@@ -83,7 +83,7 @@ class AgilexFeedback:
             self._command_mode
         }
         self._actuators = config.actuators or model.actuators
-        self._no_frames = no_frames
+        self._no_frames_hint = no_frames_hint
         self._slip_factor = config.slip_factor
         width_m = track_width_of(config)
         self._geometry = None if width_m is None else TrackGeometry(width_m, config.slip_factor)
@@ -124,7 +124,7 @@ class AgilexFeedback:
         return min(self.motion_ns, self._odometer_ns)
 
     @property
-    def disobeys(self) -> str:
+    def command_refusal(self) -> str:
         """Why the base does not take commands, by its newest system state, or that it restarted since it was
         armed; "" when it obeys."""
         if self._state is None:
@@ -141,7 +141,7 @@ class AgilexFeedback:
         return self._state is not None and self._state.control_mode == self._command_mode
 
     @property
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of 0x211, and what to check."""
         if self._foreign_id == _V1_STATE_ID:
             return "frames of protocol V1 came; this driver speaks V2"
@@ -149,7 +149,7 @@ class AgilexFeedback:
             return "0x221 came, but no 0x211"
         if self._foreign_id is not None:
             return f"only foreign frames came, such as 0x{self._foreign_id:X}; is this the base's bus?"
-        return self._no_frames()
+        return self._no_frames_hint()
 
     @property
     def missing_message(self) -> str:

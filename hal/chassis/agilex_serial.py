@@ -139,7 +139,7 @@ class AgilexSerialBus(DeviceWrapper):
             self._arrived.extend(self._reader.feed(data))
         return self._arrived.popleft() if self._arrived else None
 
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of any frame that was understood, and what to check."""
         if self._bytes_received == 0:
             return "not one byte came; check port, power and that RX and TX are crossed"

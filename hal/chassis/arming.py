@@ -23,14 +23,14 @@ class ArmingLimits:
 
     feedback_timeout_ns, status_timeout_ns: how long silence may last before the chassis counts as lost.
     arming_timeout_ns: how long arming may take.
-    stall_ns: the longest gap between two steps while armed. After a longer one the base may have stopped by
-    its own time-out, and resuming the old speed would be a jump.
+    max_step_gap_ns: the longest gap between two steps while armed. After a longer one the base may have
+    stopped by its own time-out, and resuming the old speed would be a jump.
     """
 
     feedback_timeout_ns: int
     status_timeout_ns: int
     arming_timeout_ns: int
-    stall_ns: int
+    max_step_gap_ns: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,26 +39,26 @@ class Evidence:
 
     link_error: "" while the link works.
     feedback_ns, status_ns: when the newest motion feedback and the newest status arrived (None: never).
-    disobeys: why the base does not take commands, by the newest status ("" when it takes them).
+    command_refusal: why the base does not take commands, by the newest status ("" when it takes them).
     stop_cause: why the robot must not move ("" for none).
     standing: measured speed is zero; False when unknown.
     command_is_zero: the setpoint of this step asks for no motion.
-    silence: while no status or no motion feedback was ever heard, what came instead and what to check.
+    silence_hint: while no status or no motion feedback was ever heard, what came instead and what to check.
     resettable: the base keeps stop_cause until arming resets it, so it prevents armed, but not arming.
-    unread: more was waiting than could be read, so what is known may be out of date.
+    input_overflow: more was waiting than could be read, so what is known may be out of date.
     """
 
     now_ns: int
     link_error: str
     feedback_ns: int | None
     status_ns: int | None
-    disobeys: str
+    command_refusal: str
     stop_cause: str
     standing: bool
     command_is_zero: bool
-    silence: str = ""
+    silence_hint: str = ""
     resettable: bool = False
-    unread: bool = False
+    input_overflow: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ def _next(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
         return _arming(state, evidence, limits)
     if state.mode is ChassisMode.ARMED:
         return _armed(state, evidence, limits)
-    if state.mode is ChassisMode.STOPPING and evidence.standing and evidence.disobeys:
+    if state.mode is ChassisMode.STOPPING and evidence.standing and evidence.command_refusal:
         return Arming(ChassisMode.STANDBY, "stopped", evidence.now_ns)
     return state
 
@@ -143,8 +143,8 @@ def _arming(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
         waiting = "no motion feedback heard from the base"
     elif evidence.stop_cause:
         waiting = evidence.stop_cause
-    elif evidence.disobeys:
-        waiting = f"the base does not take commands: {evidence.disobeys}"
+    elif evidence.command_refusal:
+        waiting = f"the base does not take commands: {evidence.command_refusal}"
     elif not evidence.command_is_zero:
         waiting = "the command is not zero"
     else:
@@ -152,17 +152,19 @@ def _arming(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
     if evidence.now_ns - state.since_ns > limits.arming_timeout_ns:
         waited_s = (evidence.now_ns - state.since_ns) / NS_PER_S
         cause = f"arming gave up after {waited_s:.1f} s: {waiting}" + (
-            evidence.silence and f": {evidence.silence}"
+            evidence.silence_hint and f": {evidence.silence_hint}"
         )
         return Arming(ChassisMode.STANDBY, cause, evidence.now_ns)
     return replace(state, cause=f"arming: {waiting}")
 
 
 def _armed(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
-    if evidence.disobeys:
-        return Arming(ChassisMode.ESTOP, f"the base no longer obeys: {evidence.disobeys}", evidence.now_ns)
+    if evidence.command_refusal:
+        return Arming(
+            ChassisMode.ESTOP, f"the base no longer obeys: {evidence.command_refusal}", evidence.now_ns
+        )
     gap_ns = evidence.now_ns - state.stepped_ns
-    if not 0 <= gap_ns <= limits.stall_ns:
+    if not 0 <= gap_ns <= limits.max_step_gap_ns:
         return Arming(
             ChassisMode.ESTOP,
             f"the control loop stood still for {gap_ns / NS_PER_MS:.0f} ms",
@@ -174,7 +176,7 @@ def _armed(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
 def _refusal(state: Arming, evidence: Evidence, limits: ArmingLimits) -> str:
     if state.mode is ChassisMode.STOPPING:
         return "still stopping"
-    if evidence.unread:
+    if evidence.input_overflow:
         return "more came than can be read at once, and it may be old; what floods the line?"
     if problem := _loss(evidence, limits) or ("" if evidence.resettable else evidence.stop_cause):
         return problem

@@ -34,9 +34,9 @@ class CommandLimits:
     max_yaw_rate_radps: float
     timeout_ns: int
 
-    def objection(self, setpoint: Setpoint | None, now_ns: int) -> str:
+    def setpoint_error(self, setpoint: Setpoint | None, now_ns: int) -> str:
         """Why this setpoint must stop the robot; "" if it need not. A speed above the limits is no
-        objection: fit() slows it down."""
+        error: fit() slows it down."""
         if setpoint is None:
             return ""
         if not (math.isfinite(setpoint.v_mps) and math.isfinite(setpoint.w_radps)):

@@ -35,7 +35,7 @@ class ChassisFeedback(Protocol):
     """What the base has reported. hal.types.ChassisState and arming.Evidence describe the fields.
 
     pose_ns: the time for which pose holds; None while there is no pose.
-    silence: what came instead of a status, and what to check.
+    silence_hint: what came instead of a status, and what to check.
     """
 
     @property
@@ -43,11 +43,11 @@ class ChassisFeedback(Protocol):
     @property
     def status_ns(self) -> int | None: ...
     @property
-    def disobeys(self) -> str: ...
+    def command_refusal(self) -> str: ...
     @property
     def stop_cause(self) -> str: ...
     @property
-    def silence(self) -> str: ...
+    def silence_hint(self) -> str: ...
     @property
     def v_mps(self) -> float: ...
     @property
@@ -79,7 +79,7 @@ class ChassisDriver(ABC):
         self._rolling_back = RollingBack()
         self._reverse_allowed = True
         self._requested: Setpoint | None = None
-        self._objection = ""
+        self._setpoint_error = ""
         self._link_error = ""
         self._retry_ns: int | None = None
         self._now_ns = 0
@@ -102,7 +102,7 @@ class ChassisDriver(ABC):
         the resolution of the protocol."""
         self._now_ns = now_ns
         self._requested = setpoint
-        self._objection = self._commands.objection(setpoint, now_ns)
+        self._setpoint_error = self._commands.setpoint_error(setpoint, now_ns)
         self._poll_link(now_ns)
         self._following.step(self._reported.pose, now_ns)
         self._rolling_back.step(self._reported.pose, now_ns, expected=self._reverse_allowed)
@@ -117,9 +117,9 @@ class ChassisDriver(ABC):
         """See hal.api.Chassis. The reason of a refusal is in the state's reason."""
         self._now_ns = now_ns
         # Read everything first: bytes of unknown age in the port must not count as an answer to this consent.
-        unread = all(self._poll_link(now_ns) for _ in range(_MAX_READS))
+        input_overflow = all(self._poll_link(now_ns) for _ in range(_MAX_READS))
         before = self._arming.mode
-        evidence = replace(self._evidence(now_ns), unread=unread)
+        evidence = replace(self._evidence(now_ns), input_overflow=input_overflow)
         self._arming = arming.consent(self._arming, evidence, self._limits)
         if self._arming.mode is not before:
             self._begin_arming()
@@ -165,9 +165,9 @@ class ChassisDriver(ABC):
         is unknown."""
         return ""
 
-    def _silence(self) -> str:
+    def _silence_hint(self) -> str:
         if self._reported.status_ns is None:
-            return self._reported.silence
+            return self._reported.silence_hint
         return self._missing_feedback() if self._reported.feedback_ns is None else ""
 
     def _poll_link(self, now_ns: int) -> bool:
@@ -212,14 +212,14 @@ class ChassisDriver(ABC):
             link_error=self._link_error,
             feedback_ns=feedback.feedback_ns,
             status_ns=feedback.status_ns,
-            disobeys=feedback.disobeys,
+            command_refusal=feedback.command_refusal,
             stop_cause=feedback.stop_cause
-            or self._objection
+            or self._setpoint_error
             or self._rolling_back.sentence
             or self._following.sentence,
             standing=feedback.standing,
             command_is_zero=is_zero(self._requested),
-            silence=self._silence(),
+            silence_hint=self._silence_hint(),
             resettable=self._resettable(),
         )
 

@@ -33,7 +33,7 @@ class KobukiChassis(ChassisDriver):
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             status_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
-            stall_ns=config.base_timeout_ms * NS_PER_MS,
+            max_step_gap_ns=config.base_timeout_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits)
         self._link = link

@@ -103,14 +103,14 @@ class KobukiFeedback:
         return math.nan if self._core is None else self._core.battery_v
 
     @property
-    def disobeys(self) -> str:
+    def command_refusal(self) -> str:
         """A Kobuki always takes commands, so this tells only whether it restarted since it was armed."""
         if not self._setup_requested:
             return "nobody asked it to"
         return "its clock or its ticks jumped: restarted" if self._restarted else ""
 
     @property
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of a frame with the basic sensors, and what to check."""
         if self.bytes_received == 0:
             return "not one byte came; check port, power and the switch on the base"

@@ -66,7 +66,7 @@ class RoboclawChassis(ChassisDriver):
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             status_timeout_ns=config.status_timeout_ms * NS_PER_MS,
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
-            stall_ns=config.timeout_ms * NS_PER_MS,
+            max_step_gap_ns=config.timeout_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits)
         self._config = config

@@ -35,7 +35,7 @@ class RoboclawFeedback(EncoderFeedback):
         self._unanswered: int | None = None
 
     @property
-    def disobeys(self) -> str:
+    def command_refusal(self) -> str:
         """Why the controller must not be driven: its time-out is not what was set, or it restarted; "" if it
         may be."""
         if not self._setup_requested:
@@ -51,7 +51,7 @@ class RoboclawFeedback(EncoderFeedback):
         return f"its time-out reads {self._timeout_ms} ms, not {self._config.timeout_ms} ms"
 
     @property
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of a status, and what to check."""
         if self.bytes_received == 0:
             return (

@@ -63,7 +63,7 @@ class RoboteqChassis(ChassisDriver):
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             status_timeout_ns=config.status_timeout_ms * NS_PER_MS,
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
-            stall_ns=config.watchdog_ms * NS_PER_MS,
+            max_step_gap_ns=config.watchdog_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits)
         self._link = link

@@ -35,7 +35,7 @@ class RoboteqFeedback(EncoderFeedback):
         self._echo_resumed = False
 
     @property
-    def disobeys(self) -> str:
+    def command_refusal(self) -> str:
         """Why the controller must not be driven: its watchdog is not what was set, it restarted, or it
         refuses commands; "" if it may be."""
         if not self._setup_requested:
@@ -53,7 +53,7 @@ class RoboteqFeedback(EncoderFeedback):
         return ""
 
     @property
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of a status, and what to check."""
         if self.bytes_received == 0:
             return "not one byte came; check port, power, baud and the crossed lines"

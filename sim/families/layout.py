@@ -127,7 +127,7 @@ def robot(random: Random, name: str, start: tuple[float, float], motion: MotionP
 
 
 def _first_heading_deg(start: tuple[float, float], motion: MotionPlan | None) -> float:
-    first = None if motion is None else next((one for one in motion.steps if isinstance(one, Go)), None)
+    first = None if motion is None else next((step for step in motion.steps if isinstance(step, Go)), None)
     if first is None:
         return 180.0
     return math.degrees(math.atan2(first.y_m - start[1], first.x_m - start[0]))

@@ -20,7 +20,7 @@ from config.chassis import (
     SerialLinkConfig,
 )
 from hal.api import CanLink, Chassis, SerialLink
-from hal.chassis.agilex import AgilexChassis, no_can_frames
+from hal.chassis.agilex import AgilexChassis, no_can_frames_hint
 from hal.chassis.agilex_models import model_of, over_serial
 from hal.chassis.agilex_serial import AgilexSerialBus
 from hal.chassis.kobuki import KobukiChassis
@@ -192,7 +192,7 @@ def agilex_rig(kind: str, link: CanLinkConfig | None = None, model: str = "bunke
     for RS-232."""
     can_bus = link or can_link_config()
     bus: AgilexLinkConfig = can_bus
-    no_frames = no_can_frames
+    no_frames_hint = no_can_frames_hint
     with ExitStack() as stack:
         if kind.startswith("serial-"):
             near, far = serial_ends(kind.removeprefix("serial-"))
@@ -200,7 +200,7 @@ def agilex_rig(kind: str, link: CanLinkConfig | None = None, model: str = "bunke
             serial_bus = AgilexSerialBus(serial_plug)
             ends: tuple[CanLink, CanLink] = serial_bus, AgilexSerialBus(far)
             plug: PluggedCan | PluggedSerial = serial_plug
-            bus, no_frames = SerialLinkConfig(url="loop://"), serial_bus.silence
+            bus, no_frames_hint = SerialLinkConfig(url="loop://"), serial_bus.silence_hint
         else:
             ends = can_pair() if kind == "scripted" else (CanBusLink(can_bus), CanBusLink(can_bus))
             plug = can_plug = PluggedCan(ends[0])
@@ -210,7 +210,7 @@ def agilex_rig(kind: str, link: CanLinkConfig | None = None, model: str = "bunke
             ends[1], TrackedPlant(PLANT), model=model_of(config), over_serial=over_serial(config)
         )
         stack.enter_context(emulator)
-        chassis = stack.enter_context(AgilexChassis(ends[0], config, no_frames))
+        chassis = stack.enter_context(AgilexChassis(ends[0], config, no_frames_hint))
         yield Rig(chassis, emulator, plug, own_timeout_s=0.5, battery_v=50.0)
 
 

@@ -81,7 +81,7 @@ class Trajectories:
             _, old, new = np.intersect1d(snapshot.ids, self._ids, assume_unique=True, return_indices=True)
             known = snapshot.depth_m[old] > 0.0
             old, new = old[known], new[known]
-            age = len(self._history) - next(i for i, one in enumerate(self._history) if one is snapshot)
+            age = len(self._history) - next(i for i, past in enumerate(self._history) if past is snapshot)
             if age < _MIN_AGE:
                 return
             if len(old) < 30:
@@ -114,8 +114,8 @@ def _group(pixels: Points, z_m: FloatArray, k: Intrinsics) -> list[Blob]:
         merged = np.unique(label[close[index]])
         label[np.isin(label, merged)] = merged[0]
     found = []
-    for one in np.unique(label):
-        members = label == one
+    for cluster_label in np.unique(label):
+        members = label == cluster_label
         if np.count_nonzero(members) < _MIN_TRAJECTORIES:
             continue
         low, high = pixels[members].min(axis=0) * SCALE, pixels[members].max(axis=0) * SCALE

@@ -37,7 +37,7 @@ def test_every_method_it_names_is_the_driver_s(method: str) -> None:
     assert hasattr(ChassisDriver, method)
 
 
-@pytest.mark.parametrize("word", ["disobeys", "stop_cause", "silence"])
+@pytest.mark.parametrize("word", ["command_refusal", "stop_cause", "silence_hint"])
 def test_what_told_asks_for(word: str) -> None:
     assert word in PAGE.quoted
     assert hasattr(ChassisFeedback, word)

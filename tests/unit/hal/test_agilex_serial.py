@@ -118,7 +118,7 @@ class Bench:
         config = agilex_config(
             SerialLinkConfig(url="loop://"), model="scout", track_width_m=None, slip_factor=1.0
         )
-        self.chassis = AgilexChassis(self.bus, config, self.bus.silence)
+        self.chassis = AgilexChassis(self.bus, config, self.bus.silence_hint)
         self.now_ns = 0
 
     def exchange(self, v_mps: float | None = None, *said: AgilexMessage) -> ChassisState:
