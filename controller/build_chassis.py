@@ -96,7 +96,7 @@ def build_serial_driver(config: AnyChassisConfig, link: SerialLink) -> Chassis:
     match config:
         case AgilexChassisConfig():
             bus = AgilexSerialBus(link)
-            return AgilexChassis(GuardedCanLink(bus, AGILEX_COMMANDS), config, bus.silence)
+            return AgilexChassis(GuardedCanLink(bus, AGILEX_COMMANDS), config, bus.silence_hint)
         case RoboclawChassisConfig():
             return RoboclawChassis(link, config)
         case RoboteqChassisConfig():

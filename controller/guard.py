@@ -17,7 +17,7 @@ from typing import Self
 from config.robot import Limits
 from hal.api import CanLink, Chassis
 from hal.clocks import NS_PER_MS, NS_PER_S
-from hal.enclosing import Enclosing
+from hal.device_wrapper import DeviceWrapper
 from hal.errors import LinkLost
 from hal.types import LATCHED_MODES, CanFrame, ChassisMode, ChassisState, Setpoint
 
@@ -133,7 +133,7 @@ def self_check(limits: GuardLimits) -> str:
     return ""
 
 
-class GuardedChassis(Enclosing):
+class GuardedChassis(DeviceWrapper):
     """hal.api.Chassis around another one."""
 
     def __init__(self, chassis: Chassis, limits: GuardLimits) -> None:
@@ -210,7 +210,7 @@ class GuardedChassis(Enclosing):
         return replace(state, mode=ChassisMode.ESTOP, reason=reason)
 
 
-class GuardedCanLink(Enclosing):
+class GuardedCanLink(DeviceWrapper):
     """hal.api.CanLink that sends nothing but the identifiers it was given, each with its length at most."""
 
     def __init__(self, link: CanLink, allowed: Mapping[int, int]) -> None:

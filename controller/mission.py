@@ -108,10 +108,10 @@ def drive_lockstep(
             result.take(step)
             for look in moment.looks:
                 result.timing.add(look.timing_ms)
-                run_recorder.saw(look)
-            run_recorder.decided(step)
+                run_recorder.add_look(look)
+            run_recorder.add_step(step)
             report(console, result, step)
-            if result.standstill.lasted_s(step.now_ns) >= runner.max_standing_s:
+            if result.standstill.elapsed_s(step.now_ns) >= runner.max_standing_s:
                 given_up = f"stood for runner.max_standing_s of {runner.max_standing_s:g} s"
                 loop.request_stop(given_up, Outcome.BROKEN_OFF)
             if stop:

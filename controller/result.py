@@ -77,7 +77,7 @@ class DriveResult:
         """Account for one control step."""
         self.first = self.first or step
         self.last = step
-        self.setpoints.add(step.chassis.sent, step.chassis.mode, stands=step.unanswered != "")
+        self.setpoints.add(step.chassis.sent, step.chassis.mode, standing=step.unanswered != "")
         self.standstill.add(step.setpoint)
         self.shaper_faults.add(step.fault)
         if step.unanswered:

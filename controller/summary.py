@@ -31,7 +31,7 @@ def report(console: Console, result: MissionResult, step: ControlStep) -> None:
     seconds = result.seconds(step)
     if stops is None:
         console.decision(seconds, step.decision, step.setpoint.v_mps)
-        console.standing(seconds, result.standstill.lasted_s(step.now_ns), step.decision)
+        console.standing(seconds, result.standstill.elapsed_s(step.now_ns), step.decision)
     else:
         console.stopping(seconds, step.setpoint.v_mps, stops)
     console.unanswered(seconds, step.unanswered)
@@ -42,7 +42,7 @@ def summary_rows(config: AppConfig, result: MissionResult) -> list[tuple[str, st
     """The summary as (subject, text)."""
     rows = [("mission", _mission_text(config, result)), ("target", _target_text(result))]
     if result.last is not None and result.loop.ending.outcome is not Outcome.REACHED:
-        stood_s = result.standstill.lasted_s(result.last.now_ns)
+        stood_s = result.standstill.elapsed_s(result.last.now_ns)
         if stood_s >= STUCK_S:
             rows.append(("standing", f"for the last {stood_s:.1f} s: {result.last.decision.reason.sentence}"))
     rows.extend(drive_rows(config, result))
@@ -65,7 +65,7 @@ def drive_rows(config: AppConfig, result: DriveResult) -> list[tuple[str, str]]:
     rows.append(("limits", _limits_text(config, result.setpoints)))
     if result.shaper_faults.count:
         rows.append(("shaper", result.shaper_faults.line()))
-    if result.complaints.told:
+    if result.complaints.reported:
         rows.append(("base", result.complaints.line()))
     rows.append(("perception", result.timing.line()))
     if result.frames.line():
@@ -145,5 +145,5 @@ def _limits_text(config: AppConfig, tally: SetpointTally) -> str:
 def _beyond_comfort(tally: SetpointTally) -> str:
     if not tally.emergency_count:
         return "kept by all"
-    by = f"{tally.harder_count} braked harder, {tally.sharper_count} had more jerk"
+    by = f"{tally.hard_braking_count} braked harder, {tally.high_jerk_count} had more jerk"
     return f"{tally.emergency_count} setpoints beyond: {by}"

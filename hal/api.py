@@ -11,7 +11,7 @@ from typing import Protocol, Self
 from hal.types import CanFrame, ChassisState, Intrinsics, Pose, RgbdFrame, Sender, Setpoint
 
 
-class Closing(Protocol):
+class Device(Protocol):
     """A device that is open between __enter__ and __exit__. __exit__ is safe in any state."""
 
     def __enter__(self) -> Self: ...
@@ -29,7 +29,7 @@ class Clock(Protocol):
     def sleep_until_ns(self, deadline_ns: int) -> None: ...
 
 
-class FrameSource(Closing, Protocol):
+class FrameSource(Device, Protocol):
     """A camera, simulated, recorded or real. Entering raises DeviceNotFound, DeviceRefused."""
 
     @property
@@ -55,7 +55,7 @@ class OdometrySource(Protocol):
         ...
 
 
-class Chassis(Closing, Protocol):
+class Chassis(Device, Protocol):
     """A tracked base, stepped by the control loop. It never waits, except briefly for a link to write."""
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
@@ -71,7 +71,7 @@ class Chassis(Closing, Protocol):
         ...
 
 
-class CanLink(Closing, Protocol):
+class CanLink(Device, Protocol):
     """A link that carries whole CAN frames. It knows nothing about the chassis."""
 
     def send(self, frame: CanFrame) -> None:
@@ -83,7 +83,7 @@ class CanLink(Closing, Protocol):
         ...
 
 
-class SerialLink(Closing, Protocol):
+class SerialLink(Device, Protocol):
     """A link that carries bytes. The protocol above does the framing."""
 
     def write(self, data: bytes) -> None:
@@ -95,7 +95,7 @@ class SerialLink(Closing, Protocol):
         ...
 
 
-class DatagramLink(Closing, Protocol):
+class DatagramLink(Device, Protocol):
     """A link that carries whole messages of other programs, in the order of their arrival."""
 
     def receive(self) -> tuple[bytes, Sender | None] | None:

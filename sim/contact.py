@@ -87,9 +87,9 @@ def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
     """The smallest distance from any corner (K, 2) to any edge of polygon (L, 2)."""
     edge = _sides(polygon)
     to_corner = corners[:, None] - polygon[None]
-    share = np.clip((to_corner * edge).sum(axis=2) / (edge * edge).sum(axis=1), 0.0, 1.0)
-    away = to_corner - share[:, :, None] * edge
-    return float(np.sqrt((away * away).sum(axis=2).min()))
+    fraction = np.clip((to_corner * edge).sum(axis=2) / (edge * edge).sum(axis=1), 0.0, 1.0)
+    offset = to_corner - fraction[:, :, None] * edge
+    return float(np.sqrt((offset * offset).sum(axis=2).min()))
 
 
 def _sides(polygon: FloatArray) -> FloatArray:

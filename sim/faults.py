@@ -12,7 +12,7 @@ class Window:
     start_s: float
     end_s: float
 
-    def holds(self, t_s: float) -> bool:
+    def contains(self, t_s: float) -> bool:
         """Whether t_s lies in the window."""
         return self.start_s <= t_s < self.end_s
 
@@ -41,7 +41,7 @@ class Faults:
 
     def late_by(self, t_s: float) -> float:
         """Seconds by which the scene of a frame exposed at t_s is late."""
-        return self.late_by_s if self.late is not None and self.late.holds(t_s) else 0.0
+        return self.late_by_s if self.late is not None and self.late.contains(t_s) else 0.0
 
     def blind_since(self, t_s: float, after_s: float = 0.0) -> float | None:
         """Since when the camera has shown nothing new at t_s, or within after_s before t_s; None if it does
@@ -51,10 +51,12 @@ class Faults:
                 return window.start_s
         return None
 
-    def strikes(self, t_s: float, after_s: float) -> bool:
+    def demands_stop(self, t_s: float, after_s: float) -> bool:
         """Whether a fault that must lead to a stop holds at t_s, or did within after_s before t_s."""
-        windows = [one for one in (self.silent, self.frozen, self.late) if one is not None]
-        if any(one.start_s <= t_s < one.end_s + after_s for one in windows):
+        windows = [
+            fault_window for fault_window in (self.silent, self.frozen, self.late) if fault_window is not None
+        ]
+        if any(fault_window.start_s <= t_s < fault_window.end_s + after_s for fault_window in windows):
             return True
         return self.feedback_lost_s is not None and t_s >= self.feedback_lost_s
 

@@ -65,7 +65,7 @@ class _Phase:
     accel_mps2: float
     yaw_rate_radps: float
     heading_rad: float
-    covered_m: float
+    distance_before_m: float
 
 
 class Trajectory:
@@ -75,14 +75,14 @@ class Trajectory:
         """shift_s moves the plan in time (the seed's jitter)."""
         self._phases: list[_Phase] = []
         self._cursor = start
-        self._covered_m = 0.0
+        self._distance_m = 0.0
         self._time_s = -math.inf
-        self._stand(start.heading_rad)
+        self._add_standstill(start.heading_rad)
         if motion is not None:
             self._time_s = motion.start_s + shift_s
             self._plan(motion)
         self._starts = [phase.start_s for phase in self._phases]
-        self._numbers: tuple[FloatArray, NDArray[np.bool_]] | None = None
+        self._phase_table: tuple[FloatArray, NDArray[np.bool_]] | None = None
 
     def at(self, t_s: float) -> MotionState:
         """The state at t_s. Before the first step the mover stands at the start, after the last at the
@@ -91,8 +91,8 @@ class Trajectory:
         leg = phase.leg
         dt_s = t_s - phase.start_s if math.isfinite(phase.start_s) else 0.0
         speed = phase.speed_mps + phase.accel_mps2 * dt_s
-        gone_m = phase.speed_mps * dt_s + 0.5 * phase.accel_mps2 * dt_s * dt_s
-        along_m = phase.along_m + gone_m
+        travelled_m = phase.speed_mps * dt_s + 0.5 * phase.accel_mps2 * dt_s * dt_s
+        along_m = phase.along_m + travelled_m
         c, s = math.cos(leg.heading_rad), math.sin(leg.heading_rad)
         if phase.yaw_rate_radps != 0.0 or leg.length_m == 0.0:
             heading, yaw_rate = phase.heading_rad + phase.yaw_rate_radps * dt_s, phase.yaw_rate_radps
@@ -105,18 +105,18 @@ class Trajectory:
             speed * c,
             speed * s,
             yaw_rate,
-            phase.covered_m + gone_m,
+            phase.distance_before_m + travelled_m,
         )
 
-    def over(self, times_s: FloatArray) -> FloatArray:
+    def sample(self, times_s: FloatArray) -> FloatArray:
         """The same as at() for times_s (T,), as (T, 5): x, y, heading, vx, vy."""
         phase = np.maximum(np.searchsorted(self._starts, times_s, side="right") - 1, 0)
-        numbers, rounded = self._table()
-        start, x, y, c, s, along, speed, accel, heading, yaw_rate = numbers[phase].T
-        since = np.where(np.isfinite(start), times_s - start, 0.0)
-        along = along + (speed * since + 0.5 * accel * since * since)
-        speed = speed + accel * since
-        heading = heading + yaw_rate * since
+        table, rounded = self._table()
+        start, x, y, c, s, along, speed, accel, heading, yaw_rate = table[phase].T
+        elapsed = np.where(np.isfinite(start), times_s - start, 0.0)
+        along = along + (speed * elapsed + 0.5 * accel * elapsed * elapsed)
+        speed = speed + accel * elapsed
+        heading = heading + yaw_rate * elapsed
         for k in np.flatnonzero(rounded[phase]).tolist():
             heading[k] = _rounded_heading(self._phases[phase[k]].leg, float(along[k]), float(speed[k]))[0]
         wrapped = (heading + math.pi) % (2.0 * math.pi) - math.pi
@@ -124,30 +124,30 @@ class Trajectory:
 
     def _table(self) -> tuple[FloatArray, NDArray[np.bool_]]:
         """The phases as numbers, (P, 10), and the phases (P,) in which the heading changes along the way."""
-        if self._numbers is None:
+        if self._phase_table is None:
             rows, rounded = [], []
-            for one in self._phases:
-                leg = one.leg
+            for phase in self._phases:
+                leg = phase.leg
                 c, s = math.cos(leg.heading_rad), math.sin(leg.heading_rad)
-                turns = one.yaw_rate_radps != 0.0 or leg.length_m == 0.0
-                heading = one.heading_rad if turns else leg.heading_rad
+                turns = phase.yaw_rate_radps != 0.0 or leg.length_m == 0.0
+                heading = phase.heading_rad if turns else leg.heading_rad
                 rows.append(
                     (
-                        one.start_s,
+                        phase.start_s,
                         leg.x_m,
                         leg.y_m,
                         c,
                         s,
-                        one.along_m,
-                        one.speed_mps,
-                        one.accel_mps2,
+                        phase.along_m,
+                        phase.speed_mps,
+                        phase.accel_mps2,
                         heading,
-                        one.yaw_rate_radps,
+                        phase.yaw_rate_radps,
                     )
                 )
                 rounded.append(not turns and (leg.turn_in_rad != 0.0 or leg.turn_out_rad != 0.0))
-            self._numbers = np.array(rows), np.array(rounded)
-        return self._numbers
+            self._phase_table = np.array(rows), np.array(rounded)
+        return self._phase_table
 
     @property
     def end_s(self) -> float:
@@ -160,31 +160,31 @@ class Trajectory:
             if isinstance(step, Go):
                 run.append(step)
                 continue
-            self._drive(run, motion)
+            self._add_run(run, motion)
             run = []
-            self._stand(self._cursor.heading_rad)
+            self._add_standstill(self._cursor.heading_rad)
             self._time_s += step.duration_s
-        self._drive(run, motion)
-        self._stand(self._cursor.heading_rad)
+        self._add_run(run, motion)
+        self._add_standstill(self._cursor.heading_rad)
 
-    def _stand(self, heading_rad: float) -> None:
+    def _add_standstill(self, heading_rad: float) -> None:
         leg = _Leg(self._cursor.x_m, self._cursor.y_m, heading_rad, 0.0, 0.0, 0.0, 0.0)
         self._add(leg, 0.0, 0.0, 0.0, 0.0)
 
     def _add(self, leg: _Leg, along_m: float, speed: float, accel: float, yaw_rate: float) -> None:
         heading = self._cursor.heading_rad
         self._phases.append(
-            _Phase(self._time_s, leg, along_m, speed, accel, yaw_rate, heading, self._covered_m)
+            _Phase(self._time_s, leg, along_m, speed, accel, yaw_rate, heading, self._distance_m)
         )
 
-    def _drive(self, run: list[Go], motion: MotionPlan) -> None:
+    def _add_run(self, run: list[Go], motion: MotionPlan) -> None:
         legs = self._legs(run)
         turn_rate = math.radians(motion.turn_rate_degps)
         junctions = _junction_speeds(legs, motion.accel_mps2)
         for index, leg in enumerate(legs):
             if leg.turn_in_rad == 0.0:
                 self._turn_to(leg, turn_rate)
-            self._cover(leg, junctions[index], junctions[index + 1], motion.accel_mps2)
+            self._add_leg(leg, junctions[index], junctions[index + 1], motion.accel_mps2)
 
     def _legs(self, run: list[Go]) -> list[_Leg]:
         """The runs between distinct points, with every corner up to the limit rounded."""
@@ -211,21 +211,21 @@ class Trajectory:
             self._time_s += abs(turn) / turn_rate_radps
         self._cursor = PlanarPose(leg.x_m, leg.y_m, leg.heading_rad)
 
-    def _cover(self, leg: _Leg, entry: float, leave: float, accel: float) -> None:
-        peak = min(leg.cruise_mps, math.sqrt(accel * leg.length_m + 0.5 * (entry**2 + leave**2)))
-        up_m = (peak**2 - entry**2) / (2.0 * accel)
-        down_m = (peak**2 - leave**2) / (2.0 * accel)
-        start_m = self._covered_m
+    def _add_leg(self, leg: _Leg, entry_mps: float, exit_mps: float, accel: float) -> None:
+        peak = min(leg.cruise_mps, math.sqrt(accel * leg.length_m + 0.5 * (entry_mps**2 + exit_mps**2)))
+        up_m = (peak**2 - entry_mps**2) / (2.0 * accel)
+        down_m = (peak**2 - exit_mps**2) / (2.0 * accel)
+        start_m = self._distance_m
         for along_m, speed, rate, duration_s in (
-            (0.0, entry, accel, (peak - entry) / accel),
+            (0.0, entry_mps, accel, (peak - entry_mps) / accel),
             (up_m, peak, 0.0, (leg.length_m - up_m - down_m) / peak),
-            (leg.length_m - down_m, peak, -accel, (peak - leave) / accel),
+            (leg.length_m - down_m, peak, -accel, (peak - exit_mps) / accel),
         ):
             if duration_s > 1e-12:
-                self._covered_m = start_m + along_m
+                self._distance_m = start_m + along_m
                 self._add(leg, along_m, speed, rate, 0.0)
                 self._time_s += duration_s
-        self._covered_m = start_m + leg.length_m
+        self._distance_m = start_m + leg.length_m
         c, s = math.cos(leg.heading_rad), math.sin(leg.heading_rad)
         self._cursor = PlanarPose(
             leg.x_m + leg.length_m * c,
@@ -245,22 +245,22 @@ def _junction_speeds(legs: list[_Leg], accel: float) -> list[float]:
         if abs(wrap_angle_rad(after.heading_rad - before.heading_rad)) < 1e-9:
             speeds[index + 1] = min(before.cruise_mps, after.cruise_mps)
     for index, leg in enumerate(legs):
-        reach = math.sqrt(speeds[index] ** 2 + 2.0 * accel * leg.length_m)
-        speeds[index + 1] = min(speeds[index + 1], reach)
+        reachable = math.sqrt(speeds[index] ** 2 + 2.0 * accel * leg.length_m)
+        speeds[index + 1] = min(speeds[index + 1], reachable)
     for index in range(len(legs) - 1, -1, -1):
-        reach = math.sqrt(speeds[index + 1] ** 2 + 2.0 * accel * legs[index].length_m)
-        speeds[index] = min(speeds[index], reach)
+        reachable = math.sqrt(speeds[index + 1] ** 2 + 2.0 * accel * legs[index].length_m)
+        speeds[index] = min(speeds[index], reachable)
     return speeds
 
 
 def _rounded_heading(leg: _Leg, along_m: float, speed: float) -> tuple[float, float]:
     """Heading and yaw rate on a leg. Half of a rounded corner is turned before the corner, half after it."""
     radius = min(_CORNER_RADIUS_M, 0.5 * leg.length_m)
-    left_m = leg.length_m - along_m
+    remaining_m = leg.length_m - along_m
     if leg.turn_in_rad != 0.0 and along_m < radius:
         rate_per_m = leg.turn_in_rad / radius
         return leg.heading_rad - leg.turn_in_rad + rate_per_m * along_m, rate_per_m * speed
-    if leg.turn_out_rad != 0.0 and left_m < radius:
+    if leg.turn_out_rad != 0.0 and remaining_m < radius:
         rate_per_m = leg.turn_out_rad / radius
-        return leg.heading_rad + leg.turn_out_rad - rate_per_m * left_m, rate_per_m * speed
+        return leg.heading_rad + leg.turn_out_rad - rate_per_m * remaining_m, rate_per_m * speed
     return leg.heading_rad, 0.0

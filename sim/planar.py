@@ -59,33 +59,33 @@ class PlanarWorld:
         self._movers: list[int] = np.flatnonzero(self.moves).tolist()
         self._still_polygons = np.empty((len(specs), self._corners, 2))
         for k, trajectory in enumerate(self._trajectories):
-            self._still_polygons[k] = self._place(trajectory.over(np.zeros(1)), k)
+            self._still_polygons[k] = self._place(trajectory.sample(np.zeros(1)), k)
         self.end_s = max((self._trajectories[k].end_s for k in self._movers), default=0.0)
-        self.foresee(np.zeros(1))
+        self.precompute(np.zeros(1))
 
     def __len__(self) -> int:
         return len(self.names)
 
-    def foresee(self, times_s: FloatArray) -> None:
-        """Compute the results of look() at times_s (T,) all at once, which is much cheaper than one by
+    def precompute(self, times_s: FloatArray) -> None:
+        """Compute the results of snapshot() at times_s (T,) all at once, which is much cheaper than one by
         one."""
         times_s = np.append(times_s[times_s < self.end_s], self.end_s)
-        self._foreseen_at = {t_s: k for k, t_s in enumerate(times_s.tolist())}
-        self._foreseen = self._all_at(times_s)
+        self._precomputed_rows = {t_s: k for k, t_s in enumerate(times_s.tolist())}
+        self._precomputed = self._all_at(times_s)
 
-    def look(self, t_s: float) -> tuple[FloatArray, FloatArray]:
+    def snapshot(self, t_s: float) -> tuple[FloatArray, FloatArray]:
         """Polygons (N, K, 2) and velocities (N, 2) of all bodies at t_s. Do not write to them."""
         t_s = min(t_s, self.end_s)
-        row, (polygons, velocity) = self._foreseen_at.get(t_s), self._foreseen
+        row, (polygons, velocity) = self._precomputed_rows.get(t_s), self._precomputed
         if row is None:
             row, (polygons, velocity) = 0, self._all_at(np.array([t_s]))
         return polygons[row], velocity[row]
 
-    def over(self, times_s: FloatArray, body: int) -> FloatArray:
+    def sample(self, times_s: FloatArray, body: int) -> FloatArray:
         """Polygons (T, K, 2) of one body at times_s (T,)."""
         if not self.moves[body]:
             return np.broadcast_to(self._still_polygons[body], (len(times_s), self._corners, 2))
-        return self._place(self._trajectories[body].over(times_s), body)
+        return self._place(self._trajectories[body].sample(times_s), body)
 
     def room_polygon(self) -> FloatArray:
         """The building's walls from the inside (4, 2)."""
@@ -98,7 +98,7 @@ class PlanarWorld:
         polygons = np.repeat(self._still_polygons[None], len(times_s), axis=0)
         velocity = np.zeros((len(times_s), len(self), 2))
         for body in self._movers:
-            states = self._trajectories[body].over(times_s)
+            states = self._trajectories[body].sample(times_s)
             polygons[:, body], velocity[:, body] = self._place(states, body), states[:, 3:]
         return polygons, velocity
 
@@ -121,10 +121,10 @@ class PlanarWorld:
 
     def _shape(self, body: int, speed_mps: float) -> FloatArray:
         """The outline (K, 2) at a speed. It is cached, because the speed rarely changes."""
-        known = self._shapes[body]
-        if speed_mps not in known:
-            known[speed_mps] = _padded(footprint(self._specs[body], speed_mps), self._corners)
-        return known[speed_mps]
+        cache = self._shapes[body]
+        if speed_mps not in cache:
+            cache[speed_mps] = _padded(footprint(self._specs[body], speed_mps), self._corners)
+        return cache[speed_mps]
 
 
 def footprint(spec: BodySpec, speed_mps: float) -> FloatArray:
@@ -181,8 +181,8 @@ def _widest_gap(a: FloatArray, b: FloatArray) -> float:
     """The widest gap between polygons (K, 2) and (L, 2) along the normals of the first one's edges."""
     widest = -math.inf
     for k in range(len(a)):
-        following = (k + 1) % len(a)
-        edge_x, edge_y = a[following, 0] - a[k, 0], a[following, 1] - a[k, 1]
+        next_corner = (k + 1) % len(a)
+        edge_x, edge_y = a[next_corner, 0] - a[k, 0], a[next_corner, 1] - a[k, 1]
         length = math.hypot(edge_x, edge_y)
         if length <= 1e-12:
             continue
@@ -199,13 +199,13 @@ def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
     """The smallest distance of corners (K, 2) from the edges of a polygon (L, 2)."""
     nearest = math.inf
     for j in range(len(polygon)):
-        following = (j + 1) % len(polygon)
-        edge_x, edge_y = polygon[following, 0] - polygon[j, 0], polygon[following, 1] - polygon[j, 1]
+        next_corner = (j + 1) % len(polygon)
+        edge_x, edge_y = polygon[next_corner, 0] - polygon[j, 0], polygon[next_corner, 1] - polygon[j, 1]
         square = max(edge_x * edge_x + edge_y * edge_y, 1e-24)
         for k in range(len(corners)):
             dx, dy = corners[k, 0] - polygon[j, 0], corners[k, 1] - polygon[j, 1]
-            share = min(max((dx * edge_x + dy * edge_y) / square, 0.0), 1.0)
-            dx, dy = dx - share * edge_x, dy - share * edge_y
+            fraction = min(max((dx * edge_x + dy * edge_y) / square, 0.0), 1.0)
+            dx, dy = dx - fraction * edge_x, dy - fraction * edge_y
             nearest = min(nearest, dx * dx + dy * dy)
     return math.sqrt(nearest)
 
@@ -214,10 +214,10 @@ def _corner_distance(corners: FloatArray, polygon: FloatArray) -> float:
 def _separation(a: FloatArray, b: FloatArray) -> FloatArray:
     gaps = np.empty(len(a))
     for p in range(len(a)):
-        one, other = a[p], b[p]
-        gaps[p] = max(_widest_gap(one, other), _widest_gap(other, one))
+        first, second = a[p], b[p]
+        gaps[p] = max(_widest_gap(first, second), _widest_gap(second, first))
         if gaps[p] > 0.0:
-            gaps[p] = min(_corner_distance(one, other), _corner_distance(other, one))
+            gaps[p] = min(_corner_distance(first, second), _corner_distance(second, first))
     return gaps
 
 
@@ -225,6 +225,6 @@ def _separation(a: FloatArray, b: FloatArray) -> FloatArray:
 def _overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
     touching = np.empty(len(a), np.bool_)
     for p in range(len(a)):
-        one, other = a[p], b[p]
-        touching[p] = _widest_gap(one, other) <= 0.0 and _widest_gap(other, one) <= 0.0
+        first, second = a[p], b[p]
+        touching[p] = _widest_gap(first, second) <= 0.0 and _widest_gap(second, first) <= 0.0
     return touching

@@ -23,7 +23,7 @@ from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Picture
 from sim.world import World
 
-_FAR_M = 10.0
+_MAX_DEPTH_M = 10.0
 _MAP_PX = (848, 480)
 
 
@@ -65,11 +65,11 @@ def pose_along(path: PathSpec, along_m: float) -> PlanarPose:
     length and angle."""
     pose = PlanarPose(path.start.x_m, path.start.y_m, math.radians(path.start.heading_deg))
     for segment in path.segments:
-        here_m = min(max(along_m, 0.0), segment.length_m)
+        advance_m = min(max(along_m, 0.0), segment.length_m)
         bend = 0.0
         if segment.kind == "arc":
             bend = math.radians(segment.angle_deg) / segment.length_m
-        pose = advance_pose(pose, here_m, bend * here_m, 1.0)
+        pose = advance_pose(pose, advance_m, bend * advance_m, 1.0)
         along_m -= segment.length_m
     return pose
 
@@ -86,7 +86,7 @@ def sheet(frame: RgbdFrame, picture: Picture, world: World, robot: Robot, pose: 
 def depth_colours(frame: RgbdFrame) -> ColourImage:
     """Depth in colours: near is blue, far is red, no data is black."""
     metres = frame.depth * frame.depth_scale_m
-    grey = np.clip(metres / _FAR_M * 255.0, 0, 255).astype(np.uint8)
+    grey = np.clip(metres / _MAX_DEPTH_M * 255.0, 0, 255).astype(np.uint8)
     colours = np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_TURBO), dtype=np.uint8)
     colours[frame.depth == 0] = 0
     return colours

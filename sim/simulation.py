@@ -6,7 +6,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from config.robot import Body
-from hal.api import Closing
+from hal.api import Device
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
 from sim.contact import Clearance, nearest_body
@@ -17,7 +17,7 @@ from sim.world import World
 CHECK_PERIOD_NS = NS_PER_S // 200
 
 
-class Emulator(Closing, Protocol):
+class Emulator(Device, Protocol):
     """A chassis emulator: answers on its link as the real base would."""
 
     @property
@@ -60,7 +60,7 @@ class Referee:
         self._world = world
         self._body = body
         self._start_ns = start_ns
-        self._touching: str | None = None
+        self._touched_name: str | None = None
         self.contacts: list[str] = []
         self.closest: Clearance | None = None
 
@@ -69,9 +69,9 @@ class Referee:
         now = nearest_body(self._world, self._body, pose, (now_ns - self._start_ns) / NS_PER_S)
         if self.closest is None or now.distance_m < self.closest.distance_m:
             self.closest = now
-        if now.touches and self._touching != now.name:
+        if now.touches and self._touched_name != now.name:
             self.contacts.append(now.name)
-        self._touching = now.name if now.touches else None
+        self._touched_name = now.name if now.touches else None
 
 
 class Simulation:

@@ -86,36 +86,38 @@ class World:
         parts = [(BUILDING_ID, build_room(scenario.room))]
         parts.extend((body.id, faces) for body in still for faces in _placed_parts(body, 0.0))
         fixed = join([faces for _, faces in parts])
-        swung = [(body.id, faces) for body in self._movers for faces in body.model.parts]
-        moving = join([faces for _, faces in swung])
+        moving_parts = [(body.id, faces) for body in self._movers for faces in body.model.parts]
+        moving = join([faces for _, faces in moving_parts])
         self._last_poses: dict[int, tuple[MotionState, FloatArray, FloatArray]] = {}
         self._compile(fixed, moving)
         self._still_count = len(fixed)
-        owners = [id_ for id_, faces in (*parts, *swung) for _ in range(len(faces))]
+        owners = [id_ for id_, faces in (*parts, *moving_parts) for _ in range(len(faces))]
         self._body_of_face = np.array(owners, dtype=np.uint16)
-        part_sizes = [len(faces) for _, faces in swung]
+        part_sizes = [len(faces) for _, faces in moving_parts]
         self._part_of_face = np.repeat(np.arange(len(part_sizes)), part_sizes)
 
     def _compile(self, fixed: Faces, moving: Faces) -> None:
         keys = fixed.textures + moving.textures
         self.textures: tuple[str, ...] = tuple(dict.fromkeys(keys))
-        number = {key: index for index, key in enumerate(self.textures)}
-        self._texture_of_face = np.array([number[key] for key in keys], dtype=np.int32)
+        index_of = {key: index for index, key in enumerate(self.textures)}
+        self._texture_of_face = np.array([index_of[key] for key in keys], dtype=np.int32)
         self._windows = np.concatenate([fixed.windows, moving.windows])
         self._corners = np.concatenate([fixed.corners_m, moving.corners_m])
         self._normals = normals(self._corners)
 
     def geometry(self, t_s: float) -> Geometry:
         """Every face at t_s."""
-        corners, outward = self._corners.copy(), self._normals.copy()
+        corners, rotated_normals = self._corners.copy(), self._normals.copy()
         if self._movers:
             rotations, translations = self._part_poses(t_s)
-            which, first = self._part_of_face, self._still_count
-            turn = rotations[which]
-            corners[first:] = np.matmul(self._corners[first:], turn.transpose(0, 2, 1))
-            corners[first:] += translations[which][:, None, :]
-            outward[first:] = np.matmul(turn, self._normals[first:, :, None])[:, :, 0]
-        return Geometry(corners, outward, self._windows, self._texture_of_face, self._body_of_face)
+            part_index, first_moving = self._part_of_face, self._still_count
+            rotation = rotations[part_index]
+            corners[first_moving:] = np.matmul(self._corners[first_moving:], rotation.transpose(0, 2, 1))
+            corners[first_moving:] += translations[part_index][:, None, :]
+            rotated_normals[first_moving:] = np.matmul(rotation, self._normals[first_moving:, :, None])[
+                :, :, 0
+            ]
+        return Geometry(corners, rotated_normals, self._windows, self._texture_of_face, self._body_of_face)
 
     def bodies(self, t_s: float) -> tuple[BodyState, ...]:
         """Every body at t_s, in the scenario's order."""

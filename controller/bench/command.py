@@ -59,7 +59,7 @@ class Plan:
     recording_passes: how often perception runs over the recording.
     pictures: number of rendered pictures.
     control_steps: number of control steps and of exchanges of each driver.
-    stretch_s: simulated duration of the lock-step mission.
+    duration_s: simulated duration of the lock-step mission.
     """
 
     mission: FilePath = CONFIG_DIR / "sim.yaml"
@@ -69,7 +69,7 @@ class Plan:
     recording_passes: int = 6
     pictures: int = 60
     control_steps: int = 500
-    stretch_s: float = 10.0
+    duration_s: float = 10.0
 
 
 _stopwatches = Stopwatches(processor_ns=time.process_time_ns, elapsed_ns=time.perf_counter_ns)
@@ -78,7 +78,7 @@ _stopwatches = Stopwatches(processor_ns=time.process_time_ns, elapsed_ns=time.pe
 def run_bench(frames: int, json_path: FilePath | None) -> None:
     """Measure, print tables, write json_path if given. frames: of each simulated reel. Raises UserError."""
     if json_path is not None:
-        _prepare(json_path)
+        _check_writable(json_path)
     with one_opencv_thread():
         report = measure_all(Plan(frames=frames))
     for line in report.lines():
@@ -95,7 +95,7 @@ def run_bench(frames: int, json_path: FilePath | None) -> None:
 
 def measure_all(plan: Plan) -> BenchReport:
     """Run all measurements. Raises ConfigError, HalError."""
-    began_s, began_cpu_s = time.perf_counter(), time.process_time()
+    start_s, start_cpu_s = time.perf_counter(), time.process_time()
     config = load_app(plan.mission)
     perception = {f"simulated_{w}x{h}": _simulated_reel_figures(config, plan, w, h) for w, h in plan.sizes}
     if plan.recording.is_dir():
@@ -106,7 +106,7 @@ def measure_all(plan: Plan) -> BenchReport:
     lockstep = _lockstep_figures(config, plan)
     return BenchReport(
         taken_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        cpu_share=(time.process_time() - began_cpu_s) / (time.perf_counter() - began_s),
+        cpu_share=(time.process_time() - start_cpu_s) / (time.perf_counter() - start_s),
         machine=describe_machine(),
         perception=perception,
         renderer=renderer,
@@ -116,7 +116,7 @@ def measure_all(plan: Plan) -> BenchReport:
     )
 
 
-def _prepare(json_path: FilePath) -> None:
+def _check_writable(json_path: FilePath) -> None:
     """Check before measuring, not after it, that the figures can be written. Raises UserError."""
     try:
         json_path.parent.mkdir(parents=True, exist_ok=True)
@@ -193,6 +193,6 @@ def _base(config: AppConfig, plan: Plan) -> tuple[TimedChassis, Emulator]:
 
 
 def _lockstep_figures(config: AppConfig, plan: Plan) -> LockstepFigures:
-    steps = round(plan.stretch_s * config.runner.control_rate_hz)
+    steps = round(plan.duration_s * config.runner.control_rate_hz)
     with progress("lock-step mission", steps) as tick:
-        return measure_lockstep(config, plan.mission, plan.stretch_s, _stopwatches, tick)
+        return measure_lockstep(config, plan.mission, plan.duration_s, _stopwatches, tick)

@@ -10,19 +10,19 @@ from controller.bench.busy_scene import OBSTACLES, busy_scene
 from controller.bench.figures import Durations
 from controller.bench.reel import Tick
 from controller.control import ControlLoop
-from hal.api import Chassis, Closing
+from hal.api import Chassis, Device
 from hal.clocks import NS_PER_S
-from hal.enclosing import Enclosing
+from hal.device_wrapper import DeviceWrapper
 from hal.types import ChassisMode, ChassisState, Setpoint
 from sim.simulation import Emulator
 
 PERIOD_NS = NS_PER_S // 50  # of the control step
 _FRAME_NS = NS_PER_S // 30
 _LATENCY_NS = NS_PER_S * 60 // 1000  # from the exposure of a frame to its scene
-_ARM_STEPS = 250  # a base that takes more steps to arm will never arm, so the bench gives up
+_MAX_ARM_STEPS = 250  # a base that takes more steps to arm will never arm, so the bench gives up
 
 
-class TimedChassis(Enclosing):
+class TimedChassis(DeviceWrapper):
     """A chassis whose exchanges are timed. spent_ns: duration of the last one."""
 
     def __init__(self, chassis: Chassis, stopwatch_ns: Callable[[], int]) -> None:
@@ -33,9 +33,9 @@ class TimedChassis(Enclosing):
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """See hal.api.Chassis."""
-        started_ns = self._stopwatch_ns()
+        start_ns = self._stopwatch_ns()
         state = self._chassis.exchange(setpoint, now_ns)
-        self.spent_ns = self._stopwatch_ns() - started_ns
+        self.spent_ns = self._stopwatch_ns() - start_ns
         return state
 
     def arm(self, now_ns: int) -> None:
@@ -74,24 +74,26 @@ def measure_control(
     """
     spent_ns: list[int] = []
     with emulator, chassis:
-        for index in range(steps + _ARM_STEPS):
+        for index in range(steps + _MAX_ARM_STEPS):
             now_ns = index * PERIOD_NS
             emulator.advance_to(now_ns)
             sequence = max(now_ns - _LATENCY_NS, 0) // _FRAME_NS
             captured_ns = sequence * _FRAME_NS
             scene = busy_scene(captured_ns, sequence, loop.localiser.body_pose(captured_ns))
-            started_ns = stopwatch_ns()
-            done = loop.step(scene, now_ns)
-            step_ns = stopwatch_ns() - started_ns
-            if done.chassis.mode is ChassisMode.ARMED:
+            start_ns = stopwatch_ns()
+            result = loop.step(scene, now_ns)
+            step_ns = stopwatch_ns() - start_ns
+            if result.chassis.mode is ChassisMode.ARMED:
                 spent_ns.append(step_ns - chassis.spent_ns)
                 tick()
             if len(spent_ns) == steps:
                 return ControlFigures(OBSTACLES, Durations.of(spent_ns))
-    raise RuntimeError(f"the emulated base obeyed in {len(spent_ns)} of {steps + _ARM_STEPS} control steps")
+    raise RuntimeError(
+        f"the emulated base obeyed in {len(spent_ns)} of {steps + _MAX_ARM_STEPS} control steps"
+    )
 
 
-class Answering(Closing, Protocol):
+class EmulatedBase(Device, Protocol):
     """The base at the other end of the link."""
 
     def advance_to(self, now_ns: int) -> None:
@@ -101,24 +103,24 @@ class Answering(Closing, Protocol):
 
 def measure_exchange(
     chassis: TimedChassis,
-    emulator: Answering,
+    emulator: EmulatedBase,
     exchanges: int,
     tick: Tick,
-    carry: Callable[[], None] = lambda: None,
+    wait_for_link: Callable[[], None] = lambda: None,
 ) -> Durations:
     """Time exchanges with an armed base that drives a bend at 0.5 m/s, without the emulator's own work.
 
-    carry: waits until what was written at one end of the link has arrived at the other.
+    wait_for_link: waits until what was written at one end of the link has arrived at the other.
     Raises RuntimeError if the emulated base does not arm, which is a bug in the program.
     """
     spent_ns: list[int] = []
     with emulator, chassis:
         chassis.arm(0)
-        for index in range(exchanges + _ARM_STEPS):
+        for index in range(exchanges + _MAX_ARM_STEPS):
             now_ns = index * PERIOD_NS
-            carry()
+            wait_for_link()
             emulator.advance_to(now_ns)
-            carry()
+            wait_for_link()
             # Accelerates at 0.25 m/s^2, because the output guard does not let a jump in speed pass.
             v_mps = min(0.005 * len(spent_ns), 0.5)
             setpoint = Setpoint(now_ns, v_mps, 0.0, 0.4 * v_mps)
@@ -128,4 +130,6 @@ def measure_exchange(
                 tick()
             if len(spent_ns) == exchanges:
                 return Durations.of(spent_ns)
-    raise RuntimeError(f"the emulated base obeyed in {len(spent_ns)} of {exchanges + _ARM_STEPS} exchanges")
+    raise RuntimeError(
+        f"the emulated base obeyed in {len(spent_ns)} of {exchanges + _MAX_ARM_STEPS} exchanges"
+    )

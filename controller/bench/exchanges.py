@@ -28,7 +28,7 @@ from sim.plant import TrackedPlant
 from sim.simulation import Emulator
 
 _ORIGIN = PlanarPose(0.0, 0.0, 0.0)
-_CARRIED_NS = 100_000  # within this time the kernel passes on the bytes of a pseudo-terminal
+_PTY_DELAY_NS = 100_000  # within this time the kernel passes on the bytes of a pseudo-terminal
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +55,11 @@ def _in_memory(config: AppConfig) -> tuple[Chassis, Emulator]:
 def _on_bus(link: CanLinkConfig) -> Callable[[AppConfig], tuple[Chassis, Emulator]]:
     def build(config: AppConfig) -> tuple[Chassis, Emulator]:
         assert config.simulation is not None
-        inside = {
+        changes = {
             "chassis": config.chassis.model_copy(update={"link": link}),
             "simulation": config.simulation.model_copy(update={"base": "emulated"}),
         }
-        chassis, emulator = build_base(config.model_copy(update=inside), _ORIGIN, 0)
+        chassis, emulator = build_base(config.model_copy(update=changes), _ORIGIN, 0)
         assert emulator is not None, "it is emulated"
         return chassis, emulator
 
@@ -112,16 +112,16 @@ def _measure(
     wire: Wire, config: AppConfig, exchanges: int, stopwatch_ns: Callable[[], int], tick: Tick
 ) -> Durations:
     chassis, emulator = wire.build(config)
-    wait = _wait if wire.asynchronous else _go_on
+    wait = _wait if wire.asynchronous else _no_wait
     return measure_exchange(TimedChassis(chassis, stopwatch_ns), emulator, exchanges, tick, wait)
 
 
 def _wait() -> None:
     # Does not sleep, because the next measurement would then begin with cold caches.
-    ends_ns = time.perf_counter_ns() + _CARRIED_NS
-    while time.perf_counter_ns() < ends_ns:
+    end_ns = time.perf_counter_ns() + _PTY_DELAY_NS
+    while time.perf_counter_ns() < end_ns:
         os.sched_yield()
 
 
-def _go_on() -> None:
+def _no_wait() -> None:
     """Do not wait: what was sent has arrived."""

@@ -57,13 +57,13 @@ class LockstepFigures:
 
 
 def measure_lockstep(
-    config: AppConfig, config_path: FilePath, stretch_s: float, stopwatches: Stopwatches, tick: Tick
+    config: AppConfig, config_path: FilePath, duration_s: float, stopwatches: Stopwatches, tick: Tick
 ) -> LockstepFigures:
-    """Drive the first stretch_s of the mission in config, without recording. Start-up is not counted."""
+    """Drive the first duration_s of the mission in config, without recording. Start-up is not counted."""
     clock = SimulatedClock()
     runner = config.runner
     assert isinstance(runner, LockstepRunner), "the bench drives a simulated mission"
-    runner = runner.model_copy(update={"max_duration_s": stretch_s})
+    runner = runner.model_copy(update={"max_duration_s": duration_s})
     chassis, emulator = build_base(config, build_path(config, config_path).start, clock.now_ns())
     assert emulator is not None, "lock-step is refused by AppConfig without an emulated base"
     simulation = build_simulation(config, config_path, emulator, clock.now_ns())

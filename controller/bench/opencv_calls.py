@@ -26,7 +26,7 @@ class OpenCvCall:
     args: tuple[Any, ...]
     kwargs: dict[str, Any]
 
-    def fresh(self) -> OpenCvCall:
+    def copied(self) -> OpenCvCall:
         """The same call with copied arguments, because some functions write into their arguments."""
         args, kwargs = copy.deepcopy((self.args, self.kwargs))
         return OpenCvCall(self.name, args, kwargs)
@@ -36,7 +36,7 @@ class OpenCvCall:
         return getattr(cv2, self.name)(*self.args, **self.kwargs)
 
 
-class OpenCvStandIn:
+class OpenCvProxy:
     """Replaces cv2; passes every function call to on_call, which must make the call.
 
     Classes and constants are passed through. Methods of OpenCV objects are not intercepted.
@@ -50,20 +50,20 @@ class OpenCvStandIn:
         if not callable(real) or isinstance(real, type):
             return real
 
-        def caught(*args: Any, **kwargs: Any) -> Any:
+        def intercepted(*args: Any, **kwargs: Any) -> Any:
             return self._on_call(name, real, args, kwargs)
 
-        setattr(self, name, caught)
-        return caught
+        setattr(self, name, intercepted)
+        return intercepted
 
 
 @contextmanager
-def stand_in_for_cv2(modules: Sequence[ModuleType], on_call: OnCall) -> Iterator[None]:
+def intercept_cv2(modules: Sequence[ModuleType], on_call: OnCall) -> Iterator[None]:
     """Inside the block, OpenCV calls of these modules go to on_call."""
     users = [module for module in modules if getattr(module, "cv2", None) is cv2]
-    stand_in = OpenCvStandIn(on_call)
+    proxy = OpenCvProxy(on_call)
     for module in users:
-        vars(module)["cv2"] = stand_in
+        vars(module)["cv2"] = proxy
     try:
         yield
     finally:
@@ -77,10 +77,10 @@ def recorded_calls(modules: Sequence[ModuleType]) -> Iterator[list[OpenCvCall]]:
     calls: list[OpenCvCall] = []
 
     def record(name: str, real: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        calls.append(OpenCvCall(name, args, kwargs).fresh())
+        calls.append(OpenCvCall(name, args, kwargs).copied())
         return real(*args, **kwargs)
 
-    with stand_in_for_cv2(modules, record):
+    with intercept_cv2(modules, record):
         yield calls
 
 
@@ -90,7 +90,7 @@ def time_bare(calls: Sequence[OpenCvCall], stopwatch_ns: Callable[[], int]) -> d
     Copying the arguments is not counted; freeing the results is.
     """
     spent_ns: dict[str, int] = {}
-    for call in [call.fresh() for call in calls]:
+    for call in [call.copied() for call in calls]:
         function, args, kwargs = getattr(cv2, call.name), call.args, call.kwargs
         started_ns = stopwatch_ns()
         function(*args, **kwargs)

@@ -13,7 +13,14 @@ from config.perception import FragmentSettings
 from controller.bench.figures import Durations, Stopwatches, median_ratio
 from controller.bench.opencv_calls import recorded_calls, time_bare
 from controller.bench.reel import Reel, Tick
-from controller.bench.stages import Spent, StageFigures, StageWatch, modules_of, summarise, watched
+from controller.bench.stages import (
+    FunctionTime,
+    StageFigures,
+    StageTimer,
+    modules_of,
+    summarise,
+    timed_functions,
+)
 from controller.bench.whole_images import WholeImages
 from hal.types import Pose, RgbdFrame
 from vision.perception import Perception
@@ -31,7 +38,7 @@ class FrameTime:
 
 
 @dataclass
-class SideBySide:
+class PairedTimes:
     """Times of each frame for perception and for OpenCV alone; the same index is the same frame.
 
     detect_ns, track_ns: processor time of the two steps of perception.
@@ -133,26 +140,26 @@ def measure_perception(
     tick: called twice a frame and pass.
     """
     modules = modules_of(vision)
-    side = SideBySide()
+    times = PairedTimes()
     for _ in range(passes):
-        run_side_by_side(reel, make, settings, modules, stopwatches, side, tick)
-    spent: list[dict[str, Spent]] = []
+        run_side_by_side(reel, make, settings, modules, stopwatches, times, tick)
+    spent: list[dict[str, FunctionTime]] = []
     for _ in range(passes):
-        spent.extend(run_watched(reel, make, modules, stopwatches.processor_ns, tick))
-    total, bare = Durations.of(side.total_ns), Durations.of(side.bare_ns)
-    whole = Durations.of(side.whole_ns)
+        spent.extend(time_functions(reel, make, modules, stopwatches.processor_ns, tick))
+    total, bare = Durations.of(times.total_ns), Durations.of(times.bare_ns)
+    whole = Durations.of(times.whole_ns)
     return PerceptionFigures(
         total=total,
-        elapsed=Durations.of(side.elapsed_ns),
-        detect=Durations.of(side.detect_ns),
-        track=Durations.of(side.track_ns),
+        elapsed=Durations.of(times.elapsed_ns),
+        detect=Durations.of(times.detect_ns),
+        track=Durations.of(times.track_ns),
         bare=bare,
         whole=whole,
-        first=Durations.of(side.first_ns),
+        first=Durations.of(times.first_ns),
         ratio_of_medians=total.median_ms / bare.median_ms,
-        median_ratio=median_ratio(side.total_ns, side.bare_ns),
+        median_ratio=median_ratio(times.total_ns, times.bare_ns),
         ratio_to_whole=total.median_ms / whole.median_ms,
-        opencv=_slowest_first({name: Durations.of(ns) for name, ns in side.opencv_ns.items()}),
+        opencv=_slowest_first({name: Durations.of(ns) for name, ns in times.opencv_ns.items()}),
         modules=summarise(spent, group=_module_of),
         functions=summarise(spent),
     )
@@ -164,7 +171,7 @@ def run_side_by_side(
     settings: FragmentSettings,
     modules: Sequence[ModuleType],
     stopwatches: Stopwatches,
-    result: SideBySide,
+    result: PairedTimes,
     tick: Tick,
 ) -> None:
     """Process every frame four times, and add the times to result.
@@ -191,21 +198,21 @@ def run_side_by_side(
         tick()
 
 
-def run_watched(
+def time_functions(
     reel: Reel,
     make: MakePerception,
     modules: Sequence[ModuleType],
     stopwatch_ns: Callable[[], int],
     tick: Tick,
-) -> list[dict[str, Spent]]:
+) -> list[dict[str, FunctionTime]]:
     """Time of every function of modules, frame by frame, without the first frame."""
-    watch = StageWatch(stopwatch_ns)
-    spent: list[dict[str, Spent]] = []
-    with watched(modules, watch):
+    timer = StageTimer(stopwatch_ns)
+    spent: list[dict[str, FunctionTime]] = []
+    with timed_functions(modules, timer):
         perception = make()
         for frame, odometry in zip(reel.frames, reel.odometry, strict=True):
             perception.perceive(frame, odometry, None)
-            spent.append(watch.take())
+            spent.append(timer.take())
             tick()
     return spent[1:]
 

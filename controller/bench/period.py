@@ -34,8 +34,8 @@ from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 
 PERIOD_NS = 20_000_000
 _SETTLE_S = 2.0  # the first commands are not counted, until the processes have settled
-_BEFORE_DRIVING_S = 8.0  # allowance for the start, on top of the measurement
-_FLOOD_FPS = 300.0  # fast enough that perception never waits for a frame
+_START_ALLOWANCE_S = 8.0  # allowance for the start, on top of the measurement
+_SATURATION_FPS = 300.0  # fast enough that perception never waits for a frame
 _SPEED_MPS = 0.25  # slow enough that the path is long enough for the measurement
 _CONFIG = CONFIG_DIR / "hil-agilex.yaml"
 _STAT = FilePath("/proc/stat")
@@ -84,7 +84,7 @@ def run_period_bench(seconds: float) -> None:
     for name, priority in (("ordinary", 0), ("SCHED_FIFO", 50)):
         _print_row(name, partial(measure_period, priority, seconds))
     # This process keeps the real-time scheduling of the second drive.
-    _print_row("SCHED_FIFO, empty loop", partial(measure_floor, clock, seconds))
+    _print_row("SCHED_FIFO, empty loop", partial(measure_empty_loop, clock, seconds))
     say(
         "off: distance of one period from 20 ms. empty loop: nothing but waiting for the next 20 ms, so it\n"
         "shows what is the machine's. load: average of the minute. stolen: processor time that the host of\n"
@@ -111,7 +111,7 @@ def stolen_s(stat: FilePath) -> float:
         return math.nan
 
 
-def measure_floor(clock: Clock, seconds: float) -> PeriodFigures:
+def measure_empty_loop(clock: Clock, seconds: float) -> PeriodFigures:
     """The period of a loop that only waits, which shows the machine's own jitter."""
     deadline_ns = clock.now_ns()
     woken_ns = []
@@ -124,21 +124,21 @@ def measure_floor(clock: Clock, seconds: float) -> PeriodFigures:
 
 def measure_period(priority: int, seconds: float) -> PeriodFigures:
     """Measure one drive of this length. priority: of SCHED_FIFO; 0: ordinary scheduling. Raises UserError."""
-    config, runner = _flooded(load_app(_CONFIG), priority, seconds + _SETTLE_S + _BEFORE_DRIVING_S)
+    config, runner = _saturated_config(load_app(_CONFIG), priority, seconds + _SETTLE_S + _START_ALLOWANCE_S)
     link = config.chassis.link
     assert isinstance(link, CanLinkConfig), "the bench drives over CAN"
     with _emulator(link), handlers_kept():
         result = drive_realtime(config, runner, MissionOptions(_CONFIG, quiet=True), Console(quiet=True))
     assert result.punctuality is not None, "a real-time drive has one"
     commanded_ns = result.punctuality.commanded_ns
-    began_ns = commanded_ns[0] + round(_SETTLE_S * NS_PER_S) if commanded_ns else 0
-    kept = [stamp_ns for stamp_ns in commanded_ns if 0 <= stamp_ns - began_ns <= seconds * NS_PER_S]
-    if len(kept) < 0.5 * seconds * NS_PER_S / PERIOD_NS:
-        raise UserError(f"only {len(kept)} commands in {seconds:g} s: {result.loop.ending.stop_reason}")
-    return PeriodFigures.of(kept)
+    start_ns = commanded_ns[0] + round(_SETTLE_S * NS_PER_S) if commanded_ns else 0
+    counted_ns = [stamp_ns for stamp_ns in commanded_ns if 0 <= stamp_ns - start_ns <= seconds * NS_PER_S]
+    if len(counted_ns) < 0.5 * seconds * NS_PER_S / PERIOD_NS:
+        raise UserError(f"only {len(counted_ns)} commands in {seconds:g} s: {result.loop.ending.stop_reason}")
+    return PeriodFigures.of(counted_ns)
 
 
-def _flooded(config: AppConfig, priority: int, seconds: float) -> tuple[AppConfig, RealtimeRunner]:
+def _saturated_config(config: AppConfig, priority: int, seconds: float) -> tuple[AppConfig, RealtimeRunner]:
     """The configuration with a bus of its own, a low speed, and a camera that never lets perception wait."""
     assert isinstance(config.runner, RealtimeRunner)
     assert isinstance(config.camera, SimulatedCameraConfig)
@@ -147,7 +147,7 @@ def _flooded(config: AppConfig, priority: int, seconds: float) -> tuple[AppConfi
     link = config.chassis.link.model_copy(update={"port": 20_000 + os.getpid() % 40_000})
     changes = {
         "runner": runner,
-        "camera": config.camera.model_copy(update={"fps": _FLOOD_FPS}),
+        "camera": config.camera.model_copy(update={"fps": _SATURATION_FPS}),
         "robot": config.robot.model_copy(update={"limits": limits}),
         "chassis": config.chassis.model_copy(update={"link": link}),
     }
@@ -158,8 +158,8 @@ def _flooded(config: AppConfig, priority: int, seconds: float) -> tuple[AppConfi
 def _emulator(link: CanLinkConfig) -> Iterator[None]:
     """Run `treadwatch emulate agilex` as its own process. Raises UserError if it does not start."""
     command = [sys.executable, "-m", "controller", "emulate", "agilex", "--port", str(link.port)]
-    pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-    with subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=pipe, text=True) as process:
+    pipe, devnull = subprocess.PIPE, subprocess.DEVNULL
+    with subprocess.Popen(command, stdin=devnull, stdout=devnull, stderr=pipe, text=True) as process:
         try:
             assert process.stderr is not None
             ready = process.stderr.readline()

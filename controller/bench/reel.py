@@ -34,21 +34,21 @@ def cruise(path: Path, stamp_ns: int) -> PlanarPose:
 
 def render_reel(camera: FrameSource, path: Path, mount: CameraMount, frames: int, tick: Tick) -> Reel:
     """Frames of a simulated camera on a robot that drives along path from time zero of the camera's clock."""
-    taken: list[RgbdFrame] = []
+    frames_read: list[RgbdFrame] = []
     with camera:
         for _ in range(frames):
-            taken.append(camera.read(_TIMEOUT_S))
+            frames_read.append(camera.read(_TIMEOUT_S))
             tick()
-    odometry = (camera_in_floor(cruise(path, frame.captured_ns), mount) for frame in taken)
-    return Reel(tuple(taken), tuple(odometry), mount)
+    odometry = (camera_in_floor(cruise(path, frame.captured_ns), mount) for frame in frames_read)
+    return Reel(tuple(frames_read), tuple(odometry), mount)
 
 
 def recorded_reel(camera: FrameSource, mount: CameraMount | None) -> Reel:
     """All frames of a recording, without odometry. mount: None if it is not known."""
-    taken: list[RgbdFrame] = []
+    frames_read: list[RgbdFrame] = []
     with camera:
         while True:
             try:
-                taken.append(camera.read(_TIMEOUT_S))
+                frames_read.append(camera.read(_TIMEOUT_S))
             except EndOfStream:
-                return Reel(tuple(taken), (None,) * len(taken), mount)
+                return Reel(tuple(frames_read), (None,) * len(frames_read), mount)

@@ -14,9 +14,9 @@ from controller.bench.rendering import RendererFigures
 from controller.bench.stages import StageFigures
 
 SCHEMA = 1  # version of the JSON layout
-_NAME = 34  # width of the name column, in characters
+_NAME_WIDTH = 34  # width of the name column, in characters
 # Rows of the stage table that are below this in every column appear in the JSON file only.
-_SHOWN_MS = 0.02
+_MIN_SHOWN_MS = 0.02
 _BUSY_SHARE = 0.9  # with less than this share of a core, the machine counts as busy
 
 
@@ -79,7 +79,7 @@ class BenchReport:
 
     def _other_lines(self) -> Iterator[str]:
         size = f"{self.renderer.width}x{self.renderer.height}"
-        yield f"{'milliseconds of processor time':{_NAME}}  median     p99"
+        yield f"{'milliseconds of processor time':{_NAME_WIDTH}}  median     p99"
         yield _row(f"renderer, {size}, {self.renderer.faces:.0f} faces", self.renderer.picture)
         yield _row("renderer with the sensor's noise", self.renderer.exposure)
         yield _row(f"control step, {self.control.obstacles} obstacles", self.control.step)
@@ -95,7 +95,7 @@ class BenchReport:
 
 def _perception_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
     yield (
-        f"{'perception, milliseconds a frame':{_NAME}}  median     p99  detect   track"
+        f"{'perception, milliseconds a frame':{_NAME_WIDTH}}  median     p99  detect   track"
         "  bare OpenCV   ratio  by frame  whole images   ratio   first  elapsed     p99"
     )
     for name, figures in reels.items():
@@ -114,27 +114,27 @@ def _perception_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
 def _stage_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
     """Each stage's own time and that of its OpenCV calls, for each reel; then the OpenCV functions alone."""
     width = max(17, *(len(name) for name in reels))
-    heads = "".join(f"  {name.replace('_', ' ', 1):>{width}}" for name in reels)
-    yield f"{'stage, own + OpenCV':{_NAME}}{heads}"
+    headings = "".join(f"  {name.replace('_', ' ', 1):>{width}}" for name in reels)
+    yield f"{'stage, own + OpenCV':{_NAME_WIDTH}}{headings}"
     for module in _rows([figures.modules for figures in reels.values()]):
         cells = (figures.modules.get(module) for figures in reels.values())
-        yield f"{module:{_NAME}}" + "".join(f"  {_stage_cell(cell):>{width}}" for cell in cells)
-    yield f"{'bare OpenCV':{_NAME}}{heads}"
+        yield f"{module:{_NAME_WIDTH}}" + "".join(f"  {_stage_cell(cell):>{width}}" for cell in cells)
+    yield f"{'bare OpenCV':{_NAME_WIDTH}}{headings}"
     functions = dict.fromkeys(name for figures in reels.values() for name in figures.opencv)
     for function in functions:
         times = (figures.opencv.get(function) for figures in reels.values())
         cells_text = ("" if time is None else f"{time.median_ms:.2f}" for time in times)
-        yield f"{'cv2.' + function:{_NAME}}" + "".join(f"  {text:>{width}}" for text in cells_text)
+        yield f"{'cv2.' + function:{_NAME_WIDTH}}" + "".join(f"  {text:>{width}}" for text in cells_text)
 
 
 def _rows(columns: list[dict[str, StageFigures]]) -> list[str]:
-    """Names that reach _SHOWN_MS in any column, in the order of the first column."""
+    """Names that reach _MIN_SHOWN_MS in any column, in the order of the first column."""
     return list(
         dict.fromkeys(
             name
             for column in columns
             for name, stage in column.items()
-            if stage.own_ms + stage.opencv_ms >= _SHOWN_MS
+            if stage.own_ms + stage.opencv_ms >= _MIN_SHOWN_MS
         )
     )
 
@@ -145,4 +145,4 @@ def _stage_cell(stage: StageFigures | None) -> str:
 
 def _row(name: str, durations: Durations) -> str:
     digits = 2 if durations.median_ms >= 1.0 else 3
-    return f"{name:{_NAME}}{durations.median_ms:8.{digits}f}{durations.p99_ms:8.{digits}f}"
+    return f"{name:{_NAME_WIDTH}}{durations.median_ms:8.{digits}f}{durations.p99_ms:8.{digits}f}"

@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from controller.bench.opencv_calls import stand_in_for_cv2
+from controller.bench.opencv_calls import intercept_cv2
 from hal.clocks import NS_PER_MS
 
 
 @dataclass(slots=True)
-class Spent:
+class FunctionTime:
     """Time of one function.
 
     calls: how often it was called.
@@ -38,17 +38,17 @@ class Spent:
 
 
 @dataclass
-class StageWatch:
+class StageTimer:
     """Adds up times by function name. While an inner function runs, the outer one is not charged."""
 
     stopwatch_ns: Callable[[], int]
-    spent: defaultdict[str, Spent] = field(default_factory=lambda: defaultdict(Spent))
+    spent: defaultdict[str, FunctionTime] = field(default_factory=lambda: defaultdict(FunctionTime))
     _running: list[str] = field(default_factory=list)
     _mark_ns: int = 0
 
-    def take(self) -> dict[str, Spent]:
+    def take(self) -> dict[str, FunctionTime]:
         """The times since the last call."""
-        spent, self.spent = dict(self.spent), defaultdict(Spent)
+        spent, self.spent = dict(self.spent), defaultdict(FunctionTime)
         return spent
 
     def run(
@@ -86,7 +86,8 @@ class StageWatch:
 
 @dataclass(frozen=True, slots=True)
 class StageFigures:
-    """A function or a group of them per frame: mean number of calls, medians of the times as in Spent."""
+    """A function or a group of them per frame: mean number of calls, medians of the times as in
+    FunctionTime."""
 
     calls: float
     own_ms: float
@@ -102,7 +103,7 @@ class StageFigures:
 
 
 def summarise(
-    frames: Sequence[Mapping[str, Spent]], group: Callable[[str], str] = lambda name: name
+    frames: Sequence[Mapping[str, FunctionTime]], group: Callable[[str], str] = lambda name: name
 ) -> dict[str, StageFigures]:
     """Figures over all frames by group, the one with the most own time first.
 
@@ -132,7 +133,7 @@ def modules_of(package: ModuleType) -> tuple[ModuleType, ...]:
 
 
 @contextmanager
-def watched(modules: Sequence[ModuleType], watch: StageWatch) -> Iterator[None]:
+def timed_functions(modules: Sequence[ModuleType], timer: StageTimer) -> Iterator[None]:
     """Inside the block, watch times every function and method of modules, and their OpenCV calls.
 
     Methods whose names begin with two underscores are not wrapped; their time counts as their caller's.
@@ -141,8 +142,8 @@ def watched(modules: Sequence[ModuleType], watch: StageWatch) -> Iterator[None]:
     try:
         for holder, name, function in _functions(modules):
             undo.append((holder, name, function))
-            setattr(holder, name, _timed(function, watch))
-        with stand_in_for_cv2(modules, watch.run_opencv):
+            setattr(holder, name, _timed(function, timer))
+        with intercept_cv2(modules, timer.run_opencv):
             yield
     finally:
         for holder, name, original in undo:
@@ -167,11 +168,11 @@ def _functions(modules: Sequence[ModuleType]) -> list[tuple[Any, str, FunctionTy
     return found
 
 
-def _timed(function: FunctionType, watch: StageWatch) -> Callable[..., Any]:
+def _timed(function: FunctionType, timer: StageTimer) -> Callable[..., Any]:
     name = f"{function.__module__}.{function.__qualname__}"
 
     @functools.wraps(function)
     def timed(*args: Any, **kwargs: Any) -> Any:
-        return watch.run(name, function, args, kwargs)
+        return timer.run(name, function, args, kwargs)
 
     return timed

@@ -28,7 +28,7 @@ from controller.build import (
     surroundings,
 )
 from controller.build_chassis import build_base
-from controller.campaign.drive import DriveLog
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.noise_mission import GIVE_UP_S
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
@@ -54,11 +54,11 @@ _NO_RECORDING = RecordingOptions(timed=False)
 
 
 @runtime_checkable
-class _Freezes(Protocol):
+class _Freezable(Protocol):
     def freeze(self) -> None: ...
 
 
-class SpoiledCamera:
+class FaultyCamera:
     """A simulated camera with faults; a FrameSource for the lockstep runner."""
 
     def __init__(self, camera: SimulatedCamera, faults: Faults, glass_ids: tuple[int, ...]) -> None:
@@ -69,7 +69,7 @@ class SpoiledCamera:
     def next_capture_ns(self) -> int:
         """The time of the next frame that is not lost."""
         silent = self._faults.silent
-        while silent is not None and silent.holds(self._camera.next_capture_ns / NS_PER_S):
+        while silent is not None and silent.contains(self._camera.next_capture_ns / NS_PER_S):
             self._camera.lose_frame()
         return self._camera.next_capture_ns
 
@@ -77,14 +77,14 @@ class SpoiledCamera:
         """The next frame, with faults, as perception gets it. Raises FrameTimeout."""
         frame = self._camera.read(timeout_s)
         frozen = self._faults.frozen
-        if frozen is not None and self._last is not None and frozen.holds(frame.captured_ns / NS_PER_S):
+        if frozen is not None and self._last is not None and frozen.contains(frame.captured_ns / NS_PER_S):
             frame = replace(frame, colour=self._last.colour, depth=self._last.depth)
         elif self._glass_ids:
-            frame = self._blinded(frame)
+            frame = self._without_glass_depth(frame)
         self._last = frame
         return frame
 
-    def _blinded(self, frame: RgbdFrame) -> RgbdFrame:
+    def _without_glass_depth(self, frame: RgbdFrame) -> RgbdFrame:
         """The frame without depth on glass."""
         picture = self._camera.last_picture
         assert picture is not None, "a frame that was read has a picture behind it"
@@ -97,7 +97,7 @@ def drive_camera(stage: Stage, config: AppConfig, policy: str, keep: FilePath | 
     with TemporaryDirectory(prefix="treadwatch-") as folder:
         scenario = FilePath(folder) / "scenario.yaml"
         scenario.write_text(scenario_yaml(stage), encoding="utf-8")
-        return _drive(stage, _with_world(config, stage, scenario), scenario, policy, keep)
+        return _drive(stage, _mission_config(config, stage, scenario), scenario, policy, keep)
 
 
 def scenario_yaml(stage: Stage) -> str:
@@ -106,7 +106,7 @@ def scenario_yaml(stage: Stage) -> str:
     return yaml.safe_dump(content, sort_keys=False)
 
 
-def _with_world(config: AppConfig, stage: Stage, scenario: FilePath) -> AppConfig:
+def _mission_config(config: AppConfig, stage: Stage, scenario: FilePath) -> AppConfig:
     """The configuration with this mission's world and slip."""
     assert isinstance(config.runner, LockstepRunner), "checked by controller/campaign/command.py"
     faults = stage.case.faults
@@ -134,9 +134,9 @@ def _drive(
     true_camera = open_simulated_camera(
         config, scenario, clock, lambda _stamp_ns: simulation.body_pose, clock.now_ns()
     )
-    camera = SpoiledCamera(true_camera, stage.case.faults, _glass_ids(stage))
+    camera = FaultyCamera(true_camera, stage.case.faults, _glass_ids(stage))
     loop = _control_loop(stage, config, policy, path, chassis)
-    options = _NO_RECORDING if keep is None else recording_in(keep, stage)
+    options = _NO_RECORDING if keep is None else prepare_recording(keep, stage)
     log = DriveLog(SetpointTally(config.robot.limits, 1.0 / config.runner.control_rate_hz))
     with ExitStack() as devices:
         devices.enter_context(simulation)
@@ -144,27 +144,32 @@ def _drive(
         devices.enter_context(true_camera)
         recorder = RunRecorder(devices.enter_context(open_recorder(options, surroundings(config))), path)
         perceiver = build_perceiver(config, loop.localiser, loop.localiser.body_pose, time.perf_counter_ns)
-        watch = _Watch(stage, simulation, log)
+        monitor = _ProgressMonitor(stage, simulation, log)
         for moment in run_lockstep(
             config.runner, clock, simulation, camera, perceiver, loop, stage.case.faults.late_by
         ):
             for look in moment.looks:
-                recorder.saw(look)
-            recorder.decided(moment.control)
+                recorder.add_look(look)
+            recorder.add_step(moment.control)
             t_s = moment.control.now_ns / NS_PER_S
-            lost_s = stage.case.faults.feedback_lost_s
-            if lost_s is not None and t_s >= lost_s and isinstance(emulator, _Freezes):
-                emulator.freeze()
+            _freeze_if_feedback_lost(emulator, stage, t_s)
             armed = moment.control.chassis.mode is ChassisMode.ARMED
-            watch.step(t_s, armed)
-            log.add(t_s, simulation.body_pose, watch.s_m, watch.v_mps, moment.control.decision)
+            monitor.step(t_s, armed)
+            log.add(t_s, simulation.body_pose, monitor.s_m, monitor.v_mps, moment.control.decision)
             log.setpoints.add(moment.control.chassis.sent, moment.control.chassis.mode)
-            if watch.given_up:
+            if monitor.given_up:
                 break
         recorder.finish()
     if loop.ending.outcome is Outcome.REACHED:
-        log.reached_s = log.times_s[-1] - SETTLE_S - watch.armed_s
+        log.reached_s = log.times_s[-1] - SETTLE_S - monitor.armed_s
     return log
+
+
+def _freeze_if_feedback_lost(emulator: object, stage: Stage, t_s: float) -> None:
+    """Freeze the emulator, so that it reports nothing, once the mission's fault takes its feedback away."""
+    lost_s = stage.case.faults.feedback_lost_s
+    if lost_s is not None and t_s >= lost_s and isinstance(emulator, _Freezable):
+        emulator.freeze()
 
 
 def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chassis: Chassis) -> ControlLoop:
@@ -181,7 +186,7 @@ def _control_loop(stage: Stage, config: AppConfig, policy: str, path: Path, chas
     )
 
 
-def recording_in(folder: FilePath, stage: Stage) -> RecordingOptions:
+def prepare_recording(folder: FilePath, stage: Stage) -> RecordingOptions:
     """Make the folder, write the mission's world into it, and return options to record there. Raises
     UserError."""
     try:
@@ -200,13 +205,13 @@ def _glass_ids(stage: Stage) -> tuple[int, ...]:
     return tuple(k + 1 for k, name in enumerate(names) if name in stage.case.faults.glass)
 
 
-class _Watch:
+class _ProgressMonitor:
     """The true position and speed of the robot along its path, and whether anything will still happen."""
 
     def __init__(self, stage: Stage, simulation: Simulation, log: DriveLog) -> None:
         self._stage, self._simulation, self._log = stage, simulation, log
         self.s_m, self.v_mps, self.armed_s = 0.0, 0.0, math.nan
-        self._before: tuple[float, PlanarPose] | None = None
+        self._previous: tuple[float, PlanarPose] | None = None
         self._standing_s = 0.0
 
     @property
@@ -222,9 +227,9 @@ class _Watch:
         self.s_m = self._stage.path.project(pose, self.s_m).s_m
         if armed and math.isnan(self.armed_s):
             self.armed_s = t_s
-        if self._before is not None:
-            dt_s = t_s - self._before[0]
-            way_m = math.hypot(pose.x_m - self._before[1].x_m, pose.y_m - self._before[1].y_m)
-            self.v_mps = way_m / dt_s
+        if self._previous is not None:
+            dt_s = t_s - self._previous[0]
+            travelled_m = math.hypot(pose.x_m - self._previous[1].x_m, pose.y_m - self._previous[1].y_m)
+            self.v_mps = travelled_m / dt_s
             self._standing_s = self._standing_s + dt_s if self.v_mps < _STANDING_MPS else 0.0
-        self._before = (t_s, pose)
+        self._previous = (t_s, pose)

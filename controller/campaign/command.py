@@ -14,7 +14,7 @@ import click
 
 from config.app import AppConfig, LockstepRunner, load_app
 from controller.campaign.judge import Row
-from controller.campaign.plan import Mission, missions, run_here, run_there
+from controller.campaign.plan import Mission, missions, run_local, run_on_cluster
 from controller.campaign.policies import OURS, POLICY_NAMES
 from controller.campaign.report import write_report
 from controller.campaign.store import MissionStore
@@ -57,7 +57,7 @@ def run_campaign(options: CampaignOptions) -> int:
     config = load_app(options.config_path)
     _check(options, config)
     if options.only is not None:
-        return _run_one(options, config, _mission_of(options.only))
+        return _run_one(options, config, _parse_mission(options.only))
     assert options.report is not None
     families = options.families or FAMILY_NAMES
     policies = options.policies or POLICY_NAMES
@@ -66,10 +66,12 @@ def run_campaign(options: CampaignOptions) -> int:
     _check_modes(options, store)
     keep = options.report / FAILING if options.video else None
     tasks = []
-    for one in missions(options.missions, families, options.seed):
-        left = tuple(name for name in policies if (one.family, one.seed, name) not in store.rows)
-        if left:
-            tasks.append(Task(one.family, one.seed, left, options.mode, config, keep))
+    for mission in missions(options.missions, families, options.seed):
+        missing_policies = tuple(
+            name for name in policies if (mission.family, mission.seed, name) not in store.rows
+        )
+        if missing_policies:
+            tasks.append(Task(mission.family, mission.seed, missing_policies, options.mode, config, keep))
     began_s = time.perf_counter()
     try:
         _run_all(options, tasks, store)
@@ -78,7 +80,7 @@ def run_campaign(options: CampaignOptions) -> int:
         raise Interrupted(f"{done}; the same command with --resume goes on") from None
     store.rewrite()
     summary = write_report(options.report, store.rows.values(), command_line(options))
-    _say(summary, len(tasks), time.perf_counter() - began_s, options.report)
+    _print_summary(summary, len(tasks), time.perf_counter() - began_s, options.report)
     return int(any(failed(row) for row in store.rows.values() if row.policy == OURS))
 
 
@@ -96,8 +98,8 @@ def _run_all(options: CampaignOptions, tasks: list[Task], store: MissionStore) -
 
 def _execute(options: CampaignOptions, tasks: list[Task]) -> Generator[list[Row], None, None]:
     if options.scheduler is not None:
-        return run_there(tasks, options.scheduler)
-    return run_here(tasks, options.workers)
+        return run_on_cluster(tasks, options.scheduler)
+    return run_local(tasks, options.workers)
 
 
 def _check(options: CampaignOptions, config: AppConfig) -> None:
@@ -128,7 +130,7 @@ def _check_modes(options: CampaignOptions, store: MissionStore) -> None:
         )
 
 
-def _mission_of(text: str) -> Mission:
+def _parse_mission(text: str) -> Mission:
     family, _, seed = text.partition(":")
     if family not in FAMILY_NAMES or not seed.isdecimal():
         raise UserError(
@@ -147,13 +149,13 @@ def _run_one(options: CampaignOptions, config: AppConfig, mission: Mission) -> i
     task = Task(mission.family, mission.seed, policies, options.mode, config, keep, keep_all=True)
     rows = run_task(task)
     for row in rows:
-        say(line_of(row))
+        say(format_row(row))
     if keep is not None:
         say(f"recording     {keep}")
     return int(any(failed(row) for row in rows))
 
 
-def line_of(row: Row) -> str:
+def format_row(row: Row) -> str:
     """A row as a line of text."""
     if row.time_s is None:
         took = "not reached" if row.expected else "not reached, as it should be"
@@ -177,14 +179,15 @@ def command_line(options: CampaignOptions) -> str:
     return " ".join(parts)
 
 
-def _say(summary: Summary, count: int, took_s: float, folder: Path) -> None:
-    for name, one in summary.policies.items():
-        median = markdown.fixed(math.nan if one.ratio_median is None else one.ratio_median, 2)
-        p90 = markdown.fixed(math.nan if one.ratio_p90 is None else one.ratio_p90, 2)
+def _print_summary(summary: Summary, count: int, took_s: float, folder: Path) -> None:
+    for name, totals in summary.policies.items():
+        median = markdown.fixed(math.nan if totals.ratio_median is None else totals.ratio_median, 2)
+        p90 = markdown.fixed(math.nan if totals.ratio_p90 is None else totals.ratio_p90, 2)
         say(
-            f"{name:<8} {one.missions} missions, reached {one.reached}/{one.expected}, "
-            f"contacts {one.contacts} ({one.contacts_at_fault} at fault), time x{median} (p90 x{p90}), "
-            f"false stops {one.false_stops}, flaps {one.flaps}, outside limits {one.limit_violations}"
+            f"{name:<8} {totals.missions} missions, reached {totals.reached}/{totals.expected}, "
+            f"contacts {totals.contacts} ({totals.contacts_at_fault} at fault), time x{median} (p90 x{p90}), "
+            f"false stops {totals.false_stops}, flaps {totals.flaps}, "
+            f"outside limits {totals.limit_violations}"
         )
     if count:
         say(f"speed    {count} missions in {took_s:.1f} s: {count / took_s:.1f} a second")

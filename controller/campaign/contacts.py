@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.campaign.drive import DriveLog
-from controller.campaign.stage import Stage, circles_around, reach_of
+from controller.campaign.drive_log import DriveLog
+from controller.campaign.stage import Stage, body_radius, enclosing_circles
 from hal.compiled import compiled
 from hal.types import FloatArray
 from sim.planar import separation
 
 # Two bodies approach each other by less than this between two control steps.
-_BETWEEN_STEPS_M = 0.15
+_MAX_APPROACH_M = 0.15
 _SUBSTEPS = 4
 _STRIDE, _ROUNDING_M = 10, 1e-9
 
@@ -35,18 +35,18 @@ def _moved_m(polygons: FloatArray, stride: int) -> FloatArray:
     one."""
     moved = np.empty(len(polygons))
     for t in range(len(polygons)):
-        since, square = t // stride * stride, 0.0
+        reference, square = t // stride * stride, 0.0
         for k in range(polygons.shape[1]):
-            dx = polygons[t, k, 0] - polygons[since, k, 0]
-            dy = polygons[t, k, 1] - polygons[since, k, 1]
+            dx = polygons[t, k, 0] - polygons[reference, k, 0]
+            dy = polygons[t, k, 1] - polygons[reference, k, 1]
             square = max(square, dx * dx + dy * dy)
         moved[t] = math.sqrt(square)
     return moved
 
 
 class DriveClearance:
-    """Distances between the robot and all bodies at its height over the whole drive. least_m: the
-    smallest."""
+    """Distances between the robot and all bodies at its height over the whole drive.
+    min_distance_m: the smallest."""
 
     def __init__(self, stage: Stage, log: DriveLog) -> None:
         self._stage, self._log = stage, log
@@ -55,77 +55,80 @@ class DriveClearance:
         # Headings are interpolated between steps, so they must not jump from half a turn to minus half a
         # turn.
         self._poses[:, 2] = np.unwrap(self._poses[:, 2])
-        self.least_m = math.inf
+        self.min_distance_m = math.inf
         self._contacts: list[Contact] = []
         bodies = np.flatnonzero(stage.in_height).tolist()
-        around = {body: self._around(body, self._times, self._poses) for body in bodies}
+        bounding_gaps = {body: self._bounding_gaps(body, self._times, self._poses) for body in bodies}
         # The nearest first. Of the others, only times at which they may come even nearer are computed
         # exactly.
-        for body in sorted(bodies, key=lambda body: float(around[body][1].min(initial=math.inf))):
-            self._look_at(body, *around[body])
+        for body in sorted(bodies, key=lambda body: float(bounding_gaps[body][1].min(initial=math.inf))):
+            self._check_body(body, *bounding_gaps[body])
 
     def contacts(self) -> list[Contact]:
         """All contacts in the order of time."""
-        return sorted(self._contacts, key=lambda one: (one.t_s, one.body))
+        return sorted(self._contacts, key=lambda contact: (contact.t_s, contact.body))
 
-    def _look_at(self, body: int, polygons: FloatArray, gap: FloatArray) -> None:
-        gap = self._gap(polygons, gap, self._poses, _BETWEEN_STEPS_M)
-        close = gap < _BETWEEN_STEPS_M
+    def _check_body(self, body: int, polygons: FloatArray, gap: FloatArray) -> None:
+        gap = self._refine_gaps(polygons, gap, self._poses, _MAX_APPROACH_M)
+        close = gap < _MAX_APPROACH_M
         if close.any():
             # Look between the steps, too, where a contact is possible.
-            times, poses = self._between(close)
-            between = self._gap(*self._around(body, times, poses), poses, math.inf)
-            self._note(body, times, between)
+            times, poses = self._interpolate(close)
+            between = self._refine_gaps(*self._bounding_gaps(body, times, poses), poses, math.inf)
+            self._record_contacts(body, times, between)
             gap = np.append(gap, between)
-        self.least_m = min(self.least_m, float(gap.min(initial=math.inf)))
+        self.min_distance_m = min(self.min_distance_m, float(gap.min(initial=math.inf)))
 
-    def _around(self, body: int, times: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _bounding_gaps(
+        self, body: int, times: FloatArray, poses: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """The body's polygons (T, K, 2), and the distances (T,) between circles around it and the robot."""
-        polygons = self._stage.world.over(times, body)
-        x, y, radius = circles_around(polygons).T
-        reach = reach_of(self._stage.robot.body)
+        polygons = self._stage.world.sample(times, body)
+        x, y, radius = enclosing_circles(polygons).T
+        reach = body_radius(self._stage.robot.body)
         return polygons, np.hypot(x - poses[:, 0], y - poses[:, 1]) - radius - reach
 
-    def _gap(
+    def _refine_gaps(
         self, polygons: FloatArray, gap: FloatArray, poses: FloatArray, exact_below_m: float
     ) -> FloatArray:
         """Distances (T,). Where they are too large to matter, gap (the distance of the circles) is kept, or
         inf if something else is certainly nearer."""
-        near = np.flatnonzero(gap < max(min(self.least_m, 2.0), min(exact_below_m, 2.0)))
+        near = np.flatnonzero(gap < max(min(self.min_distance_m, 2.0), min(exact_below_m, 2.0)))
         if not len(near):
             return gap
-        robots, others = self._stage.robots(poses[near]), polygons[near]
+        robots, others = self._stage.robot_polygons(poses[near]), polygons[near]
         # Every tenth step first. Until the next of these, the distance shrinks at most as corners move.
         sampled = separation(robots[::_STRIDE], others[::_STRIDE])
         moved = _moved_m(robots, _STRIDE) + _moved_m(others, _STRIDE)
-        at_least = sampled[np.arange(len(near)) // _STRIDE] - moved
-        matters = (
-            at_least < max(min(self.least_m, float(sampled.min())), min(exact_below_m, 2.0)) + _ROUNDING_M
+        lower_bound = sampled[np.arange(len(near)) // _STRIDE] - moved
+        relevant = (
+            lower_bound
+            < max(min(self.min_distance_m, float(sampled.min())), min(exact_below_m, 2.0)) + _ROUNDING_M
         )
-        exact = np.flatnonzero(matters)
+        exact = np.flatnonzero(relevant)
         gap[near] = np.inf
         gap[near[exact]] = separation(robots[exact], others[exact])
         return gap
 
-    def _between(self, close: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
-        wide = close.copy()
-        wide[:-1] |= close[1:]
-        wide[1:] |= close[:-1]
-        index = np.flatnonzero(wide[:-1] & wide[1:])
-        share = np.arange(_SUBSTEPS) / _SUBSTEPS
+    def _interpolate(self, close: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+        padded = close.copy()
+        padded[:-1] |= close[1:]
+        padded[1:] |= close[:-1]
+        index = np.flatnonzero(padded[:-1] & padded[1:])
+        fraction = np.arange(_SUBSTEPS) / _SUBSTEPS
         dt = self._times[index + 1] - self._times[index]
-        times = (self._times[index, None] + share * dt[:, None]).ravel()
+        times = (self._times[index, None] + fraction * dt[:, None]).ravel()
         step = self._poses[index + 1] - self._poses[index]
-        poses = (self._poses[index, None] + share[:, None] * step[:, None]).reshape(-1, 3)
+        poses = (self._poses[index, None] + fraction[:, None] * step[:, None]).reshape(-1, 3)
         return times, poses
 
-    def _note(self, body: int, times: FloatArray, gap: FloatArray) -> None:
+    def _record_contacts(self, body: int, times: FloatArray, gap: FloatArray) -> None:
         """Note each contact once, when it begins. After half a second without touching, it is another one."""
         speeds = np.interp(times, self._times, np.array(self._log.v_mps))
         touching = np.flatnonzero(gap <= 0.0)
         last_s = -math.inf
         for k in touching.tolist():
-            fresh = times[k] > last_s + 0.5
+            is_new = times[k] > last_s + 0.5
             last_s = float(times[k])
-            if fresh:
+            if is_new:
                 self._contacts.append(Contact(last_s, body, float(speeds[k])))

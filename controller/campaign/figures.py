@@ -15,7 +15,7 @@ from controller.video.style import Colour, Image, Rect
 
 _COLOURS: dict[str, Colour] = {OURS: BLUE, PAPER: ORANGE, ZONES: GREEN, FIELD: PURPLE}
 _WIDTH, _HEIGHT = 900, 560
-_MOST_RATIO = 3.0
+_MAX_RATIO = 3.0
 _SHARES = tuple((value / 5, f"{value / 5:g}") for value in range(6))
 
 
@@ -26,13 +26,13 @@ def ratio_figure(rows: list[Row]) -> Image:
         image,
         Rect(0, 0, _WIDTH, _HEIGHT),
         "Time over the oracle's",
-        Axis("time / oracle's time", 0.9, _MOST_RATIO),
+        Axis("time / oracle's time", 0.9, _MAX_RATIO),
         Axis("share of the missions", 0.0, 1.02, ticks=_SHARES),
     )
     for policy in dict.fromkeys(row.policy for row in rows):
         ratios = [time_ratio(row) for row in rows if row.policy == policy]
         ratios = [ratio for ratio in ratios if not math.isnan(ratio)]
-        _distribution(chart, ratios, _COLOURS.get(policy, GREY), policy, 0.9, _MOST_RATIO)
+        _distribution(chart, ratios, _COLOURS.get(policy, GREY), policy, 0.9, _MAX_RATIO)
     chart.legend("lower right")
     return image
 
@@ -61,8 +61,8 @@ def _distribution(
     if not values:
         return
     ordered = np.sort(np.array(values))
-    at = np.linspace(low, high, 400)
-    chart.line(at, np.searchsorted(ordered, at, side="right") / len(ordered), colour, label)
+    grid = np.linspace(low, high, 400)
+    chart.line(grid, np.searchsorted(ordered, grid, side="right") / len(ordered), colour, label)
 
 
 def family_figure(summary: Summary) -> Image:
@@ -76,7 +76,7 @@ def family_figure(summary: Summary) -> Image:
         Rect(0, 0, width, _HEIGHT),
         "Median time by family",
         Axis("family, numbered as in the report", 0.0, max(len(families), 1), ticks=ticks),
-        Axis("time / oracle's time", 0.9, _MOST_RATIO),
+        Axis("time / oracle's time", 0.9, _MAX_RATIO),
     )
     policies = list(summary.policies)
     for number, policy in enumerate(policies):
@@ -85,6 +85,6 @@ def family_figure(summary: Summary) -> Image:
         heights = [math.nan if value is None else value for value in medians]
         left = np.arange(len(families), dtype=np.float64) + (0.1 + bar * number)
         chart.bars(left, left + 0.9 * bar, heights, _COLOURS.get(policy, GREY), policy)
-    chart.level(1.1, GREY, "1.10")
-    chart.key()
+    chart.target_line(1.1, GREY, "1.10")
+    chart.inline_legend()
     return image

@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from controller.campaign.contact_fault import at_fault
 from controller.campaign.contacts import DriveClearance
-from controller.campaign.drive import DriveLog
-from controller.campaign.fault import at_fault
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.oracle import OracleTime
 from controller.campaign.stage import Stage
-from controller.campaign.view import PlanarEye
+from controller.campaign.view import PlanarCamera
 from controller.decision.decision import Action
 from hal.types import FloatArray
 
@@ -60,21 +60,25 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Yardstick:
+class JudgeReference:
     """What a drive is compared with: the oracle's time, the field of view, and the fastest possible reaction
     to something new (sightings, latency of perception, control period, lag of the chassis)."""
 
     oracle: OracleTime
-    eye: PlanarEye
+    planar_camera: PlanarCamera
     reaction_s: float
 
 
-def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) -> Row:
+def judge(stage: Stage, log: DriveLog, policy: str, mode: str, reference: JudgeReference) -> Row:
     """The row of a drive in missions.jsonl."""
     clearance = DriveClearance(stage, log)
     contacts = clearance.contacts()
     case, tally = stage.case, log.setpoints
-    faulty = [one for one in contacts if at_fault(one, stage, log, by.eye, by.reaction_s)]
+    faulty = [
+        contact
+        for contact in contacts
+        if at_fault(contact, stage, log, reference.planar_camera, reference.reaction_s)
+    ]
     return Row(
         family=case.family,
         seed=case.seed,
@@ -84,10 +88,10 @@ def judge(stage: Stage, log: DriveLog, policy: str, mode: str, by: Yardstick) ->
         expected=case.scenario.outcome == "target" and not case.halts,
         contacts=len(contacts),
         contacts_at_fault=len(faulty),
-        touched=tuple(stage.world.names[one.body] for one in faulty),
+        touched=tuple(stage.world.names[contact.body] for contact in faulty),
         time_s=None if log.reached_s is None else round(log.reached_s, 4),
-        oracle_time_s=round(by.oracle.total_s, 4) if math.isfinite(by.oracle.total_s) else None,
-        min_clearance_m=round(clearance.least_m, 4),
+        oracle_time_s=round(reference.oracle.total_s, 4) if math.isfinite(reference.oracle.total_s) else None,
+        min_clearance_m=round(clearance.min_distance_m, 4),
         max_jerk_mps3=tally.max_jerk_mps3,
         max_accel_mps2=tally.max_accel_mps2,
         reversals=tally.reversals,
@@ -127,13 +131,13 @@ def false_stops(stage: Stage, log: DriveLog) -> list[float]:
         if log.reached_s is not None and end >= len(v) - 1:
             continue
         t0, t1 = log.times_s[start] - _BEFORE_STOP_S, log.times_s[end] + _AFTER_STOP_S
-        if stage.case.faults.strikes(log.times_s[start], _AFTER_FAULT_S):
+        if stage.case.faults.demands_stop(log.times_s[start], _AFTER_FAULT_S):
             continue
         if stage.case.faults.glass and stage.case.scenario.outcome == "blocked":
             continue
         times = np.arange(max(t0, 0.0), t1, 0.2)
         s_m = log.s_m[start]
-        ahead = any(high >= s_m for stretches in stage.blocked(times) for _, high in stretches)
+        ahead = any(high >= s_m for intervals in stage.blocked(times) for _, high in intervals)
         if not ahead:
             found.append(log.times_s[start])
     return found

@@ -14,7 +14,7 @@ import numpy as np
 
 from config.app import AppConfig, LockstepRunner, SimulationConfig
 from config.camera import SimulatedCameraConfig
-from controller.campaign.drive import DriveLog
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.noisy_camera import NoisyCamera
 from controller.campaign.stage import Stage
 from controller.control import ARRIVED_M, Decides
@@ -31,8 +31,8 @@ from vision.scene import CameraCondition, CameraHealth, Scene
 # If the robot still stands this long after everything else has come to rest, it will stand for ever.
 GIVE_UP_S = 6.0
 _STANDING_MPS = 1e-3
-_OFF_PATH_SIGMA_M = 0.01
-_OFF_PATH_S = 2.0
+_OFFSET_SIGMA_M = 0.01
+_OFFSET_TIME_CONSTANT_S = 2.0
 _ODOMETRY_SIGMA = 0.003
 _FEEDBACK_TIMEOUT_S = 0.2
 _FROZEN_FRAMES = 2
@@ -56,7 +56,7 @@ class _Base:
 
 
 @compiled("int64, float64, float64")
-def _exposures(steps: int, dt_s: float, fps: float) -> FloatArray:
+def _exposure_times(steps: int, dt_s: float, fps: float) -> FloatArray:
     """The times of the control steps, of steps in total, at which a frame is exposed."""
     times, count = np.empty(steps), 0
     for k in range(steps):
@@ -66,48 +66,48 @@ def _exposures(steps: int, dt_s: float, fps: float) -> FloatArray:
     return times[:count]
 
 
-class _Eyes:
+class _DelayedCamera:
     """The camera with its faults, and the delay of its scenes until the decision."""
 
     def __init__(self, camera: NoisyCamera, stage: Stage, fps: float, latency_s: float) -> None:
         self._camera, self._faults = camera, stage.case.faults
         self._fps, self._latency_s = fps, latency_s
         self._frame = 0
-        self._same = 0
+        self._repeats = 0
         self._last: Scene | None = None
-        self._on_way: deque[tuple[float, Scene]] = deque()
+        self._in_transit: deque[tuple[float, Scene]] = deque()
         self.known: Scene | None = None
 
     def due(self, t_s: float) -> bool:
         """Whether the next frame is exposed at this control step."""
         return self._frame / self._fps <= t_s + 1e-9
 
-    def look(self, t_s: float, true_pose: PlanarPose, known_pose: PlanarPose) -> None:
-        """Expose one frame. known_pose: the pose by odometry."""
+    def expose(self, t_s: float, true_pose: PlanarPose, odometry_pose: PlanarPose) -> None:
+        """Expose one frame. odometry_pose: the pose by odometry."""
         faults = self._faults
         self._frame += 1
-        if faults.silent is not None and faults.silent.holds(t_s):
+        if faults.silent is not None and faults.silent.contains(t_s):
             return
-        if faults.frozen is not None and faults.frozen.holds(t_s) and self._last is not None:
-            scene = self._frozen(self._last, t_s)
+        if faults.frozen is not None and faults.frozen.contains(t_s) and self._last is not None:
+            scene = self._repeat_scene(self._last, t_s)
         else:
-            self._same = 0
-            scene = self._camera.look(t_s, self._frame, true_pose, known_pose)
+            self._repeats = 0
+            scene = self._camera.look(t_s, self._frame, true_pose, odometry_pose)
         self._last = scene
-        self._on_way.append((t_s + self._latency_s + faults.late_by(t_s), scene))
+        self._in_transit.append((t_s + self._latency_s + faults.late_by(t_s), scene))
 
-    def _frozen(self, last: Scene, t_s: float) -> Scene:
+    def _repeat_scene(self, last: Scene, t_s: float) -> Scene:
         """The same image with a new stamp, judged as by vision/camera/health.py."""
-        self._same += 1
+        self._repeats += 1
         health = last.health
-        if self._same >= _FROZEN_FRAMES:
-            reason = f"image has not changed by a single grey level for {self._same} frames"
+        if self._repeats >= _FROZEN_FRAMES:
+            reason = f"image has not changed by a single grey level for {self._repeats} frames"
             health = CameraHealth(CameraCondition.UNTRUSTWORTHY, reason, health.valid_depth_ratio)
         return replace(last, captured_ns=round(t_s * NS_PER_S), sequence=self._frame, health=health)
 
-    def arrived(self, t_s: float) -> Scene | None:
-        while self._on_way and self._on_way[0][0] <= t_s + 1e-9:
-            self.known = self._on_way.popleft()[1]
+    def newest_scene(self, t_s: float) -> Scene | None:
+        while self._in_transit and self._in_transit[0][0] <= t_s + 1e-9:
+            self.known = self._in_transit.popleft()[1]
         return self.known
 
 
@@ -128,24 +128,25 @@ class _NoiseDrive:
         self._stage, self._policy, self._faults = stage, policy, stage.case.faults
         self._dt_s = 1.0 / config.runner.control_rate_hz
         random = np.random.default_rng((seed, 0xB0))
-        self._odometry = 1.0 + self._faults.distance_slip + _ODOMETRY_SIGMA * float(random.standard_normal())
+        scale_error = _ODOMETRY_SIGMA * float(random.standard_normal())
+        self._odometry_scale = 1.0 + self._faults.distance_slip + scale_error
         steps = math.ceil(stage.case.scenario.duration_s / self._dt_s)
-        self._off_m = _off_path_m(random.standard_normal(steps + 1)[:-1], self._dt_s)
-        self._eyes = _Eyes(
+        self._lateral_offsets_m = _lateral_noise(random.standard_normal(steps + 1)[:-1], self._dt_s)
+        self._camera_link = _DelayedCamera(
             NoisyCamera(stage, config.camera, seed), stage, fps, config.runner.perception_latency_s
         )
         self._base = _Base(plant.lag_s, plant.max_accel_mps2)
         self._shaper = SpeedShaper(config.robot.limits, self._dt_s, config.decision.chassis_delay_s)
         self._log = DriveLog(SetpointTally(config.robot.limits, self._dt_s))
         self._standing_s = 0.0
-        stage.world.foresee(_exposures(steps, self._dt_s, fps))
+        stage.world.precompute(_exposure_times(steps, self._dt_s, fps))
 
     def run(self) -> DriveLog:
         """Run control steps until the drive is over."""
-        for k, off_m in enumerate(self._off_m.tolist()):
+        for k, offset_m in enumerate(self._lateral_offsets_m.tolist()):
             t_s = k * self._dt_s
-            pose = self._stage.pose(self._base.s_m, off_m)
-            decision = self._decide(t_s, pose, off_m)
+            pose = self._stage.pose(self._base.s_m, offset_m)
+            decision = self._decide(t_s, pose, offset_m)
             self._log.add(t_s, pose, self._base.s_m, self._base.v_mps, decision)
             self._move(t_s, decision)
             if self._is_over(t_s):
@@ -153,22 +154,22 @@ class _NoiseDrive:
         return self._log
 
     @property
-    def _known_s_m(self) -> float:
+    def _odometry_s_m(self) -> float:
         """The position along the path by odometry."""
-        return self._base.s_m * self._odometry
+        return self._base.s_m * self._odometry_scale
 
-    def _decide(self, t_s: float, pose: PlanarPose, off_m: float) -> Decision:
+    def _decide(self, t_s: float, pose: PlanarPose, offset_m: float) -> Decision:
         """The decision of one control step. pose: the true one; the policy gets the pose by odometry."""
-        known_s_m = self._known_s_m
-        known_pose = self._stage.pose(known_s_m, off_m)
-        if self._eyes.due(t_s):
-            self._eyes.look(t_s, pose, known_pose)
+        odometry_s_m = self._odometry_s_m
+        odometry_pose = self._stage.pose(odometry_s_m, offset_m)
+        if self._camera_link.due(t_s):
+            self._camera_link.expose(t_s, pose, odometry_pose)
         return self._policy.step(
             Situation(
-                self._eyes.arrived(t_s),
+                self._camera_link.newest_scene(t_s),
                 self._stage.path,
-                known_pose,
-                OnPath(known_s_m, off_m, 0.0),
+                odometry_pose,
+                OnPath(odometry_s_m, offset_m, 0.0),
                 max(self._shaper.v_mps, self._base.v_mps),
                 self._shaper.a_mps2,
                 round(t_s * NS_PER_S),
@@ -183,7 +184,7 @@ class _NoiseDrive:
         shaped = self._shaper.step(
             decision.target_speed_mps,
             emergency=decision.emergency,
-            distance_to_end_m=self._stage.path.length_m - self._known_s_m,
+            distance_to_end_m=self._stage.path.length_m - self._odometry_s_m,
         )
         self._log.setpoints.add(Setpoint(round(t_s * NS_PER_S), shaped.v_mps, shaped.a_mps2, 0.0))
         self._base.advance(shaped.v_mps, self._dt_s)
@@ -200,20 +201,20 @@ class _NoiseDrive:
         self._standing_s += self._dt_s
         if self._has_lost_feedback(t_s):
             return True
-        if self._shaper.v_mps == 0.0 and self._stage.path.length_m - self._known_s_m <= ARRIVED_M:
+        if self._shaper.v_mps == 0.0 and self._stage.path.length_m - self._odometry_s_m <= ARRIVED_M:
             self._log.reached_s = t_s + self._dt_s
             return True
         return self._standing_s >= GIVE_UP_S and t_s > max(self._stage.world.end_s, 0.0) + GIVE_UP_S
 
 
 @compiled("float64[:], float64")
-def _off_path_m(white: FloatArray, dt_s: float) -> FloatArray:
+def _lateral_noise(white_noise: FloatArray, dt_s: float) -> FloatArray:
     """The lateral offset of the robot from its path at each control step (N,): white noise, low-pass
     filtered."""
-    keep = math.exp(-dt_s / _OFF_PATH_S)
-    shake_m = _OFF_PATH_SIGMA_M * math.sqrt(1.0 - keep * keep)
-    off_m, all_m = 0.0, np.empty(len(white))
-    for k in range(len(white)):
-        off_m = keep * off_m + shake_m * white[k]
-        all_m[k] = off_m
-    return all_m
+    decay = math.exp(-dt_s / _OFFSET_TIME_CONSTANT_S)
+    noise_m = _OFFSET_SIGMA_M * math.sqrt(1.0 - decay * decay)
+    offset_m, offsets_m = 0.0, np.empty(len(white_noise))
+    for k in range(len(white_noise)):
+        offset_m = decay * offset_m + noise_m * white_noise[k]
+        offsets_m[k] = offset_m
+    return offsets_m

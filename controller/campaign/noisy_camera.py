@@ -24,7 +24,7 @@ from config.robot import Robot
 from controller.campaign.noise_model import NoiseModel
 from controller.campaign.noisy_tracks import NoisyTracks
 from controller.campaign.stage import Stage
-from controller.campaign.view import PlanarEye, PlanarView
+from controller.campaign.view import PlanarCamera, PlanarView
 from hal.clocks import NS_PER_S
 from hal.compiled import compiled
 from hal.geometry import camera_in_body
@@ -43,27 +43,27 @@ class NoisyCamera:
         self, stage: Stage, camera: SimulatedCameraConfig, seed: int, noise: NoiseModel | None = None
     ) -> None:
         self._stage, self._noise = stage, noise or NoiseModel()
-        self._least_m = camera.depth_min_m
-        unmoved = Pose(np.eye(3), np.zeros(3))
-        self._ego_motion = EgoMotion(unmoved, 1.0 / camera.fps, "none", math.nan, math.nan, math.nan)
+        self._min_depth_m = camera.depth_min_m
+        identity = Pose(np.eye(3), np.zeros(3))
+        self._ego_motion = EgoMotion(identity, 1.0 / camera.fps, "none", math.nan, math.nan, math.nan)
         mount = stage.robot.camera_mount
-        self.eye = PlanarEye(stage.world, camera, mount, stage.robot.body.height_m)
+        self.planar_camera = PlanarCamera(stage.world, camera, mount, stage.robot.body.height_m)
         self._random = np.random.default_rng((seed, 0xCA))
         glass = np.array([name in stage.case.faults.glass for name in stage.world.names], np.bool_)
-        self._glass, self._scanned = glass, stage.in_height & ~glass
+        self._glass, self._has_depth = glass, stage.in_height & ~glass
         # A body that hangs above the robot is not an obstacle.
-        listed = ~glass & (stage.world.z_m[:, 0] < stage.robot.body.height_m)
+        is_obstacle = ~glass & (stage.world.z_m[:, 0] < stage.robot.body.height_m)
         to_optical = camera_in_body(mount_of(stage.robot)).rotation.T
         self._tracks = NoisyTracks(
-            stage.world.z_m, listed, to_optical, self.eye, mount.height_m, camera, self._noise
+            stage.world.z_m, is_obstacle, to_optical, self.planar_camera, mount.height_m, camera, self._noise
         )
 
-    def look(self, t_s: float, sequence: int, true_pose: PlanarPose, known_pose: PlanarPose) -> Scene:
-        """The scene of an exposure at t_s. known_pose: the robot's pose by odometry."""
-        polygons, velocity = self._stage.world.look(t_s)
-        view = self.eye.look(polygons, true_pose)
+    def look(self, t_s: float, sequence: int, true_pose: PlanarPose, odometry_pose: PlanarPose) -> Scene:
+        """The scene of an exposure at t_s. odometry_pose: the robot's pose by odometry."""
+        polygons, velocity = self._stage.world.snapshot(t_s)
+        view = self.planar_camera.look(polygons, true_pose)
         self._tracks.advance(velocity, t_s, self._random)
-        self._tracks.sight(view, t_s, self._random)
+        self._tracks.update(view, t_s, self._random)
         return Scene(
             captured_ns=round(t_s * NS_PER_S),
             sequence=sequence,
@@ -71,34 +71,34 @@ class NoisyCamera:
             free_space=self._free_space(view),
             ego_motion=self._ego_motion,
             health=_GOOD,
-            robot_pose=known_pose,
+            robot_pose=odometry_pose,
         )
 
     def _free_space(self, view: PlanarView) -> FreeSpace:
         """The free space: for each band, the nearest surface at the robot's height, and how far the floor is
         free."""
-        noise, eye = self._noise, self.eye
-        distances, blind = _scanned(
+        noise, planar_camera = self._noise, self.planar_camera
+        distances, blank = _scan_bands(
             view.bodies,
             view.forward_m,
             view.free_m,
-            self._scanned,
+            self._has_depth,
             self._glass,
             self._random.standard_normal(len(view.free_m)),
             noise.surface_bias_sigmas,
             noise.surface_sigmas,
             noise.depth_sigma_1pm,
-            eye.range_m,
-            self._least_m,
+            planar_camera.range_m,
+            self._min_depth_m,
         )
         return FreeSpace(
-            eye.bearing_tan,
-            eye.half_width_tan,
+            planar_camera.bearing_tan,
+            planar_camera.half_width_tan,
             distances[0],
             distances[1],
-            floor_from_m=eye.floor_from_m,
-            up_tan=eye.up_tan,
-            blank=blind,
+            floor_from_m=planar_camera.floor_from_m,
+            up_tan=planar_camera.up_tan,
+            blank=blank,
         )
 
 
@@ -112,44 +112,44 @@ def mount_of(robot: Robot) -> CameraMount:
     "int64[::1], float64[:, ::1], float64[::1], boolean[::1], boolean[::1], float64[::1],"
     "float64, float64, float64, float64, float64"
 )
-def _scanned(
+def _scan_bands(
     bodies: NDArray[np.intp],
     forward_m: FloatArray,
     free_m: FloatArray,
-    scanned: NDArray[np.bool_],
+    has_depth: NDArray[np.bool_],
     glass: NDArray[np.bool_],
     errors: FloatArray,
     bias_sigmas: float,
     sigmas: float,
     depth_sigma_1pm: float,
     range_m: float,
-    least_m: float,
+    min_depth_m: float,
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """nearest_m and known_m (2, B), and blank (B,) of FreeSpace.
 
-    scanned, glass: (N,), which bodies have depth, and which are made of glass.
+    has_depth, glass: (N,), which bodies have depth, and which are made of glass.
     errors: (B,), standard normal errors of depth.
     """
     bands = len(free_m)
-    distances, blind = np.empty((2, bands)), np.zeros(bands, np.bool_)
+    distances, blank = np.empty((2, bands)), np.zeros(bands, np.bool_)
     nearest, known = distances
     for b in range(bands):
-        near, hidden = math.inf, math.inf
+        surface, nearest_glass = math.inf, math.inf
         for row in range(len(bodies)):
-            if scanned[bodies[row]]:
-                near = min(near, forward_m[row, b])
+            if has_depth[bodies[row]]:
+                surface = min(surface, forward_m[row, b])
             elif glass[bodies[row]]:
-                hidden = min(hidden, forward_m[row, b])
-        if free_m[b] <= min(near, range_m) and hidden > free_m[b]:
-            near = free_m[b]  # the building
+                nearest_glass = min(nearest_glass, forward_m[row, b])
+        if free_m[b] <= min(surface, range_m) and nearest_glass > free_m[b]:
+            surface = free_m[b]  # the building
         # There is no depth of glass, nor of anything behind it.
-        if hidden < near:
-            near = math.inf
-        if near < math.inf:
-            near += depth_sigma_1pm * near * near * (sigmas * errors[b] - bias_sigmas)
-        if not near < range_m:
-            near = math.inf
-        blind[b] = near < least_m
-        nearest[b] = math.inf if blind[b] else near
-        known[b] = 0.0 if blind[b] else min(free_m[b], hidden, range_m, near)
-    return distances, blind
+        if nearest_glass < surface:
+            surface = math.inf
+        if surface < math.inf:
+            surface += depth_sigma_1pm * surface * surface * (sigmas * errors[b] - bias_sigmas)
+        if not surface < range_m:
+            surface = math.inf
+        blank[b] = surface < min_depth_m
+        nearest[b] = math.inf if blank[b] else surface
+        known[b] = 0.0 if blank[b] else min(free_m[b], nearest_glass, range_m, surface)
+    return distances, blank

@@ -49,14 +49,14 @@ class Lattice:
         self.step_m = 0.5 * accel_mps2 * self.dt_s**2
         # From rest to rest, the lattice reaches only even numbers of position steps.
         self.end = 2 * round(0.5 * length_m / self.step_m)
-        self._whole = (1 << (self.end + 1)) - 1
-        self._allowed = [self._whole] * (_LEVELS + 1)
+        self._all_positions = (1 << (self.end + 1)) - 1
+        self._allowed = [self._all_positions] * (_LEVELS + 1)
 
     def limit(self, s_m: FloatArray, speed_mps: FloatArray) -> None:
         """Remove states faster than speed_mps (N,) at s_m (N,), which must increase."""
-        at = np.interp(np.arange(self.end + 1) * self.step_m, s_m, speed_mps)
+        limit_mps = np.interp(np.arange(self.end + 1) * self.step_m, s_m, speed_mps)
         for k, speed in enumerate(self.speeds_mps.tolist()):
-            self._allowed[k] = _bits(at >= speed - 1e-9)
+            self._allowed[k] = _bits(limit_mps >= speed - 1e-9)
 
     def steps_to_end(self, blocked: list[list[tuple[float, float]]]) -> int:
         """The number of steps until the robot stands at the end; -1 if there are not enough steps.
@@ -64,31 +64,31 @@ class Lattice:
         blocked: for each step, the intervals of s that are blocked.
         """
         states = [1] + [0] * _LEVELS
-        for number, stretches in enumerate(blocked):
-            if number:
+        for step, intervals in enumerate(blocked):
+            if step:
                 states = self._step(states)
-            free = self._whole
-            for low_m, high_m in stretches:
+            free_positions = self._all_positions
+            for low_m, high_m in intervals:
                 low = max(math.ceil(low_m / self.step_m), 0)
                 high = min(math.floor(high_m / self.step_m), self.end)
                 if high >= low:
-                    free &= ~(((1 << (high - low + 1)) - 1) << low)
-            if free != self._whole:
-                states[1:] = [bits & free for bits in states[1:]]
+                    free_positions &= ~(((1 << (high - low + 1)) - 1) << low)
+            if free_positions != self._all_positions:
+                states[1:] = [bits & free_positions for bits in states[1:]]
             if states[0] >> self.end & 1:
-                return number
+                return step
         return _NEVER
 
     def _step(self, states: list[int]) -> list[int]:
-        following = []
+        next_states = []
         for k, allowed in enumerate(self._allowed):
             bits = states[k] << (2 * k)
             if k > 0:
                 bits |= states[k - 1] << (2 * k - 1)
             if k < _LEVELS:
                 bits |= states[k + 1] << (2 * k + 1)
-            following.append(bits & allowed)
-        return following
+            next_states.append(bits & allowed)
+        return next_states
 
 
 def _bits(flags: NDArray[np.bool_]) -> int:
@@ -103,7 +103,7 @@ def free_time_s(s_m: FloatArray, speed_mps: FloatArray, accel_mps2: float, jerk_
     """
     v2 = np.minimum(speed_mps, math.inf) ** 2
     v2[0] = v2[-1] = 0.0
-    v = np.sqrt(_reached(v2, 2.0 * accel_mps2 * np.diff(s_m)))
+    v = np.sqrt(_reachable(v2, 2.0 * accel_mps2 * np.diff(s_m)))
     trapezoid_s = float((2.0 * np.diff(s_m) / np.maximum(v[:-1] + v[1:], 1e-9)).sum())
     peak = float(v.max())
     jerk_s = braking.stop(peak, 0.0, braking.BrakeLimits(accel_mps2, jerk_mps3)).time_s - peak / accel_mps2
@@ -111,7 +111,7 @@ def free_time_s(s_m: FloatArray, speed_mps: FloatArray, accel_mps2: float, jerk_
 
 
 @compiled("float64[:], float64[:]")
-def _reached(v2: FloatArray, rise: FloatArray) -> FloatArray:
+def _reachable(v2: FloatArray, rise: FloatArray) -> FloatArray:
     """Squares of speeds (N,), limited so that they neither rise nor fall by more than rise (N - 1,)."""
     v2 = v2.copy()
     for k in range(len(rise)):
@@ -138,6 +138,6 @@ def solve(stage: Stage, top_mps: float, horizon_s: float) -> OracleTime:
     steps = lattice.steps_to_end(blocked)
     if steps == _NEVER:
         return OracleTime(math.inf, math.inf)
-    unhindered = lattice.steps_to_end([[] for _ in blocked])
-    delay_s = (steps - unhindered) * lattice.dt_s
+    free_steps = lattice.steps_to_end([[] for _ in blocked])
+    delay_s = (steps - free_steps) * lattice.dt_s
     return OracleTime(free_s + delay_s, delay_s)

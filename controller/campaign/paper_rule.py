@@ -10,7 +10,7 @@ import numpy as np
 
 from config.robot import Robot
 from controller import braking
-from controller.campaign.rivals import decision, free_speed
+from controller.campaign.baseline_policy import decision, free_speed
 from controller.decision.bodies import Bodies, bodies_of
 from controller.decision.corridor import Corridor, path_velocities, place
 from controller.decision.decision import Decision
@@ -18,7 +18,7 @@ from controller.decision.situation import Situation
 from hal.types import CameraMount
 from vision.scene import Scene
 
-_LOOK_M = 14.0
+_LOOKAHEAD_M = 14.0
 _STOP_SHORT_M = 0.1
 
 
@@ -41,7 +41,7 @@ class PaperRule:
             self._scene = at.scene
             self._bodies = bodies_of(at.scene, at.scene.robot_pose or at.pose, self._mount, 0.0)
         assert self._bodies is not None
-        for distance_m, closing_mps in self._inside(self._bodies, self._corridor, at.on_path.s_m):
+        for distance_m, closing_mps in self._obstacles_ahead(self._bodies, self._corridor, at.on_path.s_m):
             needed_m = self.detection_distance(at.v_mps, closing_mps)
             if distance_m <= needed_m:
                 sentence = f"something is {distance_m:.1f} m ahead, S_n is {needed_m:.1f} m"
@@ -55,11 +55,11 @@ class PaperRule:
         towards_mps = min(max(closing_mps, 0.0), limits.max_obstacle_speed_mps)
         return _STOP_SHORT_M + braking.paper_detection_distance(v_mps, towards_mps, limits.max_accel_mps2)
 
-    def _inside(self, bodies: Bodies, corridor: Corridor, s_m: float) -> list[tuple[float, float]]:
+    def _obstacles_ahead(self, bodies: Bodies, corridor: Corridor, s_m: float) -> list[tuple[float, float]]:
         """(free way before the front, closing speed) of each obstacle in the swept corridor ahead."""
         if not len(bodies):
             return []
-        placed = place(bodies, corridor, np.zeros(1), s_m, _LOOK_M)
+        placed = place(bodies, corridor, np.zeros(1), s_m, _LOOKAHEAD_M)
         along = path_velocities(bodies, placed.heading_rad[:, 0]).along_mps
         rows = np.flatnonzero((placed.clearance_m[:, 0] <= 0.0) & (placed.block_to_s_m[:, 0] > s_m))
         return [

@@ -12,7 +12,7 @@ from controller.errors import UserError
 from controller.workers import worker_processes
 
 # Tasks submitted per worker, enough to keep every worker busy. The rest waits here and can still be dropped.
-_AHEAD = 4
+_TASKS_PER_WORKER = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ def missions(count: int, families: tuple[str, ...], seed: int) -> list[Mission]:
     return [Mission(families[k % len(families)], seed + k // len(families)) for k in range(count)]
 
 
-def run_here(tasks: list[Task], workers: int) -> Generator[list[Row], None, None]:
+def run_local(tasks: list[Task], workers: int) -> Generator[list[Row], None, None]:
     """Run tasks in processes of this machine, or in this process if workers is 1. Rows come as they are
     done."""
     if workers == 1:
@@ -39,7 +39,7 @@ def run_here(tasks: list[Task], workers: int) -> Generator[list[Row], None, None
         yield from _run(pool, tasks, workers, set())
 
 
-def run_there(tasks: list[Task], scheduler: str) -> Generator[list[Row], None, None]:
+def run_on_cluster(tasks: list[Task], scheduler: str) -> Generator[list[Row], None, None]:
     """Run tasks on a cluster, through the executor of Dask distributed. Raises UserError."""
     try:
         from distributed import Client
@@ -59,21 +59,21 @@ def run_there(tasks: list[Task], scheduler: str) -> Generator[list[Row], None, N
         try:
             yield from _run(client.get_executor(pure=False), tasks, workers, running)
         finally:
-            for one in running:
-                one.cancel()
+            for task in running:
+                task.cancel()
 
 
 def _run(
     pool: Executor, tasks: list[Task], workers: int, running: set[Future[list[Row]]]
 ) -> Iterator[list[Row]]:
     """Run tasks on pool. running: the submitted tasks, kept up to date for the caller."""
-    waiting = iter(tasks)
-    for _, task in zip(range(workers * _AHEAD), waiting, strict=False):
+    remaining = iter(tasks)
+    for _, task in zip(range(workers * _TASKS_PER_WORKER), remaining, strict=False):
         running.add(pool.submit(run_task, task))
     while running:
         done = next(as_completed(running))
         running.remove(done)
-        following = next(waiting, None)
-        if following is not None:
-            running.add(pool.submit(run_task, following))
+        next_task = next(remaining, None)
+        if next_task is not None:
+            running.add(pool.submit(run_task, next_task))
         yield done.result()

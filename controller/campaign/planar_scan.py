@@ -12,7 +12,7 @@ from hal.types import FloatArray, PlanarPose
 from sim.planar import PlanarWorld
 
 SCAN_HEIGHT_M = 0.2
-_FIELD_RAD = math.radians(270.0)
+_FIELD_OF_VIEW_RAD = math.radians(270.0)
 _RAYS = 271
 _RANGE_M = 12.0
 _PERIOD_S = 0.066
@@ -30,11 +30,11 @@ class PlanarScanner:
         self._front_m = stage.robot.body.front_m
         z_m = self._world.z_m
         self._at_height = (z_m[:, 0] <= SCAN_HEIGHT_M) & (z_m[:, 1] > SCAN_HEIGHT_M)
-        self._angles = np.linspace(-0.5 * _FIELD_RAD, 0.5 * _FIELD_RAD, _RAYS)
+        self._angles = np.linspace(-0.5 * _FIELD_OF_VIEW_RAD, 0.5 * _FIELD_OF_VIEW_RAD, _RAYS)
         self._cos, self._sin = np.cos(self._angles), np.sin(self._angles)
         self._next_s = 0.0
         self._points: FloatArray = np.zeros((0, 2))
-        self._taken_at: PlanarPose | None = None
+        self._scan_pose: PlanarPose | None = None
 
     def points(self, pose: PlanarPose, t_s: float) -> FloatArray:
         """Points (P, 2) of the newest scan, moved to the present body frame by the robot's motion since
@@ -42,24 +42,24 @@ class PlanarScanner:
         if t_s >= self._next_s:
             self._next_s = t_s + _PERIOD_S
             self._points = self._scan(pose, t_s)
-            self._taken_at = pose
-        if self._taken_at is None or not len(self._points):
+            self._scan_pose = pose
+        if self._scan_pose is None or not len(self._points):
             return self._points
-        return _seen_from(pose, _on_floor(self._taken_at, self._points))
+        return _to_body(pose, _to_floor(self._scan_pose, self._points))
 
     def _scan(self, pose: PlanarPose, t_s: float) -> FloatArray:
-        polygons = self._world.look(t_s)[0][self._at_height]
+        polygons = self._world.snapshot(t_s)[0][self._at_height]
         shift = pose.x_m, pose.y_m, pose.heading_rad, self._front_m
-        nearest = _nearest(_NOTHING, self._world.room_polygon()[None], self._cos, self._sin, *shift)
-        nearest = _nearest(nearest, polygons, self._cos, self._sin, *shift)
-        seen = nearest < _RANGE_M
-        x = nearest[seen] * self._cos[seen] + self._front_m
-        return np.stack((x, nearest[seen] * self._sin[seen]), axis=1)
+        nearest = _ray_lengths(_NOTHING, self._world.room_polygon()[None], self._cos, self._sin, *shift)
+        nearest = _ray_lengths(nearest, polygons, self._cos, self._sin, *shift)
+        in_range = nearest < _RANGE_M
+        x = nearest[in_range] * self._cos[in_range] + self._front_m
+        return np.stack((x, nearest[in_range] * self._sin[in_range]), axis=1)
 
 
 @compiled("float64[:], float64[:, :, ::1], float64[:], float64[:], float64, float64, float64, float64")
-def _nearest(
-    so_far_m: FloatArray,
+def _ray_lengths(
+    max_m: FloatArray,
     polygons: FloatArray,
     ray_cos: FloatArray,
     ray_sin: FloatArray,
@@ -68,39 +68,39 @@ def _nearest(
     heading_rad: float,
     front_m: float,
 ) -> FloatArray:
-    """The lengths (R,) of rays up to the first edge of polygons (N, K, 2), at most so_far_m. The rays begin
+    """The lengths (R,) of rays up to the first edge of polygons (N, K, 2), at most max_m. The rays begin
     front_m ahead of a body at x_m, y_m; their angles are relative to its heading."""
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    nearest, corners = so_far_m.copy(), polygons.shape[1]
+    nearest, corners = max_m.copy(), polygons.shape[1]
     forward, left = np.empty(corners), np.empty(corners)
     for polygon in polygons:
         for j in range(corners):
             dx, dy = polygon[j, 0] - x_m, polygon[j, 1] - y_m
             forward[j], left[j] = dx * cos + dy * sin - front_m, dy * cos - dx * sin
         for j in range(corners):
-            following = (j + 1) % corners
+            next_corner = (j + 1) % corners
             for ray in range(len(nearest)):
                 c, s = ray_cos[ray], ray_sin[ray]
-                off = left[j] * c - forward[j] * s
-                next_off = left[following] * c - forward[following] * s
-                if off * next_off > 0.0:
+                side = left[j] * c - forward[j] * s
+                next_side = left[next_corner] * c - forward[next_corner] * s
+                if side * next_side > 0.0:
                     continue
-                drop = off - next_off
-                share = off / drop if abs(drop) >= 1e-12 else 0.0
+                span = side - next_side
+                fraction = side / span if abs(span) >= 1e-12 else 0.0
                 along = forward[j] * c + left[j] * s
-                reach = along + share * (forward[following] * c + left[following] * s - along)
-                if 0.0 < reach < nearest[ray]:
-                    nearest[ray] = reach
+                distance = along + fraction * (forward[next_corner] * c + left[next_corner] * s - along)
+                if 0.0 < distance < nearest[ray]:
+                    nearest[ray] = distance
     return nearest
 
 
-def _on_floor(pose: PlanarPose, points: FloatArray) -> FloatArray:
+def _to_floor(pose: PlanarPose, points: FloatArray) -> FloatArray:
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     x, y = points[:, 0], points[:, 1]
     return np.stack((pose.x_m + cos * x - sin * y, pose.y_m + sin * x + cos * y), axis=1)
 
 
-def _seen_from(pose: PlanarPose, points: FloatArray) -> FloatArray:
+def _to_body(pose: PlanarPose, points: FloatArray) -> FloatArray:
     cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     dx, dy = points[:, 0] - pose.x_m, points[:, 1] - pose.y_m
     return np.stack((dx * cos + dy * sin, dy * cos - dx * sin), axis=1)

@@ -12,8 +12,8 @@ import numpy as np
 
 from config.robot import Robot
 from controller import braking
+from controller.campaign.baseline_policy import decision, free_speed
 from controller.campaign.planar_scan import PlanarScanner
-from controller.campaign.rivals import decision, free_speed
 from controller.campaign.stage import Stage
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
@@ -25,8 +25,8 @@ TOLERANCE_M = 0.1
 GROUND_CLEARANCE_M = 0.15
 RESTART_S = 2.0
 _RESTART_MPS = 0.3
-_SIDE_M = 0.1
-_POINTS = 2
+_SIDE_MARGIN_M = 0.1
+_MIN_POINTS = 2
 
 
 class ProtectiveField:
@@ -43,7 +43,7 @@ class ProtectiveField:
         """Stop while anything is in the field; go on some time after the field has become free."""
         t_s = at.now_ns / NS_PER_S
         field_mps = max(at.v_mps, _RESTART_MPS if self._stopped else 0.0)
-        if self._intruded(self._scanner.points(at.pose, t_s), at, field_mps):
+        if self._is_intruded(self._scanner.points(at.pose, t_s), at, field_mps):
             self._stopped, self._free_since_s = True, None
         elif self._stopped:
             self._free_since_s = t_s if self._free_since_s is None else self._free_since_s
@@ -58,7 +58,7 @@ class ProtectiveField:
         stop_m = braking.stop(v_mps, 0.0, self._brake).distance_m
         return stop_m + RESPONSE_S * v_mps + TOLERANCE_M + GROUND_CLEARANCE_M
 
-    def _intruded(self, points: FloatArray, at: Situation, v_mps: float) -> bool:
+    def _is_intruded(self, points: FloatArray, at: Situation, v_mps: float) -> bool:
         """Whether anything is in the field for v_mps. The field follows the path, as one that is selected by
         the steering angle would.
 
@@ -74,5 +74,5 @@ class ProtectiveField:
         floor = np.stack((pose.x_m + cos * x - sin * y, pose.y_m + sin * x + cos * y), axis=1)
         s, d = at.path.project_points(floor, s_m - 1.0, s_m + reach + 1.0)
         ahead = s - s_m
-        inside = (ahead > 0.0) & (ahead < reach) & (np.abs(d) < 0.5 * body.width_m + _SIDE_M)
-        return int(np.count_nonzero(inside)) >= _POINTS
+        inside = (ahead > 0.0) & (ahead < reach) & (np.abs(d) < 0.5 * body.width_m + _SIDE_MARGIN_M)
+        return int(np.count_nonzero(inside)) >= _MIN_POINTS

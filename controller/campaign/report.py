@@ -15,7 +15,7 @@ from controller.campaign.summary import Summary, Totals, summarise
 from controller.errors import UserError
 from controller.evaluation import markdown
 
-_WORST = 40
+_MAX_FAILED_ROWS = 40
 
 
 def write_report(folder: Path, rows: Iterable[Row], command: str) -> Summary:
@@ -50,7 +50,7 @@ def report_lines(summary: Summary, command: str) -> list[str]:
         when the robot moved faster than 0.02 m/s and a driver with the same field of view and reaction
         avoids it.""",
     )
-    lines += markdown.table(_HEAD, [[name, *_cells(one)] for name, one in summary.policies.items()])
+    lines += markdown.table(_HEADER, [[name, *_cells(one)] for name, one in summary.policies.items()])
     lines += markdown.picture("Time over the oracle's", "ratio.png")
     lines += markdown.picture("Smallest clearance", "clearance.png")
     lines += markdown.section(
@@ -61,40 +61,42 @@ def report_lines(summary: Summary, command: str) -> list[str]:
     lines += markdown.picture("Median time by family", "families.png")
     for number, (family, by_policy) in enumerate(summary.families.items(), start=1):
         lines += [f"### {number}. {family}", ""]
-        lines += markdown.table(_HEAD, [[name, *_cells(one)] for name, one in by_policy.items()])
+        lines += markdown.table(_HEADER, [[name, *_cells(one)] for name, one in by_policy.items()])
     lines += markdown.section(
         "What failed", "Each can be driven again alone: `treadwatch campaign --only FAMILY:SEED`."
     )
-    shown = [[family, str(seed), policy, why] for family, seed, policy, why in summary.failing[:_WORST]]
+    shown = [
+        [family, str(seed), policy, why] for family, seed, policy, why in summary.failing[:_MAX_FAILED_ROWS]
+    ]
     lines += markdown.table(["family", "seed", "policy", "why"], shown)
-    if len(summary.failing) > _WORST:
-        lines += [f"... and {len(summary.failing) - _WORST} more: see summary.json.", ""]
+    if len(summary.failing) > _MAX_FAILED_ROWS:
+        lines += [f"... and {len(summary.failing) - _MAX_FAILED_ROWS} more: see summary.json.", ""]
     return lines
 
 
-_HEAD = (
+_HEADER = (
     "policy", "missions", "reached", "contacts", "at fault", "median x", "p90 x", "clearance m",
     "false stops", "flaps", "reversals", "outside limits",
 )  # fmt: skip
 
 
-def _cells(one: Totals) -> list[str]:
+def _cells(totals: Totals) -> list[str]:
     return [
-        str(one.missions),
-        f"{one.reached}/{one.expected}",
-        str(one.contacts),
-        str(one.contacts_at_fault),
-        _number(one.ratio_median),
-        _number(one.ratio_p90),
-        _number(one.min_clearance_m),
-        str(one.false_stops),
-        str(one.flaps),
-        str(one.reversals),
-        str(one.limit_violations),
+        str(totals.missions),
+        f"{totals.reached}/{totals.expected}",
+        str(totals.contacts),
+        str(totals.contacts_at_fault),
+        _format(totals.ratio_median),
+        _format(totals.ratio_p90),
+        _format(totals.min_clearance_m),
+        str(totals.false_stops),
+        str(totals.flaps),
+        str(totals.reversals),
+        str(totals.limit_violations),
     ]
 
 
-def _number(value: float | None) -> str:
+def _format(value: float | None) -> str:
     if value is None:
         return "-"
     return f"{value:.2f}" if math.isfinite(value) else "never"

@@ -30,14 +30,14 @@ class Stage:
         low_m, high_m = self.world.z_m[:, 0], self.world.z_m[:, 1]
         self.in_height: NDArray[np.bool_] = (low_m < robot.body.height_m) & (high_m > robot.body.clearance_m)
         s_m = np.arange(0.0, self.path.length_m + 1.0, _TABLE_STEP_M)
-        self._table = self.path_poses(s_m)
+        self._pose_table = self.path_poses(s_m)
 
     def pose(self, s_m: float, d_m: float = 0.0) -> PlanarPose:
         """The path's pose at s_m, moved d_m to its left. From a table, accurate to 1 mm on a radius of 0.1
         m."""
-        return PlanarPose(*_beside(self._table, s_m / _TABLE_STEP_M, d_m))
+        return PlanarPose(*_interpolated_pose(self._pose_table, s_m / _TABLE_STEP_M, d_m))
 
-    def robots(self, poses: FloatArray) -> FloatArray:
+    def robot_polygons(self, poses: FloatArray) -> FloatArray:
         """The robot's rectangles (T, 4, 2) at poses (T, 3): x, y, heading."""
         return rectangles(self.robot.body, poses)
 
@@ -47,32 +47,32 @@ class Stage:
 
     def blocked(self, times_s: FloatArray) -> list[list[tuple[float, float]]]:
         """For each time, the intervals (from, to) of s in which the robot would touch something."""
-        stretches: list[list[tuple[float, float]]] = [[] for _ in times_s]
+        intervals: list[list[tuple[float, float]]] = [[] for _ in times_s]
         s_m = np.arange(0.0, self.path.length_m + _SWEEP_STEP_M, _SWEEP_STEP_M)
         poses = self.path_poses(s_m)
-        robots = self.robots(poses)
-        reach_m = reach_of(self.robot.body)
+        robot_polygons = self.robot_polygons(poses)
+        reach_m = body_radius(self.robot.body)
         for k in np.flatnonzero(self.in_height).tolist():
             moves = bool(self.world.moves[k])
-            polygons = self.world.over(times_s if moves else times_s[:1], k)
-            when, where = _near(circles_around(polygons), poses, reach_m)
-            if not len(when):
+            polygons = self.world.sample(times_s if moves else times_s[:1], k)
+            time_index, pose_index = _close_pairs(enclosing_circles(polygons), poses, reach_m)
+            if not len(time_index):
                 continue
-            touch = overlap(robots[where], polygons[when])
-            for t, (low, high) in _runs(when[touch], where[touch]):
-                stretch = (s_m[low] - 0.5 * _SWEEP_STEP_M, s_m[high] + 0.5 * _SWEEP_STEP_M)
-                for one in [stretches[t]] if moves else stretches:
-                    one.append(stretch)
-        return stretches
+            touching = overlap(robot_polygons[pose_index], polygons[time_index])
+            for t, (low, high) in _runs(time_index[touching], pose_index[touching]):
+                interval = (s_m[low] - 0.5 * _SWEEP_STEP_M, s_m[high] + 0.5 * _SWEEP_STEP_M)
+                for step_intervals in [intervals[t]] if moves else intervals:
+                    step_intervals.append(interval)
+        return intervals
 
 
-def reach_of(body: Body) -> float:
+def body_radius(body: Body) -> float:
     """The radius of the circle around the turning centre that encloses the robot."""
     return math.hypot(max(body.front_m, body.rear_m), 0.5 * body.width_m)
 
 
 @compiled("float64[:, :, :]")
-def circles_around(polygons: FloatArray) -> FloatArray:
+def enclosing_circles(polygons: FloatArray) -> FloatArray:
     """Circles (T, 3), centre and radius, that enclose polygons (T, K, 2)."""
     circles = np.empty((len(polygons), 3))
     for t in range(len(polygons)):
@@ -87,49 +87,53 @@ def circles_around(polygons: FloatArray) -> FloatArray:
 
 
 @compiled("float64[:, ::1], float64[:, ::1], float64")
-def _near(
+def _close_pairs(
     circles: FloatArray, poses: FloatArray, reach_m: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The pairs of circles (T, 3) and poses (S, 3) whose circle and circle of reach_m overlap: their indices,
     sorted."""
-    meets, count = np.empty((len(circles), len(poses)), np.bool_), 0
+    overlaps, count = np.empty((len(circles), len(poses)), np.bool_), 0
     for t in range(len(circles)):
         square = (reach_m + circles[t, 2]) ** 2
         for s in range(len(poses)):
             dx, dy = circles[t, 0] - poses[s, 0], circles[t, 1] - poses[s, 1]
-            meets[t, s] = dx * dx + dy * dy < square
-            count += meets[t, s]
-    when, where, found = np.empty(count, np.intp), np.empty(count, np.intp), 0
+            overlaps[t, s] = dx * dx + dy * dy < square
+            count += overlaps[t, s]
+    time_index, pose_index, found = np.empty(count, np.intp), np.empty(count, np.intp), 0
     for t in range(len(circles)):
         for s in range(len(poses)):
-            if meets[t, s]:
-                when[found], where[found] = t, s
+            if overlaps[t, s]:
+                time_index[found], pose_index[found] = t, s
                 found += 1
-    return when, where
+    return time_index, pose_index
 
 
 @compiled("float64[:, ::1], float64, float64")
-def _beside(poses: FloatArray, place: float, d_m: float) -> tuple[float, float, float]:
-    """The pose at place, a fractional index of poses (S, 3), moved d_m to its left."""
-    # In this order of the arguments of max, NaN becomes a valid place.
-    place = min(max(0.0, place), len(poses) - 1.001)
-    k = int(place)
-    before, step, share = poses[k], poses[k + 1] - poses[k], place - k
-    heading = before[2] + share * step[2]
+def _interpolated_pose(poses: FloatArray, index: float, d_m: float) -> tuple[float, float, float]:
+    """The pose at index, a fractional index of poses (S, 3), moved d_m to its left."""
+    # In this order of the arguments of max, NaN becomes a valid index.
+    index = min(max(0.0, index), len(poses) - 1.001)
+    k = int(index)
+    before, step, fraction = poses[k], poses[k + 1] - poses[k], index - k
+    heading = before[2] + fraction * step[2]
     return (
-        before[0] + share * step[0] - d_m * math.sin(heading),
-        before[1] + share * step[1] + d_m * math.cos(heading),
+        before[0] + fraction * step[0] - d_m * math.sin(heading),
+        before[1] + fraction * step[1] + d_m * math.cos(heading),
         heading,
     )
 
 
-def _runs(when: NDArray[np.intp], where: NDArray[np.intp]) -> list[tuple[int, tuple[int, int]]]:
-    """Runs of consecutive places (first, last) for each time. when, where: sorted by time, then place."""
-    if not len(when):
+def _runs(time_index: NDArray[np.intp], pose_index: NDArray[np.intp]) -> list[tuple[int, tuple[int, int]]]:
+    """Runs of consecutive poses (first, last) for each time. time_index, pose_index: sorted by time,
+    then pose."""
+    if not len(time_index):
         return []
-    breaks = np.flatnonzero((np.diff(when) != 0) | (np.diff(where) != 1)) + 1
-    firsts, lasts = np.append(0, breaks), np.append(breaks, len(when)) - 1
-    return [(int(when[a]), (int(where[a]), int(where[b]))) for a, b in zip(firsts, lasts, strict=True)]
+    breaks = np.flatnonzero((np.diff(time_index) != 0) | (np.diff(pose_index) != 1)) + 1
+    firsts, lasts = np.append(0, breaks), np.append(breaks, len(time_index)) - 1
+    return [
+        (int(time_index[a]), (int(pose_index[a]), int(pose_index[b])))
+        for a, b in zip(firsts, lasts, strict=True)
+    ]
 
 
 def rectangles(body: Body, poses: FloatArray) -> FloatArray:
@@ -143,19 +147,19 @@ def rectangles(body: Body, poses: FloatArray) -> FloatArray:
     )
 
 
-def envelope_speed_mps(config: AppConfig) -> float:
+def sight_limited_speed_mps(config: AppConfig) -> float:
     """The top speed that the camera's range allows: an obstacle that comes from beyond it at V_omax must find
     the robot at rest, with the hardest braking and the minimum latency."""
     robot, decision = config.robot, config.decision
-    sees_m = decision.sight.range_m + robot.camera_mount.forward_m - robot.body.front_m
+    sight_m = decision.sight.range_m + robot.camera_mount.forward_m - robot.body.front_m
     limits = (
         braking.emergency(robot.limits) if decision.emergency_caps_range else braking.comfort(robot.limits)
     )
-    seen_s = config.runner.perception_latency_s if isinstance(config.runner, LockstepRunner) else 0.0
+    perception_s = config.runner.perception_latency_s if isinstance(config.runner, LockstepRunner) else 0.0
     speed = braking.speed_for_distance(
-        sees_m,
+        sight_m,
         limits,
-        latency_s=1.0 / config.runner.control_rate_hz + decision.chassis_delay_s + seen_s,
+        latency_s=1.0 / config.runner.control_rate_hz + decision.chassis_delay_s + perception_s,
         closing_mps=robot.limits.max_obstacle_speed_mps,
         margin_m=decision.margins.least_m,
     )

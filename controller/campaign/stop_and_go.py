@@ -4,8 +4,7 @@ Nav2's collision monitor is tested on recordings with four numbers (nav2_collisi
 collision_monitor_node_bag.cpp): time to stop, share of the time that the stop is held, time to resume, and
 share of false stops. There, 0.02 m/s counts as stopped, 0.10 m/s as driving, and three samples in a row as
 certain. Here, the window in which a stop is due comes from the ground truth of the simulated world, and the
-recording is
-the log of a drive: one row per control step.
+recording is the log of a drive: one row per control step.
 """
 
 from __future__ import annotations
@@ -21,15 +20,15 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.robot import Robot
 from controller import braking
-from controller.campaign.drive import DriveLog
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.stage import Stage
 from controller.decision.decision import Action
 from controller.errors import UserError
 from hal.types import FloatArray
 
-STOPPED_MPS, DRIVING_MPS, SAMPLES = 0.02, 0.10, 3
-_ROOM_M = 0.3
-_HEAD = ("t_s", "s_m", "v_mps", "action", "free_m")
+STOPPED_MPS, DRIVING_MPS, MIN_SAMPLES = 0.02, 0.10, 3
+_CLEAR_MARGIN_M = 0.3
+_COLUMNS = ("t_s", "s_m", "v_mps", "action", "free_m")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +78,8 @@ def record(stage: Stage, log: DriveLog) -> DriveRecording:
     """The recording of a drive, with the true free way."""
     times, s = np.array(log.times_s), np.array(log.s_m)
     free = np.full(len(times), np.inf)
-    for k, stretches in enumerate(stage.blocked(times)):
-        ahead = [low - s[k] for low, high in stretches if high >= s[k]]
+    for k, intervals in enumerate(stage.blocked(times)):
+        ahead = [low - s[k] for low, high in intervals if high >= s[k]]
         free[k] = max(min(ahead), 0.0) if ahead else np.inf
     faster = np.array([action is Action.INCREASE for action in log.actions], np.bool_)
     return DriveRecording(times, s, np.array(log.v_mps), faster, free)
@@ -91,7 +90,7 @@ def write(path: Path, recording: DriveRecording) -> None:
     try:
         with path.open("w", encoding="utf-8", newline="") as file:
             rows = csv.writer(file)
-            rows.writerow(_HEAD)
+            rows.writerow(_COLUMNS)
             for t, s, v, faster, free in zip(
                 recording.times_s, recording.s_m, recording.v_mps, recording.faster, recording.free_m,
                 strict=True,
@@ -107,7 +106,8 @@ def read(path: Path) -> DriveRecording:
         with path.open(encoding="utf-8", newline="") as file:
             head, *rows = csv.reader(file)
         table = np.array([[float(cell) for cell in row] for row in rows], np.float64)
-        if tuple(head) != _HEAD or table.shape[1:] != (len(_HEAD),) or not np.isfinite(table[:, :4]).all():
+        right_shape = tuple(head) == _COLUMNS and table.shape[1:] == (len(_COLUMNS),)
+        if not right_shape or not np.isfinite(table[:, :4]).all():
             raise ValueError("other columns, or values that are no numbers")
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror})") from error
@@ -120,81 +120,91 @@ def read(path: Path) -> DriveRecording:
 def measure(recording: DriveRecording, robot: Robot, decision: DecisionConfig) -> StopAndGo:
     """The four numbers of a drive in which at most one obstacle comes into the way and leaves it again."""
     comfort = braking.comfort(robot.limits)
-    recording = _until_at_rest_for_good(recording)
+    recording = _without_final_rest(recording)
     times, v, free = recording.times_s, recording.v_mps, recording.free_m
-    needs = np.array(
-        [
-            braking.required_distance(
-                max(speed, 0.0), 0.0, 0.0, decision.chassis_delay_s, comfort, decision.margins.stop_m
-            )
-            for speed in v
-        ]
-    )
+    needed_m = _stopping_distances_m(v, comfort, decision)
     starting_s = math.sqrt(2.0 * DRIVING_MPS / robot.limits.max_jerk_mps3)
-    driving = _first(v >= DRIVING_MPS, 0)
-    must = _must_stop(free, needs, v, driving)
-    if must == len(v):
-        nothing = math.nan
+    driving = _first_index(v >= DRIVING_MPS, 0)
+    stop_due = _stop_due_step(free, needed_m, v, driving)
+    if stop_due == len(v):
+        unknown = math.nan
         false_stops = _standing_share(v[driving:])
-        return StopAndGo(nothing, nothing, nothing, nothing, starting_s, nothing, false_stops)
-    braking_s = braking.stop(max(float(v[must]), 0.0), 0.0, comfort).time_s
-    clear = _first(~np.isfinite(free) | (free > needs[must] + 1.0), must, certain=1)
-    stopped = _first(v <= STOPPED_MPS, must)
+        return StopAndGo(unknown, unknown, unknown, unknown, starting_s, unknown, false_stops)
+    braking_s = braking.stop(max(float(v[stop_due]), 0.0), 0.0, comfort).time_s
+    clear_step = _first_index(~np.isfinite(free) | (free > needed_m[stop_due] + 1.0), stop_due, min_run=1)
+    stopped = _first_index(v <= STOPPED_MPS, stop_due)
     to_stop_s, hold = math.inf, 0.0
-    if stopped < clear:
-        to_stop_s = float(times[stopped] - times[must])
-        hold = _standing_share(v[stopped:clear])
-    resumed = _first(v >= DRIVING_MPS, clear) if clear < len(v) else len(v)
-    decided = _first(recording.faster, clear, certain=1) if clear < len(v) else len(v)
-    right = np.zeros(len(v), np.bool_)
-    right[must : max(resumed, clear)] = True
+    if stopped < clear_step:
+        to_stop_s = float(times[stopped] - times[stop_due])
+        hold = _standing_share(v[stopped:clear_step])
+    resumed = _first_index(v >= DRIVING_MPS, clear_step) if clear_step < len(v) else len(v)
+    decided = _first_index(recording.faster, clear_step, min_run=1) if clear_step < len(v) else len(v)
+    stop_expected = np.zeros(len(v), np.bool_)
+    stop_expected[stop_due : max(resumed, clear_step)] = True
     return StopAndGo(
         to_stop_s,
         braking_s,
         hold,
-        _since(times, clear, resumed),
+        _elapsed_s(times, clear_step, resumed),
         starting_s,
-        _since(times, clear, decided),
-        _standing_share(v[driving:], ~right[driving:]),
+        _elapsed_s(times, clear_step, decided),
+        _standing_share(v[driving:], ~stop_expected[driving:]),
     )
 
 
-def _must_stop(free_m: FloatArray, needs_m: FloatArray, v_mps: FloatArray, driving: int) -> int:
+def _stopping_distances_m(
+    v_mps: FloatArray, limits: braking.BrakeLimits, decision: DecisionConfig
+) -> FloatArray:
+    """The free way that a stop from each speed needs, margin included."""
+    return np.array(
+        [
+            braking.required_distance(
+                max(speed, 0.0), 0.0, 0.0, decision.chassis_delay_s, limits, decision.margins.stop_m
+            )
+            for speed in v_mps
+        ]
+    )
+
+
+def _stop_due_step(free_m: FloatArray, needed_m: FloatArray, v_mps: FloatArray, driving: int) -> int:
     """The last step before the robot stands from which the free way is no longer than a comfortable stop
     needs. A robot that slowed down in time has room again, and need not stop yet."""
-    first = _first(free_m <= needs_m, driving, certain=1)
-    until = min(_first(v_mps <= STOPPED_MPS, first), _first(~np.isfinite(free_m), first, certain=1))
-    roomy = np.flatnonzero(free_m[first:until] > needs_m[first:until] + _ROOM_M)
-    return first if not len(roomy) else _first(free_m <= needs_m, first + int(roomy[-1]), certain=1)
+    first = _first_index(free_m <= needed_m, driving, min_run=1)
+    stopped = _first_index(v_mps <= STOPPED_MPS, first)
+    until = min(stopped, _first_index(~np.isfinite(free_m), first, min_run=1))
+    clear_steps = np.flatnonzero(free_m[first:until] > needed_m[first:until] + _CLEAR_MARGIN_M)
+    if not len(clear_steps):
+        return first
+    return _first_index(free_m <= needed_m, first + int(clear_steps[-1]), min_run=1)
 
 
-def _until_at_rest_for_good(recording: DriveRecording) -> DriveRecording:
+def _without_final_rest(recording: DriveRecording) -> DriveRecording:
     """The recording without the time at rest on the target, which is not a stop. If the drive ends with
     something in its way, all of it is kept."""
     moving = np.flatnonzero(recording.v_mps > STOPPED_MPS)
     if not len(moving) or np.isfinite(recording.free_m[-1]):
         return recording
     end = int(moving[-1]) + 1
-    return DriveRecording(*(getattr(recording, one.name)[:end] for one in fields(recording)))
+    return DriveRecording(*(getattr(recording, field.name)[:end] for field in fields(recording)))
 
 
-def _first(holds: NDArray[np.bool_], start: int, certain: int = SAMPLES) -> int:
-    """The first index from start on at which holds is true for certain samples in a row; the length if
+def _first_index(condition: NDArray[np.bool_], start: int, min_run: int = MIN_SAMPLES) -> int:
+    """The first index from start on at which condition is true for min_run samples in a row; the length if
     none."""
     run = 0
-    for k in range(start, len(holds)):
-        run = run + 1 if holds[k] else 0
-        if run == certain:
-            return k - certain + 1
-    return len(holds)
+    for k in range(start, len(condition)):
+        run = run + 1 if condition[k] else 0
+        if run == min_run:
+            return k - min_run + 1
+    return len(condition)
 
 
-def _since(times_s: FloatArray, start: int, end: int) -> float:
+def _elapsed_s(times_s: FloatArray, start: int, end: int) -> float:
     if start >= len(times_s):
         return math.nan
     return float(times_s[end] - times_s[start]) if end < len(times_s) else math.inf
 
 
-def _standing_share(v_mps: FloatArray, of: NDArray[np.bool_] | None = None) -> float:
-    chosen = v_mps if of is None else v_mps[of]
-    return float(np.mean(chosen <= STOPPED_MPS)) if len(chosen) else 0.0
+def _standing_share(v_mps: FloatArray, mask: NDArray[np.bool_] | None = None) -> float:
+    selected = v_mps if mask is None else v_mps[mask]
+    return float(np.mean(selected <= STOPPED_MPS)) if len(selected) else 0.0

@@ -49,18 +49,22 @@ class _Target:
     name: str
     value: Callable[[StopAndGo], float]
     limit: float
-    at_least: bool = False
+    is_minimum: bool = False
 
-    def missed(self, one: StopAndGo) -> bool:
-        value = self.value(one)
-        return not (value >= self.limit if self.at_least else value <= self.limit)
+    def missed(self, result: StopAndGo) -> bool:
+        value = self.value(result)
+        return not (value >= self.limit if self.is_minimum else value <= self.limit)
 
 
 TARGETS = (
-    _Target("time to stop beyond braking, s", lambda one: one.to_stop_s - one.braking_s, TO_STOP_S),
-    _Target("hold, share", lambda one: one.hold_share, HOLD, at_least=True),
-    _Target("time to resume beyond starting, s", lambda one: one.to_resume_s - one.starting_s, TO_RESUME_S),
-    _Target("false stop, share", lambda one: one.false_stop_share, FALSE_STOPS),
+    _Target("time to stop beyond braking, s", lambda result: result.to_stop_s - result.braking_s, TO_STOP_S),
+    _Target("hold, share", lambda result: result.hold_share, HOLD, is_minimum=True),
+    _Target(
+        "time to resume beyond starting, s",
+        lambda result: result.to_resume_s - result.starting_s,
+        TO_RESUME_S,
+    ),
+    _Target("false stop, share", lambda result: result.false_stop_share, FALSE_STOPS),
 )
 
 
@@ -85,15 +89,15 @@ def run_stop_and_go(options: StopAndGoOptions) -> int:
         for seed in bar:
             _drive(options, config, seed, folder / f"{seed}.csv")
     # Measured from the files, which shows that a recording holds everything that is needed.
-    found = {
+    results = {
         seed: stop_and_go.measure(stop_and_go.read(folder / f"{seed}.csv"), config.robot, config.decision)
         for seed in seeds
     }
-    _write(options, found)
+    _write(options, results)
     for target in TARGETS:
-        say(f"{target.name:<36} {_line(target, list(found.values()))}")
+        say(f"{target.name:<36} {_result_line(target, list(results.values()))}")
     say(f"report   {options.report / 'report.md'}")
-    return int(any(target.missed(one) for one in found.values() for target in TARGETS))
+    return int(any(target.missed(result) for result in results.values() for target in TARGETS))
 
 
 def _drive(options: StopAndGoOptions, config: AppConfig, seed: int, file: Path) -> None:
@@ -106,19 +110,19 @@ def _drive(options: StopAndGoOptions, config: AppConfig, seed: int, file: Path) 
     stop_and_go.write(file, stop_and_go.record(stage, log))
 
 
-def _line(target: _Target, found: list[StopAndGo]) -> str:
-    values = [target.value(one) for one in found]
-    worst = min(values) if target.at_least else max(values)
-    missed = sum(target.missed(one) for one in found)
-    verdict = "all reach it" if not missed else f"{missed} of {len(found)} miss it"
-    sign = ">=" if target.at_least else "<="
+def _result_line(target: _Target, results: list[StopAndGo]) -> str:
+    values = [target.value(result) for result in results]
+    worst = min(values) if target.is_minimum else max(values)
+    missed = sum(target.missed(result) for result in results)
+    verdict = "all reach it" if not missed else f"{missed} of {len(results)} miss it"
+    sign = ">=" if target.is_minimum else "<="
     return (
         f"median {markdown.fixed(float(np.median(values)))}, worst {markdown.fixed(worst)}; "
         f"{sign} {target.limit:g}: {verdict}"
     )
 
 
-def _write(options: StopAndGoOptions, found: dict[int, StopAndGo]) -> None:
+def _write(options: StopAndGoOptions, results: dict[int, StopAndGo]) -> None:
     command = (
         f"treadwatch stop-and-go --drives {options.drives} --seed {options.seed} --mode {options.mode} "
         f"--report {options.report}"
@@ -135,11 +139,12 @@ def _write(options: StopAndGoOptions, found: dict[int, StopAndGo]) -> None:
         "seed", "to stop s", "of that braking s", "hold", "to resume s", "of that starting s", "decided s",
         "false stops",
     )  # fmt: skip
-    lines += markdown.table(head, [[str(seed), *_cells(one)] for seed, one in found.items()])
+    lines += markdown.table(head, [[str(seed), *_cells(result)] for seed, result in results.items()])
     lines += markdown.table(
-        ("metric", "result"), [(target.name, _line(target, list(found.values()))) for target in TARGETS]
+        ("metric", "result"),
+        [(target.name, _result_line(target, list(results.values()))) for target in TARGETS],
     )
-    content = {"command": command, "drives": {seed: one.as_dict() for seed, one in found.items()}}
+    content = {"command": command, "drives": {seed: result.as_dict() for seed, result in results.items()}}
     try:
         (options.report / "report.md").write_text("\n".join(lines), encoding="utf-8")
         (options.report / "summary.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
@@ -147,14 +152,14 @@ def _write(options: StopAndGoOptions, found: dict[int, StopAndGo]) -> None:
         raise UserError(f"{options.report}: the report cannot be written ({error.strerror})") from error
 
 
-def _cells(one: StopAndGo) -> list[str]:
-    share = "n/a" if math.isnan(one.hold_share) else f"{100 * one.hold_share:.1f} %"
+def _cells(result: StopAndGo) -> list[str]:
+    share = "n/a" if math.isnan(result.hold_share) else f"{100 * result.hold_share:.1f} %"
     return [
-        markdown.fixed(one.to_stop_s, 2),
-        markdown.fixed(one.braking_s, 2),
+        markdown.fixed(result.to_stop_s, 2),
+        markdown.fixed(result.braking_s, 2),
         share,
-        markdown.fixed(one.to_resume_s, 2),
-        markdown.fixed(one.starting_s, 2),
-        markdown.fixed(one.to_decide_s, 2),
-        f"{100 * one.false_stop_share:.2f} %",
+        markdown.fixed(result.to_resume_s, 2),
+        markdown.fixed(result.starting_s, 2),
+        markdown.fixed(result.to_decide_s, 2),
+        f"{100 * result.false_stop_share:.2f} %",
     ]

@@ -16,7 +16,7 @@ SETTINGS = "config.json"
 Key = tuple[str, int, str]
 
 
-def key_of(row: Row) -> Key:
+def row_key(row: Row) -> Key:
     """The key that identifies a row within a report."""
     return row.family, row.seed, row.policy
 
@@ -46,9 +46,9 @@ class MissionStore:
                 self._read()
                 self.rewrite()
             # Find out now whether files can be written, not when the first mission is over.
-            part = self.path.with_suffix(".part")
-            part.touch()
-            part.unlink()
+            temporary = self.path.with_suffix(".part")
+            temporary.touch()
+            temporary.unlink()
         except OSError as error:
             raise UserError(f"{self.path}: {error.strerror}; choose a folder that can be written") from error
 
@@ -57,25 +57,25 @@ class MissionStore:
 
         Raises UserError.
         """
-        with self._told():
+        with self._reporting_errors():
             if not self.path.exists():
                 self._settings_path.write_text(self._settings, encoding="utf-8")
             with self.path.open("a", encoding="utf-8") as file:
                 for row in rows:
-                    self.rows[key_of(row)] = row
+                    self.rows[row_key(row)] = row
                     file.write(json.dumps(row.as_dict()) + "\n")
 
     def rewrite(self) -> None:
         """Write all rows in a fixed order, independent of the order of the workers. Raises UserError."""
         self.rows = dict(sorted(self.rows.items()))
         text = "".join(json.dumps(row.as_dict()) + "\n" for row in self.rows.values())
-        part = self.path.with_suffix(".part")
-        with self._told():
-            part.write_text(text, encoding="utf-8")
-            part.replace(self.path)
+        temporary = self.path.with_suffix(".part")
+        with self._reporting_errors():
+            temporary.write_text(text, encoding="utf-8")
+            temporary.replace(self.path)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _reporting_errors(self) -> Iterator[None]:
         """Turn an OSError, such as a full disk, into a UserError; the rows so far are not lost."""
         try:
             yield
@@ -87,29 +87,29 @@ class MissionStore:
 
     def _check_settings(self) -> None:
         """Raise UserError if the earlier rows were driven with another configuration."""
-        if self._settings_path.exists() and _text_of(self._settings_path) != self._settings:
+        if self._settings_path.exists() and _read_text(self._settings_path) != self._settings:
             raise UserError(
                 f"{self.path}: was driven with another --config (it is in {self._settings_path}); go on with "
                 "that one, or give another --report folder"
             )
 
     def _read(self) -> None:
-        text = _text_of(self.path)
-        lines, cut = text.splitlines(), not text.endswith("\n")
+        text = _read_text(self.path)
+        lines, truncated = text.splitlines(), not text.endswith("\n")
         for number, line in enumerate(lines, start=1):
             try:
-                row = row_of(json.loads(line))
+                row = parse_row(json.loads(line))
             except (ValueError, TypeError, KeyError) as error:
-                if cut and number == len(lines):
+                if truncated and number == len(lines):
                     return
                 raise UserError(
                     f"{self.path}: line {number} is not a row of this program ({error}); "
                     "mend it or give another --report folder"
                 ) from error
-            self.rows[key_of(row)] = row
+            self.rows[row_key(row)] = row
 
 
-def _text_of(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -119,7 +119,7 @@ def _text_of(path: Path) -> str:
         ) from error
 
 
-def row_of(values: dict[str, object]) -> Row:
+def parse_row(values: dict[str, object]) -> Row:
     """A row from its JSON object. Raises TypeError if it is not a row."""
     if not isinstance(values, dict):
         raise TypeError("no object")

@@ -64,10 +64,10 @@ def totals(rows: list[Row]) -> Totals:
     )
 
 
-def _percentile(values: list[float], share: float) -> float | None:
-    """The smallest value that share per cent of the values do not exceed. Not interpolated, because values
+def _percentile(values: list[float], percent: float) -> float | None:
+    """The smallest value that this percentage of the values do not exceed. Not interpolated, because values
     may be infinite."""
-    return round(float(np.percentile(values, share, method="inverted_cdf")), 4) if values else None
+    return round(float(np.percentile(values, percent, method="inverted_cdf")), 4) if values else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +81,9 @@ class Summary:
     def as_dict(self) -> dict[str, object]:
         """The summary as a dictionary for summary.json."""
         return {
-            "policies": {name: _plain(one) for name, one in self.policies.items()},
+            "policies": {name: _json_values(one) for name, one in self.policies.items()},
             "families": {
-                family: {name: _plain(one) for name, one in by_policy.items()}
+                family: {name: _json_values(one) for name, one in by_policy.items()}
                 for family, by_policy in self.families.items()
             },
             "failing": [
@@ -93,9 +93,9 @@ class Summary:
         }
 
 
-def _plain(one: Totals) -> dict[str, object]:
+def _json_values(totals: Totals) -> dict[str, object]:
     """The totals for JSON, with null for infinity."""
-    values = asdict(one)
+    values = asdict(totals)
     return {key: None if value == math.inf else value for key, value in values.items()}
 
 

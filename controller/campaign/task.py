@@ -14,12 +14,12 @@ from config.app import AppConfig, LockstepRunner
 from config.camera import SimulatedCameraConfig
 from controller.campaign import oracle
 from controller.campaign.camera_mission import drive_camera
-from controller.campaign.judge import Row, Yardstick, judge
+from controller.campaign.judge import JudgeReference, Row, judge
 from controller.campaign.noise_mission import drive_noise
 from controller.campaign.noisy_camera import NoiseModel
 from controller.campaign.policies import build_policy
-from controller.campaign.stage import Stage, envelope_speed_mps
-from controller.campaign.view import PlanarEye
+from controller.campaign.stage import Stage, sight_limited_speed_mps
+from controller.campaign.view import PlanarCamera
 from sim.families import generate
 
 Mode = Literal["noise", "camera"]
@@ -45,15 +45,15 @@ class Task:
 def run_task(task: Task) -> list[Row]:
     """A row for each policy, in their order. The same task gives the same rows on every machine."""
     stage = Stage(generate(task.family, task.seed), task.config.robot)
-    by = yardstick(stage, task.config)
-    return [_run(task, stage, policy, by) for policy in task.policies]
+    reference = judge_reference(stage, task.config)
+    return [_run(task, stage, policy, reference) for policy in task.policies]
 
 
-def yardstick(stage: Stage, config: AppConfig) -> Yardstick:
+def judge_reference(stage: Stage, config: AppConfig) -> JudgeReference:
     """The yardstick for drives of this mission."""
     assert isinstance(config.camera, SimulatedCameraConfig), "checked by controller/campaign/command.py"
     assert isinstance(config.runner, LockstepRunner), "checked by controller/campaign/command.py"
-    best = oracle.solve(stage, envelope_speed_mps(config), stage.case.scenario.duration_s)
+    best = oracle.solve(stage, sight_limited_speed_mps(config), stage.case.scenario.duration_s)
     reaction_s = (
         NoiseModel().sightings / config.camera.fps
         + config.runner.perception_latency_s
@@ -61,19 +61,19 @@ def yardstick(stage: Stage, config: AppConfig) -> Yardstick:
         + config.decision.chassis_delay_s
     )
     robot = config.robot
-    eye = PlanarEye(stage.world, config.camera, robot.camera_mount, robot.body.height_m)
-    return Yardstick(best, eye, reaction_s)
+    planar_camera = PlanarCamera(stage.world, config.camera, robot.camera_mount, robot.body.height_m)
+    return JudgeReference(best, planar_camera, reaction_s)
 
 
-def _run(task: Task, stage: Stage, policy: str, by: Yardstick) -> Row:
+def _run(task: Task, stage: Stage, policy: str, reference: JudgeReference) -> Row:
     config = task.config
     if task.mode == "noise":
-        with _no_search_for_garbage():
+        with _garbage_collector_off():
             log = drive_noise(stage, config, build_policy(policy, config, stage))
-        return judge(stage, log, policy, task.mode, by)
+        return judge(stage, log, policy, task.mode, reference)
     keep = None if task.keep is None else task.keep / f"{task.family}-{task.seed}-{policy}"
     log = drive_camera(stage, config, policy, keep if task.keep_all else None)
-    row = judge(stage, log, policy, task.mode, by)
+    row = judge(stage, log, policy, task.mode, reference)
     if keep is not None and not task.keep_all and failed(row):
         # Repeat the drive and record it. Recording every drive would cost more.
         drive_camera(stage, config, policy, keep)
@@ -81,7 +81,7 @@ def _run(task: Task, stage: Stage, policy: str, by: Yardstick) -> Row:
 
 
 @contextmanager
-def _no_search_for_garbage() -> Iterator[None]:
+def _garbage_collector_off() -> Iterator[None]:
     """Switch the garbage collector off: reference counting frees what a drive leaves behind, and the search
     for reference cycles would take 5 % of the time."""
     was_enabled = gc.isenabled()

@@ -21,7 +21,7 @@ BoolArray = NDArray[np.bool_]
 
 BANDS = 80
 _NEAR_M = 0.1
-_TOUCHING_M = 1e-6
+_TOLERANCE_M = 1e-6
 
 
 @record(frozen=True, slots=True, eq=False)
@@ -32,16 +32,16 @@ class PlanarView:
     forward_m: (M, B), forward distance at which each band's ray meets each body; inf if it misses or the body
         is occluded there.
     free_m: (B,), distance of the first body or wall that occludes what is behind it.
-    place: PlanarEye.place() of the camera.
+    camera_pose: PlanarCamera.camera_pose().
     """
 
     bodies: IntArray
     forward_m: FloatArray
     free_m: FloatArray
-    place: tuple[float, float, float, float]
+    camera_pose: tuple[float, float, float, float]
 
 
-class PlanarEye:
+class PlanarCamera:
     """A pinhole camera with its height and pitch.
 
     bearing_tan: (B,), right divided by forward, of the ray of each band.
@@ -53,9 +53,9 @@ class PlanarEye:
         world: PlanarWorld,
         camera: SimulatedCameraConfig,
         mount: Mount,
-        hangs_m: float = math.inf,
+        max_underside_m: float = math.inf,
     ) -> None:
-        """hangs_m: a body whose underside is at least this high does not occlude the floor behind it."""
+        """max_underside_m: a body with a higher underside does not occlude the floor behind it."""
         self._mount, self._z_m, self._room = mount, world.z_m, world.room_polygon()
         self.range_m = camera.depth_max_m
         left, right = (-0.5 - camera.cx) / camera.fx, (camera.width - 0.5 - camera.cx) / camera.fx
@@ -69,16 +69,16 @@ class PlanarEye:
         sees_floor = self._down_tan > mount.height_m / NEVER_M
         self.floor_from_m = mount.height_m / self._down_tan if sees_floor else NEVER_M
         z_m = self._z_m
-        self._hides = (z_m[:, 0] < min(mount.height_m, hangs_m)) & (z_m[:, 1] > mount.height_m)
+        self._occludes = (z_m[:, 0] < min(mount.height_m, max_underside_m)) & (z_m[:, 1] > mount.height_m)
 
     def look(self, polygons: FloatArray, pose: PlanarPose) -> PlanarView:
         """The view from the robot at pose. polygons: (N, K, 2), footprints of all bodies."""
-        place = self.place(pose)
-        bodies, forward_m, free_m = _look(
+        camera_pose = self.camera_pose(pose)
+        bodies, forward_m, free_m = _render(
             polygons,
             self._room,
             self._z_m,
-            self._hides,
+            self._occludes,
             self.bearing_tan,
             self.half_width_tan,
             self._edge_tan,
@@ -86,11 +86,11 @@ class PlanarEye:
             self._mount.height_m,
             self._down_tan,
             self.up_tan,
-            *place,
+            *camera_pose,
         )
-        return PlanarView(bodies, forward_m, free_m, place)
+        return PlanarView(bodies, forward_m, free_m, camera_pose)
 
-    def place(self, pose: PlanarPose) -> tuple[float, float, float, float]:
+    def camera_pose(self, pose: PlanarPose) -> tuple[float, float, float, float]:
         """x_m and y_m of the camera on the floor, and cosine and sine of its heading, for the robot at
         pose."""
         cos, sin = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
@@ -106,8 +106,8 @@ class PlanarEye:
 @inlined
 def _in_camera(
     polygon: FloatArray,
-    eye_x: float,
-    eye_y: float,
+    camera_x: float,
+    camera_y: float,
     cos: float,
     sin: float,
     forward: FloatArray,
@@ -117,12 +117,12 @@ def _in_camera(
     corner is repeated at the end."""
     count = len(polygon)
     for j in range(count + 1):
-        dx, dy = polygon[j % count, 0] - eye_x, polygon[j % count, 1] - eye_y
+        dx, dy = polygon[j % count, 0] - camera_x, polygon[j % count, 1] - camera_y
         forward[j], right[j] = dx * cos + dy * sin, dx * sin - dy * cos
 
 
 @inlined
-def _may_be_seen(forward: FloatArray, right: FloatArray, edge_tan: float, range_m: float) -> bool:
+def _may_be_in_view(forward: FloatArray, right: FloatArray, edge_tan: float, range_m: float) -> bool:
     """Whether a polygon may reach into the field of view."""
     nearest, farthest, leftmost, rightmost = math.inf, -math.inf, math.inf, -math.inf
     for j in range(len(forward)):
@@ -133,86 +133,90 @@ def _may_be_seen(forward: FloatArray, right: FloatArray, edge_tan: float, range_
 
 
 @inlined
-def _meet(forward: FloatArray, right: FloatArray, bearing_tan: FloatArray, hits: FloatArray) -> bool:
+def _cast_rays(forward: FloatArray, right: FloatArray, bearing_tan: FloatArray, hits: FloatArray) -> bool:
     """Fill hits (B,) with the forward distance at which each ray first meets an edge of a polygon, inf for
     none. Return whether any ray does."""
-    met = False
+    any_hit = False
     hits[:] = math.inf
     for j in range(len(forward) - 1):
         for b in range(len(bearing_tan)):
-            here = right[j] - bearing_tan[b] * forward[j]
-            there = right[j + 1] - bearing_tan[b] * forward[j + 1]
-            if here * there > 0.0:
+            side = right[j] - bearing_tan[b] * forward[j]
+            next_side = right[j + 1] - bearing_tan[b] * forward[j + 1]
+            if side * next_side > 0.0:
                 continue
-            drop = here - there
-            share = here / drop if abs(drop) >= 1e-12 else 0.0
-            z = forward[j] + share * (forward[j + 1] - forward[j])
+            span = side - next_side
+            fraction = side / span if abs(span) >= 1e-12 else 0.0
+            z = forward[j] + fraction * (forward[j + 1] - forward[j])
             if z > _NEAR_M and z < hits[b]:
-                hits[b], met = z, True
-    return met
+                hits[b], any_hit = z, True
+    return any_hit
 
 
 @inlined
-def _show_thin(
+def _add_thin_body(
     forward: FloatArray, right: FloatArray, bearing_tan: FloatArray, half_width_tan: float, hits: FloatArray
 ) -> None:
     """Fill hits for a body that no ray has met: a pole between two rays is still visible in its band."""
-    ahead, low, high = math.inf, math.inf, -math.inf
+    nearest, low, high = math.inf, math.inf, -math.inf
     for j in range(len(forward)):
         tangent = right[j] / max(forward[j], _NEAR_M)
-        ahead, low, high = min(ahead, forward[j]), min(low, tangent), max(high, tangent)
+        nearest, low, high = min(nearest, forward[j]), min(low, tangent), max(high, tangent)
     low, high = low - half_width_tan, high + half_width_tan
-    if ahead > _NEAR_M and high - low <= 4.0 * half_width_tan:
+    if nearest > _NEAR_M and high - low <= 4.0 * half_width_tan:
         for b in range(len(bearing_tan)):
             if low < bearing_tan[b] < high:
-                hits[b] = ahead
+                hits[b] = nearest
 
 
 @compiled(
     "float64[:, :, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64[::1], float64, float64,"
     "float64, float64, float64, float64, float64, float64, float64, float64"
 )
-def _look(
+def _render(
     polygons: FloatArray,
     room: FloatArray,
     z_m: FloatArray,
-    hides: BoolArray,
+    occludes: BoolArray,
     bearing_tan: FloatArray,
     half_width_tan: float,
     edge_tan: float,
     range_m: float,
-    eye_m: float,
+    camera_height_m: float,
     down_tan: float,
     up_tan: float,
-    eye_x: float,
-    eye_y: float,
+    camera_x: float,
+    camera_y: float,
     cos: float,
     sin: float,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """The fields of PlanarView for a camera at eye_x, eye_y, at height eye_m above the floor."""
+    """The fields of PlanarView for a camera at camera_x, camera_y, camera_height_m above the floor."""
     count, corners, bands = len(polygons), polygons.shape[1], len(bearing_tan)
     bodies, hits = np.empty(count, np.intp), np.empty((count, bands))
     forward, right, free = np.empty(len(room) + 1), np.empty(len(room) + 1), np.empty(bands)
-    _in_camera(room, eye_x, eye_y, cos, sin, forward, right)
-    _meet(forward, right, bearing_tan, free)
-    forward, right, seen = np.empty(corners + 1), np.empty(corners + 1), 0
+    _in_camera(room, camera_x, camera_y, cos, sin, forward, right)
+    _cast_rays(forward, right, bearing_tan, free)
+    forward, right, in_view = np.empty(corners + 1), np.empty(corners + 1), 0
     for k in range(count):
-        _in_camera(polygons[k], eye_x, eye_y, cos, sin, forward, right)
-        if not _may_be_seen(forward, right, edge_tan, range_m):
+        _in_camera(polygons[k], camera_x, camera_y, cos, sin, forward, right)
+        if not _may_be_in_view(forward, right, edge_tan, range_m):
             continue
-        if not _meet(forward, right, bearing_tan, hits[seen]):
-            _show_thin(forward, right, bearing_tan, half_width_tan, hits[seen])
-        if hides[k]:
+        if not _cast_rays(forward, right, bearing_tan, hits[in_view]):
+            _add_thin_body(forward, right, bearing_tan, half_width_tan, hits[in_view])
+        if occludes[k]:
             for b in range(bands):
-                free[b] = min(free[b], hits[seen, b])
-        bodies[seen] = k
-        seen += 1
-    for row in range(seen):
+                free[b] = min(free[b], hits[in_view, b])
+        bodies[in_view] = k
+        in_view += 1
+    for row in range(in_view):
         low_m, high_m = z_m[bodies[row], 0], z_m[bodies[row], 1]
         for b in range(bands):
             z = hits[row, b]
             # A body is in the frame if part of its height is between the upper and lower edge of the image.
-            in_frame = z < range_m and high_m > eye_m - z * down_tan and low_m < eye_m + z * up_tan
-            if z > free[b] + _TOUCHING_M or not in_frame:
+            in_frame = (
+                z < range_m
+                and high_m > camera_height_m - z * down_tan
+                and low_m < camera_height_m + z * up_tan
+            )
+            if z > free[b] + _TOLERANCE_M or not in_frame:
                 hits[row, b] = math.inf
-    return bodies[:seen], hits[:seen], free
+    return bodies[:in_view], hits[:in_view], free

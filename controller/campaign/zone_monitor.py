@@ -13,18 +13,18 @@ import math
 import numpy as np
 
 from config.robot import Robot
+from controller.campaign.baseline_policy import decision, free_speed
 from controller.campaign.planar_scan import PlanarScanner
-from controller.campaign.rivals import decision, free_speed
 from controller.campaign.stage import Stage
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
 from hal.clocks import NS_PER_S
 from hal.types import FloatArray
 
-_STOP_BEYOND_M, _SLOW_BEYOND_M = 0.08, 0.18
+_STOP_MARGIN_M, _SLOW_MARGIN_M = 0.08, 0.18
 _SLOWDOWN_RATIO = 0.3
 _ZONE_POINTS, _APPROACH_POINTS = 4, 6
-_BEFORE_COLLISION_S, _STEP_S = 2.0, 0.1
+_TIME_BEFORE_COLLISION_S, _STEP_S = 2.0, 0.1
 
 
 class ZoneMonitor:
@@ -37,43 +37,46 @@ class ZoneMonitor:
     def step(self, at: Situation) -> Decision:
         """The speed that the zones allow, with as much braking as necessary."""
         points = self._scanner.points(at.pose, at.now_ns / NS_PER_S)
-        wanted = free_speed(at.path, at.on_path, self._robot.limits)
+        desired = free_speed(at.path, at.on_path, self._robot.limits)
         curvature = at.path.curvature(at.on_path.s_m)
-        target, rule = self.limit(points, wanted, curvature)
-        return decision("zones", rule, target, at.v_mps, hard=target < wanted)
+        target, rule = self.limit(points, desired, curvature)
+        return decision("zones", rule, target, at.v_mps, hard=target < desired)
 
-    def limit(self, points: FloatArray, wanted_mps: float, curvature_1pm: float) -> tuple[float, str]:
-        """The speed that the three zones allow of wanted_mps, and the name of the zone that limits it."""
+    def limit(self, points: FloatArray, desired_mps: float, curvature_1pm: float) -> tuple[float, str]:
+        """The speed that the three zones allow of desired_mps, and the name of the zone that limits it."""
         body = self._robot.body
-        half = 0.5 * body.width_m
-        if self._count(points, 0.0, body.front_m + _STOP_BEYOND_M, half + _STOP_BEYOND_M) >= _ZONE_POINTS:
+        half_width_m = 0.5 * body.width_m
+        if (
+            self._count(points, 0.0, body.front_m + _STOP_MARGIN_M, half_width_m + _STOP_MARGIN_M)
+            >= _ZONE_POINTS
+        ):
             return 0.0, "stop polygon"
-        target, rule = wanted_mps, "free"
-        rear, front = -body.rear_m - _SLOW_BEYOND_M, body.front_m + _SLOW_BEYOND_M
-        if self._count(points, rear, front, half + _SLOW_BEYOND_M) >= _ZONE_POINTS:
-            target, rule = _SLOWDOWN_RATIO * wanted_mps, "slowdown polygon"
-        collision_s = self.collision_time(points, wanted_mps, curvature_1pm)
-        approach = wanted_mps * collision_s / _BEFORE_COLLISION_S
+        target, rule = desired_mps, "free"
+        rear, front = -body.rear_m - _SLOW_MARGIN_M, body.front_m + _SLOW_MARGIN_M
+        if self._count(points, rear, front, half_width_m + _SLOW_MARGIN_M) >= _ZONE_POINTS:
+            target, rule = _SLOWDOWN_RATIO * desired_mps, "slowdown polygon"
+        collision_s = self.collision_time(points, desired_mps, curvature_1pm)
+        approach = desired_mps * collision_s / _TIME_BEFORE_COLLISION_S
         return (approach, "approach") if approach < target else (target, rule)
 
     def collision_time(self, points: FloatArray, v_mps: float, curvature_1pm: float) -> float:
         """The time until six points are in the footprint at constant v_mps on the present arc, at most 2.0
         s."""
         body = self._robot.body
-        half = 0.5 * body.width_m
-        if self._count(points, -body.rear_m, body.front_m, half) >= _APPROACH_POINTS:
+        half_width_m = 0.5 * body.width_m
+        if self._count(points, -body.rear_m, body.front_m, half_width_m) >= _APPROACH_POINTS:
             return 0.0
-        for k in range(round(_BEFORE_COLLISION_S / _STEP_S)):
+        for k in range(round(_TIME_BEFORE_COLLISION_S / _STEP_S)):
             turn = curvature_1pm * v_mps * (k + 1) * _STEP_S
-            way = v_mps * (k + 1) * _STEP_S * float(np.sinc(0.5 * turn / math.pi))
-            x, y = way * math.cos(0.5 * turn), way * math.sin(0.5 * turn)
+            distance = v_mps * (k + 1) * _STEP_S * float(np.sinc(0.5 * turn / math.pi))
+            x, y = distance * math.cos(0.5 * turn), distance * math.sin(0.5 * turn)
             cos, sin = math.cos(turn), math.sin(turn)
             dx, dy = points[:, 0] - x, points[:, 1] - y
-            ahead = np.stack((dx * cos + dy * sin, dy * cos - dx * sin), axis=1)
-            if self._count(ahead, -body.rear_m, body.front_m, half) >= _APPROACH_POINTS:
+            relative = np.stack((dx * cos + dy * sin, dy * cos - dx * sin), axis=1)
+            if self._count(relative, -body.rear_m, body.front_m, half_width_m) >= _APPROACH_POINTS:
                 # The tested pose is one step later than this time, as in Nav2.
                 return k * _STEP_S
-        return _BEFORE_COLLISION_S
+        return _TIME_BEFORE_COLLISION_S
 
     @staticmethod
     def _count(points: FloatArray, rear_m: float, front_m: float, half_m: float) -> int:

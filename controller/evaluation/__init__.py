@@ -4,14 +4,14 @@ The files in the order in which they come into play:
 
 * evaluate.py - the command: simulated set, recordings, or both, into one report folder
 * sequences.py - which simulated sequences there are, and which of them the detector may be tuned on
-* drive.py - the robot's motion, its odometry, the camera mount
+* scripted_drive.py - the robot's motion, its odometry, the camera mount
 * scenes.py - the movers and the clutter of a sequence
 * campaign.py - runs all sequences on several processes
 * run_sequence.py - runs all methods on one sequence; renders each frame once
 * simulate.py - the frames of a sequence: image, odometry, truth
 * truth.py - the truth about one frame
 * types.py - the truth of a frame, and a method's answer to it
-* contestants.py - the compared methods, each timed
+* timed_methods.py - the compared methods, each timed
 * ours.py - treadwatch as one of them
 * lidar_scan.py, lidar_clusters.py, lidar_matching.py, lidar_baseline.py - the lidar baseline
 * baselines/ - the camera baselines of the paper's Table 1

@@ -22,10 +22,10 @@ def assign(cost: FloatArray) -> Pairs:
         return ()
     possible = np.isfinite(cost)
     # An impossible pair costs more than all possible ones together, so the number of pairs comes first.
-    never = 1.0 + 2.0 * float(np.where(possible, cost, 0.0).sum())
-    whole = np.where(possible, cost, never)
-    chosen = _kuhn_munkres(whole) if rows <= columns else _kuhn_munkres(whole.T)
-    pairs = enumerate(chosen) if rows <= columns else ((row, column) for column, row in enumerate(chosen))
+    impossible_cost = 1.0 + 2.0 * float(np.where(possible, cost, 0.0).sum())
+    padded_cost = np.where(possible, cost, impossible_cost)
+    assigned = _kuhn_munkres(padded_cost) if rows <= columns else _kuhn_munkres(padded_cost.T)
+    pairs = enumerate(assigned) if rows <= columns else ((row, column) for column, row in enumerate(assigned))
     return tuple(sorted((row, column) for row, column in pairs if possible[row, column]))
 
 
@@ -33,31 +33,31 @@ def _kuhn_munkres(cost: FloatArray) -> list[int]:
     """For each row the column of the cheapest complete assignment; rows <= columns."""
     rows, columns = cost.shape
     row_potential, column_potential = np.zeros(rows + 1), np.zeros(columns + 1)
-    row_of = np.zeros(columns + 1, dtype=np.intp)  # row assigned to each column, both from 1; 0: free
+    row_of_column = np.zeros(columns + 1, dtype=np.intp)  # row assigned to each column, both from 1; 0: free
     for row in range(1, rows + 1):
-        row_of[0] = row
-        came_from = np.zeros(columns + 1, dtype=np.intp)
+        row_of_column[0] = row
+        previous_column = np.zeros(columns + 1, dtype=np.intp)
         slack = np.full(columns + 1, np.inf)
-        done = np.zeros(columns + 1, dtype=np.bool_)
+        visited = np.zeros(columns + 1, dtype=np.bool_)
         column = 0
-        while row_of[column] != 0:
-            done[column] = True
-            here = row_of[column]
-            reduced = cost[here - 1] - row_potential[here] - column_potential[1:]
-            better = ~done[1:] & (reduced < slack[1:])
+        while row_of_column[column] != 0:
+            visited[column] = True
+            current_row = row_of_column[column]
+            reduced = cost[current_row - 1] - row_potential[current_row] - column_potential[1:]
+            better = ~visited[1:] & (reduced < slack[1:])
             slack[1:][better] = reduced[better]
-            came_from[1:][better] = column
-            following = int(np.argmin(np.where(done, np.inf, slack)))
-            delta = slack[following]
-            row_potential[row_of[done]] += delta
-            column_potential[done] -= delta
-            slack[~done] -= delta
-            column = following
+            previous_column[1:][better] = column
+            next_column = int(np.argmin(np.where(visited, np.inf, slack)))
+            delta = slack[next_column]
+            row_potential[row_of_column[visited]] += delta
+            column_potential[visited] -= delta
+            slack[~visited] -= delta
+            column = next_column
         while column != 0:
-            row_of[column] = row_of[came_from[column]]
-            column = int(came_from[column])
-    chosen = [0] * rows
+            row_of_column[column] = row_of_column[previous_column[column]]
+            column = int(previous_column[column])
+    assigned = [0] * rows
     for column in range(1, columns + 1):
-        if row_of[column] != 0:
-            chosen[row_of[column] - 1] = column - 1
-    return chosen
+        if row_of_column[column] != 0:
+            assigned[row_of_column[column] - 1] = column - 1
+    return assigned

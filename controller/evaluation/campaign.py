@@ -11,9 +11,9 @@ from typing import Literal
 
 import cv2
 
-from controller.evaluation.contestants import ALWAYS, BASELINES
 from controller.evaluation.run_sequence import SequenceRecord, run_sequence
 from controller.evaluation.sequences import Sequence
+from controller.evaluation.timed_methods import ALWAYS, BASELINES
 from controller.workers import worker_processes
 
 Baselines = Literal["none", "some", "all"]
@@ -52,7 +52,8 @@ class Task:
 def plan(sequences: tuple[Sequence, ...], baselines: Baselines) -> tuple[Task, ...]:
     """One task a sequence, the longest first. baselines: "some" runs them on BASELINE_SEQUENCES only."""
     tasks = [
-        Task(one, ALWAYS + (BASELINES if _with_baselines(one.name, baselines) else ())) for one in sequences
+        Task(sequence, ALWAYS + (BASELINES if _with_baselines(sequence.name, baselines) else ()))
+        for sequence in sequences
     ]
     return tuple(sorted(tasks, key=lambda task: -len(task.methods)))
 

@@ -54,7 +54,7 @@ class Axis:
     log: bool = False
     ticks: tuple[tuple[float, str], ...] | None = None
 
-    def share(self, values: FloatArray) -> FloatArray:
+    def position(self, values: FloatArray) -> FloatArray:
         """Position of values along the axis: 0 at low, 1 at high."""
         if not self.log:
             return (values - self.low) / (self.high - self.low)
@@ -62,7 +62,7 @@ class Axis:
         span: FloatArray = (np.log10(safe) - math.log10(self.low)) / math.log10(self.high / self.low)
         return span
 
-    def places(self) -> list[tuple[float, str]]:
+    def tick_labels(self) -> list[tuple[float, str]]:
         """The ticks: value and label."""
         if self.ticks is not None:
             return list(self.ticks)
@@ -107,8 +107,8 @@ class Chart:
 
     def to_px(self, x: Sequence[float] | FloatArray, y: Sequence[float] | FloatArray) -> FloatArray:
         """Data (N,), (N,) to pixels (N, 2)."""
-        u = self.plot.x + self._x.share(np.asarray(x, np.float64)) * (self.plot.width - 1)
-        v = self.plot.bottom - 1 - self._y.share(np.asarray(y, np.float64)) * (self.plot.height - 1)
+        u = self.plot.x + self._x.position(np.asarray(x, np.float64)) * (self.plot.width - 1)
+        v = self.plot.bottom - 1 - self._y.position(np.asarray(y, np.float64)) * (self.plot.height - 1)
         return np.stack([u, v], axis=1)
 
     def line(
@@ -121,7 +121,7 @@ class Chart:
         dashed: bool = False,
     ) -> None:
         """A line through the points; points outside the axes are moved to the frame."""
-        points = self._inside(self.to_px(x, y))
+        points = self._clip_to_plot(self.to_px(x, y))
         if dashed:
             finite = points[np.isfinite(points).all(axis=1)]
             if len(finite) > 1:
@@ -130,7 +130,7 @@ class Chart:
             draw.line_with_gaps(self._image, points, colour, 3)
         if marker is not None:
             self._markers(points, colour, marker)
-        self._remember(label, colour, True, marker, dashed)
+        self._add_to_legend(label, colour, True, marker, dashed)
 
     def points(
         self,
@@ -142,7 +142,7 @@ class Chart:
     ) -> None:
         """Markers alone."""
         self._markers(self.to_px(x, y), colour, marker)
-        self._remember(label, colour, False, marker, False)
+        self._add_to_legend(label, colour, False, marker, False)
 
     def bars(
         self,
@@ -154,20 +154,22 @@ class Chart:
     ) -> None:
         """Vertical bars from the lower end of the axis; an arrow marks a bar that is higher than the plot."""
         base = np.full(len(height), self._y.low)
-        tops, feet = self.to_px(left, height), self.to_px(right, base)
-        for (u0, v0), (u1, v1) in zip(self._inside(tops), feet, strict=True):
+        tops, bottoms = self.to_px(left, height), self.to_px(right, base)
+        for (u0, v0), (u1, v1) in zip(self._clip_to_plot(tops), bottoms, strict=True):
             if np.isfinite([u0, v0, u1, v1]).all() and v1 - v0 >= 0.5:
                 draw.area(self._image, draw.box((u0, v0, u1, v1)), colour)
-        for u0, u1, beyond in zip(tops[:, 0], feet[:, 0], np.asarray(height) > self._y.high, strict=True):
-            if beyond:
+        for u0, u1, too_high in zip(
+            tops[:, 0], bottoms[:, 0], np.asarray(height) > self._y.high, strict=True
+        ):
+            if too_high:
                 self._arrow_up(0.5 * (u0 + u1), colour)
-        self._remember(label, colour, True, None, False)
+        self._add_to_legend(label, colour, True, None, False)
 
-    def level(self, value: float, colour: Colour, label: str) -> None:
+    def target_line(self, value: float, colour: Colour, label: str) -> None:
         """A dashed horizontal line, for a target."""
         self.line([self._x.low, self._x.high], [value, value], colour, label, dashed=True)
 
-    def note(self, x: float, y: float, words: str, colour: Colour = SOFT_INK, size: int = 14) -> None:
+    def annotate(self, x: float, y: float, words: str, colour: Colour = SOFT_INK, size: int = 14) -> None:
         """Words centred above a point."""
         u, v = self.to_px([x], [y])[0]
         if np.isfinite([u, v]).all():
@@ -191,11 +193,11 @@ class Chart:
             self._sample(entry, x + 10, middle)
             text.put(self._image, entry.label, x + 48, middle + 5, INK, _LEGEND)
 
-    def key(self) -> None:
+    def inline_legend(self) -> None:
         """A legend in one row, at the right end of the title's line."""
-        room = [text.width(entry.label, _LEGEND) + 46 for entry in self._legend]
-        x, middle = self.plot.right - sum(room), self.plot.y - 24
-        for entry, width in zip(self._legend, room, strict=True):
+        widths = [text.width(entry.label, _LEGEND) + 46 for entry in self._legend]
+        x, middle = self.plot.right - sum(widths), self.plot.y - 24
+        for entry, width in zip(self._legend, widths, strict=True):
             self._sample(entry, x, middle)
             text.put(self._image, entry.label, x + 36, middle + 5, INK, _LEGEND)
             x += width
@@ -209,18 +211,18 @@ class Chart:
         if entry.marker is not None:
             self._markers(np.array([[x + 15.0, middle]]), entry.colour, entry.marker)
 
-    def _remember(
+    def _add_to_legend(
         self, label: str | None, colour: Colour, line: bool, marker: Marker | None, dashed: bool
     ) -> None:
         if label is not None:
             self._legend.append(LegendEntry(label, colour, line, marker, dashed))
 
-    def _inside(self, points: FloatArray) -> FloatArray:
+    def _clip_to_plot(self, points: FloatArray) -> FloatArray:
         """Pixels (N, 2), limited to the plot; NaN stays NaN."""
         low = (self.plot.x, self.plot.y)
         high = (self.plot.right - 1, self.plot.bottom - 1)
-        held: FloatArray = np.clip(points, low, high)
-        return held
+        clipped: FloatArray = np.clip(points, low, high)
+        return clipped
 
     def _arrow_up(self, u: float, colour: Colour) -> None:
         base = self.plot.y - 3.0
@@ -238,12 +240,12 @@ class Chart:
     def _draw_axes(self, area: Rect, title: str) -> None:
         image, plot = self._image, self.plot
         text.put(image, title, plot.x, area.y + 32, INK, _TITLE, text.BOLD)
-        for value, label in self._x.places():
+        for value, label in self._x.tick_labels():
             u = float(self.to_px([value], [self._y.low])[0, 0])
             draw.line(image, np.array([[u, plot.y], [u, plot.bottom - 1]]), GRID)
             x = round(u) - text.width(label, _TICK) // 2
             text.put(image, label, x, plot.bottom + 21, SOFT_INK, _TICK)
-        for value, label in self._y.places():
+        for value, label in self._y.tick_labels():
             v = float(self.to_px([self._x.low], [value])[0, 1])
             draw.line(image, np.array([[plot.x, v], [plot.right - 1, v]]), GRID)
             text.put_right(image, label, plot.x - 9, round(v) + 5, SOFT_INK, _TICK)
@@ -251,7 +253,7 @@ class Chart:
         draw.line(image, frame, FRAME, 1)
         centre = plot.x + (plot.width - text.width(self._x.label, _LABEL)) // 2
         text.put(image, self._x.label, centre, plot.bottom + 48, INK, _LABEL)
-        _put_upright(image, self._y.label, area.x + 8, plot.y + plot.height // 2)
+        _put_vertical_text(image, self._y.label, area.x + 8, plot.y + plot.height // 2)
 
 
 _ANGLES = np.linspace(0.0, 2.0 * math.pi, 25)[:-1]
@@ -268,12 +270,12 @@ def blank(width: int, height: int) -> Image:
     return np.full((height, width, 3), 255, np.uint8)
 
 
-def _put_upright(image: Image, words: str, x: int, middle: int) -> None:
+def _put_vertical_text(image: Image, words: str, x: int, middle: int) -> None:
     """Text that reads upwards, its middle at the given row."""
     length = text.width(words, _LABEL)
     strip = blank(length + 4, _LABEL + 10)
     text.put(strip, words, 2, _LABEL + 1, INK, _LABEL)
-    turned = np.asarray(cv2.rotate(strip, cv2.ROTATE_90_COUNTERCLOCKWISE), np.uint8)
-    top = max(middle - turned.shape[0] // 2, 0)
-    part = image[top : top + turned.shape[0], x : x + turned.shape[1]]
-    np.minimum(part, turned[: part.shape[0], : part.shape[1]], out=part)
+    rotated = np.asarray(cv2.rotate(strip, cv2.ROTATE_90_COUNTERCLOCKWISE), np.uint8)
+    top = max(middle - rotated.shape[0] // 2, 0)
+    part = image[top : top + rotated.shape[0], x : x + rotated.shape[1]]
+    np.minimum(part, rotated[: part.shape[0], : part.shape[1]], out=part)

@@ -59,11 +59,11 @@ def endpoint_errors(
     end = now.ends_px[new].reshape(-1, 2).astype(np.float64)
     z = _nearest_m(start, depth_m)
     points = np.column_stack([(start - (k.cx, k.cy)) / (k.fx, k.fy) * z[:, None], z])
-    there = motion.apply(points)
-    known = np.isfinite(z) & (there[:, 2] > _NEAR_M)
-    true = there[known, :2] / there[known, 2:] * (k.fx, k.fy) + (k.cx, k.cy)
+    transformed = motion.apply(points)
+    known = np.isfinite(z) & (transformed[:, 2] > _NEAR_M)
+    true_px = transformed[known, :2] / transformed[known, 2:] * (k.fx, k.fy) + (k.cx, k.cy)
     return EndpointErrors(
-        z[known], np.hypot(*(end[known] - true).T), np.hypot(*(true - start[known]).T)
+        z[known], np.hypot(*(end[known] - true_px).T), np.hypot(*(true_px - start[known]).T)
     )  # fmt: skip
 
 
@@ -71,8 +71,8 @@ def _nearest_m(points_px: FloatArray, depth_m: NDArray[np.float32]) -> FloatArra
     """(N,) the smallest depth of the 3x3 pixels around each point; NaN where none has depth."""
     height, width = depth_m.shape
     steps = np.array([(dv, du) for dv in (-1, 0, 1) for du in (-1, 0, 1)])
-    around = np.rint(points_px[:, ::-1]).astype(np.intp)[:, None] + steps
-    around = np.clip(around, 0, (height - 1, width - 1))
-    z = depth_m[around[..., 0], around[..., 1]].astype(np.float64)
+    neighbours = np.rint(points_px[:, ::-1]).astype(np.intp)[:, None] + steps
+    neighbours = np.clip(neighbours, 0, (height - 1, width - 1))
+    z = depth_m[neighbours[..., 0], neighbours[..., 1]].astype(np.float64)
     nearest = np.where(z > 0.0, z, np.inf).min(axis=1)
     return np.where(np.isfinite(nearest), nearest, np.nan)

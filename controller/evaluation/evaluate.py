@@ -16,7 +16,6 @@ from config.camera import OdometryChoice
 from controller.build import open_replay
 from controller.errors import UserError
 from controller.evaluation.campaign import Baselines, plan, run_campaign
-from controller.evaluation.contestants import OURS, OURS_ALONE
 from controller.evaluation.markdown import fixed
 from controller.evaluation.recording_report import (
     recording_lines,
@@ -30,6 +29,7 @@ from controller.evaluation.run_sequence import SequenceRecord
 from controller.evaluation.sequences import Sequence, sequences
 from controller.evaluation.summary import Summary, as_json, summarise
 from controller.evaluation.targets import TARGETS
+from controller.evaluation.timed_methods import OURS, OURS_ALONE
 from controller.outlet import say
 
 
@@ -60,7 +60,7 @@ def run_evaluation(options: EvaluationOptions) -> None:
         raise UserError("--only chooses among the simulated sequences; give --sim with it")
     if options.static and not options.recordings:
         raise UserError("--static says that nothing moves in the recordings; give recordings with it")
-    chosen = choose(options.only)
+    selected = choose(options.only)
     for folder in options.recordings:
         open_replay(folder, options.odometry)  # reports a bad recording now, not after minutes
     names = distinct_names(options.recordings)
@@ -68,35 +68,37 @@ def run_evaluation(options: EvaluationOptions) -> None:
     result: dict[str, Any] = {}
     lines: list[str] = []
     if options.simulated:
-        records = _simulated(options, chosen)
+        records = _simulated(options, selected)
         summary = summarise(records)
         write_figures(options.report, summary, records)
         failures = write_failures(options.report, records)
         result.update(as_json(summary))
         lines.extend(simulated_lines(summary, records, failures, command_of(options)))
-        _say_figures(summary)
+        _print_figures(summary)
     if options.recordings:
-        looked = [_recording(options, *one) for one in zip(options.recordings, names, strict=True)]
-        write_recording_pictures(options.report, looked)
-        result["recordings"] = recordings_json(looked)
-        lines.extend(recording_lines(looked, command_of(options)))
-        _say_recordings(looked)
+        recording_records = [
+            _recording(options, path, name) for path, name in zip(options.recordings, names, strict=True)
+        ]
+        write_recording_pictures(options.report, recording_records)
+        result["recordings"] = recordings_json(recording_records)
+        lines.extend(recording_lines(recording_records, command_of(options)))
+        _print_recordings(recording_records)
     write_texts(options.report, result, lines)
     say(f"report        {options.report / 'report.md'}")
 
 
 def choose(names: tuple[str, ...]) -> tuple[Sequence, ...]:
     """The named sequences, or all if there are no names. Raises UserError for an unknown name."""
-    every = sequences()
-    unknown = sorted(set(names) - {one.name for one in every})
+    available = sequences()
+    unknown = sorted(set(names) - {sequence.name for sequence in available})
     if unknown:
-        known = ", ".join(one.name for one in every)
+        known = ", ".join(sequence.name for sequence in available)
         raise UserError(f"--only {unknown[0]}: there is no such sequence; choose among {known}")
-    return tuple(one for one in every if not names or one.name in names)
+    return tuple(sequence for sequence in available if not names or sequence.name in names)
 
 
-def _simulated(options: EvaluationOptions, chosen: tuple[Sequence, ...]) -> tuple[SequenceRecord, ...]:
-    tasks = plan(chosen, options.baselines)
+def _simulated(options: EvaluationOptions, selected: tuple[Sequence, ...]) -> tuple[SequenceRecord, ...]:
+    tasks = plan(selected, options.baselines)
     with click.progressbar(
         length=len(tasks), label="simulated sequences", file=sys.stderr, hidden=_hidden(options)
     ) as bar:
@@ -133,11 +135,11 @@ def command_of(options: EvaluationOptions) -> str:
     return shlex.join([*parts, "--report", str(options.report)])
 
 
-def _say_figures(summary: Summary) -> None:
+def _print_figures(summary: Summary) -> None:
     """Print the figures that have targets, on one screen."""
     for split in ("reporting", "tuning"):
         methods = summary.splits[split]
-        for name, alone in ((OURS, False), (OURS_ALONE, True)):
+        for name, without_odometry in ((OURS, False), (OURS_ALONE, True)):
             if name not in methods:
                 continue
             figures = methods[name].figures
@@ -146,12 +148,12 @@ def _say_figures(summary: Summary) -> None:
             say(f"{split:<13} {name}: {found}")
             for target in TARGETS:
                 value = target.value(figures)
-                mark = "" if target.reached(value, alone) else "  missed"
-                bound = target.bound(alone)
+                mark = "" if target.reached(value, without_odometry) else "  missed"
+                bound = target.bound(without_odometry)
                 say(f"{'':13} {target.name:<32} {fixed(value):>7} {target.unit:<8} {bound}{mark}")
 
 
-def _say_recordings(records: ReadOnly[RecordingRecord]) -> None:
+def _print_recordings(records: ReadOnly[RecordingRecord]) -> None:
     for record in records:
         moving = f"{len(record.moving_objects)} of {record.objects} objects called moving"
         false = f", {fixed(record.false_per_minute, 2)} false a minute" if record.static else ""

@@ -21,7 +21,9 @@ from controller.evaluation.chart import (
     Chart,
     blank,
 )
-from controller.evaluation.contestants import (
+from controller.evaluation.paper import PAPER_LIDAR, PAPER_OURS
+from controller.evaluation.summary import MethodSummary, Summary
+from controller.evaluation.timed_methods import (
     BACKGROUND,
     DENSE_FLOW,
     LIDAR,
@@ -31,8 +33,6 @@ from controller.evaluation.contestants import (
     TRACKING,
     TRAJECTORIES,
 )
-from controller.evaluation.paper import PAPER_LIDAR, PAPER_OURS
-from controller.evaluation.summary import MethodSummary, Summary
 from controller.evaluation.totals import DISTANCE_BINS_M, ByDistance, Curve
 from controller.video.style import Colour, Image, Rect
 
@@ -59,8 +59,8 @@ def precision_recall(summary: Summary) -> Image:
     recall, precision = _shares("recall", "precision")
     left = Chart(image, Rect(0, 0, width, height), "Pixel level", recall, precision)
     _curve(left, summary.per_pixel, BLUE, "treadwatch")
-    at = ours.pixel_counts
-    left.points([at.recall], [at.precision], BLUE, "circle", "called moving")
+    operating_point = ours.pixel_counts
+    left.points([operating_point.recall], [operating_point.precision], BLUE, "circle", "called moving")
     left.legend("lower left")
     right = Chart(image, Rect(width, 0, width, height), "Object level", recall, precision)
     _curve(right, summary.per_object, BLUE, "treadwatch, per object")
@@ -93,7 +93,7 @@ def endpoint_error(endpoint: ByDistance) -> Image:
     chart.line(middles, endpoint.p90, SKY, "90th percentile", "square")
     chart.line(middles, endpoint.mean, ORANGE, "mean", "diamond")
     chart.line(middles, endpoint.median, BLUE, "median", "circle")
-    chart.level(TARGET_ENDPOINT_PX, GREY, "target beyond 2 m (median)")
+    chart.target_line(TARGET_ENDPOINT_PX, GREY, "target beyond 2 m (median)")
     chart.legend("upper right")
     return image
 
@@ -125,8 +125,8 @@ def latency(methods: dict[str, MethodSummary]) -> Image:
         image, Rect(0, 0, width + 200, height), "From eligible to first detection",
         Axis("time in s", 0.0, 2.0), Axis("share of the objects detected", 0.0, 1.02, ticks=_SHARE.ticks),
     )  # fmt: skip
-    for name, one in methods.items():
-        times = np.sort(np.array(one.figures.latencies_s))
+    for name, summary in methods.items():
+        times = np.sort(np.array(summary.figures.latencies_s))
         if len(times) == 0:
             continue
         shares = np.arange(1, len(times) + 1) / len(times)
@@ -139,18 +139,19 @@ def latency(methods: dict[str, MethodSummary]) -> Image:
     return image
 
 
-def found_by_distance(one: MethodSummary) -> Image:
+def found_by_distance(method: MethodSummary) -> Image:
     """The number of objects at each distance, and how many of them were found."""
     width, height = _PANEL
     image = blank(width + 200, height)
-    counts = one.figures.found_by_distance
-    there = [count.correct + count.missed for count in counts]
+    counts = method.figures.found_by_distance
+    object_counts = [count.correct + count.missed for count in counts]
     edges = np.array(DISTANCE_BINS_M)
     chart = Chart(
         image, Rect(0, 0, width + 200, height), "Moving objects by distance",
-        Axis("median distance in m", 0.0, float(edges[-1])), Axis("objects", 0.0, _round_up(max(*there, 4))),
+        Axis("median distance in m", 0.0, float(edges[-1])),
+        Axis("objects", 0.0, _round_up(max(*object_counts, 4))),
     )  # fmt: skip
-    chart.bars(edges[:-1] + 0.06, edges[1:] - 0.06, there, GREY, "there were")
+    chart.bars(edges[:-1] + 0.06, edges[1:] - 0.06, object_counts, GREY, "there were")
     chart.bars(edges[:-1] + 0.06, edges[1:] - 0.06, [count.correct for count in counts], BLUE, "found")
     chart.legend("upper right")
     return image
@@ -175,7 +176,7 @@ def table_one(methods: dict[str, MethodSummary]) -> Image:
             chart.points([value], [middle + offset], colour, "circle")
     chart.points([], [], BLUE, "circle", "precision")
     chart.points([], [], AMBER, "circle", "recall")
-    chart.key()
+    chart.inline_legend()
     empty = Axis("", 0.0, float(len(names)), ticks=tuple((place, "") for place, _ in ticks))
     cost = Axis("median ms a frame", 0.5, 1000.0, log=True)
     times = Chart(image, Rect(left.right, 0, width - left.right, height), "Time", cost, empty)
@@ -184,7 +185,7 @@ def table_one(methods: dict[str, MethodSummary]) -> Image:
         ms = methods[name].figures.ms_per_frame
         times.line([0.5, ms], [middle] * 2, COLOURS[name])
         times.points([ms], [middle], COLOURS[name], "square")
-        times.note(ms, middle + 0.06, f"{ms:.1f}")
+        times.annotate(ms, middle + 0.06, f"{ms:.1f}")
     return image
 
 
@@ -200,16 +201,16 @@ def _middles(edges_m: Sequence[float]) -> list[float]:
     return [0.5 * (low + high) for low, high in itertools.pairwise(edges_m)]
 
 
-def _medians(one: ByDistance) -> tuple[float, ...]:
-    return one.median
+def _medians(bins: ByDistance) -> tuple[float, ...]:
+    return bins.median
 
 
-def _p90s(one: ByDistance) -> tuple[float, ...]:
-    return one.p90
+def _p90s(bins: ByDistance) -> tuple[float, ...]:
+    return bins.p90
 
 
-def _measures_speed(one: MethodSummary) -> bool:
-    return math.isfinite(one.figures.speed_error_median_mps)
+def _measures_speed(method: MethodSummary) -> bool:
+    return math.isfinite(method.figures.speed_error_median_mps)
 
 
 def _round_up(value: float) -> float:

@@ -23,14 +23,14 @@ from hal.types import CameraMount, FloatArray, Intrinsics, PlanarPose, Pose
 _GATE_M = 0.6  # a cluster farther from a track does not belong to it
 # Standard deviation of a cluster's middle: noise, and the change of the outline with the view.
 _POSITION_SIGMA_M = 0.06
-_CUT_SIGMA_M = 0.35  # the same for a cluster that is partly occluded
+_OCCLUDED_SIGMA_M = 0.35  # the same for a cluster that is partly occluded
 _ACCEL_MPS2 = 1.0  # standard deviation of a track's acceleration
 # Thresholds for calling a track moving.
 _MIN_SPEED_MPS = 0.25
 _CHI2 = 25.0  # five standard deviations of the velocity
 _MIN_SCANS = 4
-_MIN_WAY_M = 0.12  # distance from where the track began
-_FORGET_S = 0.5  # a track without clusters for longer is dropped
+_MIN_TRAVEL_M = 0.12  # distance from where the track began
+_MAX_UNSEEN_S = 0.5  # a track without clusters for longer is dropped
 
 
 @dataclass(slots=True, eq=False)
@@ -38,8 +38,8 @@ class _Track:
     """One tracked cluster, in the floor frame of the first scan.
 
     state, covariance: of x, y, vx, vy.
-    born_m: (2,) where the track began.
-    seen_s: time of the last cluster.
+    start_m: (2,) where the track began.
+    last_update_s: time of the last cluster.
     scans: number of clusters so far.
     streak: consecutive scans that passed the thresholds for moving.
     """
@@ -47,8 +47,8 @@ class _Track:
     id: int
     state: FloatArray
     covariance: FloatArray
-    born_m: FloatArray
-    seen_s: float
+    start_m: FloatArray
+    last_update_s: float
     scans: int = 1
     streak: int = 0
     moving: bool = False
@@ -61,15 +61,15 @@ class _Track:
         self.state = f @ self.state
         self.covariance = f @ self.covariance @ f.T + g @ g.T * _ACCEL_MPS2**2
 
-    def correct(self, seen_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
-        """Kalman update with a cluster's middle seen_m (2,), and a new verdict on moving."""
+    def correct(self, measured_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
+        """Kalman update with a cluster's centre measured_m (2,), and a new verdict on moving."""
         innovation_cov = self.covariance[:2, :2] + np.eye(2) * sigma_m**2
         gain = self.covariance[:, :2] @ np.linalg.inv(innovation_cov)
-        self.state = self.state + gain @ (seen_m - self.state[:2])
+        self.state = self.state + gain @ (measured_m - self.state[:2])
         self.covariance = self.covariance - gain @ self.covariance[:2]
-        self.seen_s = stamp_s
+        self.last_update_s = stamp_s
         self.scans += 1
-        self._judge()
+        self._update_moving()
 
     @property
     def chi2(self) -> float:
@@ -77,11 +77,11 @@ class _Track:
         velocity = self.state[2:]
         return float(velocity @ np.linalg.solve(self.covariance[2:, 2:], velocity))
 
-    def _judge(self) -> None:
+    def _update_moving(self) -> None:
         speed_mps = float(np.hypot(*self.state[2:]))
-        way_m = float(np.hypot(*(self.state[:2] - self.born_m)))
-        speaks = speed_mps >= _MIN_SPEED_MPS and self.chi2 >= _CHI2 and way_m >= _MIN_WAY_M
-        self.streak = self.streak + 1 if speaks else 0
+        travelled_m = float(np.hypot(*(self.state[:2] - self.start_m)))
+        passes = speed_mps >= _MIN_SPEED_MPS and self.chi2 >= _CHI2 and travelled_m >= _MIN_TRAVEL_M
+        self.streak = self.streak + 1 if passes else 0
         if self.streak >= 2 and self.scans >= _MIN_SCANS:
             self.moving = True
         elif speed_mps < 0.5 * _MIN_SPEED_MPS:
@@ -105,27 +105,29 @@ class LidarTracker:
         """Take in one scan. odometry: the robot's pose at that time."""
         clusters = find_clusters(scan)
         self._predict_to(scan.stamp_s)
-        self._move(scan, odometry)
-        seen_m = self._pose.apply(_on_floor(clusters.middle_m + np.array([self._model.forward_m, 0.0])))[
+        self._update_pose(scan, odometry)
+        measured_m = self._pose.apply(_on_floor(clusters.centre_m + np.array([self._model.forward_m, 0.0])))[
             :, :2
         ]
-        sigma_m = np.where(clusters.whole, _POSITION_SIGMA_M, _CUT_SIGMA_M)
+        sigma_m = np.where(clusters.unoccluded, _POSITION_SIGMA_M, _OCCLUDED_SIGMA_M)
         expected = np.array([track.state[:2] for track in self._tracks]).reshape(-1, 2)
-        apart_m = np.linalg.norm(seen_m[:, None] - expected[None], axis=2)
-        pairs = assign(np.where(apart_m <= _GATE_M, apart_m, np.inf))
+        distance_m = np.linalg.norm(measured_m[:, None] - expected[None], axis=2)
+        pairs = assign(np.where(distance_m <= _GATE_M, distance_m, np.inf))
         for row, column in pairs:
-            self._tracks[column].correct(seen_m[row], float(sigma_m[row]), scan.stamp_s)
-        taken = {row for row, _ in pairs}
-        for row in range(len(seen_m)):
-            if row not in taken:
-                self._begin(seen_m[row], float(sigma_m[row]), scan.stamp_s)
-        self._tracks = [track for track in self._tracks if scan.stamp_s - track.seen_s <= _FORGET_S]
+            self._tracks[column].correct(measured_m[row], float(sigma_m[row]), scan.stamp_s)
+        matched_rows = {row for row, _ in pairs}
+        for row in range(len(measured_m)):
+            if row not in matched_rows:
+                self._start_track(measured_m[row], float(sigma_m[row]), scan.stamp_s)
+        self._tracks = [
+            track for track in self._tracks if scan.stamp_s - track.last_update_s <= _MAX_UNSEEN_S
+        ]
 
     def answer(self, t_s: float, odometry: PlanarPose) -> Answer:
         """The tracks in the camera's field of view at t_s, in the optical frame; height is not measured."""
         self._predict_to(t_s)
-        since = self._since_last_scan(odometry)
-        camera = self._pose @ body_in_floor(since) @ camera_in_body(self._mount)
+        motion = self._motion_since_last_scan(odometry)
+        camera = self._pose @ body_in_floor(motion) @ camera_in_body(self._mount)
         detections = []
         for track in self._tracks:
             on_floor = np.array([[track.state[0], track.state[1], self._mount.height_m]])
@@ -141,26 +143,28 @@ class LidarTracker:
             )  # fmt: skip
         return Answer(tuple(detections))
 
-    def _move(self, scan: Scan, odometry: PlanarPose) -> None:
+    def _update_pose(self, scan: Scan, odometry: PlanarPose) -> None:
         """Update the robot's pose by odometry, corrected by matching this scan to the last one."""
         if self._last is not None:
             before, _ = self._last
             sensor = Pose(np.eye(3), np.array([self._model.forward_m, 0.0, 0.0]))
-            told = sensor.inverse() @ body_in_floor(self._since_last_scan(odometry)) @ sensor
-            matched = body_in_floor(refine(before, scan, _planar(told)))
+            odometry_motion = (
+                sensor.inverse() @ body_in_floor(self._motion_since_last_scan(odometry)) @ sensor
+            )
+            matched = body_in_floor(refine(before, scan, _planar(odometry_motion)))
             self._pose = self._pose @ sensor @ matched @ sensor.inverse()
         self._last = (scan, odometry)
 
-    def _since_last_scan(self, odometry: PlanarPose) -> PlanarPose:
+    def _motion_since_last_scan(self, odometry: PlanarPose) -> PlanarPose:
         """Pose of the robot relative to its pose at the last scan, by odometry."""
         if self._last is None:
             return PlanarPose(0.0, 0.0, 0.0)
         return _planar(body_in_floor(self._last[1]).inverse() @ body_in_floor(odometry))
 
-    def _begin(self, where_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
+    def _start_track(self, position_m: FloatArray, sigma_m: float, stamp_s: float) -> None:
         covariance = np.diag([sigma_m**2, sigma_m**2, 1.0, 1.0])
-        state = np.array([*where_m, 0.0, 0.0])
-        self._tracks.append(_Track(self._next_id, state, covariance, where_m.copy(), stamp_s))
+        state = np.array([*position_m, 0.0, 0.0])
+        self._tracks.append(_Track(self._next_id, state, covariance, position_m.copy(), stamp_s))
         self._next_id += 1
 
     def _predict_to(self, t_s: float) -> None:

@@ -16,7 +16,7 @@ from hal.types import FloatArray, PlanarPose
 _ITERATIONS = 8
 _WINDOW = 4  # the corresponding point is searched this many beams to either side
 _GATE_M = 0.25  # greatest distance of corresponding points
-_ROBUST_M = 0.05  # residuals above this lose weight (Cauchy)
+_CAUCHY_M = 0.05  # residuals above this lose weight (Cauchy)
 _MIN_POINTS = 30
 # Standard deviation of the odometry within one scan. It decides in directions that the scene leaves open.
 _GUESS_SIGMA = np.array([0.01, 0.01, 0.01])  # m, m, rad
@@ -33,16 +33,16 @@ def refine(before: Scan, now: Scan, guess: PlanarPose) -> PlanarPose:
     start = pose.copy()
     for _ in range(_ITERATIONS):
         moved = _transform(points, pose)
-        partner, apart_m = _partners(moved, reference, before)
-        usable = (apart_m <= _GATE_M) & np.isfinite(normals[partner]).all(axis=1)
+        match, distance_m = _correspondences(moved, reference, before)
+        usable = (distance_m <= _GATE_M) & np.isfinite(normals[match]).all(axis=1)
         if np.count_nonzero(usable) < _MIN_POINTS:
             return guess
-        normal, at = normals[partner[usable]], moved[usable]
-        residual = ((reference[partner[usable]] - at) * normal).sum(axis=1)
-        lever = at - pose[:2]
-        turn = normal[:, 1] * lever[:, 0] - normal[:, 0] * lever[:, 1]
-        jacobian = np.column_stack([normal, turn])
-        weight = 1.0 / (_ROBUST_M**2 + np.square(residual))
+        normal, matched = normals[match[usable]], moved[usable]
+        residual = ((reference[match[usable]] - matched) * normal).sum(axis=1)
+        lever = matched - pose[:2]
+        rotation_column = normal[:, 1] * lever[:, 0] - normal[:, 0] * lever[:, 1]
+        jacobian = np.column_stack([normal, rotation_column])
+        weight = 1.0 / (_CAUCHY_M**2 + np.square(residual))
         information = (jacobian * weight[:, None]).T @ jacobian + prior
         gradient = jacobian.T @ (weight * residual) + prior @ (start - pose)
         step = np.linalg.solve(information, gradient)
@@ -63,8 +63,8 @@ def _normals(points: FloatArray) -> FloatArray:
     along = np.full_like(points, np.nan)
     along[2:-2] = points[4:] - points[:-4]
     length = np.hypot(along[:, 0], along[:, 1])
-    reach = np.hypot(points[:, 0], points[:, 1])
-    smooth = length < 0.15 + 0.08 * reach
+    range_m = np.hypot(points[:, 0], points[:, 1])
+    smooth = length < 0.15 + 0.08 * range_m
     unit = along / np.where(smooth & (length > 0.0), length, np.nan)[:, None]
     return np.stack([-unit[:, 1], unit[:, 0]], axis=1)
 
@@ -75,16 +75,16 @@ def _transform(points: FloatArray, pose: FloatArray) -> FloatArray:
     return moved
 
 
-def _partners(
+def _correspondences(
     points: FloatArray, reference: FloatArray, scan: Scan
 ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.intp]], FloatArray]:
     """For each of N points, index and distance of the nearest reference point in a window of beams."""
     step_rad = float(scan.bearings_rad[1] - scan.bearings_rad[0])
     bearing = np.arctan2(points[:, 1], points[:, 0])
     middle = np.rint((bearing - scan.bearings_rad[0]) / step_rad).astype(np.intp)
-    around = np.clip(middle[:, None] + np.arange(-_WINDOW, _WINDOW + 1), 0, len(reference) - 1)
-    apart = np.linalg.norm(reference[around] - points[:, None], axis=2)
-    apart = np.where(np.isfinite(apart), apart, np.inf)
-    nearest = np.argmin(apart, axis=1)
+    candidates = np.clip(middle[:, None] + np.arange(-_WINDOW, _WINDOW + 1), 0, len(reference) - 1)
+    distance = np.linalg.norm(reference[candidates] - points[:, None], axis=2)
+    distance = np.where(np.isfinite(distance), distance, np.inf)
+    nearest = np.argmin(distance, axis=1)
     rows = np.arange(len(points))
-    return around[rows, nearest], apart[rows, nearest]
+    return candidates[rows, nearest], distance[rows, nearest]

@@ -12,7 +12,7 @@ from config.scenario import Room
 from hal.types import FloatArray, PlanarPose
 from sim.world import BodyState
 
-_LEGS = 0.6  # size of a person's outline, as a share of the footprint
+_LEG_OUTLINE_RATIO = 0.6  # size of a person's outline, as a share of the footprint
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +55,8 @@ class Scan:
 class Lidar:
     """Scans the world.
 
-    A person is one convex outline, _LEGS times the footprint that swinging limbs need. This favours the
-    lidar: two legs that occlude each other in turn would be harder to track.
+    A person is one convex outline, _LEG_OUTLINE_RATIO times the footprint that swinging limbs need. This
+    favours the lidar: two legs that occlude each other in turn would be harder to track.
     """
 
     def __init__(self, model: LidarModel, room: Room, seed: int) -> None:
@@ -92,7 +92,7 @@ def _outline(body: BodyState) -> FloatArray:
     if body.kind != "person":
         return body.footprint_m
     middle = body.footprint_m.mean(axis=0)
-    return np.asarray(middle + _LEGS * (body.footprint_m - middle))
+    return np.asarray(middle + _LEG_OUTLINE_RATIO * (body.footprint_m - middle))
 
 
 def cast(origin: FloatArray, angles_rad: FloatArray, segments: FloatArray) -> FloatArray:
@@ -100,10 +100,10 @@ def cast(origin: FloatArray, angles_rad: FloatArray, segments: FloatArray) -> Fl
     direction = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=1)[:, None, :]
     start = segments[None, :, 0] - origin
     along = (segments[:, 1] - segments[:, 0])[None]
-    across = direction[..., 0] * along[..., 1] - direction[..., 1] * along[..., 0]
-    safe = np.where(np.abs(across) > 1e-12, across, np.nan)
+    determinant = direction[..., 0] * along[..., 1] - direction[..., 1] * along[..., 0]
+    safe = np.where(np.abs(determinant) > 1e-12, determinant, np.nan)
     range_m = (start[..., 0] * along[..., 1] - start[..., 1] * along[..., 0]) / safe
-    share = (start[..., 0] * direction[..., 1] - start[..., 1] * direction[..., 0]) / safe
-    hit = (range_m > 0.0) & (share >= 0.0) & (share <= 1.0)
+    fraction = (start[..., 0] * direction[..., 1] - start[..., 1] * direction[..., 0]) / safe
+    hit = (range_m > 0.0) & (fraction >= 0.0) & (fraction <= 1.0)
     nearest: FloatArray = np.where(hit, range_m, np.inf).min(axis=1)
     return nearest

@@ -22,8 +22,8 @@ def iou(a: Box, b: Box) -> float:
     height = min(a[3], b[3]) - max(a[1], b[1])
     if width <= 0.0 or height <= 0.0:
         return 0.0
-    shared = width * height
-    return shared / ((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - shared)
+    intersection = width * height
+    return intersection / ((a[2] - a[0]) * (a[3] - a[1]) + (b[2] - b[0]) * (b[3] - b[1]) - intersection)
 
 
 def distance_m(detection: DetectedObject, true: TrueObject) -> float:
@@ -38,9 +38,9 @@ def costs(detections: Sequence[DetectedObject], objects: Sequence[TrueObject]) -
     cost = np.full((len(detections), len(objects)), np.inf)
     for row, detection in enumerate(detections):
         for column, true in enumerate(objects):
-            overlap, apart_m = iou(detection.box, true.box), distance_m(detection, true)
-            if overlap >= MIN_IOU or apart_m <= MAX_DISTANCE_M:
-                cost[row, column] = (1.0 - overlap) + min(apart_m / MAX_DISTANCE_M, 1.0)
+            overlap, centre_distance_m = iou(detection.box, true.box), distance_m(detection, true)
+            if overlap >= MIN_IOU or centre_distance_m <= MAX_DISTANCE_M:
+                cost[row, column] = (1.0 - overlap) + min(centre_distance_m / MAX_DISTANCE_M, 1.0)
     return cost
 
 

@@ -13,8 +13,9 @@ from hal.types import CameraMount, FloatArray, Pose, RgbdFrame
 from vision.perception import Perception
 from vision.scene import Fragments, Obstacle
 
-_ROOM = 1.0 - CALLED_MOVING  # the part of the confidence scale for obstacles that are called moving
-_DOUBT_SPEED_MPS = 0.1  # standard deviation whose square is added to the velocity's covariance
+# The part of the confidence scale for obstacles that are called moving.
+_MOVING_CONFIDENCE_SPAN = 1.0 - CALLED_MOVING
+_EXTRA_SIGMA_MPS = 0.1  # standard deviation whose square is added to the velocity's covariance
 
 
 class Treadwatch:
@@ -50,14 +51,14 @@ def motion_confidence(obstacle: Obstacle) -> float:
     beyond the operating point.
     """
     if obstacle.moving:
-        return CALLED_MOVING + _ROOM * min(max(obstacle.score, 0.0), 1.0)
-    doubt = _velocity_sigmas(obstacle.velocity_mps, obstacle.velocity_cov)
-    return CALLED_MOVING * 0.999 * (1.0 - math.exp(-0.5 * doubt))
+        return CALLED_MOVING + _MOVING_CONFIDENCE_SPAN * min(max(obstacle.score, 0.0), 1.0)
+    sigmas = _velocity_sigmas(obstacle.velocity_mps, obstacle.velocity_cov)
+    return CALLED_MOVING * 0.999 * (1.0 - math.exp(-0.5 * sigmas))
 
 
 def _velocity_sigmas(velocity: FloatArray, covariance: FloatArray) -> float:
     """How many standard deviations the velocity is away from zero; 0 if it is not known."""
     if not (np.isfinite(velocity).all() and np.isfinite(covariance).all()):
         return 0.0
-    widened = covariance + np.eye(3) * _DOUBT_SPEED_MPS**2
-    return math.sqrt(max(float(velocity @ np.linalg.solve(widened, velocity)), 0.0))
+    inflated = covariance + np.eye(3) * _EXTRA_SIGMA_MPS**2
+    return math.sqrt(max(float(velocity @ np.linalg.solve(inflated, velocity)), 0.0))

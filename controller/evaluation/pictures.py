@@ -21,10 +21,10 @@ from vision.scene import Fragments
 
 _MISSED = bgr("E02424")
 _FOUND = GREEN
-_CLAIMED = ORANGE
-_UNJUDGED = BLUE  # a true object that need not be found: new, slow, small, occluded or far
+_DETECTED = ORANGE
+_NOT_JUDGED = BLUE  # a true object that need not be found: new, slow, small, occluded or far
 _DEPTH_RANGE_M = 10.0
-_GAP, _HEAD = 12, 40
+_GAP, _HEADER_PX = 12, 40
 _CELL = (480, 360)
 _BRIGHTNESS = 0.8
 
@@ -32,13 +32,13 @@ _BRIGHTNESS = 0.8
 def scene_depth_result(snapshots: Sequence[Snapshot]) -> Image:
     """Fig. 6: one row a snapshot, with colour image, depth and result."""
     width, height = _CELL
-    image = blank(3 * width + 4 * _GAP, _HEAD + len(snapshots) * (height + _GAP))
+    image = blank(3 * width + 4 * _GAP, _HEADER_PX + len(snapshots) * (height + _GAP))
     for column, title in enumerate(("Scene", "Depth: near is bright, black is none", "Result")):
         text.put(image, title, _GAP + column * (width + _GAP), 27, INK, 19, text.BOLD)
     for row, snapshot in enumerate(snapshots):
         cells = (snapshot.colour, depth_picture(snapshot.depth_m), result_picture(snapshot))
         for column, cell in enumerate(cells):
-            x, y = _GAP + column * (width + _GAP), _HEAD + row * (height + _GAP)
+            x, y = _GAP + column * (width + _GAP), _HEADER_PX + row * (height + _GAP)
             image[y : y + height, x : x + width] = cv2.resize(
                 cell, (width, height), interpolation=cv2.INTER_AREA
             )
@@ -56,10 +56,14 @@ def result_picture(snapshot: Snapshot) -> Image:
     image = np.asarray(cv2.convertScaleAbs(snapshot.colour, alpha=_BRIGHTNESS), np.uint8)
     if snapshot.fragments is not None:
         _draw_fragments(image, snapshot.fragments)
-    moving = [one for one in snapshot.detections if one.confidence >= CALLED_MOVING and _has_box(one.box)]
-    for one in moving:
-        draw.line(image, draw.box(one.box), MOVING, 3, closed=True)
-    draw_labels(image, [_label(one, MOVING) for one in moving], size=17)
+    moving = [
+        detection
+        for detection in snapshot.detections
+        if detection.confidence >= CALLED_MOVING and _has_box(detection.box)
+    ]
+    for detection in moving:
+        draw.line(image, draw.box(detection.box), MOVING, 3, closed=True)
+    draw_labels(image, [_label(detection, MOVING) for detection in moving], size=17)
     return image
 
 
@@ -70,31 +74,32 @@ def failure_picture(snapshot: Snapshot) -> Image:
     for true in snapshot.truth.objects:
         if _has_box(true.box):
             colour = _colour_of(true.id, snapshot.score)
-            draw.dashed(image, _closed(true.box), colour, 2, 7.0)
+            draw.dashed(image, _closed_outline(true.box), colour, 2, 7.0)
             words = f"{true.kind} {true.distance_m:.1f} m, {true.speed_mps:.1f} m/s"
             labels.append(_box_label(words, true.box, colour))
-    for one in snapshot.detections:
-        if one.confidence >= CALLED_MOVING and _has_box(one.box):
-            draw.line(image, draw.box(one.box), _CLAIMED, 2, closed=True)
-            labels.append(_label(one, _CLAIMED))
+    for detection in snapshot.detections:
+        if detection.confidence >= CALLED_MOVING and _has_box(detection.box):
+            draw.line(image, draw.box(detection.box), _DETECTED, 2, closed=True)
+            labels.append(_label(detection, _DETECTED))
     draw_labels(image, labels, size=14)
-    return _with_caption(image, f"{snapshot.sequence}, frame {snapshot.index}", describe_faults(snapshot))
+    return _with_caption(image, f"{snapshot.sequence}, frame {snapshot.index}", describe_errors(snapshot))
 
 
 def _colour_of(identity: int, score: FrameScore) -> Colour:
     if identity in score.missed_settled:
         return _MISSED
-    return _FOUND if any(hit.object_id == identity for hit in score.hits) else _UNJUDGED
+    return _FOUND if any(hit.object_id == identity for hit in score.hits) else _NOT_JUDGED
 
 
-def describe_faults(snapshot: Snapshot) -> str:
+def describe_errors(snapshot: Snapshot) -> str:
     """The errors in the frame, in words."""
     by_id = {true.id: true for true in snapshot.truth.objects}
     parts = [
-        f"missed: {by_id[one].kind} at {by_id[one].distance_m:.1f} m" for one in snapshot.score.missed_settled
+        f"missed: {by_id[object_id].kind} at {by_id[object_id].distance_m:.1f} m"
+        for object_id in snapshot.score.missed_settled
     ]
-    parts.extend(f"false: #{one}" for one in snapshot.score.wrong)
-    parts.extend(f"second box for one object: #{one}" for one in snapshot.score.duplicates)
+    parts.extend(f"false: #{track_id}" for track_id in snapshot.score.wrong)
+    parts.extend(f"second box for one object: #{track_id}" for track_id in snapshot.score.duplicates)
     return "; ".join(parts)
 
 
@@ -105,17 +110,17 @@ def _with_caption(image: ColourImage, title: str, words: str) -> Image:
     text.put(picture, title, 10, height + 23, INK, 16, text.BOLD)
     text.put(picture, text.fit(words, width - 20, 15), 10, height + 46, SOFT_INK, 15)
     x = -8
-    for meaning, colour in _KEY:
+    for meaning, colour in _COLOUR_KEY:
         picture[height + 58 : height + 70, x + 18 : x + 30] = colour
         x = text.put(picture, meaning, x + 36, height + 69, SOFT_INK, 14)
     return picture
 
 
-_KEY = (
+_COLOUR_KEY = (
     ("true, found", _FOUND),
     ("true, missed", _MISSED),
-    ("true, not judged", _UNJUDGED),
-    ("called moving", _CLAIMED),
+    ("true, not judged", _NOT_JUDGED),
+    ("called moving", _DETECTED),
 )
 
 
@@ -125,10 +130,10 @@ def _draw_fragments(image: Image, fragments: Fragments) -> None:
     draw.lines(image, ends[fragments.moving], MOVING, 3)
 
 
-def _label(one: DetectedObject, colour: Colour) -> Label:
-    speed_mps = float(np.linalg.norm(one.velocity_mps))
-    words = f"#{one.id}  {speed_mps:.1f} m/s" if np.isfinite(speed_mps) else f"#{one.id}"
-    return _box_label(words, one.box, colour)
+def _label(detection: DetectedObject, colour: Colour) -> Label:
+    speed_mps = float(np.linalg.norm(detection.velocity_mps))
+    words = f"#{detection.id}  {speed_mps:.1f} m/s" if np.isfinite(speed_mps) else f"#{detection.id}"
+    return _box_label(words, detection.box, colour)
 
 
 def _box_label(words: str, box: Box, colour: Colour) -> Label:
@@ -139,6 +144,6 @@ def _has_box(box: Box) -> bool:
     return bool(np.isfinite(box).all())
 
 
-def _closed(box: Box) -> FloatArray:
+def _closed_outline(box: Box) -> FloatArray:
     corners = draw.box(box)
     return np.concatenate([corners, corners[:1]])

@@ -25,21 +25,25 @@ _DEPTH_MARGIN_M = 0.15
 _DEPTH_MARGIN_PER_M2 = 0.015
 
 
-def claimed(frame: RgbdFrame, detections: Sequence[DetectedObject]) -> NDArray[np.uint8]:
+def claimed_levels(frame: RgbdFrame, detections: Sequence[DetectedObject]) -> NDArray[np.uint8]:
     """(H / 2, W / 2) levels 0..255: the greatest confidence of the detections that claim the pixel."""
     depth_m = frame.depth[::STEP_PX, ::STEP_PX].astype(np.float32) * np.float32(frame.depth_scale_m)
     levels = np.zeros(depth_m.shape, np.uint8)
     height, width = depth_m.shape
-    for one in sorted(detections, key=lambda detection: detection.confidence):
-        if not np.isfinite(one.box).all() or not np.isfinite(one.position_m[2]):
+    for detection in sorted(detections, key=lambda detection: detection.confidence):
+        if not np.isfinite(detection.box).all() or not np.isfinite(detection.position_m[2]):
             continue
-        u0, v0, u1, v1 = one.box
+        u0, v0, u1, v1 = detection.box
         left, right = _span(u0, u1, width)
         top, bottom = _span(v0, v1, height)
-        z_m = float(one.position_m[2])
-        half_m = 0.5 * float(np.nan_to_num(one.extent_m[2])) + _DEPTH_MARGIN_M + _DEPTH_MARGIN_PER_M2 * z_m**2
+        z_m = float(detection.position_m[2])
+        half_m = (
+            0.5 * float(np.nan_to_num(detection.extent_m[2]))
+            + _DEPTH_MARGIN_M
+            + _DEPTH_MARGIN_PER_M2 * z_m**2
+        )
         inside = np.abs(depth_m[top:bottom, left:right] - z_m) <= half_m
-        levels[top:bottom, left:right][inside] = round(255 * min(max(one.confidence, 0.0), 1.0))
+        levels[top:bottom, left:right][inside] = round(255 * min(max(detection.confidence, 0.0), 1.0))
     return levels
 
 
@@ -61,9 +65,9 @@ def count_pixels(
     moving, excused: ids of bodies that move, and of those whose pixels do not count.
     """
     judged = (depth_m > 0.0) & (depth_m <= MAX_DISTANCE_M)
-    moves = judged & np.isin(instances, list(moving))
-    rests = judged & ~moves & ~np.isin(instances, list(excused))
+    moving_pixels = judged & np.isin(instances, list(moving))
+    static_pixels = judged & ~moving_pixels & ~np.isin(instances, list(excused))
     return PixelCounts(
-        np.bincount(levels[moves], minlength=256).astype(np.int64),
-        np.bincount(levels[rests], minlength=256).astype(np.int64),
+        np.bincount(levels[moving_pixels], minlength=256).astype(np.int64),
+        np.bincount(levels[static_pixels], minlength=256).astype(np.int64),
     )

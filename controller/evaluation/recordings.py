@@ -29,8 +29,8 @@ from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream
 from vision.scene import CameraCondition
 
-MOST_PICTURES = 6
-_APART_FRAMES = 5  # least distance of two pictures
+MAX_PICTURES = 6
+_MIN_PICTURE_SPACING = 5  # least distance of two pictures
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +75,7 @@ class RecordingRecord:
 class _Tally:
     """Counts over the frames of one recording."""
 
-    seen: set[int] = field(default_factory=set)
+    track_ids: set[int] = field(default_factory=set)
     moving: Counter[int] = field(default_factory=Counter)
     frames_with_moving: int = 0
     stamps_ns: list[int] = field(default_factory=list)
@@ -87,7 +87,7 @@ class _Tally:
     def add(self, name: str, look: Look) -> None:
         """Count one frame."""
         moving = [obstacle.id for obstacle in look.scene.obstacles if obstacle.moving]
-        self.seen.update(obstacle.id for obstacle in look.scene.obstacles)
+        self.track_ids.update(obstacle.id for obstacle in look.scene.obstacles)
         self.moving.update(moving)
         self.frames_with_moving += bool(moving)
         self.stamps_ns.append(look.scene.captured_ns)
@@ -95,8 +95,8 @@ class _Tally:
         self.conditions[look.scene.health.condition] += 1
         self.ego_sources[look.scene.ego_motion.source] += 1
         index = len(self.stamps_ns) - 1
-        fresh = not self.pictures or index - self.pictures[-1].index >= _APART_FRAMES
-        if index == 1 or (moving and fresh and len(self.pictures) < MOST_PICTURES):
+        is_due = not self.pictures or index - self.pictures[-1].index >= _MIN_PICTURE_SPACING
+        if index == 1 or (moving and is_due and len(self.pictures) < MAX_PICTURES):
             self.pictures.append(_snapshot(name, index, look))
 
     @property
@@ -159,7 +159,7 @@ def evaluate_recording(
         len(tally.stamps_ns),
         len(source.skipped),
         tally.seconds,
-        len(tally.seen),
+        len(tally.track_ids),
         tuple(sorted(identity for identity, count in tally.moving.items() if count >= WRONG_FRAMES)),
         tally.frames_with_moving,
         tuple(tally.ms),

@@ -12,13 +12,13 @@ import cv2
 
 from controller.errors import UserError
 from controller.evaluation import figures, pictures
-from controller.evaluation.contestants import OURS
 from controller.evaluation.run_sequence import SequenceRecord, Snapshot
 from controller.evaluation.sequences import sequences
 from controller.evaluation.summary import Summary
+from controller.evaluation.timed_methods import OURS
 from controller.video.style import Image
 
-MOST_FAILURES = 24
+MAX_FAILURES = 24
 _FIGURES = (
     "fig4-precision-recall.png",
     "fig5-endpoint-error.png",
@@ -37,7 +37,7 @@ def prepare_folder(folder: Path) -> None:
 
     Deletes what an earlier run left there, and nothing else. Raises UserError.
     """
-    ours = {one.name for one in sequences()}
+    simulated_names = {sequence.name for sequence in sequences()}
     try:
         (folder / "failures").mkdir(parents=True, exist_ok=True)
         for name in (*_FIGURES, "summary.json"):
@@ -46,7 +46,7 @@ def prepare_folder(folder: Path) -> None:
             if _RECORDING.fullmatch(old.name):
                 old.unlink()
         for old in (folder / "failures").glob("*-[0-9][0-9][0-9].png"):
-            if old.stem[:-4] in ours:
+            if old.stem[:-4] in simulated_names:
                 old.unlink()
         (folder / "report.md").write_text("The evaluation is still running, or was broken off.\n", "utf-8")
     except OSError as error:
@@ -77,9 +77,9 @@ def write_failures(folder: Path, records: Sequence[SequenceRecord]) -> list[tupl
 
     Raises UserError.
     """
-    every = [snapshot for record in records for snapshot in record.failures]
-    every.sort(key=lambda snapshot: (-snapshot.score.faults, snapshot.sequence, snapshot.index))
-    worst = sorted(every[:MOST_FAILURES], key=lambda snapshot: (snapshot.sequence, snapshot.index))
+    failing = [snapshot for record in records for snapshot in record.failures]
+    failing.sort(key=lambda snapshot: (-snapshot.score.error_count, snapshot.sequence, snapshot.index))
+    worst = sorted(failing[:MAX_FAILURES], key=lambda snapshot: (snapshot.sequence, snapshot.index))
     named = [(snapshot, f"failures/{snapshot.sequence}-{snapshot.index:03d}.png") for snapshot in worst]
     for snapshot, file in named:
         write_picture(folder / file, pictures.failure_picture(snapshot))

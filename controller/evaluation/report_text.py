@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 
 from controller.evaluation import pictures
-from controller.evaluation.contestants import LIDAR, OURS, OURS_ALONE
 from controller.evaluation.figures import TARGET_ENDPOINT_PX
 from controller.evaluation.markdown import fixed, picture, section, table
 from controller.evaluation.paper import PAPER_LIDAR, PAPER_OURS
 from controller.evaluation.run_sequence import SequenceRecord, Snapshot
 from controller.evaluation.summary import MethodSummary, Summary
 from controller.evaluation.targets import TARGETS, Target
+from controller.evaluation.timed_methods import LIDAR, OURS, OURS_ALONE
 from controller.evaluation.totals import Counts
 
 _RULES = """A moving object is found when it is matched (IoU >= 0.3, or middles within 0.5 m, one to one) in
@@ -40,7 +40,7 @@ def simulated_lines(
 ) -> list[str]:
     """The lines of report.md. command: the one that made it. failures: frames with their picture files."""
     reporting = summary.splits["reporting"]
-    count = {split: sum(one.split == split for one in records) for split in ("reporting", "tuning")}
+    count = {split: sum(record.split == split for record in records) for split in ("reporting", "tuning")}
     lines = ["# Evaluation on the simulated set", ""]
     lines.append(
         f"Made by `{command}`. {len(records)} sequences with fixed seeds, 640x480 at 30 frames a second: "
@@ -64,8 +64,8 @@ def _targets(reporting: dict[str, MethodSummary]) -> list[str]:
     rows = [
         (
             f"{target.name}{f' ({target.unit})' if target.unit else ''}",
-            *_verdict(target, reporting.get(OURS), alone=False),
-            *_verdict(target, reporting.get(OURS_ALONE), alone=True),
+            *_verdict(target, reporting.get(OURS), without_odometry=False),
+            *_verdict(target, reporting.get(OURS_ALONE), without_odometry=True),
         )
         for target in TARGETS
     ]
@@ -73,17 +73,23 @@ def _targets(reporting: dict[str, MethodSummary]) -> list[str]:
     return section("Targets") + table(head, rows)
 
 
-def _verdict(target: Target, one: MethodSummary | None, alone: bool) -> tuple[str, str, str]:
-    value = math.nan if one is None else target.value(one.figures)
-    return fixed(value), target.bound(alone), "reached" if target.reached(value, alone) else "**missed**"
+def _verdict(
+    target: Target, method_summary: MethodSummary | None, without_odometry: bool
+) -> tuple[str, str, str]:
+    value = math.nan if method_summary is None else target.value(method_summary.figures)
+    return (
+        fixed(value),
+        target.bound(without_odometry),
+        "reached" if target.reached(value, without_odometry) else "**missed**",
+    )
 
 
 def _table_two(reporting: dict[str, MethodSummary]) -> list[str]:
-    told = (("the paper's lidar [20]", PAPER_LIDAR), ("the paper's method", PAPER_OURS))
+    reported = (("the paper's lidar [20]", PAPER_LIDAR), ("the paper's method", PAPER_OURS))
     rows = [
-        (name, str(one.objects), str(one.correct), str(one.wrong), fixed(one.precision), fixed(one.recall),
-         f"{one.seconds_per_frame:.2f}")
-        for name, one in told
+        (name, str(paper.objects), str(paper.correct), str(paper.wrong), fixed(paper.precision),
+         fixed(paper.recall), f"{paper.seconds_per_frame:.2f}")
+        for name, paper in reported
     ]  # fmt: skip
     names = (("our lidar baseline", LIDAR), ("treadwatch", OURS), ("treadwatch, no odometry", OURS_ALONE))
     for label, name in names:
@@ -99,15 +105,15 @@ def _table_one(methods: dict[str, MethodSummary]) -> list[str]:
     rows = [
         (
             name,
-            *_objects(one.figures.objects),
-            *_shares(one.figures.settled),
-            *_shares(one.pixel_counts),
-            fixed(one.figures.wrong_per_minute, 1),
-            fixed(one.figures.ms_per_frame, 1),
+            *_objects(method_summary.figures.objects),
+            *_shares(method_summary.figures.settled),
+            *_shares(method_summary.pixel_counts),
+            fixed(method_summary.figures.wrong_per_minute, 1),
+            fixed(method_summary.figures.ms_per_frame, 1),
         )
-        for name, one in methods.items()
+        for name, method_summary in methods.items()
     ]
-    sequences = max(one.sequences for one in methods.values())
+    sequences = max(method_summary.sequences for method_summary in methods.values())
     head = ("method", *_OBJECT_HEAD, "per frame P", "R", "pixel P", "R", "false a minute", "ms a frame")
     return (
         section("Table 1, measured", _TABLE_ONE.format(sequences))
@@ -143,8 +149,8 @@ def _figures(summary: Summary, shown: bool) -> list[str]:
 def _by_split(summary: Summary) -> list[str]:
     rows = []
     for split in ("reporting", "tuning"):
-        for name, one in summary.splits[split].items():
-            f = one.figures
+        for name, method_summary in summary.splits[split].items():
+            f = method_summary.figures
             error = f"{fixed(f.speed_error_median_mps)} / {fixed(f.speed_error_p90_mps)}"
             rows.append(
                 (split, name, *_objects(f.objects), *_shares(f.settled), fixed(f.frames.recall),
@@ -163,17 +169,17 @@ def _by_sequence(summary: Summary) -> list[str]:
         for method in (OURS, OURS_ALONE):
             if method not in methods:
                 continue
-            one = methods[method]
+            sequence_score = methods[method]
             rows.append(
                 (
                     name,
                     summary.split_of[name],
                     method,
-                    f"{sum(true.found for true in one.objects)} of {len(one.objects)}",
-                    str(len(one.wrong_objects)),
-                    str(sum(len(frame.wrong) for frame in one.frames)),
-                    str(sum(len(frame.duplicates) for frame in one.frames)),
-                    str(sum(len(frame.missed_settled) for frame in one.frames)),
+                    f"{sum(true.found for true in sequence_score.objects)} of {len(sequence_score.objects)}",
+                    str(len(sequence_score.wrong_objects)),
+                    str(sum(len(frame.wrong) for frame in sequence_score.frames)),
+                    str(sum(len(frame.duplicates) for frame in sequence_score.frames)),
+                    str(sum(len(frame.missed_settled) for frame in sequence_score.frames)),
                 )
             )
     head = (
@@ -194,14 +200,14 @@ def _failing(failures: Sequence[tuple[Snapshot, str]]) -> list[str]:
         return section("Failing frames", "None.")
     lines = section("Failing frames", "The worst frames of the sequences (treadwatch, with odometry).")
     for snapshot, file in failures:
-        words = f"{snapshot.sequence}, frame {snapshot.index}: {pictures.describe_faults(snapshot)}"
+        words = f"{snapshot.sequence}, frame {snapshot.index}: {pictures.describe_errors(snapshot)}"
         lines += [words, "", *picture(snapshot.sequence, file)]
     return lines
 
 
 def _objects(counts: Counts) -> tuple[str, str, str, str, str]:
-    whole = counts.correct + counts.missed
-    return str(whole), str(counts.correct), str(counts.wrong), *_shares(counts)
+    total = counts.correct + counts.missed
+    return str(total), str(counts.correct), str(counts.wrong), *_shares(counts)
 
 
 def _shares(counts: Counts) -> tuple[str, str]:

@@ -8,23 +8,23 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.evaluation.contestants import (
-    OURS,
-    CameraContestant,
-    Contestant,
-    Stopwatch,
-    build_world,
-    line_up,
-)
 from controller.evaluation.eligibility import MOVING_MPS, STANDING_MPS
 from controller.evaluation.endpoint_error import EndpointErrors, endpoint_errors
 from controller.evaluation.ours import Treadwatch
-from controller.evaluation.pixels import STEP_PX, claimed, count_pixels
+from controller.evaluation.pixels import STEP_PX, claimed_levels, count_pixels
 from controller.evaluation.scoring import FrameScore, score
 from controller.evaluation.sequences import Sequence
 from controller.evaluation.simulate import SimulatedFrame, simulate
+from controller.evaluation.timed_methods import (
+    OURS,
+    CameraMethod,
+    Stopwatch,
+    TimedMethod,
+    build_methods,
+    build_world,
+)
 from controller.evaluation.totals import PixelCounts
-from controller.evaluation.truth import TruthTeller
+from controller.evaluation.truth import FrameTruthBuilder
 from controller.evaluation.types import Answer, DetectedObject, FrameDetections, FrameTruth
 from hal.types import ColourImage, RgbdFrame
 from sim.rendering.camera import intrinsics_of
@@ -78,11 +78,11 @@ def run_sequence(
     """Run the named methods. show_frames: indices of frames to keep for pictures."""
     world = build_world(sequence)
     intrinsics = intrinsics_of(sequence.camera())
-    teller = TruthTeller(world, intrinsics)
-    contestants = line_up(methods, sequence, intrinsics, stopwatch_ns)
+    truth_builder = FrameTruthBuilder(world, intrinsics)
+    timed_methods = build_methods(methods, sequence, intrinsics, stopwatch_ns)
     recorder = _Recorder(sequence, methods, show_frames)
-    for index, seen in enumerate(simulate(sequence, teller, world)):
-        recorder.add(index, seen, contestants)
+    for index, simulated in enumerate(simulate(sequence, truth_builder, world)):
+        recorder.add(index, simulated, timed_methods)
     return recorder.result()
 
 
@@ -96,23 +96,25 @@ class _Recorder:
         self._answers: dict[str, list[FrameDetections]] = {name: [] for name in methods}
         self._pixels = {name: PixelCounts.none() for name in methods}
         self._endpoint = EndpointErrors.none()
-        self._before: tuple[SimulatedFrame, Fragments] | None = None
+        self._previous: tuple[SimulatedFrame, Fragments] | None = None
         self._jpegs: list[NDArray[np.uint8]] = []
         self._shown: dict[int, tuple[RgbdFrame, Fragments | None]] = {}
 
-    def add(self, index: int, seen: SimulatedFrame, contestants: dict[str, Contestant]) -> None:
-        """Give one frame to all contestants, and keep their answers."""
-        self._truths.append(seen.truth)
-        for name, contestant in contestants.items():
-            answer, duration_ms = contestant.answer(seen)
-            self._answers[name].append(FrameDetections(seen.truth.stamp_s, answer.detections, duration_ms))
-            self._pixels[name] += self._count_pixels(seen, answer)
-        fragments = _fragments(contestants)
-        self._measure_endpoints(seen, fragments)
-        if OURS in contestants:
-            self._jpegs.append(np.asarray(cv2.imencode(".jpg", seen.frame.colour, _JPEG)[1], np.uint8))
+    def add(self, index: int, simulated: SimulatedFrame, timed_methods: dict[str, TimedMethod]) -> None:
+        """Give one frame to all methods, and keep their answers."""
+        self._truths.append(simulated.truth)
+        for name, timed_method in timed_methods.items():
+            answer, duration_ms = timed_method.answer(simulated)
+            self._answers[name].append(
+                FrameDetections(simulated.truth.stamp_s, answer.detections, duration_ms)
+            )
+            self._pixels[name] += self._count_pixels(simulated, answer)
+        fragments = _fragments(timed_methods)
+        self._measure_endpoints(simulated, fragments)
+        if OURS in timed_methods:
+            self._jpegs.append(np.asarray(cv2.imencode(".jpg", simulated.frame.colour, _JPEG)[1], np.uint8))
         if index in self._show_frames:
-            self._shown[index] = (seen.frame, fragments)
+            self._shown[index] = (simulated.frame, fragments)
 
     def result(self) -> SequenceRecord:
         """The results, after the last frame has been added."""
@@ -120,42 +122,46 @@ class _Recorder:
             name: MethodRecord(tuple(answers), self._pixels[name]) for name, answers in self._answers.items()
         }
         scores = score(self._truths, records[OURS].answers).frames if OURS in records else ()
-        worst = sorted(range(len(scores)), key=lambda index: (-scores[index].faults, index))
-        bad = _spread([index for index in worst if scores[index].faults > 0])
+        worst = sorted(range(len(scores)), key=lambda index: (-scores[index].error_count, index))
+        failing = _spaced([index for index in worst if scores[index].error_count > 0])
         return SequenceRecord(
             self._sequence.name,
             self._sequence.split,
             tuple(self._truths),
             records,
             self._endpoint,
-            tuple(self._snapshot(index, records, scores[index]) for index in bad),
+            tuple(self._snapshot(index, records, scores[index]) for index in failing),
             tuple(self._snapshot(index, records, scores[index]) for index in self._shown if scores),
         )
 
-    def _count_pixels(self, seen: SimulatedFrame, answer: Answer) -> PixelCounts:
-        levels = claimed(seen.frame, answer.detections) if answer.mask is None else answer.mask
-        half = np.s_[::STEP_PX, ::STEP_PX]
-        objects = seen.truth.objects
+    def _count_pixels(self, simulated: SimulatedFrame, answer: Answer) -> PixelCounts:
+        levels = claimed_levels(simulated.frame, answer.detections) if answer.mask is None else answer.mask
+        judged_pixels = np.s_[::STEP_PX, ::STEP_PX]
+        objects = simulated.truth.objects
         return count_pixels(
             levels,
-            seen.images.instances[half],
-            seen.images.depth_m[half],
-            moving=[one.id for one in objects if one.speed_mps >= MOVING_MPS],
-            excused=[one.id for one in objects if one.turning or STANDING_MPS <= one.speed_mps < MOVING_MPS],
+            simulated.images.instances[judged_pixels],
+            simulated.images.depth_m[judged_pixels],
+            moving=[true_object.id for true_object in objects if true_object.speed_mps >= MOVING_MPS],
+            excused=[
+                true_object.id
+                for true_object in objects
+                if true_object.turning or STANDING_MPS <= true_object.speed_mps < MOVING_MPS
+            ],
         )
 
-    def _measure_endpoints(self, seen: SimulatedFrame, fragments: Fragments | None) -> None:
+    def _measure_endpoints(self, simulated: SimulatedFrame, fragments: Fragments | None) -> None:
         if not self._sequence.static or fragments is None:
             return
-        if self._before is not None:
-            before, known = self._before
-            motion = seen.camera.inverse() @ before.camera
+        if self._previous is not None:
+            previous, known = self._previous
+            motion = simulated.camera.inverse() @ previous.camera
             self._endpoint = self._endpoint + endpoint_errors(
-                known, fragments, before.images.depth_m, motion, seen.frame.intrinsics
+                known, fragments, previous.images.depth_m, motion, simulated.frame.intrinsics
             )
-        self._before = (seen, fragments)
+        self._previous = (simulated, fragments)
 
-    def _snapshot(self, index: int, records: dict[str, MethodRecord], scored: FrameScore) -> Snapshot:
+    def _snapshot(self, index: int, records: dict[str, MethodRecord], frame_score: FrameScore) -> Snapshot:
         if index in self._shown:
             frame, fragments = self._shown[index]
             colour, depth_m = frame.colour, frame.depth.astype(np.float32) * np.float32(frame.depth_scale_m)
@@ -164,18 +170,25 @@ class _Recorder:
             depth_m = np.empty((0, 0), np.float32)
         detections = records[OURS].answers[index].detections
         return Snapshot(
-            self._sequence.name, index, colour, depth_m, self._truths[index], detections, fragments, scored
+            self._sequence.name,
+            index,
+            colour,
+            depth_m,
+            self._truths[index],
+            detections,
+            fragments,
+            frame_score,
         )
 
 
-def _fragments(contestants: dict[str, Contestant]) -> Fragments | None:
-    contestant = contestants.get(OURS)
-    if isinstance(contestant, CameraContestant) and isinstance(contestant.method, Treadwatch):
-        return contestant.method.fragments
+def _fragments(timed_methods: dict[str, TimedMethod]) -> Fragments | None:
+    timed_method = timed_methods.get(OURS)
+    if isinstance(timed_method, CameraMethod) and isinstance(timed_method.method, Treadwatch):
+        return timed_method.method.fragments
     return None
 
 
-def _spread(indices: list[int]) -> list[int]:
+def _spaced(indices: list[int]) -> list[int]:
     """The first few that are at least ten frames apart; neighbouring frames show the same error."""
     chosen: list[int] = []
     for index in indices:

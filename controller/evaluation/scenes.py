@@ -29,14 +29,14 @@ from config.scenario import (
     Texture,
     Wall,
 )
-from controller.evaluation.drive import ScriptedDrive
+from controller.evaluation.scripted_drive import ScriptedDrive
 from hal.types import FloatArray, PlanarPose
 
 Kind = Literal["person", "robot", "cart"]
 
-_AT_ONCE_MPS2 = 20.0  # acceleration of movers that are in motion from the start
-_ROBOT_ROOM_M = 1.1  # least distance of clutter from the robot's path
-_MOVER_ROOM_M = 0.9  # least distance of clutter from a mover's path
+_INSTANT_MPS2 = 20.0  # acceleration of movers that are in motion from the start
+_ROBOT_CLEARANCE_M = 1.1  # least distance of clutter from the robot's path
+_MOVER_CLEARANCE_M = 0.9  # least distance of clutter from a mover's path
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Mover:
 
 
 @dataclass(frozen=True, slots=True)
-class _Way:
+class _MoverPath:
     """A mover's straight path on the floor."""
 
     start: FloatArray
@@ -100,18 +100,21 @@ def build(
 ) -> Scenario:
     """A scene with the movers, and clutter off their paths and the robot's."""
     generator = np.random.default_rng((seed, 7))
-    ways = [_way(mover, drive, duration_s) for mover in movers]
+    mover_paths = [_mover_path(mover, drive, duration_s) for mover in movers]
     bodies: list[BodySpec] = [
-        _mover_body(index, mover, way) for index, (mover, way) in enumerate(zip(movers, ways, strict=True))
+        _mover_body(index, mover, mover_path)
+        for index, (mover, mover_path) in enumerate(zip(movers, mover_paths, strict=True))
     ]
     course = np.array([_point(drive.pose(t_s), 0.0, 0.0) for t_s in np.linspace(0.0, duration_s, 17)])
     room, fixed, clutter = _PLACES[place](generator, course)
     bodies.extend(fixed)
     for body in clutter:
         middle = np.array([body.x_m, body.y_m])
-        reach = _reach_m(body)
-        free = all(_distance_m(middle, way) > _MOVER_ROOM_M + reach for way in ways)
-        if free and np.hypot(*(course - middle).T).min() > _ROBOT_ROOM_M + reach:
+        radius = _radius_m(body)
+        free = all(
+            _distance_m(middle, mover_path) > _MOVER_CLEARANCE_M + radius for mover_path in mover_paths
+        )
+        if free and np.hypot(*(course - middle).T).min() > _ROBOT_CLEARANCE_M + radius:
             bodies.append(body)
     return Scenario(
         name=name,
@@ -129,7 +132,7 @@ def _point(pose: PlanarPose, ahead_m: float, left_m: float) -> FloatArray:
     return np.array([pose.x_m + ahead_m * c - left_m * s, pose.y_m + ahead_m * s + left_m * c])
 
 
-def _way(mover: Mover, drive: ScriptedDrive, duration_s: float) -> _Way:
+def _mover_path(mover: Mover, drive: ScriptedDrive, duration_s: float) -> _MoverPath:
     pose = drive.pose(mover.at_s)
     through = _point(pose, mover.ahead_m, mover.left_m)
     heading = pose.heading_rad + math.radians(mover.course_deg)
@@ -137,18 +140,25 @@ def _way(mover: Mover, drive: ScriptedDrive, duration_s: float) -> _Way:
     starts_s = 0.0 if mover.starts_s is None else mover.starts_s
     ends_s = duration_s + 1.0 if mover.stops_s is None else mover.stops_s
     start = through - along * mover.speed_mps * (mover.at_s - starts_s)
-    return _Way(start, start + along * mover.speed_mps * (ends_s - starts_s), math.degrees(heading))
+    return _MoverPath(start, start + along * mover.speed_mps * (ends_s - starts_s), math.degrees(heading))
 
 
-def _mover_body(index: int, mover: Mover, way: _Way) -> BodySpec:
-    gently = mover.starts_s is not None or mover.stops_s is not None
+def _mover_body(index: int, mover: Mover, mover_path: _MoverPath) -> BodySpec:
+    gradual = mover.starts_s is not None or mover.stops_s is not None
     motion = MotionPlan(
         start_s=0.0 if mover.starts_s is None else mover.starts_s,
-        accel_mps2=1.5 if gently else _AT_ONCE_MPS2,
-        steps=(Go(kind="go", x_m=float(way.end[0]), y_m=float(way.end[1]), speed_mps=mover.speed_mps),),
+        accel_mps2=1.5 if gradual else _INSTANT_MPS2,
+        steps=(
+            Go(
+                kind="go",
+                x_m=float(mover_path.end[0]),
+                y_m=float(mover_path.end[1]),
+                speed_mps=mover.speed_mps,
+            ),
+        ),
     )
-    heading_deg = math.remainder(way.heading_deg, 360.0)
-    name, x_m, y_m = f"{mover.kind} {index + 1}", float(way.start[0]), float(way.start[1])
+    heading_deg = math.remainder(mover_path.heading_deg, 360.0)
+    name, x_m, y_m = f"{mover.kind} {index + 1}", float(mover_path.start[0]), float(mover_path.start[1])
     if mover.kind == "person":
         return Person(
             kind="person", name=name, x_m=x_m, y_m=y_m, heading_deg=heading_deg,
@@ -165,14 +175,14 @@ def _mover_body(index: int, mover: Mover, way: _Way) -> BodySpec:
     )  # fmt: skip
 
 
-def _distance_m(point: FloatArray, way: _Way) -> float:
+def _distance_m(point: FloatArray, mover_path: _MoverPath) -> float:
     """Distance of a point from a path."""
-    along = way.end - way.start
-    share = float(np.clip((point - way.start) @ along / max(float(along @ along), 1e-9), 0.0, 1.0))
-    return float(np.hypot(*(point - way.start - share * along)))
+    along = mover_path.end - mover_path.start
+    fraction = float(np.clip((point - mover_path.start) @ along / max(float(along @ along), 1e-9), 0.0, 1.0))
+    return float(np.hypot(*(point - mover_path.start - fraction * along)))
 
 
-def _reach_m(body: BodySpec) -> float:
+def _radius_m(body: BodySpec) -> float:
     """Radius of the circle around its footprint."""
     match body:
         case Column() | Pole():
@@ -251,15 +261,15 @@ def _scatter(
     placed: list[FloatArray] = []
     bodies: list[BodySpec] = []
     for index in range(count):
-        where = np.array([generator.uniform(x0, x1), generator.uniform(y0, y1)])
-        if placed and np.hypot(*(np.array(placed) - where).T).min() < 1.2:
+        position = np.array([generator.uniform(x0, x1), generator.uniform(y0, y1)])
+        if placed and np.hypot(*(np.array(placed) - position).T).min() < 1.2:
             continue
-        placed.append(where)
-        bodies.append(_thing(generator, index, float(where[0]), float(where[1])))
+        placed.append(position)
+        bodies.append(_clutter_object(generator, index, float(position[0]), float(position[1])))
     return bodies
 
 
-def _thing(generator: np.random.Generator, index: int, x_m: float, y_m: float) -> BodySpec:
+def _clutter_object(generator: np.random.Generator, index: int, x_m: float, y_m: float) -> BodySpec:
     turn_deg = float(generator.uniform(-90.0, 90.0))
     name = f"thing {index}"
     texture: Texture = ("fine", "coarse", "plain")[int(generator.integers(3))]

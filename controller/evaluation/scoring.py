@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.evaluation.eligibility import Call, Standing, calls
+from controller.evaluation.eligibility import Eligibility, Verdict, judge_eligibility
 from controller.evaluation.matching import costs, match
 from controller.evaluation.types import CALLED_MOVING, DetectedObject, FrameDetections, FrameTruth, TrueObject
 
@@ -57,7 +57,7 @@ class FrameScore:
     duplicates: tuple[int, ...]
 
     @property
-    def faults(self) -> int:
+    def error_count(self) -> int:
         """The number of errors in this frame."""
         return len(self.missed_settled) + len(self.wrong) + len(self.duplicates)
 
@@ -106,45 +106,49 @@ def score(
         truth.stamp_s != answer.stamp_s for truth, answer in zip(truths, answers, strict=False)
     ):
         raise ValueError("truths and answers must be the same frames in the same order")
-    called = calls(truths)
+    verdicts = judge_eligibility(truths)
     frames = tuple(
-        _score_frame(truth, call, [d for d in answer.detections if d.confidence >= threshold])
-        for truth, call, answer in zip(truths, called, answers, strict=True)
+        _score_frame(truth, verdict, [d for d in answer.detections if d.confidence >= threshold])
+        for truth, verdict, answer in zip(truths, verdicts, answers, strict=True)
     )
     count = Counter(identity for frame in frames for identity in frame.wrong)
     wrong = tuple(sorted(identity for identity, times in count.items() if times >= WRONG_FRAMES))
-    return SequenceScore(frames, _score_objects(truths, called, frames), wrong, _duration_s(truths))
+    return SequenceScore(frames, _score_objects(truths, verdicts, frames), wrong, _duration_s(truths))
 
 
-def _score_frame(truth: FrameTruth, call: dict[int, Call], detections: list[DetectedObject]) -> FrameScore:
-    eligible = [true for true in truth.objects if call[true.id].standing is Standing.ELIGIBLE]
-    excused = [true for true in truth.objects if call[true.id].standing is Standing.EXCUSED]
+def _score_frame(
+    truth: FrameTruth, verdicts: dict[int, Verdict], detections: list[DetectedObject]
+) -> FrameScore:
+    eligible = [true for true in truth.objects if verdicts[true.id].eligibility is Eligibility.ELIGIBLE]
+    excused = [true for true in truth.objects if verdicts[true.id].eligibility is Eligibility.EXCUSED]
     pairs = match(detections, eligible)
-    hits = tuple(_hit(detections[row], eligible[column], call) for row, column in pairs)
-    taken = {row for row, _ in pairs}
-    seen = {hit.object_id for hit in hits}
-    rest = [detection for row, detection in enumerate(detections) if row not in taken]
-    is_moving = [bool(row.any()) for row in np.isfinite(costs(rest, eligible))]
-    may_move = [bool(row.any()) for row in np.isfinite(costs(rest, excused))]
-    missed = tuple(true.id for true in eligible if true.id not in seen)
+    hits = tuple(_hit(detections[row], eligible[column], verdicts) for row, column in pairs)
+    matched_rows = {row for row, _ in pairs}
+    matched_ids = {hit.object_id for hit in hits}
+    unmatched = [detection for row, detection in enumerate(detections) if row not in matched_rows]
+    is_moving = [bool(row.any()) for row in np.isfinite(costs(unmatched, eligible))]
+    may_move = [bool(row.any()) for row in np.isfinite(costs(unmatched, excused))]
+    missed = tuple(true.id for true in eligible if true.id not in matched_ids)
     return FrameScore(
         hits,
         missed,
-        tuple(identity for identity in missed if call[identity].settled),
-        tuple(d.id for d, is_, may in zip(rest, is_moving, may_move, strict=True) if not is_ and not may),
-        tuple(d.id for d, is_, may in zip(rest, is_moving, may_move, strict=True) if is_ and not may),
+        tuple(identity for identity in missed if verdicts[identity].settled),
+        tuple(
+            d.id for d, is_, may in zip(unmatched, is_moving, may_move, strict=True) if not is_ and not may
+        ),
+        tuple(d.id for d, is_, may in zip(unmatched, is_moving, may_move, strict=True) if is_ and not may),
     )
 
 
-def _hit(detection: DetectedObject, true: TrueObject, call: dict[int, Call]) -> Hit:
+def _hit(detection: DetectedObject, true: TrueObject, verdicts: dict[int, Verdict]) -> Hit:
     difference = detection.velocity_mps - true.velocity_mps
     known = np.isfinite(difference)
     error = float(np.linalg.norm(difference[known])) if known.any() else math.nan
-    return Hit(true.id, true.distance_m, error, call[true.id].settled)
+    return Hit(true.id, true.distance_m, error, verdicts[true.id].settled)
 
 
 def _score_objects(
-    truths: Sequence[FrameTruth], called: Sequence[dict[int, Call]], frames: Sequence[FrameScore]
+    truths: Sequence[FrameTruth], verdicts: Sequence[dict[int, Verdict]], frames: Sequence[FrameScore]
 ) -> tuple[ObjectScore, ...]:
     first_s: dict[int, float] = {}
     hit_s: dict[int, float] = {}
@@ -152,16 +156,16 @@ def _score_objects(
     detected: Counter[int] = Counter()
     kinds: dict[int, str] = {}
     distances_m: dict[int, list[float]] = {}
-    for truth, call, frame in zip(truths, called, frames, strict=True):
+    for truth, verdict, frame in zip(truths, verdicts, frames, strict=True):
         hits = {hit.object_id for hit in frame.hits}
         for true in truth.objects:
-            if call[true.id].standing is not Standing.ELIGIBLE:
+            if verdict[true.id].eligibility is not Eligibility.ELIGIBLE:
                 continue
             kinds[true.id] = true.kind
             first_s.setdefault(true.id, truth.stamp_s)
             if true.id in hits:
                 hit_s.setdefault(true.id, truth.stamp_s)
-            if call[true.id].settled:
+            if verdict[true.id].settled:
                 judged[true.id] += 1
                 detected[true.id] += true.id in hits
                 distances_m.setdefault(true.id, []).append(true.distance_m)

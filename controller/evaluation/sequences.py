@@ -11,8 +11,8 @@ from typing import Literal
 
 from config.camera import SimulatedCameraConfig
 from config.scenario import Scenario
-from controller.evaluation.drive import SLIPPING, Knot, OdometryError, ScriptedDrive
 from controller.evaluation.scenes import Mover, build, side_by_side
+from controller.evaluation.scripted_drive import SLIPPING, Knot, OdometryError, ScriptedDrive
 
 Split = Literal["tuning", "reporting"]
 Noise = Literal["realsense", "paper"]

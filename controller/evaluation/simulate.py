@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from controller.evaluation.drive import MOUNT
+from controller.evaluation.scripted_drive import MOUNT
 from controller.evaluation.sequences import Sequence
-from controller.evaluation.truth import TrueImages, TruthTeller
+from controller.evaluation.truth import FrameTruthBuilder, TrueImages
 from controller.evaluation.types import FrameTruth
 from hal.clocks import NS_PER_S, SimulatedClock
 from hal.types import Pose, RgbdFrame
@@ -34,7 +34,7 @@ class SimulatedFrame:
     bodies: tuple[BodyState, ...]
 
 
-def simulate(sequence: Sequence, teller: TruthTeller, world: World) -> Iterator[SimulatedFrame]:
+def simulate(sequence: Sequence, truth_builder: FrameTruthBuilder, world: World) -> Iterator[SimulatedFrame]:
     """The sequence's frames in order. Every run yields the same bytes."""
     drive = sequence.drive()
     config = sequence.camera()
@@ -50,7 +50,7 @@ def simulate(sequence: Sequence, teller: TruthTeller, world: World) -> Iterator[
                 frame,
                 drive.odometry_camera(frame.captured_ns),
                 picture.camera,
-                teller.frame(picture),
-                teller.images(picture),
+                truth_builder.frame(picture),
+                truth_builder.images(picture),
                 world.bodies(picture.t_s),
             )

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from controller.evaluation import endpoint_error
-from controller.evaluation.contestants import ALWAYS, BASELINES, OURS
 from controller.evaluation.endpoint_error import EndpointErrors
 from controller.evaluation.run_sequence import SequenceRecord
 from controller.evaluation.scoring import SequenceScore, score
+from controller.evaluation.timed_methods import ALWAYS, BASELINES, OURS
 from controller.evaluation.totals import (
     DISTANCE_BINS_M,
     PIXEL_LEVEL,
@@ -21,8 +21,8 @@ from controller.evaluation.totals import (
     Counts,
     Curve,
     Figures,
+    MethodAnswers,
     PixelCounts,
-    Recorded,
     bin_by_distance,
     object_curves,
     pixel_curve,
@@ -85,11 +85,11 @@ def summarise(records: Sequence[SequenceRecord]) -> Summary:
             [record for record in records if BASELINES[0] in record.methods], scores, ALWAYS + BASELINES
         ),
     }
-    shown = [record for record in reporting if OURS in record.methods]
+    scored_records = [record for record in reporting if OURS in record.methods]
     per_object, per_frame = object_curves(
-        [Recorded(record.truths, record.methods[OURS].answers) for record in shown]
+        [MethodAnswers(record.truths, record.methods[OURS].answers) for record in scored_records]
     )
-    pixels = sum((record.methods[OURS].pixels for record in shown), PixelCounts.none())
+    pixels = sum((record.methods[OURS].pixels for record in scored_records), PixelCounts.none())
     endpoint = sum((record.endpoint for record in records), EndpointErrors.none())
     beyond = endpoint.error_px[endpoint.distance_m >= BEYOND_M]
     return Summary(
@@ -109,13 +109,13 @@ def _by_method(
 ) -> dict[str, MethodSummary]:
     result = {}
     for name in names:
-        seen = [record for record in records if name in record.methods]
-        if not seen:
+        used_records = [record for record in records if name in record.methods]
+        if not used_records:
             continue
-        durations = [answer.duration_ms for record in seen for answer in record.methods[name].answers]
-        figures = total([scores[record.name][name] for record in seen], durations)
-        pixels = sum((record.methods[name].pixels for record in seen), PixelCounts.none())
-        result[name] = MethodSummary(figures, pixels, len(seen))
+        durations = [answer.duration_ms for record in used_records for answer in record.methods[name].answers]
+        figures = total([scores[record.name][name] for record in used_records], durations)
+        pixels = sum((record.methods[name].pixels for record in used_records), PixelCounts.none())
+        result[name] = MethodSummary(figures, pixels, len(used_records))
     return result
 
 
@@ -152,15 +152,15 @@ def number(value: float, digits: int = 4) -> float | None:
     return round(float(value), digits) if math.isfinite(value) else None
 
 
-def _method(one: MethodSummary) -> dict[str, Any]:
-    figures = one.figures
+def _method(summary: MethodSummary) -> dict[str, Any]:
+    figures = summary.figures
     return {
-        "sequences": one.sequences,
+        "sequences": summary.sequences,
         "minutes": number(figures.minutes),
         "object": _counts(figures.objects),
         "frame": _counts(figures.settled),
         "frame_with_first_half_second": _counts(figures.frames),
-        "pixel": _counts(one.pixel_counts),
+        "pixel": _counts(summary.pixel_counts),
         "false_moving_per_minute": number(figures.wrong_per_minute, 3),
         "speed_error_mps": {
             "median": number(figures.speed_error_median_mps),
@@ -190,13 +190,13 @@ def _counts(counts: Counts) -> dict[str, Any]:
     }
 
 
-def _by_distance(one: ByDistance) -> dict[str, Any]:
+def _by_distance(by_distance: ByDistance) -> dict[str, Any]:
     return {
-        "edges_m": list(one.edges_m),
-        "count": list(one.count),
-        "median_by_distance": [number(value) for value in one.median],
-        "mean_by_distance": [number(value) for value in one.mean],
-        "p90_by_distance": [number(value) for value in one.p90],
+        "edges_m": list(by_distance.edges_m),
+        "count": list(by_distance.count),
+        "median_by_distance": [number(value) for value in by_distance.median],
+        "mean_by_distance": [number(value) for value in by_distance.mean],
+        "p90_by_distance": [number(value) for value in by_distance.p90],
     }
 
 
@@ -208,7 +208,7 @@ def _curve(curve: Curve) -> dict[str, Any]:
     }
 
 
-def _sequence(one: SequenceScore) -> dict[str, Any]:
+def _sequence(score: SequenceScore) -> dict[str, Any]:
     return {
         "objects": [
             {
@@ -220,10 +220,10 @@ def _sequence(one: SequenceScore) -> dict[str, Any]:
                 "first_detection_s": number(true.latency_s),
                 "distance_m": number(true.distance_m, 2),
             }
-            for true in one.objects
+            for true in score.objects
         ],
-        "wrong_objects": list(one.wrong_objects),
-        "false_detections": sum(len(frame.wrong) for frame in one.frames),
-        "duplicate_detections": sum(len(frame.duplicates) for frame in one.frames),
-        "missed_frames": sum(len(frame.missed_settled) for frame in one.frames),
+        "wrong_objects": list(score.wrong_objects),
+        "false_detections": sum(len(frame.wrong) for frame in score.frames),
+        "duplicate_detections": sum(len(frame.duplicates) for frame in score.frames),
+        "missed_frames": sum(len(frame.missed_settled) for frame in score.frames),
     }

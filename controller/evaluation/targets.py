@@ -14,25 +14,26 @@ class Target:
     """A figure and its bounds.
 
     value: the figure, from all figures of a method.
-    with_odometry, alone: bounds with and without odometry.
-    at_least: the figure must be at least the bound; otherwise at most.
+    with_odometry, without_odometry: bounds with and without odometry.
+    is_minimum: the figure must be at least the bound; otherwise at most.
     """
 
     name: str
     unit: str
     value: Callable[[Figures], float]
     with_odometry: float
-    alone: float
-    at_least: bool
+    without_odometry: float
+    is_minimum: bool
 
-    def bound(self, alone: bool) -> str:
+    def bound(self, without_odometry: bool) -> str:
         """The bound as text, such as ">= 0.99"."""
-        return f"{'>=' if self.at_least else '<='} {self.alone if alone else self.with_odometry:g}"
+        limit = self.without_odometry if without_odometry else self.with_odometry
+        return f"{'>=' if self.is_minimum else '<='} {limit:g}"
 
-    def reached(self, value: float, alone: bool) -> bool:
+    def reached(self, value: float, without_odometry: bool) -> bool:
         """Whether the value meets the bound; an unknown value (NaN) does not."""
-        compare = operator.ge if self.at_least else operator.le
-        return bool(compare(value, self.alone if alone else self.with_odometry))
+        compare = operator.ge if self.is_minimum else operator.le
+        return bool(compare(value, self.without_odometry if without_odometry else self.with_odometry))
 
 
 TARGETS = (

@@ -92,8 +92,8 @@ def bin_by_distance(
     distance_m: FloatArray, values: FloatArray, edges_m: tuple[float, ...] = DISTANCE_BINS_M
 ) -> ByDistance:
     """Median, mean and 90th percentile of values (N,) in bins of distance (N,)."""
-    which = np.digitize(distance_m, edges_m) - 1
-    groups = [values[which == index] for index in range(len(edges_m) - 1)]
+    bin_index = np.digitize(distance_m, edges_m) - 1
+    groups = [values[bin_index == index] for index in range(len(edges_m) - 1)]
     return ByDistance(
         edges_m,
         tuple(len(group) for group in groups),
@@ -105,20 +105,20 @@ def bin_by_distance(
 
 def total(scores: Sequence[SequenceScore], durations_ms: Sequence[float]) -> Figures:
     """The figures of all scores together. durations_ms: one a frame, NaN if there was nothing to process."""
-    objects = [one for sequence in scores for one in sequence.objects]
+    objects = [object_score for sequence in scores for object_score in sequence.objects]
     frames = [frame for sequence in scores for frame in sequence.frames]
     hits = [hit for frame in frames for hit in frame.hits]
     distance = np.array([hit.distance_m for hit in hits])
     error = np.array([hit.speed_error_mps for hit in hits])
     known = np.isfinite(error)
-    found = sum(one.found for one in objects)
+    found = sum(object_score.found for object_score in objects)
     wrong = sum(len(sequence.wrong_objects) for sequence in scores)
     return Figures(
         Counts(found, wrong, len(objects) - found),
         _settled_counts(frames),
         _frame_counts(frames),
         sum(sequence.duration_s for sequence in scores) / 60.0,
-        tuple(one.latency_s for one in objects),
+        tuple(object_score.latency_s for object_score in objects),
         bin_by_distance(distance[known], error[known]),
         float(np.median(error[known])) if known.any() else math.nan,
         float(np.percentile(error[known], 90)) if known.any() else math.nan,
@@ -150,11 +150,11 @@ def _frame_counts(frames: Sequence[FrameScore]) -> Counts:
 
 def _found_by_distance(scores: Sequence[SequenceScore]) -> tuple[Counts, ...]:
     """Counts of objects by their median distance over the judged frames."""
-    objects = [one for sequence in scores for one in sequence.objects]
+    objects = [object_score for sequence in scores for object_score in sequence.objects]
     result = []
     for low, high in itertools.pairwise(DISTANCE_BINS_M):
-        inside = [one for one in objects if low <= one.distance_m < high]
-        found = sum(one.found for one in inside)
+        inside = [object_score for object_score in objects if low <= object_score.distance_m < high]
+        found = sum(object_score.found for object_score in inside)
         result.append(Counts(found, 0, len(inside) - found))
     return tuple(result)
 
@@ -169,7 +169,7 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recorded:
+class MethodAnswers:
     """One method's answers on one sequence."""
 
     truths: Sequence[FrameTruth]
@@ -179,11 +179,11 @@ class Recorded:
 THRESHOLDS = tuple(float(value) for value in np.round(np.linspace(1.0, 0.0, 41), 3))
 
 
-def object_curves(recorded: Sequence[Recorded]) -> tuple[Curve, Curve]:
+def object_curves(method_answers: Sequence[MethodAnswers]) -> tuple[Curve, Curve]:
     """Precision-recall curves per object and per frame, over the threshold of confidence."""
     per_object, per_frame = [], []
     for threshold in THRESHOLDS:
-        figures = total([score(one.truths, one.answers, threshold) for one in recorded], ())
+        figures = total([score(answers.truths, answers.answers, threshold) for answers in method_answers], ())
         per_object.append(figures.objects)
         per_frame.append(figures.settled)
     return _curve(THRESHOLDS, per_object), _curve(THRESHOLDS, per_frame)

@@ -24,7 +24,7 @@ class TrueImages:
     depth_m: NDArray[np.float32]
 
 
-class TruthTeller:
+class FrameTruthBuilder:
     """Ground truth of one world as seen by one camera."""
 
     def __init__(self, world: World, intrinsics: Intrinsics) -> None:
@@ -42,20 +42,20 @@ class TruthTeller:
         """All bodies that have a motion plan, visible or not."""
         if not self._movers:
             return FrameTruth(picture.t_s, ())
-        seen = {body.state.id: body for body in self._truth.bodies(picture, self._movers)}
+        visible = {body.state.id: body for body in self._truth.bodies(picture, self._movers)}
         objects = tuple(
-            _seen(seen[body.id]) if body.id in seen else _unseen(body, picture.camera)
+            _visible_object(visible[body.id]) if body.id in visible else _hidden_object(body, picture.camera)
             for body in self._world.bodies(picture.t_s)
             if body.moves
         )
         return FrameTruth(picture.t_s, objects)
 
 
-def _turns(body: BodyState) -> bool:
+def _is_turning(body: BodyState) -> bool:
     return abs(body.yaw_rate_radps) > _MIN_TURN_RADPS
 
 
-def _seen(body: BodyTruth) -> TrueObject:
+def _visible_object(body: BodyTruth) -> TrueObject:
     u0, v0, u1, v1 = body.bbox_px
     return TrueObject(
         body.state.id,
@@ -65,12 +65,12 @@ def _seen(body: BodyTruth) -> TrueObject:
         body.visible_ratio,
         body.position_m,
         body.velocity_mps,
-        _turns(body.state),
+        _is_turning(body.state),
     )
 
 
-def _unseen(body: BodyState, camera: Pose) -> TrueObject:
+def _hidden_object(body: BodyState, camera: Pose) -> TrueObject:
     velocity: FloatArray = np.array([*body.velocity_mps, 0.0]) @ camera.rotation
     on_floor = np.array([[body.pose.x_m, body.pose.y_m, 0.5 * sum(body.z_m)]])
     middle = camera.inverse().apply(on_floor)[0]
-    return TrueObject(body.id, body.kind, NO_BOX, 0, 0.0, middle, velocity, _turns(body))
+    return TrueObject(body.id, body.kind, NO_BOX, 0, 0.0, middle, velocity, _is_turning(body))

@@ -68,10 +68,10 @@ def describe(trials: list[TrialResult], kills: list[KillResult], kind: str | Non
     for trial in trials:
         reason = trial.reason.removesuffix("; gone now, arm again to go on")
         stood = "never" if math.isnan(trial.stood_after_s) else f"{trial.stood_after_s:.2f} s"
-        again = "yes" if trial.again else "**no**"
+        drives_again = "yes" if trial.drives_again else "**no**"
         lines.append(
-            f"| {trial.kind} | {trial.fault} | {trial.mode.value} | {reason} | {stood} | {trial.way_m:.2f} m "
-            f"| {trial.moved_after_m:.3f} m | {again} |"
+            f"| {trial.kind} | {trial.fault} | {trial.mode.value} | {reason} | {stood} "
+            f"| {trial.travelled_m:.2f} m | {trial.moved_after_m:.3f} m | {drives_again} |"
         )
     if kills:
         lines += [

@@ -22,7 +22,7 @@ _DRIVING_MPS = 0.3  # the fault comes when the base is faster than this
 _START_S = 40.0  # longest time until it drives
 _STOP_S = 15.0  # longest time until it stands, and until the drive ends
 
-_TOLD = re.compile(r"v (-?[\d.]+) m/s, w (-?[\d.]+) rad/s, x (-?[\d.]+) m, y (-?[\d.]+) m")
+_STATE_LINE = re.compile(r"v (-?[\d.]+) m/s, w (-?[\d.]+) rad/s, x (-?[\d.]+) m, y (-?[\d.]+) m")
 _ENDED = re.compile(r"^mission +[^:]*: (.*); [\d.]+ m in", re.MULTILINE)
 
 
@@ -41,7 +41,7 @@ class KillResult:
     exit_code: int | None
 
 
-class Trio:
+class DriveProcesses:
     """The processes of emulator and drive; perception is a child of the drive."""
 
     def __init__(self, kind: str, config_path: Path) -> None:
@@ -59,15 +59,15 @@ class Trio:
         except BaseException:
             _end(self.base)
             raise
-        self._told: queue.Queue[str | None] = queue.Queue()
-        threading.Thread(target=self._listen, name="emulator", daemon=True).start()
+        self._lines: queue.Queue[str | None] = queue.Queue()
+        threading.Thread(target=self._read_lines, name="emulator", daemon=True).start()
 
-    def _listen(self) -> None:
+    def _read_lines(self) -> None:
         """The lines of the base; None when there will be no more."""
         assert self.base.stdout is not None
         for line in self.base.stdout:
-            self._told.put(line)
-        self._told.put(None)
+            self._lines.put(line)
+        self._lines.put(None)
 
     def close(self) -> None:
         """Kill the processes that still run."""
@@ -83,26 +83,26 @@ class Trio:
                 return int(child)
         raise UserError("the drive has no perception process")
 
-    def wait_for_drive(self, within_s: float) -> None:
+    def wait_for_drive(self, timeout_s: float) -> None:
         """Wait until the drive has ended by itself, at most this long."""
         with suppress(subprocess.TimeoutExpired):
-            self.drive.wait(within_s)
+            self.drive.wait(timeout_s)
 
-    def await_speed(self, reached: Callable[[float], bool], within_s: float) -> float:
+    def wait_for_speed(self, condition: Callable[[float], bool], timeout_s: float) -> float:
         """Read the base's output until reached() holds for its speed; gives the time that this took.
 
-        Raises UserError if it takes longer than within_s.
+        Raises UserError if it takes longer than timeout_s.
         """
-        began_s = time.monotonic()
+        start_s = time.monotonic()
         with suppress(queue.Empty):  # it may tell nothing at all
-            while (left_s := began_s + within_s - time.monotonic()) > 0.0:
-                line = self._told.get(timeout=left_s)
+            while (remaining_s := start_s + timeout_s - time.monotonic()) > 0.0:
+                line = self._lines.get(timeout=remaining_s)
                 if line is None:
                     break
-                match = _TOLD.match(line)
-                if match is not None and reached(abs(float(match[1]))):
-                    return time.monotonic() - began_s
-        raise UserError(f"the emulated base was not so within {within_s:g} s")
+                match = _STATE_LINE.match(line)
+                if match is not None and condition(abs(float(match[1]))):
+                    return time.monotonic() - start_s
+        raise UserError(f"the emulated base was not so within {timeout_s:g} s")
 
 
 def _end(process: subprocess.Popen[str]) -> None:
@@ -116,47 +116,47 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 @contextmanager
-def _trio(kind: str, config_path: Path) -> Iterator[Trio]:
-    trio = Trio(kind, config_path)
+def _processes(kind: str, config_path: Path) -> Iterator[DriveProcesses]:
+    processes = DriveProcesses(kind, config_path)
     try:
-        yield trio
+        yield processes
     finally:
-        trio.close()
+        processes.close()
 
 
-def _kill_control(trio: Trio) -> None:
-    trio.drive.kill()
+def _kill_control(processes: DriveProcesses) -> None:
+    processes.drive.kill()
 
 
-def _kill_perception(trio: Trio) -> None:
-    os.kill(trio.perception, signal.SIGKILL)
+def _kill_perception(processes: DriveProcesses) -> None:
+    os.kill(processes.perception, signal.SIGKILL)
 
 
-def _freeze_perception(trio: Trio) -> None:
-    os.kill(trio.perception, signal.SIGSTOP)
+def _freeze_perception(processes: DriveProcesses) -> None:
+    os.kill(processes.perception, signal.SIGSTOP)
 
 
-def _kill_base(trio: Trio) -> None:
-    trio.base.kill()
+def _kill_base(processes: DriveProcesses) -> None:
+    processes.base.kill()
 
 
-def _freeze_base(trio: Trio) -> None:
-    trio.base.send_signal(signal.SIGSTOP)
-    trio.wait_for_drive(_STOP_S)
-    trio.base.send_signal(signal.SIGCONT)
+def _freeze_base(processes: DriveProcesses) -> None:
+    processes.base.send_signal(signal.SIGSTOP)
+    processes.wait_for_drive(_STOP_S)
+    processes.base.send_signal(signal.SIGCONT)
 
 
-def _press_estop(trio: Trio) -> None:
-    assert trio.base.stdin is not None
-    trio.base.stdin.write("estop\n")
+def _press_estop(processes: DriveProcesses) -> None:
+    assert processes.base.stdin is not None
+    processes.base.stdin.write("estop\n")
 
 
-def _ask_to_stop(trio: Trio) -> None:
-    trio.drive.terminate()
+def _terminate_control(processes: DriveProcesses) -> None:
+    processes.drive.terminate()
 
 
-KILLS: dict[str, Callable[[Trio], None]] = {
-    "SIGTERM to control": _ask_to_stop,
+KILLS: dict[str, Callable[[DriveProcesses], None]] = {
+    "SIGTERM to control": _terminate_control,
     "kill -9 of control": _kill_control,
     "kill -9 of perception": _kill_perception,
     "perception frozen (SIGSTOP)": _freeze_perception,
@@ -171,26 +171,26 @@ def run_kill(kind: str, config_path: Path, fault: str) -> KillResult:
 
     Raises UserError if the base does not drive or does not stop.
     """
-    with _trio(kind, config_path) as trio:
-        trio.await_speed(lambda v_mps: v_mps > _DRIVING_MPS, _START_S)
-        began_s = time.monotonic()
+    with _processes(kind, config_path) as processes:
+        processes.wait_for_speed(lambda v_mps: v_mps > _DRIVING_MPS, _START_S)
+        start_s = time.monotonic()
         frozen = None
         if fault == "perception frozen (SIGSTOP)":
-            frozen = trio.perception
-        KILLS[fault](trio)
+            frozen = processes.perception
+        KILLS[fault](processes)
         stood_s = None
-        if trio.base.poll() is None and KILLS[fault] is not _kill_base:
-            trio.await_speed(lambda v_mps: v_mps < _STANDING_MPS, _STOP_S)
-            stood_s = time.monotonic() - began_s
+        if processes.base.poll() is None and KILLS[fault] is not _kill_base:
+            processes.wait_for_speed(lambda v_mps: v_mps < _STANDING_MPS, _STOP_S)
+            stood_s = time.monotonic() - start_s
         if KILLS[fault] is _kill_control:
             return KillResult(fault, stood_s, None, None)
         if frozen is not None:
             # A mission with stale scenes stops and waits for new ones. That is measured, so end it.
-            trio.drive.terminate()
+            processes.drive.terminate()
             # Perception is still frozen. The drive must end all the same, and kill perception.
-            trio.wait_for_drive(_STOP_S)
+            processes.wait_for_drive(_STOP_S)
             with suppress(ProcessLookupError):
                 os.kill(frozen, signal.SIGKILL)
-        out, _ = trio.drive.communicate(timeout=_STOP_S)
+        out, _ = processes.drive.communicate(timeout=_STOP_S)
         ended = _ENDED.search(out)
-        return KillResult(fault, stood_s, ended[1] if ended else out.strip(), trio.drive.returncode)
+        return KillResult(fault, stood_s, ended[1] if ended else out.strip(), processes.drive.returncode)

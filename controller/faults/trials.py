@@ -23,7 +23,7 @@ _PERIOD_NS = NS_PER_S // 50
 _SPEED_MPS = 0.5
 _STANDING = 1e-3  # m/s and rad/s; below both the base stands
 _GIVE_UP_S = 6.0  # longest time until it stands
-_AFTERWARDS_S = 3.0  # time in which the base must not move by itself after the fault
+_OBSERVATION_S = 3.0  # time in which the base must not move by itself after the fault
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +32,9 @@ class TrialResult:
 
     mode, reason: of the chassis after the fault.
     stood_after_s: time until the true base stood still; NaN if it did not.
-    way_m: distance travelled until then.
+    travelled_m: distance travelled until then.
     moved_after_m: distance it moved by itself after the fault was over, while a speed was still commanded.
-    again: it drove again after a zero command and consent.
+    drives_again: it drove again after a zero command and consent.
     """
 
     kind: str
@@ -42,12 +42,12 @@ class TrialResult:
     mode: ChassisMode
     reason: str
     stood_after_s: float
-    way_m: float
+    travelled_m: float
     moved_after_m: float
-    again: bool
+    drives_again: bool
 
 
-class Bench:
+class TrialRig:
     """A guarded driver and its base, driven as by the control loop: shaped speeds while armed."""
 
     def __init__(self, kind: str) -> None:
@@ -58,39 +58,39 @@ class Bench:
         self.state: ChassisState | None = None
 
     @property
-    def stands(self) -> bool:
+    def standing(self) -> bool:
         """Whether the true base stands still."""
         v_mps, w_radps = self.emulator.plant.twist
         return abs(v_mps) < _STANDING and abs(w_radps) < _STANDING
 
     @property
-    def way_m(self) -> float:
+    def travelled_m(self) -> float:
         """Distance travelled by the tracks since the start, mean of both."""
         left_m, right_m = self.emulator.plant.track_travel_m
         return 0.5 * (abs(left_m) + abs(right_m))
 
-    def coast(self) -> None:
+    def step_without_control(self) -> None:
         """One period without the control loop."""
         self.now_ns += _PERIOD_NS
         self.emulator.advance_to(self.now_ns)
 
-    def step(self, wanted_mps: float) -> None:
+    def step(self, target_mps: float) -> None:
         """One period with the control loop, which asks for this speed."""
-        self.coast()
+        self.step_without_control()
         if self.state is None or self.state.mode is not ChassisMode.ARMED:
             self._shaper.reset()
             # The loop keeps asking for the speed; only the driver may keep it from the tracks.
-            setpoint = Setpoint(self.now_ns, wanted_mps, 0.0, 0.0)
+            setpoint = Setpoint(self.now_ns, target_mps, 0.0, 0.0)
         else:
-            shaped = self._shaper.step(wanted_mps)
-            v_mps = shaped.v_mps if math.isfinite(wanted_mps) else wanted_mps
+            shaped = self._shaper.step(target_mps)
+            v_mps = shaped.v_mps if math.isfinite(target_mps) else target_mps
             setpoint = Setpoint(self.now_ns, v_mps, shaped.a_mps2, 0.0)
         self.state = self.chassis.exchange(setpoint, self.now_ns)
 
-    def run(self, seconds: float, wanted_mps: float) -> None:
+    def run(self, seconds: float, target_mps: float) -> None:
         """Periods with the control loop for this time."""
         for _ in range(round(seconds * NS_PER_S / _PERIOD_NS)):
-            self.step(wanted_mps)
+            self.step(target_mps)
 
     def arm(self) -> bool:
         """Command zero, give consent, and wait a second; whether the chassis is armed then."""
@@ -100,8 +100,8 @@ class Bench:
         return self.state is not None and self.state.mode is ChassisMode.ARMED
 
 
-def _ask_on(bench: Bench) -> None:
-    bench.step(_SPEED_MPS)
+def _keep_commanding(rig: TrialRig) -> None:
+    rig.step(_SPEED_MPS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,20 +109,20 @@ class Fault:
     """A fault: begin it, run live for each period, end it."""
 
     name: str
-    begin: Callable[[Bench], None] = lambda _: None
-    end: Callable[[Bench], None] = lambda _: None
-    live: Callable[[Bench], None] = _ask_on
+    begin: Callable[[TrialRig], None] = lambda _: None
+    end: Callable[[TrialRig], None] = lambda _: None
+    during: Callable[[TrialRig], None] = _keep_commanding
 
 
 FAULTS = (
-    Fault("stop is asked for", live=lambda bench: bench.step(0.0)),
-    Fault("e-stop", lambda bench: bench.emulator.press_estop(), lambda bench: bench.emulator.release_estop()),
-    Fault("base restarts", lambda bench: bench.emulator.restart()),
-    Fault("base frozen", lambda bench: bench.emulator.freeze(), lambda bench: bench.emulator.thaw()),
-    Fault("unplugged", lambda bench: bench.link.unplug(), lambda bench: bench.link.plug()),
-    Fault("nothing comes back", lambda bench: bench.link.hear_nothing(), lambda bench: bench.link.hear_all()),
-    Fault("control hangs or is killed", live=lambda bench: bench.coast()),
-    Fault("command is no number", live=lambda bench: bench.step(math.nan)),
+    Fault("stop is asked for", during=lambda rig: rig.step(0.0)),
+    Fault("e-stop", lambda rig: rig.emulator.press_estop(), lambda rig: rig.emulator.release_estop()),
+    Fault("base restarts", lambda rig: rig.emulator.restart()),
+    Fault("base frozen", lambda rig: rig.emulator.freeze(), lambda rig: rig.emulator.thaw()),
+    Fault("unplugged", lambda rig: rig.link.unplug(), lambda rig: rig.link.plug()),
+    Fault("nothing comes back", lambda rig: rig.link.cut_wire(), lambda rig: rig.link.restore_wire()),
+    Fault("control hangs or is killed", during=lambda rig: rig.step_without_control()),
+    Fault("command is no number", during=lambda rig: rig.step(math.nan)),
 )
 
 
@@ -131,28 +131,30 @@ def run_trial(kind: str, fault: Fault) -> TrialResult:
 
     Raises RuntimeError if the emulated base does not drive before the fault, which is a bug in the program.
     """
-    bench = Bench(kind)
-    with bench.emulator, bench.chassis:
-        if not bench.arm():
+    rig = TrialRig(kind)
+    with rig.emulator, rig.chassis:
+        if not rig.arm():
             raise RuntimeError(f"{kind} did not arm")
-        bench.run(4.0, _SPEED_MPS)
-        if bench.emulator.plant.twist[0] < 0.9 * _SPEED_MPS:
+        rig.run(4.0, _SPEED_MPS)
+        if rig.emulator.plant.twist[0] < 0.9 * _SPEED_MPS:
             raise RuntimeError(f"{kind} did not drive")
-        began_ns, began_m = bench.now_ns, bench.way_m
-        fault.begin(bench)
-        while not bench.stands and bench.now_ns - began_ns < _GIVE_UP_S * NS_PER_S:
-            fault.live(bench)
-        stood_s = (bench.now_ns - began_ns) / NS_PER_S if bench.stands else math.nan
-        way_m = bench.way_m - began_m
-        fault.live(bench)
-        fault.end(bench)
-        stood_m = bench.way_m
+        start_ns, start_m = rig.now_ns, rig.travelled_m
+        fault.begin(rig)
+        while not rig.standing and rig.now_ns - start_ns < _GIVE_UP_S * NS_PER_S:
+            fault.during(rig)
+        stood_s = (rig.now_ns - start_ns) / NS_PER_S if rig.standing else math.nan
+        travelled_m = rig.travelled_m - start_m
+        fault.during(rig)
+        fault.end(rig)
+        stood_m = rig.travelled_m
         # The first entry is a requested stop and no fault, so nothing asks for a speed afterwards.
-        bench.run(_AFTERWARDS_S, 0.0 if fault is FAULTS[0] else _SPEED_MPS)
-        state = bench.state
+        rig.run(_OBSERVATION_S, 0.0 if fault is FAULTS[0] else _SPEED_MPS)
+        state = rig.state
         assert state is not None
-        moved_m = bench.way_m - stood_m
-        again = bench.arm()
-        bench.run(2.0, _SPEED_MPS)
-        again = again and bench.emulator.plant.twist[0] > 0.2
-    return TrialResult(kind, fault.name, state.mode, state.reason, stood_s, way_m, moved_m, again)
+        moved_m = rig.travelled_m - stood_m
+        drives_again = rig.arm()
+        rig.run(2.0, _SPEED_MPS)
+        drives_again = drives_again and rig.emulator.plant.twist[0] > 0.2
+    return TrialResult(
+        kind, fault.name, state.mode, state.reason, stood_s, travelled_m, moved_m, drives_again
+    )

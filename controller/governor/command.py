@@ -94,7 +94,7 @@ def _report(console: Console, governing: Governing, step: ControlStep) -> None:
     seconds = governing.seconds(step)
     console.progress(0.0, f"{step.setpoint.v_mps:4.2f} m/s  {step.decision.reason.sentence}")
     console.decision(seconds, step.decision, step.setpoint.v_mps)
-    console.standing(seconds, governing.standstill.lasted_s(step.now_ns), step.decision)
+    console.standing(seconds, governing.standstill.elapsed_s(step.now_ns), step.decision)
     console.unanswered(seconds, step.unanswered)
     console.complaints(seconds, governing.complaints.add(step.chassis.faults), step.chassis.battery_v)
 

@@ -157,9 +157,9 @@ def _look_until_the_end(
                 with suppress(FrameTimeout):
                     look = perceiver.look(camera.read(timeout_s))
                     channel.send(SceneMessage(look.scene, look.timing_ms))
-                    run_recorder.saw(look)
+                    run_recorder.add_look(look)
                 for step in body.take_steps():
-                    run_recorder.decided(step)
+                    run_recorder.add_step(step)
         except (PeerGone, EndOfStream):
             run_recorder.finish()
             raise

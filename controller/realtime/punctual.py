@@ -5,14 +5,14 @@ whoever looks at them last knows when they leave.
 from __future__ import annotations
 
 from hal.api import Chassis, Clock
-from hal.enclosing import Enclosing
+from hal.device_wrapper import DeviceWrapper
 from hal.types import ChassisState, Setpoint
 
 # Of the period, after its beginning: later than nearly every decision takes, and only this much older.
 _HOLD_SHARE = 0.2
 
 
-class PunctualChassis(Enclosing):
+class PunctualChassis(DeviceWrapper):
     """hal.api.Chassis around another one, for a loop that steps at a fixed rate on absolute deadlines.
 
     The first exchange sets the beat; each later one is held until a fifth of its period is over. A step

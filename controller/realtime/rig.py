@@ -193,8 +193,8 @@ def perception_beside(
         if process.is_alive():
             process.kill()
             process.join()
-            if recording.wanted:
-                names = ", ".join(map(str, recording.wanted))
+            if recording.paths:
+                names = ", ".join(map(str, recording.paths))
                 why = f"they were not closed within {GOODBYE_S:g} s; is the disk too slow?"
                 link.cut_off.append(f"{names}: may not be whole: {why}")
         channel.close()

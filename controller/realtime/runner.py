@@ -17,7 +17,7 @@ from controller.ending import Outcome
 from controller.lockstep import Outside
 from controller.realtime.channel import Channel, PeerGone
 from controller.realtime.service import ServiceManager, StopRequest
-from controller.record.tally import MOST_SAMPLES
+from controller.record.tally import MAX_SAMPLES
 from hal.api import Clock
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
@@ -63,13 +63,13 @@ class Punctuality:
 
     late_ns: how late each step began.
     commanded_ns: when each command had been sent.
-    Both keep the last MOST_SAMPLES only, because a robot may be governed for days.
+    Both keep the last MAX_SAMPLES only, because a robot may be governed for days.
     steps: number of steps.
     skipped: number of periods without a step.
     """
 
-    late_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
-    commanded_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_SAMPLES))
+    late_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MAX_SAMPLES))
+    commanded_ns: deque[int] = field(default_factory=lambda: deque(maxlen=MAX_SAMPLES))
     steps: int = 0
     skipped: int = 0
 

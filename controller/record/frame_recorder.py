@@ -15,7 +15,7 @@ from hal.types import Pose, RgbdFrame
 
 # Maximum number of frames that wait to be written: two thirds of a second, longer than the occasional pauses
 # of a disk; about 30 MB.
-_MOST_WAITING = 20
+_MAX_WAITING = 20
 
 
 class FrameRecorder:
@@ -44,8 +44,8 @@ class FrameRecorder:
         assert self._thread is not None
         self._thread.shutdown(wait=True)
         if self.dropped:
-            why = "they came faster than they could be written"
-            say(f"treadwatch: {self._folder}: {self.dropped} frames were left out: {why}", to_stderr=True)
+            reason = "they came faster than they could be written"
+            say(f"treadwatch: {self._folder}: {self.dropped} frames were left out: {reason}", to_stderr=True)
         try:
             self._collect(0)
         except DeviceRefused as refused:
@@ -61,8 +61,8 @@ class FrameRecorder:
         if self._last_ns is not None and frame.captured_ns <= self._last_ns:
             return
         self._last_ns = frame.captured_ns
-        self._collect(len(self._waiting) if self._may_drop else _MOST_WAITING - 1)
-        if len(self._waiting) >= _MOST_WAITING:
+        self._collect(len(self._waiting) if self._may_drop else _MAX_WAITING - 1)
+        if len(self._waiting) >= _MAX_WAITING:
             self.dropped += 1
             return
         self._waiting.append(self._thread.submit(self._write, frame, odometry))
@@ -76,7 +76,8 @@ class FrameRecorder:
             self._failed = True
             raise
 
-    def _collect(self, most: int) -> None:
-        """Wait until at most `most` frames are waiting. Raises DeviceRefused if one could not be written."""
-        while self._waiting and (self._waiting[0].done() or len(self._waiting) > most):
+    def _collect(self, max_waiting: int) -> None:
+        """Wait until at most max_waiting frames are waiting. Raises DeviceRefused if one could not be
+        written."""
+        while self._waiting and (self._waiting[0].done() or len(self._waiting) > max_waiting):
             self._waiting.popleft().result()

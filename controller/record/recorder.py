@@ -18,9 +18,9 @@ from controller.errors import UserError
 from controller.outlet import say
 from controller.path.path import Path
 from controller.perceive import Look
-from controller.record.apart import Apart
 from controller.record.frame_recorder import FrameRecorder
 from controller.record.observations import ObservationFile
+from controller.record.output_isolation import OutputIsolation
 from controller.video.compose import Composer
 from controller.video.moment import VideoMoment
 from controller.video.writer import VideoWriter
@@ -31,8 +31,8 @@ from hal.types import CameraMount, FloatArray, PlanarPose
 PATH_SHOWN_M = 12.0
 PATH_STEP_M = 0.25
 
-# Half a second of a camera of 90 frames a second: a scene older than that is decided on by nobody.
-MOST_WAITING = 45
+# Half a second of a camera with 90 frames a second: no decision uses an older scene.
+MAX_WAITING = 45
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +46,8 @@ class RecordingOptions:
     timed: bool = True
 
     @property
-    def wanted(self) -> list[FilePath]:
-        """All that is to be written."""
+    def paths(self) -> list[FilePath]:
+        """All files and folders to be written."""
         return [path for path in (self.observations, self.video, self.frames) if path is not None]
 
 
@@ -73,9 +73,9 @@ class Recorder:
         frames: FrameRecorder | None,
         surroundings: Surroundings,
         timed: bool,
-        apart: Apart | None = None,
+        output_isolation: OutputIsolation | None = None,
     ) -> None:
-        self._apart = apart or Apart()
+        self._isolation = output_isolation or OutputIsolation()
         self._observations = observations
         self._video = video
         self._frames = frames
@@ -85,8 +85,8 @@ class Recorder:
 
     @property
     def records(self) -> bool:
-        """Anything is wanted at all, and can still be written."""
-        return any(map(self._apart.goes_on, (self._observations, self._frames, self._video)))
+        """Whether there is any output that can still be written."""
+        return any(map(self._isolation.is_active, (self._observations, self._frames, self._video)))
 
     def record(
         self,
@@ -96,16 +96,16 @@ class Recorder:
         measured_mps: float | None = None,
         path_ahead_m: FloatArray | None = None,
     ) -> None:
-        """One frame. path_ahead_m: (N, 2) in the body frame."""
+        """Write one frame to every output. path_ahead_m: (N, 2) in the body frame."""
         observations, frames, video = self._observations, self._frames, self._video
-        if observations is not None and self._apart.goes_on(observations):
-            with self._apart.attempt(observations):
+        if observations is not None and self._isolation.is_active(observations):
+            with self._isolation.guard(observations):
                 observations.write(look.scene, decision, look.timing_ms if self._timed else {})
-        if frames is not None and self._apart.goes_on(frames):
-            with self._apart.attempt(frames):
+        if frames is not None and self._isolation.is_active(frames):
+            with self._isolation.guard(frames):
                 frames.write(look.frame, look.camera_pose)
-        if video is not None and self._apart.goes_on(video):
-            around = self._surroundings
+        if video is not None and self._isolation.is_active(video):
+            surroundings = self._surroundings
             moment = VideoMoment(
                 look.frame,
                 look.scene,
@@ -113,23 +113,24 @@ class Recorder:
                 decision,
                 commanded_mps,
                 measured_mps,
-                around.mount,
-                around.body,
+                surroundings.mount,
+                surroundings.body,
                 path_ahead_m,
-                around.corridor_half_width_m,
+                surroundings.corridor_half_width_m,
             )
-            with self._apart.attempt(video):
+            with self._isolation.guard(video):
                 video.write(self._composer.compose(moment))
 
 
 def require_two_files(observations: FilePath | None, video: FilePath | None) -> None:
-    """Raises UserError where both name the same file: each would write over the other."""
+    """Raise UserError if both name the same file: each would overwrite the other."""
     if observations is not None and video is not None and realpath(observations) == realpath(video):
         raise UserError(f"{observations}: is to hold the observations and the video; name two files")
 
 
 def require_writable(options: RecordingOptions) -> None:
-    """Before a robot is armed for a drive that another process records. Raises UserError, HalError."""
+    """Check, before a robot is armed, that another process can record the drive. Raises UserError,
+    HalError."""
     require_two_files(options.observations, options.video)
     if options.observations is not None:
         with ObservationFile(options.observations):
@@ -144,30 +145,30 @@ def require_writable(options: RecordingOptions) -> None:
 def open_recorder(
     options: RecordingOptions, surroundings: Surroundings, cut_off: Callable[[str], None] | None = None
 ) -> Iterator[Recorder]:
-    """A recorder whose files are complete when the block ends. cut_off: see Apart.
+    """A recorder whose files are complete when the block ends. cut_off: see OutputIsolation.
 
     Raises VideoError, UserError, HalError: where cut_off is given, only if a file cannot be opened.
     """
     require_two_files(options.observations, options.video)
-    apart = Apart(cut_off)
+    output_isolation = OutputIsolation(cut_off)
     with ExitStack() as files:
         observations = video = frames = None
         if options.observations is not None:
-            observations = files.enter_context(apart.closing(ObservationFile(options.observations)))
+            observations = files.enter_context(output_isolation.open(ObservationFile(options.observations)))
         if options.video is not None:
-            video = files.enter_context(apart.closing(VideoWriter(options.video, surroundings.fps)))
+            video = files.enter_context(output_isolation.open(VideoWriter(options.video, surroundings.fps)))
         if options.frames is not None:
             writer = files.enter_context(TumWriter(options.frames, surroundings.mount))
             recorder = FrameRecorder(writer, options.frames, may_drop=options.timed)
-            frames = files.enter_context(apart.closing(recorder))
-        yield Recorder(observations, video, frames, surroundings, options.timed, apart)
+            frames = files.enter_context(output_isolation.open(recorder))
+        yield Recorder(observations, video, frames, surroundings, options.timed, output_isolation)
 
 
 class RunRecorder:
-    """Pairs each look with the first control step whose decision knew it, which comes some latency later.
+    """Pairs each look with the first control step whose decision used it, which comes some latency later.
 
-    By the time of its frame: the numbers of frames begin anew when a camera does. A look that waits for
-    longer than a decision can take is recorded without one: whole frames wait here, some 2 MB each.
+    They are paired by the time of the frame, because sequence numbers restart with the camera. A look that
+    waits for longer than a decision can take is recorded without one: each waiting frame takes some 2 MB.
     """
 
     def __init__(self, recorder: Recorder, path: Path) -> None:
@@ -176,17 +177,17 @@ class RunRecorder:
         self._waiting: deque[Look] = deque()
         self._undecided = 0
 
-    def saw(self, look: Look) -> None:
-        """A look whose decision is still to come."""
+    def add_look(self, look: Look) -> None:
+        """Add a look whose decision is still to come."""
         if not self._recorder.records:
             return
         self._waiting.append(look)
-        if len(self._waiting) > MOST_WAITING:
+        if len(self._waiting) > MAX_WAITING:
             self._undecided += 1
             self._recorder.record(self._waiting.popleft(), None)
 
-    def decided(self, step: ControlStep) -> None:
-        """Records every look that step's decision knew."""
+    def add_step(self, step: ControlStep) -> None:
+        """Record every look that the decision of this control step used."""
         if not any(look.scene.captured_ns == step.scene_ns for look in self._waiting):
             return
         known = False
@@ -202,13 +203,14 @@ class RunRecorder:
             )
 
     def finish(self) -> None:
-        """Records what no decision has used: the run ended first. Says where that was not why."""
+        """Record the looks that no decision has used, because the run ended first. Print how many looks were
+        recorded without a decision for another reason."""
         while self._waiting:
             self._recorder.record(self._waiting.popleft(), None)
         if self._undecided:
-            why = f"none came within {MOST_WAITING} frames"
+            reason = f"none came within {MAX_WAITING} frames"
             say(
-                f"treadwatch: {self._undecided} frames were recorded without a decision: {why}",
+                f"treadwatch: {self._undecided} frames were recorded without a decision: {reason}",
                 to_stderr=True,
             )
 

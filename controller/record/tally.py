@@ -15,7 +15,7 @@ from hal.types import LATCHED_MODES, ChassisMode, Setpoint
 
 TOLERANCE = 1e-6
 # Maximum number of durations that are kept: one hour at 50 a second.
-MOST_SAMPLES = 180_000
+MAX_SAMPLES = 180_000
 
 
 @dataclass
@@ -27,8 +27,8 @@ class SetpointTally:
     profile claims, nor how late a step began by the clock. Drivers do not send at every step. The emergency
     limits are the bounds for violations.
 
-    emergency_count: setpoints beyond the comfort limits; harder_count and sharper_count: by their braking, by
-    their jerk. One may be both.
+    emergency_count: setpoints beyond the comfort limits; hard_braking_count and high_jerk_count: by their
+    braking, by their jerk. One may be both.
     """
 
     limits: Limits
@@ -39,23 +39,23 @@ class SetpointTally:
     max_jerk_mps3: float = 0.0
     reversals: int = 0
     emergency_count: int = 0
-    harder_count: int = 0
-    sharper_count: int = 0
+    hard_braking_count: int = 0
+    high_jerk_count: int = 0
     violations: int = 0
     _last: Setpoint | None = None
     _steps: int = 0
 
     def add(
-        self, sent: Setpoint | None, mode: ChassisMode = ChassisMode.ARMED, *, stands: bool = False
+        self, sent: Setpoint | None, mode: ChassisMode = ChassisMode.ARMED, *, standing: bool = False
     ) -> None:
         """Add what one control step sent, as the driver reports it. None, and repeats of the last, do not
         count.
 
         Nor does the zero of a latched driver, which is not part of a profile: the base stops by itself then.
-        The same holds for the zero that a base is told which stands though it was told to go (stands).
+        The same holds for the zero that is sent to a base that stands although it was told to go (standing).
         """
         self._steps += 1
-        if (stands or mode in LATCHED_MODES) and (sent is None or sent.v_mps == 0.0):
+        if (standing or mode in LATCHED_MODES) and (sent is None or sent.v_mps == 0.0):
             self._last, self._steps = sent or self._last, 0
             return
         if sent is None or (self._last is not None and sent.stamp_ns == self._last.stamp_ns):
@@ -66,11 +66,11 @@ class SetpointTally:
         accel_mps2, jerk_mps3 = self._differences(sent)
         self.max_accel_mps2 = max(self.max_accel_mps2, abs(accel_mps2))
         self.max_jerk_mps3 = max(self.max_jerk_mps3, abs(jerk_mps3))
-        harder = sent.a_mps2 < -self.limits.max_accel_mps2 - TOLERANCE
-        sharper = abs(jerk_mps3) > self.limits.max_jerk_mps3 + TOLERANCE
-        self.harder_count += harder
-        self.sharper_count += sharper
-        self.emergency_count += harder or sharper
+        hard_braking = sent.a_mps2 < -self.limits.max_accel_mps2 - TOLERANCE
+        high_jerk = abs(jerk_mps3) > self.limits.max_jerk_mps3 + TOLERANCE
+        self.hard_braking_count += hard_braking
+        self.high_jerk_count += high_jerk
+        self.emergency_count += hard_braking or high_jerk
         limits = self.limits
         self.violations += (
             sent.v_mps > limits.max_speed_mps + TOLERANCE
@@ -110,17 +110,17 @@ class ShaperFaults:
 class Complaints:
     """The faults that the base has reported, each once and in the order of their appearance."""
 
-    told: list[str] = field(default_factory=list)
+    reported: list[str] = field(default_factory=list)
 
     def add(self, faults: Sequence[str]) -> list[str]:
         """Add the faults of one exchange; return those that are new."""
-        new = [fault for fault in faults if fault not in self.told]
-        self.told += new
+        new = [fault for fault in faults if fault not in self.reported]
+        self.reported += new
         return new
 
     def line(self) -> str:
         """For the summary."""
-        return "; ".join(self.told)
+        return "; ".join(self.reported)
 
 
 @dataclass
@@ -136,21 +136,21 @@ class Standstill:
         elif self.since_ns is None:
             self.since_ns = setpoint.stamp_ns
 
-    def lasted_s(self, now_ns: int) -> float:
+    def elapsed_s(self, now_ns: int) -> float:
         """How long the robot has been commanded to stand; 0 while it drives."""
         return 0.0 if self.since_ns is None else (now_ns - self.since_ns) / NS_PER_S
 
 
 @dataclass
 class TimingTally:
-    """Durations of named stages, in milliseconds: the last MOST_SAMPLES of each."""
+    """Durations of named stages, in milliseconds: the last MAX_SAMPLES of each."""
 
     samples_ms: dict[str, deque[float]] = field(default_factory=dict)
 
     def add(self, timing_ms: dict[str, float]) -> None:
         """Add the durations of one frame."""
         for stage, duration_ms in timing_ms.items():
-            self.samples_ms.setdefault(stage, deque(maxlen=MOST_SAMPLES)).append(duration_ms)
+            self.samples_ms.setdefault(stage, deque(maxlen=MAX_SAMPLES)).append(duration_ms)
 
     def line(self) -> str:
         """Median and 99th percentile of the sum, and medians of the stages, as a line."""
@@ -166,22 +166,22 @@ class TimingTally:
 class FrameTally:
     """How many of the frames that the camera counted were processed."""
 
-    looked_at: int = 0
-    counted: int = 0
+    processed: int = 0
+    captured: int = 0
     _last: int | None = None
 
     def add(self, sequence: int) -> None:
         """Add a processed frame by the camera's number. If the number goes back, the camera has restarted."""
-        self.looked_at += 1
-        self.counted += sequence - self._last if self._last is not None and sequence > self._last else 1
+        self.processed += 1
+        self.captured += sequence - self._last if self._last is not None and sequence > self._last else 1
         self._last = sequence
 
     def line(self) -> str:
         """A sentence for the summary; "" if no frame was left out."""
-        if self.looked_at == self.counted:
+        if self.processed == self.captured:
             return ""
         return (
-            f"{self.looked_at} of the camera's {self.counted} were looked at: perception did not keep up "
+            f"{self.processed} of the camera's {self.captured} were looked at: perception did not keep up "
             "(a video or a recording takes time from it), or the camera lost them"
         )
 

@@ -1,12 +1,12 @@
 """The annotated video: what was seen, what was decided and why, how fast the robot went; for people.
 
 moment.py - the data of one picture
-seen.py - obstacles in the body frame, as all views name them
+seen_obstacles.py - obstacles in the body frame, as all views name them
 corridor.py - the planned path as it is drawn
 compose.py - one picture from one moment
-style.py, draw.py, text.py, labels.py, picture.py - palette, layout, strokes, text and labels
+style.py, draw.py, text.py, labels.py, placement.py - palette, strokes, text, labels and layout
 header.py, colour_view.py, depth_view.py, top_view.py, speed_strip.py, legend.py - the panels
-writer.py - pictures into a video file
+writer.py, disk_reservation.py - pictures into a video file
 """
 
 from controller.video.compose import Composer

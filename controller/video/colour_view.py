@@ -10,8 +10,8 @@ from controller.video import draw, text
 from controller.video.corridor import DrawnCorridor
 from controller.video.labels import draw_labels
 from controller.video.moment import VideoMoment
-from controller.video.picture import Placement, placement
-from controller.video.seen import Seen
+from controller.video.placement import Placement, placement
+from controller.video.seen_obstacles import SeenObstacle
 from controller.video.style import (
     DARK_TEXT,
     HEALTH,
@@ -29,7 +29,7 @@ from vision.scene import CameraCondition, Fragments
 
 # The image is drawn a little darker, so that lines and labels stand out against bright floors.
 _BRIGHTNESS = 0.82
-_NEAREST_FLOOR_M = 0.25
+_MIN_FLOOR_DISTANCE_M = 0.25
 _BANNER_PX = 24
 
 
@@ -44,7 +44,7 @@ class ColourView:
         text.caption(canvas, self._panel, "COLOUR")
 
     def draw(
-        self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: DrawnCorridor | None
+        self, canvas: Image, moment: VideoMoment, seen: list[SeenObstacle], corridor: DrawnCorridor | None
     ) -> None:
         """Draw the image, then what lies on the floor, the fragments, the obstacles and their labels."""
         view = self._panel.of(canvas)
@@ -56,14 +56,16 @@ class ColourView:
         if corridor is not None and moment.mount is not None:
             _draw_corridor(inside, corridor, moment.mount, moment.frame.intrinsics, placed, origin)
         _draw_fragments(inside, moment.fragments, placed, origin)
-        boxes_px = [(one, one.box_px(moment.frame.intrinsics)) for one in seen]
+        boxes_px = [(obstacle, obstacle.box_px(moment.frame.intrinsics)) for obstacle in seen]
         boxes = [
-            (one, placed.to_panel(box_px) - origin) for one, box_px in boxes_px if np.isfinite(box_px).all()
+            (obstacle, placed.to_panel(box_px) - origin)
+            for obstacle, box_px in boxes_px
+            if np.isfinite(box_px).all()
         ]
-        for one, corners in reversed(boxes):
-            _draw_box(inside, one, draw.box(corners))
+        for obstacle, corners in reversed(boxes):
+            _draw_box(inside, obstacle, draw.box(corners))
         banner = _draw_health(inside, moment)
-        labels = [one.label(one.describe(), corners) for one, corners in boxes]
+        labels = [obstacle.label(obstacle.describe(), corners) for obstacle, corners in boxes]
         draw_labels(inside, labels, banner)
         text.caption_note(canvas, self._panel, _count(moment))
 
@@ -118,7 +120,7 @@ def _floor_to_image(points_m: FloatArray, mount: CameraMount, intrinsics: Intrin
     it."""
     on_floor_m = np.column_stack([points_m, np.zeros(len(points_m))])
     x, y, z = camera_in_body(mount).inverse().apply(on_floor_m).T
-    z = np.where(z > _NEAREST_FLOOR_M, z, np.nan)
+    z = np.where(z > _MIN_FLOOR_DISTANCE_M, z, np.nan)
     return np.column_stack(
         [intrinsics.fx * x / z + intrinsics.cx, intrinsics.fy * y / z + intrinsics.cy],
     )
@@ -134,14 +136,14 @@ def _draw_fragments(
     draw.lines(inside, ends[fragments.moving], MOVING)
 
 
-def _draw_box(inside: Image, one: Seen, corners: FloatArray) -> None:
-    if one.decides:
-        draw.line(inside, corners, OWN, one.thickness + 4, closed=True)
-    if one.predicted:
-        draw.dashed(inside, np.concatenate([corners, corners[:1]]), one.colour, one.thickness)
+def _draw_box(inside: Image, obstacle: SeenObstacle, corners: FloatArray) -> None:
+    if obstacle.is_deciding:
+        draw.line(inside, corners, OWN, obstacle.thickness + 4, closed=True)
+    if obstacle.predicted:
+        draw.dashed(inside, np.concatenate([corners, corners[:1]]), obstacle.colour, obstacle.thickness)
     else:
-        draw.line(inside, corners, DARK_TEXT, one.thickness + 2, closed=True)
-        draw.line(inside, corners, one.colour, one.thickness, closed=True)
+        draw.line(inside, corners, DARK_TEXT, obstacle.thickness + 2, closed=True)
+        draw.line(inside, corners, obstacle.colour, obstacle.thickness, closed=True)
 
 
 def _draw_health(inside: Image, moment: VideoMoment) -> list[Rect]:

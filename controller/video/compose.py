@@ -10,7 +10,7 @@ from controller.video.depth_view import DepthView
 from controller.video.header import Header
 from controller.video.legend import draw_legend
 from controller.video.moment import VideoMoment
-from controller.video.seen import seen_obstacles
+from controller.video.seen_obstacles import seen_obstacles
 from controller.video.speed_strip import SpeedStrip
 from controller.video.style import (
     BACKGROUND,

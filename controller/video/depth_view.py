@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from controller.video import draw, text
 from controller.video.moment import VideoMoment
-from controller.video.picture import placement
-from controller.video.seen import Seen
+from controller.video.placement import placement
+from controller.video.seen_obstacles import SeenObstacle
 from controller.video.style import FAINT_TEXT, NO_DEPTH, OWN, Image, Rect
 
 _BAR_PX = 10
@@ -38,13 +38,13 @@ class DepthView:
         view = self._scale.of(canvas)
         levels = np.linspace(1, 255, self._scale.width).astype(np.intp)
         view[:_BAR_PX] = self._table[levels]
-        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-            label = f"{share * self._range_m:g}" + (" m" if share == 1.0 else "")
-            centred = round(share * self._scale.width) - text.width(label, 12) // 2
+        for fraction in (0.0, 0.25, 0.5, 0.75, 1.0):
+            label = f"{fraction * self._range_m:g}" + (" m" if fraction == 1.0 else "")
+            centred = round(fraction * self._scale.width) - text.width(label, 12) // 2
             x = max(0, min(centred, self._scale.width - text.width(label, 12)))
             text.put(view, label, x, _BAR_PX + 13, FAINT_TEXT, 12)
 
-    def draw(self, canvas: Image, moment: VideoMoment, seen: list[Seen]) -> None:
+    def draw(self, canvas: Image, moment: VideoMoment, seen: list[SeenObstacle]) -> None:
         """Draw the depth image with the outlines of the obstacles."""
         view = self._panel.of(canvas)
         height, width = moment.frame.depth.shape
@@ -58,11 +58,11 @@ class DepthView:
         if place.width < self._panel.width or place.height < self._panel.height:
             view[:] = NO_DEPTH
         np.take(self._table, levels, axis=0, out=(inside := place.of(view)))
-        for one in reversed(seen):
-            corners = placed.to_panel(one.box_px(moment.frame.intrinsics)) - (place.x, place.y)
+        for obstacle in reversed(seen):
+            corners = placed.to_panel(obstacle.box_px(moment.frame.intrinsics)) - (place.x, place.y)
             # An obstacle that is not seen in this frame has no depth here.
-            if np.isfinite(corners).all() and not one.predicted:
-                draw.line(inside, draw.box(corners), OWN, one.thickness - 1, closed=True)
+            if np.isfinite(corners).all() and not obstacle.predicted:
+                draw.line(inside, draw.box(corners), OWN, obstacle.thickness - 1, closed=True)
         valid = moment.scene.health.valid_depth_ratio
         if np.isfinite(valid):
             text.caption_note(canvas, self._panel, f"{100.0 * valid:.0f} % valid")

@@ -15,12 +15,12 @@ Points = NDArray[np.floating]
 _FRACTION_BITS = 4
 _HEAD_PX = 8.0  # of an arrow
 # Far outside every picture, and far inside int32 with the fraction bits.
-_FARTHEST_PX = 1e5
+_CLIP_PX = 1e5
 
 
 def fixed_point(points: Points) -> NDArray[np.int32]:
     """Sub-pixel coordinates as OpenCV takes them. Points must be finite."""
-    clipped = np.clip(points, -_FARTHEST_PX, _FARTHEST_PX)
+    clipped = np.clip(points, -_CLIP_PX, _CLIP_PX)
     return np.rint(clipped * (1 << _FRACTION_BITS)).astype(np.int32)
 
 

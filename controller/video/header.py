@@ -80,17 +80,17 @@ def _draw_action(view: Image, decision: Decision) -> None:
     x = text.put(view, style.symbol, _CHIP.x + 10, _BASELINE_PX, DARK_TEXT, 19)
     action = "emergency" if decision.emergency else decision.action.value
     to = "at" if decision.action is Action.KEEP else "to"
-    wanted = f"{action} {to} {decision.target_speed_mps:.2f} m/s"
-    text.put(view, wanted, x + 6, _BASELINE_PX - 1, DARK_TEXT, 15, text.BOLD)
+    words = f"{action} {to} {decision.target_speed_mps:.2f} m/s"
+    text.put(view, words, x + 6, _BASELINE_PX - 1, DARK_TEXT, 15, text.BOLD)
 
 
 def _draw_reason(view: Image, sentence: str) -> None:
     """Draw the reason in one line, or in two lines of smaller text."""
     x = _CHIP.right + 14
-    room_px = _CAMERA_X - 24 - x
+    max_width_px = _CAMERA_X - 24 - x
     for size in (16, 15, 14, 13):
-        if text.width(sentence, size) <= room_px:
+        if text.width(sentence, size) <= max_width_px:
             text.put(view, sentence, x, _BASELINE_PX - 1, TEXT, size)
             return
-    for baseline, line in zip((18, 35), text.wrap(sentence, room_px, 2, 13), strict=False):
+    for baseline, line in zip((18, 35), text.wrap(sentence, max_width_px, 2, 13), strict=False):
         text.put(view, line, x, baseline, TEXT, 13)

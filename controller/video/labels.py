@@ -14,7 +14,7 @@ from controller.video.style import DARK_TEXT, OWN, Colour, Image, Rect
 _PAD_PX = 4
 # Maximum number of labels in one view, the most important first. More would cover the obstacles: a distant
 # wall falls into a dozen pieces.
-MOST_LABELS = 8
+MAX_LABELS = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,16 +44,17 @@ def arrange(
     labels: Iterable[Label], bounds: Rect, occupied: Iterable[Rect] = (), size: int = 13
 ) -> list[tuple[Label, Rect]]:
     """A place inside bounds for each label for which there is room; no two places overlap."""
-    taken = list(occupied)
+    occupied_places = list(occupied)
     arranged = []
     for label in labels:
         place = next(
-            (p for p in _candidates(label, bounds, size) if not any(p.overlaps(t) for t in taken)), None
+            (p for p in _candidates(label, bounds, size) if not any(p.overlaps(t) for t in occupied_places)),
+            None,
         )
         if place is not None:
-            taken.append(place)
+            occupied_places.append(place)
             arranged.append((label, place))
-        if len(arranged) == MOST_LABELS:
+        if len(arranged) == MAX_LABELS:
             break
     return arranged
 

@@ -38,7 +38,7 @@ def draw_legend(canvas: Image, panel: Rect) -> None:
         (_moving, "moving"),
         (_unmeasured, "edge, speed unknown yet"),
         (_predicted, "not seen now, predicted"),
-        (_decides, "decides the speed"),
+        (_is_deciding, "decides the speed"),
         (_velocity, "motion in 1 s, ±1 sigma"),
         (_surface, "nearest surface by depth"),
         (_free, "seen to be free"),
@@ -52,23 +52,25 @@ def draw_legend(canvas: Image, panel: Rect) -> None:
     _draw_actions(view, round(4 + len(rows) * row_px), round(row_px))
 
 
-def _across(swatch: Image, share: float = 0.5, left: int = 0, right: int = _SWATCH_PX - 1) -> draw.Points:
-    y = share * (swatch.shape[0] - 1)
+def _horizontal(
+    swatch: Image, fraction: float = 0.5, left: int = 0, right: int = _SWATCH_PX - 1
+) -> draw.Points:
+    y = fraction * (swatch.shape[0] - 1)
     return np.array([[left, y], [right, y]], np.float64)
 
 
 def _static(swatch: Image) -> None:
-    draw.line(swatch, _across(swatch, left=0, right=16), STATIC)
+    draw.line(swatch, _horizontal(swatch, left=0, right=16), STATIC)
     draw.line(swatch, draw.box((24, 5, 44, swatch.shape[0] - 6)), STATIC, 2, closed=True)
 
 
 def _moving(swatch: Image) -> None:
-    draw.line(swatch, _across(swatch, left=0, right=16), MOVING)
+    draw.line(swatch, _horizontal(swatch, left=0, right=16), MOVING)
     draw.line(swatch, draw.box((24, 5, 44, swatch.shape[0] - 6)), MOVING, 3, closed=True)
 
 
 def _unmeasured(swatch: Image) -> None:
-    draw.line(swatch, _across(swatch), UNMEASURED)
+    draw.line(swatch, _horizontal(swatch), UNMEASURED)
 
 
 def _predicted(swatch: Image) -> None:
@@ -76,7 +78,7 @@ def _predicted(swatch: Image) -> None:
     draw.dashed(swatch, np.concatenate([corners, corners[:1]]), STATIC, 2, dash_px=4.0)
 
 
-def _decides(swatch: Image) -> None:
+def _is_deciding(swatch: Image) -> None:
     corners = draw.box((12, 5, 44, swatch.shape[0] - 6))
     draw.line(swatch, corners, OWN, 6, closed=True)
     draw.line(swatch, corners, DARK_TEXT, 4, closed=True)
@@ -84,13 +86,13 @@ def _decides(swatch: Image) -> None:
 
 
 def _velocity(swatch: Image) -> None:
-    tail, tip = _across(swatch, left=2, right=34)
+    tail, tip = _horizontal(swatch, left=2, right=34)
     draw.arrow(swatch, tail, tip, MOVING)
     draw.ellipse(swatch, tip, np.diag([80.0, 36.0]), MOVING)
 
 
 def _surface(swatch: Image) -> None:
-    draw.line(swatch, _across(swatch), SURFACE, 2)
+    draw.line(swatch, _horizontal(swatch), SURFACE, 2)
 
 
 def _free(swatch: Image) -> None:
@@ -102,10 +104,10 @@ def _path(swatch: Image) -> None:
     draw.tint(swatch, draw.box((0, 5, _SWATCH_PX, height - 6)), OWN, 0.13)
     draw.lines(
         swatch,
-        np.stack([_across(swatch, 5 / (height - 1)), _across(swatch, 1 - 5 / (height - 1))]),
+        np.stack([_horizontal(swatch, 5 / (height - 1)), _horizontal(swatch, 1 - 5 / (height - 1))]),
         FAINT_TEXT,
     )
-    draw.line(swatch, _across(swatch), OWN, 2)
+    draw.line(swatch, _horizontal(swatch), OWN, 2)
 
 
 def _draw_actions(view: Image, y: int, height: int) -> None:

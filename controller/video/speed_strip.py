@@ -81,7 +81,7 @@ class SpeedStrip:
 
     def draw(self, canvas: Image, moment: VideoMoment) -> None:
         """Add this moment to the history and draw the history."""
-        self._remember(moment)
+        self._append(moment)
         view = self._panel.of(canvas)
         ages_s = self._stamps_s[-1] - np.array(self._stamps_s)
         speeds_mps = np.array(self._speeds_mps)
@@ -92,11 +92,11 @@ class SpeedStrip:
         draw.line_with_gaps(view, curves[:, 2], MEASURED_SPEED, 1)
         self._draw_values(canvas, self._speeds_mps[-1])
 
-    def _remember(self, moment: VideoMoment) -> None:
+    def _append(self, moment: VideoMoment) -> None:
         stamp_s = moment.frame.captured_ns / NS_PER_S
         if self._stamps_s and stamp_s < self._stamps_s[-1]:
-            for past in (self._stamps_s, self._speeds_mps, self._actions):
-                past.clear()
+            for history in (self._stamps_s, self._speeds_mps, self._actions):
+                history.clear()
         decision = moment.decision
         target_mps = None if decision is None else decision.target_speed_mps
         self._stamps_s.append(stamp_s)
@@ -112,9 +112,9 @@ class SpeedStrip:
     def _draw_ribbon(self, view: Image, ages_s: FloatArray) -> None:
         """Draw a band for each period with the same action, with its symbol and word if they fit."""
         actions = list(self._actions)
-        begins = [0] + [i for i in range(1, len(actions)) if actions[i] != actions[i - 1]]
+        starts = [0] + [i for i in range(1, len(actions)) if actions[i] != actions[i - 1]]
         x = np.rint(self.to_pixels(ages_s, np.zeros_like(ages_s))[:, 0]).astype(int)
-        for begin, end in zip(begins, [*begins[1:], len(actions) - 1], strict=True):
+        for begin, end in zip(starts, [*starts[1:], len(actions) - 1], strict=True):
             action = actions[begin]
             if action is None:
                 continue

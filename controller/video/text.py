@@ -33,32 +33,32 @@ def width(text: str, size: int, weight: int = REGULAR) -> int:
     return int(cv2.getTextSize((0, 0), text, (0, 0), _FACE, size, weight)[2])
 
 
-def fit(text: str, room_px: int, size: int, weight: int = REGULAR) -> str:
+def fit(text: str, max_width_px: int, size: int, weight: int = REGULAR) -> str:
     """The text, shortened with an ellipsis if it does not fit."""
-    if width(text, size, weight) <= room_px:
+    if width(text, size, weight) <= max_width_px:
         return text
     shortest, longest = 0, len(text)
     while shortest < longest:
         middle = (shortest + longest + 1) // 2
-        if width(text[:middle].rstrip() + ELLIPSIS, size, weight) <= room_px:
+        if width(text[:middle].rstrip() + ELLIPSIS, size, weight) <= max_width_px:
             shortest = middle
         else:
             longest = middle - 1
     return text[:shortest].rstrip() + ELLIPSIS
 
 
-def wrap(text: str, room_px: int, most_lines: int, size: int, weight: int = REGULAR) -> list[str]:
+def wrap(text: str, max_width_px: int, max_lines: int, size: int, weight: int = REGULAR) -> list[str]:
     """The text, broken between words into lines that fit. The last line is shortened if there is too much
     text."""
     lines: list[str] = []
     words = text.split()
-    while words and len(lines) < most_lines - 1:
+    while words and len(lines) < max_lines - 1:
         count = len(words)
-        while count > 1 and width(" ".join(words[:count]), size, weight) > room_px:
+        while count > 1 and width(" ".join(words[:count]), size, weight) > max_width_px:
             count -= 1
-        lines.append(fit(" ".join(words[:count]), room_px, size, weight))
+        lines.append(fit(" ".join(words[:count]), max_width_px, size, weight))
         words = words[count:]
-    return [*lines, fit(" ".join(words), room_px, size, weight)] if words else lines
+    return [*lines, fit(" ".join(words), max_width_px, size, weight)] if words else lines
 
 
 def caption(image: Image, panel: Rect, title: str) -> int:

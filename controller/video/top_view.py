@@ -12,7 +12,7 @@ from controller.video import draw, text
 from controller.video.corridor import DrawnCorridor
 from controller.video.labels import draw_labels
 from controller.video.moment import VideoMoment
-from controller.video.seen import LEVEL_CAMERA, Seen
+from controller.video.seen_obstacles import LEVEL_CAMERA, SeenObstacle
 from controller.video.style import (
     BACKGROUND,
     FAINT_TEXT,
@@ -34,8 +34,8 @@ _RING_M = 2.0
 _RING_LABEL_SIN, _RING_LABEL_RIGHT_M = 0.5, 2.7
 _PATH_PX = 1.0  # half of the width of the path
 _ARROW_S = 1.0
-_WIDEST_SIGMA_M = 2.5
-_TRACK_SHARE = 0.24
+_MAX_SIGMA_M = 2.5
+_TRACK_WIDTH_RATIO = 0.24
 
 
 class TopView:
@@ -65,7 +65,7 @@ class TopView:
         text.caption_note(canvas, self._panel, "distance from the camera")
 
     def draw(
-        self, canvas: Image, moment: VideoMoment, seen: list[Seen], corridor: DrawnCorridor | None
+        self, canvas: Image, moment: VideoMoment, seen: list[SeenObstacle], corridor: DrawnCorridor | None
     ) -> None:
         """From the floor upwards."""
         view = self._panel.of(canvas)
@@ -84,25 +84,25 @@ class TopView:
         if moment.body is not None:
             self._draw_robot(view, moment.body)
         self._draw_camera(view, mount)
-        for one in reversed(seen):
-            self._draw_obstacle(view, one)
-        labels = [one.label(f"#{one.obstacle.id}", self._label_box(one)) for one in seen]
+        for obstacle in reversed(seen):
+            self._draw_obstacle(view, obstacle)
+        labels = [obstacle.label(f"#{obstacle.obstacle.id}", self._label_box(obstacle)) for obstacle in seen]
         draw_labels(view, labels, self._draw_ring_labels(view, mount), size=12)
 
     def _draw_rings(self, view: Image, mount: CameraMount) -> None:
         """Draw the rings around the point of the floor below the camera."""
-        foot_m = np.array([mount.forward_m, mount.left_m])
+        camera_m = np.array([mount.forward_m, mount.left_m])
         radii_m = self._radii_m()
         angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 61)
         circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        draw.lines(view, self.to_pixels(foot_m + radii_m[:, np.newaxis, np.newaxis] * circle), GRID)
+        draw.lines(view, self.to_pixels(camera_m + radii_m[:, np.newaxis, np.newaxis] * circle), GRID)
 
     def _draw_ring_labels(self, view: Image, mount: CameraMount) -> list[Rect]:
         """Draw the labels of the rings, last so that nothing covers them; return their places."""
-        foot_m = np.array([mount.forward_m, mount.left_m])
+        camera_m = np.array([mount.forward_m, mount.left_m])
         radii_m = self._radii_m()
         right_m = np.minimum(_RING_LABEL_SIN * radii_m, _RING_LABEL_RIGHT_M)
-        at_m = foot_m + np.column_stack([np.sqrt(radii_m**2 - right_m**2), -right_m])
+        at_m = camera_m + np.column_stack([np.sqrt(radii_m**2 - right_m**2), -right_m])
         places = []
         for radius_m, (x, y) in zip(radii_m, self.to_pixels(at_m), strict=True):
             label = f"{radius_m:g} m"
@@ -115,7 +115,7 @@ class TopView:
 
     def _draw_robot(self, view: Image, body: Body) -> None:
         half_m = 0.5 * body.width_m
-        track_m = _TRACK_SHARE * body.width_m
+        track_m = _TRACK_WIDTH_RATIO * body.width_m
         hull_m = draw.box((-body.rear_m, -half_m, body.front_m, half_m))
         draw.area(view, self.to_pixels(hull_m), BACKGROUND)
         for inner_m, outer_m in ((half_m - track_m, half_m), (track_m - half_m, -half_m)):
@@ -128,32 +128,32 @@ class TopView:
         draw.area(view, self.to_pixels(arrowhead_m), OWN)
 
     def _draw_camera(self, view: Image, mount: CameraMount) -> None:
-        foot = self.to_pixels(np.array([mount.forward_m, mount.left_m]))
-        draw.disc(view, foot, 3.5, OWN)
+        camera = self.to_pixels(np.array([mount.forward_m, mount.left_m]))
+        draw.disc(view, camera, 3.5, OWN)
 
-    def _draw_obstacle(self, view: Image, one: Seen) -> None:
-        centre, corners = self.to_pixels(one.centre_m), self.to_pixels(one.corners_m)
-        draw.tint(view, corners, one.colour, 0.45 if one.obstacle.moving else 0.25)
-        if one.decides:
+    def _draw_obstacle(self, view: Image, seen_obstacle: SeenObstacle) -> None:
+        centre, corners = self.to_pixels(seen_obstacle.centre_m), self.to_pixels(seen_obstacle.corners_m)
+        draw.tint(view, corners, seen_obstacle.colour, 0.45 if seen_obstacle.obstacle.moving else 0.25)
+        if seen_obstacle.is_deciding:
             draw.line(view, corners, OWN, 6, closed=True)
-        if one.predicted:
-            draw.dashed(view, np.concatenate([corners, corners[:1]]), one.colour, 2, dash_px=4.0)
+        if seen_obstacle.predicted:
+            draw.dashed(view, np.concatenate([corners, corners[:1]]), seen_obstacle.colour, 2, dash_px=4.0)
         else:
-            draw.line(view, corners, one.colour, 2, closed=True)
-        if one.obstacle.moving and np.isfinite(one.velocity_mps).all():
-            self._draw_velocity(view, one, centre)
+            draw.line(view, corners, seen_obstacle.colour, 2, closed=True)
+        if seen_obstacle.obstacle.moving and np.isfinite(seen_obstacle.velocity_mps).all():
+            self._draw_velocity(view, seen_obstacle, centre)
 
-    def _draw_velocity(self, view: Image, one: Seen, centre: NDArray[np.float64]) -> None:
-        tip = self.to_pixels(one.centre_m + _ARROW_S * one.velocity_mps)
-        draw.arrow(view, centre, tip, one.colour)
-        spread_m2 = _ARROW_S**2 * one.velocity_cov
-        if np.isfinite(spread_m2).all() and np.trace(spread_m2) < _WIDEST_SIGMA_M**2:
+    def _draw_velocity(self, view: Image, seen_obstacle: SeenObstacle, centre: NDArray[np.float64]) -> None:
+        tip = self.to_pixels(seen_obstacle.centre_m + _ARROW_S * seen_obstacle.velocity_mps)
+        draw.arrow(view, centre, tip, seen_obstacle.colour)
+        spread_m2 = _ARROW_S**2 * seen_obstacle.velocity_cov
+        if np.isfinite(spread_m2).all() and np.trace(spread_m2) < _MAX_SIGMA_M**2:
             # From (forward, left) to (right, down): both axes are swapped and negated, so only their order
             # changes.
-            draw.ellipse(view, tip, spread_m2[::-1, ::-1] * self._px_per_m**2, one.colour)
+            draw.ellipse(view, tip, spread_m2[::-1, ::-1] * self._px_per_m**2, seen_obstacle.colour)
 
-    def _label_box(self, one: Seen) -> FloatArray:
-        corners = self.to_pixels(one.corners_m)
+    def _label_box(self, seen_obstacle: SeenObstacle) -> FloatArray:
+        corners = self.to_pixels(seen_obstacle.corners_m)
         return np.stack([corners.min(axis=0) - 2.0, corners.max(axis=0) + 2.0])
 
 
@@ -166,14 +166,14 @@ class _Scan:
 
     def __init__(self, free: FreeSpace, mount: CameraMount, range_m: float) -> None:
         edges_tan = free.bearing_tan[:, np.newaxis] + free.half_width_tan * np.array([-1.0, 1.0])
-        foot_m = np.array([mount.forward_m, mount.left_m])
-        reach_m = np.minimum(np.nan_to_num(np.minimum(free.nearest_m, free.known_m), nan=0.0), range_m)
-        far_m = foot_m + _forward_left(reach_m, edges_tan)
+        camera_m = np.array([mount.forward_m, mount.left_m])
+        seen_m = np.minimum(np.nan_to_num(np.minimum(free.nearest_m, free.known_m), nan=0.0), range_m)
+        far_m = camera_m + _forward_left(seen_m, edges_tan)
         self.free_m = (
-            np.concatenate([foot_m[np.newaxis], far_m.reshape(-1, 2)]) if len(reach_m) else far_m[:, 0]
+            np.concatenate([camera_m[np.newaxis], far_m.reshape(-1, 2)]) if len(seen_m) else far_m[:, 0]
         )
-        struck = np.isfinite(free.nearest_m) & (free.nearest_m <= range_m)
-        self.surfaces_m = foot_m + _forward_left(free.nearest_m[struck], edges_tan[struck])
+        has_surface = np.isfinite(free.nearest_m) & (free.nearest_m <= range_m)
+        self.surfaces_m = camera_m + _forward_left(free.nearest_m[has_surface], edges_tan[has_surface])
 
 
 def _forward_left(forward_m: FloatArray, bearings_tan: FloatArray) -> FloatArray:

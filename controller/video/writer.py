@@ -13,7 +13,7 @@ from typing import Self
 import cv2
 
 from controller.errors import UserError
-from controller.video.room import Room
+from controller.video.disk_reservation import DiskReservation
 from controller.video.style import Image
 
 # Codecs that OpenCV's wheel really encodes (it has no H.264 encoder). Browsers play VP8 in WebM, which takes
@@ -40,8 +40,8 @@ class VideoWriter:
 
     Raises VideoError: at once if the suffix is unknown or the file cannot be written, so that a long run does
     not fail at its end; from write() if no encoder opens, if a picture has another size than the first, or if
-    the disk is full. OpenCV does not tell that, so the room is claimed before each picture. What was written
-    before can be seen.
+    the disk is full. OpenCV does not report a full disk, so space is reserved before each picture. What was
+    written before can be played.
     """
 
     def __init__(self, path: Path, fps: float) -> None:
@@ -54,7 +54,7 @@ class VideoWriter:
         self._fps = fps
         self._size: tuple[int, int] | None = None
         self._writer: cv2.VideoWriter | None = None
-        self._room: Room | None = None
+        self._reservation: DiskReservation | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -75,16 +75,16 @@ class VideoWriter:
         if self._writer is None:
             self._writer = self._open((width, height))
             self._size = (width, height)
-            with self._told():
-                self._room = Room(self._path).__enter__()
+            with self._reporting_errors():
+                self._reservation = DiskReservation(self._path).__enter__()
         if (width, height) != self._size:
             raise VideoError(
                 f"{self._path}: a picture of {width}x{height} after others of another size; "
                 "write one video for each size"
             )
-        assert self._room is not None, "opened with the writer"
-        with self._told():
-            self._room.claim()
+        assert self._reservation is not None, "opened with the writer"
+        with self._reporting_errors():
+            self._reservation.reserve_next()
         self._writer.write(picture)
 
     def close(self) -> None:
@@ -93,27 +93,27 @@ class VideoWriter:
         Raises VideoError if what was written is no video.
         """
         writer, self._writer = self._writer, None
-        room, self._room = self._room, None
+        disk_reservation, self._reservation = self._reservation, None
         if writer is None:
             return
         with _native_stderr_silenced():
             writer.release()
-        if room is not None:
-            with self._told():
-                room.__exit__(None, None, None)
+        if disk_reservation is not None:
+            with self._reporting_errors():
+                disk_reservation.__exit__(None, None, None)
             if not _readable(self._path):
-                raise self._cut_off("its end could not be written")
+                raise self._write_error("its end could not be written")
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _reporting_errors(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
-            raise self._cut_off(str(error.strerror)) from error
+            raise self._write_error(str(error.strerror)) from error
 
-    def _cut_off(self, why: str) -> VideoError:
+    def _write_error(self, reason: str) -> VideoError:
         return VideoError(
-            f"{self._path}: nothing more can be written ({why}); make room or name another file"
+            f"{self._path}: nothing more can be written ({reason}); make room or name another file"
         )
 
     def _open(self, size: tuple[int, int]) -> cv2.VideoWriter:
@@ -164,15 +164,15 @@ def _native_stderr_silenced() -> Iterator[None]:
     them."""
     sys.stderr.flush()
     try:
-        kept = os.dup(_STDERR_FD)
+        saved_fd = os.dup(_STDERR_FD)
     except OSError:  # standard error is closed, as in some services: nothing to silence
         yield
         return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    null_fd = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, _STDERR_FD)
+        os.dup2(null_fd, _STDERR_FD)
         yield
     finally:
-        os.dup2(kept, _STDERR_FD)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(saved_fd, _STDERR_FD)
+        os.close(saved_fd)
+        os.close(null_fd)

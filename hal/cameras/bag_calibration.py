@@ -16,22 +16,28 @@ from hal.errors import BadRecording
 from hal.types import Pose
 
 _TF_STATIC = "/tf_static"
-_PER_METRE = 1000.0
-_BROWN = ("plumb_bob", "rational_polynomial", "Brown Conrady")
-_COEFFICIENTS = 5
+_DEFAULT_UNITS_PER_M = 1000.0
+_BROWN_MODELS = ("plumb_bob", "rational_polynomial", "Brown Conrady")
+_MAX_COEFFICIENTS = 5
 
 
 def read_transforms(bag: BagFile) -> StaticTransforms:
     """The transforms of /tf_static and of RealSense streams. Raises BadRecording."""
     transforms = StaticTransforms()
-    own = [topic.name for topic in bag.topics if topic.kind == TRANSFORM and reference_of(topic.name)]
-    for topic, message in bag.messages((_TF_STATIC, *own)):
+    stream_topics = [
+        topic.name for topic in bag.topics if topic.kind == TRANSFORM and reference_of(topic.name)
+    ]
+    for topic, message in bag.messages((_TF_STATIC, *stream_topics)):
         try:
             if (streams := reference_of(topic)) is not None:
                 transforms.add(*streams, message)
                 continue
-            for one in message.transforms:
-                transforms.add(frame_name(one.header.frame_id), frame_name(one.child_frame_id), one.transform)
+            for transform in message.transforms:
+                transforms.add(
+                    frame_name(transform.header.frame_id),
+                    frame_name(transform.child_frame_id),
+                    transform.transform,
+                )
         except ValueError as error:
             raise BadRecording(f"{bag.path}: {topic}: {error}") from error
     return transforms
@@ -60,9 +66,11 @@ def read_calibration(
     try:
         return RecordingCamera(**values), frame, notes
     except ValidationError as error:
-        told = "; ".join(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())
+        details = "; ".join(
+            f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors()
+        )
         raise BadRecording(
-            f"{bag.path}: the calibration in {topics.colour_info} is impossible ({told})"
+            f"{bag.path}: the calibration in {topics.colour_info} is impossible ({details})"
         ) from error
 
 
@@ -76,7 +84,7 @@ def _depth_factor(bag: BagFile, topics: BagTopics) -> float:
     stream = stream_of(topics.depth.name)
     option = None if stream is None else bag.first(depth_unit_topic(stream))
     if option is None:
-        return _PER_METRE
+        return _DEFAULT_UNITS_PER_M
     try:
         # Rounded, because a float32 of 0.001 reads as 0.0010000000475.
         return round(1.0 / float(option.data), 3)
@@ -102,8 +110,8 @@ def _distortion(bag: BagFile, topic: str, info: Any) -> tuple[float, ...]:
     found = tuple(float(value) for value in _matrix(info, "d"))
     if not any(found):
         return ()
-    if info.distortion_model in _BROWN and not any(found[_COEFFICIENTS:]):
-        return found[:_COEFFICIENTS]
+    if info.distortion_model in _BROWN_MODELS and not any(found[_MAX_COEFFICIENTS:]):
+        return found[:_MAX_COEFFICIENTS]
     raise BadRecording(
         f"{bag.path}: {topic}: the lens model {info.distortion_model} with {len(found)} coefficients cannot "
         "be used; rectify the images (image_proc) and choose their topic with --colour-topic"
@@ -124,8 +132,8 @@ def _depth_camera(
     frame, depth_frame = _frame_of(colour, topics.colour), _frame_of(depth, topics.depth)
     if topics.says_registered or depth_frame == frame:
         # Same viewpoint; but the lens or the number of pixels may differ.
-        of_one_size = (depth.width, depth.height) == (colour.width, colour.height)
-        if of_one_size and (topics.says_registered or _of_one_lens(depth, colour)):
+        same_size = (depth.width, depth.height) == (colour.width, colour.height)
+        if same_size and (topics.says_registered or _same_lens(depth, colour)):
             return {}, ()
         depth_frame = frame
     notes = []
@@ -143,7 +151,7 @@ def _depth_camera(
     return _depth_values(depth, _pinhole(depth, rectified), in_colour), tuple(notes)
 
 
-def _of_one_lens(depth: Any, colour: Any) -> bool:
+def _same_lens(depth: Any, colour: Any) -> bool:
     return _pinhole(depth, rectified=False) == _pinhole(colour, rectified=False)
 
 

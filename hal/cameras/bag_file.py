@@ -25,8 +25,10 @@ def is_bag(path: Path) -> bool:
     incomplete (ROS 2 writes metadata.yaml last)."""
     # os.path, not Path: a path without permission is not a bag, and must not raise.
     if os.path.isdir(path):
-        written = os.path.isfile(path / _METADATA) or any(one.suffix in _ROS_2 for one in path.glob("*"))
-        return written and not os.path.exists(path / "rgb.txt")
+        has_bag_files = os.path.isfile(path / _METADATA) or any(
+            file.suffix in _ROS_2 for file in path.glob("*")
+        )
+        return has_bag_files and not os.path.exists(path / "rgb.txt")
     return path.suffix in _SUFFIXES
 
 
@@ -59,8 +61,8 @@ class BagFile:
             self._reader = self._closing.enter_context(reader)
         except Exception as error:
             raise BadRecording(
-                f"{self.path}: cannot be read as a ROS bag ({_told(error)}); check it with `rosbag info` or "
-                "`ros2 bag info`, and mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`"
+                f"{self.path}: cannot be read as a ROS bag ({_one_line(error)}); check it with `rosbag info` "
+                "or `ros2 bag info`, and mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`"
             ) from error
         return self
 
@@ -73,28 +75,28 @@ class BagFile:
     def topics(self) -> tuple[Topic, ...]:
         """The topics that have messages, sorted by name."""
         counts: dict[tuple[str, str], int] = {}
-        for one in self._reader.connections:
-            key = (one.topic, one.msgtype)
-            counts[key] = counts.get(key, 0) + one.msgcount
+        for connection in self._reader.connections:
+            key = (connection.topic, connection.msgtype)
+            counts[key] = counts.get(key, 0) + connection.msgcount
         return tuple(Topic(*key, count) for key, count in sorted(counts.items()) if count)
 
     def messages(self, names: Collection[str]) -> Iterator[tuple[str, Any]]:
         """(topic, message) of these topics, in the order of the recording. Raises BadRecording where the bag
         is damaged; all messages before that are valid."""
-        wanted = [one for one in self._reader.connections if one.topic in names]
-        if not wanted:
+        selected = [connection for connection in self._reader.connections if connection.topic in names]
+        if not selected:
             return
-        found = self._reader.messages(connections=wanted)
+        records = self._reader.messages(connections=selected)
         while True:
             try:
-                connection, _, data = next(found)
+                connection, _, data = next(records)
                 if not self._reader.is2:
                     data = message_of(connection.topic, connection.msgtype, data)
                 message = self._reader.deserialize(data, connection.msgtype)
             except StopIteration:
                 return
             except Exception as error:
-                raise BadRecording(f"{self.path}: is damaged from here on ({_told(error)})") from error
+                raise BadRecording(f"{self.path}: is damaged from here on ({_one_line(error)})") from error
             yield connection.topic, message
 
     def first(self, name: str) -> Any:
@@ -102,7 +104,7 @@ class BagFile:
         return next((message for _, message in self.messages((name,))), None)
 
 
-def _told(error: Exception) -> str:
+def _one_line(error: Exception) -> str:
     """The error's message in one line."""
     return " ".join(str(error).split()) or type(error).__name__
 

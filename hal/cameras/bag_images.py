@@ -32,7 +32,7 @@ _COLOURS: dict[str, tuple[int, int | None]] = {
     "yuyv": (2, cv2.COLOR_YUV2BGR_YUY2),
 }
 # With this many bytes per pixel, two neighbouring pixels share their chrominance.
-_SHARED_COLOUR = 2
+_YUV422_CHANNELS = 2
 _MILLIMETRES, _METRES = ("16UC1", "mono16"), "32FC1"
 _MM_PER_M = 1000.0
 _PNG_START = b"\x89PNG"
@@ -48,10 +48,10 @@ def colour_image(message: Any, width: int, height: int) -> ColourImage:
     if message.encoding not in _COLOURS:
         raise ImageError(f"has the encoding {message.encoding}, none of {', '.join(_COLOURS)}")
     channels, to_bgr = _COLOURS[message.encoding]
-    pixels = _pixels(message, np.dtype(np.uint8), channels)
+    pixels = _pixel_array(message, np.dtype(np.uint8), channels)
     if to_bgr is None:
         return pixels.copy()
-    if channels == _SHARED_COLOUR and width % 2:
+    if channels == _YUV422_CHANNELS and width % 2:
         raise ImageError(f"is {width} pixels wide, as {message.encoding} no image can be")
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(pixels), to_bgr), np.uint8)
 
@@ -64,22 +64,22 @@ def depth_image(message: Any, width: int, height: int) -> DepthImage:
     require_size(message.width, message.height, width, height)
     order = ">" if message.is_bigendian else "<"
     if message.encoding in _MILLIMETRES:
-        return _pixels(message, np.dtype(f"{order}u2"), 1)[..., 0].astype(np.uint16)
+        return _pixel_array(message, np.dtype(f"{order}u2"), 1)[..., 0].astype(np.uint16)
     if message.encoding == _METRES:
-        return _in_millimetres(_pixels(message, np.dtype(f"{order}f4"), 1)[..., 0])
+        return _in_millimetres(_pixel_array(message, np.dtype(f"{order}f4"), 1)[..., 0])
     raise ImageError(f"has the encoding {message.encoding}, a depth image has 16UC1 or 32FC1")
 
 
-def _pixels(message: Any, of: np.dtype[Any], channels: int) -> NDArray[Any]:
+def _pixel_array(message: Any, pixel_dtype: np.dtype[Any], channels: int) -> NDArray[Any]:
     """The pixels (height, width, channels) of a message, whose rows may be padded. May share its memory."""
     data = np.asarray(message.data, np.uint8)
-    row = message.width * channels * of.itemsize
+    row = message.width * channels * pixel_dtype.itemsize
     if message.step < row or data.size < message.step * message.height:
         raise ImageError(
             f"holds {data.size} bytes in rows of {message.step}, too few for {message.width}x{message.height}"
         )
     rows = data[: message.step * message.height].reshape(message.height, message.step)[:, :row]
-    return np.ascontiguousarray(rows).view(of).reshape(message.height, message.width, channels)
+    return np.ascontiguousarray(rows).view(pixel_dtype).reshape(message.height, message.width, channels)
 
 
 def _in_millimetres(metres: NDArray[Any]) -> DepthImage:

@@ -29,8 +29,8 @@ def read_odometry(bag: BagFile, topic: str, camera: str, transforms: StaticTrans
     base = None
     for _, message in bag.messages((topic,)):
         base = base or frame_name(message.child_frame_id) or "base_link"
-        at, q = message.pose.pose.position, message.pose.pose.orientation
-        values = np.array([at.x, at.y, at.z, q.x, q.y, q.z, q.w])
+        position, q = message.pose.pose.position, message.pose.pose.orientation
+        values = np.array([position.x, position.y, position.z, q.x, q.y, q.z, q.w])
         length = float(np.linalg.norm(values[3:]))
         if not (np.isfinite(values).all() and abs(length - 1.0) <= _UNIT_TOLERANCE):
             raise BadRecording(
@@ -45,17 +45,19 @@ def read_odometry(bag: BagFile, topic: str, camera: str, transforms: StaticTrans
             "/tf_static; record it, or replay with --odometry none"
         )
     stamps_ns = sorted(rows)
-    poses = np.stack([rows[one] for one in stamps_ns])
+    poses = np.stack([rows[stamp] for stamp in stamps_ns])
     # The camera is fixed to the base, so its rotation is that of the base times a constant rotation on the
     # right.
     positions = np.stack([rotation_matrix(pose[3:]) @ mount.translation_m + pose[:3] for pose in poses])
-    return PoseTrack(topic, stamps_ns, positions, _turned(poses[:, 3:], quaternion_of(mount.rotation)))
+    return PoseTrack(
+        topic, stamps_ns, positions, _quaternion_products(poses[:, 3:], quaternion_of(mount.rotation))
+    )
 
 
-def _turned(first: FloatArray, then: FloatArray) -> FloatArray:
+def _quaternion_products(left: FloatArray, right: FloatArray) -> FloatArray:
     """The Hamilton products (N, 4) of quaternions (N, 4) and (4,), each qx qy qz qw."""
-    x, y, z, w = first.T
-    a, b, c, d = then
+    x, y, z, w = left.T
+    a, b, c, d = right
     return np.stack(
         (
             w * a + x * d + y * c - z * b,

@@ -15,7 +15,7 @@ _IMAGE = "sensor_msgs/msg/Image"
 _LENGTH = struct.Struct("<I")
 # Bytes of a serialised Image before the name of the frame, between that and the name of the encoding, and
 # from there to the length of the data.
-_NUMBER_AND_STAMP, _SIZE, _ORDER_AND_STEP = 12, 8, 5
+_BYTES_BEFORE_FRAME_NAME, _BYTES_BEFORE_ENCODING, _BYTES_BEFORE_DATA = 12, 8, 5
 TRANSFORM = "geometry_msgs/msg/Transform"
 
 
@@ -30,9 +30,9 @@ def message_of(topic: str, kind: str, data: bytes) -> bytes:
     record is too short."""
     if kind != _IMAGE or not stream_of(topic):
         return data
-    end = _NUMBER_AND_STAMP
-    for then in (_SIZE, _ORDER_AND_STEP, 0):
-        end += _LENGTH.size + _LENGTH.unpack_from(data, end)[0] + then
+    end = _BYTES_BEFORE_FRAME_NAME
+    for gap_bytes in (_BYTES_BEFORE_ENCODING, _BYTES_BEFORE_DATA, 0):
+        end += _LENGTH.size + _LENGTH.unpack_from(data, end)[0] + gap_bytes
     return data[:end]
 
 

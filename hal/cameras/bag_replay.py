@@ -29,8 +29,8 @@ from hal.errors import BadRecording, DeviceRefused, EndOfStream
 from hal.types import CameraMount, Intrinsics, RgbdFrame
 
 _ANY_TOPICS = WantedTopics()
-_FIRST_IMAGES = 10
-_THE_REST = "the rest"
+_FPS_SAMPLE = 10
+_REMAINDER = "the rest"
 
 
 class BagReplay:
@@ -55,7 +55,7 @@ class BagReplay:
             transforms = read_transforms(bag)
             camera, frame, notes = read_calibration(bag, self._topics, transforms)
             self.odometry, odometry_notes = _odometry(bag, self._topics, odometry, frame, transforms)
-            self.fps = _usual_fps(bag, self._topics.colour.name)
+            self.fps = _estimate_fps(bag, self._topics.colour.name)
         self._calibration = RecordingCalibration(camera)
         self._notes = (*notes, *odometry_notes)
         self._messages: Iterator[tuple[str, Any]] | None = None
@@ -118,7 +118,7 @@ class BagReplay:
             raise DeviceRefused(f"{self._path}: the recording is not open; read it inside a with block")
         while self._pairs or not self._ended:
             if not self._pairs:
-                self._take_in(self._messages)
+                self._read_message(self._messages)
                 continue
             outcome = self._load(*self._pairs.popleft())
             if isinstance(outcome, RgbdFrame):
@@ -126,20 +126,20 @@ class BagReplay:
                 return outcome
             self._skipped.append(outcome)
         if self._usable == 0:
-            raise BadRecording(f"{self._path}: not one frame is usable; {self._why_none()}")
+            raise BadRecording(f"{self._path}: not one frame is usable; {self._no_frame_reason()}")
         raise EndOfStream(f"{self._path}: no further frame")
 
-    def _why_none(self) -> str:
+    def _no_frame_reason(self) -> str:
         if not self._skipped:
             return "check the times of its images"
         first = self._skipped[0]
-        return first.reason if first.file == _THE_REST else f"the first: {first}"
+        return first.reason if first.file == _REMAINDER else f"the first: {first}"
 
-    def pass_over(self, until_ns: int) -> None:
+    def skip_until(self, until_ns: int) -> None:
         """Skip, without decoding, every frame that is followed by another one not later than until_ns."""
         while self._messages is not None:
             while len(self._pairs) < 2 and not self._ended:
-                self._take_in(self._messages)
+                self._read_message(self._messages)
             if len(self._pairs) < 2 or self._pairs[1][0].stamp_ns > until_ns:
                 return
             self._pairs.popleft()
@@ -148,32 +148,34 @@ class BagReplay:
         self._pairing: StampPairing[Any] = StampPairing(self._max_gap_ns)
         self._pairs: deque[tuple[Stamped[Any], Stamped[Any]]] = deque()
         self._skipped: list[SkippedFrame] = []
-        self._usable, self._taken, self._ended = 0, 0, False
+        self._usable, self._messages_read, self._ended = 0, 0, False
 
-    def _take_in(self, messages: Iterator[tuple[str, Any]]) -> None:
+    def _read_message(self, messages: Iterator[tuple[str, Any]]) -> None:
         try:
             topic, message = next(messages)
         except StopIteration:
-            self._end()
+            self._finish()
         except BadRecording as error:
             # Everything before the damage is valid and stays usable.
-            self._skipped.append(SkippedFrame(_THE_REST, str(error)))
+            self._skipped.append(SkippedFrame(_REMAINDER, str(error)))
             self._ended = True
         else:
-            self._taken += 1
+            self._messages_read += 1
             is_colour = topic == self._topics.colour.name
             stream = self._pairing.colour if is_colour else self._pairing.depth
             stream.add(stamp_ns(message), message)
         self._pairs.extend(self._pairing.pairs(self._ended))
 
-    def _end(self) -> None:
+    def _finish(self) -> None:
         """Compare with the number of messages in the bag's index: a storage format may skip damage
         silently."""
         self._ended = True
-        promised = self._topics.colour.messages + self._topics.depth.messages
-        if self._taken < promised:
-            why = f"{promised - self._taken} of {promised} images cannot be found; the bag is damaged"
-            self._skipped.append(SkippedFrame(_THE_REST, why))
+        expected = self._topics.colour.messages + self._topics.depth.messages
+        if self._messages_read < expected:
+            reason = (
+                f"{expected - self._messages_read} of {expected} images cannot be found; the bag is damaged"
+            )
+            self._skipped.append(SkippedFrame(_REMAINDER, reason))
 
     def _load(self, colour: Stamped[Any], depth: Stamped[Any]) -> RgbdFrame | SkippedFrame:
         calibration = self._calibration
@@ -181,13 +183,13 @@ class BagReplay:
         try:
             bgr = colour_image(colour.item, calibration.intrinsics.width, calibration.intrinsics.height)
             topic, stamp = self._topics.depth.name, depth.stamp_ns
-            measured = depth_image(depth.item, calibration.depth_width, calibration.depth_height)
+            depth_units = depth_image(depth.item, calibration.depth_width, calibration.depth_height)
         except ImageError as error:
             return SkippedFrame(f"{topic} at {format_stamp(stamp)}", str(error))
-        bgr, measured = calibration.rectify(bgr, measured)
+        bgr, depth_units = calibration.rectify(bgr, depth_units)
         return RgbdFrame(
             colour=bgr,
-            depth=measured,
+            depth=depth_units,
             depth_scale_m=calibration.depth_scale_m,
             captured_ns=colour.stamp_ns,
             device_s=colour.stamp_ns / NS_PER_S,
@@ -196,13 +198,13 @@ class BagReplay:
         )
 
 
-def _usual_fps(bag: BagFile, topic: str) -> float | None:
+def _estimate_fps(bag: BagFile, topic: str) -> float | None:
     """The rate of the first images. The duration of the bag cannot be used, because other topics may begin
     earlier and end later."""
     stamps_ns = []
     # Damage is reported when the frames are read.
     with suppress(BadRecording):
-        for _, message in islice(bag.messages((topic,)), _FIRST_IMAGES):
+        for _, message in islice(bag.messages((topic,)), _FPS_SAMPLE):
             stamps_ns.append(stamp_ns(message))
     gaps_ns = [after - before for before, after in pairwise(stamps_ns) if after > before]
     return NS_PER_S / median(gaps_ns) if gaps_ns else None

@@ -60,16 +60,16 @@ def choose_topics(
 ) -> BagTopics:
     """Choose the topics. Raises BadRecording if there is none, or if several are equally good, with their
     names."""
-    images = [one for one in topics if one.kind in _IMAGES]
+    images = [topic for topic in topics if topic.kind in _IMAGES]
     colour = _choose(path, images, wanted.colour, "colour", _colour_rank)
     depth = _choose(path, images, wanted.depth, "depth", _depth_rank)
     if colour == depth:
         raise BadRecording(f"{path}: {colour.name} cannot be both colour and depth; choose another topic")
-    infos = {one.name for one in topics if one.kind == _CAMERA_INFO}
-    moves = [one for one in topics if one.kind == _ODOMETRY]
+    infos = {topic.name for topic in topics if topic.kind == _CAMERA_INFO}
+    odometry_topics = [topic for topic in topics if topic.kind == _ODOMETRY]
     odometry = None
-    if with_odometry and (moves or wanted.odometry is not None):
-        odometry = _choose(path, moves, wanted.odometry, "odometry", lambda _: 0).name
+    if with_odometry and (odometry_topics or wanted.odometry is not None):
+        odometry = _choose(path, odometry_topics, wanted.odometry, "odometry", lambda _: 0).name
     return BagTopics(colour, depth, _info_of(colour, infos), _info_of(depth, infos), odometry)
 
 
@@ -90,27 +90,28 @@ def _is_rectified(topic: str) -> bool:
 
 
 def _choose(
-    path: Path, topics: Sequence[Topic], wanted: str | None, what: str, rank: Callable[[Topic], int | None]
+    path: Path, topics: Sequence[Topic], wanted: str | None, kind: str, rank: Callable[[Topic], int | None]
 ) -> Topic:
     """The wanted topic, or the one with the lowest rank. A rank of None excludes a topic."""
     if wanted is not None:
-        named = [one for one in topics if one.name == wanted]
+        named = [topic for topic in topics if topic.name == wanted]
         if named:
             return named[0]
-        raise BadRecording(f"{path}: {what} topic {wanted}: there is none; there are {_names(topics)}")
-    ranked = {one: place for one in topics if (place := rank(one)) is not None}
+        raise BadRecording(f"{path}: {kind} topic {wanted}: there is none; there are {_list_names(topics)}")
+    ranked = {topic: rank_value for topic in topics if (rank_value := rank(topic)) is not None}
     if not ranked:
         raise BadRecording(
-            f"{path}: no topic with {what} images was found; choose one with {_option(what)}; "
-            f"there are {_names(topics)}"
+            f"{path}: no topic with {kind} images was found; choose one with {_option(kind)}; "
+            f"there are {_list_names(topics)}"
         )
-    best = [one for one in topics if ranked.get(one) == min(ranked.values())]
+    best = [topic for topic in topics if ranked.get(topic) == min(ranked.values())]
     # The same images in several transports: uncompressed ones sort first, by their shorter name.
-    if len({base_name(one.name) for one in best}) > 1:
+    if len({base_name(topic.name) for topic in best}) > 1:
         raise BadRecording(
-            f"{path}: several topics could be the {what}: {_names(best)}; choose one with {_option(what)}"
+            f"{path}: several topics could be the {kind}: {_list_names(best)}; "
+            f"choose one with {_option(kind)}"
         )
-    return min(best, key=lambda one: len(one.name))
+    return min(best, key=lambda topic: len(topic.name))
 
 
 def _colour_rank(topic: Topic) -> int | None:
@@ -133,8 +134,8 @@ def _info_of(topic: Topic, infos: set[str]) -> str | None:
     """The topic with the camera_info of images, where image_transport looks for it: beside the images."""
     beside = base_name(topic.name).rsplit("/", 1)[0] + "/camera_info"
     stream = stream_of(topic.name)
-    places = [beside] if stream is None else [beside, info_topic(stream)]
-    return next((place for place in places if place in infos), None)
+    candidates = [beside] if stream is None else [beside, info_topic(stream)]
+    return next((candidate for candidate in candidates if candidate in infos), None)
 
 
 def _option(what: str) -> str:
@@ -143,5 +144,5 @@ def _option(what: str) -> str:
     return f"--{what}-topic{in_yaml}"
 
 
-def _names(topics: Sequence[Topic]) -> str:
-    return ", ".join(one.name for one in topics) or "none of that kind"
+def _list_names(topics: Sequence[Topic]) -> str:
+    return ", ".join(topic.name for topic in topics) or "none of that kind"

@@ -15,7 +15,7 @@ class StaticTransforms:
     """The poses of frames relative to each other."""
 
     def __init__(self) -> None:
-        self._seen_from: dict[str, dict[str, Pose]] = {}
+        self._edges: dict[str, dict[str, Pose]] = {}
 
     def add(self, parent: str, child: str, transform: Any) -> None:
         """Add a transform: a geometry_msgs Transform, child in parent. Raises ValueError if it is invalid."""
@@ -25,19 +25,19 @@ class StaticTransforms:
         if not (length > 0.0 and np.isfinite(length) and np.isfinite(origin_m).all()):
             raise ValueError(f"the transform from {parent} to {child} is impossible")
         pose = Pose(rotation_matrix(quaternion / length), origin_m)
-        self._seen_from.setdefault(parent, {})[child] = pose
-        self._seen_from.setdefault(child, {})[parent] = pose.inverse()
+        self._edges.setdefault(parent, {})[child] = pose
+        self._edges.setdefault(child, {})[parent] = pose.inverse()
 
     def find(self, outer: str, inner: str) -> Pose | None:
         """The pose of the inner frame in the outer one, over any frames in between; None if not connected."""
         poses = {outer: Pose(np.eye(3), np.zeros(3))}
-        waiting = deque([outer])
-        while waiting and inner not in poses:
-            here = waiting.popleft()
-            for there, pose in self._seen_from.get(here, {}).items():
-                if there not in poses:
-                    poses[there] = poses[here] @ pose
-                    waiting.append(there)
+        queue = deque([outer])
+        while queue and inner not in poses:
+            frame = queue.popleft()
+            for neighbour, pose in self._edges.get(frame, {}).items():
+                if neighbour not in poses:
+                    poses[neighbour] = poses[frame] @ pose
+                    queue.append(neighbour)
         return poses.get(inner)
 
 

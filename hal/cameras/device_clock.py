@@ -21,13 +21,13 @@ class DeviceClock:
     def __init__(self, latency_ns: int, window: int = 128) -> None:
         self._latency_ns = latency_ns
         self._offsets_ns: deque[int] = deque(maxlen=window)
-        self._device_ns: int | None = None
+        self._last_device_ns: int | None = None
 
     def captured_ns(self, device_ns: int, arrival_ns: int) -> int:
         """The monotonic time of a frame with the given device time that has just arrived."""
-        if self._device_ns is not None and device_ns <= self._device_ns:
+        if self._last_device_ns is not None and device_ns <= self._last_device_ns:
             self._offsets_ns.clear()  # the device was reset, so its old offsets are invalid
-        self._device_ns = device_ns
+        self._last_device_ns = device_ns
         self._offsets_ns.append(arrival_ns - device_ns)
         return self.monotonic_ns(device_ns)
 

@@ -24,7 +24,7 @@ class PacedRecording:
     def __init__(self, recording: Recording, clock: Clock) -> None:
         self._recording, self._clock = recording, clock
         self._waiting: RgbdFrame | None = None
-        self._later_ns: int | None = None
+        self._offset_ns: int | None = None
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -32,7 +32,7 @@ class PacedRecording:
 
     def __enter__(self) -> Self:
         self._recording.__enter__()
-        self._waiting = self._later_ns = None
+        self._waiting = self._offset_ns = None
         return self
 
     def __exit__(
@@ -44,21 +44,21 @@ class PacedRecording:
         """Wait for the next frame. Raises FrameTimeout if it is not due within timeout_s, and what the
         recording raises."""
         now_ns = self._clock.now_ns()
-        frame = self._waiting or self._newest(now_ns)
-        if self._later_ns is None:
+        frame = self._waiting or self._newest_due(now_ns)
+        if self._offset_ns is None:
             now_ns = self._clock.now_ns()
-            self._later_ns = now_ns - frame.captured_ns
-        due_ns = frame.captured_ns + self._later_ns
-        gives_up_ns = now_ns + round(timeout_s * NS_PER_S)
-        self._clock.sleep_until_ns(min(due_ns, gives_up_ns))
-        if due_ns > gives_up_ns:
+            self._offset_ns = now_ns - frame.captured_ns
+        due_ns = frame.captured_ns + self._offset_ns
+        deadline_ns = now_ns + round(timeout_s * NS_PER_S)
+        self._clock.sleep_until_ns(min(due_ns, deadline_ns))
+        if due_ns > deadline_ns:
             self._waiting = frame
             raise FrameTimeout(f"the recording has no frame within {timeout_s:g} s")
         self._waiting = None
         return replace(frame, captured_ns=due_ns)
 
-    def _newest(self, now_ns: int) -> RgbdFrame:
+    def _newest_due(self, now_ns: int) -> RgbdFrame:
         """The newest frame that is due, or the next one if none is."""
-        if self._later_ns is not None:
-            self._recording.pass_over(now_ns - self._later_ns)
+        if self._offset_ns is not None:
+            self._recording.skip_until(now_ns - self._offset_ns)
         return self._recording.read(0.0)

@@ -56,9 +56,9 @@ class PoseTrack:
             return self._pose(self._positions_m[before], self._quaternions[before])
         if after == len(self._stamps_ns) or self._stamps_ns[after] - start_ns > self._max_gap_ns:
             return None
-        share = (stamp_ns - start_ns) / (self._stamps_ns[after] - start_ns)
-        position_m = (1.0 - share) * self._positions_m[before] + share * self._positions_m[after]
-        return self._pose(position_m, _slerp(self._quaternions[before], self._quaternions[after], share))
+        fraction = (stamp_ns - start_ns) / (self._stamps_ns[after] - start_ns)
+        position_m = (1.0 - fraction) * self._positions_m[before] + fraction * self._positions_m[after]
+        return self._pose(position_m, _slerp(self._quaternions[before], self._quaternions[after], fraction))
 
     @staticmethod
     def _pose(position_m: FloatArray, quaternion: FloatArray) -> Pose:
@@ -95,7 +95,7 @@ def quaternion_of(rotation: FloatArray) -> FloatArray:
     return vectors[:, -1]
 
 
-def _slerp(start: FloatArray, end: FloatArray, share: float) -> FloatArray:
+def _slerp(start: FloatArray, end: FloatArray, fraction: float) -> FloatArray:
     """Spherical linear interpolation of unit quaternions (Shoemake), along the shorter arc."""
     cosine = float(start @ end)
     if cosine < 0.0:  # q and -q are the same rotation
@@ -103,5 +103,5 @@ def _slerp(start: FloatArray, end: FloatArray, share: float) -> FloatArray:
     angle_rad = math.acos(min(cosine, 1.0))
     if angle_rad < _SMALL_ANGLE_RAD:
         return start
-    mixed = math.sin((1.0 - share) * angle_rad) * start + math.sin(share * angle_rad) * end
+    mixed = math.sin((1.0 - fraction) * angle_rad) * start + math.sin(fraction * angle_rad) * end
     return mixed / math.sin(angle_rad)

@@ -50,15 +50,15 @@ class RealsenseCamera:
 
     def __enter__(self) -> Self:
         """Open and wait for the first frame. Raises DeviceNotFound, DeviceRefused."""
-        with contextlib.ExitStack() as opening:
+        with contextlib.ExitStack() as stack:
             try:
-                self._open(opening)
+                self._open(stack)
                 self.read(self._config.start_timeout_s)
             except FrameTimeout as error:
                 raise DeviceRefused(f"opened, but no frames come: {error}; {_USB_HINT}") from error
             except RuntimeError as error:
                 raise DeviceRefused(f"{self._name}: cannot be opened ({error}); {_USB_HINT}") from error
-            self._closing = opening.pop_all()
+            self._closing = stack.pop_all()
         return self
 
     def __exit__(
@@ -82,26 +82,26 @@ class RealsenseCamera:
             remaining_ms = max(0, math.ceil((deadline_ns - self._clock.now_ns()) / NS_PER_MS))
             arrived, frames = self._pipeline.try_wait_for_frames(remaining_ms)
             if not arrived:
-                raise self._silence(timeout_s, self.incomplete - incomplete_before)
+                raise self._no_frame_error(timeout_s, self.incomplete - incomplete_before)
             arrival_ns = self._clock.now_ns()
-            if self._is_whole(frames):
+            if self._is_complete(frames):
                 return self._frame(frames, arrival_ns)
             self.incomplete += 1
 
-    def _silence(self, timeout_s: float, partial: int) -> FrameTimeout | LinkLost:
+    def _no_frame_error(self, timeout_s: float, partial: int) -> FrameTimeout | LinkLost:
         if not self._device.is_connected():
             return LinkLost(f"{self._name}: disconnected; check its cable and reopen it")
         detail = f"; {partial} came without their depth or colour" if partial else ""
         return FrameTimeout(f"{self._name}: no frame within {timeout_s:g} s{detail}")
 
-    def _open(self, opening: contextlib.ExitStack) -> None:
+    def _open(self, stack: contextlib.ExitStack) -> None:
         rs = self._rs = self._vendor if self._vendor is not None else _load_vendor()
         context = rs.context()
         device = _find_device(rs, context, self._config.serial)
         serial = device.get_info(rs.camera_info.serial_number)
         self._name = f"{device.get_info(rs.camera_info.name)} {serial}"
         _set_up_sensors(rs, device)
-        profile = self._start_video(context, serial, opening)
+        profile = self._start_video(context, serial, stack)
         self._device = profile.get_device()
         colour = profile.get_stream(rs.stream.color).as_video_stream_profile()
         depth = profile.get_stream(rs.stream.depth).as_video_stream_profile()
@@ -112,31 +112,35 @@ class RealsenseCamera:
         self._align = rs.align(rs.stream.color)
         self._device_clock = DeviceClock(round(self._config.latency_s * NS_PER_S))
         self._colour_number = self._depth_number = -1
-        self._gyro_queue = self._start_gyro(context, serial, colour, opening) if self._config.gyro else None
+        self._gyro_queue = self._start_gyro(context, serial, colour, stack) if self._config.gyro else None
 
-    def _start_video(self, context: Any, serial: str, opening: contextlib.ExitStack) -> Any:
-        rs, wanted = self._rs, self._config
+    def _start_video(self, context: Any, serial: str, stack: contextlib.ExitStack) -> Any:
+        rs, requested = self._rs, self._config
         settings = rs.config()
         settings.enable_device(serial)
-        settings.enable_stream(rs.stream.color, wanted.width, wanted.height, rs.format.bgr8, wanted.fps)
-        settings.enable_stream(rs.stream.depth, wanted.width, wanted.height, rs.format.z16, wanted.fps)
+        settings.enable_stream(
+            rs.stream.color, requested.width, requested.height, rs.format.bgr8, requested.fps
+        )
+        settings.enable_stream(
+            rs.stream.depth, requested.width, requested.height, rs.format.z16, requested.fps
+        )
         pipeline = rs.pipeline(context)
         try:
             profile = pipeline.start(settings)
         except RuntimeError as error:
             raise DeviceRefused(
-                f"{self._name}: does not start {wanted.width}x{wanted.height} colour and depth "
-                f"at {wanted.fps} Hz ({error}); {_USB_HINT}"
+                f"{self._name}: does not start {requested.width}x{requested.height} colour and depth "
+                f"at {requested.fps} Hz ({error}); {_USB_HINT}"
             ) from error
-        opening.callback(_stop, pipeline)
-        opening.callback(self._forget_pipeline)
+        stack.callback(_stop, pipeline)
+        stack.callback(self._forget_pipeline)
         self._pipeline = pipeline
         return profile
 
     def _forget_pipeline(self) -> None:
         self._pipeline = None
 
-    def _start_gyro(self, context: Any, serial: str, colour: Any, opening: contextlib.ExitStack) -> Any:
+    def _start_gyro(self, context: Any, serial: str, colour: Any, stack: contextlib.ExitStack) -> Any:
         """Start the gyro in a separate pipeline: the framesets of the video would hold only its newest
         sample."""
         rs = self._rs
@@ -152,20 +156,20 @@ class RealsenseCamera:
                 f"{self._name}: gives no gyro at {_GYRO_RATE_HZ} Hz ({error}); "
                 "a D435i has one, a D435 has not: set camera.gyro to false"
             ) from error
-        opening.callback(_stop, pipeline)
+        stack.callback(_stop, pipeline)
         # librealsense stores rotations column by column.
         extrinsics = profile.get_stream(rs.stream.gyro).get_extrinsics_to(colour)
         self._gyro_to_colour = np.array(extrinsics.rotation, np.float64).reshape(3, 3).T
         return queue
 
     def _verify(self, stream: Any, pixel_format: Any) -> None:
-        wanted = self._config
-        given = (stream.width(), stream.height(), stream.fps(), stream.format())
-        if given != (wanted.width, wanted.height, wanted.fps, pixel_format):
+        requested = self._config
+        actual = (stream.width(), stream.height(), stream.fps(), stream.format())
+        if actual != (requested.width, requested.height, requested.fps, pixel_format):
             raise DeviceRefused(
-                f"{self._name}: {stream.stream_name()} was asked for {wanted.width}x{wanted.height} at "
-                f"{wanted.fps} Hz as {pixel_format}, the device gave {given[0]}x{given[1]} at {given[2]} Hz "
-                f"as {given[3]}; choose a mode that it has (rs-enumerate-devices lists them)"
+                f"{self._name}: {stream.stream_name()} was asked for {requested.width}x{requested.height} at "
+                f"{requested.fps} Hz as {pixel_format}, the device gave {actual[0]}x{actual[1]} at "
+                f"{actual[2]} Hz as {actual[3]}; choose a mode that it has (rs-enumerate-devices lists them)"
             )
 
     def _read_intrinsics(self, k: Any) -> Intrinsics:
@@ -183,7 +187,7 @@ class RealsenseCamera:
         # The device's float32 0.001 means 0.001, not 0.0010000000475.
         return float(str(np.float32(scale_m)))
 
-    def _is_whole(self, frames: Any) -> bool:
+    def _is_complete(self, frames: Any) -> bool:
         """Whether a frameset holds both streams, both new and of the same time.
 
         The first frameset after a start holds only one stream. While one stream stalls, librealsense may
@@ -192,13 +196,13 @@ class RealsenseCamera:
         colour, depth = frames.get_color_frame(), frames.get_depth_frame()
         if not colour or not depth:
             return False
-        numbers = colour.get_frame_number(), depth.get_frame_number()
-        apart_ms = abs(colour.get_timestamp() - depth.get_timestamp())
-        if self._colour_number == numbers[0] or self._depth_number == numbers[1]:
+        frame_numbers = colour.get_frame_number(), depth.get_frame_number()
+        difference_ms = abs(colour.get_timestamp() - depth.get_timestamp())
+        if self._colour_number == frame_numbers[0] or self._depth_number == frame_numbers[1]:
             return False
-        if apart_ms > 1000.0 / self._config.fps:
+        if difference_ms > 1000.0 / self._config.fps:
             return False
-        self._colour_number, self._depth_number = numbers
+        self._colour_number, self._depth_number = frame_numbers
         return True
 
     def _frame(self, frames: Any, arrival_ns: int) -> RgbdFrame:

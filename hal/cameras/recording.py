@@ -23,7 +23,7 @@ class SkippedFrame:
 class Recording(FrameSource, Protocol):
     """A FrameSource that ends, with a description of the recording."""
 
-    def pass_over(self, until_ns: int) -> None:
+    def skip_until(self, until_ns: int) -> None:
         """Skip, without decoding, every frame that is followed by another one not later than until_ns."""
         ...
 

@@ -11,7 +11,7 @@ from hal.clocks import NS_PER_S
 
 Item = TypeVar("Item")
 
-_PATIENCE_NS = 2 * NS_PER_S
+_MAX_WAIT_NS = 2 * NS_PER_S
 # How far to look ahead, in multiples of the maximum gap. A depth image may fit a rival colour image better,
 # and that rival may fit another depth image with a rival of its own; three gaps are enough to settle this.
 _LOOK_AHEAD_GAPS = 3
@@ -60,7 +60,7 @@ class StampPairing(Generic[Item]):
     """
 
     def __init__(self, max_gap_ns: int) -> None:
-        self._max_gap_ns, self._ahead_ns = max_gap_ns, _LOOK_AHEAD_GAPS * max_gap_ns
+        self._max_gap_ns, self._look_ahead_ns = max_gap_ns, _LOOK_AHEAD_GAPS * max_gap_ns
         self.colour: Stream[Item] = Stream()
         self.depth: Stream[Item] = Stream()
 
@@ -71,7 +71,7 @@ class StampPairing(Generic[Item]):
             # Of the depth images earlier than the first colour image, only the last can be its partner.
             while len(depths) > 1 and depths[1].stamp_ns <= colours[0].stamp_ns:
                 self.depth.drop()
-            if not (ended or self._certain()):
+            if not (ended or self._partner_is_certain()):
                 return
             partner = self._first_partner()
             if partner is None:
@@ -80,24 +80,24 @@ class StampPairing(Generic[Item]):
             for _ in range(partner):
                 self.depth.drop()
             yield colours.popleft(), depths.popleft()
-        while depths and (ended or self._waited(depths)):
+        while depths and (ended or self._has_waited(depths)):
             self.depth.drop()
 
-    def _certain(self) -> bool:
+    def _partner_is_certain(self) -> bool:
         """Whether the partner of the first colour image is certain: both streams reach far enough ahead, or
         one of them seems to have ended."""
         colours, depths = self.colour.waiting, self.depth.waiting
-        late_ns = colours[0].stamp_ns + self._ahead_ns
-        known = bool(depths) and min(colours[-1].stamp_ns, depths[-1].stamp_ns) >= late_ns
-        return known or self._waited(colours) or self._waited(depths)
+        needed_until_ns = colours[0].stamp_ns + self._look_ahead_ns
+        known = bool(depths) and min(colours[-1].stamp_ns, depths[-1].stamp_ns) >= needed_until_ns
+        return known or self._has_waited(colours) or self._has_waited(depths)
 
-    def _waited(self, stream: deque[Stamped[Item]]) -> bool:
+    def _has_waited(self, stream: deque[Stamped[Item]]) -> bool:
         """Whether the oldest item has waited long enough: the other stream seems to have ended."""
-        return bool(stream) and stream[-1].stamp_ns - stream[0].stamp_ns > _PATIENCE_NS + self._ahead_ns
+        return bool(stream) and stream[-1].stamp_ns - stream[0].stamp_ns > _MAX_WAIT_NS + self._look_ahead_ns
 
     def _first_partner(self) -> int | None:
         """Index of the waiting depth image that is paired with the first colour image; None if there is
         none."""
-        colour_ns = [one.stamp_ns for one in self.colour.waiting]
-        depth_ns = [one.stamp_ns for one in self.depth.waiting]
+        colour_ns = [frame.stamp_ns for frame in self.colour.waiting]
+        depth_ns = [frame.stamp_ns for frame in self.depth.waiting]
         return dict(associate(colour_ns, depth_ns, self._max_gap_ns)).get(0)

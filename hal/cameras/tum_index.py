@@ -94,21 +94,21 @@ def read_index(path: Path) -> ImageIndex:
 def associate(colour_ns: Sequence[int], depth_ns: Sequence[int], max_gap_ns: int) -> list[tuple[int, int]]:
     """Pairs (index of colour, index of depth) in time order; both inputs strictly increase.
 
-    As in the benchmark's own associate.py: of all couples not further apart than max_gap_ns, the closest is
-    taken first, and each image is used once. A couple that would reverse the order of depth next to a closer
-    couple is not used.
+    As in the benchmark's own associate.py: of all candidate pairs not further apart than max_gap_ns, the
+    closest is taken first, and each image is used once. A couple that would reverse the order of depth next
+    to a closer couple is not used.
     """
-    couples: list[tuple[int, int, int]] = []
+    candidates: list[tuple[int, int, int]] = []
     for i, stamp_ns in enumerate(colour_ns):
         j = bisect_left(depth_ns, stamp_ns - max_gap_ns)
         while j < len(depth_ns) and depth_ns[j] <= stamp_ns + max_gap_ns:
-            couples.append((abs(depth_ns[j] - stamp_ns), i, j))
+            candidates.append((abs(depth_ns[j] - stamp_ns), i, j))
             j += 1
     pairs: list[tuple[int, int]] = []
-    for _, i, j in sorted(couples):
-        at = bisect_left(pairs, (i, j))
-        after_those_before = at == 0 or (pairs[at - 1][0] < i and pairs[at - 1][1] < j)
-        before_those_after = at == len(pairs) or (i < pairs[at][0] and j < pairs[at][1])
-        if after_those_before and before_those_after:
-            pairs.insert(at, (i, j))
+    for _, i, j in sorted(candidates):
+        position = bisect_left(pairs, (i, j))
+        follows_previous = position == 0 or (pairs[position - 1][0] < i and pairs[position - 1][1] < j)
+        precedes_next = position == len(pairs) or (i < pairs[position][0] and j < pairs[position][1])
+        if follows_previous and precedes_next:
+            pairs.insert(position, (i, j))
     return pairs

@@ -22,7 +22,7 @@ from hal.clocks import NS_PER_S
 from hal.errors import BadRecording, DeviceRefused, EndOfStream
 from hal.types import CameraMount, Intrinsics, RgbdFrame
 
-_NEEDED = ("rgb.txt", "depth.txt", "camera.yaml")
+_REQUIRED_FILES = ("rgb.txt", "depth.txt", "camera.yaml")
 _FORMAT_HINT = (
     "a recording is a folder with rgb.txt, depth.txt, camera.yaml and the images they name, or a ROS bag "
     "(.bag, .db3, .mcap, or the folder around it)"
@@ -113,7 +113,7 @@ class TumReplay:
         if self._reader is not None:
             self._reader.shutdown(wait=True, cancel_futures=True)
             self._reader = None
-        self._ahead.clear()
+        self._futures.clear()
 
     def read(self, timeout_s: float) -> RgbdFrame:
         """The next usable frame. timeout_s has no effect, because a recording is never late.
@@ -135,32 +135,32 @@ class TumReplay:
             )
         raise EndOfStream(f"{self._folder}: no further frame")
 
-    def pass_over(self, until_ns: int) -> None:
+    def skip_until(self, until_ns: int) -> None:
         """Skip, without decoding, every frame that is followed by another one not later than until_ns."""
-        while (second := self._second()) < len(self._pairs):
-            if self._pairs[second].colour.stamp_ns > until_ns:
+        while (second_index := self._second_index()) < len(self._pairs):
+            if self._pairs[second_index].colour.stamp_ns > until_ns:
                 return
-            if self._ahead:
-                self._ahead.popleft().cancel()
+            if self._futures:
+                self._futures.popleft().cancel()
             else:
                 self._next += 1
 
-    def _second(self) -> int:
+    def _second_index(self) -> int:
         """Index of the pair after the one that read() gives next."""
-        return self._next - len(self._ahead) + 1
+        return self._next - len(self._futures) + 1
 
     def _rewind(self) -> None:
         self._next = 0
         self._usable = 0
         self._skipped: list[SkippedFrame] = []
-        self._ahead: deque[Future[RgbdFrame | SkippedFrame]] = deque()
+        self._futures: deque[Future[RgbdFrame | SkippedFrame]] = deque()
 
     def _next_outcome(self, reader: ThreadPoolExecutor) -> RgbdFrame | SkippedFrame | None:
         """The next frame, or why it is unusable; None after the last."""
-        while self._next < len(self._pairs) and len(self._ahead) <= self._read_ahead:
-            self._ahead.append(reader.submit(self._load, self._pairs[self._next]))
+        while self._next < len(self._pairs) and len(self._futures) <= self._read_ahead:
+            self._futures.append(reader.submit(self._load, self._pairs[self._next]))
             self._next += 1
-        return self._ahead.popleft().result() if self._ahead else None
+        return self._futures.popleft().result() if self._futures else None
 
     def _load(self, pair: _Pair) -> RgbdFrame | SkippedFrame:
         calibration = self._calibration
@@ -189,7 +189,7 @@ def _require_recording(folder: Path) -> None:
     if not os.path.isdir(folder):
         found = "it is not a folder" if os.path.exists(folder) else "there is no such folder"
         raise BadRecording(f"{folder}: {found}; {_FORMAT_HINT}")
-    missing = [name for name in _NEEDED if not os.path.isfile(folder / name)]
+    missing = [name for name in _REQUIRED_FILES if not os.path.isfile(folder / name)]
     if missing:
         raise BadRecording(f"{folder}: {', '.join(missing)} missing; {_FORMAT_HINT}")
 
@@ -206,15 +206,17 @@ def _pairs(folder: Path, colour: ImageIndex, depth: ImageIndex, max_pair_gap_s: 
     if not pairs:
         raise BadRecording(
             f"{folder}: no colour and depth image within {max_pair_gap_s} s of each other; the closest are "
-            f"{_closest_s(colour_ns, depth_ns):.3f} s apart; check the times in rgb.txt and depth.txt"
+            f"{_smallest_gap_s(colour_ns, depth_ns):.3f} s apart; check the times in rgb.txt and depth.txt"
         )
     return [_Pair(i, colour.entries[i], depth.entries[j]) for i, j in pairs]
 
 
-def _closest_s(colour_ns: Sequence[int], depth_ns: Sequence[int]) -> float:
+def _smallest_gap_s(colour_ns: Sequence[int], depth_ns: Sequence[int]) -> float:
     """The smallest time between any colour and any depth image; both inputs are sorted."""
     gaps_ns: list[int] = []
     for stamp_ns in colour_ns:
         after = bisect_left(depth_ns, stamp_ns)
-        gaps_ns.extend(abs(near_ns - stamp_ns) for near_ns in depth_ns[max(after - 1, 0) : after + 1])
+        gaps_ns.extend(
+            abs(depth_stamp_ns - stamp_ns) for depth_stamp_ns in depth_ns[max(after - 1, 0) : after + 1]
+        )
     return min(gaps_ns) / NS_PER_S

@@ -22,7 +22,7 @@ from hal.types import CameraMount, Pose, RgbdFrame
 _PNG_FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 
 
-class _Lines:
+class _AppendFile:
     """A text file to which whole lines are added. They are on their way to the disk at once, so that a
     recording that ends abruptly can still be read.
 
@@ -37,12 +37,12 @@ class _Lines:
 
     def add(self, line: str) -> None:
         """Raises OSError; a part of the line may have been written then."""
-        rest = f"{line}\n".encode()
-        while rest:  # a disk that is nearly full takes a part
-            rest = rest[self._file.write(rest) :]
+        remaining = f"{line}\n".encode()
+        while remaining:  # a disk that is nearly full takes a part
+            remaining = remaining[self._file.write(remaining) :]
         self.length = self._file.tell()
 
-    def take_back(self, length: int) -> None:
+    def truncate_to(self, length: int) -> None:
         """Forget what was added since the file was this long."""
         with suppress(OSError):
             self._file.truncate(length)
@@ -63,21 +63,21 @@ class TumWriter:
         self._mount = mount
         self._first: RgbdFrame | None = None
         self._last_ns = -1
-        self._odometry: _Lines | None = None
+        self._odometry: _AppendFile | None = None
 
     def prepare(self) -> None:
         """Make the folders. Raises DeviceRefused if that fails or if there is a recording already."""
         if os.path.exists(self._folder / "rgb.txt"):
             raise DeviceRefused(f"{self._folder}: holds a recording already; choose another folder")
         for name in ("rgb", "depth"):
-            with self._told(name):
+            with self._refusing(name):
                 (self._folder / name).mkdir(parents=True, exist_ok=True)
 
     def __enter__(self) -> Self:
         """Open the files. Raises DeviceRefused as prepare() does, and if the files cannot be made."""
         self.prepare()
-        self._colour_index = self._index("rgb.txt", "# time of the colour image in seconds, file")
-        self._depth_index = self._index("depth.txt", "# time of the depth image in seconds, file")
+        self._colour_index = self._open_file("rgb.txt", "# time of the colour image in seconds, file")
+        self._depth_index = self._open_file("depth.txt", "# time of the depth image in seconds, file")
         return self
 
     def __exit__(
@@ -95,7 +95,7 @@ class TumWriter:
         Nothing of it is left then: the indexes name whole files only.
         """
         if self._first is None:
-            with self._told("camera.yaml"):
+            with self._refusing("camera.yaml"):
                 self._write_calibration(frame)
             self._first = frame
         if (frame.intrinsics, frame.depth_scale_m) != (self._first.intrinsics, self._first.depth_scale_m):
@@ -105,44 +105,44 @@ class TumWriter:
         self._last_ns = frame.captured_ns
         stamp = format_stamp(frame.captured_ns)
         colour, depth = f"rgb/{stamp}.png", f"depth/{stamp}.png"
-        with ExitStack() as undone:
-            self._image(colour, frame.colour, undone)
-            self._image(depth, frame.depth, undone)
+        with ExitStack() as rollback:
+            self._write_image(colour, frame.colour, rollback)
+            self._write_image(depth, frame.depth, rollback)
             if odometry is not None:
-                self._add(self._poses(), _pose_line(stamp, odometry), undone)
-            self._add(self._colour_index, f"{stamp} {colour}", undone)
-            self._add(self._depth_index, f"{stamp} {depth}", undone)
-            undone.pop_all()
+                self._add(self._pose_file(), _pose_line(stamp, odometry), rollback)
+            self._add(self._colour_index, f"{stamp} {colour}", rollback)
+            self._add(self._depth_index, f"{stamp} {depth}", rollback)
+            rollback.pop_all()
 
-    def _image(self, file: str, image: cv2.typing.MatLike, undone: ExitStack) -> None:
+    def _write_image(self, file: str, image: cv2.typing.MatLike, rollback: ExitStack) -> None:
         # Not written by OpenCV, which reports success even if the last bytes did not fit on the disk.
         data = cv2.imencode(".png", image, _PNG_FAST)[1]
-        undone.callback(_remove, self._folder / file)
-        with self._told(file):
+        rollback.callback(_remove, self._folder / file)
+        with self._refusing(file):
             (self._folder / file).write_bytes(data.tobytes())
 
-    def _add(self, lines: _Lines, line: str, undone: ExitStack) -> None:
-        undone.callback(lines.take_back, lines.length)
-        with self._told(lines.name):
-            lines.add(line)
+    def _add(self, file: _AppendFile, line: str, rollback: ExitStack) -> None:
+        rollback.callback(file.truncate_to, file.length)
+        with self._refusing(file.name):
+            file.add(line)
 
-    def _poses(self) -> _Lines:
+    def _pose_file(self) -> _AppendFile:
         if self._odometry is None:
-            self._odometry = self._index("odometry.txt", "# camera: time tx ty tz qx qy qz qw")
+            self._odometry = self._open_file("odometry.txt", "# camera: time tx ty tz qx qy qz qw")
         return self._odometry
 
     @contextmanager
-    def _told(self, file: str) -> Iterator[None]:
+    def _refusing(self, file: str) -> Iterator[None]:
         """Turn an OSError, such as a full disk, into DeviceRefused."""
         try:
             yield
         except OSError as error:
-            why = f"cannot be written ({error.strerror}); make room or choose another folder"
-            raise DeviceRefused(f"{self._folder / file}: {why}") from error
+            reason = f"cannot be written ({error.strerror}); make room or choose another folder"
+            raise DeviceRefused(f"{self._folder / file}: {reason}") from error
 
-    def _index(self, name: str, heading: str) -> _Lines:
-        with self._told(name):
-            return _Lines(self._folder / name, heading)
+    def _open_file(self, name: str, heading: str) -> _AppendFile:
+        with self._refusing(name):
+            return _AppendFile(self._folder / name, heading)
 
     def _write_calibration(self, frame: RgbdFrame) -> None:
         k = frame.intrinsics

@@ -7,6 +7,7 @@ arming.py - the arming state machine
 following.py - checks that the base follows its commands
 rolling_back.py - checks that the base does not roll backwards
 tracks.py - skid-steer kinematics, dead reckoning, wrapping counters
+other_master.py - detects a second master on the same CAN bus
 disagreement.py - compares two sensors of the same motion
 frame_age.py - how long a frame waited in buffers
 encoder_feedback.py - speeds and pose from two encoders, for RoboClaw and Roboteq

@@ -24,9 +24,9 @@ from hal.chassis.agilex_messages import (
 )
 from hal.chassis.agilex_models import model_of, over_serial
 from hal.chassis.arming import ArmingLimits
-from hal.chassis.bus_rival import HOST_FRAMES, BusRival
 from hal.chassis.command import CommandLimits, due, is_zero, zero
 from hal.chassis.driver import ChassisDriver
+from hal.chassis.other_master import HOST_FRAMES, OtherMaster
 from hal.clocks import NS_PER_MS
 from hal.types import ChassisMode, Setpoint
 
@@ -38,13 +38,13 @@ _MAX_FRAMES = 256
 
 # Motor speeds and currents, 100 frames a second, which are not used.
 _FIRST_ACTUATOR = 0x251
-_NOT_NEEDED = frozenset(range(_FIRST_ACTUATOR, _FIRST_ACTUATOR + ACTUATORS))
+_UNUSED_IDS = frozenset(range(_FIRST_ACTUATOR, _FIRST_ACTUATOR + ACTUATORS))
 
 # Period of 0x421 while the base has not followed it.
 _MODE_RETRY_NS = 40 * NS_PER_MS
 
 
-def no_can_frames() -> str:
+def no_can_frames_hint() -> str:
     """What to check if the bus is silent."""
     return "not one frame came; check power, wiring, termination and 500 kbit/s"
 
@@ -52,15 +52,19 @@ def no_can_frames() -> str:
 class AgilexChassis(ChassisDriver):
     """hal.api.Chassis for AgileX V2.
 
-    link: over RS-232, a hal.chassis.agilex_serial.AgilexSerialBus. no_frames: over RS-232, its silence().
+    link: over RS-232, a hal.chassis.agilex_serial.AgilexSerialBus. no_frames_hint: over RS-232, its
+    silence_hint().
     """
 
     def __init__(
-        self, link: CanLink, config: AgilexChassisConfig, no_frames: Callable[[], str] = no_can_frames
+        self,
+        link: CanLink,
+        config: AgilexChassisConfig,
+        no_frames_hint: Callable[[], str] = no_can_frames_hint,
     ) -> None:
         model = model_of(config)
-        rival = BusRival()
-        feedback = AgilexFeedback(config, model, no_frames, rival)
+        other_master = OtherMaster()
+        feedback = AgilexFeedback(config, model, no_frames_hint, other_master)
         # The model's limit applies to the commanded yaw rate, which is slip_factor times the real one.
         commands = CommandLimits(
             max_speed_mps=model.max_speed_mps,
@@ -71,15 +75,15 @@ class AgilexChassis(ChassisDriver):
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             status_timeout_ns=config.status_timeout_ms * NS_PER_MS,
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
-            stall_ns=model.base_timeout_ms * NS_PER_MS,
+            max_step_gap_ns=model.base_timeout_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits)
         self._link = link
         self._model = model
-        self._obeying = model.obeying_mode(over_serial(config))
+        self._command_mode = model.command_mode(over_serial(config))
         # A serial line has one computer at its end; a command that comes from there is an echo.
-        self._rival = None if over_serial(config) else rival
-        self._began = False
+        self._other_master = None if over_serial(config) else other_master
+        self._arming_begun = False
         self._feedback = feedback
         self._slip_factor = config.slip_factor
         self._period_ns = config.command_period_ms * NS_PER_MS
@@ -87,45 +91,45 @@ class AgilexChassis(ChassisDriver):
         self._moving = False
         self._mode_sent_ns: int | None = None
 
-    def _listen(self, now_ns: int) -> bool:
+    def _receive(self, now_ns: int) -> bool:
         messages: list[AgilexMessage] = []
-        heard = False
+        received = False
         try:
             for _ in range(_MAX_FRAMES):
                 frame = self._link.receive()
                 if frame is None:
                     break
-                heard = True
-                if frame.arbitration_id in _NOT_NEEDED:
+                received = True
+                if frame.arbitration_id in _UNUSED_IDS:
                     self._feedback.note_actuator(frame.arbitration_id - _FIRST_ACTUATOR)
                     continue
                 message = decode(frame)
-                if self._rival is not None and frame.arbitration_id in HOST_FRAMES:
-                    self._rival.hear(frame.arbitration_id, now_ns)
+                if self._other_master is not None and frame.arbitration_id in HOST_FRAMES:
+                    self._other_master.note_frame(frame.arbitration_id, now_ns)
                 elif message is None:
                     self._feedback.note_foreign(frame.arbitration_id)
                 else:
                     messages.append(message)
         finally:
             # What arrived before the link was lost is still valid.
-            if self._rival is not None:
-                self._rival.step(now_ns)
+            if self._other_master is not None:
+                self._other_master.step(now_ns)
             self._feedback.update(messages, now_ns)
-        return heard
+        return received
 
-    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
-        if self._others_drive:
+    def _send(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        if self._other_master_drives:
             return None
-        goes_out = due(self._motion_sent_ns, self._period_ns, now_ns) or (self._moving and is_zero(command))
-        if goes_out:
+        motion_due = due(self._motion_sent_ns, self._period_ns, now_ns) or (self._moving and is_zero(command))
+        if motion_due:
             self._send_motion(command, now_ns)
         mode = self._mode_to_send(now_ns)
         if mode is not None:
             self._send_mode(mode, now_ns)
-        return command if goes_out else None
+        return command if motion_due else None
 
-    def _speak_stop(self, now_ns: int) -> None:
-        if self._others_drive:
+    def _send_stop(self, now_ns: int) -> None:
+        if self._other_master_drives:
             return
         self._send_motion(zero(now_ns), now_ns)
         self._send_mode(self._model.mode_standby, now_ns)
@@ -135,15 +139,15 @@ class AgilexChassis(ChassisDriver):
         # 0x421 at once.
         self._feedback.await_setup()
         self._mode_sent_ns = None
-        self._began = True
+        self._arming_begun = True
 
-    def _no_feedback(self) -> str:
-        return self._feedback.no_feedback
+    def _missing_feedback(self) -> str:
+        return self._feedback.missing_message
 
     @property
-    def _others_drive(self) -> bool:
+    def _other_master_drives(self) -> bool:
         """Whether somebody else commands a base that this driver never asked to obey."""
-        return not self._began and self._rival is not None and self._rival.sentence != ""
+        return not self._arming_begun and self._other_master is not None and self._other_master.sentence != ""
 
     def _mode_to_send(self, now_ns: int) -> int | None:
         """The mode of the 0x421 that is due, or None.
@@ -155,12 +159,12 @@ class AgilexChassis(ChassisDriver):
         if mode is ChassisMode.ARMED:
             period_ms = self._model.mode_period_ms
             if period_ms is not None and due(self._mode_sent_ns, period_ms * NS_PER_MS, now_ns):
-                return self._obeying
+                return self._command_mode
             return None
         if not due(self._mode_sent_ns, _MODE_RETRY_NS, now_ns):
             return None
         if mode is ChassisMode.ARMING:
-            return self._obeying
+            return self._command_mode
         return self._model.mode_standby if self._feedback.in_command_mode else None
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> None:

@@ -21,8 +21,8 @@ from hal.chassis.agilex_models import (
     over_serial,
     track_width_of,
 )
-from hal.chassis.bus_rival import BusRival
 from hal.chassis.disagreement import Disagreement
+from hal.chassis.other_master import OtherMaster
 from hal.chassis.tracks import DeadReckoning, TrackCounter, TrackGeometry
 from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.types import PlanarPose
@@ -36,15 +36,15 @@ _V1_STATE_ID = 0x151
 
 # Minimum period of 0x211, and how many may arrive at once on top of that: the shortest period in any manual
 # is 20 ms (TRACER v1.2).
-_LEAST_STATE_NS = 10 * NS_PER_MS
-_STATES_AT_ONCE = 2
+_MIN_STATE_PERIOD_NS = 10 * NS_PER_MS
+_MAX_STATE_BURST = 2
 
 # Travel beyond what the top speed allows that two odometer frames cannot be apart, even where frames were
 # lost or came late.
 _JUMP_SLACK_M = 0.2
 
 # How far a track may deviate from its last speed between two odometer frames, by stopping or rolling back.
-_COURSE_SLACK_M = 0.01
+_STEP_SLACK_M = 0.01
 # Period of the odometer.
 _ODOMETER_S = 0.02
 
@@ -65,27 +65,29 @@ class AgilexFeedback:
     command mode before the base reports standby. Then the restart shows in a jump of the odometer that no
     track can make, or in the count of 0x211 (byte 7, 0..255), which begins anew.
 
-    no_frames: what came and what to check, for the case that not one frame was understood. rival: whether
-    somebody else commands the base.
+    no_frames_hint: what came and what to check, for the case that not one frame was understood. other_master:
+    whether somebody else commands the base.
     """
 
     def __init__(
         self,
         config: AgilexChassisConfig,
         model: AgilexModel,
-        no_frames: Callable[[], str],
-        rival: BusRival,
+        no_frames_hint: Callable[[], str],
+        other_master: OtherMaster,
     ) -> None:
         self._model = model
-        self._rival = rival
-        self._obeying = model.obeying_mode(over_serial(config))
-        self._others = (model.modes_remote | {model.mode_can, model.mode_serial}) - {self._obeying}
+        self._other_master = other_master
+        self._command_mode = model.command_mode(over_serial(config))
+        self._other_control_modes = (model.modes_remote | {model.mode_can, model.mode_serial}) - {
+            self._command_mode
+        }
         self._actuators = config.actuators or model.actuators
-        self._no_frames = no_frames
+        self._no_frames_hint = no_frames_hint
         self._slip_factor = config.slip_factor
         width_m = track_width_of(config)
         self._geometry = None if width_m is None else TrackGeometry(width_m, config.slip_factor)
-        self._silence_ns = config.feedback_timeout_ms * NS_PER_MS
+        self._max_gap_ns = config.feedback_timeout_ms * NS_PER_MS
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter()
         self._disagreement = Disagreement(
@@ -122,7 +124,7 @@ class AgilexFeedback:
         return min(self.motion_ns, self._odometer_ns)
 
     @property
-    def disobeys(self) -> str:
+    def command_refusal(self) -> str:
         """Why the base does not take commands, by its newest system state, or that it restarted since it was
         armed; "" when it obeys."""
         if self._state is None:
@@ -136,10 +138,10 @@ class AgilexFeedback:
     @property
     def in_command_mode(self) -> bool:
         """Whether the newest system state says that commands of this wire are followed."""
-        return self._state is not None and self._state.control_mode == self._obeying
+        return self._state is not None and self._state.control_mode == self._command_mode
 
     @property
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of 0x211, and what to check."""
         if self._foreign_id == _V1_STATE_ID:
             return "frames of protocol V1 came; this driver speaks V2"
@@ -147,10 +149,10 @@ class AgilexFeedback:
             return "0x221 came, but no 0x211"
         if self._foreign_id is not None:
             return f"only foreign frames came, such as 0x{self._foreign_id:X}; is this the base's bus?"
-        return self._no_frames()
+        return self._no_frames_hint()
 
     @property
-    def no_feedback(self) -> str:
+    def missing_message(self) -> str:
         """Which message for dead reckoning is missing, and what to do; "" if none is."""
         if self.motion_ns is None:
             return "0x211 came, but no 0x221"
@@ -197,8 +199,8 @@ class AgilexFeedback:
                 f"motor {self._highest_actuator + 1} reports, but model {self._model.name} has "
                 f"{self._actuators}; check chassis.model, or set chassis.actuators if your base has more"
             )
-        if self._rival.sentence:
-            return self._rival.sentence
+        if self._other_master.sentence:
+            return self._other_master.sentence
         state = self._state
         if state is None:
             return ""
@@ -207,7 +209,7 @@ class AgilexFeedback:
         if state.vehicle_state != VEHICLE_NORMAL:
             faults = ", ".join(self.faults) or "no fault named"
             return f"the base reports an exception (vehicle state {state.vehicle_state}: {faults})"
-        if state.control_mode in self._others:
+        if state.control_mode in self._other_control_modes:
             return f"{self._model.describe_mode(state.control_mode)} has taken over"
         return self._disagreement.sentence
 
@@ -219,9 +221,9 @@ class AgilexFeedback:
                 case MotionFeedback():
                     motions.append(message)
                 case Odometer():
-                    self._count(message, now_ns)
+                    self._take_odometer(message, now_ns)
                 case SystemState():
-                    self._follow_count(message, now_ns)
+                    self._check_state_count(message, now_ns)
                     self._state, self.status_ns = message, now_ns
                     self._list_faults()
                 case ActuatorSlow():
@@ -234,47 +236,49 @@ class AgilexFeedback:
         if motions:
             self._integrate(motions, now_ns)
 
-    def _follow_count(self, state: SystemState, now_ns: int) -> None:
+    def _check_state_count(self, state: SystemState, now_ns: int) -> None:
         # Only where 0x421 is repeated. Other models stay in standby after a restart, and not every manual
         # says what their byte 7 counts.
         if self._model.mode_period_ms is None or self._state is None or self.status_ns is None:
             return
-        most = _STATES_AT_ONCE + (now_ns - self.status_ns) // _LEAST_STATE_NS
-        if (state.count - self._state.count) % 256 > most and state.count <= most:
+        max_increment = _MAX_STATE_BURST + (now_ns - self.status_ns) // _MIN_STATE_PERIOD_NS
+        if (state.count - self._state.count) % 256 > max_increment and state.count <= max_increment:
             self._restart = "the count of its 0x211 began anew: restarted"
 
     def _integrate(self, motions: Sequence[MotionFeedback], now_ns: int) -> None:
         # Several at once have waited in a buffer: each covers an equal share of the time since the last
         # update. After a longer silence the motion is unknown: the newest speeds do not cover all of that
         # time.
-        elapsed_ns = 0 if self.motion_ns is None else min(now_ns - self.motion_ns, self._silence_ns)
-        share_s = elapsed_ns / NS_PER_S / len(motions)
+        elapsed_ns = 0 if self.motion_ns is None else min(now_ns - self.motion_ns, self._max_gap_ns)
+        interval_s = elapsed_ns / NS_PER_S / len(motions)
         for motion in motions:
-            self._disagreement.expect(motion.v_mps * share_s)
+            self._disagreement.expect(motion.v_mps * interval_s)
             if self._geometry is None:
-                self._reckoning.advance(motion.v_mps * share_s, motion.w_radps / self._slip_factor * share_s)
+                self._reckoning.advance(
+                    motion.v_mps * interval_s, motion.w_radps / self._slip_factor * interval_s
+                )
         self.motion_ns = now_ns
         self.v_mps = motions[-1].v_mps
         self.w_radps = motions[-1].w_radps / self._slip_factor
 
-    def _count(self, odometer: Odometer, now_ns: int) -> None:
+    def _take_odometer(self, odometer: Odometer, now_ns: int) -> None:
         if self._geometry is None:
             return
         elapsed_s = 0.0 if self._odometer_ns is None else (now_ns - self._odometer_ns) / NS_PER_S
         self._odometer_ns = now_ns
-        fastest_mps = (
+        max_track_mps = (
             self._model.max_speed_mps + self._geometry.to_tracks(0.0, self._model.max_yaw_rate_radps)[1]
         )
-        limit_mm = 1000.0 * (fastest_mps * elapsed_s + _JUMP_SLACK_M)
+        limit_mm = 1000.0 * (max_track_mps * elapsed_s + _JUMP_SLACK_M)
         # Of several odometer frames that arrive at once, each of the later ones still covers one period.
         left_mps, right_mps = self._geometry.to_tracks(self.v_mps, self.w_radps)
-        ms = 1000.0 * max(elapsed_s, _ODOMETER_S)
+        mm_per_mps = 1000.0 * max(elapsed_s, _ODOMETER_S)
         steps = self._counter.increments(
             odometer.left_mm,
             odometer.right_mm,
             limit_mm,
-            (left_mps * ms, right_mps * ms),
-            1000.0 * _COURSE_SLACK_M,
+            (left_mps * mm_per_mps, right_mps * mm_per_mps),
+            1000.0 * _STEP_SLACK_M,
         )
         if steps is None:
             self._restart = "its odometer jumped: restarted"

@@ -62,7 +62,7 @@ class AgilexModel:
     mode_period_ms: int | None = None
     track_width_m: float | None = None
 
-    def obeying_mode(self, over_serial: bool) -> int:
+    def command_mode(self, over_serial: bool) -> int:
         """The value of 0x211 byte 1 while the base takes commands from this wire. Raises ValueError if the
         base has no such wire."""
         mode = self.mode_serial if over_serial else self.mode_can

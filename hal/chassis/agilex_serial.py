@@ -17,7 +17,7 @@ from types import MappingProxyType
 
 from hal.api import SerialLink
 from hal.chassis.reading import read_all
-from hal.enclosing import Enclosing
+from hal.device_wrapper import DeviceWrapper
 from hal.types import CanFrame
 
 _START = b"\x5a\xa5"
@@ -25,8 +25,8 @@ _COMMAND, _FEEDBACK = 0x55, 0xAA
 
 # Bytes that the length counts besides the data: the length itself, type, id and count. The data have at most
 # the 8 bytes of a CAN frame.
-_AROUND_DATA = 4
-_LENGTHS = range(_AROUND_DATA, _AROUND_DATA + 9)
+_OVERHEAD_BYTES = 4
+_LENGTHS = range(_OVERHEAD_BYTES, _OVERHEAD_BYTES + 9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,22 +61,23 @@ def wrap(frame: CanFrame, count: int) -> bytes | None:
     if kind is None:
         return None
     data = frame.data[: kind.data_bytes].ljust(kind.data_bytes, b"\0")
-    body = bytes((len(data) + _AROUND_DATA, kind.frame_type, kind.frame_id)) + data + bytes((count % 256,))
-    whole = _START + body
-    return whole + bytes((sum(whole) % 256,))
+    body = bytes((len(data) + _OVERHEAD_BYTES, kind.frame_type, kind.frame_id)) + data + bytes((count % 256,))
+    frame_bytes = _START + body
+    return frame_bytes + bytes((sum(frame_bytes) % 256,))
 
 
 class FrameReader:
     """Finds frames in a stream of bytes.
 
     rejected: number of start bytes that no frame followed.
-    strangers: number of frames with a right checksum, but with a type, id and length of another protocol.
+    foreign_frames: number of frames with a right checksum, but with a type, id and length of another
+    protocol.
     """
 
     def __init__(self) -> None:
         self._buffer = bytearray()
         self.rejected = 0
-        self.strangers = 0
+        self.foreign_frames = 0
 
     def feed(self, data: bytes) -> list[CanFrame]:
         """The CAN frames that these bytes complete."""
@@ -107,12 +108,12 @@ class FrameReader:
         kind = _BY_SERIAL.get((body[0], body[1])) if len(body) >= 2 else None
         data = body[2:]
         if kind is None or len(data) != kind.data_bytes:
-            self.strangers += 1
+            self.foreign_frames += 1
             return
         frames.append(CanFrame(kind.arbitration_id, data.ljust(8, b"\0") if len(data) > 1 else data))
 
 
-class AgilexSerialBus(Enclosing):
+class AgilexSerialBus(DeviceWrapper):
     """hal.api.CanLink over a serial line, for either end of the line."""
 
     def __init__(self, link: SerialLink) -> None:
@@ -121,7 +122,7 @@ class AgilexSerialBus(Enclosing):
         self._reader = FrameReader()
         self._arrived: deque[CanFrame] = deque()
         self._count = 0
-        self._bytes_heard = 0
+        self._bytes_received = 0
 
     def send(self, frame: CanFrame) -> None:
         """See hal.api.CanLink. A frame without a serial equivalent is not sent; the base does the same."""
@@ -134,20 +135,20 @@ class AgilexSerialBus(Enclosing):
         """See hal.api.CanLink."""
         if not self._arrived:
             data = read_all(self._link)
-            self._bytes_heard += len(data)
+            self._bytes_received += len(data)
             self._arrived.extend(self._reader.feed(data))
         return self._arrived.popleft() if self._arrived else None
 
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of any frame that was understood, and what to check."""
-        if self._bytes_heard == 0:
+        if self._bytes_received == 0:
             return "not one byte came; check port, power and that RX and TX are crossed"
-        if self._reader.strangers:
+        if self._reader.foreign_frames:
             return (
-                f"{self._reader.strangers} frames came whose checksum is right, but of another protocol; "
-                "check chassis.model, and that the firmware is 1.5.0 or newer"
+                f"{self._reader.foreign_frames} frames came whose checksum is right, but of another "
+                "protocol; check chassis.model, and that the firmware is 1.5.0 or newer"
             )
         return (
-            f"{self._bytes_heard} bytes came, not one frame with a right checksum; check baud (115200) and "
-            "that it is an AgileX base"
+            f"{self._bytes_received} bytes came, not one frame with a right checksum; check baud (115200) "
+            "and that it is an AgileX base"
         )

@@ -23,14 +23,14 @@ class ArmingLimits:
 
     feedback_timeout_ns, status_timeout_ns: how long silence may last before the chassis counts as lost.
     arming_timeout_ns: how long arming may take.
-    stall_ns: the longest gap between two steps while armed. After a longer one the base may have stopped by
-    its own time-out, and resuming the old speed would be a jump.
+    max_step_gap_ns: the longest gap between two steps while armed. After a longer one the base may have
+    stopped by its own time-out, and resuming the old speed would be a jump.
     """
 
     feedback_timeout_ns: int
     status_timeout_ns: int
     arming_timeout_ns: int
-    stall_ns: int
+    max_step_gap_ns: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,26 +39,26 @@ class Evidence:
 
     link_error: "" while the link works.
     feedback_ns, status_ns: when the newest motion feedback and the newest status arrived (None: never).
-    disobeys: why the base does not take commands, by the newest status ("" when it takes them).
+    command_refusal: why the base does not take commands, by the newest status ("" when it takes them).
     stop_cause: why the robot must not move ("" for none).
     standing: measured speed is zero; False when unknown.
     command_is_zero: the setpoint of this step asks for no motion.
-    silence: while no status or no motion feedback was ever heard, what came instead and what to check.
+    silence_hint: while no status or no motion feedback was ever heard, what came instead and what to check.
     resettable: the base keeps stop_cause until arming resets it, so it prevents armed, but not arming.
-    unread: more was waiting than could be read, so what is known may be out of date.
+    input_overflow: more was waiting than could be read, so what is known may be out of date.
     """
 
     now_ns: int
     link_error: str
     feedback_ns: int | None
     status_ns: int | None
-    disobeys: str
+    command_refusal: str
     stop_cause: str
     standing: bool
     command_is_zero: bool
-    silence: str = ""
+    silence_hint: str = ""
     resettable: bool = False
-    unread: bool = False
+    input_overflow: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,100 +94,106 @@ class Arming:
         return self.mode in LATCHED_MODES
 
 
-def step(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+def step(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
     """The state after one exchange."""
-    return replace(_next(state, seen, limits), stepped_ns=seen.now_ns)
+    return replace(_next(state, evidence, limits), stepped_ns=evidence.now_ns)
 
 
-def consent(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+def consent(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
     """The state after arm(): arming, or the old state with the refusal in its reason. Armed and arming stay
     as they are."""
     if state.mode in (ChassisMode.ARMED, ChassisMode.ARMING):
         return state
-    if refusal := _refusal(state, seen, limits):
+    if refusal := _refusal(state, evidence, limits):
         return replace(state, refusal=refusal)
-    return Arming(ChassisMode.ARMING, "arming", seen.now_ns, seen.now_ns)
+    return Arming(ChassisMode.ARMING, "arming", evidence.now_ns, evidence.now_ns)
 
 
-def release(state: Arming, now_ns: int) -> Arming:
+def disarm(state: Arming, now_ns: int) -> Arming:
     """The state after stop(): stopping, which leads to standby. A latched state stays latched."""
     if state.mode in (ChassisMode.ARMED, ChassisMode.ARMING):
         return Arming(ChassisMode.STOPPING, "stop was asked for", now_ns, now_ns)
     return state
 
 
-def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
-    loss = _loss(seen, limits)
+def _next(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
+    loss = _loss(evidence, limits)
     if state.latched:
         # The link may work again while the base does not answer yet.
-        heard = seen.status_ns is not None and seen.feedback_ns is not None
-        return replace(state, cleared=heard and not loss and not seen.stop_cause)
+        answered = evidence.status_ns is not None and evidence.feedback_ns is not None
+        return replace(state, cleared=answered and not loss and not evidence.stop_cause)
     if loss:
-        return Arming(ChassisMode.LOST, loss, seen.now_ns)
-    if seen.stop_cause and not (state.mode is ChassisMode.ARMING and seen.resettable):
-        return Arming(ChassisMode.ESTOP, seen.stop_cause, seen.now_ns)
+        return Arming(ChassisMode.LOST, loss, evidence.now_ns)
+    if evidence.stop_cause and not (state.mode is ChassisMode.ARMING and evidence.resettable):
+        return Arming(ChassisMode.ESTOP, evidence.stop_cause, evidence.now_ns)
     if state.mode is ChassisMode.ARMING:
-        return _arming(state, seen, limits)
+        return _arming(state, evidence, limits)
     if state.mode is ChassisMode.ARMED:
-        return _armed(state, seen, limits)
-    if state.mode is ChassisMode.STOPPING and seen.standing and seen.disobeys:
-        return Arming(ChassisMode.STANDBY, "stopped", seen.now_ns)
+        return _armed(state, evidence, limits)
+    if state.mode is ChassisMode.STOPPING and evidence.standing and evidence.command_refusal:
+        return Arming(ChassisMode.STANDBY, "stopped", evidence.now_ns)
     return state
 
 
-def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+def _arming(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
     # Only what arrived after the consent counts: an old "obeys" may be from before a restart.
-    if seen.status_ns is None or seen.status_ns <= state.since_ns:
+    if evidence.status_ns is None or evidence.status_ns <= state.since_ns:
         waiting = "no status heard from the base"
-    elif seen.feedback_ns is None or seen.feedback_ns <= state.since_ns:
+    elif evidence.feedback_ns is None or evidence.feedback_ns <= state.since_ns:
         waiting = "no motion feedback heard from the base"
-    elif seen.stop_cause:
-        waiting = seen.stop_cause
-    elif seen.disobeys:
-        waiting = f"the base does not take commands: {seen.disobeys}"
-    elif not seen.command_is_zero:
+    elif evidence.stop_cause:
+        waiting = evidence.stop_cause
+    elif evidence.command_refusal:
+        waiting = f"the base does not take commands: {evidence.command_refusal}"
+    elif not evidence.command_is_zero:
         waiting = "the command is not zero"
     else:
-        return Arming(ChassisMode.ARMED, "armed", seen.now_ns)
-    if seen.now_ns - state.since_ns > limits.arming_timeout_ns:
-        waited_s = (seen.now_ns - state.since_ns) / NS_PER_S
-        cause = f"arming gave up after {waited_s:.1f} s: {waiting}" + (seen.silence and f": {seen.silence}")
-        return Arming(ChassisMode.STANDBY, cause, seen.now_ns)
+        return Arming(ChassisMode.ARMED, "armed", evidence.now_ns)
+    if evidence.now_ns - state.since_ns > limits.arming_timeout_ns:
+        waited_s = (evidence.now_ns - state.since_ns) / NS_PER_S
+        cause = f"arming gave up after {waited_s:.1f} s: {waiting}" + (
+            evidence.silence_hint and f": {evidence.silence_hint}"
+        )
+        return Arming(ChassisMode.STANDBY, cause, evidence.now_ns)
     return replace(state, cause=f"arming: {waiting}")
 
 
-def _armed(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
-    if seen.disobeys:
-        return Arming(ChassisMode.ESTOP, f"the base no longer obeys: {seen.disobeys}", seen.now_ns)
-    gap_ns = seen.now_ns - state.stepped_ns
-    if not 0 <= gap_ns <= limits.stall_ns:
+def _armed(state: Arming, evidence: Evidence, limits: ArmingLimits) -> Arming:
+    if evidence.command_refusal:
         return Arming(
-            ChassisMode.ESTOP, f"the control loop stood still for {gap_ns / NS_PER_MS:.0f} ms", seen.now_ns
+            ChassisMode.ESTOP, f"the base no longer obeys: {evidence.command_refusal}", evidence.now_ns
+        )
+    gap_ns = evidence.now_ns - state.stepped_ns
+    if not 0 <= gap_ns <= limits.max_step_gap_ns:
+        return Arming(
+            ChassisMode.ESTOP,
+            f"the control loop stood still for {gap_ns / NS_PER_MS:.0f} ms",
+            evidence.now_ns,
         )
     return state
 
 
-def _refusal(state: Arming, seen: Evidence, limits: ArmingLimits) -> str:
+def _refusal(state: Arming, evidence: Evidence, limits: ArmingLimits) -> str:
     if state.mode is ChassisMode.STOPPING:
         return "still stopping"
-    if seen.unread:
+    if evidence.input_overflow:
         return "more came than can be read at once, and it may be old; what floods the line?"
-    if problem := _loss(seen, limits) or ("" if seen.resettable else seen.stop_cause):
+    if problem := _loss(evidence, limits) or ("" if evidence.resettable else evidence.stop_cause):
         return problem
-    if not seen.command_is_zero:
+    if not evidence.command_is_zero:
         return "the command is not zero"
     return ""
 
 
-def _loss(seen: Evidence, limits: ArmingLimits) -> str:
+def _loss(evidence: Evidence, limits: ArmingLimits) -> str:
     """Why the chassis counts as lost; "" if it does not. Feedback or status that never came is not a loss:
     arming waits for it."""
-    if seen.link_error:
-        return seen.link_error
+    if evidence.link_error:
+        return evidence.link_error
     for what, stamp_ns, limit_ns in (
-        ("motion feedback", seen.feedback_ns, limits.feedback_timeout_ns),
-        ("status", seen.status_ns, limits.status_timeout_ns),
+        ("motion feedback", evidence.feedback_ns, limits.feedback_timeout_ns),
+        ("status", evidence.status_ns, limits.status_timeout_ns),
     ):
-        if stamp_ns is not None and seen.now_ns - stamp_ns > limit_ns:
-            return f"no {what} for {(seen.now_ns - stamp_ns) / NS_PER_MS:.0f} ms"
+        if stamp_ns is not None and evidence.now_ns - stamp_ns > limit_ns:
+            return f"no {what} for {(evidence.now_ns - stamp_ns) / NS_PER_MS:.0f} ms"
     return ""

@@ -22,7 +22,7 @@ def zero(now_ns: int) -> Setpoint:
 
 
 def due(last_ns: int | None, period_ns: int, now_ns: int) -> bool:
-    """What is sent every period_ns, last at last_ns (None: never), is to be sent now."""
+    """Whether something that is sent every period_ns, and was last sent at last_ns (None: never), is due."""
     return last_ns is None or not 0 <= now_ns - last_ns < COMMAND_EARLY * period_ns
 
 
@@ -34,8 +34,9 @@ class CommandLimits:
     max_yaw_rate_radps: float
     timeout_ns: int
 
-    def objection(self, setpoint: Setpoint | None, now_ns: int) -> str:
-        """Why this setpoint must stop the robot; "" if it need not. Too fast is no objection: fit() slows."""
+    def setpoint_error(self, setpoint: Setpoint | None, now_ns: int) -> str:
+        """Why this setpoint must stop the robot; "" if it need not. A speed above the limits is no
+        error: fit() slows it down."""
         if setpoint is None:
             return ""
         if not (math.isfinite(setpoint.v_mps) and math.isfinite(setpoint.w_radps)):

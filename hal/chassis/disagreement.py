@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-_COMPARED_NS = 1_000_000_000
+_WINDOW_NS = 1_000_000_000
 
 
 class Disagreement:
     """sentence: "" while both agree, and until the first second is full.
 
-    what: the beginning of the sentence. unit: of both sums.
+    title: the beginning of the sentence. unit: of both sums.
     slack, ratio: the threshold is slack + ratio * |expected sum|.
     """
 
-    def __init__(self, what: str, unit: str, slack: float, ratio: float) -> None:
+    def __init__(self, title: str, unit: str, slack: float, ratio: float) -> None:
         self.sentence = ""
-        self._what = what
+        self._title = title
         self._unit = unit
         self._slack = slack
         self._ratio = ratio
         self._measured = 0.0
         self._expected = 0.0
-        self._since_ns: int | None = None
+        self._window_start_ns: int | None = None
 
     def expect(self, amount: float) -> None:
         """Add a motion that the reference sensor reported."""
@@ -28,15 +28,15 @@ class Disagreement:
 
     def compare(self, amount: float, now_ns: int) -> None:
         """Add a motion that the other sensor reported up to now_ns; once a second, compare the sums."""
-        if self._since_ns is None:
+        if self._window_start_ns is None:
             self.restart(now_ns)
         self._measured += amount
-        if self._since_ns is None or now_ns - self._since_ns < _COMPARED_NS:
+        if self._window_start_ns is None or now_ns - self._window_start_ns < _WINDOW_NS:
             return
-        apart = abs(self._measured - self._expected)
+        difference = abs(self._measured - self._expected)
         self.sentence = (
-            f"{self._what}: {self._measured:.2f} {self._unit} against {self._expected:.2f} {self._unit}"
-            if apart > self._slack + self._ratio * abs(self._expected)
+            f"{self._title}: {self._measured:.2f} {self._unit} against {self._expected:.2f} {self._unit}"
+            if difference > self._slack + self._ratio * abs(self._expected)
             else ""
         )
         self.restart(now_ns)
@@ -44,4 +44,4 @@ class Disagreement:
     def restart(self, now_ns: int) -> None:
         """Restart the comparison from here, because one of the sensors restarted."""
         self._measured = self._expected = 0.0
-        self._since_ns = now_ns
+        self._window_start_ns = now_ns

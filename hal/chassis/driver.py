@@ -1,6 +1,6 @@
 """What all chassis drivers share: arming, a link that may be lost, and the final check of the command.
 
-A driver adds its protocol in four methods: _listen, _speak, _speak_stop and _begin_arming. The first three
+A driver adds its protocol in four methods: _receive, _send, _send_stop and _begin_arming. The first three
 may raise LinkLost, which is handled here: exchange(), arm() and stop() never raise.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Protocol, Self
 
-from hal.api import Closing
+from hal.api import Device
 from hal.chassis import arming
 from hal.chassis.arming import Arming, ArmingLimits, Evidence
 from hal.chassis.command import CommandLimits, is_zero, zero
@@ -28,14 +28,14 @@ from hal.types import ChassisState, PlanarPose, Setpoint
 _RETRY_NS = 500 * NS_PER_MS
 
 # How often arm() reads while bytes keep coming. Each read takes at most as much as one exchange does.
-_MOST_READS = 32
+_MAX_READS = 32
 
 
-class Told(Protocol):
+class ChassisFeedback(Protocol):
     """What the base has reported. hal.types.ChassisState and arming.Evidence describe the fields.
 
     pose_ns: the time for which pose holds; None while there is no pose.
-    silence: what came instead of a status, and what to check.
+    silence_hint: what came instead of a status, and what to check.
     """
 
     @property
@@ -43,11 +43,11 @@ class Told(Protocol):
     @property
     def status_ns(self) -> int | None: ...
     @property
-    def disobeys(self) -> str: ...
+    def command_refusal(self) -> str: ...
     @property
     def stop_cause(self) -> str: ...
     @property
-    def silence(self) -> str: ...
+    def silence_hint(self) -> str: ...
     @property
     def v_mps(self) -> float: ...
     @property
@@ -67,24 +67,26 @@ class Told(Protocol):
 class ChassisDriver(ABC):
     """hal.api.Chassis without the protocol."""
 
-    def __init__(self, link: Closing, told: Told, commands: CommandLimits, limits: ArmingLimits) -> None:
-        self._closing = link
-        self._told = told
+    def __init__(
+        self, link: Device, feedback: ChassisFeedback, commands: CommandLimits, limits: ArmingLimits
+    ) -> None:
+        self._device = link
+        self._reported = feedback
         self._commands = commands
         self._limits = limits
         self._arming = Arming()
         self._following = Following()
         self._rolling_back = RollingBack()
-        self._may_go_back = True
-        self._asked: Setpoint | None = None
-        self._objection = ""
+        self._reverse_allowed = True
+        self._requested: Setpoint | None = None
+        self._setpoint_error = ""
         self._link_error = ""
         self._retry_ns: int | None = None
         self._now_ns = 0
 
     def __enter__(self) -> Self:
         """Open the link. Raises DeviceNotFound, DeviceRefused."""
-        self._closing.__enter__()
+        self._device.__enter__()
         return self
 
     def __exit__(
@@ -93,53 +95,53 @@ class ChassisDriver(ABC):
         try:
             self.stop(self._now_ns)
         finally:
-            self._closing.__exit__(kind, error, trace)
+            self._device.__exit__(kind, error, trace)
 
     def exchange(self, setpoint: Setpoint | None, now_ns: int) -> ChassisState:
         """See hal.api.Chassis. sent is the setpoint limited to what the base can do, before it is rounded to
         the resolution of the protocol."""
         self._now_ns = now_ns
-        self._asked = setpoint
-        self._objection = self._commands.objection(setpoint, now_ns)
-        self._hear(now_ns)
-        self._following.step(self._told.pose, now_ns)
-        self._rolling_back.step(self._told.pose, now_ns, expected=self._may_go_back)
+        self._requested = setpoint
+        self._setpoint_error = self._commands.setpoint_error(setpoint, now_ns)
+        self._poll_link(now_ns)
+        self._following.step(self._reported.pose, now_ns)
+        self._rolling_back.step(self._reported.pose, now_ns, expected=self._reverse_allowed)
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
         command = self._commands.fit(setpoint, now_ns) if self._arming.may_move else zero(now_ns)
         # While not armed, the base may be pushed, or driven by somebody else.
         self._following.ordered(command if self._arming.may_move else None)
-        self._may_go_back = command.v_mps < 0.0 or not self._arming.may_move
-        return self._state(now_ns, self._say(command, now_ns))
+        self._reverse_allowed = command.v_mps < 0.0 or not self._arming.may_move
+        return self._state(now_ns, self._send_unless_lost(command, now_ns))
 
     def arm(self, now_ns: int) -> None:
         """See hal.api.Chassis. The reason of a refusal is in the state's reason."""
         self._now_ns = now_ns
         # Read everything first: bytes of unknown age in the port must not count as an answer to this consent.
-        unread = all(self._hear(now_ns) for _ in range(_MOST_READS))
+        input_overflow = all(self._poll_link(now_ns) for _ in range(_MAX_READS))
         before = self._arming.mode
-        seen = replace(self._evidence(now_ns), unread=unread)
-        self._arming = arming.consent(self._arming, seen, self._limits)
+        evidence = replace(self._evidence(now_ns), input_overflow=input_overflow)
+        self._arming = arming.consent(self._arming, evidence, self._limits)
         if self._arming.mode is not before:
             self._begin_arming()
 
     def stop(self, now_ns: int) -> None:
         """See hal.api.Chassis."""
         self._now_ns = now_ns
-        self._arming = arming.release(self._arming, now_ns)
+        self._arming = arming.disarm(self._arming, now_ns)
         try:  # Also on a lost link: it may work again.
-            self._speak_stop(now_ns)
+            self._send_stop(now_ns)
         except LinkLost as error:
-            self._lose(error, now_ns)
+            self._handle_loss(error, now_ns)
 
     @abstractmethod
-    def _listen(self, now_ns: int) -> bool:
+    def _receive(self, now_ns: int) -> bool:
         """Read and keep what has arrived, without waiting and up to a maximum; return whether anything had.
 
         Must use the link every time, so that a link that works again is noticed. May raise LinkLost.
         """
 
     @abstractmethod
-    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+    def _send(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         """Send what is due; return the motion command that was sent, None if none was due. May raise
         LinkLost.
 
@@ -147,92 +149,92 @@ class ChassisDriver(ABC):
         """
 
     @abstractmethod
-    def _speak_stop(self, now_ns: int) -> None:
+    def _send_stop(self, now_ns: int) -> None:
         """Send an explicit zero, then standby, now. May raise LinkLost."""
 
     @abstractmethod
     def _begin_arming(self) -> None:
-        """Arming begins: forget what the base said before about obeying commands."""
+        """Arming begins: forget what the base reported before about taking commands."""
 
     def _resettable(self) -> bool:
         """Whether the base keeps its stop cause until arming resets it."""
         return False
 
-    def _no_feedback(self) -> str:
-        """For a base that sent a status but no motion feedback: what came instead, and what to do; "" if that
+    def _missing_feedback(self) -> str:
+        """If the base sent a status but no motion feedback: what came instead, and what to do; "" if that
         is unknown."""
         return ""
 
-    def _silence(self) -> str:
-        if self._told.status_ns is None:
-            return self._told.silence
-        return self._no_feedback() if self._told.feedback_ns is None else ""
+    def _silence_hint(self) -> str:
+        if self._reported.status_ns is None:
+            return self._reported.silence_hint
+        return self._missing_feedback() if self._reported.feedback_ns is None else ""
 
-    def _hear(self, now_ns: int) -> bool:
+    def _poll_link(self, now_ns: int) -> bool:
         """Read from the link, unless it is lost and not yet due to be tried again; return whether anything
         came."""
-        if self._link_error and not self._tries_again(now_ns):
+        if self._link_error and not self._retry_due(now_ns):
             return False
         try:
-            heard = self._listen(now_ns)
+            received = self._receive(now_ns)
         except LinkLost as error:
-            self._lose(error, now_ns)
+            self._handle_loss(error, now_ns)
             return False
         self._link_error = ""
-        return heard
+        return received
 
-    def _tries_again(self, now_ns: int) -> bool:
+    def _retry_due(self, now_ns: int) -> bool:
         """Whether a lost link is due to be tried again. The waiting time begins with the first exchange after
         the last try, because only then the end of that try is known."""
         if self._retry_ns is None:
             self._retry_ns = now_ns + _RETRY_NS
         return now_ns >= self._retry_ns
 
-    def _say(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+    def _send_unless_lost(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         if self._link_error:
             return None
         try:
-            return self._speak(command, now_ns)
+            return self._send(command, now_ns)
         except LinkLost as error:
-            self._lose(error, now_ns)
+            self._handle_loss(error, now_ns)
             return None
 
-    def _lose(self, error: LinkLost, now_ns: int) -> None:
+    def _handle_loss(self, error: LinkLost, now_ns: int) -> None:
         """Step the arming machine at once, so that the state of this same exchange says lost."""
         self._link_error = str(error)
         self._retry_ns = None
         self._arming = arming.step(self._arming, self._evidence(now_ns), self._limits)
 
     def _evidence(self, now_ns: int) -> Evidence:
-        told = self._told
+        feedback = self._reported
         return Evidence(
             now_ns=now_ns,
             link_error=self._link_error,
-            feedback_ns=told.feedback_ns,
-            status_ns=told.status_ns,
-            disobeys=told.disobeys,
-            stop_cause=told.stop_cause
-            or self._objection
+            feedback_ns=feedback.feedback_ns,
+            status_ns=feedback.status_ns,
+            command_refusal=feedback.command_refusal,
+            stop_cause=feedback.stop_cause
+            or self._setpoint_error
             or self._rolling_back.sentence
             or self._following.sentence,
-            standing=told.standing,
-            command_is_zero=is_zero(self._asked),
-            silence=self._silence(),
+            standing=feedback.standing,
+            command_is_zero=is_zero(self._requested),
+            silence_hint=self._silence_hint(),
             resettable=self._resettable(),
         )
 
     def _state(self, now_ns: int, sent: Setpoint | None) -> ChassisState:
-        told = self._told
+        feedback = self._reported
         return ChassisState(
             stamp_ns=now_ns,
             mode=self._arming.mode,
             reason=self._arming.reason,
-            feedback_ns=told.feedback_ns,
-            v_mps=told.v_mps,
-            w_radps=told.w_radps,
+            feedback_ns=feedback.feedback_ns,
+            v_mps=feedback.v_mps,
+            w_radps=feedback.w_radps,
             pose=self._pose_now(now_ns),
-            battery_v=told.battery_v,
-            faults=told.faults,
+            battery_v=feedback.battery_v,
+            faults=feedback.faults,
             sent=sent,
         )
 
@@ -242,8 +244,12 @@ class ChassisDriver(ABC):
         Feedback may come less often than exchanges, and consecutive poses must not stand still and then jump.
         Beyond the feedback's time limit the motion is unknown, and the pose is not extrapolated further.
         """
-        told = self._told
-        if told.pose_ns is None or math.isnan(told.v_mps):
-            return told.pose
-        age_ns = min(max(now_ns - told.pose_ns, 0), self._limits.feedback_timeout_ns)
-        return advance_pose(told.pose, told.v_mps, told.w_radps, age_ns / NS_PER_S) if age_ns else told.pose
+        feedback = self._reported
+        if feedback.pose_ns is None or math.isnan(feedback.v_mps):
+            return feedback.pose
+        age_ns = min(max(now_ns - feedback.pose_ns, 0), self._limits.feedback_timeout_ns)
+        return (
+            advance_pose(feedback.pose, feedback.v_mps, feedback.w_radps, age_ns / NS_PER_S)
+            if age_ns
+            else feedback.pose
+        )

@@ -16,7 +16,7 @@ _JUMP_RATIO = 1.5
 _JUMP_SLACK_M = 0.05
 
 # How far a track may deviate from its last speed between two answers, by stopping or rolling back.
-_COURSE_SLACK_M = 0.01
+_STEP_SLACK_M = 0.01
 
 # Below these the base stands still.
 _STANDING_MPS = 0.005
@@ -24,24 +24,24 @@ _STANDING_RADPS = 0.01
 
 
 class EncoderFeedback:
-    """The part of hal.chassis.driver.Told that comes from the counters. Speed is the counter step divided by
-    the time between two answers.
+    """The part of hal.chassis.driver.ChassisFeedback that comes from the counters. Speed is the counter step
+    divided by the time between two answers.
 
-    signs: +1 or -1 for (left, right), the sign of counts that mean ahead. fastest_mps: maximum track speed.
+    signs: +1 or -1 for (left, right), the sign of counts that mean ahead. max_track_mps: maximum track speed.
     """
 
     def __init__(
-        self, geometry: TrackGeometry, counts_per_m: float, signs: tuple[int, int], fastest_mps: float
+        self, geometry: TrackGeometry, counts_per_m: float, signs: tuple[int, int], max_track_mps: float
     ) -> None:
         self._geometry = geometry
         self._counts_per_m = counts_per_m
         self._signs = signs
-        self._fastest_mps = fastest_mps
+        self._max_track_mps = max_track_mps
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter()
         self._restarted = False
-        self._wanted = False
-        self.bytes_heard = 0
+        self._setup_requested = False
+        self.bytes_received = 0
         self.pose_ns: int | None = None
         self.feedback_ns: int | None = None
         self.status_ns: int | None = None
@@ -62,24 +62,24 @@ class EncoderFeedback:
 
     def await_setup(self) -> None:
         """Arming begins: earlier settings are no longer trusted; they must be set and read back."""
-        self._wanted = True
+        self._setup_requested = True
         self._restarted = False
 
     def forget_setup(self) -> None:
         """The controller is no longer asked to take commands."""
-        self._wanted = False
+        self._setup_requested = False
 
-    def _count(self, left: int, right: int, asked_ns: int, now_ns: int) -> None:
-        """Take in both counters: asked for at asked_ns, answered at now_ns."""
-        last_ns, self.pose_ns = self.pose_ns, asked_ns
-        elapsed_s = 0.0 if last_ns is None else (asked_ns - last_ns) / NS_PER_S
-        limit_m = _JUMP_RATIO * self._fastest_mps * elapsed_s + _JUMP_SLACK_M
+    def _take_counters(self, left: int, right: int, requested_ns: int, now_ns: int) -> None:
+        """Take in both counters: asked for at requested_ns, answered at now_ns."""
+        last_ns, self.pose_ns = self.pose_ns, requested_ns
+        elapsed_s = 0.0 if last_ns is None else (requested_ns - last_ns) / NS_PER_S
+        limit_m = _JUMP_RATIO * self._max_track_mps * elapsed_s + _JUMP_SLACK_M
         steps = self._counter.increments(
             left,
             right,
             limit_m * self._counts_per_m,
-            self._expected(elapsed_s),
-            _COURSE_SLACK_M * self._counts_per_m,
+            self._expected_counts(elapsed_s),
+            _STEP_SLACK_M * self._counts_per_m,
         )
         if steps is None:
             self._restarted = True
@@ -94,7 +94,7 @@ class EncoderFeedback:
         self.v_mps, self.w_radps = distance_m / elapsed_s, turn_rad / elapsed_s
         self.feedback_ns = now_ns
 
-    def _expected(self, elapsed_s: float) -> tuple[float, float]:
+    def _expected_counts(self, elapsed_s: float) -> tuple[float, float]:
         """Counts (left, right) in this time at the last measured speed; NaN while unknown."""
         left_mps, right_mps = self._geometry.to_tracks(self.v_mps, self.w_radps)
         counts = self._counts_per_m * elapsed_s

@@ -14,18 +14,20 @@ class FrameAge:
 
     def __init__(self) -> None:
         self._sender_ns = 0
-        self._least_ns: int | None = None
+        self._min_offset_ns: int | None = None
         self._now_ns = 0
 
     def restart(self) -> None:
         """The sender's clock restarted, or the waiting frames were discarded: the next frame has no age."""
-        self._least_ns = None
+        self._min_offset_ns = None
 
     def step(self, elapsed_ms: int, now_ns: int) -> int:
         """The age in ns of a frame that arrived at now_ns and was made elapsed_ms after the frame before."""
         self._sender_ns += elapsed_ms * NS_PER_MS
-        apart_ns = now_ns - self._sender_ns
-        since_ns, self._now_ns = now_ns - self._now_ns, now_ns
-        least_ns = apart_ns if self._least_ns is None else self._least_ns + since_ns // _DRIFT
-        self._least_ns = min(apart_ns, least_ns)
-        return apart_ns - self._least_ns
+        offset_ns = now_ns - self._sender_ns
+        elapsed_ns, self._now_ns = now_ns - self._now_ns, now_ns
+        min_offset_ns = (
+            offset_ns if self._min_offset_ns is None else self._min_offset_ns + elapsed_ns // _DRIFT
+        )
+        self._min_offset_ns = min(offset_ns, min_offset_ns)
+        return offset_ns - self._min_offset_ns

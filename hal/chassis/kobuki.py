@@ -33,7 +33,7 @@ class KobukiChassis(ChassisDriver):
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             status_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
-            stall_ns=config.base_timeout_ms * NS_PER_MS,
+            max_step_gap_ns=config.base_timeout_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits)
         self._link = link
@@ -44,27 +44,27 @@ class KobukiChassis(ChassisDriver):
         self._motion_sent_ns: int | None = None
         self._moving = False
 
-    def _listen(self, now_ns: int) -> bool:
+    def _receive(self, now_ns: int) -> bool:
         arrived = read_all(self._link)
-        self._feedback.bytes_heard += len(arrived)
+        self._feedback.bytes_received += len(arrived)
         for payload in self._reader.feed(arrived):
-            told = parse(payload)
-            if told is not None:
-                self._feedback.take(told, now_ns)
+            feedback = parse(payload)
+            if feedback is not None:
+                self._feedback.take(feedback, now_ns)
         return bool(arrived)
 
-    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
-        stops = self._moving and is_zero(command)
-        if not (stops or due(self._motion_sent_ns, self._period_ns, now_ns)):
+    def _send(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        stopping = self._moving and is_zero(command)
+        if not (stopping or due(self._motion_sent_ns, self._period_ns, now_ns)):
             return None
-        fitted = self._fitted(command)
+        limited = self._limited(command)
         # The base turns by 1 / slip_factor of what its wheels say, so ask for slip_factor times as much.
-        self._link.write(base_control(fitted.v_mps, fitted.w_radps * self._geometry.slip_factor))
+        self._link.write(base_control(limited.v_mps, limited.w_radps * self._geometry.slip_factor))
         self._motion_sent_ns = now_ns
         self._moving = not is_zero(command)
-        return fitted
+        return limited
 
-    def _speak_stop(self, now_ns: int) -> None:
+    def _send_stop(self, now_ns: int) -> None:
         self._feedback.forget_setup()
         self._link.write(base_control(0.0, 0.0))
         self._motion_sent_ns = now_ns
@@ -73,11 +73,11 @@ class KobukiChassis(ChassisDriver):
     def _begin_arming(self) -> None:
         self._feedback.await_setup()
 
-    def _fitted(self, command: Setpoint) -> Setpoint:
+    def _limited(self, command: Setpoint) -> Setpoint:
         """The command, scaled down so that no wheel is too fast."""
-        wanted = self._geometry.to_tracks(command.v_mps, command.w_radps)
-        fitted = scale_to_fit(*wanted, KOBUKI_TOP_SPEED_MPS, KOBUKI_TOP_SPEED_MPS)
-        if fitted == wanted:
+        requested = self._geometry.to_tracks(command.v_mps, command.w_radps)
+        limited = scale_to_fit(*requested, KOBUKI_TOP_SPEED_MPS, KOBUKI_TOP_SPEED_MPS)
+        if limited == requested:
             return command
-        v_mps, w_radps = self._geometry.to_twist(*fitted)
+        v_mps, w_radps = self._geometry.to_twist(*limited)
         return replace(command, v_mps=v_mps, w_radps=w_radps)

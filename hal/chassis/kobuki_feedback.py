@@ -8,10 +8,10 @@ from config.chassis import KobukiChassisConfig
 from hal.chassis.disagreement import Disagreement
 from hal.chassis.frame_age import FrameAge
 from hal.chassis.kobuki_packets import (
+    CHARGER_OFF_CABLE,
+    CHARGER_ON_CABLE,
     CLOCK_BITS,
     ENCODER_BITS,
-    OFF_CABLE,
-    STANDING_ON_CABLE,
     TICK_M,
     WHEEL_BASE_M,
     Core,
@@ -46,7 +46,7 @@ _BATTERY_LOW_V, _BATTERY_DANGEROUS_V = 14.0, 13.2
 # How much more time may have passed between two frames by the base's clock than by ours. Frames wait in
 # buffers: less may have passed for the base (but not less than none), and more only by the time that the
 # earlier frame had waited, which is always less than this.
-_CLOCKS_APART_MS = 500
+_MAX_CLOCK_LEAD_MS = 500
 
 
 class KobukiFeedback:
@@ -66,7 +66,7 @@ class KobukiFeedback:
         self._reckoning = DeadReckoning()
         self._counter = TrackCounter(ENCODER_BITS)
         self._core: Core | None = None
-        self._counted: Core | None = None  # the frame that the next one continues
+        self._previous: Core | None = None  # the frame that the next one continues
         self._angle_rad: float | None = None
         self._disagreement = Disagreement(
             "gyro and wheels disagree", "rad", _DISAGREEMENT_RAD, _DISAGREEMENT_RATIO
@@ -74,8 +74,8 @@ class KobukiFeedback:
         self._age = FrameAge()
         self._arrived_ns = 0
         self._restarted = False
-        self._wanted = False
-        self.bytes_heard = 0
+        self._setup_requested = False
+        self.bytes_received = 0
         self.pose_ns: int | None = None
         self.feedback_ns: int | None = None
         self.v_mps = math.nan
@@ -103,18 +103,18 @@ class KobukiFeedback:
         return math.nan if self._core is None else self._core.battery_v
 
     @property
-    def disobeys(self) -> str:
+    def command_refusal(self) -> str:
         """A Kobuki always takes commands, so this tells only whether it restarted since it was armed."""
-        if not self._wanted:
+        if not self._setup_requested:
             return "nobody asked it to"
         return "its clock or its ticks jumped: restarted" if self._restarted else ""
 
     @property
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of a frame with the basic sensors, and what to check."""
-        if self.bytes_heard == 0:
+        if self.bytes_received == 0:
             return "not one byte came; check port, power and the switch on the base"
-        return f"{self.bytes_heard} bytes came, no frame of a Kobuki; check port and baud (115200)"
+        return f"{self.bytes_received} bytes came, no frame of a Kobuki; check port and baud (115200)"
 
     @property
     def stop_cause(self) -> str:
@@ -123,13 +123,13 @@ class KobukiFeedback:
         if core is None:
             return ""
         causes = [
-            *_named("bumper pressed", core.bumper, _SIDES),
-            *_named("cliff", core.cliff, _SIDES),
-            *_named("wheel dropped", core.wheel_drop, _WHEELS),
+            *_named_bits("bumper pressed", core.bumper, _SIDES),
+            *_named_bits("cliff", core.cliff, _SIDES),
+            *_named_bits("wheel dropped", core.wheel_drop, _WHEELS),
         ]
-        if core.charger in STANDING_ON_CABLE:
+        if core.charger in CHARGER_ON_CABLE:
             causes.append("the charging cable is plugged in")
-        elif core.charger not in OFF_CABLE:
+        elif core.charger not in CHARGER_OFF_CABLE:
             causes.append(f"unknown state {core.charger} of the charger")
         if self._disagreement.sentence and not causes:
             return self._disagreement.sentence
@@ -141,45 +141,45 @@ class KobukiFeedback:
         core = self._core
         if core is None:
             return ()
-        return _battery_faults(core.battery_v) + _named(
+        return _battery_faults(core.battery_v) + _named_bits(
             "error: motor over-current", core.over_current, _MOTORS
         )
 
     def await_setup(self) -> None:
         """Arming begins: what is reported from now on need not continue what waited in buffers before."""
-        self._wanted = True
+        self._setup_requested = True
         self._restarted = False
-        self._counted = None
+        self._previous = None
         self._counter = TrackCounter(ENCODER_BITS)
         self._age.restart()
 
     def forget_setup(self) -> None:
         """The base is no longer asked to take commands."""
-        self._wanted = False
+        self._setup_requested = False
 
-    def take(self, told: Feedback, now_ns: int) -> None:
+    def take(self, frame: Feedback, now_ns: int) -> None:
         """Take in one frame that arrived at now_ns."""
-        if told.currents_a is not None:
-            self.currents_a = told.currents_a
-        if told.core is not None:
-            self._count(told.core, told.inertia, now_ns)
+        if frame.currents_a is not None:
+            self.currents_a = frame.currents_a
+        if frame.core is not None:
+            self._take_core(frame.core, frame.inertia, now_ns)
 
-    def _count(self, core: Core, inertia: Inertia | None, now_ns: int) -> None:
-        last, self._core, self._counted = self._counted, core, core
+    def _take_core(self, core: Core, inertia: Inertia | None, now_ns: int) -> None:
+        last, self._core, self._previous = self._previous, core, core
         last_ns, self._arrived_ns = self._arrived_ns, now_ns
         last_rad, self._angle_rad = self._angle_rad, None if inertia is None else inertia.angle_rad
         elapsed_ms = 0
         if last is not None:
             elapsed_ms = wrapped_difference(core.clock_ms, last.clock_ms, CLOCK_BITS)
-            most_ms = (now_ns - last_ns) / NS_PER_MS + _CLOCKS_APART_MS
-            if not 0 <= elapsed_ms <= most_ms:
-                self._jumped(core, now_ns)
+            max_ms = (now_ns - last_ns) / NS_PER_MS + _MAX_CLOCK_LEAD_MS
+            if not 0 <= elapsed_ms <= max_ms:
+                self._handle_restart(core, now_ns)
                 return
         self.pose_ns = now_ns - self._age.step(elapsed_ms, now_ns)
-        limit_m = _JUMP_RATIO * self._fastest_mps() * abs(elapsed_ms) / 1000.0 + _JUMP_SLACK_M
+        limit_m = _JUMP_RATIO * self._max_wheel_mps() * abs(elapsed_ms) / 1000.0 + _JUMP_SLACK_M
         steps = self._counter.increments(core.left_ticks, core.right_ticks, limit_m / TICK_M)
         if steps is None:
-            self._jumped(core, now_ns)
+            self._handle_restart(core, now_ns)
             return
         if elapsed_ms <= 0:
             return
@@ -196,7 +196,7 @@ class KobukiFeedback:
         self.v_mps = distance_m / elapsed_s
         self.feedback_ns = self.pose_ns
 
-    def _jumped(self, core: Core, now_ns: int) -> None:
+    def _handle_restart(self, core: Core, now_ns: int) -> None:
         """The base restarted: the motion since the last frame is unknown, and counting starts anew."""
         self._restarted = True
         self.pose_ns = now_ns
@@ -206,12 +206,12 @@ class KobukiFeedback:
         self._counter.increments(core.left_ticks, core.right_ticks, math.inf)
         self.v_mps = self.w_radps = math.nan
 
-    def _fastest_mps(self) -> float:
+    def _max_wheel_mps(self) -> float:
         config = self._config
         return config.max_speed_mps + self._geometry.to_tracks(0.0, config.max_yaw_rate_radps)[1]
 
 
-def _named(what: str, bits: int, names: tuple[str, ...]) -> tuple[str, ...]:
+def _named_bits(what: str, bits: int, names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(
         f"{what} ({names[bit] if bit < len(names) else f'unknown bit {bit}'})"
         for bit in range(8)

@@ -31,12 +31,12 @@ _LENGTHS: Mapping[int, int] = MappingProxyType({_CORE: 15, 3: 3, _INERTIA: 7, 5:
 
 _STRAIGHT_RADPS = 1e-4
 # With a radius up to this the base turns on the spot.
-_SPIN_M = 1e-3
+_MAX_SPIN_RADIUS_M = 1e-3
 _INT16 = 32_767
 
 # Values of Core.charger: while the charging cable is plugged in, and without it (in the dock or off it).
-STANDING_ON_CABLE = (18, 22)
-OFF_CABLE = (0, 2, 6)
+CHARGER_ON_CABLE = (18, 22)
+CHARGER_OFF_CABLE = (0, 2, 6)
 
 
 def base_control(v_mps: float, w_radps: float) -> bytes:
@@ -59,7 +59,7 @@ def _speed_and_radius(v_mps: float, w_radps: float) -> tuple[int, int]:
     if abs(w_radps) < _STRAIGHT_RADPS or abs(v_mps) > 1e-3 * _INT16 * abs(w_radps):
         return _int16(1000.0 * v_mps), 0
     half_mm = 1000.0 * WHEEL_BASE_M / 2.0
-    if abs(v_mps) <= _SPIN_M * abs(w_radps) or abs(v_mps) < 1e-4:
+    if abs(v_mps) <= _MAX_SPIN_RADIUS_M * abs(w_radps) or abs(v_mps) < 1e-4:
         return _int16(half_mm * w_radps), 1
     radius_mm = 1000.0 * v_mps / w_radps
     outer_mm = radius_mm + math.copysign(half_mm, radius_mm)
@@ -68,8 +68,8 @@ def _speed_and_radius(v_mps: float, w_radps: float) -> tuple[int, int]:
 
 def _int16(value: float) -> int:
     """value, rounded (a half towards zero) and clamped to int16."""
-    held = min(max(value, -_INT16), _INT16)
-    return int(math.copysign(math.ceil(abs(held) - 0.5), held))
+    clamped = min(max(value, -_INT16), _INT16)
+    return int(math.copysign(math.ceil(abs(clamped) - 0.5), clamped))
 
 
 @dataclass(frozen=True, slots=True)

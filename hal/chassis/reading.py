@@ -7,8 +7,8 @@ from hal.api import SerialLink
 
 # Maximum for one exchange. A line at 115200 baud carries 230 bytes in 20 ms; much more is a flood, which must
 # not hold up the control loop.
-_MOST_BYTES = 16_384
-_MOST_READS = 256
+_MAX_BYTES = 16_384
+_MAX_READS = 256
 
 
 def read_all(link: SerialLink) -> bytes:
@@ -17,9 +17,9 @@ def read_all(link: SerialLink) -> bytes:
     Raises LinkLost; then the bytes that were read before are lost, too.
     """
     arrived = bytearray()
-    for _ in range(_MOST_READS):
+    for _ in range(_MAX_READS):
         data = link.read()
         arrived += data
-        if not data or len(arrived) >= _MOST_BYTES:
+        if not data or len(arrived) >= _MAX_BYTES:
             break
     return bytes(arrived)

@@ -47,7 +47,7 @@ _SETTINGS = frozenset({packets.SET_TIMEOUT, packets.GET_TIMEOUT})
 
 # Turns of zeros and queries before a setting without an answer is repeated: encoders and status must not grow
 # old in the meantime.
-_TURNS_BETWEEN = 4
+_RETRY_TURNS = 4
 
 
 class RoboclawChassis(ChassisDriver):
@@ -66,7 +66,7 @@ class RoboclawChassis(ChassisDriver):
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             status_timeout_ns=config.status_timeout_ms * NS_PER_MS,
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
-            stall_ns=config.timeout_ms * NS_PER_MS,
+            max_step_gap_ns=config.timeout_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits)
         self._config = config
@@ -77,33 +77,33 @@ class RoboclawChassis(ChassisDriver):
         self._setup: deque[Request] = deque()
         self._turns_before_setup = 0
         self._queries = cycle(_QUERIES)
-        self._queries_turn = False
-        self._heeded = True
+        self._query_turn = False
+        self._motion_acknowledged = True
         self._moving = False
 
-    def _listen(self, now_ns: int) -> bool:
-        before = self._port.bytes_heard
+    def _receive(self, now_ns: int) -> bool:
+        received_before = self._port.bytes_received
         answer = self._port.poll(now_ns)
-        self._feedback.bytes_heard = self._port.bytes_heard
+        self._feedback.bytes_received = self._port.bytes_received
         if answer is not None:
             self._take(answer, now_ns)
-        return self._port.bytes_heard > before
+        return self._port.bytes_received > received_before
 
     def _take(self, answer: Answer, now_ns: int) -> None:
         if answer.request.command == packets.RAMPED_SPEEDS:
-            self._heeded = answer.data is not None
+            self._motion_acknowledged = answer.data is not None
         if answer.request.command in _SETTINGS:
             self._feedback.note_setting(answer.request.command, answer.data is not None)
         if answer.data is not None:
-            self._feedback.take(answer.request.command, answer.data, answer.asked_ns, now_ns)
+            self._feedback.take(answer.request.command, answer.data, answer.requested_ns, now_ns)
         elif answer.request.command in _SETTINGS and self._arming.mode is ChassisMode.ARMING:
             self._setup.appendleft(answer.request)
-            self._turns_before_setup = _TURNS_BETWEEN
+            self._turns_before_setup = _RETRY_TURNS
 
-    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+    def _send(self, command: Setpoint, now_ns: int) -> Setpoint | None:
         if not self._port.idle(now_ns):
             return None
-        stops = self._moving and is_zero(command)
+        stopping = self._moving and is_zero(command)
         if self._arming.mode is not ChassisMode.ARMING:
             # Left over from an arming that a lost link or a fault ended; the consent ended with it.
             self._setup.clear()
@@ -111,13 +111,13 @@ class RoboclawChassis(ChassisDriver):
             self._port.start(self._setup.popleft(), now_ns)
             return None
         self._turns_before_setup = max(0, self._turns_before_setup - 1)
-        self._queries_turn = not self._queries_turn and not stops and self._heeded
-        if self._queries_turn:
+        self._query_turn = not self._query_turn and not stopping and self._motion_acknowledged
+        if self._query_turn:
             self._port.start(next(self._queries), now_ns)
             return None
         return self._send_motion(command, now_ns)
 
-    def _speak_stop(self, now_ns: int) -> None:
+    def _send_stop(self, now_ns: int) -> None:
         # The zero does not wait for an answer that is under way; the controller takes packets in order.
         self._port.abandon(now_ns)
         self._feedback.forget_setup()
@@ -132,13 +132,13 @@ class RoboclawChassis(ChassisDriver):
 
     def _send_motion(self, command: Setpoint, now_ns: int) -> Setpoint:
         config, limit = self._config, self._max_track_mps
-        wanted = self._geometry.to_tracks(command.v_mps, command.w_radps)
-        left_mps, right_mps = fitted = scale_to_fit(*wanted, limit, limit)
+        requested = self._geometry.to_tracks(command.v_mps, command.w_radps)
+        left_mps, right_mps = limited = scale_to_fit(*requested, limit, limit)
         left_qpps = config.left_sign * left_mps * config.counts_per_m
         right_qpps = config.right_sign * right_mps * config.counts_per_m
         self._port.start(packets.ramped_speeds(config.accel_qpps2, left_qpps, right_qpps), now_ns)
         self._moving = not is_zero(command)
-        if fitted == wanted:
+        if limited == requested:
             return command
         v_mps, w_radps = self._geometry.to_twist(left_mps, right_mps)
         return replace(command, v_mps=v_mps, w_radps=w_radps)

@@ -35,10 +35,10 @@ class RoboclawFeedback(EncoderFeedback):
         self._unanswered: int | None = None
 
     @property
-    def disobeys(self) -> str:
+    def command_refusal(self) -> str:
         """Why the controller must not be driven: its time-out is not what was set, or it restarted; "" if it
         may be."""
-        if not self._wanted:
+        if not self._setup_requested:
             return "nobody asked it to"
         if self._restarted:
             return "its encoders jumped: restarted"
@@ -51,15 +51,15 @@ class RoboclawFeedback(EncoderFeedback):
         return f"its time-out reads {self._timeout_ms} ms, not {self._config.timeout_ms} ms"
 
     @property
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of a status, and what to check."""
-        if self.bytes_heard == 0:
+        if self.bytes_received == 0:
             return (
                 f"not one byte came; check port, power, baud, address 0x{self._config.address:X} and that "
                 "packet serial is on"
             )
         return (
-            f"{self.bytes_heard} bytes came, none a status with a right checksum; "
+            f"{self.bytes_received} bytes came, none a status with a right checksum; "
             f"check baud, address 0x{self._config.address:X} and that it is a RoboClaw"
         )
 
@@ -89,11 +89,11 @@ class RoboclawFeedback(EncoderFeedback):
         elif self._unanswered == command:
             self._unanswered = None
 
-    def take(self, command: int, data: bytes, asked_ns: int, now_ns: int) -> None:
-        """Take in the valid answer to a request that was written at asked_ns."""
+    def take(self, command: int, data: bytes, requested_ns: int, now_ns: int) -> None:
+        """Take in the valid answer to a request that was written at requested_ns."""
         match command:
             case packets.ENCODERS:
-                self._count(*packets.encoders(data), asked_ns, now_ns)
+                self._take_counters(*packets.encoders(data), requested_ns, now_ns)
             case packets.STATUS:
                 self._status, self.status_ns = packets.status(data), now_ns
             case packets.GET_TIMEOUT:

@@ -62,12 +62,13 @@ class Request:
 
 
 def set_timeout(timeout_ms: int) -> Request:
-    """Stop the motors by yourself after so long without a packet; rounded to 100 ms, 100..25500."""
+    """The request that the controller stops the motors after this time without a packet; rounded to 100 ms,
+    100..25500."""
     return Request(SET_TIMEOUT, bytes((min(max(round(timeout_ms / 100), 1), 255),)))
 
 
 def speeds(left_qpps: float, right_qpps: float) -> Request:
-    """Both motors to these speeds at once, without a ramp. Rounded and held at int32."""
+    """Both motors to these speeds at once, without a ramp. Rounded and clamped to int32."""
     return Request(SPEEDS, struct.pack(">ii", _int32(left_qpps), _int32(right_qpps)))
 
 
@@ -86,30 +87,30 @@ STATUS_REQUEST = Request(STATUS, reply_lengths=(4, 2))
 
 
 def timeout_ms(data: bytes) -> int:
-    """Of a reply to 15."""
+    """The time-out in a reply to command 15."""
     return data[0] * 100
 
 
 def main_battery_v(data: bytes) -> float:
-    """Of a reply to 24."""
+    """The voltage of the main battery in a reply to command 24."""
     return int.from_bytes(data, "big") / 10.0
 
 
 def currents_a(data: bytes) -> tuple[float, float]:
-    """Of a reply to 49: (left, right)."""
+    """The motor currents (left, right) in a reply to command 49."""
     left, right = struct.unpack(">hh", data)
     return left / 100.0, right / 100.0
 
 
 def encoders(data: bytes) -> tuple[int, int]:
-    """Of a reply to 78: (left, right), 32 bits that wrap around."""
+    """The encoder counts (left, right) in a reply to command 78; they wrap around at 32 bits."""
     left, right = struct.unpack(">II", data)
     return left, right
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """Of a reply to 90. errors stop the motors, or will; warnings do not."""
+    """The status in a reply to command 90. errors stop the motors, or will; warnings do not."""
 
     estop: bool
     errors: tuple[str, ...]
@@ -184,8 +185,8 @@ _STATUS_LAYOUTS: Mapping[int, _StatusLayout] = MappingProxyType(
 
 
 def status(data: bytes) -> Status:
-    """Of a reply to 90; the length tells which of the two layouts it is. A bit of neither table is an error:
-    what a newer firmware says with it is not known, and it may be that the motors stop."""
+    """Decode a reply to command 90; its length selects one of the two layouts. A bit without an entry counts
+    as an error: its meaning in a newer firmware is unknown, and it may stop the motors."""
     layout = _STATUS_LAYOUTS[len(data)]
     bits = int.from_bytes(data, "big")
     errors, warnings = [], []

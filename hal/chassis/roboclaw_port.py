@@ -22,17 +22,18 @@ class Answer:
     """The result of a request.
 
     data: None if no valid answer came.
-    asked_ns: when the request was written. The controller reads its encoders a few milliseconds later, long
-    before the answer is read here.
+    requested_ns: when the request was written. The controller reads its encoders a few milliseconds later,
+    long before the answer is read here.
     """
 
     request: Request
     data: bytes | None
-    asked_ns: int
+    requested_ns: int
 
 
 class RoboclawPort:
-    """A port that poll() steps; start() is allowed while idle. bytes_heard: all bytes that ever arrived."""
+    """A port that poll() steps; start() is allowed while idle. bytes_received: all bytes that ever
+    arrived."""
 
     def __init__(self, link: SerialLink, address: int) -> None:
         self._link = link
@@ -40,9 +41,9 @@ class RoboclawPort:
         self._request: Request | None = None
         self._sent_ns = 0
         self._received = bytearray()
-        self._heard_ns = 0
+        self._received_ns = 0
         self._quiet_until_ns = 0
-        self.bytes_heard = 0
+        self.bytes_received = 0
 
     def idle(self, now_ns: int) -> bool:
         """Whether no answer is awaited, and no period of silence is being kept."""
@@ -51,7 +52,7 @@ class RoboclawPort:
     def start(self, request: Request, now_ns: int) -> None:
         """Write the request. Raises LinkLost."""
         self._link.write(request.packet(self._address))
-        self._request, self._sent_ns, self._heard_ns = request, now_ns, now_ns
+        self._request, self._sent_ns, self._received_ns = request, now_ns, now_ns
         self._received.clear()
 
     def abandon(self, now_ns: int) -> None:
@@ -66,7 +67,7 @@ class RoboclawPort:
         Raises LinkLost.
         """
         arrived = read_all(self._link)
-        self.bytes_heard += len(arrived)
+        self.bytes_received += len(arrived)
         request = self._request
         if request is None:
             if arrived:  # Not asked for: noise, or an answer that came too late.
@@ -74,7 +75,7 @@ class RoboclawPort:
             return None
         if arrived:
             self._received += arrived
-            self._heard_ns = now_ns
+            self._received_ns = now_ns
         too_late = now_ns - self._sent_ns >= _REPLY_TIMEOUT_NS
         data = self._complete(request, now_ns, too_late)
         failed = len(self._received) >= request.longest_reply or too_late
@@ -92,7 +93,7 @@ class RoboclawPort:
         longer one. At the last poll its checksum decides, because there is no time left to wait for silence.
         """
         received = bytes(self._received)
-        silent = now_ns - self._heard_ns >= _SILENCE_NS
+        silent = now_ns - self._received_ns >= _SILENCE_NS
         if len(received) < request.longest_reply and not silent and not last_chance:
             return None
         return request.accept(self._address, received)

@@ -26,7 +26,7 @@ from hal.types import ChassisMode, Setpoint
 
 # Queries in between those of the counters, which take every second turn. ?FF and ?FM take every sixth each:
 # the status is as old as the older of the two. The watchdog is queried regularly because a restart clears it.
-_BETWEEN = (
+_OTHER_QUERIES = (
     lines.FAULT_FLAGS,
     lines.MOTOR_FLAGS,
     lines.WATCHDOG,
@@ -45,7 +45,7 @@ _REPLY_TIMEOUT_NS = 40 * NS_PER_MS
 _SILENCE_NS = 10 * NS_PER_MS
 
 # A base that still moves after this time of zero commands does not follow them: !EX cuts the motors.
-_DEFIANCE_NS = 3_000 * NS_PER_MS
+_STOP_TIMEOUT_NS = 3_000 * NS_PER_MS
 
 
 class RoboteqChassis(ChassisDriver):
@@ -63,7 +63,7 @@ class RoboteqChassis(ChassisDriver):
             feedback_timeout_ns=config.feedback_timeout_ms * NS_PER_MS,
             status_timeout_ns=config.status_timeout_ms * NS_PER_MS,
             arming_timeout_ns=config.arming_timeout_ms * NS_PER_MS,
-            stall_ns=config.watchdog_ms * NS_PER_MS,
+            max_step_gap_ns=config.watchdog_ms * NS_PER_MS,
         )
         super().__init__(link, feedback, commands, limits)
         self._link = link
@@ -75,55 +75,55 @@ class RoboteqChassis(ChassisDriver):
         self._gap_ns = config.watchdog_ms * NS_PER_MS // 2
         self._reader = LineReader()
         counters = lines.ENCODERS if config.encoder == "quadrature" else lines.HALL_COUNTERS
-        self._queries = cycle([lines.QUERIES[name] for other in _BETWEEN for name in (counters, other)])
-        self._asked_query: Query | None = None
-        self._asked_ns = 0
+        self._queries = cycle([lines.QUERIES[name] for other in _OTHER_QUERIES for name in (counters, other)])
+        self._pending_query: Query | None = None
+        self._query_sent_ns = 0
         self._quiet_until_ns = 0
         self._setup = b""
         self._motion_sent_ns: int | None = None
         self._moving = False
 
-    def _listen(self, now_ns: int) -> bool:
+    def _receive(self, now_ns: int) -> bool:
         arrived = read_all(self._link)
-        self._feedback.bytes_heard += len(arrived)
+        self._feedback.bytes_received += len(arrived)
         for line in self._reader.feed(arrived):
             if line is Reply.ECHO:
                 self._feedback.note_echo()
             elif isinstance(line, Reply):
                 self._feedback.note_reply(line is Reply.ACCEPTED)
-            elif self._asked_query is not None and line.name == self._asked_query.name:
-                self._asked_query = None
-                self._feedback.take(line.name, line.values, self._asked_ns, now_ns)
+            elif self._pending_query is not None and line.name == self._pending_query.name:
+                self._pending_query = None
+                self._feedback.take(line.name, line.values, self._query_sent_ns, now_ns)
             else:  # An answer that came too late, or that was not asked for.
                 self._quiet_until_ns = max(self._quiet_until_ns, now_ns + _SILENCE_NS)
-        if self._asked_query is not None and now_ns - self._asked_ns >= _REPLY_TIMEOUT_NS:
-            self._asked_query = None
+        if self._pending_query is not None and now_ns - self._query_sent_ns >= _REPLY_TIMEOUT_NS:
+            self._pending_query = None
             self._reader.forget()
             self._quiet_until_ns = now_ns + _SILENCE_NS
         return bool(arrived)
 
-    def _speak(self, command: Setpoint, now_ns: int) -> Setpoint | None:
-        stops = self._moving and is_zero(command)
+    def _send(self, command: Setpoint, now_ns: int) -> Setpoint | None:
+        stopping = self._moving and is_zero(command)
         # The setup ends with !MG. Sent after a lost link, it would end an emergency stop without consent.
         setup = self._setup if self._arming.mode is ChassisMode.ARMING else b""
-        if not (stops or setup or due(self._motion_sent_ns, self._period_ns, now_ns)):
+        if not (stopping or setup or due(self._motion_sent_ns, self._period_ns, now_ns)):
             return None
         self._setup = b""
         motion, sent = self._motion(command)
-        said = self._first_after_a_gap(now_ns) + setup + motion
-        if self._defies(now_ns):
-            said += lines.EMERGENCY_STOP
+        data = self._stop_after_gap(now_ns) + setup + motion
+        if self._ignores_zero(now_ns):
+            data += lines.EMERGENCY_STOP
         query = None
-        if self._asked_query is None and now_ns >= self._quiet_until_ns:
+        if self._pending_query is None and now_ns >= self._quiet_until_ns:
             query = lines.QUERIES[lines.WATCHDOG] if setup else next(self._queries)
-            said += query.line
-        self._write(said, now_ns)
+            data += query.line
+        self._write(data, now_ns)
         self._moving = not is_zero(command)
         if query is not None:
-            self._asked_query, self._asked_ns = query, now_ns
+            self._pending_query, self._query_sent_ns = query, now_ns
         return sent
 
-    def _speak_stop(self, now_ns: int) -> None:
+    def _send_stop(self, now_ns: int) -> None:
         self._feedback.forget_setup()
         self._setup = b""
         self._write(lines.STOP, now_ns)
@@ -140,32 +140,32 @@ class RoboteqChassis(ChassisDriver):
         # Only an emergency stop can be reset. A fault beside it must disappear by itself.
         return self._feedback.estop and not self._feedback.errors
 
-    def _first_after_a_gap(self, now_ns: int) -> bytes:
+    def _stop_after_gap(self, now_ns: int) -> bytes:
         last_ns = self._motion_sent_ns
         return b"" if last_ns is not None and 0 <= now_ns - last_ns < self._gap_ns else lines.STOP
 
-    def _write(self, said: bytes, now_ns: int) -> None:
+    def _write(self, data: bytes, now_ns: int) -> None:
         try:
-            self._link.write(said)
+            self._link.write(data)
         except LinkLost:
             # It is unknown how much of it arrived, so the next command must be zero.
             self._motion_sent_ns = None
             raise
         self._motion_sent_ns = now_ns
 
-    def _defies(self, now_ns: int) -> bool:
+    def _ignores_zero(self, now_ns: int) -> bool:
         """Whether the base still moves although it was latched, and commanded zero, long ago."""
         latched = self._arming.mode is ChassisMode.ESTOP
-        return latched and now_ns - self._arming.since_ns > _DEFIANCE_NS and not self._feedback.standing
+        return latched and now_ns - self._arming.since_ns > _STOP_TIMEOUT_NS and not self._feedback.standing
 
     def _motion(self, command: Setpoint) -> tuple[bytes, Setpoint]:
         """The line for this command, and the command scaled down so that no track is too fast."""
         config, limit = self._config, self._config.full_speed_mps
-        wanted = self._geometry.to_tracks(command.v_mps, command.w_radps)
-        left_mps, right_mps = fitted = scale_to_fit(*wanted, limit, limit)
+        requested = self._geometry.to_tracks(command.v_mps, command.w_radps)
+        left_mps, right_mps = limited = scale_to_fit(*requested, limit, limit)
         scale = lines.FULL_SCALE / limit
         line = lines.motors(config.left_sign * left_mps * scale, config.right_sign * right_mps * scale)
-        if fitted == wanted:
+        if limited == requested:
             return line, command
         v_mps, w_radps = self._geometry.to_twist(left_mps, right_mps)
         return line, replace(command, v_mps=v_mps, w_radps=w_radps)

@@ -9,11 +9,11 @@ from hal.chassis.roboteq_lines import MotorFlags
 from hal.chassis.tracks import TrackGeometry
 
 # Single refusals are noise on the line. This many in a row mean that the controller takes no commands.
-_MOST_REFUSALS = 5
+_MAX_REFUSALS = 5
 
 # A controller that echoes returns two lines between two answers: a command and a query. A single one may be
 # noise.
-_ECHOING = 2
+_MIN_ECHOES = 2
 
 
 class RoboteqFeedback(EncoderFeedback):
@@ -31,36 +31,36 @@ class RoboteqFeedback(EncoderFeedback):
         self._watchdog_ms: int | None = None
         self._refusals = 0
         self._echoes = 0
-        self._quiet = False
-        self._echoes_again = False
+        self._echo_off = False
+        self._echo_resumed = False
 
     @property
-    def disobeys(self) -> str:
+    def command_refusal(self) -> str:
         """Why the controller must not be driven: its watchdog is not what was set, it restarted, or it
         refuses commands; "" if it may be."""
-        if not self._wanted:
+        if not self._setup_requested:
             return "nobody asked it to"
         if self._restarted:
             return "its counters jumped: restarted"
-        if self._echoes_again:
+        if self._echo_resumed:
             return "it echoes again: restarted"
         if self._watchdog_ms is None:
             return "its watchdog is not set"
         if self._watchdog_ms != self._config.watchdog_ms:
             return f"its watchdog reads {self._watchdog_ms} ms, not {self._config.watchdog_ms} ms"
-        if self._refusals >= _MOST_REFUSALS:
+        if self._refusals >= _MAX_REFUSALS:
             return "it refuses commands"
         return ""
 
     @property
-    def silence(self) -> str:
+    def silence_hint(self) -> str:
         """What came instead of a status, and what to check."""
-        if self.bytes_heard == 0:
+        if self.bytes_received == 0:
             return "not one byte came; check port, power, baud and the crossed lines"
         if self._flags_ns is not None:
             return "it answers ?FF, but not ?FM (motor flags) for two motors; is it a two-channel controller?"
         return (
-            f"{self.bytes_heard} bytes came, none an answer to ?FF; check baud and that it is a Roboteq "
+            f"{self.bytes_received} bytes came, none an answer to ?FF; check baud and that it is a Roboteq "
             "whose serial input takes ASCII commands"
         )
 
@@ -91,27 +91,27 @@ class RoboteqFeedback(EncoderFeedback):
         super().await_setup()
         self._watchdog_ms = None
         self._refusals = 0
-        self._quiet = False
-        self._echoes_again = False
+        self._echo_off = False
+        self._echo_resumed = False
 
     def note_echo(self) -> None:
         """A written line came back. ^ECHOF 1 switched the echo off; a restart switches it on again."""
         self._echoes += 1
-        self._echoes_again = self._echoes_again or (self._quiet and self._echoes >= _ECHOING)
+        self._echo_resumed = self._echo_resumed or (self._echo_off and self._echoes >= _MIN_ECHOES)
 
     def note_reply(self, accepted: bool) -> None:
         """A command was accepted or refused."""
         self._refusals = 0 if accepted else self._refusals + 1
 
-    def take(self, name: str, values: tuple[int, ...], asked_ns: int, now_ns: int) -> None:
-        """Take in the answer to a query that was written at asked_ns."""
+    def take(self, name: str, values: tuple[int, ...], requested_ns: int, now_ns: int) -> None:
+        """Take in the answer to a query that was written at requested_ns."""
         # The first answer about the watchdog follows ^ECHOF 1. Only silence after that shows that the echo is
         # off.
-        self._quiet = self._quiet or (self._watchdog_ms is not None and self._echoes == 0)
+        self._echo_off = self._echo_off or (self._watchdog_ms is not None and self._echoes == 0)
         self._echoes = 0
         match name:
             case lines.ENCODERS | lines.HALL_COUNTERS:
-                self._count(values[0], values[1], asked_ns, now_ns)
+                self._take_counters(values[0], values[1], requested_ns, now_ns)
             case lines.FAULT_FLAGS:
                 self._flags, self._flags_ns = values[0], now_ns
             case lines.MOTOR_FLAGS:

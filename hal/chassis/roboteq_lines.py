@@ -117,27 +117,28 @@ def parse(line: bytes) -> Line | None:
 
 
 class LineReader:
-    """Assembles lines from bytes that arrive in pieces. strangers: number of lines of another protocol."""
+    """Assembles lines from bytes that arrive in pieces. foreign_lines: number of lines of another
+    protocol."""
 
     def __init__(self) -> None:
         self._partial = bytearray()
         self._too_long = False
-        self.strangers = 0
+        self.foreign_lines = 0
 
     def feed(self, data: bytes) -> list[Line]:
         """The lines that these bytes complete."""
         lines: list[Line] = []
         *ends, rest = data.split(b"\r")
         for end in ends:
-            self._keep(end)
+            self._append(end)
             whole, too_long = bytes(self._partial), self._too_long
             self.forget()
             line = None if too_long else parse(whole)
             if line is not None:
                 lines.append(line)
             elif whole:
-                self.strangers += 1
-        self._keep(rest)
+                self.foreign_lines += 1
+        self._append(rest)
         return lines
 
     def forget(self) -> None:
@@ -145,7 +146,7 @@ class LineReader:
         self._partial.clear()
         self._too_long = False
 
-    def _keep(self, data: bytes) -> None:
+    def _append(self, data: bytes) -> None:
         room = _MAX_LINE - len(self._partial)
         self._too_long = self._too_long or len(data) > room
         self._partial += data[:room]
@@ -201,8 +202,8 @@ def describe_motors(flags: tuple[int, ...]) -> MotorFlags:
             if bit in _MOTOR_WARNINGS:
                 warnings.append(f"warning: motor {channel} {_MOTOR_WARNINGS[bit]}")
             else:
-                told = _MOTOR_FAULTS.get(bit, f"has unknown flag bit {bit}")
-                faults.append(f"error: motor {channel} {told}")
+                description = _MOTOR_FAULTS.get(bit, f"has unknown flag bit {bit}")
+                faults.append(f"error: motor {channel} {description}")
     return MotorFlags(tuple(faults), tuple(warnings))
 
 

@@ -102,11 +102,11 @@ class TrackCounter:
         right_step = wrapped_difference(right, last[1], self._bits)
         if max(abs(left_step), abs(right_step)) > limit:
             return None
-        if self._begins_anew(last, (left, right), expected, slack):
+        if self._restarted_from_zero(last, (left, right), expected, slack):
             return None
         return left_step, right_step
 
-    def _begins_anew(
+    def _restarted_from_zero(
         self, last: tuple[int, int], new: tuple[int, int], expected: tuple[float, float], slack: float
     ) -> bool:
         """Whether the counters restarted from 0.
@@ -114,14 +114,14 @@ class TrackCounter:
         Both must be near 0 now. At least one must have returned there by more than its motion explains, and
         the other must have done so, too, or have been near 0 before.
         """
-        back = False
-        for before, after, ahead in zip(last, new, expected, strict=True):
-            was, now = (wrapped_difference(count, 0, self._bits) for count in (before, after))
-            known = ahead if math.isfinite(ahead) else 0.0
-            near = slack + abs(known)  # the most that a track can have moved since the restart
-            homewards = max(0.0, -known if was > 0 else known)
-            returned = abs(was) - abs(now) > slack + 2.0 * homewards
-            if abs(now) > near or (not returned and abs(was) > near):
+        any_returned = False
+        for before, after, expected_step in zip(last, new, expected, strict=True):
+            count_before, count_now = (wrapped_difference(count, 0, self._bits) for count in (before, after))
+            known = expected_step if math.isfinite(expected_step) else 0.0
+            max_moved = slack + abs(known)  # the most that a track can have moved since the restart
+            towards_zero = max(0.0, -known if count_before > 0 else known)
+            returned = abs(count_before) - abs(count_now) > slack + 2.0 * towards_zero
+            if abs(count_now) > max_moved or (not returned and abs(count_before) > max_moved):
                 return False
-            back = back or returned
-        return back
+            any_returned = any_returned or returned
+        return any_returned

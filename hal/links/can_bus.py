@@ -37,7 +37,7 @@ _ERROR_BUS_OFF = 0x40
 _BUS_OFF = "bus-off"
 
 # python-can's error when nobody on the bus acknowledges.
-_FULL = "Transmit buffer full"
+_BUFFER_FULL = "Transmit buffer full"
 
 _OPEN_ERRORS = (can.CanError, OSError, ValueError, ImportError, NotImplementedError)
 
@@ -56,7 +56,7 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         )
         # gs_usb gives back what it has sent. SocketCAN marks what other programs of this computer send in the
         # same way, and that must be heard.
-        self._own_are_marked = config.interface == "gs_usb"
+        self._marks_own_frames = config.interface == "gs_usb"
         self._send_timeout_s = _SERIAL_SEND_TIMEOUT_S if config.interface == "slcan" else _SEND_TIMEOUT_S
 
     def send(self, frame: CanFrame) -> None:
@@ -65,16 +65,16 @@ class CanBusLink(ReopeningLink[can.BusABC]):
             arbitration_id=frame.arbitration_id, data=frame.data, is_extended_id=False, check=True
         )
         try:
-            self._opened().send(message, timeout=self._send_timeout_s)
+            self._require_open().send(message, timeout=self._send_timeout_s)
         except (can.CanError, OSError) as error:
-            raise self._lost("sending", error) from error
+            raise self._mark_lost("sending", error) from error
         if self._echoes is not None:
             self._echoes.append(frame)
 
     def receive(self) -> CanFrame | None:
         """The oldest classic frame with an 11-bit identifier, without waiting; None if there is none. Raises
         LinkLost."""
-        bus = self._opened()
+        bus = self._require_open()
         for _ in range(_MAX_FOREIGN):
             try:
                 message = bus.recv(timeout=0)
@@ -84,16 +84,16 @@ class CanBusLink(ReopeningLink[can.BusABC]):
                 if _is_foreign_datagram(error):
                     self._drop_partial(bus)
                     continue
-                raise self._lost("receiving", error) from error
+                raise self._mark_lost("receiving", error) from error
             except (ValueError, IndexError):  # slcan: noise on the line
                 continue
             if message is None:
                 return None
             if message.is_error_frame:
                 if message.arbitration_id & _ERROR_BUS_OFF:
-                    raise self._lost("receiving", can.CanOperationError(_BUS_OFF))
+                    raise self._mark_lost("receiving", can.CanOperationError(_BUS_OFF))
                 continue
-            if self._own_are_marked and not message.is_rx:
+            if self._marks_own_frames and not message.is_rx:
                 continue
             if message.is_extended_id or message.is_remote_frame or message.is_fd:
                 continue
@@ -112,7 +112,7 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         try:
             bus.flush()
         except (can.CanError, OSError) as error:
-            raise self._lost("receiving", error) from error
+            raise self._mark_lost("receiving", error) from error
 
     def _open(self) -> can.BusABC:
         return _open(self._config, self._where)
@@ -128,10 +128,10 @@ class CanBusLink(ReopeningLink[can.BusABC]):
         super()._close_lost(device)
 
     def _remedy(self, error: Exception) -> str:
-        number = _errno(error)
-        if self._config.interface == "socketcan" and number == errno.ENETDOWN:
+        error_number = _errno(error)
+        if self._config.interface == "socketcan" and error_number == errno.ENETDOWN:
             return f"the bus is down: `ip link set {self._config.channel} up type can bitrate 500000`"
-        if number == errno.ENOBUFS or str(error) in (_BUS_OFF, _FULL):
+        if error_number == errno.ENOBUFS or str(error) in (_BUS_OFF, _BUFFER_FULL):
             advice = (
                 "nobody acknowledges: check the base's power, CAN high and low, termination and 500 kbit/s"
             )
@@ -160,26 +160,26 @@ def _open(config: CanLinkConfig, where: str) -> can.BusABC:
         )
         if isinstance(bus, slcanBus):
             # It would wait after every frame until the adapter has taken it: for ever if the adapter hangs.
-            bus.serialPortOrig.flush = _wait_for_nothing  # type: ignore[method-assign]
+            bus.serialPortOrig.flush = _skip_flush  # type: ignore[method-assign]
         return bus
     except _OPEN_ERRORS as error:
-        number = _errno(error)
-        if number in (errno.EACCES, errno.EPERM):
+        error_number = _errno(error)
+        if error_number in (errno.EACCES, errno.EPERM):
             raise DeviceRefused(
                 f"{where}: permission denied; add the user to the group of the adapter's port (often "
                 "dialout), then log in again"
             ) from error
-        if number in (errno.EBUSY, errno.EADDRINUSE, errno.EAGAIN):
+        if error_number in (errno.EBUSY, errno.EADDRINUSE, errno.EAGAIN):
             raise DeviceRefused(
                 f"{where}: in use by another program ({reason(error)}); stop that one first"
             ) from error
         raise DeviceNotFound(
-            f"{where}: cannot be opened ({reason(error)}); {_advice(config, number)}"
+            f"{where}: cannot be opened ({reason(error)}); {_advice(config, error_number)}"
         ) from error
 
 
-def _advice(config: CanLinkConfig, number: int | None) -> str:
-    if config.interface == "socketcan" and number == errno.EAFNOSUPPORT:
+def _advice(config: CanLinkConfig, error_number: int | None) -> str:
+    if config.interface == "socketcan" and error_number == errno.EAFNOSUPPORT:
         return "this kernel has no SocketCAN; try `modprobe can_raw`, or use another interface"
     if config.interface == "socketcan" and config.channel.startswith("vcan"):
         return f"`ip link add dev {config.channel} type vcan`, then `ip link set {config.channel} up`"
@@ -193,7 +193,7 @@ def _advice(config: CanLinkConfig, number: int | None) -> str:
     return "check interface and channel in the configuration, and that the adapter is plugged in"
 
 
-def _wait_for_nothing() -> None:
+def _skip_flush() -> None:
     """Replacement for pyserial's flush(), which has no time-out."""
 
 

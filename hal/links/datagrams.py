@@ -17,9 +17,9 @@ from hal.types import Sender
 
 # The kernel cuts longer datagrams at this length; the parser refuses messages of this length.
 _READ_BYTES = 4096
-_BACKLOG_BYTES = 16_384
+_RECEIVE_BUFFER_BYTES = 16_384
 # Errors that the kernel reports on the next call after a peer went away; the socket itself is fine.
-_PEER_GONE = frozenset(
+_PEER_GONE_ERRORS = frozenset(
     {errno.ECONNREFUSED, errno.ENOENT, errno.ECONNRESET, errno.EHOSTUNREACH, errno.ENETUNREACH}
 )
 
@@ -35,7 +35,7 @@ class DatagramSocket(ABC):
         self._socket = self._bind()
         self._socket.setblocking(False)
         # A short queue: commands that waited for long should not be obeyed.
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BACKLOG_BYTES)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
         return self
 
     def __exit__(
@@ -53,7 +53,7 @@ class DatagramSocket(ABC):
         except BlockingIOError:
             return None
         except OSError as error:
-            if error.errno in _PEER_GONE:
+            if error.errno in _PEER_GONE_ERRORS:
                 return None
             raise LinkLost(f"command socket: reading failed ({error.strerror}); start again") from error
         return data, sender or None
@@ -107,13 +107,13 @@ class UdpSocket(DatagramSocket):
 
 
 class UnixSocket(DatagramSocket):
-    """A Unix socket bound to a path, which is removed at the end. for_group: processes of the group may send,
-    too."""
+    """A Unix socket bound to a path, which is removed at the end. group_may_send: processes of
+    the group may send, too."""
 
-    def __init__(self, path: Path, for_group: bool = False) -> None:
+    def __init__(self, path: Path, group_may_send: bool = False) -> None:
         super().__init__()
         self._path = path
-        self._mode = 0o660 if for_group else 0o600
+        self._mode = 0o660 if group_may_send else 0o600
         self._bound_inode: int | None = None
 
     def __exit__(
@@ -126,10 +126,10 @@ class UnixSocket(DatagramSocket):
                 self._path.unlink()
 
     def _bind(self) -> socket.socket:
-        self._clear_away()
+        self._remove_stale_socket()
         bound = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         # The permissions must hold from the first moment, so they cannot be set after bind.
-        before = os.umask(0o777 & ~self._mode)
+        old_umask = os.umask(0o777 & ~self._mode)
         try:
             bound.bind(str(self._path))
         except OSError as error:
@@ -138,11 +138,11 @@ class UnixSocket(DatagramSocket):
                 f"{self._path}: cannot listen there ({error.strerror}); can its folder be written?"
             ) from error
         finally:
-            os.umask(before)
+            os.umask(old_umask)
         self._bound_inode = self._path.lstat().st_ino
         return bound
 
-    def _clear_away(self) -> None:
+    def _remove_stale_socket(self) -> None:
         """Remove a socket that a killed program left behind, and nothing else. Raises DeviceRefused."""
         try:
             mode = self._path.lstat().st_mode

@@ -17,20 +17,21 @@ _log = logging.getLogger(__name__)
 
 class ReopeningLink(ABC, Generic[DeviceT]):
     """After LinkLost the next use opens the device anew, so that a re-plugged adapter is found again; whoever
-    uses the link decides how often. where: how messages name it. gone: what closing a lost device may raise.
+    uses the link decides how often. where: how messages name it. close_errors: what closing a lost device
+    may raise.
 
     slow: opening and closing it may take long, over a network above all. Then one thread after it was lost
     closes it and opens it anew, in this order, for what closing says late would reach the new one. Meanwhile
     every use raises LinkLost; ``with`` waits.
     """
 
-    def __init__(self, where: str, gone: tuple[type[Exception], ...], slow: bool = False) -> None:
+    def __init__(self, where: str, close_errors: tuple[type[Exception], ...], slow: bool = False) -> None:
         self._where = where
-        self._gone = gone
+        self._close_errors = close_errors
         self._slow = slow
         self._device: DeviceT | None = None
-        self._opening: _Opening[DeviceT] | None = None
-        self._why = f"{where}: is being opened"
+        self._opening: _OpenAttempt[DeviceT] | None = None
+        self._last_failure = f"{where}: is being opened"
         self._closed = False
 
     def __enter__(self) -> Self:
@@ -52,7 +53,7 @@ class ReopeningLink(ABC, Generic[DeviceT]):
             self._opening.abandon()
         device, self._device = self._device, None
         if device is not None:
-            self._shut(device)
+            self._close_quietly(device)
 
     @abstractmethod
     def _open(self) -> DeviceT:
@@ -70,52 +71,52 @@ class ReopeningLink(ABC, Generic[DeviceT]):
         """What to do about a device that worked until this error."""
         return "check the adapter, the cable and the power of the base"
 
-    def _opened(self) -> DeviceT:
+    def _require_open(self) -> DeviceT:
         if self._closed:
             raise LinkLost(f"{self._where}: the link is closed")
         if self._device is None:
             try:
-                self._device = self._opened_by_thread() if self._slow else self._open()
+                self._device = self._open_in_background() if self._slow else self._open()
             except HalError as error:
-                self._why = str(error)
-                raise LinkLost(self._why) from error
+                self._last_failure = str(error)
+                raise LinkLost(self._last_failure) from error
         return self._device
 
-    def _opened_by_thread(self) -> DeviceT:
+    def _open_in_background(self) -> DeviceT:
         """Raises LinkLost while it is being opened, with what went wrong last."""
         if self._opening is None:
-            self._opening = _Opening(self)
+            self._opening = _OpenAttempt(self)
         if not self._opening.done:
-            raise LinkLost(self._why)
+            raise LinkLost(self._last_failure)
         opening, self._opening = self._opening, None
         return opening.device()
 
-    def _lost(self, doing: str, error: Exception) -> LinkLost:
+    def _mark_lost(self, action: str, error: Exception) -> LinkLost:
         device, self._device = self._device, None
         if device is not None and self._slow:
-            self._opening = _Opening(self, device)
+            self._opening = _OpenAttempt(self, device)
         elif device is not None:
-            self._shut(device, lost=True)
-        self._why = f"{self._where}: lost while {doing} ({reason(error)}); {self._remedy(error)}"
-        return LinkLost(self._why)
+            self._close_quietly(device, lost=True)
+        self._last_failure = f"{self._where}: lost while {action} ({reason(error)}); {self._remedy(error)}"
+        return LinkLost(self._last_failure)
 
-    def _shut(self, device: DeviceT, lost: bool = False) -> None:
+    def _close_quietly(self, device: DeviceT, lost: bool = False) -> None:
         try:
             if lost:
                 self._close_lost(device)
             else:
                 self._close(device)
-        except self._gone as error:
+        except self._close_errors as error:
             # It is gone anyway; python-can raises here after an unplug.
             _log.debug("closing %s: %s", self._where, error)
 
 
-class _Opening(Generic[DeviceT]):
+class _OpenAttempt(Generic[DeviceT]):
     """One attempt to open a link's device, in a thread that nobody waits for. lost: is closed before."""
 
     def __init__(self, link: ReopeningLink[DeviceT], lost: DeviceT | None = None) -> None:
         self._link = link
-        self._lost = lost
+        self._lost_device = lost
         self._lock = threading.Lock()
         self._wanted = True
         self._device: DeviceT | None = None
@@ -136,7 +137,7 @@ class _Opening(Generic[DeviceT]):
             self._wanted = False
             device, self._device = self._device, None
         if device is not None:
-            self._link._shut(device)
+            self._link._close_quietly(device)
 
     def wait(self) -> None:
         """Until nothing is opened or closed by it any more."""
@@ -145,9 +146,9 @@ class _Opening(Generic[DeviceT]):
     def _run(self) -> None:
         device = None
         try:
-            lost, self._lost = self._lost, None
+            lost, self._lost_device = self._lost_device, None
             if lost is not None:
-                self._link._shut(lost, lost=True)
+                self._link._close_quietly(lost, lost=True)
             if self._wanted:
                 device = self._link._open()
         except HalError as error:
@@ -159,7 +160,7 @@ class _Opening(Generic[DeviceT]):
                     self._device, device = device, None
                 self.done = True
         if device is not None:
-            self._link._shut(device)
+            self._link._close_quietly(device)
 
 
 def reason(error: BaseException) -> str:

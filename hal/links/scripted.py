@@ -82,15 +82,15 @@ class ScriptedCanLink(_ScriptedLink):
             if passed is not None:
                 self._arrived.append(passed)
 
-    def hear_through(self, change: Callable[[CanFrame], CanFrame | None]) -> None:
+    def set_filter(self, transform: Callable[[CanFrame], CanFrame | None]) -> None:
         """Change (or, with None, drop) every frame before it arrives here."""
-        self._filter = change
+        self._filter = transform
 
-    def hear_nothing(self) -> None:
+    def cut_wire(self) -> None:
         """The wire to here is cut: silence without an error."""
         self._filter = lambda frame: None
 
-    def hear_all(self) -> None:
+    def restore_wire(self) -> None:
         """The wire is whole again."""
         self._filter = lambda frame: frame
 
@@ -105,7 +105,7 @@ class ScriptedSerialLink(_ScriptedLink):
         self.peer: ScriptedSerialLink | None = None
         self._arrived = bytearray()
         self._filter: Callable[[bytes], bytes] = lambda data: data
-        self._at_most: int | None = None
+        self._max_read: int | None = None
 
     def write(self, data: bytes) -> None:
         """See hal.api.SerialLink."""
@@ -118,7 +118,7 @@ class ScriptedSerialLink(_ScriptedLink):
     def read(self) -> bytes:
         """See hal.api.SerialLink."""
         self._check()
-        count = len(self._arrived) if self._at_most is None else self._at_most
+        count = len(self._arrived) if self._max_read is None else self._max_read
         data = bytes(self._arrived[:count])
         del self._arrived[:count]
         return data
@@ -128,19 +128,19 @@ class ScriptedSerialLink(_ScriptedLink):
         if self._plugged:
             self._arrived += self._filter(data)
 
-    def read_at_most(self, count: int | None) -> None:
+    def limit_reads(self, count: int | None) -> None:
         """Let each read give at most count bytes; None: all that is there (several messages merged)."""
-        self._at_most = count
+        self._max_read = count
 
-    def hear_through(self, change: Callable[[bytes], bytes]) -> None:
+    def set_filter(self, transform: Callable[[bytes], bytes]) -> None:
         """Change every write of the peer before it arrives here: noise, wrong bytes, nothing."""
-        self._filter = change
+        self._filter = transform
 
-    def hear_nothing(self) -> None:
+    def cut_wire(self) -> None:
         """The wire to here is cut: silence without an error."""
         self._filter = lambda data: b""
 
-    def hear_all(self) -> None:
+    def restore_wire(self) -> None:
         """The wire is whole again."""
         self._filter = lambda data: data
 

@@ -37,18 +37,18 @@ class SerialPortLink(ReopeningLink[serial.SerialBase]):
         """Hand all of data to the system within 50 ms. Raises LinkLost; part of data may have been sent
         then."""
         try:
-            written = self._opened().write(data)
+            written = self._require_open().write(data)
         except _ERRORS as error:
-            raise self._lost("writing", error) from error
+            raise self._mark_lost("writing", error) from error
         if written != len(data):
-            raise self._lost("writing", OSError(f"{written} of {len(data)} bytes accepted"))
+            raise self._mark_lost("writing", OSError(f"{written} of {len(data)} bytes accepted"))
 
     def read(self) -> bytes:
         """What has arrived, at most 4096 bytes, without waiting. Raises LinkLost."""
         try:
-            return self._opened().read(_MAX_READ)
+            return self._require_open().read(_MAX_READ)
         except _ERRORS as error:
-            raise self._lost("reading", error) from error
+            raise self._mark_lost("reading", error) from error
 
     def _open(self) -> serial.SerialBase:
         return _open(self._config)
@@ -63,36 +63,38 @@ def _open(config: SerialLinkConfig) -> serial.SerialBase:
             config.url, baudrate=config.baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True
         )
     except (*_ERRORS, ValueError) as error:
-        raise _translated(error, config) from error
+        raise _hal_error(error, config) from error
     return port
 
 
-def _translated(error: Exception, config: SerialLinkConfig) -> HalError:
+def _hal_error(error: Exception, config: SerialLinkConfig) -> HalError:
     where = f"serial port {config.url}"
-    number = getattr(error, "errno", None)
-    if number in (errno.EACCES, errno.EPERM):
-        group = _group_of(config.url)
+    error_number = getattr(error, "errno", None)
+    if error_number in (errno.EACCES, errno.EPERM):
+        group = _owner_group(config.url)
         return DeviceRefused(
             f"{where}: permission denied; `sudo usermod -aG {group} $USER`, then log in again (a service: "
             f"SupplementaryGroups={group})"
         )
-    if number in (errno.EBUSY, errno.EAGAIN):
+    if error_number in (errno.EBUSY, errno.EAGAIN):
         return DeviceRefused(
             f"{where}: in use by another program; stop that one first (ModemManager takes new ports for a "
             "while, unless a udev rule tells it not to)"
         )
     # pyserial drops the number when the file is there but does not take a port's settings.
-    if isinstance(error.__context__, termios.error) or number not in (None, errno.ENOENT):
+    if isinstance(error.__context__, termios.error) or error_number not in (None, errno.ENOENT):
         return DeviceRefused(f"{where}: is not a serial port that takes {config.baud} baud ({reason(error)})")
     # pyserial's own text repeats the name of the port, and the meaning of the error number.
-    why = reason(error).rpartition(f"{config.url}: ")[2] if number is None else os.strerror(number)
-    there = f"that the adapter is plugged in ({_ports_here(_DEVICES)})"
+    cause = (
+        reason(error).rpartition(f"{config.url}: ")[2] if error_number is None else os.strerror(error_number)
+    )
+    remedy = f"that the adapter is plugged in ({_describe_ports(_DEVICES)})"
     if not config.url.startswith(f"{_DEVICES}/"):
-        there = "that what is to make this port, an emulator for example, runs already"
-    return DeviceNotFound(f"{where}: cannot be opened ({why}); check the url and {there}")
+        remedy = "that what is to make this port, an emulator for example, runs already"
+    return DeviceNotFound(f"{where}: cannot be opened ({cause}); check the url and {remedy}")
 
 
-def _group_of(path: str) -> str:
+def _owner_group(path: str) -> str:
     """The group that may use the port; dialout if that is unknown, or if it is root, which no user joins."""
     try:
         group = grp.getgrgid(os.stat(path).st_gid).gr_name
@@ -101,11 +103,11 @@ def _group_of(path: str) -> str:
     return "dialout" if group == "root" else group
 
 
-def _ports_here(devices: Path) -> str:
+def _describe_ports(devices: Path) -> str:
     """A sentence with the serial ports of this machine: by names that do not depend on the order in which
     adapters were plugged in, if there are such names."""
-    stable = sorted(str(path) for path in devices.glob("serial/by-id/*"))
-    ports = stable or sorted(
+    stable_paths = sorted(str(path) for path in devices.glob("serial/by-id/*"))
+    ports = stable_paths or sorted(
         str(path) for pattern in ("ttyUSB*", "ttyACM*") for path in devices.glob(pattern)
     )
     return f"here are: {', '.join(ports)}" if ports else "no USB serial port is here"

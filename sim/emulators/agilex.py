@@ -63,11 +63,11 @@ class AgilexEmulator(ChassisEmulator):
         super().__init__(link, plant, boot_ms)
         self._link = link
         self._actuators = model.actuators
-        self._obeying_mode = model.obeying_mode(over_serial)
+        self._command_mode = model.command_mode(over_serial)
         self._command_timeout_ns = model.base_timeout_ms * NS_PER_MS
         # A mode that must be repeated times out as fast as the motion command.
         self._mode_timeout_ns = None if model.mode_period_ms is None else self._command_timeout_ns
-        self._mode_heard_ns = plant.now_ns
+        self._mode_received_ns = plant.now_ns
         start_ns = plant.now_ns
         self._broadcasts = (
             _Broadcast(20 * NS_PER_MS, start_ns, self._motion),
@@ -88,7 +88,7 @@ class AgilexEmulator(ChassisEmulator):
 
     def advance_to(self, now_ns: int) -> None:
         """Follow what has arrived, move, and send what is due up to and including now_ns."""
-        self._listen()
+        self._handle_received()
         while (event_ns := self._next_event_ns()) <= now_ns:
             self._move_to(event_ns)
             for broadcast in self._broadcasts:
@@ -143,7 +143,7 @@ class AgilexEmulator(ChassisEmulator):
         self._command_ns = None
         self._plant.command(0.0, 0.0)
 
-    def _listen(self) -> None:
+    def _handle_received(self) -> None:
         try:
             while (frame := self._link.receive()) is not None:
                 message = decode(frame)
@@ -156,11 +156,11 @@ class AgilexEmulator(ChassisEmulator):
     def _obey(self, message: AgilexMessage) -> None:
         if isinstance(message, ControlModeCommand):
             if self.mode != _REMOTE and message.mode in (_STANDBY, _CAN, _SERIAL):
-                self._mode_heard_ns = self._now_ns
+                self._mode_received_ns = self._now_ns
                 self._enter(message.mode)
         elif (
             isinstance(message, MotionCommand)
-            and self.mode == self._obeying_mode
+            and self.mode == self._command_mode
             and self.vehicle_state == _NORMAL
         ):
             self._command_ns = self._now_ns
@@ -182,8 +182,8 @@ class AgilexEmulator(ChassisEmulator):
     def _move_to(self, now_ns: int) -> None:
         self._plant.advance_to(now_ns)
         self._now_ns = max(self._now_ns, now_ns)
-        waits_ns, commanded = self._mode_timeout_ns, self.mode in (_CAN, _SERIAL)
-        if commanded and waits_ns is not None and self._now_ns - self._mode_heard_ns >= waits_ns:
+        timeout_ns, commanded = self._mode_timeout_ns, self.mode in (_CAN, _SERIAL)
+        if commanded and timeout_ns is not None and self._now_ns - self._mode_received_ns >= timeout_ns:
             self._enter(_STANDBY)
         if self._command_ns is not None and self._now_ns - self._command_ns >= self._command_timeout_ns:
             self._command_ns = None
@@ -198,7 +198,7 @@ class AgilexEmulator(ChassisEmulator):
                 if frame.arbitration_id not in self._muted:
                     self._link.send(frame)
         except LinkLost:
-            # As in _listen: the base keeps sending into an unplugged cable.
+            # As in _handle_received: the base keeps sending into an unplugged cable.
             return
 
     def _motion(self) -> tuple[AgilexMessage, ...]:

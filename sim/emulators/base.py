@@ -5,23 +5,23 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from hal.api import Closing, SerialLink
+from hal.api import Device, SerialLink
 from hal.clocks import NS_PER_MS, NS_PER_S
-from hal.enclosing import Enclosing
+from hal.device_wrapper import DeviceWrapper
 from hal.errors import LinkLost
 from sim.plant import TrackedPlant
 
 _STEP_NS = NS_PER_MS
 
 
-class ChassisEmulator(Enclosing, ABC):
+class ChassisEmulator(DeviceWrapper, ABC):
     """An emulator that is stepped with the time. What has arrived counts as of the time of the last step, so
     the order "advance the emulator, then exchange with the driver" has no hidden delay in lockstep.
 
     boot_ms: how long the base is silent after a restart.
     """
 
-    def __init__(self, link: Closing, plant: TrackedPlant, boot_ms: int) -> None:
+    def __init__(self, link: Device, plant: TrackedPlant, boot_ms: int) -> None:
         super().__init__(link)
         self._plant = plant
         self._boot_ns = boot_ms * NS_PER_MS
@@ -78,7 +78,7 @@ class SerialEmulator(ChassisEmulator):
         super().__init__(link, plant, boot_ms)
         self._link = link
 
-    def _hear(self) -> bytes:
+    def _receive(self) -> bytes:
         """What has arrived; nothing while the base is silent."""
         try:
             arrived = self._link.read()
@@ -86,7 +86,7 @@ class SerialEmulator(ChassisEmulator):
             return b""
         return b"" if self._silent else arrived
 
-    def _say(self, data: bytes) -> None:
+    def _transmit(self, data: bytes) -> None:
         try:
             self._link.write(data)
         except LinkLost:
@@ -109,7 +109,7 @@ class MotorController(SerialEmulator):
 
     def advance_to(self, now_ns: int) -> None:
         """Answer what has arrived, then move on to now_ns."""
-        self._listen()
+        self._handle_received()
         while self._now_ns < now_ns:
             step_ns = min(_STEP_NS, now_ns - self._now_ns)
             self._ramp(step_ns / NS_PER_S)
@@ -118,12 +118,12 @@ class MotorController(SerialEmulator):
             self._plant.advance_to(self._now_ns)
 
     @property
-    def _turned_m(self) -> tuple[float, float]:
+    def _motor_travel_m(self) -> tuple[float, float]:
         """Travel of the tracks since power-up, with the signs of the motors."""
         return self._signed(*self._travel_m)
 
     @property
-    def _turning_mps(self) -> tuple[float, float]:
+    def _motor_speeds_mps(self) -> tuple[float, float]:
         """Speeds of the tracks, with the signs of the motors."""
         return self._signed(*self._plant.track_speeds_mps)
 
@@ -131,14 +131,14 @@ class MotorController(SerialEmulator):
         return self._signs[0] * left, self._signs[1] * right
 
     @abstractmethod
-    def _listen(self) -> None:
+    def _handle_received(self) -> None:
         """Handle what has arrived."""
 
     @abstractmethod
     def _ramp(self, step_s: float) -> None:
         """Move the targets towards the goals."""
 
-    def _towards(self, track: int, goal_mps: float, ramp_mps2: float, step_s: float) -> None:
+    def _ramp_towards(self, track: int, goal_mps: float, ramp_mps2: float, step_s: float) -> None:
         limit_mps = ramp_mps2 * step_s
         change_mps = goal_mps - self._target_mps[track]
         self._target_mps[track] += min(max(change_mps, -limit_mps), limit_mps)

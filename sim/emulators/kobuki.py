@@ -57,7 +57,7 @@ class KobukiEmulator(SerialEmulator):
 
     def advance_to(self, now_ns: int) -> None:
         """Follow what has arrived, move, and stream what is due up to and including now_ns."""
-        self._listen()
+        self._handle_received()
         while (event_ns := self._next_event_ns()) <= now_ns:
             self._move_to(event_ns)
             if self._stream_ns <= event_ns:
@@ -85,8 +85,8 @@ class KobukiEmulator(SerialEmulator):
         self._heading_zero_rad = self._plant.pose.heading_rad
         self._plant.command_tracks(0.0, 0.0)
 
-    def _listen(self) -> None:
-        self._received += self._hear()
+    def _handle_received(self) -> None:
+        self._received += self._receive()
         while self._take_frame():
             pass
 
@@ -116,7 +116,7 @@ class KobukiEmulator(SerialEmulator):
             if kind == 1 and len(data) == 4:
                 self._drive(*struct.unpack("<hh", data))
             elif kind == 9 and len(data) == 2:
-                self._extra += self._about(int.from_bytes(data, "little"))
+                self._extra += self._version_payload(int.from_bytes(data, "little"))
 
     def _drive(self, speed: int, radius: int) -> None:
         """Drive with this speed of the outer wheel (mm/s) and radius (mm; 0: straight on, 1: turn on the
@@ -135,7 +135,7 @@ class KobukiEmulator(SerialEmulator):
             left, right = float(speed), w * (radius + _HALF_BASE_MM)
         self._plant.command_tracks(left / 1000.0, right / 1000.0)
 
-    def _about(self, flags: int) -> bytes:
+    def _version_payload(self, flags: int) -> bytes:
         """Sub-payloads with hardware version, firmware version and unique id, as far as flags ask for
         them."""
         hardware = bytes((10, 4, 4, 0, 1, 0)) if flags & 1 else b""
@@ -161,7 +161,7 @@ class KobukiEmulator(SerialEmulator):
         payload = self._core() + (self._inertia() if self.gyro else b"") + bytes((6, 2, 8, 8)) + self._extra
         self._extra = b""
         body = bytes((len(payload),)) + payload
-        self._say(_HEADER + body + bytes((reduce(xor, body),)))
+        self._transmit(_HEADER + body + bytes((reduce(xor, body),)))
 
     def _core(self) -> bytes:
         left, right = (round(travel_m * _TICKS_PER_M) % (1 << 16) for travel_m in self._travel_m)

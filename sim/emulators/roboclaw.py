@@ -1,8 +1,7 @@
 """An emulated RoboClaw with two tracks, on a serial line.
 
 It knows the packets that the manual documents for speed control. Like the device, it answers errors on the
-line
-with silence: it does not acknowledge a packet with a bad CRC, and drops a packet with a gap of 10 ms.
+line with silence: it does not acknowledge a packet with a bad CRC, and drops a packet with a gap of 10 ms.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ class RoboclawEmulator(MotorController):
         self._address = address
         self._status_bytes = status_bytes
         self._buffer = bytearray()
-        self._heard_ns = self._now_ns
+        self._received_ns = self._now_ns
         self._valid_ns = self._now_ns
         self._ramp_mps2 = [float("inf"), float("inf")]
         self._estop = False
@@ -80,14 +79,14 @@ class RoboclawEmulator(MotorController):
         self.timeout_ms = 0
         self._stop_motors()
 
-    def _listen(self) -> None:
-        arrived = self._hear()
+    def _handle_received(self) -> None:
+        arrived = self._receive()
         if self._silent:
             return
-        if self._now_ns - self._heard_ns > _GAP_NS:
+        if self._now_ns - self._received_ns > _GAP_NS:
             self._buffer.clear()
         if arrived:
-            self._heard_ns = self._now_ns
+            self._received_ns = self._now_ns
             self._buffer += arrived
         while self._take_packet():
             pass
@@ -104,7 +103,7 @@ class RoboclawEmulator(MotorController):
             del buffer[:2]
             self._valid_ns = self._now_ns
             data = self._read(command)
-            self._say(data + self._crc(bytes((self._address, command)) + data))
+            self._transmit(data + self._crc(bytes((self._address, command)) + data))
             return True
         if command not in _WRITES:
             buffer.clear()
@@ -122,7 +121,7 @@ class RoboclawEmulator(MotorController):
             return False
         self._valid_ns = self._now_ns
         self._write(command, packet[2:-2])
-        self._say(_ACK)
+        self._transmit(_ACK)
         return True
 
     @staticmethod
@@ -131,7 +130,7 @@ class RoboclawEmulator(MotorController):
 
     def _read(self, command: int) -> bytes:
         left, right = self._counts()
-        left_qpps, right_qpps = (round(speed * self._counts_per_m) for speed in self._turning_mps)
+        left_qpps, right_qpps = (round(speed * self._counts_per_m) for speed in self._motor_speeds_mps)
         replies: dict[int, Callable[[], bytes]] = {
             15: lambda: bytes((self.timeout_ms // 100,)),
             16: lambda: struct.pack(">IB", left, left_qpps < 0),
@@ -157,7 +156,7 @@ class RoboclawEmulator(MotorController):
         return bits.to_bytes(self._status_bytes, "big")
 
     def _counts(self) -> tuple[int, int]:
-        left_m, right_m = self._turned_m
+        left_m, right_m = self._motor_travel_m
         return round(left_m * self._counts_per_m) % (1 << 32), round(right_m * self._counts_per_m) % (1 << 32)
 
     def _write(self, command: int, data: bytes) -> None:
@@ -189,4 +188,4 @@ class RoboclawEmulator(MotorController):
         if self.timeout_ms and self._now_ns - self._valid_ns >= self.timeout_ms * NS_PER_MS:
             self._stop_motors()
         for track in (0, 1):
-            self._towards(track, self._goal_mps[track], self._ramp_mps2[track], step_s)
+            self._ramp_towards(track, self._goal_mps[track], self._ramp_mps2[track], step_s)

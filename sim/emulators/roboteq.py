@@ -85,29 +85,29 @@ class RoboteqEmulator(MotorController):
         self.fault_flags |= _ESTOP_FLAG
         self._stop_motors()
 
-    def _listen(self) -> None:
-        for character in self._hear().decode("latin-1"):
+    def _handle_received(self) -> None:
+        for character in self._receive().decode("latin-1"):
             if self.echo:
-                self._tell(character)
+                self._send_text(character)
             if character not in "\r_":
                 # As in the device, a line without an end does not grow for ever.
                 self._line = (self._line + character)[-128:]
                 continue
             line, self._line = self._line, ""
             if line:
-                self._tell(self._answer(line) + "\r")
+                self._send_text(self._answer(line) + "\r")
 
-    def _tell(self, text: str) -> None:
-        self._say(text.encode("latin-1"))
+    def _send_text(self, text: str) -> None:
+        self._transmit(text.encode("latin-1"))
 
     def _answer(self, line: str) -> str:
         try:
-            return self._obeyed(line)
+            return self._execute(line)
         except (_Refused, ValueError):
             self.refused += 1
             return _REFUSED
 
-    def _obeyed(self, line: str) -> str:
+    def _execute(self, line: str) -> str:
         """The answer to a line that is carried out. Raises _Refused or ValueError."""
         mark, (name, *arguments) = line[0], line[1:].upper().split() or [""]
         values = [int(argument) for argument in arguments]
@@ -127,39 +127,39 @@ class RoboteqEmulator(MotorController):
     def _command(self, name: str, values: list[int]) -> None:
         match name, values:
             case "M", [left, right]:
-                self._feed()
-                self._go([left, right])
+                self._feed_watchdog()
+                self._set_speeds([left, right])
             case "G", [1 | 2 as channel, value]:
-                self._feed()
-                self._go([value], channel)
+                self._feed_watchdog()
+                self._set_speeds([value], channel)
             case "S", [1 | 2 as channel, rpm]:
-                self._feed()
-                self._go([round(1000 * rpm / self._max_rpm)], channel)
+                self._feed_watchdog()
+                self._set_speeds([round(1000 * rpm / self._max_rpm)], channel)
             case "MS", [1 | 2 as channel]:
-                self._feed()
-                self._go([0], channel)
+                self._feed_watchdog()
+                self._set_speeds([0], channel)
             case "AC", [1 | 2 as channel, ramp]:
-                self._feed()
+                self._feed_watchdog()
                 self._rise_mps2[channel - 1] = self._ramp_mps2(ramp)
             case "DC", [1 | 2 as channel, ramp]:
-                self._feed()
+                self._feed_watchdog()
                 self._fall_mps2[channel - 1] = self._ramp_mps2(ramp)
             case "EX", []:
-                self._feed()
+                self._feed_watchdog()
                 self._shut_down()
             case "MG", []:
-                self._feed()
+                self._feed_watchdog()
                 if not self._button_pressed:
                     self.fault_flags &= ~_ESTOP_FLAG
             case _:
                 raise _Refused
 
-    def _feed(self) -> None:
+    def _feed_watchdog(self) -> None:
         """Feed the watchdog, as any valid command does. Motors that the watchdog stopped run again."""
         self._fed_ns = self._now_ns
         self._timed_out = False
 
-    def _go(self, thousandths: list[int], channel: int = 1) -> None:
+    def _set_speeds(self, thousandths: list[int], channel: int = 1) -> None:
         if self.fault_flags:
             return
         self.commands_obeyed += 1
@@ -173,7 +173,7 @@ class RoboteqEmulator(MotorController):
 
     def _query(self, name: str, values: list[int]) -> str:
         left_rpm, right_rpm = (
-            round(speed / self._full_speed_mps * self._max_rpm) for speed in self._turning_mps
+            round(speed / self._full_speed_mps * self._max_rpm) for speed in self._motor_speeds_mps
         )
         if name == "FID":
             return "FID=Roboteq v2.1 EMULATED 01/01/2020"
@@ -191,15 +191,15 @@ class RoboteqEmulator(MotorController):
         }
         if name not in answers:
             raise _Refused
-        told = answers[name]()
+        reply = answers[name]()
         if values:  # one channel alone
-            if len(values) != 1 or not 1 <= values[0] <= len(told):
+            if len(values) != 1 or not 1 <= values[0] <= len(reply):
                 raise _Refused
-            told = (told[values[0] - 1],)
-        return f"{name}={':'.join(map(str, told))}"
+            reply = (reply[values[0] - 1],)
+        return f"{name}={':'.join(map(str, reply))}"
 
     def _counts(self) -> tuple[int, ...]:
-        return tuple(as_int32(round(travel_m * self._counts_per_m)) for travel_m in self._turned_m)
+        return tuple(as_int32(round(travel_m * self._counts_per_m)) for travel_m in self._motor_travel_m)
 
     def _currents(self) -> tuple[int, ...]:
         return tuple(round(5 + 30 * abs(speed)) for speed in self._target_mps)
@@ -233,4 +233,4 @@ class RoboteqEmulator(MotorController):
             goal_mps = 0.0 if self._timed_out else self._goal_mps[track]
             rises = abs(goal_mps) > abs(self._target_mps[track])
             ramps = self._rise_mps2 if rises else self._fall_mps2
-            self._towards(track, goal_mps, ramps[track], step_s)
+            self._ramp_towards(track, goal_mps, ramps[track], step_s)

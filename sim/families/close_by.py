@@ -13,9 +13,9 @@ from sim.families.layout import (
     HALF_WIDTH_M,
     RACK_DEPTH_M,
     Random,
-    round_a_bend,
+    bend_path,
+    random_side,
     scenario,
-    side_of,
 )
 
 # Corners and middles of the sides of a crate, as shares of its size.
@@ -24,10 +24,10 @@ _OUTLINE = np.array([(x, y) for x in (-0.5, 0.0, 0.5) for y in (-0.5, 0.0, 0.5) 
 
 def crate_beside_bend(random: Random) -> Scenario:
     """A crate at any angle, inside or outside of a bend: the robot must not stop for it."""
-    radius, turn = float(random.uniform(2.5, 7.0)), side_of(random) * float(random.uniform(40.0, 90.0))
+    radius, turn = float(random.uniform(2.5, 7.0)), random_side(random) * float(random.uniform(40.0, 90.0))
     before, after = float(random.uniform(3.0, 5.0)), float(random.uniform(4.0, 6.0))
     crate = _crate_at(random, before, radius, turn, outside=bool(random.integers(2)))
-    path, room = round_a_bend(before, radius, turn, after)
+    path, room = bend_path(before, radius, turn, after)
     return scenario("crate_beside_bend", 0.0, (crate,), path=path, room=room)
 
 
@@ -37,17 +37,17 @@ def _crate_at(random: Random, before_m: float, radius_m: float, turn_deg: float,
     length, width = float(random.uniform(0.4, 0.9)), float(random.uniform(0.4, 0.8))
     heading = float(random.uniform(0.0, 180.0))
     left = math.copysign(1.0, turn_deg)
-    along = math.radians(abs(turn_deg)) * float(random.uniform(0.2, 0.8))
-    outwards = np.array([math.sin(along), -left * math.cos(along)])
+    angle = math.radians(abs(turn_deg)) * float(random.uniform(0.2, 0.8))
+    outwards = np.array([math.sin(angle), -left * math.cos(angle)])
     cos, sin = math.cos(math.radians(heading)), math.sin(math.radians(heading))
     outline = _OUTLINE * (length, width) @ np.array([[cos, sin], [-sin, cos]])
-    swept = math.hypot(radius_m + HALF_WIDTH_M, FRONT_M) - radius_m + float(random.uniform(0.3, 0.7))
+    clearance = math.hypot(radius_m + HALF_WIDTH_M, FRONT_M) - radius_m + float(random.uniform(0.3, 0.7))
     # Distance of the crate's centre from the centre of the bend, from the crate's innermost or outermost
     # point.
     if outside:
-        from_centre = radius_m + swept - float((outline @ outwards).min())
+        from_centre = radius_m + clearance - float((outline @ outwards).min())
     else:
-        from_centre = radius_m - swept - float((outline @ outwards).max())
+        from_centre = radius_m - clearance - float((outline @ outwards).max())
     x, y = np.array([before_m + 0.5 * BLEND_M, left * radius_m]) + from_centre * outwards
     return Crate(
         kind="crate",
@@ -66,13 +66,13 @@ def narrow_aisle(random: Random) -> Scenario:
     length = float(random.uniform(18.0, 24.0))
     shelves = []
     for side in (1.0, -1.0):
-        beside = HALF_WIDTH_M + float(random.uniform(0.3, 0.6))
+        offset = HALF_WIDTH_M + float(random.uniform(0.3, 0.6))
         shelves.append(
             Shelf(
                 kind="shelf",
                 name="rack left" if side > 0 else "rack right",
                 x_m=0.5 * length - 2.0,
-                y_m=side * (beside + 0.5 * RACK_DEPTH_M),
+                y_m=side * (offset + 0.5 * RACK_DEPTH_M),
                 length_m=length,
                 width_m=RACK_DEPTH_M,
             )

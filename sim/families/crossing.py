@@ -9,19 +9,19 @@ from sim.families.layout import (
     BLEND_M,
     RACK_DEPTH_M,
     Random,
+    bend_path,
     drive,
-    earliest_s,
+    earliest_arrival_s,
     go,
     person,
     racks,
+    random_side,
     robot,
-    round_a_bend,
     scenario,
-    side_of,
     walk,
 )
 
-_OUT_M = 3.6
+_START_OFFSET_M = 3.6
 
 
 def crossing_left(random: Random) -> Scenario:
@@ -42,24 +42,24 @@ def _crossing(random: Random, name: str, side: float) -> Scenario:
 
 
 def _crosser(
-    random: Random, name: str, x_m: float, side: float, angle_rad: float, late_s: float
+    random: Random, name: str, x_m: float, side: float, angle_rad: float, delay_s: float
 ) -> tuple[BodySpec, tuple[float, float]]:
-    """A body that is on the path at x_m, late_s after the earliest time at which the robot could be there;
+    """A body that is on the path at x_m, delay_s after the earliest time at which the robot could be there;
     and the interval along the aisle that must be free of racks. angle_rad: between the body's way and the
     path."""
-    by_robot = bool(random.integers(3) == 0)
-    speed = float(random.uniform(0.5, 1.0) if by_robot else random.uniform(0.6, 1.5))
-    shift = _OUT_M / math.tan(angle_rad)
-    start, end = (x_m - shift, side * _OUT_M), (x_m + shift, -side * _OUT_M)
-    way_s = _OUT_M / math.sin(angle_rad) / speed
-    start_s = earliest_s(x_m) + late_s - way_s
+    is_robot = bool(random.integers(3) == 0)
+    speed = float(random.uniform(0.5, 1.0) if is_robot else random.uniform(0.6, 1.5))
+    shift = _START_OFFSET_M / math.tan(angle_rad)
+    start, end = (x_m - shift, side * _START_OFFSET_M), (x_m + shift, -side * _START_OFFSET_M)
+    approach_s = _START_OFFSET_M / math.sin(angle_rad) / speed
+    start_s = earliest_arrival_s(x_m) + delay_s - approach_s
     if start_s < 0.0:
         # It would have to start before time zero, so it begins part of the way in.
-        share = min(-start_s / way_s, 0.45)
-        start = (x_m - shift * (1.0 - share), side * _OUT_M * (1.0 - share))
+        skipped = min(-start_s / approach_s, 0.45)
+        start = (x_m - shift * (1.0 - skipped), side * _START_OFFSET_M * (1.0 - skipped))
     margin = 1.3
     gap = (x_m - abs(shift) - margin, x_m + abs(shift) + margin)
-    if by_robot:
+    if is_robot:
         return robot(random, name, start, drive(start_s, go(*end, speed))), gap
     return person(random, name, start, walk(start_s, go(*end, speed))), gap
 
@@ -67,7 +67,7 @@ def _crosser(
 def behind_shelf(random: Random) -> Scenario:
     """Somebody steps out from behind the end of a shelf that stands close to the path."""
     length = float(random.uniform(12.0, 15.0))
-    side = side_of(random)
+    side = random_side(random)
     corner_x = float(random.uniform(5.0, 8.0))
     inner = float(random.uniform(0.85, 1.4))
     speed = float(random.uniform(0.6, 1.4))
@@ -82,11 +82,11 @@ def behind_shelf(random: Random) -> Scenario:
         width_m=RACK_DEPTH_M,
     )
     start_y = inner + RACK_DEPTH_M + 0.8
-    on_path_s = earliest_s(x - 2.0) + float(random.uniform(-1.0, 3.0))
-    way = walk(on_path_s - start_y / speed, go(x, -side * _OUT_M, speed))
-    who = person(random, "person", (x, side * start_y), way)
-    far = Column(kind="column", name="pillar", x_m=corner_x + 3.0, y_m=-side * 2.2)
-    return scenario("behind_shelf", length, (shelf, far, who))
+    on_path_s = earliest_arrival_s(x - 2.0) + float(random.uniform(-1.0, 3.0))
+    motion = walk(on_path_s - start_y / speed, go(x, -side * _START_OFFSET_M, speed))
+    obstacle = person(random, "person", (x, side * start_y), motion)
+    pillar = Column(kind="column", name="pillar", x_m=corner_x + 3.0, y_m=-side * 2.2)
+    return scenario("behind_shelf", length, (shelf, pillar, obstacle))
 
 
 def crowd_junction(random: Random) -> Scenario:
@@ -94,19 +94,19 @@ def crowd_junction(random: Random) -> Scenario:
     length = float(random.uniform(13.0, 16.0))
     bodies: list[BodySpec] = []
     for number in range(int(random.integers(4, 8))):
-        side = side_of(random)
+        side = random_side(random)
         x, angle = float(random.uniform(6.0, 9.0)), math.radians(float(random.uniform(75.0, 105.0)))
-        late_s = 1.6 * number - 3.0 + float(random.uniform(-0.8, 0.8))
-        body, _ = _crosser(random, f"crosser {number + 1}", x, side, angle, late_s)
+        delay_s = 1.6 * number - 3.0 + float(random.uniform(-0.8, 0.8))
+        body, _ = _crosser(random, f"crosser {number + 1}", x, side, angle, delay_s)
         bodies.append(body)
     return scenario("crowd_junction", length, (*racks(random, length, ((3.8, 11.2),)), *bodies))
 
 
 def curved_path(random: Random) -> Scenario:
     """A bend with crates on both sides, and for most seeds somebody who crosses after the bend."""
-    radius, turn = float(random.uniform(3.0, 7.0)), side_of(random) * float(random.uniform(40.0, 90.0))
+    radius, turn = float(random.uniform(3.0, 7.0)), random_side(random) * float(random.uniform(40.0, 90.0))
     before, after = float(random.uniform(3.0, 5.0)), float(random.uniform(4.0, 6.0))
-    path, room = round_a_bend(before, radius, turn, after)
+    path, room = bend_path(before, radius, turn, after)
     left = math.copysign(1.0, turn)
     bend = math.radians(abs(turn))
     # The geometry of the circle without the blends, which is accurate enough to place bodies beside it.
@@ -131,10 +131,10 @@ def curved_path(random: Random) -> Scenario:
     if random.random() < 0.7:
         along = float(random.uniform(1.0, after - 1.5))
         x, y = exit_x + along * out_x, exit_y + along * out_y
-        side = side_of(random)
-        away_x, away_y = -out_y * side * _OUT_M, out_x * side * _OUT_M
+        side = random_side(random)
+        away_x, away_y = -out_y * side * _START_OFFSET_M, out_x * side * _START_OFFSET_M
         speed = float(random.uniform(0.6, 1.4))
-        on_path_s = earliest_s(before + radius * bend + along) + float(random.uniform(-2.0, 3.0))
-        way = walk(on_path_s - _OUT_M / speed, go(x - away_x, y - away_y, speed))
-        bodies.append(person(random, "person", (x + away_x, y + away_y), way))
+        on_path_s = earliest_arrival_s(before + radius * bend + along) + float(random.uniform(-2.0, 3.0))
+        motion = walk(on_path_s - _START_OFFSET_M / speed, go(x - away_x, y - away_y, speed))
+        bodies.append(person(random, "person", (x + away_x, y + away_y), motion))
     return scenario("curved_path", 0.0, tuple(bodies), path=path, room=room)

@@ -35,18 +35,18 @@ BLEND_M = 0.8  # length of the blend at either end of a bend
 _BAY_M = 2.7
 
 
-def furthest_m(t_s: float) -> float:
+def max_travel_m(t_s: float) -> float:
     """The furthest that the robot can have come at t_s."""
-    rising_s = min(max(t_s, 0.0), _TOP_MPS / _ACCEL_MPS2)
-    return 0.5 * _ACCEL_MPS2 * rising_s**2 + _TOP_MPS * max(t_s - _TOP_MPS / _ACCEL_MPS2, 0.0)
+    accelerating_s = min(max(t_s, 0.0), _TOP_MPS / _ACCEL_MPS2)
+    return 0.5 * _ACCEL_MPS2 * accelerating_s**2 + _TOP_MPS * max(t_s - _TOP_MPS / _ACCEL_MPS2, 0.0)
 
 
-def earliest_s(x_m: float) -> float:
+def earliest_arrival_s(x_m: float) -> float:
     """The earliest time at which the robot's turning centre can be at x_m."""
-    rising_m = 0.5 * _TOP_MPS**2 / _ACCEL_MPS2
-    if x_m <= rising_m:
+    accelerating_m = 0.5 * _TOP_MPS**2 / _ACCEL_MPS2
+    if x_m <= accelerating_m:
         return math.sqrt(2.0 * max(x_m, 0.0) / _ACCEL_MPS2)
-    return _TOP_MPS / _ACCEL_MPS2 + (x_m - rising_m) / _TOP_MPS
+    return _TOP_MPS / _ACCEL_MPS2 + (x_m - accelerating_m) / _TOP_MPS
 
 
 def straight(length_m: float) -> PathSpec:
@@ -54,7 +54,7 @@ def straight(length_m: float) -> PathSpec:
     return PathSpec(segments=(LineSpec(kind="line", length_m=length_m),))
 
 
-def round_a_bend(before_m: float, radius_m: float, turn_deg: float, after_m: float) -> tuple[PathSpec, Room]:
+def bend_path(before_m: float, radius_m: float, turn_deg: float, after_m: float) -> tuple[PathSpec, Room]:
     """A path from the origin along x, round a bend and on; and a building around it."""
     path = PathSpec(
         segments=(
@@ -81,9 +81,9 @@ def racks(random: Random, length_m: float, gaps_m: tuple[tuple[float, float], ..
         number = 0
         while x < length_m + 3.0:
             length = _BAY_M * int(random.integers(1, 4))
-            hit = [gap for gap in gaps_m if gap[0] < x + length and gap[1] > x]
-            if hit:
-                length = hit[0][0] - x
+            blocking_gaps = [gap for gap in gaps_m if gap[0] < x + length and gap[1] > x]
+            if blocking_gaps:
+                length = blocking_gaps[0][0] - x
             if length > 0.8:
                 number += 1
                 shelves.append(
@@ -96,7 +96,7 @@ def racks(random: Random, length_m: float, gaps_m: tuple[tuple[float, float], ..
                         width_m=RACK_DEPTH_M,
                     )
                 )
-            x = hit[0][1] if hit else x + length + float(random.choice([0.0, 0.0, 1.2]))
+            x = blocking_gaps[0][1] if blocking_gaps else x + length + float(random.choice([0.0, 0.0, 1.2]))
     return tuple(shelves)
 
 
@@ -127,7 +127,7 @@ def robot(random: Random, name: str, start: tuple[float, float], motion: MotionP
 
 
 def _first_heading_deg(start: tuple[float, float], motion: MotionPlan | None) -> float:
-    first = None if motion is None else next((one for one in motion.steps if isinstance(one, Go)), None)
+    first = None if motion is None else next((step for step in motion.steps if isinstance(step, Go)), None)
     if first is None:
         return 180.0
     return math.degrees(math.atan2(first.y_m - start[1], first.x_m - start[0]))
@@ -153,14 +153,14 @@ def wait(duration_s: float) -> Wait:
     return Wait(kind="wait", duration_s=duration_s)
 
 
-def side_of(random: Random) -> float:
+def random_side(random: Random) -> float:
     """A random side: 1 for the left, -1 for the right."""
     return float(random.choice([1.0, -1.0]))
 
 
-def texture_of(random: Random, *among: Texture) -> Texture:
+def random_texture(random: Random, *choices: Texture) -> Texture:
     """One of these textures, at random."""
-    return among[int(random.integers(len(among)))]
+    return choices[int(random.integers(len(choices)))]
 
 
 def scenario(

@@ -97,7 +97,7 @@ FAMILY_NAMES: tuple[str, ...] = tuple(_FAMILIES)
 
 def generate(family: str, seed: int) -> Case:
     """The mission of a family for a seed, always the same. Raises KeyError for an unknown family."""
-    made = _FAMILIES[family]
+    entry = _FAMILIES[family]
     random = np.random.default_rng((zlib.crc32(family.encode()), seed))
-    world = made.world(random).model_copy(update={"name": f"{family}-{seed}"})
-    return Case(family, seed, world, made.faults(random), made.halts)
+    world = entry.world(random).model_copy(update={"name": f"{family}-{seed}"})
+    return Case(family, seed, world, entry.faults(random), entry.halts)

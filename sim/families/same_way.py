@@ -7,61 +7,61 @@ from sim.families.layout import (
     FRONT_M,
     Random,
     drive,
-    furthest_m,
     go,
+    max_travel_m,
     person,
     racks,
+    random_side,
     robot,
     scenario,
-    side_of,
     wait,
     walk,
 )
 
-_BESIDE_M = 1.2
+_LANE_OFFSET_M = 1.2
 
 
 def cut_in(random: Random) -> Scenario:
     """Somebody beside the path turns into it just ahead of the robot, and leaves it again."""
     length = float(random.uniform(14.0, 18.0))
-    side = side_of(random)
+    side = random_side(random)
     speed = float(random.uniform(0.5, 1.1))
     start_x, cut_x = float(random.uniform(1.0, 3.5)), float(random.uniform(4.5, 6.5))
     steps = (
-        go(cut_x, side * _BESIDE_M, speed),
+        go(cut_x, side * _LANE_OFFSET_M, speed),
         go(cut_x + 1.2, 0.0, speed),
         go(cut_x + float(random.uniform(3.0, 5.0)), 0.0, speed),
-        go(cut_x + 6.5, -side * _BESIDE_M, speed),
-        go(length + 5.0, -side * _BESIDE_M, speed),
+        go(cut_x + 6.5, -side * _LANE_OFFSET_M, speed),
+        go(length + 5.0, -side * _LANE_OFFSET_M, speed),
     )
-    start = (start_x, side * _BESIDE_M)
-    who: BodySpec
+    start = (start_x, side * _LANE_OFFSET_M)
+    obstacle: BodySpec
     if random.integers(2):
-        who = robot(random, "robot", start, drive(0.0, *steps))
+        obstacle = robot(random, "robot", start, drive(0.0, *steps))
     else:
-        who = person(random, "person", start, walk(0.0, *steps))
-    return scenario("cut_in", length, (*racks(random, length), who))
+        obstacle = person(random, "person", start, walk(0.0, *steps))
+    return scenario("cut_in", length, (*racks(random, length), obstacle))
 
 
 def overtaking(random: Random) -> Scenario:
     """Somebody faster passes the robot and, for some of the seeds, goes on ahead in its lane."""
     length = float(random.uniform(14.0, 18.0))
-    side = side_of(random)
+    side = random_side(random)
     speed = float(random.uniform(1.6, 2.0))
     from_x, start_s = -2.5, float(random.uniform(0.0, 3.0))
     merge_x = float(random.uniform(4.0, 10.0))
     # Merge only if the robot cannot be close behind: nobody merges right in front of somebody they just
     # passed.
-    passed = furthest_m(start_s + (merge_x - from_x) / speed + 0.6) + FRONT_M + 1.5 < merge_x
-    lane = 0.0 if passed and random.integers(4) else side * _BESIDE_M
-    way = walk(
+    passed = max_travel_m(start_s + (merge_x - from_x) / speed + 0.6) + FRONT_M + 1.5 < merge_x
+    lane = 0.0 if passed and random.integers(4) else side * _LANE_OFFSET_M
+    motion = walk(
         start_s,
-        go(merge_x, side * _BESIDE_M, speed),
+        go(merge_x, side * _LANE_OFFSET_M, speed),
         go(merge_x + 1.5, lane, speed),
         go(length + 6.0, lane, speed),
     )
-    who = person(random, "person", (from_x, side * _BESIDE_M), way)
-    return scenario("overtaking", length, (*racks(random, length), who))
+    obstacle = person(random, "person", (from_x, side * _LANE_OFFSET_M), motion)
+    return scenario("overtaking", length, (*racks(random, length), obstacle))
 
 
 def lead_brakes(random: Random) -> Scenario:
@@ -69,7 +69,7 @@ def lead_brakes(random: Random) -> Scenario:
     length = float(random.uniform(14.0, 18.0))
     speed = float(random.uniform(0.5, 1.1))
     stop_x = float(random.uniform(6.0, 9.0))
-    way = MotionPlan(
+    motion = MotionPlan(
         start_s=float(random.uniform(0.0, 1.0)),
         accel_mps2=float(random.uniform(0.5, 1.0)),
         turn_rate_degps=60.0,
@@ -79,5 +79,5 @@ def lead_brakes(random: Random) -> Scenario:
             go(length + 6.0, 0.0, speed),
         ),
     )
-    lead = robot(random, "lead", (float(random.uniform(2.2, 3.5)), float(random.uniform(-0.1, 0.1))), way)
+    lead = robot(random, "lead", (float(random.uniform(2.2, 3.5)), float(random.uniform(-0.1, 0.1))), motion)
     return scenario("lead_brakes", length, (*racks(random, length), lead))

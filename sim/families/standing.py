@@ -9,9 +9,9 @@ from sim.families.layout import (
     Random,
     hall,
     racks,
+    random_side,
+    random_texture,
     scenario,
-    side_of,
-    texture_of,
 )
 
 GLASS = "glass front"
@@ -35,7 +35,7 @@ def static_crate(random: Random) -> Scenario:
         length_m=float(random.uniform(0.4, 0.9)),
         width_m=float(random.uniform(0.4, 0.8)),
         height_m=float(random.uniform(0.35, 1.0)),
-        texture=texture_of(random, "fine", "coarse", "plain"),
+        texture=random_texture(random, "fine", "coarse", "plain"),
     )
     return scenario("static_crate", length, (*racks(random, length), crate), blocked=True)
 
@@ -46,13 +46,13 @@ def crate_beside(random: Random) -> Scenario:
     crates = []
     for number, x in enumerate((7.0, 15.0, 23.0), start=1):
         width = float(random.uniform(0.4, 0.8))
-        beside = HALF_WIDTH_M + float(random.uniform(0.22, 0.6))
+        offset = HALF_WIDTH_M + float(random.uniform(0.22, 0.6))
         crates.append(
             Crate(
                 kind="crate",
                 name=f"crate {number}",
                 x_m=x + float(random.uniform(-2.0, 2.0)),
-                y_m=side_of(random) * (beside + 0.5 * width),
+                y_m=random_side(random) * (offset + 0.5 * width),
                 length_m=float(random.uniform(0.4, 0.9)),
                 width_m=width,
                 height_m=float(random.uniform(0.4, 1.0)),
@@ -85,7 +85,7 @@ def thin_pole(random: Random) -> Scenario:
         y_m=float(random.uniform(-0.3, 0.3)),
         diameter_m=float(random.uniform(0.04, 0.09)),
         height_m=float(random.uniform(0.9, 2.2)),
-        texture=texture_of(random, "coarse", "plain"),
+        texture=random_texture(random, "coarse", "plain"),
     )
     return scenario("thin_pole", length, (*racks(random, length), pole), blocked=True)
 
@@ -105,16 +105,16 @@ def hanging_beam(random: Random) -> Scenario:
     """A bar across the path, at the robot's height or, for half of the seeds, above it."""
     length = float(random.uniform(11.0, 15.0))
     blocked = bool(random.integers(2))
-    under = float(random.uniform(0.35, 0.65)) if blocked else float(random.uniform(1.1, 1.8))
+    underside = float(random.uniform(0.35, 0.65)) if blocked else float(random.uniform(1.1, 1.8))
     beam = Beam(
         kind="beam",
         name="beam",
         x_m=float(random.uniform(6.0, length - 1.0)),
         y_m=0.0,
-        z_m=under,
+        z_m=underside,
         heading_deg=90.0,
         length_m=float(random.uniform(2.0, 3.2)),
-        texture=texture_of(random, "fine", "coarse"),
+        texture=random_texture(random, "fine", "coarse"),
     )
     return scenario("hanging_beam", length, (beam, *racks(random, length)), blocked=blocked)
 

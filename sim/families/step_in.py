@@ -6,11 +6,11 @@ import zlib
 
 import numpy as np
 
-from sim.families.layout import earliest_s, go, person, racks, scenario, side_of, wait, walk
+from sim.families.layout import earliest_arrival_s, go, person, racks, random_side, scenario, wait, walk
 from sim.families.registry import Case
 from sim.faults import NO_FAULTS
 
-_BESIDE_M = 3.4
+_START_OFFSET_M = 3.4
 _LENGTH_M = 16.0
 
 
@@ -19,18 +19,18 @@ def step_in(seed: int) -> Case:
     to 7 m away."""
     random = np.random.default_rng((zlib.crc32(b"step_in"), seed))
     x = float(random.uniform(8.0, 11.0))
-    side, speed = side_of(random), float(random.uniform(1.0, 1.4))
+    side, speed = random_side(random), float(random.uniform(1.0, 1.4))
     stand_y = side * float(random.uniform(-0.2, 0.2))
     ahead_m, pause_s = float(random.uniform(3.5, 7.0)), float(random.uniform(9.0, 13.0))
-    leaves = side if random.integers(2) else -side
-    start_s = earliest_s(x - ahead_m) - (_BESIDE_M - 0.5) / speed
+    exit_side = side if random.integers(2) else -side
+    start_s = earliest_arrival_s(x - ahead_m) - (_START_OFFSET_M - 0.5) / speed
     motion = walk(
         start_s,
         go(x, stand_y, speed),
         wait(pause_s),
-        go(x, leaves * _BESIDE_M, float(random.uniform(0.8, 1.3))),
+        go(x, exit_side * _START_OFFSET_M, float(random.uniform(0.8, 1.3))),
     )
-    body = person(random, "person", (x, side * _BESIDE_M), motion)
+    body = person(random, "person", (x, side * _START_OFFSET_M), motion)
     shelves = racks(random, _LENGTH_M, ((x - 1.5, x + 1.5),))
     world = scenario(f"step_in-{seed}", _LENGTH_M, (*shelves, body))
     return Case("step_in", seed, world, NO_FAULTS, False)

@@ -71,8 +71,7 @@ def box(
     """A box of size (x, y, z). centre_m: the centre of its underside.
 
     textures: one key, or keys for "front" (+x), "back" (-x), "left" (+y), "right" (-y), "top" and
-    "underside",
-        with "side" (the first four) and "all" as fall-backs.
+        "underside", with "side" (the first four) and "all" as fall-backs.
     skip: first letters of faces to leave out ("b" for back, "u" for underside, "f", "l", "r", "t").
     """
     hx, hy = 0.5 * size_m[0], 0.5 * size_m[1]
@@ -122,8 +121,8 @@ def prism(
     ring = np.stack([radii_m[0] * np.cos(angles), radii_m[1] * np.sin(angles)], axis=1)
     bottom = np.column_stack([ring, np.full(sides, z_m[0])])
     top = np.column_stack([ring * taper, np.full(sides, z_m[1])])
-    after = np.roll(np.arange(sides), -1)
-    corners = np.stack([top, top[after], bottom[after], bottom], axis=1)
+    following = np.roll(np.arange(sides), -1)
+    corners = np.stack([top, top[following], bottom[following], bottom], axis=1)
     steps = np.arange(sides) / sides
     zeros = np.zeros(sides)
     windows = np.column_stack([steps, zeros, steps + 1.0 / sides, zeros + 1.0])
@@ -142,8 +141,8 @@ def _cap(ring: FloatArray, texture: str, upward: bool) -> Faces:
         far_left, far_right = ring[count - 1 - k], ring[count - 2 - k]
         strip = [far_left, left, right, far_right] if not upward else [left, far_left, far_right, right]
         strips.append(np.array(strip))
-    share = np.arange(len(strips)) / len(strips)
-    windows = np.column_stack([share * 0, share, share * 0 + 1, share + 1.0 / len(strips)])
+    fraction = np.arange(len(strips)) / len(strips)
+    windows = np.column_stack([fraction * 0, fraction, fraction * 0 + 1, fraction + 1.0 / len(strips)])
     return Faces(np.array(strips), windows, (texture,) * len(strips))
 
 

@@ -18,7 +18,7 @@ _STEP_M = 0.42  # length of a step as a share of the height
 # Heel and toe relative to the ankle, as shares of the height.
 _SOLE: FloatArray = np.array([[-0.035, 0.0, -_ANKLE], [0.104, 0.0, -_ANKLE]])
 # A foot pitches by this share of its shank's angle.
-_FOOT_TIPS = 0.4
+_FOOT_PITCH_RATIO = 0.4
 _ARM_SWING_RAD, _KNEE_BEND_RAD = 0.38, 0.85
 
 
@@ -55,17 +55,17 @@ def pose_person(spec: Person, state: MotionState) -> tuple[Pose, ...]:
     arms: list[Pose] = []
     for side, offset in ((1.0, 0.0), (-1.0, 0.5)):
         hip = np.array([0.0, side * 0.052 * h, _HIP * h])
-        reach, lifted = _stride((cycle + offset) % 1.0)
-        knee_rad = _KNEE_BEND_RAD * swing * lifted
+        reach, lift_ratio = _stride((cycle + offset) % 1.0)
+        knee_rad = _KNEE_BEND_RAD * swing * lift_ratio
         # Bending the knee would pull the foot back; the thigh compensates for that.
         thigh_rad = -math.asin(swing * reach * _STEP_M / (_HIP - _ANKLE)) - 0.5 * knee_rad
-        legs.extend(_chain(hip, thigh_rad, (_HIP - _KNEE) * h, knee_rad))
+        legs.extend(_limb_poses(hip, thigh_rad, (_HIP - _KNEE) * h, knee_rad))
         ankle = legs[-1].apply(np.array([[0.0, 0.0, (_ANKLE - _KNEE) * h]]))[0]
-        legs.append(Pose(axis_rotation("y", _FOOT_TIPS * (thigh_rad + knee_rad)), ankle))
+        legs.append(Pose(axis_rotation("y", _FOOT_PITCH_RATIO * (thigh_rad + knee_rad)), ankle))
     for side, offset in ((1.0, 0.5), (-1.0, 0.0)):
         shoulder = np.array([0.0, side * 0.13 * h, (_SHOULDER - 0.01) * h])
         arm_rad = -_ARM_SWING_RAD * swing * math.cos(2.0 * math.pi * (cycle + offset))
-        arms.extend(_chain(shoulder, arm_rad, (_SHOULDER - _ELBOW) * h, -0.15 - 0.3 * swing))
+        arms.extend(_limb_poses(shoulder, arm_rad, (_SHOULDER - _ELBOW) * h, -0.15 - 0.3 * swing))
     soles = np.concatenate([foot.apply(_SOLE * h)[:, 2] for foot in (legs[2], legs[5])])
     lift = np.array([0.0, 0.0, spec.z_m - float(soles.min())])
     poses = (Pose(np.eye(3), np.zeros(3)), *legs, *arms)
@@ -135,7 +135,7 @@ def _trunk(h: float, clothes: dict[str, str]) -> Faces:
     )
 
 
-def _chain(joint: FloatArray, upper_rad: float, length_m: float, lower_rad: float) -> list[Pose]:
+def _limb_poses(joint: FloatArray, upper_rad: float, length_m: float, lower_rad: float) -> list[Pose]:
     """The poses of an upper limb rotated about y at its joint, and of the lower limb bent relative to it."""
     upper = axis_rotation("y", upper_rad)
     middle = joint + upper @ np.array([0.0, 0.0, -length_m])

@@ -48,11 +48,11 @@ class Sheet:
     """A texture ready for warping.
 
     image: (H, W, 4) uint8, whole tiles with a rim of one texel around them.
-    from_tiles: (3, 3), from texture coordinates (a tile is 1 wide and 1 high) to pixels of image.
+    texture_to_pixel: (3, 3), from texture coordinates (a tile is 1 wide and 1 high) to pixels of image.
     """
 
     image: NDArray[np.uint8]
-    from_tiles: FloatArray
+    texture_to_pixel: FloatArray
 
 
 class TextureStore:
@@ -77,13 +77,13 @@ class TextureStore:
 
     def sheet(self, key: str, step_u: int, step_v: int, tiles_u: int, tiles_v: int) -> Sheet:
         """tiles_u x tiles_v copies, shrunk by 2**(step_u / 2) along u and by 2**(step_v / 2) along v."""
-        name = (key, step_u, step_v, tiles_u, tiles_v)
-        sheet = self._sheets.get(name)
+        cache_key = (key, step_u, step_v, tiles_u, tiles_v)
+        sheet = self._sheets.get(cache_key)
         if sheet is None:
-            sheet = self._sheets[name] = self._make(*name)
+            sheet = self._sheets[cache_key] = self._make_sheet(*cache_key)
         return sheet
 
-    def _make(self, key: str, step_u: int, step_v: int, tiles_u: int, tiles_v: int) -> Sheet:
+    def _make_sheet(self, key: str, step_u: int, step_v: int, tiles_u: int, tiles_v: int) -> Sheet:
         if tiles_u > 1 or tiles_v > 1:
             tile = self.sheet(key, step_u, step_v, 1, 1).image[1:-1, 1:-1]
             # Several tiles are part of a pattern that continues; a single tile ends at the edge of its face.
@@ -131,10 +131,10 @@ class TexelPool:
 
     def place(self, key: str, step_u: int, step_v: int) -> tuple[int, int, int]:
         """Where a sheet begins in texels, and its width and height with the rim."""
-        name = (key, step_u, step_v)
-        place = self._places.get(name)
+        cache_key = (key, step_u, step_v)
+        place = self._places.get(cache_key)
         if place is None:
-            place = self._places[name] = self._add(self._textures.sheet(key, step_u, step_v, 1, 1).image)
+            place = self._places[cache_key] = self._add(self._textures.sheet(key, step_u, step_v, 1, 1).image)
         return place
 
     def _add(self, image: NDArray[np.uint8]) -> tuple[int, int, int]:

@@ -24,11 +24,11 @@ def build_robot(
     x, y = 0.5 * spec.length_m - 1.3 * radius, 0.5 * spec.width_m - 0.035
     hubs = [np.array([sx * x, sy * y, spec.z_m + radius]) for sx in (1.0, -1.0) for sy in (1.0, -1.0)]
 
-    def stand(state: MotionState) -> tuple[Pose, ...]:
+    def pose_parts(state: MotionState) -> tuple[Pose, ...]:
         roll = axis_rotation("y", state.distance_m / radius)
         return (Pose(np.eye(3), np.array([0.0, 0.0, spec.z_m])), *(Pose(roll, hub) for hub in hubs))
 
-    return (_hull(spec, radius, pick), wheel, wheel, wheel, wheel), stand
+    return (_hull(spec, radius, pick), wheel, wheel, wheel, wheel), pose_parts
 
 
 def _hull(spec: RobotBody, radius: float, pick: int) -> Faces:
@@ -67,6 +67,6 @@ def _hull(spec: RobotBody, radius: float, pick: int) -> Faces:
 
 def _wheel(radius: float, width: float) -> Faces:
     """A wheel with its axis along y and its hub at the origin."""
-    lying = axis_rotation("x", np.pi / 2.0)
+    rotation = axis_rotation("x", np.pi / 2.0)
     drum = prism(_WHEEL_SIDES, (radius, radius), (-0.5 * width, 0.5 * width), "wheel", cap="hub")
-    return drum.moved(lying, np.zeros(3))
+    return drum.moved(rotation, np.zeros(3))

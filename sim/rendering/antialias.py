@@ -39,11 +39,12 @@ def smooth_edges(
         pixels[where] = values
 
 
-def _contrasting(pixels: NDArray[np.uint32], here: NDArray[np.intp], stride: int) -> NDArray[np.intp]:
-    """The pixels here where some channel differs enough for a jagged edge to be visible."""
-    one, other = pixels[here].view(np.uint8), pixels[here + stride].view(np.uint8)
-    difference = np.maximum(one, other) - np.minimum(one, other)
-    kept: NDArray[np.intp] = here[(difference.view(np.uint32) & _VISIBLE_STEP) != 0]
+def _contrasting(pixels: NDArray[np.uint32], first: NDArray[np.intp], stride: int) -> NDArray[np.intp]:
+    """The pixels of first that differ enough in some channel from the pixel stride further on for a jagged
+    edge to be visible."""
+    values, neighbour_values = pixels[first].view(np.uint8), pixels[first + stride].view(np.uint8)
+    difference = np.maximum(values, neighbour_values) - np.minimum(values, neighbour_values)
+    kept: NDArray[np.intp] = first[(difference.view(np.uint32) & _VISIBLE_STEP) != 0]
     return kept
 
 
@@ -53,32 +54,32 @@ def _blend(
     inverse_depth: Float32Image,
     lines: NDArray[np.float32],
     slopes: NDArray[np.float32],
-    here: NDArray[np.intp],
+    first: NDArray[np.intp],
     stride: int,
 ) -> tuple[NDArray[np.intp], NDArray[np.uint32]]:
-    """New colours for the pixels that an edge cuts between here and the pixel stride further on."""
+    """New colours for the pixels that an edge cuts between the pixels first and those stride further on."""
     depth = inverse_depth.reshape(-1)
-    behind = depth[here + stride] > depth[here]
-    inside = here + stride * behind
+    behind = depth[first + stride] > depth[first]
+    inside = first + stride * behind
     label = labels.reshape(-1)[inside]
     row, column = np.divmod(inside.astype(np.int32), np.int32(labels.shape[1]))
-    towards = np.take(slopes, label, axis=1) * (np.float32(1.0) - 2.0 * behind.astype(np.float32))
+    slope_towards = np.take(slopes, label, axis=1) * (np.float32(1.0) - 2.0 * behind.astype(np.float32))
     at_inside = np.take(lines[0], label, axis=1) * column.astype(np.float32)
     at_inside += np.take(lines[1], label, axis=1) * row.astype(np.float32)
     at_inside += np.take(lines[2], label, axis=1)
     # With float32, a centre exactly on an edge may come out slightly outside: it is kept inside. The distance
     # to an edge that is not approached becomes nearly infinite.
-    reaches = np.maximum(at_inside, _ON_EDGE) / np.maximum(-towards, _NOT_APPROACHED)
-    reach = np.minimum(np.minimum(reaches[0], reaches[1]), np.minimum(reaches[2], reaches[3]))
-    found = np.flatnonzero(reach <= 1.0)
-    inside, reach = inside[found], reach[found]
-    outside = inside + (stride - 2 * stride * behind[found])
-    # The edge lies reach pixels beyond the inner pixel's centre: it cuts that pixel or the next one.
-    cuts_inner = reach < 0.5
+    distances = np.maximum(at_inside, _ON_EDGE) / np.maximum(-slope_towards, _NOT_APPROACHED)
+    distance = np.minimum(np.minimum(distances[0], distances[1]), np.minimum(distances[2], distances[3]))
+    cut = np.flatnonzero(distance <= 1.0)
+    inside, distance = inside[cut], distance[cut]
+    outside = inside + (stride - 2 * stride * behind[cut])
+    # The edge lies distance pixels beyond the inner pixel's centre: it cuts that pixel or the next one.
+    cuts_inner = distance < 0.5
     pixel = np.where(cuts_inner, inside, outside)
     partner = np.where(cuts_inner, outside, inside)
     own, other = _channels(pixels, pixel), _channels(pixels, partner)
-    mixed = own + (other - own) * np.abs(reach - 0.5)[:, None] + 0.5
+    mixed = own + (other - own) * np.abs(distance - 0.5)[:, None] + 0.5
     return pixel, mixed.astype(np.uint8).view(np.uint32)[:, 0]
 
 

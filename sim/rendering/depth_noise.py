@@ -46,7 +46,7 @@ class DepthSensor:
         shape = (intrinsics.height, intrinsics.width)
         self._shape = shape
         self._disparity_px_m = intrinsics.fx * _BASELINE_M
-        self._widest_px = min(self._disparity_px_m / config.depth_min_m, shape[1] - 1)
+        self._max_shift_px = min(self._disparity_px_m / config.depth_min_m, shape[1] - 1)
         generator = np.random.default_rng((seed, 101))
         padded = (shape[0] + _MARGIN_PX, shape[1] + _MARGIN_PX)
         # A frame adds two independent noise fields, one of which it shares with the next frame: the
@@ -58,7 +58,7 @@ class DepthSensor:
         self._columns = np.arange(shape[1], dtype=np.float32)[None, :]
         band = (BAND_ROWS, shape[1])
         self._noisy: Float32Image = np.empty(band, np.float32)
-        self._seen_at: Float32Image = np.empty(band, np.float32)
+        self._right_column: Float32Image = np.empty(band, np.float32)
         self._windows = np.empty(band, np.float32), np.empty(band, np.float32)
 
     def measure(self, inverse_depth: Float32Image, frame: int) -> DepthImage:
@@ -68,8 +68,8 @@ class DepthSensor:
         """
         depth = np.empty(self._shape, np.uint16)
         config = self._config
-        noises = [self._cut(self._noise, frame + k, 0) for k in (0, 1)] if self._sigma > 0.0 else []
-        holes = self._cut(self._holes, frame, 1) if config.hole_ratio > 0.0 else None
+        noises = [self._crop(self._noise, frame + k, 0) for k in (0, 1)] if self._sigma > 0.0 else []
+        holes = self._crop(self._holes, frame, 1) if config.hole_ratio > 0.0 else None
         for first in range(0, self._shape[0], BAND_ROWS):
             rows = slice(first, first + BAND_ROWS)
             exact = inverse_depth[rows]
@@ -92,22 +92,23 @@ class DepthSensor:
 
     def shadows(self, inverse_depth: Float32Image) -> NDArray[np.bool_]:
         """The pixels (R, W) that the left infrared camera sees and the right one does not, for at most
-        BAND_ROWS
-        whole rows: the strip of background to the left of every nearer object, as wide as the difference of
-        their disparities."""
+        BAND_ROWS whole rows: the strip of background to the left of every nearer object, as wide as the
+        difference of their disparities."""
         count = len(inverse_depth)
-        seen_at = np.multiply(inverse_depth, np.float32(self._disparity_px_m), out=self._seen_at[:count])
-        np.subtract(self._columns, seen_at, out=seen_at)
+        right_column = np.multiply(
+            inverse_depth, np.float32(self._disparity_px_m), out=self._right_column[:count]
+        )
+        np.subtract(self._columns, right_column, out=right_column)
         # Minimum over all pixels to the right, as far as a shadow can reach, with windows of doubling width.
-        nearest, reach = seen_at, 1
+        nearest, reach = right_column, 1
         wider, spare = (window[:count] for window in self._windows)
-        while reach <= self._widest_px:
+        while reach <= self._max_shift_px:
             cv2.min(nearest[:, :-reach], nearest[:, reach:], dst=wider[:, :-reach])
             wider[:, -reach:] = nearest[:, -reach:]
             nearest, wider, spare, reach = wider, spare, wider, 2 * reach
-        return seen_at > np.add(nearest, np.float32(_TOLERATED_SHIFT_PX), out=wider)
+        return right_column > np.add(nearest, np.float32(_TOLERATED_SHIFT_PX), out=wider)
 
-    def _cut(self, field: NDArray[ScalarT], frame: int, stream: int) -> NDArray[ScalarT]:
+    def _crop(self, field: NDArray[ScalarT], frame: int, stream: int) -> NDArray[ScalarT]:
         """The part of a noise field at a shift that is drawn for this frame."""
         generator = np.random.default_rng((self._seed, 102 + stream, frame))
         top, left = (int(shift) for shift in generator.integers(_MARGIN_PX, size=2))

@@ -61,7 +61,7 @@ class Rasteriser:
         self._plane = np.empty(shape[0] * shape[1], np.float32)
         self._label = np.empty(shape[0] * shape[1], np.uint16)
         self._inside = np.empty(shape[0] * shape[1], np.bool_)
-        self._other = np.empty(shape[0] * shape[1], np.bool_)
+        self._condition = np.empty(shape[0] * shape[1], np.bool_)
         k = intrinsics
         self._pixel_to_ray = np.array(
             [[1.0 / k.fx, 0.0, -k.cx / k.fx], [0.0, 1.0 / k.fy, -k.cy / k.fy], [0.0, 0.0, 1.0]]
@@ -71,10 +71,10 @@ class Rasteriser:
         """Fill inverse_depth and labels with what camera (in the floor's frame) sees."""
         self.inverse_depth.fill(0.0)
         self.labels.fill(0)
-        face, corners = self._facing(geometry, camera)
+        face, corners = self._front_faces(geometry, camera)
         spans = convert(corners, self.intrinsics)
         keep = np.flatnonzero(spans.bounds[:, 2] > 0)
-        face, corners, spans = face[keep], corners[keep], spans.chosen(keep)
+        face, corners, spans = face[keep], corners[keep], spans.select(keep)
         to_plane = np.linalg.inv(texture_frames(corners)) @ self._pixel_to_ray
         size = (spans.bounds[:, 2] - spans.bounds[:, 0]) * (spans.bounds[:, 3] - spans.bounds[:, 1])
         small = size < SMALL_PX
@@ -83,7 +83,7 @@ class Rasteriser:
         edges = edge_planes(corners) @ self._pixel_to_ray
         return Drawn(face, edges, to_plane, spans.bounds, small, small_pixels)
 
-    def _facing(self, geometry: Geometry, camera: Pose) -> tuple[NDArray[np.intp], FloatArray]:
+    def _front_faces(self, geometry: Geometry, camera: Pose) -> tuple[NDArray[np.intp], FloatArray]:
         """The faces that face the camera and may reach into the image, and their corners in the optical
         frame."""
         to_eye = camera.translation_m - geometry.corners_m[:, 0]
@@ -103,29 +103,29 @@ class Rasteriser:
     def _draw_large(self, numbers: NDArray[np.intp], planes: FloatArray, spans: Spans) -> None:
         """Draw one face after the other, where it is nearer than what is there already."""
         columns, steps = self._columns, self._steps
-        chosen = spans.chosen(numbers)
+        selected = spans.select(numbers)
         slopes = planes[numbers, 0].astype(np.float32)
-        _, _, entry = chosen.entries()
+        _, _, entry = selected.entries()
         at_left = np.empty((len(spans.first), 1), np.float32)
-        at_left[entry, 0] = _inverse_depth_at_left(planes[numbers], chosen)
-        begins = (chosen.start - chosen.row + chosen.bounds[:, 1]).tolist()
+        at_left[entry, 0] = _inverse_depth_at_left(planes[numbers], selected)
+        first_rows = (selected.start - selected.row + selected.bounds[:, 1]).tolist()
         first, last = spans.first[:, None], spans.last[:, None]
-        for index, (u0, v0, u1, v1) in enumerate(chosen.bounds.tolist()):
+        for index, (u0, v0, u1, v1) in enumerate(selected.bounds.tolist()):
             height, width = v1 - v0, u1 - u0
             size, shape = height * width, (height, width)
-            rows = slice(begins[index], begins[index] + height)
+            rows = slice(first_rows[index], first_rows[index] + height)
             window = slice(v0, v1), slice(u0, u1)
             inside = self._inside[:size].reshape(shape)
-            other = self._other[:size].reshape(shape)
+            condition = self._condition[:size].reshape(shape)
             plane = self._plane[:size].reshape(shape)
             label = self._label[:size].reshape(shape)
             nearest = self.inverse_depth[window]
             np.add(steps[:, :width] * slopes[index], at_left[rows], out=plane)
             np.greater(plane, nearest, out=inside)
-            np.greater_equal(columns[:, u0:u1], first[rows], out=other)
-            np.logical_and(inside, other, out=inside)
-            np.less(columns[:, u0:u1], last[rows], out=other)
-            np.logical_and(inside, other, out=inside)
+            np.greater_equal(columns[:, u0:u1], first[rows], out=condition)
+            np.logical_and(inside, condition, out=inside)
+            np.less(columns[:, u0:u1], last[rows], out=condition)
+            np.logical_and(inside, condition, out=inside)
             mask = inside.view(np.uint8)
             cv2.copyTo(plane, mask, nearest)
             label.fill(numbers[index] + 1)
@@ -134,28 +134,28 @@ class Rasteriser:
     def _draw_small(self, numbers: NDArray[np.intp], planes: FloatArray, spans: Spans) -> NDArray[np.intp]:
         """Draw many faces at once; return the pixels (flat indices) that show one of them."""
         depth, labels = self.inverse_depth.reshape(-1), self.labels.reshape(-1)
-        chosen = spans.chosen(numbers)
-        face, row, entry = chosen.entries()
+        selected = spans.select(numbers)
+        face, row, entry = selected.entries()
         first = spans.first[entry].astype(np.intp)
         length = np.maximum(spans.last[entry] - first, 0)
         step = np.arange(int(length.sum())) - np.repeat(np.cumsum(length) - length, length)
         slope = planes[numbers, 0].astype(np.float32)[face]
-        begin = _inverse_depth_at_left(planes[numbers], chosen)
-        begin += slope * (first - chosen.bounds[face, 0]).astype(np.float32)
+        begin = _inverse_depth_at_left(planes[numbers], selected)
+        begin += slope * (first - selected.bounds[face, 0]).astype(np.float32)
         pixel = np.repeat(row * self.intrinsics.width + first, length) + step
         inverse = np.repeat(begin, length) + np.repeat(slope, length) * step.astype(np.float32)
         label = np.repeat((numbers[face] + 1).astype(np.uint16), length)
         nearer = np.flatnonzero(inverse > depth[pixel])
         pixel, inverse, label = pixel[nearer], inverse[nearer], label[nearer]
-        candidates, wanted = pixel, inverse
+        candidates, candidate_depths = pixel, inverse
         while len(pixel):
             # If several faces share a pixel, the last one is stored: repeat with those that are nearer than
             # it.
             depth[pixel], labels[pixel] = inverse, label
             nearer = np.flatnonzero(inverse > depth[pixel])
             pixel, inverse, label = pixel[nearer], inverse[nearer], label[nearer]
-        seen: NDArray[np.intp] = candidates[depth[candidates] == wanted]
-        return seen
+        visible: NDArray[np.intp] = candidates[depth[candidates] == candidate_depths]
+        return visible
 
 
 def _inverse_depth_at_left(planes: FloatArray, spans: Spans) -> NDArray[np.float32]:

@@ -30,8 +30,8 @@ class _Parts:
 
     number: P indices of faces in Drawn.
     rectangle: P rectangles.
-    to_sheet: (P, 3, 3), from pixels of the rectangle to texture coordinates, relative to the first whole
-    tile.
+    to_sheet: (P, 3, 3), from pixels of the rectangle to texture coordinates, relative to the first
+        whole tile.
     steps: (P, 2), steps of the pyramid along u and v.
     tiles: (P, 2), number of copies of the texture side by side along u and v.
     """
@@ -74,7 +74,7 @@ class Painter:
             width, height = right - left, bottom - top
             patch = self._patch[: width * height * 4].reshape(height, width, 4)
             cv2.warpPerspective(
-                sheet.image, sheet.from_tiles @ parts.to_sheet[index], (width, height), dst=patch,
+                sheet.image, sheet.texture_to_pixel @ parts.to_sheet[index], (width, height), dst=patch,
                 flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_CONSTANT,
             )  # fmt: skip
             cv2.convertScaleAbs(patch, dst=patch, alpha=gains[number])
@@ -105,7 +105,7 @@ class Painter:
                 for t, (u, v) in zip(texture.tolist(), steps.tolist(), strict=True)
             ]
         )
-        u, v = _place_at(to_uv, bounds, pixel, index, labels.shape[1])
+        u, v = _texture_coordinates(to_uv, bounds, pixel, index, labels.shape[1])
         texels = _interpolate(self._pool.texels, places, index, u, v)
         values = np.minimum(texels * gains[numbers].astype(np.float32)[index, None] + 0.5, 255.0)
         self.colour.reshape(-1).view(np.uint32)[pixel] = values.astype(np.uint8).view(np.uint32)[:, 0]
@@ -160,7 +160,7 @@ def _window_matrices(windows: FloatArray) -> FloatArray:
     return matrices
 
 
-def _place_at(
+def _texture_coordinates(
     to_uv: FloatArray, bounds: FloatArray, pixel: NDArray[np.intp], index: NDArray[np.intp], width: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Texture coordinates (P,), (P,) in 0..1 at pixels (P,). index (P,): which matrix to use for each."""
@@ -190,20 +190,22 @@ def _interpolate(
     inner_width, inner_height = (width - 2).astype(np.float32), (height - 2).astype(np.float32)
     x, y = u * inner_width[index] + np.float32(0.5), v * inner_height[index] + np.float32(0.5)
     left, top = x.astype(np.intp), y.astype(np.intp)
-    right_share, lower_share = (x - left)[:, None], (y - top)[:, None]
+    right_weight, lower_weight = (x - left)[:, None], (y - top)[:, None]
     stride = width[index]
     at = begin[index] + top * stride + left
-    upper = _mix(texels, at, right_share)
-    lower = _mix(texels, at + stride, right_share)
-    samples: NDArray[np.float32] = upper + (lower - upper) * lower_share
+    upper = _mix(texels, at, right_weight)
+    lower = _mix(texels, at + stride, right_weight)
+    samples: NDArray[np.float32] = upper + (lower - upper) * lower_weight
     return samples
 
 
-def _mix(texels: NDArray[np.uint32], at: NDArray[np.intp], share: NDArray[np.float32]) -> NDArray[np.float32]:
+def _mix(
+    texels: NDArray[np.uint32], at: NDArray[np.intp], weight: NDArray[np.float32]
+) -> NDArray[np.float32]:
     """Linear interpolation (P, 4) between the texels at and at + 1, for each channel."""
     here = texels[at].view(np.uint8).reshape(-1, 4).astype(np.float32)
     after = texels[at + 1].view(np.uint8).reshape(-1, 4).astype(np.float32)
-    mixed: NDArray[np.float32] = here + (after - here) * share
+    mixed: NDArray[np.float32] = here + (after - here) * weight
     return mixed
 
 
@@ -257,9 +259,9 @@ def _pyramid_steps(to_uv: FloatArray, bounds: FloatArray, sizes: FloatArray) -> 
     place = at_centre[:, :2] * z[:, None]
     slopes = to_uv[:, :2, :2] - place[:, :, None] * to_uv[:, 2:3, :2]
     texels = np.hypot(slopes[:, :, 0], slopes[:, :, 1]) * z[:, None] * sizes
-    wanted = np.rint(STEPS_PER_OCTAVE * np.log2(np.maximum(texels, 1.0)))
-    most = np.floor(STEPS_PER_OCTAVE * np.log2(sizes))
-    steps: NDArray[np.intp] = np.minimum(wanted, most).astype(np.intp)
+    desired = np.rint(STEPS_PER_OCTAVE * np.log2(np.maximum(texels, 1.0)))
+    max_steps = np.floor(STEPS_PER_OCTAVE * np.log2(sizes))
+    steps: NDArray[np.intp] = np.minimum(desired, max_steps).astype(np.intp)
     return steps
 
 
@@ -274,11 +276,11 @@ def _tiles(to_uv: FloatArray, bounds: FloatArray, windows: FloatArray) -> tuple[
     corners = np.ones((len(wraps), 3, 4))
     corners[:, 0] = rect[:, [0, 2, 2, 0]] - 0.5
     corners[:, 1] = rect[:, [1, 1, 3, 3]] - 0.5
-    seen = to_uv[wraps] @ corners
-    ahead = np.min(seen[:, 2], axis=1, keepdims=True) > 1.0 / 500.0
-    place = seen[:, :2] / np.where(ahead, seen[:, 2], 1.0)[:, None, :]
-    low = np.where(ahead, np.clip(place.min(axis=2), low, high), low)
-    high = np.where(ahead, np.clip(place.max(axis=2), low, high), high)
+    projected = to_uv[wraps] @ corners
+    in_front = np.min(projected[:, 2], axis=1, keepdims=True) > 1.0 / 500.0
+    place = projected[:, :2] / np.where(in_front, projected[:, 2], 1.0)[:, None, :]
+    low = np.where(in_front, np.clip(place.min(axis=2), low, high), low)
+    high = np.where(in_front, np.clip(place.max(axis=2), low, high), high)
     first[wraps] = np.floor(low)
     tiles[wraps] = np.maximum(np.ceil(high) - np.floor(low), 1.0)
     return first, tiles

@@ -15,9 +15,9 @@ from sim.rendering.spans import convert
 from sim.world import BUILDING_ID, BodyState, Geometry
 
 _MARGIN_M = 0.6  # half width of the penumbra of a large lamp: to either side of the footprint's edge
-_DARKEST = 0.6  # share of the light that is lost right below a body
-_HIGH_M = 0.5  # bodies that hang higher than this cast no distinct shadow
-_FAR_M = 12.0  # shadows further away than this are left out
+_MAX_DARKENING = 0.6  # share of the light that is lost right below a body
+_MAX_UNDERSIDE_M = 0.5  # bodies that hang higher than this cast no distinct shadow
+_MAX_DISTANCE_M = 12.0  # shadows further away than this are left out
 _SIDE_PX = 64
 _RIM = 0.3  # share of the shadow's image that lies outside the footprint, on each side
 
@@ -30,7 +30,7 @@ class ShadowCaster:
         azimuth = math.radians(light.azimuth_deg)
         # Away from the light.
         self._drift = -0.06 * np.array([math.cos(azimuth), math.sin(azimuth)])
-        self._blot = _soft_blot()
+        self._patch_image = _soft_patch()
         self._still: dict[int, FloatArray] = {}
 
     def cast(
@@ -46,20 +46,20 @@ class ShadowCaster:
         near = self._near(bodies, camera)
         if not near:
             return
-        corners = np.array([self._patch_of(state) for state in near])
+        corners = np.array([self._cached_patch(state) for state in near])
         corners = (corners - camera.translation_m) @ camera.rotation
         k = self._intrinsics
         bounds = convert(corners, k).bounds
         to_ray = np.array([[1 / k.fx, 0, -k.cx / k.fx], [0, 1 / k.fy, -k.cy / k.fy], [0, 0, 1]])
-        to_blot = np.diag([_SIDE_PX, _SIDE_PX, 1.0]) @ np.linalg.inv(texture_frames(corners)) @ to_ray
+        to_patch = np.diag([_SIDE_PX, _SIDE_PX, 1.0]) @ np.linalg.inv(texture_frames(corners)) @ to_ray
         on_floor = _floor_faces(drawn, geometry)
-        for (u0, v0, u1, v1), matrix in zip(bounds.tolist(), to_blot, strict=True):
+        for (u0, v0, u1, v1), matrix in zip(bounds.tolist(), to_patch, strict=True):
             if u1 <= u0:
                 continue
             floor = on_floor[labels[v0:v1, u0:u1]]
             matrix[:, 2] += matrix[:, 0] * u0 + matrix[:, 1] * v0
             shade = cv2.warpPerspective(
-                self._blot, matrix, (u1 - u0, v1 - v0), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+                self._patch_image, matrix, (u1 - u0, v1 - v0), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
                 borderMode=cv2.BORDER_CONSTANT, borderValue=(255, 255, 255, 255),
             )  # fmt: skip
             lit = colour[v0:v1, u0:u1]
@@ -67,13 +67,15 @@ class ShadowCaster:
 
     def _near(self, bodies: tuple[BodyState, ...], camera: Pose) -> list[BodyState]:
         """The bodies whose shadow may be visible."""
-        low = [state for state in bodies if state.z_m[0] < _HIGH_M]
+        low = [state for state in bodies if state.z_m[0] < _MAX_UNDERSIDE_M]
         places = np.array([(state.pose.x_m, state.pose.y_m) for state in low]).reshape(-1, 2)
         reaches = np.array([state.reach_m for state in low]) + _MARGIN_M
         ahead = (places - camera.translation_m[:2]) @ camera.rotation[:2, 2]
-        return [low[k] for k in np.flatnonzero((ahead > -reaches) & (ahead < _FAR_M + reaches)).tolist()]
+        return [
+            low[k] for k in np.flatnonzero((ahead > -reaches) & (ahead < _MAX_DISTANCE_M + reaches)).tolist()
+        ]
 
-    def _patch_of(self, state: BodyState) -> FloatArray:
+    def _cached_patch(self, state: BodyState) -> FloatArray:
         """As _patch, but cached for bodies that never move."""
         if state.moves:
             return self._patch(state)
@@ -104,12 +106,12 @@ def _floor_faces(drawn: Drawn, geometry: Geometry) -> NDArray[np.uint8]:
     return np.concatenate([[False], floor]).astype(np.uint8) * np.uint8(255)
 
 
-def _soft_blot() -> NDArray[np.uint8]:
+def _soft_patch() -> NDArray[np.uint8]:
     """The share of light that remains (H, W, 4), 255 for all: dark in the middle, all of it at the border."""
     dark = np.zeros((_SIDE_PX, _SIDE_PX), np.float32)
     rim = round(_RIM * _SIDE_PX)
     dark[rim:-rim, rim:-rim] = 1.0
     soft = np.asarray(cv2.GaussianBlur(dark, (0, 0), 0.5 * rim, borderType=cv2.BORDER_CONSTANT))
     soft = np.maximum(soft - soft[0].max(), 0.0)
-    left = 255.0 * (1.0 - _DARKEST * soft / soft.max())
+    left = 255.0 * (1.0 - _MAX_DARKENING * soft / soft.max())
     return np.repeat(np.rint(left).astype(np.uint8)[:, :, None], 4, axis=2)

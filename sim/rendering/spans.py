@@ -34,7 +34,7 @@ class Spans:
     last: NDArray[np.int16]
     bounds: NDArray[np.intp]
 
-    def chosen(self, faces: NDArray[np.intp]) -> Spans:
+    def select(self, faces: NDArray[np.intp]) -> Spans:
         """The spans of these faces only; first and last do not change."""
         return Spans(
             self.start[faces], self.row[faces], self.count[faces], self.first, self.last, self.bounds[faces]
@@ -59,20 +59,20 @@ def convert(corners: FloatArray, intrinsics: Intrinsics) -> Spans:
     start = np.cumsum(count) - count
     first = np.zeros(int(count.sum()), np.int16)
     last = np.zeros(len(first), np.int16)
-    below, after = np.roll(top, -1, axis=1), np.roll(u, -1, axis=1)
+    next_top, next_u = np.roll(top, -1, axis=1), np.roll(u, -1, axis=1)
     lines = edge_planes(polygons)
     # Faces are clockwise in an image whose v points down, so edges that go down bound them on the right.
-    for side, from_row, to_row in ((last, top, below), (first, below, top)):
+    for side, from_row, to_row in ((last, top, next_top), (first, next_top, top)):
         owner, edge = np.nonzero(to_row > from_row)
         begin_row = from_row[owner, edge]
         length = to_row[owner, edge] - begin_row
         begin = np.cumsum(length) - length
         step = np.arange(int(length.sum()))
-        slope, offset = _columns_of(lines[owner, edge], k)
+        slope, offset = _column_lines(lines[owner, edge], k)
         cut = np.repeat(slope, length) * (step + np.repeat(begin_row - begin, length))
         cut += np.repeat(offset, length)
         # With rounding, a nearly level edge might cut its row anywhere: keep the cut between its ends.
-        ends = u[owner, edge], after[owner, edge]
+        ends = u[owner, edge], next_u[owner, edge]
         low, high = np.minimum(*ends).clip(-1.0, k.width), np.maximum(*ends).clip(-1.0, k.width)
         np.clip(cut, np.repeat(low, length), np.repeat(high, length), out=cut)
         side[step + np.repeat((start - row)[owner] + begin_row - begin, length)] = np.ceil(cut).clip(
@@ -90,7 +90,7 @@ def edge_planes(polygons: FloatArray) -> FloatArray:
     return planes
 
 
-def _columns_of(lines: FloatArray, k: Intrinsics) -> tuple[FloatArray, FloatArray]:
+def _column_lines(lines: FloatArray, k: Intrinsics) -> tuple[FloatArray, FloatArray]:
     """(slope, offset) of the column slope * v + offset at which planes (N, 3) through the eye cut row v."""
     x, y, z = lines.T
     across = np.where(x == 0.0, 1.0, x) / k.fx
@@ -104,14 +104,16 @@ def _clip_near(corners: FloatArray) -> FloatArray:
     crossing = np.flatnonzero(corners[:, :, 2].min(axis=1) < NEAR_M)
     if len(crossing) == 0:
         return polygons
-    here = corners[crossing]
-    after = np.roll(here, -1, axis=1)
-    ahead = here[:, :, 2] >= NEAR_M
-    cuts = ahead != np.roll(ahead, -1, axis=1)
-    depth = np.where(cuts, after[:, :, 2] - here[:, :, 2], 1.0)
-    cut = here + ((NEAR_M - here[:, :, 2]) / depth)[:, :, None] * (after - here)
-    points = np.stack([here, cut], axis=2).reshape(len(here), 8, 3)
-    used = np.stack([ahead, cuts], axis=2).reshape(len(here), 8)
+    face_corners = corners[crossing]
+    next_corners = np.roll(face_corners, -1, axis=1)
+    in_front = face_corners[:, :, 2] >= NEAR_M
+    crosses = in_front != np.roll(in_front, -1, axis=1)
+    depth = np.where(crosses, next_corners[:, :, 2] - face_corners[:, :, 2], 1.0)
+    cut = face_corners + ((NEAR_M - face_corners[:, :, 2]) / depth)[:, :, None] * (
+        next_corners - face_corners
+    )
+    points = np.stack([face_corners, cut], axis=2).reshape(len(face_corners), 8, 3)
+    used = np.stack([in_front, crosses], axis=2).reshape(len(face_corners), 8)
     order = np.argsort(~used, axis=1, kind="stable")[:, :5]
     order = np.where(np.arange(5) < used.sum(axis=1, keepdims=True), order, order[:, :1])
     polygons[crossing] = np.take_along_axis(points, order[:, :, None], axis=1)
@@ -126,14 +128,14 @@ def _bounds(
     last: NDArray[np.int16],
 ) -> NDArray[np.intp]:
     bounds = np.zeros((len(count), 4), np.intp)
-    some = np.flatnonzero(count)
-    if len(some) == 0:
+    nonempty = np.flatnonzero(count)
+    if len(nonempty) == 0:
         return bounds
-    starts, empty = start[some], last <= first
-    rows = np.arange(len(empty)) + np.repeat((row - start)[some], count[some])
-    bounds[some, 0] = np.minimum.reduceat(np.where(empty, np.int16(32767), first), starts)
-    bounds[some, 1] = np.minimum.reduceat(np.where(empty, 1 << 20, rows), starts)
-    bounds[some, 2] = np.maximum.reduceat(np.where(empty, np.int16(0), last), starts)
-    bounds[some, 3] = np.maximum.reduceat(np.where(empty, 0, rows + 1), starts)
+    starts, empty = start[nonempty], last <= first
+    rows = np.arange(len(empty)) + np.repeat((row - start)[nonempty], count[nonempty])
+    bounds[nonempty, 0] = np.minimum.reduceat(np.where(empty, np.int16(32767), first), starts)
+    bounds[nonempty, 1] = np.minimum.reduceat(np.where(empty, 1 << 20, rows), starts)
+    bounds[nonempty, 2] = np.maximum.reduceat(np.where(empty, np.int16(0), last), starts)
+    bounds[nonempty, 3] = np.maximum.reduceat(np.where(empty, 0, rows + 1), starts)
     bounds[bounds[:, 2] == 0] = 0
     return bounds

@@ -41,7 +41,7 @@ class GroundTruth:
     def __init__(self, world: World, intrinsics: Intrinsics) -> None:
         self._world = world
         self._intrinsics = intrinsics
-        self._alone = Rasteriser(intrinsics)
+        self._single_body = Rasteriser(intrinsics)
 
     def bodies(self, picture: Picture, only: Collection[int] | None = None) -> tuple[BodyTruth, ...]:
         """Every body with at least one visible pixel, in the order of their ids.
@@ -64,7 +64,7 @@ class GroundTruth:
                     state=state,
                     bbox_px=(int(u.min()), int(v.min()), int(u.max()) + 1, int(v.max()) + 1),
                     visible_px=len(u),
-                    visible_ratio=len(u) / self._pixels_alone(picture, state.id),
+                    visible_ratio=len(u) / self._unoccluded_pixels(picture, state.id),
                     position_m=surface.mean(axis=0),
                     velocity_mps=velocity @ picture.camera.rotation,
                 )
@@ -86,11 +86,13 @@ class GroundTruth:
         flow = np.full((k.height, k.width, 2), np.nan, np.float32)
         for number, (u0, v0, u1, v1) in enumerate(picture.drawn.bounds.tolist()):
             v, u = np.nonzero(picture.labels[v0:v1, u0:u1] == number + 1)
-            here = np.stack([u + u0, v + v0, np.ones(len(u))])
-            there = homographies[number] @ here
-            # there[2] is z in the other camera, divided by z in this one.
-            ratio = np.where(there[2] / (picture.drawn.to_plane[number, 2] @ here) > NEAR_M, there[2], np.nan)
-            flow[v + v0, u + u0] = (there[:2] / ratio - here[:2]).T
+            pixels = np.stack([u + u0, v + v0, np.ones(len(u))])
+            projected = homographies[number] @ pixels
+            # projected[2] is z in the other camera, divided by z in this one.
+            ratio = np.where(
+                projected[2] / (picture.drawn.to_plane[number, 2] @ pixels) > NEAR_M, projected[2], np.nan
+            )
+            flow[v + v0, u + u0] = (projected[:2] / ratio - pixels[:2]).T
         return flow
 
     def _points(self, picture: Picture) -> FloatArray:
@@ -100,11 +102,15 @@ class GroundTruth:
         v, u = np.mgrid[0 : k.height, 0 : k.width]
         return np.stack([(u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z], axis=2)
 
-    def _pixels_alone(self, picture: Picture, body_id: int) -> int:
-        every = picture.geometry
-        own = every.body == body_id
+    def _unoccluded_pixels(self, picture: Picture, body_id: int) -> int:
+        full = picture.geometry
+        selected = full.body == body_id
         only = Geometry(
-            every.corners_m[own], every.normals[own], every.windows[own], every.texture[own], every.body[own]
+            full.corners_m[selected],
+            full.normals[selected],
+            full.windows[selected],
+            full.texture[selected],
+            full.body[selected],
         )
-        self._alone.draw(only, picture.camera)
-        return int(np.count_nonzero(self._alone.labels))
+        self._single_body.draw(only, picture.camera)
+        return int(np.count_nonzero(self._single_body.labels))

@@ -30,7 +30,7 @@ def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
 
 
 def test_nothing_is_known_before_the_base_speaks(rig: Rig) -> None:
-    rig.needs_emulator("it speaks as soon as the port is open")
+    rig.require_emulator("it speaks as soon as the port is open")
     state = rig.chassis.exchange(None, 1 * MS)
     assert state.mode is ChassisMode.STANDBY
     assert state.feedback_ns is None
@@ -84,7 +84,7 @@ def test_moves_as_commanded(rig: Rig, v_mps: float, w_radps: float) -> None:
 
 
 def test_dead_reckoning_follows_the_true_body(rig: Rig) -> None:
-    rig.needs_emulator("where it truly is, nobody knows")
+    rig.require_emulator("where it truly is, nobody knows")
     rig.run(0.2)
     rig.arm()
     rig.run(2.0, 0.5)
@@ -99,7 +99,7 @@ def test_dead_reckoning_follows_the_true_body(rig: Rig) -> None:
 
 def test_dead_reckoning_moves_with_every_exchange(rig: Rig) -> None:
     """However seldom the base reports: who compares poses must not see them stand and jump."""
-    rig.needs_emulator("its frames come when they like")
+    rig.require_emulator("its frames come when they like")
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
@@ -123,7 +123,7 @@ def test_says_what_was_sent(rig: Rig) -> None:
 
 
 def test_too_fast_a_command_is_slowed_on_the_same_curve(rig: Rig) -> None:
-    rig.needs_emulator("its full speed is not wanted")
+    rig.require_emulator("its full speed is not wanted")
     rig.run(0.2)
     rig.arm()
     twists = sent_twists([rig.step(100.0, 50.0) for _ in range(10)])
@@ -134,7 +134,7 @@ def test_too_fast_a_command_is_slowed_on_the_same_curve(rig: Rig) -> None:
 
 
 def test_the_newest_command_arrives_within_three_periods(rig: Rig) -> None:
-    rig.needs_emulator("how soon it brakes is its own affair")
+    rig.require_emulator("how soon it brakes is its own affair")
     rig.run(0.2)
     rig.arm()
     rig.run(2.0, 0.5)
@@ -150,10 +150,10 @@ def test_stop_is_explicit_zero_then_standby_and_may_be_repeated(rig: Rig) -> Non
     rig.run(1.0, 0.5)
     for _ in range(3):
         rig.chassis.stop(rig.now_ns)
-    rig.coast(rig.braking_s)
+    rig.run_emulator_only(rig.braking_s)
     assert rig.plant.twist[0] < 0.35, "braking by the explicit zero, well before the base's own time-out"
     state = rig.run(2.0, 0.5)
-    assert rig.stands()
+    assert rig.is_standing()
     assert (state.mode, state.reason) == (ChassisMode.STANDBY, "stopped")
 
 
@@ -161,9 +161,9 @@ def test_leaving_the_context_stops(rig: Rig) -> None:
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
-    rig.needs_emulator("its driver is closed, so nobody could tell")
+    rig.require_emulator("its driver is closed, so nobody could tell")
     rig.chassis.__exit__(None, None, None)
-    rig.coast(0.1)
+    rig.run_emulator_only(0.1)
     assert rig.plant.twist[0] < 0.35
 
 
@@ -220,7 +220,7 @@ def test_frozen_base_latches(rig: Rig) -> None:
     rig.run(1.0, 0.5)
     rig.emulator.freeze()
     rig.run(rig.own_timeout_s + 1.0, 0.5)
-    assert rig.stands(), "its own time-out stopped the motors"
+    assert rig.is_standing(), "its own time-out stopped the motors"
     rig.emulator.thaw()
     rig.run(0.3, 0.5)
     assert_latched(rig, ChassisMode.LOST, "feedback")
@@ -228,7 +228,7 @@ def test_frozen_base_latches(rig: Rig) -> None:
 
 
 def test_unplugging_latches_and_the_base_stops_by_itself(rig: Rig) -> None:
-    rig.needs_emulator("unplugged, it cannot tell that it stands: see for yourself")
+    rig.require_emulator("unplugged, it cannot tell that it stands: see for yourself")
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
@@ -236,7 +236,7 @@ def test_unplugging_latches_and_the_base_stops_by_itself(rig: Rig) -> None:
     state = rig.step(0.5)
     assert (state.mode, state.sent) == (ChassisMode.LOST, None)
     rig.run(rig.own_timeout_s + 1.0, 0.5)
-    assert rig.stands()
+    assert rig.is_standing()
     rig.chassis.stop(rig.now_ns)
     rig.plug.plug()
     rig.run(1.0, 0.5)
@@ -264,7 +264,7 @@ def test_stop_on_a_link_that_has_come_back_is_heard(rig: Rig) -> None:
     rig.step(0.5)
     rig.plug.plug()
     rig.chassis.stop(rig.now_ns)
-    rig.coast(rig.braking_s)
+    rig.run_emulator_only(rig.braking_s)
     assert rig.plant.twist[0] < 0.35
 
 
@@ -272,15 +272,15 @@ def test_a_host_that_dies_leaves_a_base_that_stops(rig: Rig) -> None:
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
-    rig.coast(rig.own_timeout_s + 1.0)
-    assert rig.stands()
+    rig.run_emulator_only(rig.own_timeout_s + 1.0)
+    assert rig.is_standing()
 
 
 def test_a_control_loop_that_hung_does_not_go_on_at_the_old_speed(rig: Rig) -> None:
     rig.run(0.2)
     rig.arm()
     rig.run(1.0, 0.5)
-    rig.coast(rig.own_timeout_s + 0.2)
+    rig.run_emulator_only(rig.own_timeout_s + 0.2)
     rig.step(0.5)
     assert rig.state.mode in (ChassisMode.ESTOP, ChassisMode.LOST)
     rig.run(0.5, 0.5)

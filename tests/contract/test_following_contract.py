@@ -34,7 +34,7 @@ def test_a_base_that_tells_of_no_motion_when_told_to_move_latches(
         assert state.mode is ChassisMode.ESTOP
         assert state.sent is None or (state.sent.v_mps, state.sent.w_radps) == (0.0, 0.0)
     rig.run(1.0, 0.5)
-    assert rig.stands(), "free again, and yet it needs consent"
+    assert rig.is_standing(), "free again, and yet it needs consent"
     rig.step()
     rig.arm()
     rig.run(2.0, 0.3)
@@ -56,7 +56,7 @@ def test_a_base_that_rolls_back_latches(rig: Rig, monkeypatch: pytest.MonkeyPatc
         assert "rolls back" in rig.state.reason
     rig.plant.command(0.0, 0.0)
     rig.run(1.0, 0.5)
-    assert rig.stands(), "held again, and yet it needs consent"
+    assert rig.is_standing(), "held again, and yet it needs consent"
 
 
 @pytest.mark.parametrize(("v_mps", "w_radps"), [(0.4, 0.0), (0.0, 1.0)])
@@ -82,4 +82,4 @@ def test_a_base_that_moves_on_its_own_latches_and_one_that_is_not_armed_may(
         assert "does not follow" in rig.state.reason
     rig.plant.command(0.0, 0.0)
     rig.run(1.0, 0.5)
-    assert rig.stands(), "it stands again, and yet it needs consent"
+    assert rig.is_standing(), "it stands again, and yet it needs consent"

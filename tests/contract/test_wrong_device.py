@@ -71,8 +71,8 @@ def test_a_wrong_baud_rate(kind: str) -> None:
     rng = random.Random(7)
     near, far = serial_pair()
     base = emulator(kind, far)
-    near.hear_through(lambda data: rng.randbytes(len(data)))
-    far.hear_through(lambda data: rng.randbytes(len(data)))
+    near.set_filter(lambda data: rng.randbytes(len(data)))
+    far.set_filter(lambda data: rng.randbytes(len(data)))
     # A controller that only answers may have nothing to say to such noise.
     near.deliver(rng.randbytes(50))
     state = try_to_arm(kind, near, base)

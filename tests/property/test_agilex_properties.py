@@ -94,7 +94,7 @@ def test_agilex_serial_accepts_nothing_but_a_right_checksum(chunks: list[bytes],
 def test_agilex_serial_driver_survives_any_bytes(chunks: list[bytes]) -> None:
     link = ScriptedSerialLink()
     bus = agilex_serial.AgilexSerialBus(link)
-    chassis = AgilexChassis(bus, agilex_config(SerialLinkConfig(url="loop://")), bus.silence)
+    chassis = AgilexChassis(bus, agilex_config(SerialLinkConfig(url="loop://")), bus.silence_hint)
     for k, chunk in enumerate(chunks, start=1):
         link.deliver(chunk)
         check_state(chassis.exchange(Setpoint(k * 20 * MS, 1.0, 0.0, 0.5), k * 20 * MS))

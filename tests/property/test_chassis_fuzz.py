@@ -75,7 +75,7 @@ def test_of_spoilt_roboteq_bytes_only_whole_values_are_taken() -> None:
                 assert len(line.values) in QUERIES[line.name].values
                 right += 1
     assert right > 1000
-    assert reader.strangers > 1000
+    assert reader.foreign_lines > 1000
 
 
 def test_a_roboclaw_answer_is_accepted_by_its_checksum_alone(share: int) -> None:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from config.robot import Robot
 from controller.governor.request import MessageError, Twist, parse_request
-from tests.support.closed_loop import PERIOD_S, Thing, stands
-from tests.support.governed import GovernedDrive, Step
+from tests.support.closed_loop import PERIOD_S, Box, standing_at
+from tests.support.governed_drive import GovernedDrive, Step
 
 LIMITS = Robot().limits
 NUMBERS = st.floats(-2.0, 2.0) | st.sampled_from([0.0, math.nan, math.inf, 1e300, 5e-324])
@@ -23,9 +23,9 @@ DRIVEN = st.builds(Twist, st.floats(0.05, 1.4), st.floats(-0.5, 0.5))
 SEQUENCES = st.lists(st.tuples(st.none() | TWISTS | DRIVEN, st.integers(1, 60)), min_size=1, max_size=8)
 
 
-def drive(sequence: list[tuple[Twist | None, int]], things: list[Thing] | None = None) -> list[Step]:
+def drive(sequence: list[tuple[Twist | None, int]], boxes: list[Box] | None = None) -> list[Step]:
     asked = [twist for twist, count in sequence for _ in range(count)]
-    run = GovernedDrive(lambda t: asked[min(round(t / PERIOD_S), len(asked) - 1)], things)
+    run = GovernedDrive(lambda t: asked[min(round(t / PERIOD_S), len(asked) - 1)], boxes)
     return run.run(len(asked) * PERIOD_S - 1e-6)
 
 
@@ -42,7 +42,7 @@ STILL_FASTER: list[tuple[Twist | None, int]] = [
 @given(SEQUENCES)
 @example(STILL_FASTER)
 def test_limits_are_kept_whatever_is_asked(sequence: list[tuple[Twist | None, int]]) -> None:
-    steps = drive(sequence, [Thing(stands(3.5, 0.2))])
+    steps = drive(sequence, [Box(standing_at(3.5, 0.2))])
     v = np.array([0.0] + [one.governed.v_mps for one in steps])
     a = np.array([0.0] + [one.governed.a_mps2 for one in steps])
     w = np.array([one.governed.w_radps for one in steps])
@@ -62,7 +62,7 @@ def test_limits_are_kept_whatever_is_asked(sequence: list[tuple[Twist | None, in
 @given(DRIVEN, st.integers(100, 250))
 @example(Twist(1.0, 1e-5), 100)
 def test_the_arc_is_kept_and_no_step_is_faster_than_asked(twist: Twist, count: int) -> None:
-    for one in drive([(twist, count)], [Thing(stands(3.0, 0.0))]):
+    for one in drive([(twist, count)], [Box(standing_at(3.0, 0.0))]):
         governed = one.governed
         assert governed.v_mps <= twist.v_mps + 1e-9
         assert abs(governed.w_radps) <= abs(twist.w_radps) + 1e-9

@@ -16,7 +16,7 @@ from controller.decision.bodies import SceneError
 from controller.decision.surfaces import check_scan
 from controller.shape import SpeedShaper
 from hal.types import FloatArray
-from tests.support.deciding import Bench
+from tests.support.decision_bench import Bench
 from tests.support.scenes import free_space
 from vision.scene import NEVER_M, FreeSpace
 

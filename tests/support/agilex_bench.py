@@ -27,7 +27,7 @@ class Bench:
         self.chassis = AgilexChassis(self.link, agilex_config(None, **(values | changes)))
         self.now_ns = 0
 
-    def say(self, *messages: AgilexMessage) -> None:
+    def deliver(self, *messages: AgilexMessage) -> None:
         self.link.deliver(*(encode(message) for message in messages))
 
     def exchange(self, v_mps: float | None = None, w_radps: float = 0.0, after_ms: int = 20) -> ChassisState:
@@ -41,7 +41,7 @@ class Bench:
 
     def arm(self) -> None:
         self.chassis.arm(self.now_ns)
-        self.say(state(CAN), MotionFeedback(0.0, 0.0), Odometer(0, 0))
+        self.deliver(state(CAN), MotionFeedback(0.0, 0.0), Odometer(0, 0))
         assert self.exchange().mode is ChassisMode.ARMED
 
 

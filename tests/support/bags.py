@@ -34,8 +34,8 @@ COLOUR_FRAME, DEPTH_FRAME = "camera_color_optical_frame", "camera_depth_optical_
 class Ros:
     """Makes the messages of one ROS: those of ROS 1 have a number in their header, and capitals."""
 
-    def __init__(self, of: Format) -> None:
-        self.is1 = of == "bag"
+    def __init__(self, bag_format: Format) -> None:
+        self.is1 = bag_format == "bag"
         self.store = get_typestore(Stores.ROS1_NOETIC if self.is1 else Stores.ROS2_HUMBLE)
         if self.is1:
             transforms = "geometry_msgs/TransformStamped[] transforms"
@@ -116,13 +116,13 @@ class Ros:
             translation=self.make("geometry_msgs/msg/Vector3", **at),
             rotation=turn,
         )
-        one = self.make(
+        stamped = self.make(
             "geometry_msgs/msg/TransformStamped",
             header=self.header(0, parent),
             child_frame_id=child,
             transform=transform,
         )
-        return self.make("tf2_msgs/msg/TFMessage", transforms=[one])
+        return self.make("tf2_msgs/msg/TFMessage", transforms=[stamped])
 
     def odometry(
         self, stamp_ns: int, position: Sequence[float], quaternion: Sequence[float], child: str = "base_link"
@@ -151,14 +151,14 @@ Entry = tuple[str, int, Any]
 """Topic, time of arrival in nanoseconds, message."""
 
 
-def write_bag(folder: Path, of: Format, entries: Callable[[Ros], Sequence[Entry]]) -> Path:
+def write_bag(folder: Path, bag_format: Format, entries: Callable[[Ros], Sequence[Entry]]) -> Path:
     """A bag with these entries in their order. Returns the file or, of ROS 2, the folder."""
-    ros = Ros(of)
-    path = folder / ("run.bag" if of == "bag" else f"run_{of}")
-    if of == "bag":
+    ros = Ros(bag_format)
+    path = folder / ("run.bag" if bag_format == "bag" else f"run_{bag_format}")
+    if bag_format == "bag":
         writer: Any = rosbag1.Writer(path)
     else:
-        plugin = StoragePlugin.MCAP if of == "mcap" else StoragePlugin.SQLITE3
+        plugin = StoragePlugin.MCAP if bag_format == "mcap" else StoragePlugin.SQLITE3
         writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
     with writer:
         connections: dict[str, Any] = {}
@@ -175,18 +175,20 @@ def camera_entries(ros: Ros, frames: Sequence[RgbdFrame]) -> list[Entry]:
     """As a driver records them with depth aligned to colour. The depth must be in millimetres."""
     camera, first_ns = frames[0].intrinsics, frames[0].captured_ns
     info = ros.info(COLOUR_FRAME, camera)
-    found: list[Entry] = [(COLOUR_INFO, first_ns, info), (ALIGNED_INFO, first_ns, info)]
+    entries: list[Entry] = [(COLOUR_INFO, first_ns, info), (ALIGNED_INFO, first_ns, info)]
     for frame in frames:
         stamp_ns = frame.captured_ns
         depth = ros.image(stamp_ns, COLOUR_FRAME, "16UC1", frame.depth)
         colour = ros.image(stamp_ns, COLOUR_FRAME, "bgr8", frame.colour)
-        found += [(ALIGNED, stamp_ns, depth), (COLOUR, stamp_ns, colour)]
-    return found
+        entries += [(ALIGNED, stamp_ns, depth), (COLOUR, stamp_ns, colour)]
+    return entries
 
 
-def small_bag(folder: Path, of: Format = "mcap", count: int = 4) -> Path:
+def small_bag(folder: Path, bag_format: Format = "mcap", count: int = 4) -> Path:
     """Of tests.support.recordings.small_frame, without odometry."""
-    return write_bag(folder, of, lambda ros: camera_entries(ros, [small_frame(n) for n in range(count)]))
+    return write_bag(
+        folder, bag_format, lambda ros: camera_entries(ros, [small_frame(n) for n in range(count)])
+    )
 
 
 def read_all(replay: BagReplay) -> list[RgbdFrame]:
@@ -200,4 +202,4 @@ def read_all(replay: BagReplay) -> list[RgbdFrame]:
 
 
 def without(entries: list[Entry], *topics: str) -> list[Entry]:
-    return [one for one in entries if one[0] not in topics]
+    return [entry for entry in entries if entry[0] not in topics]

@@ -9,7 +9,7 @@ from config.loader import CONFIG_DIR
 from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from config.scenario import BodySpec, Crate, Go, MotionPlan, RobotBody, Room, Scenario
-from controller.campaign.drive import DriveLog
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.stage import Stage
 from controller.decision.decision import Action, Decision, Reason
 from controller.record.tally import SetpointTally

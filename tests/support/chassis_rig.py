@@ -20,7 +20,7 @@ from config.chassis import (
     SerialLinkConfig,
 )
 from hal.api import CanLink, Chassis, SerialLink
-from hal.chassis.agilex import AgilexChassis, no_can_frames
+from hal.chassis.agilex import AgilexChassis, no_can_frames_hint
 from hal.chassis.agilex_models import model_of, over_serial
 from hal.chassis.agilex_serial import AgilexSerialBus
 from hal.chassis.kobuki import KobukiChassis
@@ -97,7 +97,7 @@ class Rig:
             self.step(v_mps, w_radps)
         return self.state
 
-    def coast(self, seconds: float) -> None:
+    def run_emulator_only(self, seconds: float) -> None:
         """The host is gone: only the emulator goes on."""
         self.now_ns += round(seconds * 1e9)
         self.emulator.advance_to(self.now_ns)
@@ -110,12 +110,12 @@ class Rig:
                 return
         raise AssertionError(f"did not arm: {self.state.reason}")
 
-    def stands(self) -> bool:
+    def is_standing(self) -> bool:
         """The true body does not move."""
         v_mps, w_radps = self.plant.twist
         return abs(v_mps) < 0.5 * self.tolerance_mps and abs(w_radps) < self.tolerance_radps
 
-    def needs_emulator(self, why: str) -> None:
+    def require_emulator(self, reason: str) -> None:
         """Skips the test on a real base."""
 
 
@@ -192,7 +192,7 @@ def agilex_rig(kind: str, link: CanLinkConfig | None = None, model: str = "bunke
     for RS-232."""
     can_bus = link or can_link_config()
     bus: AgilexLinkConfig = can_bus
-    no_frames = no_can_frames
+    no_frames_hint = no_can_frames_hint
     with ExitStack() as stack:
         if kind.startswith("serial-"):
             near, far = serial_ends(kind.removeprefix("serial-"))
@@ -200,7 +200,7 @@ def agilex_rig(kind: str, link: CanLinkConfig | None = None, model: str = "bunke
             serial_bus = AgilexSerialBus(serial_plug)
             ends: tuple[CanLink, CanLink] = serial_bus, AgilexSerialBus(far)
             plug: PluggedCan | PluggedSerial = serial_plug
-            bus, no_frames = SerialLinkConfig(url="loop://"), serial_bus.silence
+            bus, no_frames_hint = SerialLinkConfig(url="loop://"), serial_bus.silence_hint
         else:
             ends = can_pair() if kind == "scripted" else (CanBusLink(can_bus), CanBusLink(can_bus))
             plug = can_plug = PluggedCan(ends[0])
@@ -210,7 +210,7 @@ def agilex_rig(kind: str, link: CanLinkConfig | None = None, model: str = "bunke
             ends[1], TrackedPlant(PLANT), model=model_of(config), over_serial=over_serial(config)
         )
         stack.enter_context(emulator)
-        chassis = stack.enter_context(AgilexChassis(ends[0], config, no_frames))
+        chassis = stack.enter_context(AgilexChassis(ends[0], config, no_frames_hint))
         yield Rig(chassis, emulator, plug, own_timeout_s=0.5, battery_v=50.0)
 
 

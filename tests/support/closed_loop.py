@@ -31,7 +31,7 @@ EDGE_TAN = 0.687
 STILL = EgoMotion(Pose(np.eye(3), np.zeros(3)), FRAME_S, "none", math.nan, math.nan, math.nan)
 GOOD = CameraHealth(CameraCondition.GOOD, "", 0.9)
 
-Where = Callable[[float], tuple[float, float]]
+Trajectory = Callable[[float], tuple[float, float]]
 
 
 def straight(length_m: float) -> Path:
@@ -47,34 +47,34 @@ def bend(radius_m: float, angle_deg: float, before_m: float = 6.0, after_m: floa
     return Path(PathSpec(segments=segments), Robot())
 
 
-def stands(x_m: float, y_m: float) -> Where:
+def standing_at(x_m: float, y_m: float) -> Trajectory:
     return lambda _: (x_m, y_m)
 
 
-def walks(
+def walking(
     x_m: float, y_m: float, vx_mps: float, vy_mps: float, from_s: float = 0.0, to_s: float = math.inf
-) -> Where:
+) -> Trajectory:
     """At (x, y) until from_s, then with constant velocity until to_s, then standing."""
 
-    def where(t_s: float) -> tuple[float, float]:
-        on_way = min(max(t_s - from_s, 0.0), to_s - from_s)
-        return x_m + vx_mps * on_way, y_m + vy_mps * on_way
+    def position_at(t_s: float) -> tuple[float, float]:
+        moving_s = min(max(t_s - from_s, 0.0), to_s - from_s)
+        return x_m + vx_mps * moving_s, y_m + vy_mps * moving_s
 
-    return where
+    return position_at
 
 
 @dataclass(frozen=True)
-class Thing:
+class Box:
     """A box along the axes of the floor. seen_by_edges: False for a plain wall, which only depth sees."""
 
-    where: Where
+    position_at: Trajectory
     length_m: float = 0.4
     width_m: float = 0.5
     height_m: float = 1.7
     seen_by_edges: bool = True
 
     def velocity(self, t_s: float) -> tuple[float, float]:
-        (x0, y0), (x1, y1) = self.where(t_s - 0.01), self.where(t_s + 0.01)
+        (x0, y0), (x1, y1) = self.position_at(t_s - 0.01), self.position_at(t_s + 0.01)
         return (x1 - x0) / 0.02, (y1 - y0) / 0.02
 
 
@@ -105,7 +105,7 @@ class Mission:
     def __init__(
         self,
         path: Path,
-        things: list[Thing],
+        boxes: list[Box],
         noise: Noise | None = None,
         config: DecisionConfig | None = None,
         alter: Callable[[Scene, float], Scene | None] | None = None,
@@ -113,7 +113,7 @@ class Mission:
         yaw_ratio: float = 1.0,
     ) -> None:
         self.robot = Robot()
-        self.path, self.things, self.noise = path, things, noise or Noise()
+        self.path, self.boxes, self.noise = path, boxes, noise or Noise()
         self.decide = DecisionMaker(config or DecisionConfig(), self.robot, MOUNT, PERIOD_S)
         self.shape = SpeedShaper(self.robot.limits, PERIOD_S, 0.15)
         self.follow = PathFollower(path, self.robot.limits, preview_s=0.1)
@@ -121,18 +121,18 @@ class Mission:
         self.pose, self.v, self.w, self.s, self.t = path.start, 0.0, 0.0, 0.0, 0.0
         self.log = Log()
         self._random = np.random.default_rng(self.noise.seed)
-        self._since: dict[int, float] = {}
-        self._wander: dict[int, FloatArray] = {}
+        self._first_seen_s: dict[int, float] = {}
+        self._drift: dict[int, FloatArray] = {}
         self._frames = 0
-        self._on_way: deque[tuple[float, Scene]] = deque()
+        self._in_transit: deque[tuple[float, Scene]] = deque()
         self._scene: Scene | None = None
 
     def run(self, limit_s: float = 90.0) -> Log:
         """Until it rests at the target or the time is up."""
         while self.t < limit_s:
             self.step()
-            at_end = self.path.length_m - self.s < 0.03
-            if at_end and self.log.v_mps[-1] == 0.0 and self.v < 1e-3:
+            at_target = self.path.length_m - self.s < 0.03
+            if at_target and self.log.v_mps[-1] == 0.0 and self.v < 1e-3:
                 break
         return self.log
 
@@ -146,9 +146,9 @@ class Mission:
             scene = self.look()
             altered = self.alter(scene, self.t) if self.alter else scene
             if altered is not None:
-                self._on_way.append((self.t + LATENCY_S, altered))
-        while self._on_way and self._on_way[0][0] <= self.t:
-            self._scene = self._on_way.popleft()[1]
+                self._in_transit.append((self.t + LATENCY_S, altered))
+        while self._in_transit and self._in_transit[0][0] <= self.t:
+            self._scene = self._in_transit.popleft()[1]
         on_path = self.path.project(self.pose, self.s)
         self.s = on_path.s_m
         now_ns = round(self.t * NS_PER_S)
@@ -161,9 +161,9 @@ class Mission:
             distance_to_end_m=self.path.length_m - self.s,
         )
         w = self.follow.step(on_path, shaped.v_mps)
-        share = 1.0 - math.exp(-PERIOD_S / self.lag_s)
-        self.v += share * (shaped.v_mps - self.v)
-        self.w += share * (w - self.w)
+        gain = 1.0 - math.exp(-PERIOD_S / self.lag_s)
+        self.v += gain * (shaped.v_mps - self.v)
+        self.w += gain * (w - self.w)
         self.pose = advance_pose(self.pose, self.v, self.yaw_ratio * self.w, PERIOD_S)
         self.t += PERIOD_S
         log = self.log
@@ -178,62 +178,68 @@ class Mission:
         """Between the robot's rectangle and the nearest thing; 0 when they overlap."""
         body = self.robot.body
         c, s = math.cos(self.pose.heading_rad), math.sin(self.pose.heading_rad)
-        least = math.inf
-        for thing in self.things:
-            x, y = thing.where(self.t)
+        min_clearance_m = math.inf
+        for box in self.boxes:
+            x, y = box.position_at(self.t)
             u = np.linspace(-0.5, 0.5, 9)
             edge = np.concatenate(
                 [np.stack((u, np.full(9, side)), 1) for side in (-0.5, 0.5)]
                 + [np.stack((np.full(9, side), u), 1) for side in (-0.5, 0.5)]
             )
-            px, py = x + edge[:, 0] * thing.length_m, y + edge[:, 1] * thing.width_m
+            px, py = x + edge[:, 0] * box.length_m, y + edge[:, 1] * box.width_m
             ahead = (px - self.pose.x_m) * c + (py - self.pose.y_m) * s
             left = (py - self.pose.y_m) * c - (px - self.pose.x_m) * s
-            off_x = np.maximum(np.maximum(-body.rear_m - ahead, ahead - body.front_m), 0.0)
-            off_y = np.maximum(np.abs(left) - body.width_m / 2, 0.0)
-            least = min(least, float(np.hypot(off_x, off_y).min()))
-        return least
+            outside_x = np.maximum(np.maximum(-body.rear_m - ahead, ahead - body.front_m), 0.0)
+            outside_y = np.maximum(np.abs(left) - body.width_m / 2, 0.0)
+            min_clearance_m = min(min_clearance_m, float(np.hypot(outside_x, outside_y).min()))
+        return min_clearance_m
 
     def look(self) -> Scene:
         captured_ns = round(self.t * NS_PER_S)
         obstacles = tuple(
-            seen for k, thing in enumerate(self.things) if (seen := self._see(k, thing)) is not None
+            seen for k, box in enumerate(self.boxes) if (seen := self._observe(k, box)) is not None
         )
-        return Scene(captured_ns, self._frames, obstacles, self._free(), STILL, GOOD, self.pose)
+        return Scene(captured_ns, self._frames, obstacles, self._free_space(), STILL, GOOD, self.pose)
 
-    def _see(self, k: int, thing: Thing) -> Obstacle | None:
-        x, y = thing.where(self.t)
-        vx, vy = thing.velocity(self.t)
+    def _observe(self, k: int, box: Box) -> Obstacle | None:
+        x, y = box.position_at(self.t)
+        vx, vy = box.velocity(self.t)
         camera = camera_in_floor(self.pose, MOUNT).inverse()
-        p = camera.apply(np.array([[x, y, thing.height_m / 2]]))[0]
+        position = camera.apply(np.array([[x, y, box.height_m / 2]]))[0]
         c, s = abs(math.cos(self.pose.heading_rad)), abs(math.sin(self.pose.heading_rad))
-        deep = c * thing.length_m + s * thing.width_m
-        wide = s * thing.length_m + c * thing.width_m
-        half_tan = (abs(p[0]) - wide / 2) / max(p[2], 1e-6)
-        hidden_below = thing.height_m < MOUNT.height_m * (1.0 - p[2] / 1.3)
-        if not thing.seen_by_edges or p[2] < 0.2 or p[2] > 10.0 or half_tan > EDGE_TAN or hidden_below:
-            self._since.pop(k, None)
+        depth_m = c * box.length_m + s * box.width_m
+        width_m = s * box.length_m + c * box.width_m
+        half_tan = (abs(position[0]) - width_m / 2) / max(position[2], 1e-6)
+        hidden_below = box.height_m < MOUNT.height_m * (1.0 - position[2] / 1.3)
+        if (
+            not box.seen_by_edges
+            or position[2] < 0.2
+            or position[2] > 10.0
+            or half_tan > EDGE_TAN
+            or hidden_below
+        ):
+            self._first_seen_s.pop(k, None)
             return None
-        age_s = self.t - self._since.setdefault(k, self.t)
-        sigma = 0.25 * self.noise.depth_1pm * p[2] ** 2
-        wander = self._wander.setdefault(k, np.zeros(3))
-        wander[:] = 0.9 * wander + math.sqrt(1 - 0.81) * self._random.normal(size=3)
-        p = p + np.array([0.1 * sigma, 0.0, sigma]) * wander
+        age_s = self.t - self._first_seen_s.setdefault(k, self.t)
+        sigma_m = 0.25 * self.noise.depth_1pm * position[2] ** 2
+        drift = self._drift.setdefault(k, np.zeros(3))
+        drift[:] = 0.9 * drift + math.sqrt(1 - 0.81) * self._random.normal(size=3)
+        position = position + np.array([0.1 * sigma_m, 0.0, sigma_m]) * drift
         # Only the near half is seen: the centre of the visible surface is nearer than the body's.
-        p[2] -= 0.25 * deep
-        v = camera.rotation @ np.array([vx, vy, 0.0])
-        sigma_v = max(self.noise.velocity_mps, 0.1)
-        young = age_s < 0.2
-        moving = not young and math.hypot(vx, vy) > 0.15
+        position[2] -= 0.25 * depth_m
+        velocity_mps = camera.rotation @ np.array([vx, vy, 0.0])
+        sigma_mps = max(self.noise.velocity_mps, 0.1)
+        is_new = age_s < 0.2
+        moving = not is_new and math.hypot(vx, vy) > 0.15
         if moving:
-            v = v + self.noise.velocity_mps * wander[[1, 0, 2]]
+            velocity_mps = velocity_mps + self.noise.velocity_mps * drift[[1, 0, 2]]
         return Obstacle(
             id=k + 1,
             bbox_px=(0.0, 0.0, 1.0, 1.0),
-            position_m=p,
-            extent_m=np.array([wide, thing.height_m, 0.5 * deep]),
-            velocity_mps=v if moving else np.zeros(3),
-            velocity_cov=np.eye(3) * (1.5 if young else sigma_v) ** 2,
+            position_m=position,
+            extent_m=np.array([width_m, box.height_m, 0.5 * depth_m]),
+            velocity_mps=velocity_mps if moving else np.zeros(3),
+            velocity_cov=np.eye(3) * (1.5 if is_new else sigma_mps) ** 2,
             moving=moving,
             score=0.9,
             fragments=8,
@@ -241,7 +247,7 @@ class Mission:
             unseen_s=0.0,
         )
 
-    def _free(self) -> FreeSpace:
+    def _free_space(self) -> FreeSpace:
         half = EDGE_TAN / BANDS
         bearing = np.linspace(-EDGE_TAN + half, EDGE_TAN - half, BANDS)
         nearest = np.full(BANDS, np.inf)
@@ -249,13 +255,13 @@ class Mission:
         # Rays of unit forward distance from the camera, in floor axes.
         dx, dy = c + bearing * s, s - bearing * c
         ox, oy = self.pose.x_m + c * MOUNT.forward_m, self.pose.y_m + s * MOUNT.forward_m
-        for thing in self.things:
-            x, y = thing.where(self.t)
+        for box in self.boxes:
+            x, y = box.position_at(self.t)
             with np.errstate(divide="ignore", invalid="ignore"):
-                tx = np.sort(np.stack([(x + e * thing.length_m / 2 - ox) / dx for e in (-1, 1)]), axis=0)
-                ty = np.sort(np.stack([(y + e * thing.width_m / 2 - oy) / dy for e in (-1, 1)]), axis=0)
+                tx = np.sort(np.stack([(x + e * box.length_m / 2 - ox) / dx for e in (-1, 1)]), axis=0)
+                ty = np.sort(np.stack([(y + e * box.width_m / 2 - oy) / dy for e in (-1, 1)]), axis=0)
             near, far = np.maximum(tx[0], ty[0]), np.minimum(tx[1], ty[1])
-            below = thing.height_m < MOUNT.height_m * (1.0 - near / 1.3)
+            below = box.height_m < MOUNT.height_m * (1.0 - near / 1.3)
             hit = (near < far) & (near > 0.25) & (near < 10.0) & ~below
             nearest = np.where(hit, np.minimum(nearest, near), nearest)
         if self.noise.depth_1pm:

@@ -20,7 +20,7 @@ from tests.support.chassis_rig import (
     roboteq_rig,
     udp_link_config,
 )
-from tests.support.page_chassis import page_rig
+from tests.support.docs_page_chassis import page_rig
 from tests.support.real_base import DEFAULT_BASE, real_rig
 from tests.support.wires import open_can_link
 

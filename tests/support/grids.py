@@ -53,10 +53,10 @@ def nearest(*depths_m: FloatArray) -> FloatArray:
 
 
 def grid_of(
-    depth_m: FloatArray, up: FloatArray | None = None, camera_height_m: float = 0.5, most_m: float = 10.0
+    depth_m: FloatArray, up: FloatArray | None = None, camera_height_m: float = 0.5, max_m: float = 10.0
 ) -> DepthGrid:
     """The grid of depth_m (ROWS, COLUMNS). up (3,): the floor's normal, None where it is not known."""
-    beyond = depth_m > most_m
+    beyond = depth_m > max_m
     valid: BoolGrid = (depth_m > 0.0) & ~beyond
     depth = np.where(valid, depth_m, 0.0)
     inverse = np.divide(1.0, depth, out=np.zeros_like(depth), where=valid)
@@ -76,7 +76,7 @@ def grid_of(
         nan,
         nan,
         None,
-        most_m,
+        max_m,
     )
     if up is None:
         return grid

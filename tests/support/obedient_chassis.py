@@ -14,12 +14,12 @@ PERIOD_S = 0.02
 class ObedientChassis:
     """hal.api.Chassis; arms after a few exchanges. Set ``fault`` and it is in that mode from then on.
 
-    late_ns: how long after the time of an exchange its state holds, as in real time.
+    stamp_offset_ns: how long after the time of an exchange its state is stamped, as in real time.
     """
 
-    def __init__(self, arms_after: int = 3, late_ns: int = 0) -> None:
+    def __init__(self, arms_after: int = 3, stamp_offset_ns: int = 0) -> None:
         self._arms_after = arms_after
-        self._late_ns = late_ns
+        self._stamp_offset_ns = stamp_offset_ns
         self._pose = ORIGIN
         self.fault: ChassisMode | None = None
         self.armed_at_ns: list[int] = []
@@ -49,4 +49,6 @@ class ObedientChassis:
         if mode is ChassisMode.ARMED:
             self._pose = advance_pose(self._pose, setpoint.v_mps, setpoint.w_radps, PERIOD_S)
         reason = "e-stop pressed" if self.fault else ""
-        return chassis_state(now_ns + self._late_ns, mode, setpoint.v_mps, self._pose, reason, setpoint)
+        return chassis_state(
+            now_ns + self._stamp_offset_ns, mode, setpoint.v_mps, self._pose, reason, setpoint
+        )

@@ -19,15 +19,15 @@ class Body:
     z: float = 4.0
     width: float = 0.4
     height: float = 1.6
-    deep: float = 0.2
+    depth: float = 0.2
     cells: int = 200
 
 
 PERSON = Body(0.0)
 ARM = Body(0.45, y=-0.3, width=0.3, height=0.3, cells=90)  # 0.1 m from the person's box
 CART = Body(0.0, y=0.2, z=1.0, width=0.6, height=0.4, cells=900)
-MAST = Body(0.0, y=-0.3, z=1.7, width=0.2, height=0.6, deep=0.1, cells=100)  # 0.55 m behind the cart's front
-FAR_WHEEL = Body(0.1, y=0.5, z=2.0, width=0.2, height=0.4, deep=0.1, cells=40)  # 0.85 m behind the front
+MAST = Body(0.0, y=-0.3, z=1.7, width=0.2, height=0.6, depth=0.1, cells=100)  # 0.55 m behind the cart's front
+FAR_WHEEL = Body(0.1, y=0.5, z=2.0, width=0.2, height=0.4, depth=0.1, cells=40)  # 0.85 m behind the front
 
 
 def regions(*bodies: Body) -> Regions:
@@ -46,7 +46,7 @@ def regions(*bodies: Body) -> Regions:
         np.array([10 for _ in bodies]),
         np.array(bbox),
         np.array([[b.x, b.y, b.z] for b in bodies]),
-        np.array([[b.width, b.height, b.deep] for b in bodies]),
+        np.array([[b.width, b.height, b.depth] for b in bodies]),
         np.ones(len(bodies), np.bool_),
         np.ones(len(bodies), np.bool_),
         np.zeros(len(bodies), np.bool_),

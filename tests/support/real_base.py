@@ -31,8 +31,8 @@ from tests.support.wires import PluggedCan, PluggedSerial
 if TYPE_CHECKING:
     from sim.plant import TrackedPlant
 
-_PATIENCE_S = 30.0
-_MEASURING = 25
+_ANSWER_TIMEOUT_S = 30.0
+_MAX_MEASUREMENTS = 25
 # Half of a usual track width: what a turn means to a track.
 _HALF_WIDTH_M = 0.25
 
@@ -47,29 +47,29 @@ def base_config(file: Path, channel: str) -> AnyChassisConfig:
     return chassis.model_copy(update={"link": chassis.link.model_copy(update={"url": channel})})
 
 
-class Measured:
+class MeasuredPlant:
     """What stands for the emulator's plant: all that is known of a real base."""
 
     def __init__(self) -> None:
         self.state: ChassisState | None = None
-        self._last: PlanarPose | None = None
-        self._ahead_m = 0.0
+        self._last_pose: PlanarPose | None = None
+        self._travel_m = 0.0
         self._turned_rad = 0.0
-        self.renew: Callable[[], None] = lambda: None
+        self.refresh: Callable[[], None] = lambda: None
 
-    def take(self, state: ChassisState) -> None:
+    def update(self, state: ChassisState) -> None:
         """The newest state of the driver."""
-        if self._last is not None and state.feedback_ns is not None:
-            ahead_m = (state.pose.x_m - self._last.x_m) * math.cos(state.pose.heading_rad)
-            ahead_m += (state.pose.y_m - self._last.y_m) * math.sin(state.pose.heading_rad)
-            self._ahead_m += ahead_m
-            self._turned_rad += math.remainder(state.pose.heading_rad - self._last.heading_rad, math.tau)
-        self.state, self._last = state, state.pose
+        if self._last_pose is not None and state.feedback_ns is not None:
+            travel_m = (state.pose.x_m - self._last_pose.x_m) * math.cos(state.pose.heading_rad)
+            travel_m += (state.pose.y_m - self._last_pose.y_m) * math.sin(state.pose.heading_rad)
+            self._travel_m += travel_m
+            self._turned_rad += math.remainder(state.pose.heading_rad - self._last_pose.heading_rad, math.tau)
+        self.state, self._last_pose = state, state.pose
 
     @property
     def twist(self) -> tuple[float, float]:
         """(v, w) as measured now; NaN where the base says nothing."""
-        self.renew()
+        self.refresh()
         assert self.state is not None, "not stepped yet"
         return self.state.v_mps, self.state.w_radps
 
@@ -77,7 +77,7 @@ class Measured:
     def track_travel_m(self) -> tuple[float, float]:
         """(left, right) since the rig was opened."""
         turned_m = self._turned_rad * _HALF_WIDTH_M
-        return self._ahead_m - turned_m, self._ahead_m + turned_m
+        return self._travel_m - turned_m, self._travel_m + turned_m
 
     @property
     def pose(self) -> PlanarPose:
@@ -86,14 +86,14 @@ class Measured:
         return self.state.pose
 
 
-class Person:
+class Operator:
     """Does to the base what an emulator does at a word."""
 
     def __init__(self, attended: bool) -> None:
         self._attended = attended
         self._clock = MonotonicClock()
-        self.measured = Measured()
-        self.live: Callable[[], ChassisState] = lambda: pytest.fail("not connected")
+        self.measured = MeasuredPlant()
+        self.read_state: Callable[[], ChassisState] = lambda: pytest.fail("not connected")
 
     @property
     def plant(self) -> TrackedPlant:
@@ -103,14 +103,14 @@ class Person:
         self._clock.sleep_until_ns(now_ns)
 
     def press_estop(self) -> None:
-        self._ask("PRESS the emergency stop", lambda state: state.mode is not ChassisMode.ARMED)
+        self._request("PRESS the emergency stop", lambda state: state.mode is not ChassisMode.ARMED)
 
     def release_estop(self) -> None:
-        self._ask("RELEASE the emergency stop", lambda state: "gone now" in state.reason)
+        self._request("RELEASE the emergency stop", lambda state: "gone now" in state.reason)
 
     def restart(self) -> None:
-        self._ask("switch the base OFF and ON again", lambda state: state.mode is not ChassisMode.ARMED)
-        self._ask("wait until it is back", lambda state: "gone now" in state.reason)
+        self._request("switch the base OFF and ON again", lambda state: state.mode is not ChassisMode.ARMED)
+        self._request("wait until it is back", lambda state: "gone now" in state.reason)
 
     def freeze(self) -> None:
         pytest.skip("nobody can freeze the processor of a real base")
@@ -118,42 +118,42 @@ class Person:
     def thaw(self) -> None:
         raise AssertionError("what cannot be frozen cannot be thawed")
 
-    def _ask(self, wish: str, granted: Callable[[ChassisState], bool]) -> None:
+    def _request(self, request: str, is_done: Callable[[ChassisState], bool]) -> None:
         if not self._attended:
-            pytest.skip(f"needs a person to {wish}: run with --attended")
+            pytest.skip(f"needs a person to {request}: run with --attended")
         with Path("/dev/tty").open("w") as terminal:
-            terminal.write(f"\n>>> {wish}, within {_PATIENCE_S:g} s\a\n")
-        for _ in range(round(_PATIENCE_S * 50)):
-            if granted(self.live()):
+            terminal.write(f"\n>>> {request}, within {_ANSWER_TIMEOUT_S:g} s\a\n")
+        for _ in range(round(_ANSWER_TIMEOUT_S * 50)):
+            if is_done(self.read_state()):
                 return
-        pytest.fail(f"nobody did: {wish}")
+        pytest.fail(f"nobody did: {request}")
 
 
 @dataclass
 class RealRig(Rig):
     """Steps in real time. Fields as of Rig; now_ns is the monotonic clock."""
 
-    person: Person = field(default_factory=lambda: Person(attended=False))
+    operator: Operator = field(default_factory=lambda: Operator(attended=False))
 
     def __post_init__(self) -> None:
         self.now_ns = MonotonicClock().now_ns()
         self._command: tuple[float | None, float] = (None, 0.0)
-        self._fresh_ns = -1
-        self.person.live = lambda: self.step(*self._command)
-        self.person.measured.renew = self._measure
+        self._measured_ns = -1
+        self.operator.read_state = lambda: self.step(*self._command)
+        self.operator.measured.refresh = self._measure
 
     def step(self, v_mps: float | None = None, w_radps: float = 0.0) -> ChassisState:
         self._command = (v_mps, w_radps)
         super().step(v_mps, w_radps)
-        return self._took()
+        return self._record_state()
 
-    def coast(self, seconds: float) -> None:
-        super().coast(seconds)
-        self._fresh_ns = -1
+    def run_emulator_only(self, seconds: float) -> None:
+        super().run_emulator_only(seconds)
+        self._measured_ns = -1
 
-    def _took(self) -> ChassisState:
-        self._fresh_ns = self.now_ns
-        self.person.measured.take(self.state)
+    def _record_state(self) -> ChassisState:
+        self._measured_ns = self.now_ns
+        self.operator.measured.update(self.state)
         return self.state
 
     def _measure(self) -> None:
@@ -162,21 +162,21 @@ class RealRig(Rig):
         The first may have waited since before; the second is then the mean since the first, where speed is
         counted.
         """
-        if self._fresh_ns == self.now_ns:
+        if self._measured_ns == self.now_ns:
             return
-        before = None if self.person.measured.state is None else self.person.measured.state.feedback_ns
-        heard = {before}
-        for _ in range(_MEASURING):
+        before = None if self.operator.measured.state is None else self.operator.measured.state.feedback_ns
+        reading_times = {before}
+        for _ in range(_MAX_MEASUREMENTS):
             self.now_ns += PERIOD_NS
             self.emulator.advance_to(self.now_ns)
             self.state = self.chassis.exchange(None, self.now_ns)
-            self._took()
-            heard.add(self.state.feedback_ns)
-            if len(heard) > 3:
+            self._record_state()
+            reading_times.add(self.state.feedback_ns)
+            if len(reading_times) > 3:
                 return
 
-    def needs_emulator(self, why: str) -> None:
-        pytest.skip(f"a real base: {why}")
+    def require_emulator(self, reason: str) -> None:
+        pytest.skip(f"a real base: {reason}")
 
 
 @contextmanager
@@ -190,25 +190,25 @@ def real_rig(file: Path, channel: str, attended: bool) -> Iterator[Rig]:
     else:
         plug = PluggedSerial(SerialPortLink(config.link))
         chassis = build_serial_driver(config, plug)
-    person = Person(attended)
+    operator = Operator(attended)
     with ExitStack() as stack:
-        refusal = None
+        error_text = None
         try:
             stack.enter_context(chassis)
         except HalError as error:
-            refusal = str(error)
-        if refusal is not None:
-            pytest.fail(refusal, pytrace=False)
+            error_text = str(error)
+        if error_text is not None:
+            pytest.fail(error_text, pytrace=False)
         rig = RealRig(
             chassis,
-            person,
+            operator,
             plug,
             own_timeout_s=1.0,
             battery_v=math.nan,
             tolerance_mps=0.05,
             tolerance_radps=0.1,
             braking_s=0.2,
-            person=person,
+            operator=operator,
         )
         yield rig
         rig.chassis.stop(rig.now_ns)

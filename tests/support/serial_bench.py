@@ -20,10 +20,10 @@ EmulatorT = TypeVar("EmulatorT", bound=SerialEmulator)
 class SerialBench(Generic[EmulatorT]):
     """The driver with the emulator, and the line between them; near is the driver's end.
 
-    periods: how long arming may take.
+    arming_periods: how many control periods arming may take.
     """
 
-    periods = 40
+    arming_periods = 40
 
     def __init__(
         self,
@@ -55,17 +55,17 @@ class SerialBench(Generic[EmulatorT]):
         """Consent, and wait until it is followed."""
         self.run(10)
         self.chassis.arm(self.now_ns)
-        state = self.run(self.periods)
+        state = self.run(self.arming_periods)
         assert state.mode is ChassisMode.ARMED, state.reason
 
 
 def every(nth: int, change: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
-    """For ScriptedSerialLink.hear_through: each nth message is changed, the others pass."""
+    """For ScriptedSerialLink.set_filter: each nth message is changed, the others pass."""
     numbers = count(1)
     return lambda data: change(data) if next(numbers) % nth == 0 else data
 
 
-def first_known(states: list[ChassisState]) -> int:
+def first_with_speed(states: list[ChassisState]) -> int:
     """The first state with a speed. Before it there is none, and it begins with standing."""
     known = next(k for k, state in enumerate(states) if state.feedback_ns is not None)
     assert all(state.v_mps != state.v_mps for state in states[:known])
@@ -73,15 +73,15 @@ def first_known(states: list[ChassisState]) -> int:
     return known
 
 
-def reason_for_giving_up(make_chassis: Callable[[SerialLink], Chassis], babble: bytes) -> str:
+def arming_failure_reason(make_chassis: Callable[[SerialLink], Chassis], noise: bytes) -> str:
     """What the driver says when the base at the other end says nothing but this, again and again."""
     link = ScriptedSerialLink()
     chassis = make_chassis(link)
     chassis.arm(0)
     for k in range(1, 160):
-        link.deliver(babble)
+        link.deliver(noise)
         state = chassis.exchange(None, k * 20 * MS)
     assert state.mode is ChassisMode.STANDBY
-    begins = "arming gave up after 3.0 s: no status heard from the base: "
-    assert state.reason.startswith(begins)
-    return state.reason.removeprefix(begins)
+    prefix = "arming gave up after 3.0 s: no status heard from the base: "
+    assert state.reason.startswith(prefix)
+    return state.reason.removeprefix(prefix)

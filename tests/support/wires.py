@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from config.chassis import CanLinkConfig, SerialLinkConfig
-from hal.api import CanLink, Closing, SerialLink
-from hal.enclosing import Enclosing
+from hal.api import CanLink, Device, SerialLink
+from hal.device_wrapper import DeviceWrapper
 from hal.errors import LinkLost
 from hal.links.can_bus import CanBusLink
 from hal.links.pseudo_terminal import PseudoTerminal
@@ -20,10 +20,10 @@ from hal.links.serial_port import SerialPortLink
 from hal.types import CanFrame
 
 # Bytes that can be waited for where nobody reads: a terminal's buffer, less what it keeps free.
-_TERMINAL_HOLDS = 3_900
+_TERMINAL_CAPACITY = 3_900
 
 # A busy machine may leave the kernel no core to carry bytes over for a while.
-_PATIENCE_S = 10.0
+_TIMEOUT_S = 10.0
 
 
 def open_serial_link(config: SerialLinkConfig) -> SerialPortLink:
@@ -36,10 +36,10 @@ def open_can_link(config: CanLinkConfig) -> CanBusLink:
     return CanBusLink(config).__enter__()
 
 
-class _Plug(Enclosing):
+class _Plug(DeviceWrapper):
     """A plug in front of any link: out, every use raises LinkLost and nothing reaches it."""
 
-    def __init__(self, link: Closing) -> None:
+    def __init__(self, link: Device) -> None:
         super().__init__(link)
         self.out = False
 
@@ -93,9 +93,9 @@ class SettledTerminal(PseudoTerminal):
     """Waits until the kernel has carried the bytes over: simulated time must not outrun it."""
 
     def write(self, data: bytes) -> None:
-        before = _waiting(self._slave)
+        before = _bytes_available(self._slave)
         super().write(data)
-        _await(self._slave, min(before + len(data), _TERMINAL_HOLDS))
+        _wait_for_bytes(self._slave, min(before + len(data), _TERMINAL_CAPACITY))
 
     @contextmanager
     def settled(self, count: int) -> Iterator[None]:
@@ -103,9 +103,9 @@ class SettledTerminal(PseudoTerminal):
         if not self._open:
             yield
             return
-        before = _waiting(self._master)
+        before = _bytes_available(self._master)
         yield
-        _await(self._master, min(before + count, _TERMINAL_HOLDS))
+        _wait_for_bytes(self._master, min(before + count, _TERMINAL_CAPACITY))
 
 
 class SettledPort(SerialPortLink):
@@ -120,16 +120,16 @@ class SettledPort(SerialPortLink):
             super().write(data)
 
 
-def _waiting(descriptor: int) -> int:
+def _bytes_available(descriptor: int) -> int:
     answer = bytearray(4)
     fcntl.ioctl(descriptor, termios.FIONREAD, answer)
     return int.from_bytes(answer, sys.byteorder)
 
 
-def _await(descriptor: int, count: int) -> None:
-    give_up_s = time.monotonic() + _PATIENCE_S
-    while time.monotonic() < give_up_s:
-        if _waiting(descriptor) >= count:
+def _wait_for_bytes(descriptor: int, count: int) -> None:
+    deadline_s = time.monotonic() + _TIMEOUT_S
+    while time.monotonic() < deadline_s:
+        if _bytes_available(descriptor) >= count:
             return
         os.sched_yield()
     raise AssertionError(f"the kernel did not carry {count} bytes over")

@@ -8,7 +8,7 @@ import pytest
 
 from config.app import AppConfig
 from config.loader import Section
-from tests.support.pages import ROOT, Page
+from tests.support.docs_pages import ROOT, Page
 
 PAGES = [Page("docs/add-a-chassis.md"), Page("docs/add-a-camera.md")]
 SECTIONS = ("robot", "perception", "decision")

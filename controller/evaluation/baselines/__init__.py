@@ -7,6 +7,6 @@ The files in the order in which they come into play:
 * box_tracking.py - object tracking (third row)
 * low_rank.py - low rank and sparse representation (fourth row)
 * dense_flow.py - dense flow minus rigid flow (not in the table)
-* ego.py - the camera's ego-motion, for those above
+* ego_motion.py - the camera's ego-motion, for those above
 * masks.py - half-size images; from a mask to detections with track ids
 """

@@ -19,7 +19,7 @@ _SEED = 20200127
 
 
 @dataclass(slots=True, eq=False)
-class _Followed:
+class _TrackedBox:
     id: int
     tracker: cv2.Tracker
 
@@ -29,12 +29,12 @@ class BoxTracking:
 
     def __init__(self) -> None:
         cv2.setRNGSeed(_SEED)
-        self._followed: list[_Followed] = []
-        self._given: list[tuple[int, Box]] = []
+        self._tracked: list[_TrackedBox] = []
+        self._new_objects: list[tuple[int, Box]] = []
 
-    def give(self, object_id: int, box: Box) -> None:
+    def add_object(self, object_id: int, box: Box) -> None:
         """Give the true box of an object in the next frame; once for each object."""
-        self._given.append((object_id, box))
+        self._new_objects.append((object_id, box))
 
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
         """Odometry is not used."""
@@ -43,17 +43,17 @@ class BoxTracking:
             np.uint8,
         )
         boxes: list[tuple[int, Box]] = []
-        for followed in list(self._followed):
-            ok, rectangle = followed.tracker.update(image)
+        for tracked in list(self._tracked):
+            ok, rectangle = tracked.tracker.update(image)
             if ok:
                 left, top, width, height = (float(edge) * SCALE for edge in rectangle)
-                boxes.append((followed.id, (left, top, left + width, top + height)))
+                boxes.append((tracked.id, (left, top, left + width, top + height)))
             else:
-                self._followed.remove(followed)
-        for object_id, box in self._given:
-            self._begin(image, object_id, box)
+                self._tracked.remove(tracked)
+        for object_id, box in self._new_objects:
+            self._start_tracker(image, object_id, box)
             boxes.append((object_id, box))
-        self._given.clear()
+        self._new_objects.clear()
         depth_m, k = half_depth_m(frame), half_intrinsics(frame.intrinsics)
         return Answer(
             tuple(
@@ -64,22 +64,22 @@ class BoxTracking:
             )
         )
 
-    def _begin(self, image: ColourImage, object_id: int, box: Box) -> None:
+    def _start_tracker(self, image: ColourImage, object_id: int, box: Box) -> None:
         height, width = image.shape[:2]
         u0, v0, u1, v1 = (round(edge / SCALE) for edge in box)
         u0, v0 = int(np.clip(u0, 0, width - 2)), int(np.clip(v0, 0, height - 2))
         u1, v1 = int(np.clip(u1, u0 + 1, width)), int(np.clip(v1, v0 + 1, height))
         tracker = cv2.TrackerMIL.create()
         tracker.init(image, (u0, v0, u1 - u0, v1 - v0))
-        self._followed.append(_Followed(object_id, tracker))
+        self._tracked.append(_TrackedBox(object_id, tracker))
 
 
 def _position(box: Box, depth_m: np.typing.NDArray[np.float32], k: Intrinsics) -> FloatArray:
     """Position by the median depth in the middle half of the box; NaN if there is no depth."""
     u0, v0, u1, v1 = (edge / SCALE for edge in box)
     height, width = depth_m.shape
-    left, right = (int(np.clip(u0 + share * (u1 - u0), 0, width)) for share in (0.25, 0.75))
-    top, bottom = (int(np.clip(v0 + share * (v1 - v0), 0, height)) for share in (0.25, 0.75))
+    left, right = (int(np.clip(u0 + fraction * (u1 - u0), 0, width)) for fraction in (0.25, 0.75))
+    top, bottom = (int(np.clip(v0 + fraction * (v1 - v0), 0, height)) for fraction in (0.25, 0.75))
     z = depth_m[top:bottom, left:right]
     z = z[z > 0.0]
     if z.size == 0:

@@ -9,15 +9,15 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from controller.evaluation.baselines import ego
+from controller.evaluation.baselines import ego_motion
 from controller.evaluation.baselines.masks import (
     HalfDepth,
-    Identities,
+    IdTracker,
     Mask,
+    blobs,
     half_depth_m,
     half_grey,
     half_intrinsics,
-    things,
 )
 from controller.evaluation.types import Answer
 from hal.types import FloatArray, Intrinsics, Pose, RgbdFrame
@@ -34,21 +34,21 @@ class DenseFlow:
     """Keeps the image and the depth of the previous frame."""
 
     def __init__(self) -> None:
-        ego.seed_ransac()
+        ego_motion.seed_ransac()
         self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
-        self._before: tuple[Mask, HalfDepth] | None = None
-        self._identities = Identities()
+        self._previous: tuple[Mask, HalfDepth] | None = None
+        self._id_tracker = IdTracker()
 
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
         """Odometry is not used; the images give the motion more accurately."""
         grey, depth_m, k = half_grey(frame), half_depth_m(frame), half_intrinsics(frame.intrinsics)
-        before, self._before = self._before, (grey, depth_m)
-        if before is None:
-            return self._identities.answer([], np.zeros_like(grey))
+        previous, self._previous = self._previous, (grey, depth_m)
+        if previous is None:
+            return self._id_tracker.answer([], np.zeros_like(grey))
         # From the current to the previous frame, so that the result is on the pixels of this frame.
-        flow = np.asarray(self._flow.calc(grey, before[0], None), np.float64)  # type: ignore[call-overload]  # the stub lacks None
+        flow = np.asarray(self._flow.calc(grey, previous[0], None), np.float64)  # type: ignore[call-overload]  # the stub lacks None
         mask = self._residual(flow, depth_m, k)
-        return self._identities.answer(things(mask, depth_m, k), mask)
+        return self._id_tracker.answer(blobs(mask, depth_m, k), mask)
 
     def _residual(self, flow: FloatArray, depth_m: HalfDepth, k: Intrinsics) -> Mask:
         height, width = depth_m.shape
@@ -56,17 +56,19 @@ class DenseFlow:
         pixels = np.stack([u, v], axis=2).astype(np.float32)
         grid = np.s_[_GRID_PX // 2 :: _GRID_PX, _GRID_PX // 2 :: _GRID_PX]
         known = depth_m[grid] > 0.0
-        points_m = ego.back_project(pixels[grid][known], depth_m[grid][known].astype(np.float64), k)
-        seen = (pixels + flow)[grid][known].astype(np.float32)
-        motion = ego.rigid_motion(points_m, seen, k, _TOLERANCE_PX)
+        points_m = ego_motion.back_project(pixels[grid][known], depth_m[grid][known].astype(np.float64), k)
+        tracked_px = (pixels + flow)[grid][known].astype(np.float32)
+        motion = ego_motion.rigid_motion(points_m, tracked_px, k, _TOLERANCE_PX)
         if motion is None:
             return np.zeros((height, width), np.uint8)
         flat = pixels.reshape(-1, 2)
         z_m = depth_m.ravel().astype(np.float64)
-        rigid = ego.project(motion.apply(ego.back_project(flat, z_m, k)), k) - flat
-        miss_px = np.hypot(*(flow.reshape(-1, 2) - rigid).T)
+        rigid = ego_motion.project(motion.apply(ego_motion.back_project(flat, z_m, k)), k) - flat
+        residual_px = np.hypot(*(flow.reshape(-1, 2) - rigid).T)
         allowed_px = _BASE_PX + _PER_FLOW * np.hypot(*rigid.T)
         level = np.where(
-            (z_m > 0.0) & (miss_px > allowed_px), 1.0 - 0.5 * allowed_px / np.maximum(miss_px, 1e-9), 0.0
+            (z_m > 0.0) & (residual_px > allowed_px),
+            1.0 - 0.5 * allowed_px / np.maximum(residual_px, 1e-9),
+            0.0,
         )
         return np.rint(255.0 * np.nan_to_num(level)).astype(np.uint8).reshape(height, width)

@@ -13,14 +13,14 @@ from collections import deque
 import cv2
 import numpy as np
 
-from controller.evaluation.baselines import ego
+from controller.evaluation.baselines import ego_motion
 from controller.evaluation.baselines.masks import (
-    Identities,
+    IdTracker,
     Mask,
+    blobs,
     half_depth_m,
     half_grey,
     half_intrinsics,
-    things,
 )
 from controller.evaluation.types import Answer
 from hal.types import FloatArray, Pose, RgbdFrame
@@ -37,16 +37,16 @@ class LowRank:
     """Keeps the last images and the homographies that lead to the newest."""
 
     def __init__(self) -> None:
-        ego.seed_ransac()
+        ego_motion.seed_ransac()
         self._images: deque[Mask] = deque(maxlen=_WINDOW)
         self._to_newest: deque[FloatArray] = deque(maxlen=_WINDOW)
-        self._identities = Identities()
+        self._id_tracker = IdTracker()
 
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
         """Odometry is not used."""
         grey = half_grey(frame)
         if self._images:
-            step = ego.homography(self._images[-1], grey)
+            step = ego_motion.homography(self._images[-1], grey)
             if step is None:
                 self._images.clear()
                 self._to_newest.clear()
@@ -55,10 +55,10 @@ class LowRank:
         self._images.append(grey)
         self._to_newest.append(np.eye(3))
         if len(self._images) < _MIN_WINDOW:
-            return self._identities.answer([], np.zeros_like(grey))
+            return self._id_tracker.answer([], np.zeros_like(grey))
         mask = self._sparse_mask(grey)
-        found = things(mask, half_depth_m(frame), half_intrinsics(frame.intrinsics))
-        return self._identities.answer(found, mask)
+        found = blobs(mask, half_depth_m(frame), half_intrinsics(frame.intrinsics))
+        return self._id_tracker.answer(found, mask)
 
     def _sparse_mask(self, grey: Mask) -> Mask:
         height, width = grey.shape[0] // _SHRINK, grey.shape[1] // _SHRINK
@@ -91,8 +91,8 @@ def robust_pca(data: FloatArray) -> FloatArray:
     penalty, sparse = 1.25 / largest, np.zeros_like(data)
     for _ in range(_ITERATIONS):
         low = _shrink_singular_values(data - sparse + multiplier / penalty, 1.0 / penalty)
-        rest = data - low + multiplier / penalty
-        sparse = np.sign(rest) * np.maximum(np.abs(rest) - weight / penalty, 0.0)
+        residual = data - low + multiplier / penalty
+        sparse = np.sign(residual) * np.maximum(np.abs(residual) - weight / penalty, 0.0)
         remainder = data - low - sparse
         multiplier = multiplier + penalty * remainder
         penalty *= 1.5
@@ -101,12 +101,12 @@ def robust_pca(data: FloatArray) -> FloatArray:
     return sparse
 
 
-def _shrink_singular_values(matrix: FloatArray, by: float) -> FloatArray:
+def _shrink_singular_values(matrix: FloatArray, threshold: float) -> FloatArray:
     """Singular value thresholding through the small Gram matrix (K, K)."""
     squares, vectors = np.linalg.eigh(_gram(matrix))
     values = np.sqrt(np.maximum(squares, 0.0))
-    share = np.where(values > by, 1.0 - by / np.maximum(values, 1e-12), 0.0)
-    return np.asarray(cv2.gemm(matrix, (vectors * share) @ vectors.T, 1.0, np.empty(0), 0.0), np.float64)
+    factor = np.where(values > threshold, 1.0 - threshold / np.maximum(values, 1e-12), 0.0)
+    return np.asarray(cv2.gemm(matrix, (vectors * factor) @ vectors.T, 1.0, np.empty(0), 0.0), np.float64)
 
 
 # OpenCV's matrix products stay on one core. NumPy's use several threads, which at this size costs far more

@@ -1,7 +1,7 @@
 """From a mask of moving pixels to detections with track ids. Shared by all baselines that give a mask.
 
 Images are at half resolution. The mask is cleaned by morphology and cut at depth jumps. Every connected
-component within 10 m of at least 400 pixels of the full image is a thing. A thing is called moving from its
+component within 10 m of at least 400 pixels of the full image is a blob. A blob is called moving from its
 second frame on.
 """
 
@@ -28,9 +28,9 @@ _MIN_KNOWN = 0.3  # least share of a component's pixels that have depth
 # Least difference of neighbouring depths that is a jump: a constant, and a part with the square of the depth.
 _JUMP_M = 0.3
 _JUMP_PER_M2 = 0.03
-_GATE_M = 0.6  # greatest distance between a thing and its track
+_GATE_M = 0.6  # greatest distance between a blob and its track
 _FORGET_FRAMES = 8  # a track unseen for more frames is dropped
-_CONFIRM_FRAMES = 2  # frames from which a thing is called moving
+_CONFIRM_FRAMES = 2  # frames from which a blob is called moving
 _OPEN = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
 _CLOSE = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
 
@@ -63,7 +63,7 @@ def half_intrinsics(k: Intrinsics) -> Intrinsics:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Thing:
+class Blob:
     """A connected component of a mask. box: in pixels of the full image. level: mean of the mask, 0..1."""
 
     box: Box
@@ -72,8 +72,8 @@ class Thing:
     level: float
 
 
-def things(mask: Mask, depth_m: HalfDepth, k: Intrinsics) -> list[Thing]:
-    """The things in a mask.
+def blobs(mask: Mask, depth_m: HalfDepth, k: Intrinsics) -> list[Blob]:
+    """The blobs in a mask.
 
     mask: (H / 2, W / 2) confidence that a pixel moves, 0..255.
     k: intrinsics of the half-size image.
@@ -93,7 +93,7 @@ def things(mask: Mask, depth_m: HalfDepth, k: Intrinsics) -> list[Thing]:
         if np.count_nonzero(known) < _MIN_KNOWN * area:
             continue
         level = float(clean[top : top + height, left : left + width][inside].mean()) / 255.0
-        found.append(_thing(inside, left, top, z_m, known, k, level))
+        found.append(_blob(inside, left, top, z_m, known, k, level))
     return found
 
 
@@ -103,10 +103,10 @@ def depth_jumps(depth_m: HalfDepth) -> NDArray[np.bool_]:
     jumps = np.zeros(depth_m.shape, np.bool_)
     for axis in (0, 1):
         step = np.abs(np.diff(depth_m, axis=axis))
-        here = depth_m[:-1] if axis == 0 else depth_m[:, :-1]
-        there = depth_m[1:] if axis == 0 else depth_m[:, 1:]
+        values = depth_m[:-1] if axis == 0 else depth_m[:, :-1]
+        neighbours = depth_m[1:] if axis == 0 else depth_m[:, 1:]
         limit = allowed[:-1] if axis == 0 else allowed[:, :-1]
-        cut = (step > limit) & (here > 0.0) & (there > 0.0)
+        cut = (step > limit) & (values > 0.0) & (neighbours > 0.0)
         if axis == 0:
             jumps[:-1] |= cut
         else:
@@ -114,7 +114,7 @@ def depth_jumps(depth_m: HalfDepth) -> NDArray[np.bool_]:
     return jumps
 
 
-def _thing(
+def _blob(
     inside: NDArray[np.bool_],
     left: int,
     top: int,
@@ -122,58 +122,60 @@ def _thing(
     known: NDArray[np.bool_],
     k: Intrinsics,
     level: float,
-) -> Thing:
+) -> Blob:
     v, u = np.nonzero(inside)
     middle_m = float(np.median(z_m[known]))
-    near = known & (np.abs(z_m - middle_m) <= 0.5)
-    z = z_m[near].astype(np.float64)
-    x = (u[near] + left - k.cx) / k.fx * z
-    y = (v[near] + top - k.cy) / k.fy * z
+    close = known & (np.abs(z_m - middle_m) <= 0.5)
+    z = z_m[close].astype(np.float64)
+    x = (u[close] + left - k.cx) / k.fx * z
+    y = (v[close] + top - k.cy) / k.fy * z
     points = np.stack([x, y, z], axis=1)
     box = tuple(float(SCALE * edge) for edge in (left, top, left + inside.shape[1], top + inside.shape[0]))
-    return Thing((box[0], box[1], box[2], box[3]), points.mean(axis=0), np.ptp(points, axis=0), level)
+    return Blob((box[0], box[1], box[2], box[3]), points.mean(axis=0), np.ptp(points, axis=0), level)
 
 
 @dataclass(slots=True)
-class _Known:
+class _Track:
     id: int
     position_m: FloatArray
     frames: int
     unseen: int
 
 
-class Identities:
-    """Gives each thing the id of the nearest known one within a gate, or a new id."""
+class IdTracker:
+    """Gives each blob the id of the nearest track within a gate, or a new id."""
 
     def __init__(self) -> None:
-        self._known: list[_Known] = []
+        self._tracks: list[_Track] = []
         self._next_id = 0
 
-    def answer(self, found: Sequence[Thing], mask: Mask | None) -> Answer:
+    def answer(self, found: Sequence[Blob], mask: Mask | None) -> Answer:
         """The detections of this frame, with ids."""
-        apart = np.array(
+        distance_m = np.array(
             [
-                [float(np.linalg.norm(one.position_m - known.position_m)) for known in self._known]
-                for one in found
+                [float(np.linalg.norm(blob.position_m - track.position_m)) for track in self._tracks]
+                for blob in found
             ]
-        ).reshape(len(found), len(self._known))
-        owner = dict(assign(np.where(apart <= _GATE_M, apart, np.inf)))
-        for known in self._known:
-            known.unseen += 1
+        ).reshape(len(found), len(self._tracks))
+        track_of_blob = dict(assign(np.where(distance_m <= _GATE_M, distance_m, np.inf)))
+        for track in self._tracks:
+            track.unseen += 1
         detections = []
-        for index, one in enumerate(found):
-            known = self._known[owner[index]] if index in owner else self._begin()
-            known.position_m, known.frames, known.unseen = one.position_m, known.frames + 1, 0
-            room = 1.0 - CALLED_MOVING
-            confirmed = known.frames >= _CONFIRM_FRAMES
-            confidence = CALLED_MOVING + room * one.level if confirmed else 0.99 * CALLED_MOVING * one.level
+        for index, blob in enumerate(found):
+            track = self._tracks[track_of_blob[index]] if index in track_of_blob else self._start_track()
+            track.position_m, track.frames, track.unseen = blob.position_m, track.frames + 1, 0
+            span = 1.0 - CALLED_MOVING
+            confirmed = track.frames >= _CONFIRM_FRAMES
+            confidence = CALLED_MOVING + span * blob.level if confirmed else 0.99 * CALLED_MOVING * blob.level
             detections.append(
-                DetectedObject(known.id, one.box, one.position_m, unknown_vector(), one.extent_m, confidence)
+                DetectedObject(
+                    track.id, blob.box, blob.position_m, unknown_vector(), blob.extent_m, confidence
+                )
             )
-        self._known = [known for known in self._known if known.unseen <= _FORGET_FRAMES]
+        self._tracks = [track for track in self._tracks if track.unseen <= _FORGET_FRAMES]
         return Answer(tuple(detections), mask)
 
-    def _begin(self) -> _Known:
-        self._known.append(_Known(self._next_id, np.zeros(3), 0, 0))
+    def _start_track(self) -> _Track:
+        self._tracks.append(_Track(self._next_id, np.zeros(3), 0, 0))
         self._next_id += 1
-        return self._known[-1]
+        return self._tracks[-1]

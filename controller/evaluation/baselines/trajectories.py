@@ -2,7 +2,7 @@
 
 Corners are tracked for up to half a second. RANSAC over the points with depth gives the camera's rigid motion
 between the oldest and the newest image. Trajectories that are outliers in several frames are moving. Those
-that are close in space are one thing.
+that are close in space are one blob.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.evaluation.baselines import ego
-from controller.evaluation.baselines.ego import Points
+from controller.evaluation.baselines import ego_motion
+from controller.evaluation.baselines.ego_motion import Points
 from controller.evaluation.baselines.masks import (
     SCALE,
-    Identities,
+    Blob,
+    IdTracker,
     Mask,
-    Thing,
     half_depth_m,
     half_grey,
     half_intrinsics,
@@ -32,13 +32,13 @@ _WINDOW = 15  # frames
 _MIN_AGE = 6  # least age of the old image, in frames
 _TOLERANCE_PX = 1.0  # inliers of the rigid motion
 _MOVING_PX = 2.0  # a trajectory whose residual is larger gets a vote for moving
-_LINK_M = 0.45  # points that are closer belong to one thing
-_MIN_TRAJECTORIES = 5  # of a thing
-_MEMORY = 0.6  # weight of the votes of earlier frames
+_LINK_M = 0.45  # points that are closer belong to one blob
+_MIN_TRAJECTORIES = 5  # of a blob
+_VOTE_DECAY = 0.6  # weight of the votes of earlier frames
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Past:
+class _Snapshot:
     """The trajectories in an earlier frame: ids (N,), pixels (N, 2), depth_m (N,)."""
 
     ids: NDArray[np.int64]
@@ -50,76 +50,76 @@ class Trajectories:
     """Keeps the corners and their positions in the last images."""
 
     def __init__(self) -> None:
-        ego.seed_ransac()
-        self._before: Mask | None = None
+        ego_motion.seed_ransac()
+        self._previous: Mask | None = None
         self._ids = np.empty(0, np.int64)
         self._pixels: Points = np.empty((0, 2), np.float32)
         self._votes = np.empty(0)
         self._next_id = 0
-        self._past: deque[_Past] = deque(maxlen=_WINDOW)
-        self._identities = Identities()
+        self._history: deque[_Snapshot] = deque(maxlen=_WINDOW)
+        self._id_tracker = IdTracker()
 
     def observe(self, frame: RgbdFrame, odometry: Pose | None) -> Answer:
         """Odometry is not used."""
         grey, depth_m, k = half_grey(frame), half_depth_m(frame), half_intrinsics(frame.intrinsics)
-        if self._before is not None:
-            there, found = ego.follow(self._before, grey, self._pixels)
-            self._ids, self._pixels, self._votes = self._ids[found], there[found], self._votes[found]
-        self._before = grey
-        z_m = ego.depth_at(self._pixels, depth_m)
+        if self._previous is not None:
+            tracked, found = ego_motion.track_points(self._previous, grey, self._pixels)
+            self._ids, self._pixels, self._votes = self._ids[found], tracked[found], self._votes[found]
+        self._previous = grey
+        z_m = ego_motion.depth_at(self._pixels, depth_m)
         self._vote(k)
         moving = (self._votes > 0.5) & (z_m > 0.0)
-        found_things = _group(self._pixels[moving], z_m[moving], k)
-        self._renew(grey)
-        self._past.append(_Past(self._ids, self._pixels, ego.depth_at(self._pixels, depth_m)))
-        return self._identities.answer(found_things, None)
+        found_blobs = _group(self._pixels[moving], z_m[moving], k)
+        self._add_corners(grey)
+        self._history.append(_Snapshot(self._ids, self._pixels, ego_motion.depth_at(self._pixels, depth_m)))
+        return self._id_tracker.answer(found_blobs, None)
 
     def _vote(self, k: Intrinsics) -> None:
         """Vote by the motion since the oldest image that shares enough trajectories with the newest."""
-        self._votes = self._votes * _MEMORY
-        for past in self._past:
-            _, old, new = np.intersect1d(past.ids, self._ids, assume_unique=True, return_indices=True)
-            known = past.depth_m[old] > 0.0
+        self._votes = self._votes * _VOTE_DECAY
+        for snapshot in self._history:
+            _, old, new = np.intersect1d(snapshot.ids, self._ids, assume_unique=True, return_indices=True)
+            known = snapshot.depth_m[old] > 0.0
             old, new = old[known], new[known]
-            age = len(self._past) - next(i for i, one in enumerate(self._past) if one is past)
+            age = len(self._history) - next(i for i, past in enumerate(self._history) if past is snapshot)
             if age < _MIN_AGE:
                 return
             if len(old) < 30:
                 continue
-            points_m = ego.back_project(past.pixels[old], past.depth_m[old], k)
-            motion = ego.rigid_motion(points_m, self._pixels[new], k, _TOLERANCE_PX)
+            points_m = ego_motion.back_project(snapshot.pixels[old], snapshot.depth_m[old], k)
+            motion = ego_motion.rigid_motion(points_m, self._pixels[new], k, _TOLERANCE_PX)
             if motion is None:
                 return
-            miss_px = np.hypot(*(ego.project(motion.apply(points_m), k) - self._pixels[new]).T)
-            self._votes[new] += np.where(np.nan_to_num(miss_px) > _MOVING_PX, 1.0 - _MEMORY, 0.0)
+            residual_px = np.hypot(*(ego_motion.project(motion.apply(points_m), k) - self._pixels[new]).T)
+            self._votes[new] += np.where(np.nan_to_num(residual_px) > _MOVING_PX, 1.0 - _VOTE_DECAY, 0.0)
             return
 
-    def _renew(self, grey: Mask) -> None:
-        wanted = _CORNERS - len(self._ids)
-        if wanted < _CORNERS // 8:
+    def _add_corners(self, grey: Mask) -> None:
+        missing = _CORNERS - len(self._ids)
+        if missing < _CORNERS // 8:
             return
-        fresh = ego.corners(grey, wanted, self._pixels)
-        self._ids = np.concatenate([self._ids, np.arange(self._next_id, self._next_id + len(fresh))])
-        self._next_id += len(fresh)
-        self._pixels = np.concatenate([self._pixels, fresh])
-        self._votes = np.concatenate([self._votes, np.zeros(len(fresh))])
+        new_corners = ego_motion.corners(grey, missing, self._pixels)
+        self._ids = np.concatenate([self._ids, np.arange(self._next_id, self._next_id + len(new_corners))])
+        self._next_id += len(new_corners)
+        self._pixels = np.concatenate([self._pixels, new_corners])
+        self._votes = np.concatenate([self._votes, np.zeros(len(new_corners))])
 
 
-def _group(pixels: Points, z_m: FloatArray, k: Intrinsics) -> list[Thing]:
+def _group(pixels: Points, z_m: FloatArray, k: Intrinsics) -> list[Blob]:
     """Single-linkage clustering in space: points closer than _LINK_M belong together."""
-    points_m = ego.back_project(pixels, z_m, k)
+    points_m = ego_motion.back_project(pixels, z_m, k)
     label = np.arange(len(points_m))
     close = np.linalg.norm(points_m[:, None] - points_m[None], axis=2) <= _LINK_M
     for index in range(len(points_m)):
-        joined = np.unique(label[close[index]])
-        label[np.isin(label, joined)] = joined[0]
+        merged = np.unique(label[close[index]])
+        label[np.isin(label, merged)] = merged[0]
     found = []
-    for one in np.unique(label):
-        own = label == one
-        if np.count_nonzero(own) < _MIN_TRAJECTORIES:
+    for cluster_label in np.unique(label):
+        members = label == cluster_label
+        if np.count_nonzero(members) < _MIN_TRAJECTORIES:
             continue
-        low, high = pixels[own].min(axis=0) * SCALE, pixels[own].max(axis=0) * SCALE
+        low, high = pixels[members].min(axis=0) * SCALE, pixels[members].max(axis=0) * SCALE
         box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
-        members_m = points_m[own]
-        found.append(Thing(box, members_m.mean(axis=0), np.ptp(members_m, axis=0), 1.0))
+        members_m = points_m[members]
+        found.append(Blob(box, members_m.mean(axis=0), np.ptp(members_m, axis=0), 1.0))
     return found

@@ -24,7 +24,7 @@ from hal.clocks import MonotonicClock
 from hal.types import CameraMount, PlanarPose
 from sim.rendering.camera import SimulatedCamera
 from sim.world import World
-from tests.support.pages import PROGRAM, ROOT, Page, changed, complaints_of_ruff, python_in
+from tests.support.docs_pages import PACKAGES, ROOT, Page, changed, python_in, ruff_findings
 
 PAGE = Page("docs/add-a-camera.md")
 WRITER = "tests/support/frame_writer.py"
@@ -37,7 +37,7 @@ LINES_SEEN = 12
 def pasted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project with the page's camera in it."""
     project = tmp_path_factory.mktemp("project")
-    PAGE.paste(project, (*PROGRAM, "tests/contract", "tests/support", "tests/unit/hal"))
+    PAGE.paste(project, (*PACKAGES, "tests/contract", "tests/support", "tests/unit/hal"))
     shutil.copy(ROOT / "tests" / "conftest.py", project / "tests")
     return project
 
@@ -63,7 +63,7 @@ def test_its_lines_still_fit_once_another_kind_was_added(file: str, last: str, m
 
 
 def test_ruff_is_content(pasted: Path) -> None:
-    assert not complaints_of_ruff(pasted)
+    assert not ruff_findings(pasted)
 
 
 def test_it_passes_the_contract_suite_and_its_own_test(pasted: Path) -> None:

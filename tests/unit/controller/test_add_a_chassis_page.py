@@ -13,13 +13,13 @@ from config.chassis import CHASSIS_KINDS, AnyChassisConfig
 from config.loader import CONFIG_DIR
 from controller.emulate import FAULTS
 from controller.faults.trials import KINDS as EVERY_BASE
-from hal.chassis.driver import ChassisDriver, Told
+from hal.chassis.driver import ChassisDriver, ChassisFeedback
 from hal.links.scripted import serial_pair
 from hal.types import Setpoint
 from tests.support.chassis_rig import MS
 from tests.support.contract_rigs import EMULATED
-from tests.support.page_chassis import PAGE, page_module
-from tests.support.pages import ROOT, changed, complaints_of_ruff, python_in
+from tests.support.docs_page_chassis import PAGE, page_module
+from tests.support.docs_pages import ROOT, changed, python_in, ruff_findings
 
 KINDS = dict(zip(CHASSIS_KINDS, get_args(AnyChassisConfig), strict=True))
 
@@ -37,10 +37,10 @@ def test_every_method_it_names_is_the_driver_s(method: str) -> None:
     assert hasattr(ChassisDriver, method)
 
 
-@pytest.mark.parametrize("word", ["disobeys", "stop_cause", "silence"])
+@pytest.mark.parametrize("word", ["command_refusal", "stop_cause", "silence_hint"])
 def test_what_told_asks_for(word: str) -> None:
     assert word in PAGE.quoted
-    assert hasattr(Told, word)
+    assert hasattr(ChassisFeedback, word)
 
 
 def test_the_faults_to_type() -> None:
@@ -100,7 +100,7 @@ def test_a_line_that_has_changed_is_told_with_its_page_and_file() -> None:
 
 def test_what_is_pasted_from_the_page_passes_the_checks_and_drives(tmp_path: Path) -> None:
     PAGE.paste(tmp_path)
-    assert not complaints_of_ruff(tmp_path)
+    assert not ruff_findings(tmp_path)
     config = yaml.safe_load(read("config/sim.yaml"))
     config["chassis"] = {
         "kind": "minitrack",

@@ -11,14 +11,14 @@ from controller.answer import Answer, BaseAnswer
 from controller.control import ControlStep
 from controller.ending import Outcome
 from controller.record.tally import SetpointTally
-from tests.support.deaf_base import DeafBase
+from tests.support.imperfect_base import ImperfectBase
 from tests.support.obedient_chassis import PERIOD_S
 from tests.unit.controller.test_control import drive, loop_on
 
 LIMITS = Robot().limits
 
 
-def driven(base: DeafBase, length_m: float = 6.0) -> tuple[list[ControlStep], Outcome | None]:
+def driven(base: ImperfectBase, length_m: float = 6.0) -> tuple[list[ControlStep], Outcome | None]:
     """The steps of a whole drive, and its end."""
     loop = loop_on(base, length_m)
     return drive(loop, 2500), loop.ending.outcome
@@ -29,7 +29,7 @@ def driven(base: DeafBase, length_m: float = 6.0) -> tuple[list[ControlStep], Ou
 def test_a_base_that_hears_again_begins_gently_and_ends_at_the_target(
     deaf_for_s: float, from_s: float
 ) -> None:
-    base = DeafBase(deaf_s=(from_s, from_s + deaf_for_s))
+    base = ImperfectBase(unresponsive_s=(from_s, from_s + deaf_for_s))
     taken, outcome = driven(base)
     told = [step for step in taken if step.unanswered]
     assert len(told) == 1
@@ -44,7 +44,7 @@ def test_a_base_that_hears_again_begins_gently_and_ends_at_the_target(
     assert taken[-1].progress_m == pytest.approx(6.0, abs=0.03)
     tally = SetpointTally(LIMITS, PERIOD_S)
     for step in taken:
-        tally.add(step.chassis.sent, step.chassis.mode, stands=step.unanswered != "")
+        tally.add(step.chassis.sent, step.chassis.mode, standing=step.unanswered != "")
     assert tally.violations == 0
 
 
@@ -54,7 +54,7 @@ def test_after_a_dip_nothing_wrong_was_learnt_and_it_ends_at_the_target(
     deaf_for_s: float, from_s: float
 ) -> None:
     """It hears again before it has fallen by half. The lag and drift learnt of that made it go past."""
-    base = DeafBase(deaf_s=(from_s, from_s + deaf_for_s))
+    base = ImperfectBase(unresponsive_s=(from_s, from_s + deaf_for_s))
     taken, outcome = driven(base, 8.0)
     assert outcome is Outcome.REACHED
     assert taken[-1].progress_m == pytest.approx(8.0, abs=0.03)
@@ -63,7 +63,7 @@ def test_after_a_dip_nothing_wrong_was_learnt_and_it_ends_at_the_target(
 @pytest.mark.parametrize("gain", [-1.0, -2.0])
 def test_a_base_that_goes_back_again_ends_the_drive(gain: float) -> None:
     """It would twitch back for ever, each time too briefly for hal/chassis/rolling_back.py."""
-    taken, outcome = driven(DeafBase(gain=gain))
+    taken, outcome = driven(ImperfectBase(gain=gain))
     assert outcome is Outcome.BROKEN_OFF
     assert len([step for step in taken if step.unanswered]) == 2
     assert "again; do its motors turn the right way?" in "".join(step.unanswered for step in taken)
@@ -72,7 +72,7 @@ def test_a_base_that_goes_back_again_ends_the_drive(gain: float) -> None:
 
 def test_a_base_that_never_hears_is_not_asked_for_more_and_more() -> None:
     """hal/chassis/following.py latches it; the command waits at what may break it loose."""
-    base = DeafBase(deaf_s=(0.0, math.inf))
+    base = ImperfectBase(unresponsive_s=(0.0, math.inf))
     taken = driven(base)[0][:400]
     assert max(step.setpoint.v_mps for step in taken) < 0.4
     assert taken[-1].setpoint.v_mps == pytest.approx(0.2, abs=0.01)
@@ -80,7 +80,7 @@ def test_a_base_that_never_hears_is_not_asked_for_more_and_more() -> None:
 
 @pytest.mark.parametrize("gain", [2.0, 6.0])
 def test_a_base_that_runs_away_is_not_told_to_go_faster(gain: float) -> None:
-    base = DeafBase(gain=gain)
+    base = ImperfectBase(gain=gain)
     taken = driven(base)[0][:600]
     speeds = base.speeds
     first = next(k for k, step in enumerate(taken) if speeds[k] > 1.5 * step.setpoint.v_mps + 0.16)
@@ -91,24 +91,24 @@ def test_a_base_that_runs_away_is_not_told_to_go_faster(gain: float) -> None:
 
 
 NORMAL = {
-    "quick": DeafBase(lag_s=0.02),
-    "a lag of 0.3 s": DeafBase(lag_s=0.3),
-    "a lag of 2 s": DeafBase(lag_s=2.0),
-    "a dead time of 0.3 s": DeafBase(dead_s=0.3),
-    "both": DeafBase(lag_s=0.3, dead_s=0.2),
-    "40 ms": DeafBase(lag_s=0.04),
-    "sticks for 0.3 s": DeafBase(sticks_s=0.3),
-    "sticks for 0.6 s with a lag": DeafBase(sticks_s=0.6, lag_s=0.3),
-    "reports ten times a second": DeafBase(report_every=5),
-    "reports rarely, lags": DeafBase(report_every=5, lag_s=0.3, dead_s=0.1),
-    "tells half of it": DeafBase(gain=0.5),
-    "tells a third more": DeafBase(gain=1.3),
+    "quick": ImperfectBase(lag_s=0.02),
+    "a lag of 0.3 s": ImperfectBase(lag_s=0.3),
+    "a lag of 2 s": ImperfectBase(lag_s=2.0),
+    "a dead time of 0.3 s": ImperfectBase(dead_time_s=0.3),
+    "both": ImperfectBase(lag_s=0.3, dead_time_s=0.2),
+    "40 ms": ImperfectBase(lag_s=0.04),
+    "sticks for 0.3 s": ImperfectBase(stiction_s=0.3),
+    "sticks for 0.6 s with a lag": ImperfectBase(stiction_s=0.6, lag_s=0.3),
+    "reports ten times a second": ImperfectBase(report_every=5),
+    "reports rarely, lags": ImperfectBase(report_every=5, lag_s=0.3, dead_time_s=0.1),
+    "tells half of it": ImperfectBase(gain=0.5),
+    "tells a third more": ImperfectBase(gain=1.3),
 }
 
 
 @pytest.mark.parametrize("base", NORMAL.values(), ids=NORMAL.keys())
 def test_whatever_a_base_is_like_its_commands_are_as_they_were(
-    base: DeafBase, monkeypatch: pytest.MonkeyPatch
+    base: ImperfectBase, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No answer of it ever caps a command, so they are bit for bit those of a loop that does not look."""
     given: set[Answer] = set()

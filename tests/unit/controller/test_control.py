@@ -163,7 +163,7 @@ def test_a_robot_that_knows_not_where_it_is_stops_and_the_loop_goes_on() -> None
 
 
 def test_odometry_has_the_time_for_which_the_chassis_tells_it() -> None:
-    loop = loop_on(ObedientChassis(late_ns=4_000_000))
+    loop = loop_on(ObedientChassis(stamp_offset_ns=4_000_000))
     last = drive(loop, 100)[-1]
     assert last.setpoint.v_mps > 0.2
     then = loop.localiser.body_pose(last.now_ns + 4_000_000)

@@ -9,17 +9,17 @@ from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from controller.path.path import Path
 from tests.support.closed_loop import (
+    Box,
     Log,
     Mission,
     Noise,
-    Thing,
-    Where,
+    Trajectory,
     bend,
     optimum_s,
     reversals,
-    stands,
+    standing_at,
     straight,
-    walks,
+    walking,
 )
 from vision.scene import Scene
 
@@ -94,7 +94,7 @@ def test_no_slow_section_is_left_before_its_end() -> None:
 def test_a_crate_beside_the_path_costs_at_most_two_per_cent() -> None:
     empty, beside = (
         Mission(straight(25.0), []),
-        Mission(straight(25.0), [Thing(stands(12.0, -1.0), 0.6, 0.5, 0.6)], REAL),
+        Mission(straight(25.0), [Box(standing_at(12.0, -1.0), 0.6, 0.5, 0.6)], REAL),
     )
     drive(empty)
     drive(beside)
@@ -103,7 +103,7 @@ def test_a_crate_beside_the_path_costs_at_most_two_per_cent() -> None:
 
 @pytest.mark.parametrize("noise", [Noise(), REAL])
 def test_a_crate_on_the_path_is_stopped_before_comfortably(noise: Noise) -> None:
-    mission = Mission(straight(15.0), [Thing(stands(8.0, 0.0), 0.6, 0.6, 0.6)], noise)
+    mission = Mission(straight(15.0), [Box(standing_at(8.0, 0.0), 0.6, 0.6, 0.6)], noise)
     log = drive(mission, 20.0)
     assert log.v_mps[-1] == 0.0
     assert 0.3 <= log.clearance_m[-1] <= 0.6
@@ -112,14 +112,14 @@ def test_a_crate_on_the_path_is_stopped_before_comfortably(noise: Noise) -> None
 
 
 def test_a_low_pallet_that_sinks_below_the_view_is_not_touched() -> None:
-    mission = Mission(straight(15.0), [Thing(stands(8.0, 0.1), 1.2, 0.8, 0.15)], REAL)
+    mission = Mission(straight(15.0), [Box(standing_at(8.0, 0.1), 1.2, 0.8, 0.15)], REAL)
     log = drive(mission, 30.0)
     assert log.v_mps[-1] == 0.0
     assert log.clearance_m[-1] > 0.3
 
 
 def test_a_plain_wall_is_stopped_before_by_depth_alone() -> None:
-    wall = Thing(stands(9.0, 0.0), 0.2, 5.0, 3.0, seen_by_edges=False)
+    wall = Box(standing_at(9.0, 0.0), 0.2, 5.0, 3.0, seen_by_edges=False)
     log = drive(Mission(straight(15.0), [wall], REAL), 20.0)
     assert log.v_mps[-1] == 0.0
     assert 0.3 <= log.clearance_m[-1] <= 0.7
@@ -128,13 +128,13 @@ def test_a_plain_wall_is_stopped_before_by_depth_alone() -> None:
 @pytest.mark.parametrize(
     ("where", "slowest"),
     [
-        (walks(9.0, 4.0, 0.0, -1.2, 2.0), 0.4),
-        (walks(8.0, 3.0, 0.0, -0.6, 2.0), 0.2),
-        (walks(7.0, -3.5, 0.4, 0.9, 1.0), 0.4),
+        (walking(9.0, 4.0, 0.0, -1.2, 2.0), 0.4),
+        (walking(8.0, 3.0, 0.0, -0.6, 2.0), 0.2),
+        (walking(7.0, -3.5, 0.4, 0.9, 1.0), 0.4),
     ],
 )
-def test_a_crossing_person_is_let_pass(where: Where, slowest: float) -> None:
-    mission = Mission(straight(18.0), [Thing(where)], REAL)
+def test_a_crossing_person_is_let_pass(where: Trajectory, slowest: float) -> None:
+    mission = Mission(straight(18.0), [Box(where)], REAL)
     log = drive(mission)
     assert mission.reached
     assert min(log.v_mps[100:600]) >= slowest
@@ -145,7 +145,7 @@ def test_a_person_who_stops_on_the_path_is_waited_for_and_then_it_goes_again() -
     def where(t_s: float) -> tuple[float, float]:
         return 8.0, 3.0 - min(max(t_s - 2.0, 0.0), 2.7) * 1.1 - max(t_s - 14.0, 0.0) * 1.1
 
-    mission = Mission(straight(15.0), [Thing(where)], REAL)
+    mission = Mission(straight(15.0), [Box(where)], REAL)
     log = drive(mission)
     assert mission.reached
     assert min(log.v_mps[300:]) == 0.0
@@ -153,7 +153,7 @@ def test_a_person_who_stops_on_the_path_is_waited_for_and_then_it_goes_again() -
 
 
 def test_an_oncoming_person_finds_it_standing() -> None:
-    person = Thing(walks(18.0, 0.0, -1.2, 0.0, 0.0, 8.0))
+    person = Box(walking(18.0, 0.0, -1.2, 0.0, 0.0, 8.0))
     log = drive(Mission(straight(25.0), [person], REAL), 20.0)
     nearest = int(np.argmin(log.clearance_m))
     assert log.v_mps[nearest] == 0.0
@@ -163,7 +163,7 @@ def test_a_leader_that_brakes_hard_is_not_touched() -> None:
     def where(t_s: float) -> tuple[float, float]:
         return 4.0 + 0.8 * min(t_s, 9.0) + 0.8 * max(t_s - 15.0, 0.0), 0.0
 
-    mission = Mission(straight(18.0), [Thing(where)], REAL)
+    mission = Mission(straight(18.0), [Box(where)], REAL)
     log = drive(mission)
     assert mission.reached
     assert min(log.clearance_m) > 0.2
@@ -172,7 +172,7 @@ def test_a_leader_that_brakes_hard_is_not_touched() -> None:
 def test_a_bend_with_a_crate_behind_it() -> None:
     path = bend(3.0, 90.0)
     end = path.pose(path.length_m - 2.0)
-    mission = Mission(path, [Thing(stands(end.x_m, end.y_m), 0.6, 0.6, 0.8)], REAL, yaw_ratio=0.9)
+    mission = Mission(path, [Box(standing_at(end.x_m, end.y_m), 0.6, 0.6, 0.8)], REAL, yaw_ratio=0.9)
     log = drive(mission, 40.0)
     assert log.v_mps[-1] == 0.0
     assert log.clearance_m[-1] > 0.2

@@ -14,7 +14,7 @@ from controller.ending import Outcome
 from controller.governor.command import Governing
 from controller.record.tally import SetpointTally
 from controller.result import DriveResult, MissionResult
-from tests.support.pages import ROOT
+from tests.support.docs_pages import ROOT
 
 
 def ended(kind: Any, outcome: Outcome, *, violations: int = 0, contacts: tuple[str, ...] = ()) -> Any:

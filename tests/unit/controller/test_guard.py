@@ -144,7 +144,7 @@ def test_around_every_driver(kind: str) -> None:
         assert state.reason.startswith("output guard: accelerates too hard: ")
         assert state.sent is None or state.sent.v_mps == 0.0
         state = rig.run(2.0, 0.7)
-        assert rig.stands()
+        assert rig.is_standing()
         assert state.mode is ChassisMode.ESTOP
         rig.chassis.arm(rig.now_ns)
         assert rig.step(0.7).reason.endswith("arming refused: the command is not zero")

@@ -14,7 +14,7 @@ import controller.mission
 from controller.__main__ import main
 from controller.campaign import command
 from controller.campaign.judge import Row
-from controller.campaign.plan import run_here
+from controller.campaign.plan import run_local
 from controller.campaign.task import Task
 from controller.errors import UserError
 from controller.workers import held, worker_processes
@@ -62,11 +62,11 @@ def test_a_campaign_keeps_what_is_done_and_goes_on_from_there(
     arguments += ["--workers", "1", "--quiet", "--report", str(report)]
 
     def interrupted_after_the_first(tasks: list[Task], workers: int) -> Iterator[list[Row]]:
-        yield next(run_here(tasks, workers))
+        yield next(run_local(tasks, workers))
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(command, "run_here", interrupted_after_the_first)
+        patched.setattr(command, "run_local", interrupted_after_the_first)
         assert ended(patched, *arguments) == 130
     said = capsys.readouterr().err.strip()
     assert said == (

@@ -2,15 +2,17 @@ from config.app import LockstepRunner
 from controller.lockstep import run_lockstep
 from hal.clocks import SimulatedClock
 from sim.faults import Faults, Window
-from tests.support.drives import NotingDrive, NotingOutside, PlainEyes, TickingCamera
+from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, RecordingDrive, RecordingOutside
 
 MS = 1_000_000
 
 
-def drive(runner: LockstepRunner, steps: int, camera_ms: int) -> tuple[NotingDrive, NotingOutside, list[int]]:
-    loop, outside = NotingDrive(steps), NotingOutside()
-    camera = TickingCamera(camera_ms * MS)
-    moments = list(run_lockstep(runner, SimulatedClock(), outside, camera, PlainEyes(), loop))
+def drive(
+    runner: LockstepRunner, steps: int, camera_ms: int
+) -> tuple[RecordingDrive, RecordingOutside, list[int]]:
+    loop, outside = RecordingDrive(steps), RecordingOutside()
+    camera = PeriodicCamera(camera_ms * MS)
+    moments = list(run_lockstep(runner, SimulatedClock(), outside, camera, EmptyScenePerceiver(), loop))
     return loop, outside, [len(moment.looks) for moment in moments]
 
 
@@ -24,9 +26,11 @@ def test_a_scene_is_known_only_after_its_latency() -> None:
 
 def test_late_scenes_come_late_and_none_overtakes_another() -> None:
     runner = LockstepRunner(kind="lockstep", control_rate_hz=50, perception_latency_s=0.0)
-    loop, camera = NotingDrive(6), TickingCamera(20 * MS)
+    loop, camera = RecordingDrive(6), PeriodicCamera(20 * MS)
     late = Faults(late=Window(0.02, 0.03), late_by_s=0.05)
-    run = run_lockstep(runner, SimulatedClock(), NotingOutside(), camera, PlainEyes(), loop, late.late_by)
+    run = run_lockstep(
+        runner, SimulatedClock(), RecordingOutside(), camera, EmptyScenePerceiver(), loop, late.late_by
+    )
     assert len(list(run)) == 6
     # Frame 1, exposed at 20 ms, is known at 70: at the step at 80, together with those that came after it.
     assert [sequence for _, sequence in loop.seen] == [0, 0, 0, 0, 4, 5]

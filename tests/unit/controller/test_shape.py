@@ -11,7 +11,7 @@ from ruckig import Result, RuckigError  # type: ignore[import-not-found]  # a co
 from config.robot import Limits
 from controller import braking
 from controller.shape import SpeedShaper
-from tests.support.shaping import PERIOD_S
+from tests.support.shaper_run import PERIOD_S
 
 
 def test_reset_forgets_where_the_end_was() -> None:

@@ -11,7 +11,7 @@ import pytest
 from config.robot import Limits
 from controller import braking
 from controller.shape import SpeedShaper
-from tests.support.shaping import PERIOD_S, Run
+from tests.support.shaper_run import PERIOD_S, Run
 
 
 @pytest.mark.parametrize("length_m", [0.05, 0.3, 1.0, 3.0, 8.25, 30.0])

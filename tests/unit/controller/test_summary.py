@@ -59,7 +59,7 @@ def test_the_limits_line_tells_of_braking_and_of_jerk_beyond_comfort() -> None:
     result, config = drive(0.1, sees=False), load_app(CONFIG_PATH)
     assert "(comfort 0.3, 0.6; kept by all), 0 reversals" in dict(summary_rows(config, result))["limits"]
     tally = result.setpoints
-    tally.emergency_count, tally.harder_count, tally.sharper_count = 3, 1, 2
+    tally.emergency_count, tally.hard_braking_count, tally.high_jerk_count = 3, 1, 2
     told = dict(summary_rows(config, result))["limits"]
     assert "(comfort 0.3, 0.6; 3 setpoints beyond: 1 braked harder, 2 had more jerk), 0 reversals" in told
 

@@ -33,14 +33,14 @@ def test_arming_sends_the_mode_until_the_base_is_in_it_and_never_again() -> None
     bench.chassis.arm(0)
     modes = []
     for _ in range(6):
-        bench.say(state(STANDBY), MotionFeedback(0.0, 0.0))
+        bench.deliver(state(STANDBY), MotionFeedback(0.0, 0.0))
         bench.exchange()
         modes += [message for message in bench.sent() if isinstance(message, ControlModeCommand)]
     assert modes == [ControlModeCommand(CAN)] * 3
-    bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+    bench.deliver(state(CAN), MotionFeedback(0.0, 0.0))
     assert bench.exchange().mode is ChassisMode.ARMED
     for _ in range(50):
-        bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+        bench.deliver(state(CAN), MotionFeedback(0.0, 0.0))
         bench.exchange(0.1)
         assert bench.sent() == [MotionCommand(0.1, 0.0)]
 
@@ -49,11 +49,11 @@ def test_what_waited_in_the_port_is_no_answer_to_the_consent() -> None:
     """Frames from before a restart may still say that the base obeys."""
     bench = Bench()
     bench.exchange()
-    bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+    bench.deliver(state(CAN), MotionFeedback(0.0, 0.0))
     bench.chassis.arm(bench.now_ns)
     seen = bench.exchange()
     assert (seen.mode, seen.reason) == (ChassisMode.ARMING, "arming: no status heard from the base")
-    bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+    bench.deliver(state(CAN), MotionFeedback(0.0, 0.0))
     assert bench.exchange().mode is ChassisMode.ARMED
 
 
@@ -77,7 +77,7 @@ def test_one_command_each_period_whatever_the_loop(loop_ms: int, sent: int) -> N
     count = 0
     for k in range(1000 // loop_ms):
         if k * loop_ms % 20 == 0:
-            bench.say(state(), MotionFeedback(0.0, 0.0))
+            bench.deliver(state(), MotionFeedback(0.0, 0.0))
         bench.exchange(0.1, after_ms=loop_ms)
         count += len(bench.link.sent)
     assert count == pytest.approx(sent, abs=1 if loop_ms >= 16 else 17)
@@ -87,7 +87,7 @@ def test_a_loop_with_jitter_misses_no_period() -> None:
     bench = Bench()
     bench.arm()
     for after_ms in (20, 18, 23, 17, 21, 20, 19):
-        bench.say(MotionFeedback(0.0, 0.0))
+        bench.deliver(MotionFeedback(0.0, 0.0))
         bench.exchange(0.1, after_ms=after_ms)
         assert bench.sent() == [MotionCommand(0.1, 0.0)]
 
@@ -129,14 +129,14 @@ def test_what_the_base_says_can_latch(said: SystemState, reason: str) -> None:
     bench = Bench()
     bench.arm()
     bench.exchange(0.5)
-    bench.say(said, MotionFeedback(0.5, 0.0))
+    bench.deliver(said, MotionFeedback(0.5, 0.0))
     seen = bench.exchange(0.5)
     assert seen.mode is ChassisMode.ESTOP
     assert reason in seen.reason
     assert MotionCommand(0.0, 0.0) in bench.sent(), "zero in the very exchange"
     modes = []
     for _ in range(2):
-        bench.say(state(), MotionFeedback(0.0, 0.0))
+        bench.deliver(state(), MotionFeedback(0.0, 0.0))
         assert bench.exchange(0.5).mode is ChassisMode.ESTOP
         modes += [message for message in bench.sent() if isinstance(message, ControlModeCommand)]
     assert modes == [ControlModeCommand(STANDBY)], "a base that still obeys is taken out of command mode"
@@ -145,7 +145,7 @@ def test_what_the_base_says_can_latch(said: SystemState, reason: str) -> None:
 def test_a_remote_control_is_left_in_charge() -> None:
     bench = Bench()
     bench.arm()
-    bench.say(state(mode=REMOTE))
+    bench.deliver(state(mode=REMOTE))
     for _ in range(10):
         bench.exchange(0.5)
         assert all(isinstance(message, MotionCommand) for message in bench.sent()), "no 0x421"
@@ -156,21 +156,21 @@ def test_silence_of_the_system_state_alone_is_a_loss() -> None:
     bench = Bench()
     bench.arm()
     for _ in range(40):
-        bench.say(MotionFeedback(0.0, 0.0))
+        bench.deliver(MotionFeedback(0.0, 0.0))
         seen = bench.exchange()
     assert (seen.mode, seen.reason) == (ChassisMode.LOST, "no status for 720 ms")
 
 
 def test_faults_are_sentences_and_unknown_bits_are_not_swallowed() -> None:
     bench = Bench()
-    bench.say(state(STANDBY, faults=0x8001), ActuatorSlow(1, 48.0, 30, 30, 0x40 | 0x21))
+    bench.deliver(state(STANDBY, faults=0x8001), ActuatorSlow(1, 48.0, 30, 30, 0x40 | 0x21))
     assert bench.exchange().faults == (
         "system fault: unknown bit 0x0001",
         "system fault: unknown bit 0x8000",
         "driver 1: supply voltage low",
         "driver 1: driver fault",
     )
-    bench.say(state(STANDBY), ActuatorSlow(1, 48.0, 30, 30, 0x40))
+    bench.deliver(state(STANDBY), ActuatorSlow(1, 48.0, 30, 30, 0x40))
     assert bench.exchange().faults == ()
 
 
@@ -178,7 +178,7 @@ def test_fault_bits_alone_do_not_stop_the_drive() -> None:
     """Several models set "remote control lost" whenever it is switched off."""
     bench = Bench()
     bench.arm()
-    bench.say(state(faults=0x0004), MotionFeedback(0.0, 0.0))
+    bench.deliver(state(faults=0x0004), MotionFeedback(0.0, 0.0))
     seen = bench.exchange(0.2)
     assert seen.mode is ChassisMode.ARMED
     assert seen.faults == ("system fault: unknown bit 0x0004",)
@@ -187,9 +187,9 @@ def test_fault_bits_alone_do_not_stop_the_drive() -> None:
 def test_battery_from_either_frame() -> None:
     bench = Bench()
     assert math.isnan(bench.exchange().battery_v)
-    bench.say(Battery(80, 100, 47.5, 0.0, 20.0))
+    bench.deliver(Battery(80, 100, 47.5, 0.0, 20.0))
     assert bench.exchange().battery_v == pytest.approx(47.5)
-    bench.say(state(battery_v=48.5))
+    bench.deliver(state(battery_v=48.5))
     assert bench.exchange().battery_v == pytest.approx(48.5)
 
 
@@ -244,7 +244,7 @@ def test_a_lost_link_is_left_alone_after_a_try_that_took_long() -> None:
 def test_a_flood_does_not_hold_the_loop() -> None:
     bench = Bench()
     for _ in range(1000):
-        bench.say(MotionFeedback(0.0, 0.0))
+        bench.deliver(MotionFeedback(0.0, 0.0))
     bench.exchange()
     heard = 0
     while bench.link.receive() is not None:
@@ -258,7 +258,7 @@ def test_an_old_command_stops_and_latches() -> None:
     old = Setpoint(bench.now_ns, 0.5, 0.0, 0.0)
     for _ in range(10):
         bench.now_ns += 20 * MS
-        bench.say(MotionFeedback(0.0, 0.0))
+        bench.deliver(MotionFeedback(0.0, 0.0))
         assert bench.chassis.exchange(old, bench.now_ns).mode is ChassisMode.ARMED
     bench.now_ns += 20 * MS
     seen = bench.chassis.exchange(old, bench.now_ns)

@@ -33,7 +33,7 @@ def test_every_name_of_the_configuration_has_its_data() -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_every_model_can_be_driven_over_can(name: str) -> None:
     model = MODELS[name]
-    assert model.obeying_mode(over_serial=False) == 1
+    assert model.command_mode(over_serial=False) == 1
     assert 0 < model.max_speed_mps <= 3.0
     assert 0 < model.max_yaw_rate_radps < 3.0
     assert model.mode_standby not in model.modes_remote
@@ -42,7 +42,7 @@ def test_every_model_can_be_driven_over_can(name: str) -> None:
 
 def test_a_model_without_a_serial_port_has_no_mode_for_it() -> None:
     with pytest.raises(ValueError, match="tracer has no serial port"):
-        TRACER.obeying_mode(over_serial=True)
+        TRACER.command_mode(over_serial=True)
 
 
 def test_the_tables_of_scout_are_not_those_of_the_sdk() -> None:

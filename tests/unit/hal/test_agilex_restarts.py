@@ -25,7 +25,7 @@ def counted(count: int) -> SystemState:
 
 
 def drive(bench: Bench, millimetres: int) -> ChassisState:
-    bench.say(MotionFeedback(0.3, 0.0), Odometer(millimetres, millimetres))
+    bench.deliver(MotionFeedback(0.3, 0.0), Odometer(millimetres, millimetres))
     return bench.exchange(0.3)
 
 
@@ -35,7 +35,7 @@ def test_an_odometer_that_jumps_latches_until_consent() -> None:
     bench.arm()
     for k in range(1, 151):
         if k % 10 == 0:
-            bench.say(state(CAN))
+            bench.deliver(state(CAN))
         assert drive(bench, 6 * k).mode is ChassisMode.ARMED
     bench.exchange(0.3, after_ms=60)
     seen = drive(bench, 0)
@@ -48,8 +48,8 @@ def test_an_odometer_that_jumps_latches_until_consent() -> None:
     assert bench.sent() == [MotionCommand(0.0, 0.0), ControlModeCommand(STANDBY)], "taken back to standby"
     for k in range(100):
         if k % 5 == 0:
-            bench.say(state(STANDBY))
-        bench.say(MotionFeedback(0.0, 0.0), Odometer(0, 0))
+            bench.deliver(state(STANDBY))
+        bench.deliver(MotionFeedback(0.0, 0.0), Odometer(0, 0))
         assert bench.exchange(0.3).mode is ChassisMode.ESTOP
         assert ControlModeCommand(CAN) not in bench.sent()
     bench.exchange()
@@ -73,21 +73,21 @@ def test_however_much_waited_none_of_it_is_an_answer_to_the_consent(seconds: int
     """It obeyed for long, nobody read it, and just now it restarted into standby."""
     bench = Bench(track_width_m=0.5)
     for k in range(50 * seconds):
-        bench.say(MotionFeedback(0.0, 0.0), Odometer(k, k), state(CAN))
+        bench.deliver(MotionFeedback(0.0, 0.0), Odometer(k, k), state(CAN))
     bench.chassis.arm(bench.now_ns)
     for _ in range(20):
-        bench.say(MotionFeedback(0.0, 0.0), Odometer(0, 0), state(STANDBY))
+        bench.deliver(MotionFeedback(0.0, 0.0), Odometer(0, 0), state(STANDBY))
         seen = bench.exchange()
         assert seen.mode is ChassisMode.ARMING
     assert seen.reason == "arming: the base does not take commands: control mode is standby"
-    bench.say(MotionFeedback(0.0, 0.0), Odometer(0, 0), state(CAN))
+    bench.deliver(MotionFeedback(0.0, 0.0), Odometer(0, 0), state(CAN))
     assert bench.exchange().mode is ChassisMode.ARMED
 
 
 def test_a_flood_refuses_the_consent() -> None:
     bench = Bench()
     for _ in range(9000):
-        bench.say(MotionFeedback(0.0, 0.0))
+        bench.deliver(MotionFeedback(0.0, 0.0))
     bench.chassis.arm(bench.now_ns)
     seen = bench.exchange()
     assert (seen.mode, seen.reason) == (
@@ -102,10 +102,10 @@ def test_a_flood_refuses_the_consent() -> None:
 def test_what_jumped_before_the_consent_does_not_count() -> None:
     bench = mini(track_width_m=0.5)
     for millimetres in (50_000, 50_010, 0, 10):
-        bench.say(MotionFeedback(0.0, 0.0), Odometer(millimetres, millimetres))
+        bench.deliver(MotionFeedback(0.0, 0.0), Odometer(millimetres, millimetres))
         bench.exchange()
     bench.chassis.arm(bench.now_ns)
-    bench.say(state(CAN), MotionFeedback(0.0, 0.0), Odometer(10, 10))
+    bench.deliver(state(CAN), MotionFeedback(0.0, 0.0), Odometer(10, 10))
     assert bench.exchange().mode is ChassisMode.ARMED
 
 
@@ -128,9 +128,9 @@ def test_the_count_of_the_system_state_begins_anew(
 ) -> None:
     bench = mini()
     bench.arm()
-    bench.say(counted(before), MotionFeedback(0.0, 0.0))
+    bench.deliver(counted(before), MotionFeedback(0.0, 0.0))
     assert bench.exchange().mode is ChassisMode.ARMED
-    bench.say(counted(after), MotionFeedback(0.0, 0.0))
+    bench.deliver(counted(after), MotionFeedback(0.0, 0.0))
     seen = bench.exchange(after_ms=after_ms)
     assert seen.mode is (ChassisMode.ESTOP if restarts else ChassisMode.ARMED)
     assert ("the count of its 0x211 began anew: restarted" in seen.reason) is restarts
@@ -141,5 +141,5 @@ def test_a_base_whose_mode_is_not_repeated_is_asked_for_its_mode_alone() -> None
     bench = Bench()
     bench.arm()
     for count in (120, 0):
-        bench.say(counted(count), MotionFeedback(0.0, 0.0))
+        bench.deliver(counted(count), MotionFeedback(0.0, 0.0))
         assert bench.exchange().mode is ChassisMode.ARMED

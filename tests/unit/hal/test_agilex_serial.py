@@ -51,7 +51,7 @@ def test_understands_what_was_said(message: AgilexMessage, count: int, data: str
     assert type(decoded) is type(message)
     for name in type(message).__slots__:
         assert getattr(decoded, name) == pytest.approx(getattr(message, name), abs=1e-9)
-    assert (reader.rejected, reader.strangers) == (0, 0)
+    assert (reader.rejected, reader.foreign_frames) == (0, 0)
 
 
 def test_what_the_serial_line_has_no_word_for_is_not_sent() -> None:
@@ -96,12 +96,12 @@ def test_another_layout_with_a_right_checksum_is_a_stranger() -> None:
     body = bytes.fromhex("5A A5 0A AA 01 00 02 00 F5 00 00 00")
     reader = FrameReader()
     assert reader.feed(body + bytes((sum(body) % 256,))) == []
-    assert reader.strangers == 1
+    assert reader.foreign_frames == 1
 
 
 def test_short_reads_leave_no_frame_behind() -> None:
     link = ScriptedSerialLink()
-    link.read_at_most(3)
+    link.limit_reads(3)
     bus = AgilexSerialBus(link)
     frames = [encode(MotionFeedback(0.1 * k, 0.0)) for k in range(3)]
     for frame in frames:
@@ -118,7 +118,7 @@ class Bench:
         config = agilex_config(
             SerialLinkConfig(url="loop://"), model="scout", track_width_m=None, slip_factor=1.0
         )
-        self.chassis = AgilexChassis(self.bus, config, self.bus.silence)
+        self.chassis = AgilexChassis(self.bus, config, self.bus.silence_hint)
         self.now_ns = 0
 
     def exchange(self, v_mps: float | None = None, *said: AgilexMessage) -> ChassisState:

@@ -43,7 +43,7 @@ def test_what_dead_reckoning_lacks_is_told_when_arming_gives_up(heard: AgilexMes
     bench = Bench(track_width_m=0.5)
     bench.chassis.arm(0)
     for _ in range(160):
-        bench.say(state(), heard)
+        bench.deliver(state(), heard)
         seen = bench.exchange()
     assert seen.mode is ChassisMode.STANDBY
     begins = "arming gave up after 3.0 s: no motion feedback heard from the base: "

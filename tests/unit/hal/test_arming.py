@@ -8,19 +8,22 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from hal.chassis.arming import Arming, ArmingLimits, Evidence, consent, release, step
+from hal.chassis.arming import Arming, ArmingLimits, Evidence, consent, disarm, step
 from hal.types import ChassisMode
 
 MS = 1_000_000
 LIMITS = ArmingLimits(
-    feedback_timeout_ns=200 * MS, status_timeout_ns=700 * MS, arming_timeout_ns=2000 * MS, stall_ns=500 * MS
+    feedback_timeout_ns=200 * MS,
+    status_timeout_ns=700 * MS,
+    arming_timeout_ns=2000 * MS,
+    max_step_gap_ns=500 * MS,
 )
 GOOD = Evidence(
     now_ns=0,
     link_error="",
     feedback_ns=0,
     status_ns=0,
-    disobeys="",
+    command_refusal="",
     stop_cause="",
     standing=True,
     command_is_zero=True,
@@ -35,8 +38,8 @@ def at(now_ms: int, **changes: object) -> Evidence:
 
 def armed() -> Arming:
     """Armed at 40 ms."""
-    state = consent(Arming(), at(0, disobeys="standby"), LIMITS)
-    state = step(state, at(20, disobeys="standby"), LIMITS)
+    state = consent(Arming(), at(0, command_refusal="standby"), LIMITS)
+    state = step(state, at(20, command_refusal="standby"), LIMITS)
     return step(state, at(40), LIMITS)
 
 
@@ -64,10 +67,10 @@ def test_starts_in_standby_and_stays_there_whatever_the_base_says() -> None:
 
 
 def test_arms_after_consent_when_the_base_obeys() -> None:
-    state = consent(Arming(), at(0, disobeys="control mode is standby"), LIMITS)
+    state = consent(Arming(), at(0, command_refusal="control mode is standby"), LIMITS)
     assert state.mode is ChassisMode.ARMING
     assert not state.may_move
-    state = step(state, at(20, disobeys="control mode is standby"), LIMITS)
+    state = step(state, at(20, command_refusal="control mode is standby"), LIMITS)
     assert state.reason == "arming: the base does not take commands: control mode is standby"
     state = step(state, at(40), LIMITS)
     assert (state.mode, state.reason) == (ChassisMode.ARMED, "armed")
@@ -104,7 +107,11 @@ def test_arming_gives_up_and_says_what_was_missing() -> None:
     ("changes", "mode", "reason"),
     [
         ({"stop_cause": "emergency stop is pressed"}, ChassisMode.ESTOP, "emergency stop is pressed"),
-        ({"disobeys": "mode is standby"}, ChassisMode.ESTOP, "the base no longer obeys: mode is standby"),
+        (
+            {"command_refusal": "mode is standby"},
+            ChassisMode.ESTOP,
+            "the base no longer obeys: mode is standby",
+        ),
         ({"link_error": "unplugged"}, ChassisMode.LOST, "unplugged"),
         ({"feedback_ns": 39 * MS}, ChassisMode.LOST, "no motion feedback for 201 ms"),
         ({"status_ns": -461 * MS}, ChassisMode.LOST, "no status for 701 ms"),
@@ -171,7 +178,7 @@ def test_a_link_that_works_again_is_no_base_that_answers(heard: dict[str, object
 
 
 def test_stop_ends_in_standby_once_the_base_stands_and_has_let_go() -> None:
-    state = release(armed(), 60 * MS)
+    state = disarm(armed(), 60 * MS)
     assert state.mode is ChassisMode.STOPPING
     assert not state.may_move
     state = consent(state, at(70), LIMITS)
@@ -180,14 +187,14 @@ def test_stop_ends_in_standby_once_the_base_stands_and_has_let_go() -> None:
     assert state.mode is ChassisMode.STOPPING
     state = step(state, at(100), LIMITS)
     assert state.mode is ChassisMode.STOPPING, "the base still obeys"
-    state = step(state, at(120, disobeys="control mode is standby"), LIMITS)
+    state = step(state, at(120, command_refusal="control mode is standby"), LIMITS)
     assert (state.mode, state.reason) == (ChassisMode.STANDBY, "stopped")
 
 
 def test_stop_does_not_open_a_latch_and_arms_nothing() -> None:
     latched = step(armed(), at(60, stop_cause="pressed"), LIMITS)
-    assert release(latched, 80 * MS) == latched
-    assert release(Arming(), 0) == Arming()
+    assert disarm(latched, 80 * MS) == latched
+    assert disarm(Arming(), 0) == Arming()
 
 
 def test_arming_twice_changes_nothing() -> None:
@@ -210,7 +217,7 @@ class ArmingLife(RuleBasedStateMachine):
         dt_ms=st.integers(0, 900),
         link_error=st.sampled_from(["", "", "", "gone"]),
         stop_cause=st.sampled_from(["", "", "", "pressed"]),
-        disobeys=st.sampled_from(["", "", "standby"]),
+        command_refusal=st.sampled_from(["", "", "standby"]),
         feedback_age_ms=st.integers(0, 300),
         standing=st.booleans(),
         zero=st.booleans(),
@@ -220,7 +227,7 @@ class ArmingLife(RuleBasedStateMachine):
         dt_ms: int,
         link_error: str,
         stop_cause: str,
-        disobeys: str,
+        command_refusal: str,
         feedback_age_ms: int,
         standing: bool,
         zero: bool,
@@ -230,7 +237,7 @@ class ArmingLife(RuleBasedStateMachine):
             self.now_ms,
             link_error=link_error,
             stop_cause=stop_cause,
-            disobeys=disobeys,
+            command_refusal=command_refusal,
             feedback_ns=(self.now_ms - feedback_age_ms) * MS,
             standing=standing,
             command_is_zero=zero,
@@ -243,7 +250,7 @@ class ArmingLife(RuleBasedStateMachine):
             assert self.consented
             assert not link_error
             assert not stop_cause
-            assert not disobeys
+            assert not command_refusal
             assert feedback_age_ms <= 200
             assert before.may_move or zero, "armed into a command"
 
@@ -255,7 +262,7 @@ class ArmingLife(RuleBasedStateMachine):
     @rule()
     def stop(self) -> None:
         was_latched = self.state.latched
-        self.state = release(self.state, self.now_ms * MS)
+        self.state = disarm(self.state, self.now_ms * MS)
         assert self.state.latched == was_latched
         if not was_latched:
             self.consented = False

@@ -28,16 +28,16 @@ def test_zero_is_exactly_zero() -> None:
     "bad", [setpoint(math.nan), setpoint(0.0, math.nan), setpoint(math.inf), setpoint(0, -math.inf)]
 )
 def test_a_command_that_is_not_finite_stops(bad: Setpoint) -> None:
-    assert "not finite" in LIMITS.objection(bad, 0)
+    assert "not finite" in LIMITS.setpoint_error(bad, 0)
 
 
 def test_a_command_older_than_the_limit_stops() -> None:
     moving = setpoint(0.5)
-    assert LIMITS.objection(moving, 200 * MS) == ""
-    assert LIMITS.objection(moving, 240 * MS) == "the command is 240 ms old"
-    assert LIMITS.objection(setpoint(0.5, stamp_ns=100 * MS), 300 * MS) == ""
-    assert LIMITS.objection(setpoint(0.0), 10_000 * MS) == "", "an old zero is still a zero"
-    assert LIMITS.objection(None, 0) == ""
+    assert LIMITS.setpoint_error(moving, 200 * MS) == ""
+    assert LIMITS.setpoint_error(moving, 240 * MS) == "the command is 240 ms old"
+    assert LIMITS.setpoint_error(setpoint(0.5, stamp_ns=100 * MS), 300 * MS) == ""
+    assert LIMITS.setpoint_error(setpoint(0.0), 10_000 * MS) == "", "an old zero is still a zero"
+    assert LIMITS.setpoint_error(None, 0) == ""
 
 
 def test_a_fast_command_is_slowed_on_the_same_curve() -> None:

@@ -86,7 +86,7 @@ def test_the_group_may_send_where_the_yaml_says_so(tmp_path: Path) -> None:
     path = tmp_path / "governor.sock"
     before = os.umask(0o077)
     try:
-        with UnixSocket(path, for_group=True):
+        with UnixSocket(path, group_may_send=True):
             assert path.stat().st_mode & 0o777 == 0o660
         assert os.umask(0o077) == 0o077
     finally:

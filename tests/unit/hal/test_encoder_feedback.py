@@ -16,12 +16,12 @@ class Answers(EncoderFeedback):
     """Counters that answer every 0.1 s; the right one counts down when its track goes ahead."""
 
     def __init__(self) -> None:
-        super().__init__(TrackGeometry(0.5, 1.0), 1000.0, (1, -1), fastest_mps=0.8)
+        super().__init__(TrackGeometry(0.5, 1.0), 1000.0, (1, -1), max_track_mps=0.8)
         self.now_ns = 0
 
     def answer(self, left: int, right: int, after_ns: int = STEP_NS) -> None:
         self.now_ns += after_ns
-        self._count(left, right, self.now_ns, self.now_ns)
+        self._take_counters(left, right, self.now_ns, self.now_ns)
 
 
 def test_speeds_are_counter_steps_over_time() -> None:

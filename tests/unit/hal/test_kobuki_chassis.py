@@ -12,7 +12,7 @@ from hal.chassis.kobuki_packets import TICK_M, base_control
 from hal.types import ChassisMode
 from tests.support.chassis_rig import KOBUKI_PLANT, MS, kobuki_config
 from tests.support.kobuki_bench import STOP, Bench
-from tests.support.serial_bench import every, reason_for_giving_up
+from tests.support.serial_bench import arming_failure_reason, every
 
 
 def test_standby_says_zero_every_period() -> None:
@@ -37,7 +37,7 @@ def test_the_stop_goes_out_when_nothing_comes_back() -> None:
     bench = Bench()
     bench.arm()
     bench.run(50, 0.4)
-    bench.near.hear_nothing()
+    bench.near.cut_wire()
     state = bench.run(15, 0.4)
     assert (state.mode, bench.near.written) == (ChassisMode.LOST, [STOP])
     bench.emulator.advance_to(bench.now_ns + 100 * MS)
@@ -180,7 +180,7 @@ def test_a_restart_shows_in_clock_or_ticks() -> None:
 def test_wrong_checksums_on_the_line_are_survived() -> None:
     bench = Bench()
     bench.arm()
-    bench.near.hear_through(every(4, lambda data: data[:9] + bytes((data[9] ^ 0x40,)) + data[10:]))
+    bench.near.set_filter(every(4, lambda data: data[:9] + bytes((data[9] ^ 0x40,)) + data[10:]))
     states = [bench.step(0.4) for _ in range(300)]
     assert {state.mode for state in states} == {ChassisMode.ARMED}
     assert states[-1].pose.x_m == pytest.approx(bench.plant.pose.x_m, abs=0.01)
@@ -201,7 +201,7 @@ def test_nothing_is_known_before_the_second_frame() -> None:
     ],
 )
 def test_a_device_that_is_no_kobuki_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    assert hint in reason_for_giving_up(lambda link: KobukiChassis(link, kobuki_config()), babble)
+    assert hint in arming_failure_reason(lambda link: KobukiChassis(link, kobuki_config()), babble)
 
 
 def test_the_fastest_is_the_wire_s_too() -> None:

@@ -39,10 +39,10 @@ def test_what_waited_in_a_full_buffer_before_the_consent_is_no_restart() -> None
         kept += len(data)
         return data if kept < 2000 else b""
 
-    bench.near.hear_through(keep)
+    bench.near.set_filter(keep)
     bench.now_ns += 5000 * MS
     bench.emulator.advance_to(bench.now_ns)
-    bench.near.hear_all()
+    bench.near.restore_wire()
     bench.chassis.arm(bench.now_ns)
     assert bench.run(3).mode is ChassisMode.ARMED
 
@@ -50,7 +50,7 @@ def test_what_waited_in_a_full_buffer_before_the_consent_is_no_restart() -> None
 @pytest.mark.parametrize("bytes_a_read", [1, 9, 60])
 def test_short_reads_leave_nothing_to_grow_old(bytes_a_read: int) -> None:
     bench = Bench()
-    bench.near.read_at_most(bytes_a_read)
+    bench.near.limit_reads(bytes_a_read)
     bench.arm()
     bench.run(200, 0.4)
     bench.emulator.bumper = 2
@@ -70,7 +70,7 @@ def test_frames_that_come_later_and_later_are_no_feedback() -> None:
         waiting.append(data)
         return waiting.pop(0) if next(numbers) % 3 else b""
 
-    bench.near.hear_through(late)
+    bench.near.set_filter(late)
     states = [bench.step(0.4) for _ in range(60)]
     lost = next(state for state in states if state.mode is ChassisMode.LOST)
     assert lost.reason.startswith("no motion feedback for 2")

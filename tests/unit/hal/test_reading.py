@@ -19,7 +19,7 @@ class Flood(ScriptedSerialLink):
 
 def test_short_reads_are_put_together() -> None:
     link = ScriptedSerialLink()
-    link.read_at_most(3)
+    link.limit_reads(3)
     link.deliver(bytes(range(100)))
     assert read_all(link) == bytes(range(100))
     assert read_all(link) == b""

@@ -39,10 +39,10 @@ class SlowLink(ReopeningLink[str]):
         self.closed.append(device)
 
     def use(self) -> str:
-        return self._opened()
+        return self._require_open()
 
     def lose(self) -> LinkLost:
-        return self._lost("reading", OSError("gone"))
+        return self._mark_lost("reading", OSError("gone"))
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from hal.chassis.roboclaw import RoboclawChassis
 from hal.types import ChassisMode
 from sim.emulators.roboclaw import RoboclawEmulator
 from tests.support.chassis_rig import COUNTS_PER_M, PLANT, roboclaw_config
-from tests.support.serial_bench import SerialBench, every, first_known, reason_for_giving_up
+from tests.support.serial_bench import SerialBench, arming_failure_reason, every, first_with_speed
 
 
 class Bench(SerialBench[RoboclawEmulator]):
@@ -58,7 +58,7 @@ def test_a_lost_setting_is_repeated() -> None:
             return b""
         return data
 
-    bench.far.hear_through(lose_first_setting)
+    bench.far.set_filter(lose_first_setting)
     bench.arm()
     assert lost
     assert bench.emulator.timeout_ms == 300
@@ -74,7 +74,7 @@ def test_a_lost_setting_is_repeated() -> None:
 def test_a_setting_that_is_never_answered_is_named_and_starves_nothing(command: int, words: str) -> None:
     bench = Bench()
     bench.run(10)
-    bench.far.hear_through(lambda data: b"" if data[1] == command else data)
+    bench.far.set_filter(lambda data: b"" if data[1] == command else data)
     bench.chassis.arm(bench.now_ns)
     said: list[int] = []
     for _ in range(150):
@@ -108,7 +108,7 @@ def test_a_consent_that_a_lost_link_ended_sets_nothing_later() -> None:
 def test_a_motion_command_whose_answer_is_lost_is_not_repeated() -> None:
     bench = Bench()
     bench.arm()
-    bench.near.hear_nothing()
+    bench.near.cut_wire()
     bench.near.sent.clear()
     for k in range(8):
         bench.step(0.1 + 0.01 * k)
@@ -178,7 +178,7 @@ def test_wrong_checksums_on_the_line_are_survived() -> None:
     """Every seventh answer is spoilt: the drive goes on, and nothing wrong is believed."""
     bench = Bench()
     bench.arm()
-    bench.near.hear_through(every(7, lambda data: bytes((data[0] ^ 0x40,)) + data[1:]))
+    bench.near.set_filter(every(7, lambda data: bytes((data[0] ^ 0x40,)) + data[1:]))
     states = [bench.step(0.5) for _ in range(400)]
     assert {state.mode for state in states} == {ChassisMode.ARMED}
     assert states[-1].v_mps == pytest.approx(0.5, abs=0.005)
@@ -224,7 +224,7 @@ def test_errors_latch_and_warnings_are_told(bits: int, mode: ChassisMode, faults
 def test_nothing_is_known_before_the_second_encoder_answer() -> None:
     """One reading of an encoder is no speed."""
     bench = Bench()
-    assert first_known([bench.step() for _ in range(20)]) > 3
+    assert first_with_speed([bench.step() for _ in range(20)]) > 3
 
 
 @pytest.mark.parametrize(
@@ -238,7 +238,7 @@ def test_nothing_is_known_before_the_second_encoder_answer() -> None:
     ],
 )
 def test_a_device_that_is_no_roboclaw_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    assert hint in reason_for_giving_up(lambda link: RoboclawChassis(link, roboclaw_config()), babble)
+    assert hint in arming_failure_reason(lambda link: RoboclawChassis(link, roboclaw_config()), babble)
 
 
 def test_a_controller_that_takes_questions_but_no_commands_is_left_to_its_time_out() -> None:
@@ -246,7 +246,7 @@ def test_a_controller_that_takes_questions_but_no_commands_is_left_to_its_time_o
     bench = Bench()
     bench.arm()
     bench.run(100, 0.5)
-    bench.far.hear_through(lambda data: data if len(data) < 16 else data[:-1] + bytes((data[-1] ^ 1,)))
+    bench.far.set_filter(lambda data: data if len(data) < 16 else data[:-1] + bytes((data[-1] ^ 1,)))
     state = bench.run(60, 0.5)
     assert state.mode is ChassisMode.LOST
     assert state.reason.startswith("no motion feedback")

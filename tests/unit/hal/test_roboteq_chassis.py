@@ -8,7 +8,7 @@ import pytest
 
 from hal.types import ChassisMode
 from tests.support.roboteq_bench import Bench
-from tests.support.serial_bench import every, first_known
+from tests.support.serial_bench import every, first_with_speed
 
 
 def test_echo_off_watchdog_and_release_are_sent_with_consent_and_read_back() -> None:
@@ -123,7 +123,7 @@ def test_stop_says_zero_even_on_a_line_that_fails() -> None:
 def test_single_refusals_are_survived() -> None:
     bench = Bench()
     bench.arm()
-    bench.far.hear_through(every(3, lambda data: data.replace(b"!M", b"!N")))
+    bench.far.set_filter(every(3, lambda data: data.replace(b"!M", b"!N")))
     assert bench.run(100, 0.3).mode is ChassisMode.ARMED
     assert bench.emulator.refused > 20
 
@@ -132,7 +132,7 @@ def test_lost_answers_are_survived() -> None:
     """Every fifth answer loses its name: the drive goes on, and nothing wrong is believed."""
     bench = Bench()
     bench.arm()
-    bench.near.hear_through(every(5, lambda data: data.replace(b"=", b"?")))
+    bench.near.set_filter(every(5, lambda data: data.replace(b"=", b"?")))
     states = [bench.step(0.5) for _ in range(400)]
     assert {state.mode for state in states} == {ChassisMode.ARMED}
     assert states[-1].v_mps == pytest.approx(0.5, abs=0.005)
@@ -142,7 +142,7 @@ def test_lost_answers_are_survived() -> None:
 def test_echo_is_no_answer() -> None:
     """A controller that goes on echoing is understood all the same."""
     bench = Bench()
-    bench.far.hear_through(lambda data: data.replace(b"^ECHOF 1\r", b""))
+    bench.far.set_filter(lambda data: data.replace(b"^ECHOF 1\r", b""))
     bench.arm()
     assert bench.emulator.echo
     assert bench.run(100, 0.5).v_mps == pytest.approx(0.5, abs=0.005)
@@ -152,7 +152,7 @@ def test_a_counter_that_noise_made_is_not_believed() -> None:
     bench = Bench()
     bench.arm()
     bench.run(50, 0.5)
-    bench.near.hear_through(lambda data: data.replace(b"C=", b"C=9"))
+    bench.near.set_filter(lambda data: data.replace(b"C=", b"C=9"))
     state = bench.run(4, 0.5)
     assert state.mode is ChassisMode.ESTOP
     assert state.pose.x_m < 1.0
@@ -180,4 +180,4 @@ def test_the_fastest_speed_holds_for_each_track() -> None:
 
 def test_nothing_is_known_before_the_second_counter_answer() -> None:
     bench = Bench()
-    assert first_known([bench.step() for _ in range(20)]) >= 3
+    assert first_with_speed([bench.step() for _ in range(20)]) >= 3

@@ -10,7 +10,7 @@ from hal.chassis.roboteq import RoboteqChassis
 from hal.types import ChassisMode
 from tests.support.chassis_rig import roboteq_config
 from tests.support.roboteq_bench import Bench
-from tests.support.serial_bench import reason_for_giving_up
+from tests.support.serial_bench import arming_failure_reason
 
 
 def test_a_watchdog_that_does_not_hold_is_told() -> None:
@@ -93,7 +93,7 @@ def test_a_fault_beside_the_emergency_stop_is_not_reset() -> None:
 def test_a_base_whose_motor_flags_are_not_told_is_not_armed(refused: bool) -> None:
     """A stalled motor, or one that stopped for safety, would not show."""
     bench = Bench()
-    bench.far.hear_through(lambda data: data.replace(b"?FM\r", b"?FMX\r" if refused else b""))
+    bench.far.set_filter(lambda data: data.replace(b"?FM\r", b"?FMX\r" if refused else b""))
     bench.chassis.arm(0)
     for _ in range(155):
         assert bench.step().mode is not ChassisMode.ARMED
@@ -106,7 +106,7 @@ def test_a_base_whose_motor_flags_are_not_told_is_not_armed(refused: bool) -> No
 def test_motor_flags_that_are_no_longer_told_are_a_loss() -> None:
     bench = Bench()
     bench.arm()
-    bench.far.hear_through(lambda data: data.replace(b"?FM\r", b"?FMX\r"))
+    bench.far.set_filter(lambda data: data.replace(b"?FM\r", b"?FMX\r"))
     states = [bench.step(0.3) for _ in range(70)]
     lost = next(state for state in states if state.mode is not ChassisMode.ARMED)
     assert (lost.mode, lost.reason[:13]) == (ChassisMode.LOST, "no status for")
@@ -132,7 +132,7 @@ def test_a_base_that_moves_against_zero_is_shut_down() -> None:
     bench = Bench()
     bench.arm()
     bench.run(20, 0.3)
-    bench.far.hear_through(lambda data: data.replace(b"!M 0 0\r", b"!M 300 300\r"))
+    bench.far.set_filter(lambda data: data.replace(b"!M 0 0\r", b"!M 300 300\r"))
     bench.step(math.nan)
     lines: list[bytes] = []
     for _ in range(145):
@@ -149,7 +149,7 @@ def test_a_controller_that_refuses_commands_is_told() -> None:
     bench = Bench()
     bench.arm()
     bench.run(20, 0.3)
-    bench.far.hear_through(lambda data: data.replace(b"!M", b"!Q"))
+    bench.far.set_filter(lambda data: data.replace(b"!M", b"!Q"))
     state = bench.run(10, 0.3)
     assert (state.mode, state.reason.split(";")[0]) == (
         ChassisMode.ESTOP,
@@ -202,4 +202,4 @@ def test_a_restart_soon_after_setting_off_is_no_travel_backwards(periods: int) -
     ],
 )
 def test_a_device_that_is_no_roboteq_is_told_when_arming_gives_up(babble: bytes, hint: str) -> None:
-    assert hint in reason_for_giving_up(lambda link: RoboteqChassis(link, roboteq_config()), babble)
+    assert hint in arming_failure_reason(lambda link: RoboteqChassis(link, roboteq_config()), babble)

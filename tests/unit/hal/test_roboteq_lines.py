@@ -86,7 +86,7 @@ def test_a_line_without_an_end_does_not_grow_for_ever() -> None:
         assert reader.feed(b"C=1234") == []
     assert len(reader._partial) < 200
     assert reader.feed(b"\r") == []
-    assert reader.strangers == 1
+    assert reader.foreign_lines == 1
     assert reader.feed(b"FF=0\r") == [Value("FF", (0,))]
 
 
@@ -95,7 +95,7 @@ def test_the_end_of_an_overlong_line_is_no_line() -> None:
     reader = LineReader()
     assert reader.feed(b"C=1:2" + b"0" * 300 + b"\r") == []
     assert reader.feed(b"\r" * 3) == []
-    assert reader.strangers == 1, "an empty line is nothing"
+    assert reader.foreign_lines == 1, "an empty line is nothing"
 
 
 def test_fault_flags() -> None:

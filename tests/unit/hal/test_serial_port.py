@@ -15,7 +15,7 @@ from config.chassis import SerialLinkConfig
 from hal.api import SerialLink
 from hal.errors import DeviceNotFound, DeviceRefused, LinkLost
 from hal.links.pseudo_terminal import PseudoTerminal
-from hal.links.serial_port import SerialPortLink, _ports_here
+from hal.links.serial_port import SerialPortLink, _describe_ports
 from tests.support.wires import open_serial_link
 
 
@@ -88,13 +88,13 @@ def test_no_permission_is_refused_with_advice(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_the_ports_that_are_there_are_named(tmp_path: Path) -> None:
-    assert _ports_here(tmp_path) == "no USB serial port is here"
+    assert _describe_ports(tmp_path) == "no USB serial port is here"
     (tmp_path / "ttyUSB0").touch()
     (tmp_path / "ttyACM3").touch()
-    assert _ports_here(tmp_path) == f"here are: {tmp_path}/ttyACM3, {tmp_path}/ttyUSB0"
+    assert _describe_ports(tmp_path) == f"here are: {tmp_path}/ttyACM3, {tmp_path}/ttyUSB0"
     (tmp_path / "serial" / "by-id").mkdir(parents=True)
     (tmp_path / "serial" / "by-id" / "usb-FTDI").touch()
-    assert _ports_here(tmp_path) == f"here are: {tmp_path}/serial/by-id/usb-FTDI", "these names stay"
+    assert _describe_ports(tmp_path) == f"here are: {tmp_path}/serial/by-id/usb-FTDI", "these names stay"
 
 
 def test_opened_so_that_nothing_can_block(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hal.cameras.tum_replay import TumReplay
-from hal.cameras.tum_writer import TumWriter, _Lines
+from hal.cameras.tum_writer import TumWriter, _AppendFile
 from hal.errors import DeviceRefused
 from hal.types import CameraMount, Pose
 from tests.support.recordings import small_frame, write_recording
@@ -102,9 +102,9 @@ def test_a_full_disk_leaves_whole_frames_only(
             raise full
         return whole(path, data)
 
-    add = _Lines.add
+    add = _AppendFile.add
 
-    def half_a_line(lines: _Lines, line: str) -> None:
+    def half_a_line(lines: _AppendFile, line: str) -> None:
         if lines.name == fails:
             lines._file.write(line.encode()[:7])
             raise full
@@ -115,7 +115,7 @@ def test_a_full_disk_leaves_whole_frames_only(
         writer.write(small_frame(0), pose)
         with monkeypatch.context() as patched:
             patched.setattr(Path, "write_bytes", half_an_image)
-            patched.setattr(_Lines, "add", half_a_line)
+            patched.setattr(_AppendFile, "add", half_a_line)
             with pytest.raises(DeviceRefused, match=f"{fails}.*No space left on device.; make room"):
                 writer.write(small_frame(1), pose)
         assert len(list((tmp_path / "rgb").iterdir())) == len(list((tmp_path / "depth").iterdir())) == 1

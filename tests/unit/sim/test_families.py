@@ -32,12 +32,12 @@ def test_every_fault_is_brought_about_by_its_family_alone() -> None:
 
 def test_a_window_holds_from_its_start_to_before_its_end() -> None:
     window = Window(2.0, 3.0)
-    assert [window.holds(t_s) for t_s in (1.99, 2.0, 2.99, 3.0)] == [False, True, True, False]
+    assert [window.contains(t_s) for t_s in (1.99, 2.0, 2.99, 3.0)] == [False, True, True, False]
 
 
 def test_a_fault_strikes_in_its_window_and_a_little_after() -> None:
     faults = Faults(silent=Window(2.0, 3.0))
-    assert [faults.strikes(t_s, 1.0) for t_s in (1.9, 2.0, 3.9, 4.0)] == [False, True, True, False]
+    assert [faults.demands_stop(t_s, 1.0) for t_s in (1.9, 2.0, 3.9, 4.0)] == [False, True, True, False]
     lost = Faults(feedback_lost_s=5.0)
-    assert [lost.strikes(t_s, 1.0) for t_s in (4.9, 5.0, 50.0)] == [False, True, True]
-    assert not Faults().strikes(1.0, 1.0)
+    assert [lost.demands_stop(t_s, 1.0) for t_s in (4.9, 5.0, 50.0)] == [False, True, True]
+    assert not Faults().demands_stop(1.0, 1.0)

@@ -108,11 +108,11 @@ def test_over_times_is_the_state_at_each(corner_y: float) -> None:
     times = np.append(np.arange(-0.5, trajectory.end_s + 1.0, 0.037), trajectory.end_s)
     states = [trajectory.at(t_s) for t_s in times.tolist()]
     # Missions are repeated bit for bit, so this is no approximation.
-    assert trajectory.over(times).tolist() == [
+    assert trajectory.sample(times).tolist() == [
         [one.x_m, one.y_m, one.heading_rad, one.vx_mps, one.vy_mps] for one in states
     ]
 
 
 def test_over_times_of_what_stands() -> None:
-    states = Trajectory(PlanarPose(1.0, -2.0, 0.5), None).over(np.array([-3.0, 0.0, 99.0]))
+    states = Trajectory(PlanarPose(1.0, -2.0, 0.5), None).sample(np.array([-3.0, 0.0, 99.0]))
     assert states.tolist() == [[1.0, -2.0, 0.5, 0.0, 0.0]] * 3

@@ -56,7 +56,7 @@ SCENARIO = Scenario(
 
 @pytest.mark.parametrize("t_s", [0.0, 1.3, 2.7, 6.0, 30.0])
 def test_is_the_world_seen_from_above(t_s: float) -> None:
-    polygons, velocity = PlanarWorld(SCENARIO, seed=5).look(t_s)
+    polygons, velocity = PlanarWorld(SCENARIO, seed=5).snapshot(t_s)
     plane = PlanarWorld(SCENARIO, seed=5)
     for k, state in enumerate(World(SCENARIO, seed=5).bodies(t_s)):
         corners = len(state.footprint_m)
@@ -74,23 +74,23 @@ def test_over_times_is_the_look_at_each() -> None:
     plane = PlanarWorld(SCENARIO, seed=5)
     times = np.array([0.0, 1.7, 3.3])
     for body in range(len(plane)):
-        series = plane.over(times, body)
+        series = plane.sample(times, body)
         for k, t_s in enumerate(times.tolist()):
-            assert series[k] == pytest.approx(plane.look(t_s)[0][body])
+            assert series[k] == pytest.approx(plane.snapshot(t_s)[0][body])
 
 
 def test_what_was_foreseen_is_what_is_seen() -> None:
     plane, plain = PlanarWorld(SCENARIO, seed=5), PlanarWorld(SCENARIO, seed=5)
     times = np.array([0.0, 1.7, 3.3, 500.0])
-    plane.foresee(times)
+    plane.precompute(times)
     for t_s in (*times.tolist(), 2.2):
-        for seen, expected in zip(plane.look(t_s), plain.look(t_s), strict=True):
+        for seen, expected in zip(plane.snapshot(t_s), plain.snapshot(t_s), strict=True):
             assert (seen == expected).all()
 
 
 def test_end_is_when_the_last_mover_has_arrived() -> None:
     plane = PlanarWorld(SCENARIO, seed=5)
-    before, after = plane.look(plane.end_s - 0.2)[1], plane.look(plane.end_s + 0.01)[1]
+    before, after = plane.snapshot(plane.end_s - 0.2)[1], plane.snapshot(plane.end_s + 0.01)[1]
     assert np.abs(before).max() > 0.05
     assert np.abs(after).max() == 0.0
     assert PlanarWorld(SCENARIO.model_copy(update={"bodies": ()})).end_s == 0.0

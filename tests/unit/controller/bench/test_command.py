@@ -173,7 +173,7 @@ def test_one_short_run_of_everything(tmp_path: Path) -> None:
             recording_passes=1,
             pictures=2,
             control_steps=3,
-            stretch_s=0.2,
+            duration_s=0.2,
         )
     )
     content: dict[str, Any] = json.loads(figures.to_text())

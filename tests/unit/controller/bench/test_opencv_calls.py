@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from controller.bench.opencv_calls import OpenCvCall, recorded_calls, stand_in_for_cv2, time_bare
+from controller.bench.opencv_calls import OpenCvCall, intercept_cv2, recorded_calls, time_bare
 
 SOURCE = """
 import cv2
@@ -53,10 +53,10 @@ class Ticking:
 
 
 def test_calls_are_recorded_in_order_with_arguments() -> None:
-    watched = module()
-    with recorded_calls([watched]) as calls:
-        watched.edges(picture())
-        watched.threshold(picture())
+    timed_functions = module()
+    with recorded_calls([timed_functions]) as calls:
+        timed_functions.edges(picture())
+        timed_functions.threshold(picture())
     assert [call.name for call in calls] == ["Canny", "threshold"]
     assert calls[0].args[1:] == (50.0, 150.0)
     assert calls[1].args[1:] == (100, 255, cv2.THRESH_BINARY)
@@ -64,25 +64,25 @@ def test_calls_are_recorded_in_order_with_arguments() -> None:
 
 
 def test_results_reach_the_caller_unchanged() -> None:
-    watched = module()
-    expected = watched.edges(picture())
-    with recorded_calls([watched]):
-        np.testing.assert_array_equal(watched.edges(picture()), expected)
+    timed_functions = module()
+    expected = timed_functions.edges(picture())
+    with recorded_calls([timed_functions]):
+        np.testing.assert_array_equal(timed_functions.edges(picture()), expected)
 
 
 def test_an_executed_record_gives_the_same_result() -> None:
-    watched = module()
-    with recorded_calls([watched]) as calls:
-        seen = watched.edges(picture())
+    timed_functions = module()
+    with recorded_calls([timed_functions]) as calls:
+        seen = timed_functions.edges(picture())
     assert seen.any()
     np.testing.assert_array_equal(calls[0].execute(), seen)
 
 
 def test_arguments_are_those_from_before_the_call() -> None:
-    watched = module()
+    timed_functions = module()
     image = picture()
-    with recorded_calls([watched]) as calls:
-        after = watched.brighten_in_place(image)
+    with recorded_calls([timed_functions]) as calls:
+        after = timed_functions.brighten_in_place(image)
     assert after.max() == 205
     assert calls[0].args[0].max() == 200
     assert calls[0].kwargs["dst"] is calls[0].args[0], "what was one array stays one array"
@@ -91,28 +91,28 @@ def test_arguments_are_those_from_before_the_call() -> None:
 def test_a_fresh_call_spends_only_its_own_arguments() -> None:
     image = picture()
     call = OpenCvCall("add", (image, np.full_like(image, 5)), {"dst": image})
-    call.fresh().execute()
+    call.copied().execute()
     np.testing.assert_array_equal(image, picture())
     call.execute()
     assert image.max() == 205
 
 
 def test_cv2_is_itself_again_afterwards() -> None:
-    watched = module()
+    timed_functions = module()
     canny = cv2.Canny
-    with recorded_calls([watched]) as calls:
-        assert watched.cv2 is not cv2
+    with recorded_calls([timed_functions]) as calls:
+        assert timed_functions.cv2 is not cv2
         cv2.Canny(picture(), 1.0, 2.0)  # somebody else's call: not recorded
-    assert watched.cv2 is cv2
+    assert timed_functions.cv2 is cv2
     assert cv2.Canny is canny
     assert calls == []
 
 
 def test_cv2_is_itself_again_after_an_error() -> None:
-    watched = module()
-    with pytest.raises(cv2.error), recorded_calls([watched]):
-        watched.edges(np.zeros((4, 4), np.float64))
-    assert watched.cv2 is cv2
+    timed_functions = module()
+    with pytest.raises(cv2.error), recorded_calls([timed_functions]):
+        timed_functions.edges(np.zeros((4, 4), np.float64))
+    assert timed_functions.cv2 is cv2
 
 
 def test_modules_without_cv2_are_left_alone() -> None:
@@ -123,29 +123,29 @@ def test_modules_without_cv2_are_left_alone() -> None:
 
 
 def test_constants_and_classes_pass_through() -> None:
-    watched = module()
-    with recorded_calls([watched]) as calls:
-        assert watched.cv2.THRESH_BINARY == cv2.THRESH_BINARY
-        assert watched.cv2.error is cv2.error
+    timed_functions = module()
+    with recorded_calls([timed_functions]) as calls:
+        assert timed_functions.cv2.THRESH_BINARY == cv2.THRESH_BINARY
+        assert timed_functions.cv2.error is cv2.error
     assert calls == []
 
 
 def test_an_unknown_name_is_refused_as_by_cv2() -> None:
-    watched = module()
-    with recorded_calls([watched]), pytest.raises(AttributeError):
-        _ = watched.cv2.NoSuchFunction
+    timed_functions = module()
+    with recorded_calls([timed_functions]), pytest.raises(AttributeError):
+        _ = timed_functions.cv2.NoSuchFunction
 
 
 def test_the_stand_in_asks_its_owner_to_make_the_call() -> None:
-    watched = module()
+    timed_functions = module()
     seen: list[str] = []
 
     def answer(name: str, real: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> str:
         seen.append(name)
         return "instead"
 
-    with stand_in_for_cv2([watched], answer):
-        assert watched.edges(picture()) == "instead"
+    with intercept_cv2([timed_functions], answer):
+        assert timed_functions.edges(picture()) == "instead"
     assert seen == ["Canny"]
 
 

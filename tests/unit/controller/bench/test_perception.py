@@ -13,10 +13,10 @@ from controller.bench.figures import Stopwatches
 from controller.bench.opencv_calls import recorded_calls
 from controller.bench.perception import (
     FrameTime,
-    SideBySide,
+    PairedTimes,
     measure_perception,
     run_side_by_side,
-    run_watched,
+    time_functions,
 )
 from controller.bench.reel import Reel, recorded_reel
 from controller.bench.stages import modules_of
@@ -52,7 +52,7 @@ def steady_clock(step_ns: int) -> Iterator[int]:
 
 
 def test_functions_that_a_frame_does_not_call_take_no_time_in_it() -> None:
-    side = SideBySide()
+    side = PairedTimes()
     side.add(FrameTime(5, 1, 10), {"Canny": 2}, 20)
     side.add(FrameTime(6, 2, 11), {"Canny": 3, "LUT": 4}, 21)
     side.add(FrameTime(7, 3, 12), {"LUT": 1}, 22)
@@ -71,7 +71,7 @@ def test_side_by_side_times_perception_and_its_calls(reel: Reel) -> None:
             perception.perceive(frame, None, None)
         expected.append(1000 * len(calls))
     assert expected[1] > 0
-    side, ticks = SideBySide(), Ticks()
+    side, ticks = PairedTimes(), Ticks()
     stopwatches = Stopwatches(steady_clock(1000).__next__, steady_clock(7).__next__)
     run_side_by_side(reel, make, SETTINGS, MODULES, stopwatches, side, ticks)
     assert side.detect_ns == side.track_ns == [1000, 1000]
@@ -83,7 +83,7 @@ def test_side_by_side_times_perception_and_its_calls(reel: Reel) -> None:
 
 
 def test_a_watched_pass_sees_the_stages(reel: Reel) -> None:
-    frames = run_watched(reel, make, MODULES, time.perf_counter_ns, Ticks())
+    frames = time_functions(reel, make, MODULES, time.perf_counter_ns, Ticks())
     assert len(frames) == 2
     for spent in frames:
         assert spent["vision.perception.Perception.perceive"].calls == 1

@@ -10,7 +10,7 @@ import pytest
 
 from config.app import RealtimeRunner, load_app
 from config.loader import CONFIG_DIR
-from controller.bench.period import PeriodFigures, _flooded, measure_floor, stolen_s
+from controller.bench.period import PeriodFigures, _saturated_config, measure_empty_loop, stolen_s
 from hal.clocks import SimulatedClock
 
 MS = 1_000_000
@@ -47,8 +47,8 @@ class JitteryClock(SimulatedClock):
 
 
 def test_the_floor_is_the_clock_s_own() -> None:
-    assert measure_floor(SimulatedClock(), 10.0) == PeriodFigures(500, 20.0, 0.0, 0.0, 1.0)
-    assert measure_floor(JitteryClock(), 10.0).worst_off_ms == pytest.approx(0.5)
+    assert measure_empty_loop(SimulatedClock(), 10.0) == PeriodFigures(500, 20.0, 0.0, 0.0, 1.0)
+    assert measure_empty_loop(JitteryClock(), 10.0).worst_off_ms == pytest.approx(0.5)
 
 
 def test_stolen_time(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_stolen_time(tmp_path: Path) -> None:
 
 
 def test_perception_never_waits_and_the_path_lasts() -> None:
-    config, runner = _flooded(load_app(CONFIG_DIR / "hil-agilex.yaml"), 50, 40.0)
+    config, runner = _saturated_config(load_app(CONFIG_DIR / "hil-agilex.yaml"), 50, 40.0)
     assert isinstance(config.runner, RealtimeRunner)
     assert (runner.priority, runner.max_duration_s, config.camera.kind) == (50, 40.0, "simulated")
     assert config.robot.limits.max_speed_mps * 40.0 < 20.0, "the path of the warehouse is longer"

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 import vision
-from controller.bench.stages import Spent, StageFigures, StageWatch, modules_of, summarise, watched
+from controller.bench.stages import (
+    FunctionTime,
+    StageFigures,
+    StageTimer,
+    modules_of,
+    summarise,
+    timed_functions,
+)
 
 LOW = """
 import cv2
@@ -57,7 +64,7 @@ def module(name: str, source: str, **given: object) -> ModuleType:
 
 def test_own_time_excludes_inner_functions() -> None:
     clock = Clock()
-    watch = StageWatch(clock)
+    watch = StageTimer(clock)
 
     def inner() -> None:
         clock.now_ns += 5
@@ -70,19 +77,19 @@ def test_own_time_excludes_inner_functions() -> None:
         return "done"
 
     assert watch.run("outer", outer, (), {}) == "done"
-    assert watch.take() == {"outer": Spent(1, 3, 0), "inner": Spent(2, 10, 0)}
+    assert watch.take() == {"outer": FunctionTime(1, 3, 0), "inner": FunctionTime(2, 10, 0)}
 
 
 def test_taking_starts_anew() -> None:
-    watch = StageWatch(Clock())
+    watch = StageTimer(Clock())
     watch.run("once", lambda: None, (), {})
-    assert watch.take() == {"once": Spent(1, 0, 0)}
+    assert watch.take() == {"once": FunctionTime(1, 0, 0)}
     assert watch.take() == {}
 
 
 def test_opencv_is_charged_to_its_caller_and_to_nobody_outside() -> None:
     clock = Clock()
-    watch = StageWatch(clock)
+    watch = StageTimer(clock)
 
     def slow() -> None:
         clock.now_ns += 7
@@ -94,12 +101,12 @@ def test_opencv_is_charged_to_its_caller_and_to_nobody_outside() -> None:
 
     watch.run("caller", caller, (), {})
     watch.run_opencv("Canny", slow, (), {})
-    assert watch.take() == {"caller": Spent(1, 3, 7)}
+    assert watch.take() == {"caller": FunctionTime(1, 3, 7)}
 
 
 def test_an_error_ends_the_function_that_raised_it() -> None:
     clock = Clock()
-    watch = StageWatch(clock)
+    watch = StageTimer(clock)
 
     def fail() -> None:
         clock.now_ns += 4
@@ -111,15 +118,15 @@ def test_an_error_ends_the_function_that_raised_it() -> None:
         clock.now_ns += 1
 
     watch.run("outer", outer, (), {})
-    assert watch.take() == {"outer": Spent(1, 1, 0), "fail": Spent(1, 4, 0)}
+    assert watch.take() == {"outer": FunctionTime(1, 1, 0), "fail": FunctionTime(1, 4, 0)}
 
 
 def test_functions_methods_and_imported_names_are_watched() -> None:
     low = module("low", LOW)
     high = module("high", HIGH, Finder=low.Finder, find=low.find)
     clock = Clock()
-    watch = StageWatch(clock)
-    with watched([low, high], watch):
+    watch = StageTimer(clock)
+    with timed_functions([low, high], watch):
         assert high.look(clock, np.ones((2, 2), np.uint8)) == 1
     spent = watch.take()
     assert {name: item.calls for name, item in spent.items()} == {
@@ -134,7 +141,7 @@ def test_everything_is_itself_again_afterwards() -> None:
     find, step = low.find, low.Finder.step
 
     def fail_inside() -> None:
-        with watched([low, high], StageWatch(Clock())):
+        with timed_functions([low, high], StageTimer(Clock())):
             assert low.find is not find
             assert high.find is not find
             assert low.Finder.step is not step
@@ -151,7 +158,7 @@ def test_everything_is_itself_again_afterwards() -> None:
 def test_vision_is_whole_again_after_being_watched() -> None:
     modules = modules_of(vision)
     before = [dict(vars(module)) for module in modules]
-    with watched(modules, StageWatch(Clock())):
+    with timed_functions(modules, StageTimer(Clock())):
         assert [dict(vars(module)) for module in modules] != before
     assert [dict(vars(module)) for module in modules] == before
 
@@ -163,9 +170,9 @@ def test_modules_of_a_package_are_all_found() -> None:
 
 def test_summary_by_hand() -> None:
     frames = [
-        {"a.f": Spent(1, 1_000_000, 0), "a.g": Spent(2, 3_000_000, 500_000)},
-        {"a.f": Spent(1, 2_000_000, 0)},
-        {"a.f": Spent(2, 6_000_000, 0), "a.g": Spent(1, 1_000_000, 700_000)},
+        {"a.f": FunctionTime(1, 1_000_000, 0), "a.g": FunctionTime(2, 3_000_000, 500_000)},
+        {"a.f": FunctionTime(1, 2_000_000, 0)},
+        {"a.f": FunctionTime(2, 6_000_000, 0), "a.g": FunctionTime(1, 1_000_000, 700_000)},
     ]
     assert summarise(frames) == {
         "a.f": StageFigures(4 / 3, 2.0, 0.0),
@@ -175,8 +182,16 @@ def test_summary_by_hand() -> None:
 
 def test_summary_of_a_group_adds_up_each_frame_before_the_median() -> None:
     frames = [
-        {"a.f": Spent(1, 1_000_000, 0), "a.g": Spent(1, 9_000_000, 0), "b.h": Spent(1, 20_000_000, 0)},
-        {"a.f": Spent(1, 9_000_000, 0), "a.g": Spent(1, 1_000_000, 0), "b.h": Spent(1, 20_000_000, 0)},
+        {
+            "a.f": FunctionTime(1, 1_000_000, 0),
+            "a.g": FunctionTime(1, 9_000_000, 0),
+            "b.h": FunctionTime(1, 20_000_000, 0),
+        },
+        {
+            "a.f": FunctionTime(1, 9_000_000, 0),
+            "a.g": FunctionTime(1, 1_000_000, 0),
+            "b.h": FunctionTime(1, 20_000_000, 0),
+        },
     ]
     summary = summarise(frames, group=lambda name: name[0])
     assert list(summary) == ["b", "a"], "the one with most own time first"

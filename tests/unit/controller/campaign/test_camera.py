@@ -10,7 +10,7 @@ import pytest
 
 from config.loader import CONFIG_DIR
 from config.scenario import load_scenario
-from controller.campaign.camera_mission import drive_camera, recording_in
+from controller.campaign.camera_mission import drive_camera, prepare_recording
 from controller.errors import UserError
 from controller.replay import ReplayOptions, run_replay
 from sim.faults import Faults, Window
@@ -19,7 +19,7 @@ from tests.support.campaign import CONFIG, crate, mover, stage
 
 def test_a_recording_has_the_world_beside_it_as_a_scenario_that_can_be_run(tmp_path: Path) -> None:
     made = stage(crate(4.0))
-    options = recording_in(tmp_path / "new" / "mission", made)
+    options = prepare_recording(tmp_path / "new" / "mission", made)
     assert options.video == tmp_path / "new" / "mission" / "video.mp4"
     assert load_scenario(tmp_path / "new" / "mission" / "scenario.yaml") == made.case.scenario
 
@@ -27,7 +27,7 @@ def test_a_recording_has_the_world_beside_it_as_a_scenario_that_can_be_run(tmp_p
 def test_a_folder_for_recordings_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match=r"file/mission: cannot be written \(Not a directory\); choose"):
-        recording_in(tmp_path / "file" / "mission", stage())
+        prepare_recording(tmp_path / "file" / "mission", stage())
 
 
 def movers(observations: Path) -> dict[float, list[list[float]]]:

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from config.loader import CONFIG_DIR
 from controller.campaign.judge import Row
-from controller.campaign.plan import Mission, missions, run_here
+from controller.campaign.plan import Mission, missions, run_local
 from controller.campaign.store import MISSIONS, SETTINGS, MissionStore
 from controller.campaign.summary import summarise, totals
 from controller.campaign.task import Task, run_task
@@ -93,7 +93,9 @@ def test_two_workers_find_what_one_finds(small: Path) -> None:
         Task(one.family, one.seed, ("field", "paper"), "noise", CONFIG)
         for one in missions(2, ("plain_wall", "feedback_lost"), 3)
     ]
-    found = {(row.family, row.seed, row.policy): row.as_dict() for done in run_here(tasks, 2) for row in done}
+    found = {
+        (row.family, row.seed, row.policy): row.as_dict() for done in run_local(tasks, 2) for row in done
+    }
     expected = {(row["family"], row["seed"], row["policy"]): row for row in rows(small)}
     assert {key: json.loads(json.dumps(row)) for key, row in found.items()} == expected
 
@@ -115,7 +117,7 @@ def test_missions_take_turns_over_the_families() -> None:
 def test_every_mission_is_run_once_however_many_there_are() -> None:
     """More than wait in front of the workers at a time."""
     tasks = [Task("plain_wall", seed, (), "noise", CONFIG) for seed in range(12)]
-    assert len(list(run_here(tasks, 2))) == 12
+    assert len(list(run_local(tasks, 2))) == 12
 
 
 def test_one_mission_alone_says_how_it_went() -> None:

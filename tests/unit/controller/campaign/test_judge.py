@@ -9,11 +9,11 @@ import pytest
 from config.app import AppConfig
 from config.camera import SimulatedCameraConfig
 from config.scenario import Go, MotionPlan, RobotBody, Wait
-from controller.campaign.drive import DriveLog
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.judge import Row, false_stops, flaps, judge
 from controller.campaign.oracle import OracleTime
 from controller.campaign.stage import Stage
-from controller.campaign.task import yardstick
+from controller.campaign.task import judge_reference
 from controller.decision.decision import Action
 from sim.faults import Faults, Window
 from sim.planar import separation
@@ -23,7 +23,7 @@ UP, DOWN, KEEP = Action.INCREASE, Action.DECREASE, Action.KEEP
 
 
 def judged(made: Stage, log: DriveLog, config: AppConfig = CONFIG) -> Row:
-    return judge(made, log, "ours", "noise", yardstick(made, config))
+    return judge(made, log, "ours", "noise", judge_reference(made, config))
 
 
 def cruise(v_mps: float, duration_s: float, then: tuple[float, ...] = ()) -> DriveLog:
@@ -43,9 +43,9 @@ def test_clearance_is_the_least_of_all_steps_and_bodies(beside_m: float) -> None
     who = mover(7.0, beside_m, -3.0, beside_m + 0.2, 1.1)
     made = stage(crate(5.0, 1.9), who, crate(2.0, -2.2, name="other"), length_m=9.0)
     log = cruise(0.8, 9.0)
-    robots = made.robots(log.pose_array())
+    robots = made.robot_polygons(log.pose_array())
     times = np.array(log.times_s)
-    least_m = min(separation(robots, made.world.over(times, body)).min() for body in range(3))
+    least_m = min(separation(robots, made.world.sample(times, body)).min() for body in range(3))
     assert least_m > 0.16
     assert judged(made, log).min_clearance_m == round(float(least_m), 4)
 
@@ -166,8 +166,8 @@ def test_time_and_limits_come_from_the_drive() -> None:
 
 def test_what_even_the_oracle_does_not_reach_has_no_time() -> None:
     made = stage(crate(4.0), blocked=True)
-    by = replace(yardstick(made, CONFIG), oracle=OracleTime(math.inf, math.inf))
-    row = judge(made, cruise(0.0, 1.0), "ours", "noise", by)
+    reference = replace(judge_reference(made, CONFIG), oracle=OracleTime(math.inf, math.inf))
+    row = judge(made, cruise(0.0, 1.0), "ours", "noise", reference)
     assert (row.oracle_time_s, row.time_s, row.expected) == (None, None, False)
 
 

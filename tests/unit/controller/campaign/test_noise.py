@@ -22,13 +22,13 @@ CAMERA = SimulatedCameraConfig()
 ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 QUIET = NoiseModel(
     depth_sigma_1pm=0.0,
-    side_sigma_m=0.0,
-    side_velocity_mps=0.0,
-    side_velocity_per_m=0.0,
+    lateral_sigma_m=0.0,
+    lateral_velocity_mps=0.0,
+    lateral_velocity_per_m=0.0,
     radial_velocity_mps=0.0,
     radial_velocity_per_m=0.0,
-    missed_share=0.0,
-    missed_share_at_range=0.0,
+    miss_rate=0.0,
+    miss_rate_at_range=0.0,
 )
 
 
@@ -93,7 +93,7 @@ def test_some_frames_miss_it_and_it_is_predicted_meanwhile() -> None:
     found = scenes(stage(crate(4.0)), 400)
     unseen = [one.obstacles[0].unseen_s for one in found[5:]]
     share = np.mean(np.array(unseen) > 0.0)
-    assert share == pytest.approx(NoiseModel().missed_share, abs=0.02)
+    assert share == pytest.approx(NoiseModel().miss_rate, abs=0.02)
     assert max(unseen) < NoiseModel().forget_s
 
 

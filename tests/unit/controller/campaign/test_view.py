@@ -8,7 +8,7 @@ import pytest
 from config.camera import SimulatedCameraConfig
 from config.robot import Mount
 from config.scenario import BodySpec, Pallet, Pole
-from controller.campaign.view import PlanarEye, PlanarView
+from controller.campaign.view import PlanarCamera, PlanarView
 from hal.types import PlanarPose
 from tests.support.campaign import crate, stage
 from vision.scene import NEVER_M
@@ -17,10 +17,12 @@ LEVEL = Mount(forward_m=0.0, left_m=0.0, height_m=0.6, pitch_deg=0.0)
 ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
 
-def look(*bodies: BodySpec, mount: Mount = LEVEL, pose: PlanarPose = ORIGIN) -> tuple[PlanarEye, PlanarView]:
+def look(
+    *bodies: BodySpec, mount: Mount = LEVEL, pose: PlanarPose = ORIGIN
+) -> tuple[PlanarCamera, PlanarView]:
     made = stage(*bodies)
-    eye = PlanarEye(made.world, SimulatedCameraConfig(), mount)
-    return eye, eye.look(made.world.look(0.0)[0], pose)
+    planar_camera = PlanarCamera(made.world, SimulatedCameraConfig(), mount)
+    return planar_camera, planar_camera.look(made.world.snapshot(0.0)[0], pose)
 
 
 def distances(view: PlanarView, body: int = 0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
@@ -29,17 +31,17 @@ def distances(view: PlanarView, body: int = 0) -> np.ndarray[tuple[int, ...], np
 
 
 def test_a_crate_ahead_is_seen_at_its_front_over_its_width() -> None:
-    eye, view = look(crate(5.0, size_m=1.0))
+    planar_camera, view = look(crate(5.0, size_m=1.0))
     seen = np.isfinite(distances(view))
     assert distances(view)[seen] == pytest.approx(4.5)
-    edges = eye.bearing_tan[seen]
-    assert edges.min() == pytest.approx(-0.5 / 4.5, abs=2 * eye.half_width_tan)
-    assert edges.max() == pytest.approx(0.5 / 4.5, abs=2 * eye.half_width_tan)
+    edges = planar_camera.bearing_tan[seen]
+    assert edges.min() == pytest.approx(-0.5 / 4.5, abs=2 * planar_camera.half_width_tan)
+    assert edges.max() == pytest.approx(0.5 / 4.5, abs=2 * planar_camera.half_width_tan)
 
 
 def test_the_right_hand_side_has_positive_bearings() -> None:
-    eye, view = look(crate(5.0, -1.0, size_m=0.4))
-    assert (eye.bearing_tan[np.isfinite(distances(view))] > 0.0).all()
+    planar_camera, view = look(crate(5.0, -1.0, size_m=0.4))
+    assert (planar_camera.bearing_tan[np.isfinite(distances(view))] > 0.0).all()
 
 
 def test_the_robot_turns_its_eye() -> None:
@@ -60,8 +62,10 @@ def test_what_stands_behind_something_tall_is_hidden() -> None:
 
 
 def test_part_of_it_is_seen_beside_the_edge() -> None:
-    eye, view = look(crate(3.0, 0.5, size_m=1.0, name="near"), crate(6.0, 0.0, size_m=1.0, name="far"))
-    seen = eye.bearing_tan[np.isfinite(distances(view, 1))]
+    planar_camera, view = look(
+        crate(3.0, 0.5, size_m=1.0, name="near"), crate(6.0, 0.0, size_m=1.0, name="far")
+    )
+    seen = planar_camera.bearing_tan[np.isfinite(distances(view, 1))]
     assert len(seen)
     assert (seen > 0.0).all()
 
@@ -87,10 +91,10 @@ def test_a_thin_pole_between_two_rays_is_seen() -> None:
 
 
 def test_the_free_way_ends_at_what_hides_it_and_at_the_wall() -> None:
-    eye, view = look(crate(5.0, size_m=1.0))
-    ahead = np.abs(eye.bearing_tan) < 0.05
+    planar_camera, view = look(crate(5.0, size_m=1.0))
+    ahead = np.abs(planar_camera.bearing_tan) < 0.05
     assert view.free_m[ahead] == pytest.approx(4.5)
-    wall = ~np.isfinite(distances(view)) & (np.abs(eye.bearing_tan) < 0.45)
+    wall = ~np.isfinite(distances(view)) & (np.abs(planar_camera.bearing_tan) < 0.45)
     assert view.free_m[wall] == pytest.approx(60.0, abs=4.0)
 
 
@@ -98,11 +102,11 @@ def test_the_free_way_ends_at_what_hides_it_and_at_the_wall() -> None:
 def test_the_floor_comes_into_view_where_the_lower_edge_of_the_image_meets_it(
     height_m: float, pitch_deg: float
 ) -> None:
-    eye, _ = look(crate(5.0), mount=Mount(forward_m=0.0, height_m=height_m, pitch_deg=pitch_deg))
+    planar_camera, _ = look(crate(5.0), mount=Mount(forward_m=0.0, height_m=height_m, pitch_deg=pitch_deg))
     camera = SimulatedCameraConfig()
     down_rad = math.atan((camera.height - 0.5 - camera.cy) / camera.fy) + math.radians(pitch_deg)
-    assert eye.floor_from_m == pytest.approx(height_m / math.tan(down_rad))
+    assert planar_camera.floor_from_m == pytest.approx(height_m / math.tan(down_rad))
     up_rad = math.atan((camera.cy + 0.5) / camera.fy) - math.radians(pitch_deg)
-    assert eye.up_tan == pytest.approx(math.tan(up_rad))
+    assert planar_camera.up_tan == pytest.approx(math.tan(up_rad))
     upwards, _ = look(crate(5.0), mount=Mount(forward_m=0.0, height_m=height_m, pitch_deg=-40.0))
     assert upwards.floor_from_m == NEVER_M

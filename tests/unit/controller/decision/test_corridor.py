@@ -9,7 +9,7 @@ import pytest
 
 from config.robot import Body
 from controller.decision.corridor import Corridor, path_velocities, place
-from tests.support.bodies import arc_path, box, line_path
+from tests.support.floor_bodies import arc_path, box, line_path
 
 BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)
 

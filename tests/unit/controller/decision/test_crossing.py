@@ -12,7 +12,7 @@ from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, place
 from controller.decision.crossing import Choice, Conflict, choices, find_conflicts, likely_enters
 from controller.profile import SpeedRamps
-from tests.support.bodies import box, line_path
+from tests.support.floor_bodies import box, line_path
 
 TIMES = np.arange(0.0, 8.1, 0.2)
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))

@@ -13,7 +13,7 @@ from config.path import LineSpec, PathSpec
 from config.robot import Limits, Robot
 from controller.decision.decide import Action
 from controller.path.path import Path
-from tests.support.deciding import Bench, obstacle
+from tests.support.decision_bench import Bench, obstacle
 from tests.support.scenes import free_space
 from vision.scene import CameraCondition, CameraHealth
 

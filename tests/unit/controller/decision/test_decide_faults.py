@@ -12,7 +12,7 @@ from controller.decision.decide import Action, Decision
 from controller.decision.situation import Situation
 from controller.path.path import OnPath
 from hal.types import PlanarPose
-from tests.support.deciding import AGE_NS, PATH, STEP_NS, Bench, obstacle
+from tests.support.decision_bench import AGE_NS, PATH, STEP_NS, Bench, obstacle
 from tests.support.scenes import free_space
 from vision.scene import CameraCondition, CameraHealth, Obstacle
 

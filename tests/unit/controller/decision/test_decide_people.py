@@ -13,7 +13,7 @@ from config.path import LineSpec, PathSpec
 from config.robot import Robot
 from controller.decision.decide import Action
 from controller.path.path import Path
-from tests.support.deciding import Bench, obstacle
+from tests.support.decision_bench import Bench, obstacle
 
 
 def test_an_oncoming_person_counts_with_closing_speed() -> None:

@@ -13,7 +13,7 @@ from controller.decision.decide import Action
 from controller.decision.situation import Situation
 from controller.path.path import OnPath, Path
 from hal.types import PlanarPose
-from tests.support.deciding import STEP_NS, Bench, obstacle
+from tests.support.decision_bench import STEP_NS, Bench, obstacle
 from vision.scene import CameraCondition, CameraHealth
 
 

@@ -11,7 +11,7 @@ from controller.decision.bodies import Bodies, no_bodies
 from controller.decision.out_of_view import OutOfView
 from controller.decision.view_edges import ViewEdges
 from hal.types import CameraMount, PlanarPose
-from tests.support.bodies import box
+from tests.support.floor_bodies import box
 from vision.scene import FreeSpace
 
 MOUNT = CameraMount(0.4, 0.0, 0.60, 0.0)

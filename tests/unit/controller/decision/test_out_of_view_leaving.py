@@ -15,8 +15,8 @@ from controller.decision.view_edges import ViewEdges
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
-from tests.support.bodies import box
-from tests.support.deciding import MOUNT, PATH, obstacle
+from tests.support.decision_bench import MOUNT, PATH, obstacle
+from tests.support.floor_bodies import box
 from tests.support.scenes import GOOD, STILL, free_space
 from vision.scene import FreeSpace, Scene
 

@@ -20,8 +20,8 @@ from controller.decision.surfaces import Surfaces
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath, Path
 from hal.types import FloatArray, PlanarPose
-from tests.support.bodies import arc_path, box, line_path
-from tests.support.deciding import MOUNT, STEP_NS, Bench, obstacle
+from tests.support.decision_bench import MOUNT, STEP_NS, Bench, obstacle
+from tests.support.floor_bodies import arc_path, box, line_path
 from tests.support.scenes import free_space
 from vision.scene import FreeSpace, Obstacle
 

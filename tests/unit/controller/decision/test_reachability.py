@@ -11,7 +11,7 @@ from controller.decision.corridor import Corridor, place
 from controller.decision.reachability import Reach, last_stop_before_entry, passes_clear, reach, room, stops
 from controller.profile import SpeedRamps
 from hal.types import FloatArray
-from tests.support.bodies import box, line_path
+from tests.support.floor_bodies import box, line_path
 
 TIMES = np.arange(0.0, 4.01, 0.1)
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))

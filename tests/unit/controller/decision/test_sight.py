@@ -15,7 +15,7 @@ from controller.decision.corridor import Corridor
 from controller.decision.sight import Sight
 from controller.decision.surfaces import NO_SURFACES, surfaces_of
 from hal.types import CameraMount, FloatArray, PlanarPose
-from tests.support.bodies import arc_path, box, line_path
+from tests.support.floor_bodies import arc_path, box, line_path
 from vision.scene import FreeSpace
 
 BODY = Body(width_m=0.8, length_m=1.0, rear_m=0.5)

@@ -10,7 +10,7 @@ import pytest
 from config.perception import DepthNoise
 from controller.decision.surfaces import bands_at, seen_of, surfaces_of
 from hal.types import CameraMount, PlanarPose
-from tests.support.bodies import box
+from tests.support.floor_bodies import box
 from vision.scene import FreeSpace
 
 HERE, MOUNT = PlanarPose(0.0, 0.0, 0.0), CameraMount(0.5, 0.0, 0.6, 0.0)

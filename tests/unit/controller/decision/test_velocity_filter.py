@@ -9,7 +9,7 @@ import pytest
 
 from controller.decision.bodies import Bodies
 from controller.decision.velocity_filter import SteadyVelocities
-from tests.support.bodies import box
+from tests.support.floor_bodies import box
 
 FRAME_NS = 33_333_333
 

@@ -11,20 +11,20 @@ import pytest
 
 from config.decision import DecisionConfig
 from config.robot import Body, Mount, Robot
-from controller.campaign.drive import DriveLog
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.judge import Row, judge
 from controller.campaign.noise_mission import drive_noise
 from controller.campaign.policies import build_policy
 from controller.campaign.stage import Stage
-from controller.campaign.task import yardstick
+from controller.campaign.task import judge_reference
 from controller.decision.view_edges import ViewEdges, beyond_edges, visible_from_m
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import CameraMount, PlanarPose
 from sim.families import generate
-from tests.support.bodies import box
 from tests.support.campaign import CONFIG
-from tests.support.deciding import MOUNT, PATH, obstacle
+from tests.support.decision_bench import MOUNT, PATH, obstacle
+from tests.support.floor_bodies import box
 from tests.support.scenes import free_space, scene
 
 FRAME_NS = 100_000_000
@@ -41,7 +41,7 @@ def driven(robot: Robot, family: str, seed: int) -> tuple[Row, DriveLog]:
     config = CONFIG.model_copy(update={"robot": robot})
     stage = Stage(generate(family, seed), robot)
     log = drive_noise(stage, config, build_policy("ours", config, stage))
-    return judge(stage, log, "ours", "noise", yardstick(stage, config)), log
+    return judge(stage, log, "ours", "noise", judge_reference(stage, config)), log
 
 
 def stops_before_it(robot: Robot, family: str, seed: int) -> bool:

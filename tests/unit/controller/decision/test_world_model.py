@@ -15,7 +15,7 @@ from controller.build import build_replay_decision
 from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath
 from hal.types import PlanarPose
-from tests.support.deciding import MOUNT, PATH, Bench, obstacle
+from tests.support.decision_bench import MOUNT, PATH, Bench, obstacle
 from tests.support.scenes import free_space
 from vision.scene import FreeSpace, Obstacle
 

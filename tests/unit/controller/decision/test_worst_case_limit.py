@@ -14,7 +14,7 @@ from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, path_velocities, place
 from controller.decision.limits import Limit, Motion
 from controller.decision.worst_case_limit import WorstCase
-from tests.support.bodies import box, line_path
+from tests.support.floor_bodies import box, line_path
 
 LIMITS = Limits()
 LATENCY_S = 0.2

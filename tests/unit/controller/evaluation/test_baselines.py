@@ -11,7 +11,7 @@ from controller.evaluation.baselines.background_model import BackgroundModel
 from controller.evaluation.baselines.box_tracking import BoxTracking
 from controller.evaluation.baselines.dense_flow import DenseFlow
 from controller.evaluation.baselines.low_rank import LowRank, robust_pca
-from controller.evaluation.baselines.masks import Identities, half_depth_m, half_intrinsics, things
+from controller.evaluation.baselines.masks import IdTracker, blobs, half_depth_m, half_intrinsics
 from controller.evaluation.baselines.trajectories import Trajectories
 from controller.evaluation.matching import iou
 from controller.evaluation.types import CALLED_MOVING, Box, DetectedObject, Method
@@ -58,7 +58,7 @@ def test_two_runs_say_the_same(make: Callable[[], Method]) -> None:
 
 def test_a_tracker_keeps_the_box_that_it_was_given() -> None:
     tracking = BoxTracking()
-    tracking.give(4, (150.0, 140.0, 270.0, 340.0))
+    tracking.add_object(4, (150.0, 140.0, 270.0, 340.0))
     for index in range(8):
         answer = tracking.observe(moving_square(index, 4.0), None)
     left = square_left_px(7, 4.0)
@@ -85,7 +85,7 @@ def test_parts_are_cut_where_the_depth_jumps() -> None:
     frame = moving_square(0)
     mask = np.zeros((240, 320), np.uint8)
     mask[80:150, 100:180] = 255  # over the thing and the wall beside it
-    found = things(mask, half_depth_m(frame), half_intrinsics(CAMERA))
+    found = blobs(mask, half_depth_m(frame), half_intrinsics(CAMERA))
     depths = sorted(round(float(one.position_m[2]), 1) for one in found)
     assert depths == [3.0, 5.0]
 
@@ -93,14 +93,14 @@ def test_parts_are_cut_where_the_depth_jumps() -> None:
 def test_small_parts_are_dropped() -> None:
     mask = np.zeros((240, 320), np.uint8)
     mask[80:88, 80:88] = 255
-    assert things(mask, half_depth_m(moving_square(0)), half_intrinsics(CAMERA)) == []
+    assert blobs(mask, half_depth_m(moving_square(0)), half_intrinsics(CAMERA)) == []
 
 
 def test_an_identity_lives_on_through_a_few_frames_unseen() -> None:
-    identities = Identities()
+    identities = IdTracker()
     mask = np.zeros((240, 320), np.uint8)
     mask[80:150, 80:130] = 255
-    seen = things(mask, half_depth_m(moving_square(0)), half_intrinsics(CAMERA))
+    seen = blobs(mask, half_depth_m(moving_square(0)), half_intrinsics(CAMERA))
     first = identities.answer(seen, None).detections[0]
     identities.answer([], None)
     again = identities.answer(seen, None).detections[0]

@@ -40,9 +40,9 @@ def test_corners_of_the_data_are_corners_of_the_plot() -> None:
 
 def test_logarithmic_axis() -> None:
     axis = Axis("ms", 1.0, 100.0, log=True)
-    assert axis.share(np.array([1.0, 10.0, 100.0])).tolist() == pytest.approx([0.0, 0.5, 1.0])
-    assert math.isnan(axis.share(np.array([0.0]))[0])
-    assert [label for _, label in axis.places()] == ["1", "10", "100"]
+    assert axis.position(np.array([1.0, 10.0, 100.0])).tolist() == pytest.approx([0.0, 0.5, 1.0])
+    assert math.isnan(axis.position(np.array([0.0]))[0])
+    assert [label for _, label in axis.tick_labels()] == ["1", "10", "100"]
 
 
 def painted(image: Image, colour: tuple[int, int, int]) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
@@ -115,7 +115,7 @@ def test_the_legend_names_what_was_drawn() -> None:
 def test_the_key_stands_above_the_plot() -> None:
     image, drawn = chart()
     drawn.points([], [], BLUE, "square", "one")
-    drawn.key()
+    drawn.inline_legend()
     rows, columns = np.nonzero(painted(image, BLUE))
     assert len(rows) > 0
     assert rows.max() < drawn.plot.y

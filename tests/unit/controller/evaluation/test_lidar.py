@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from config.scenario import Room
-from controller.evaluation.drive import MOUNT
 from controller.evaluation.lidar_baseline import LidarTracker
 from controller.evaluation.lidar_clusters import find_clusters
 from controller.evaluation.lidar_matching import refine
 from controller.evaluation.lidar_scan import Lidar, LidarModel, Scan, cast
+from controller.evaluation.scripted_drive import MOUNT
 from controller.evaluation.types import CALLED_MOVING
 from hal.types import FloatArray, PlanarPose
 from sim.world import BodyState
@@ -70,14 +70,14 @@ def test_clusters_are_things_and_not_walls() -> None:
     scan = Lidar(EXACT, ROOM, seed=1).scan(0.0, ORIGIN, [crate(3.0, 0.5)])
     clusters = find_clusters(scan)
     assert len(clusters.size_m) == 1
-    assert clusters.middle_m[0] == pytest.approx([2.75 + 0.25 - 0.45, 0.5], abs=0.3)
-    assert clusters.whole[0]
+    assert clusters.centre_m[0] == pytest.approx([2.75 + 0.25 - 0.45, 0.5], abs=0.3)
+    assert clusters.unoccluded[0]
 
 
 def test_a_half_hidden_cluster_is_not_whole() -> None:
     scan = Lidar(EXACT, ROOM, seed=1).scan(0.0, ORIGIN, [crate(3.0, 0.4), crate(5.0, 0.1)])
     clusters = find_clusters(scan)
-    assert sorted(clusters.whole.tolist()) == [False, True]
+    assert sorted(clusters.unoccluded.tolist()) == [False, True]
 
 
 def test_matching_finds_the_way_that_slipping_tracks_did_not_tell() -> None:

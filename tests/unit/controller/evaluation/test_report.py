@@ -21,7 +21,6 @@ from controller.evaluation.campaign import (
     run_campaign,
     run_task,
 )
-from controller.evaluation.contestants import ALWAYS, BASELINES, LIDAR, OURS, OURS_ALONE
 from controller.evaluation.markdown import fixed, section, table
 from controller.evaluation.report import prepare_folder, write_failures, write_figures, write_texts
 from controller.evaluation.report_text import simulated_lines
@@ -29,6 +28,7 @@ from controller.evaluation.run_sequence import SequenceRecord, run_sequence
 from controller.evaluation.sequences import sequences
 from controller.evaluation.summary import as_json, summarise
 from controller.evaluation.targets import TARGETS
+from controller.evaluation.timed_methods import ALWAYS, BASELINES, LIDAR, OURS, OURS_ALONE
 from tests.support.evaluation_cases import known
 
 SET = {one.name: one for one in sequences()}
@@ -186,7 +186,11 @@ def test_baselines_look_at_some_sequences_that_exist() -> None:
 
 
 def test_an_unknown_figure_reaches_no_target() -> None:
-    assert not any(target.reached(float("nan"), alone) for target in TARGETS for alone in (True, False))
+    assert not any(
+        target.reached(float("nan"), without_odometry)
+        for target in TARGETS
+        for without_odometry in (True, False)
+    )
 
 
 def test_tables_have_three_decimals_and_say_what_is_unknown() -> None:

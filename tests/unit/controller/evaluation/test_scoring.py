@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controller.evaluation.eligibility import Standing, calls
+from controller.evaluation.eligibility import Eligibility, judge_eligibility
 from controller.evaluation.matching import costs, distance_m, iou, match
 from controller.evaluation.scoring import score
 from controller.evaluation.types import NO_BOX
@@ -53,30 +53,30 @@ def test_each_detection_goes_to_one_object() -> None:
 @pytest.mark.parametrize(
     ("change", "standing"),
     [
-        ({}, Standing.ELIGIBLE),
-        ({"visible_px": 400, "visible_ratio": 0.3}, Standing.ELIGIBLE),
-        ({"visible_px": 399}, Standing.EXCUSED),
-        ({"visible_ratio": 0.29}, Standing.EXCUSED),
-        ({"position_m": (0.0, 0.0, 10.1)}, Standing.EXCUSED),
-        ({"speed_mps": 0.09}, Standing.EXCUSED),
-        ({"speed_mps": 0.0, "turning": True}, Standing.EXCUSED),
-        ({"speed_mps": 0.0}, Standing.STILL),
+        ({}, Eligibility.ELIGIBLE),
+        ({"visible_px": 400, "visible_ratio": 0.3}, Eligibility.ELIGIBLE),
+        ({"visible_px": 399}, Eligibility.EXCUSED),
+        ({"visible_ratio": 0.29}, Eligibility.EXCUSED),
+        ({"position_m": (0.0, 0.0, 10.1)}, Eligibility.EXCUSED),
+        ({"speed_mps": 0.09}, Eligibility.EXCUSED),
+        ({"speed_mps": 0.0, "turning": True}, Eligibility.EXCUSED),
+        ({"speed_mps": 0.0}, Eligibility.STILL),
     ],
 )
-def test_who_must_be_found(change: dict[str, Any], standing: Standing) -> None:
-    assert calls(truths([[true_object(**change)]]))[0][1].standing is standing
+def test_who_must_be_found(change: dict[str, Any], standing: Eligibility) -> None:
+    assert judge_eligibility(truths([[true_object(**change)]]))[0][1].eligibility is standing
 
 
 def test_who_has_just_stopped_is_excused_for_half_a_second() -> None:
     frames = [[true_object()]] + [[true_object(speed_mps=0.0)]] * 20
-    standings = [call[1].standing for call in calls(truths(frames))]
-    assert standings[1:16] == [Standing.EXCUSED] * 15
-    assert standings[16:] == [Standing.STILL] * 5
+    standings = [call[1].eligibility for call in judge_eligibility(truths(frames))]
+    assert standings[1:16] == [Eligibility.EXCUSED] * 15
+    assert standings[16:] == [Eligibility.STILL] * 5
 
 
 def test_the_first_half_second_is_not_judged() -> None:
     frames = truths([[true_object()]] * 45)
-    assert [call[1].settled for call in calls(frames)] == [False] * 15 + [True] * 30
+    assert [call[1].settled for call in judge_eligibility(frames)] == [False] * 15 + [True] * 30
 
 
 def run(found: list[bool]) -> Any:
@@ -123,7 +123,7 @@ def test_a_second_detection_is_false_in_the_frame_but_no_wrong_object() -> None:
 
 def test_calling_an_excused_object_moving_is_neither_right_nor_wrong() -> None:
     scored = score(truths([[true_object(visible_px=100)]] * 5), answers([[detection()]] * 5))
-    assert all(frame.faults == 0 and frame.hits == () for frame in scored.frames)
+    assert all(frame.error_count == 0 and frame.hits == () for frame in scored.frames)
 
 
 def test_calling_a_standing_object_moving_is_wrong() -> None:

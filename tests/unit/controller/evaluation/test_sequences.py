@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from config.scenario import Person
-from controller.evaluation.contestants import build_world
-from controller.evaluation.drive import SLIPPING, Knot, OdometryError, ScriptedDrive
 from controller.evaluation.scenes import Mover, build, side_by_side
+from controller.evaluation.scripted_drive import SLIPPING, Knot, OdometryError, ScriptedDrive
 from controller.evaluation.sequences import Sequence, arc, sequences, straight
+from controller.evaluation.timed_methods import build_world
 
 EXACT = OdometryError(1.0, 1.0, 0.0)
 ALL = sequences()

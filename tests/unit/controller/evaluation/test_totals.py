@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from controller.evaluation.pixels import claimed, count_pixels
+from controller.evaluation.pixels import claimed_levels, count_pixels
 from controller.evaluation.scoring import score
 from controller.evaluation.totals import (
     Counts,
+    MethodAnswers,
     PixelCounts,
-    Recorded,
     bin_by_distance,
     object_curves,
     pixel_curve,
@@ -67,8 +67,8 @@ def test_object_curve_trades_precision_for_recall() -> None:
     frames = [[detection(confidence=0.9), far_detection(confidence=0.7)]] * 30
     unsure = [[detection(confidence=0.6)]] * 30
     recorded = [
-        Recorded(truths([[true_object()]] * 30), answers(frames)),
-        Recorded(truths([[true_object()]] * 30), answers(unsure)),
+        MethodAnswers(truths([[true_object()]] * 30), answers(frames)),
+        MethodAnswers(truths([[true_object()]] * 30), answers(unsure)),
     ]
     per_object, per_frame = object_curves(recorded)
     points = dict(
@@ -95,7 +95,7 @@ def test_the_pixel_curve_goes_from_the_surest_pixels_to_all_that_are_claimed() -
 def test_an_obstacle_claims_the_pixels_of_its_depth_in_its_box() -> None:
     frame = moving_square(0)
     around = detection(box=(130.0, 120.0, 310.0, 380.0), position_m=(-0.5, 0.0, 3.0), confidence=1.0)
-    levels = claimed(frame, [around])
+    levels = claimed_levels(frame, [around])
     assert (
         np.count_nonzero(levels) == 60 * 100
     )  # the thing is 120 x 200 px; the wall behind it is not claimed

@@ -13,7 +13,7 @@ import pytest
 
 from controller.errors import UserError
 from controller.faults.command import describe, write_section
-from controller.faults.kills import KillResult, Trio
+from controller.faults.kills import DriveProcesses, KillResult
 from controller.faults.trials import FAULTS, KINDS, Fault, TrialResult, run_trial
 from hal.types import ChassisMode
 
@@ -29,7 +29,7 @@ def test_every_fault_of_every_chassis_ends_in_a_base_that_stands_until_consent(
 ) -> None:
     result = run_trial(kind, fault)
     assert result.moved_after_m < 1e-3
-    assert result.again
+    assert result.drives_again
     if fault.name == "stop is asked for":
         assert (result.mode, result.reason) == (ChassisMode.ARMED, "armed")
         assert result.stood_after_s > 1.5, "jerk-limited"
@@ -100,7 +100,7 @@ def test_an_emulator_that_does_not_start_is_not_left_behind(monkeypatch: pytest.
     program = "import sys, time; print('no port', file=sys.stderr, flush=True); time.sleep(600)"
     started = processes(monkeypatch, program)
     with pytest.raises(UserError, match="the emulator did not start: no port"):
-        Trio("agilex", Path("robot.yaml"))
+        DriveProcesses("agilex", Path("robot.yaml"))
     assert [one.poll() is not None for one in started] == [True]
 
 
@@ -108,13 +108,13 @@ def test_a_base_that_tells_nothing_is_not_waited_for_for_ever(monkeypatch: pytes
     told = "print('v 0.1 m/s, w 0 rad/s, x 0 m, y 0 m', flush=True)"
     program = f"import sys, time; print('emulating', file=sys.stderr, flush=True); {told}; time.sleep(600)"
     started = processes(monkeypatch, program)
-    trio = Trio("agilex", Path("robot.yaml"))
+    drive_processes = DriveProcesses("agilex", Path("robot.yaml"))
     try:
-        assert trio.await_speed(lambda v_mps: v_mps == 0.1, 30.0) < 30.0
+        assert drive_processes.wait_for_speed(lambda v_mps: v_mps == 0.1, 30.0) < 30.0
         began_s = time.monotonic()
         with pytest.raises(UserError, match=r"was not so within 0\.3 s"):
-            trio.await_speed(lambda v_mps: v_mps == 0.1, 0.3)
+            drive_processes.wait_for_speed(lambda v_mps: v_mps == 0.1, 0.3)
         assert time.monotonic() - began_s < 30.0
     finally:
-        trio.close()
+        drive_processes.close()
     assert all(one.poll() is not None for one in started)

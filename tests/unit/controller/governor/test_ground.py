@@ -11,7 +11,7 @@ from config.robot import Robot
 from controller.decision.bodies import Bodies, no_bodies
 from controller.governor.ground import GroundMemory
 from hal.types import CameraMount, PlanarPose
-from tests.support.bodies import box
+from tests.support.floor_bodies import box
 from vision.scene import FreeSpace
 
 MOUNT = CameraMount(0.45, 0.0, 0.60, math.radians(4.0))

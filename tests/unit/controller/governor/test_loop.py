@@ -22,7 +22,7 @@ from controller.governor.loop import GovernorLoop
 from controller.governor.request import Twist
 from controller.localise import Localiser
 from hal.types import CameraMount, ChassisMode, ChassisState, PlanarPose, Setpoint
-from tests.support.deaf_base import DeafBase
+from tests.support.imperfect_base import ImperfectBase
 from tests.support.obedient_chassis import PERIOD_S, ObedientChassis
 from tests.support.scenes import ORIGIN, free_space, scene
 
@@ -89,7 +89,7 @@ def test_nothing_moves_before_the_base_is_armed_and_then_it_does_as_asked() -> N
 
 
 def test_odometry_has_the_time_for_which_the_chassis_tells_it() -> None:
-    rig = Rig(chassis=ObedientChassis(late_ns=4_000_000))
+    rig = Rig(chassis=ObedientChassis(stamp_offset_ns=4_000_000))
     last, localiser = rig.run(2.0)[-1], rig.loop.localiser
     assert last.setpoint.v_mps > 0.2
     assert localiser.body_pose(last.now_ns + 4_000_000) == localiser.pose
@@ -187,7 +187,7 @@ def test_the_way_ahead_is_the_arc_for_pictures() -> None:
 
 def test_a_base_that_fell_behind_is_told_zero_and_begins_again_gently() -> None:
     """controller/answer.py, as in a drive along a path."""
-    base = DeafBase(deaf_s=(3.0, 3.8))
+    base = ImperfectBase(unresponsive_s=(3.0, 3.8))
     planner = Planner(lambda _: GO)
     governor = SpeedGovernor(GovernorConfig(), DecisionConfig(), ROBOT, MOUNT, PERIOD_S)
     answer = BaseAnswer(0.2, ROBOT.limits.max_speed_mps)

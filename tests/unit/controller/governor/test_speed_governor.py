@@ -16,8 +16,8 @@ from controller.governor.arcs import corner_m
 from controller.governor.request import Twist
 from hal.clocks import NS_PER_S
 from hal.types import PlanarPose
-from tests.support.closed_loop import PERIOD_S, Noise, Thing, stands, walks
-from tests.support.governed import GovernedDrive, Step, after, always, rules, sentence_at_the_end
+from tests.support.closed_loop import PERIOD_S, Box, Noise, standing_at, walking
+from tests.support.governed_drive import GovernedDrive, Step, after, always, last_sentence, rules
 from vision.scene import CameraCondition, CameraHealth, Scene
 
 LIMITS = Robot().limits
@@ -40,7 +40,7 @@ def test_on_free_floor_the_robot_does_exactly_what_is_asked() -> None:
 
 
 def test_before_a_crate_on_the_arc_it_stops_where_a_mission_would_and_stays_on_the_arc() -> None:
-    crate = Thing(stands(4.0 * math.sin(1.2), 4.0 * (1.0 - math.cos(1.2))))
+    crate = Box(standing_at(4.0 * math.sin(1.2), 4.0 * (1.0 - math.cos(1.2))))
     drive = GovernedDrive(always(0.8, 0.2), [crate])
     steps = drive.run(14.0)
     assert steps[-1].governed.v_mps == 0.0
@@ -53,13 +53,13 @@ def test_before_a_crate_on_the_arc_it_stops_where_a_mission_would_and_stays_on_t
 
 
 def test_a_crate_beside_the_arc_does_not_slow_it() -> None:
-    steps = GovernedDrive(always(0.8, 0.2), [Thing(stands(6.0, 0.0))]).run(9.0)
+    steps = GovernedDrive(always(0.8, 0.2), [Box(standing_at(6.0, 0.0))]).run(9.0)
     assert {one.governed.decision.reason.rule for one in after(steps, 0.5)} == {"requested"}
     assert steps[-1].governed.v_mps == pytest.approx(0.8)
 
 
 def test_a_person_who_crosses_is_let_pass_and_then_it_goes_on_by_itself() -> None:
-    steps = GovernedDrive(always(1.0), [Thing(walks(6.0, -4.5, 0.0, 0.9))]).run(16.0)
+    steps = GovernedDrive(always(1.0), [Box(walking(6.0, -4.5, 0.0, 0.9))]).run(16.0)
     assert min(one.clearance_m for one in steps) > 0.3
     assert steps[-1].governed.v_mps == pytest.approx(1.0)
 
@@ -84,7 +84,7 @@ def test_a_lost_planner_means_a_comfortable_stop_on_the_same_arc_and_going_on_wh
 def test_reverse_is_refused_with_its_reason() -> None:
     steps = GovernedDrive(lambda t: Twist(0.6, 0.0) if t < 4.0 else Twist(-0.2, 0.0)).run(9.0)
     assert rules(steps)[-1] == "refused"
-    assert "the camera does not see behind" in sentence_at_the_end(steps)
+    assert "the camera does not see behind" in last_sentence(steps)
     assert min(one.governed.v_mps for one in steps) == 0.0
     assert steps[-1].governed.v_mps == 0.0
 
@@ -119,11 +119,11 @@ def test_floor_that_was_never_seen_stops_it() -> None:
     steps = GovernedDrive(always(0.4, 0.4)).run(12.0)
     assert steps[-1].governed.v_mps == 0.0
     assert rules(steps)[-1] == "unseen"
-    assert "never seen beyond" in sentence_at_the_end(steps)
+    assert "never seen beyond" in last_sentence(steps)
 
 
 def test_an_arc_into_a_wall_that_has_left_the_view() -> None:
-    wall = Thing(stands(8.0, 1.5), length_m=20.0, width_m=0.2)
+    wall = Box(standing_at(8.0, 1.5), length_m=20.0, width_m=0.2)
     steps = GovernedDrive(lambda t: Twist(0.8, 0.0) if t < 6.0 else Twist(0.4, 0.3), [wall]).run(14.0)
     assert steps[-1].governed.v_mps == 0.0
     assert min(one.clearance_m for one in steps) > 0.2
@@ -131,7 +131,7 @@ def test_an_arc_into_a_wall_that_has_left_the_view() -> None:
 
 def test_a_crate_below_the_view_is_not_forgotten_when_the_arc_changes() -> None:
     # 0.3 m high: from 0.65 m ahead of the camera on it cannot be seen any more.
-    crate = Thing(stands(4.0, 0.0), height_m=0.3)
+    crate = Box(standing_at(4.0, 0.0), height_m=0.3)
     drive = GovernedDrive(lambda t: Twist(0.4, 0.004 * round(t)), [crate])
     steps = drive.run(16.0)
     assert steps[-1].governed.v_mps == 0.0
@@ -157,7 +157,7 @@ def unhealthy(condition: CameraCondition) -> GovernedDrive:
 def test_a_camera_that_cannot_be_trusted_stops_it_and_a_degraded_one_slows_it() -> None:
     steps = unhealthy(CameraCondition.UNTRUSTWORTHY).run(9.0)
     assert steps[-1].governed.v_mps == 0.0
-    assert "cannot be trusted: it rains" in sentence_at_the_end(steps)
+    assert "cannot be trusted: it rains" in last_sentence(steps)
     steps = unhealthy(CameraCondition.DEGRADED).run(9.0)
     assert steps[-1].governed.v_mps == pytest.approx(0.5)
 
@@ -174,7 +174,7 @@ def test_with_a_degraded_camera_no_corner_of_a_turn_in_place_is_faster_than_it_m
     corner_mps = [abs(one.governed.w_radps) * corner_m(drive.robot) for one in steps]
     assert max(corner_mps) == pytest.approx(0.1, abs=1e-9)
     assert corner_mps[-1] == pytest.approx(0.1)
-    assert "degraded (it rains): at most 0.10 m/s" in sentence_at_the_end(steps)
+    assert "degraded (it rains): at most 0.10 m/s" in last_sentence(steps)
 
 
 @pytest.mark.parametrize("planner", [always(0.8, 0.1), always(0.0, 0.5)])
@@ -184,7 +184,7 @@ def test_without_fresh_scenes_it_stops(planner: object) -> None:
     steps = drive.run(8.0)
     assert any(abs(one.governed.w_radps) > 0.05 for one in steps)
     assert (steps[-1].governed.v_mps, steps[-1].governed.w_radps) == (0.0, 0.0)
-    assert "the last scene is" in sentence_at_the_end(steps)
+    assert "the last scene is" in last_sentence(steps)
 
 
 def test_an_impossible_scene_stops_it() -> None:
@@ -192,7 +192,7 @@ def test_an_impossible_scene_stops_it() -> None:
         nowhere = tuple(replace(one, position_m=np.full(3, np.nan)) for one in scene.obstacles)
         return scene if t_s < 3.0 else replace(scene, obstacles=nowhere)
 
-    drive = GovernedDrive(always(0.8), [Thing(stands(9.0, 3.0))], alter=alter)
+    drive = GovernedDrive(always(0.8), [Box(standing_at(9.0, 3.0))], alter=alter)
     steps = drive.run(8.0)
     assert steps[100].governed.v_mps > 0.2
     assert steps[-1].governed.v_mps == 0.0
@@ -225,14 +225,14 @@ def test_a_scene_from_where_nobody_knows_stops_it_and_spoils_nothing() -> None:
 
 
 def test_noise_makes_no_false_stop() -> None:
-    things = [Thing(stands(4.0, 1.8)), Thing(stands(8.0, -1.4)), Thing(stands(12.0, 1.6))]
-    steps = GovernedDrive(always(0.8), things, noise=Noise(0.0075, 0.1, 3)).run(14.0)
+    boxes = [Box(standing_at(4.0, 1.8)), Box(standing_at(8.0, -1.4)), Box(standing_at(12.0, 1.6))]
+    steps = GovernedDrive(always(0.8), boxes, noise=Noise(0.0075, 0.1, 3)).run(14.0)
     assert min(one.governed.v_mps for one in after(steps, 5.0)) > 0.6
 
 
 def test_scenes_without_a_pose_get_that_of_their_time() -> None:
     drive = GovernedDrive(
-        always(0.8), [Thing(stands(6.0, 0.0))], alter=lambda scene, _: replace(scene, robot_pose=None)
+        always(0.8), [Box(standing_at(6.0, 0.0))], alter=lambda scene, _: replace(scene, robot_pose=None)
     )
     steps = drive.run(12.0)
     assert steps[-1].governed.v_mps == 0.0
@@ -242,7 +242,7 @@ def test_scenes_without_a_pose_get_that_of_their_time() -> None:
 def test_two_runs_are_alike_to_the_bit() -> None:
     def once() -> list[tuple[float, float]]:
         drive = GovernedDrive(
-            lambda t: Twist(0.7, 0.3 * math.sin(t)), [Thing(stands(5.0, 0.8))], noise=Noise(0.0075, 0.1)
+            lambda t: Twist(0.7, 0.3 * math.sin(t)), [Box(standing_at(5.0, 0.8))], noise=Noise(0.0075, 0.1)
         )
         return [(one.governed.v_mps, one.governed.w_radps) for one in drive.run(3.0)]
 
@@ -261,7 +261,7 @@ def test_nothing_is_learned_of_the_floor_from_a_camera_that_cannot_be_trusted() 
         frozen = CameraHealth(CameraCondition.UNTRUSTWORTHY, "frozen", 0.9)
         return replace(scene, free_space=open_hall, obstacles=(), health=frozen)
 
-    drive = GovernedDrive(always(0.6), [Thing(stands(4.2, -0.2), 0.5, 0.5, 1.0)], alter=alter)
+    drive = GovernedDrive(always(0.6), [Box(standing_at(4.2, -0.2), 0.5, 0.5, 1.0)], alter=alter)
     ground = drive.governor._ground
     drive.run(4.0)
     seen = ground.blocked(crate, round(drive.t_s * NS_PER_S)).sum(), ground.free(behind).sum()
@@ -272,7 +272,7 @@ def test_nothing_is_learned_of_the_floor_from_a_camera_that_cannot_be_trusted() 
 
 def test_who_has_left_the_view_is_remembered_through_every_new_arc() -> None:
     """Somebody slower beside the way is overtaken; out of view he may step in for 2 s at least."""
-    drive = GovernedDrive(always(0.8), [Thing(walks(4.5, 1.9, 0.35, -0.02))])
+    drive = GovernedDrive(always(0.8), [Box(walking(4.5, 1.9, 0.35, -0.02))])
     arcs, remembered = set(), []
     for step in itertools.count():
         drive.step()

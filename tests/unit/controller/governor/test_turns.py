@@ -11,8 +11,8 @@ import pytest
 from config.governor import GovernorConfig
 from config.robot import Robot
 from controller.governor.request import Twist
-from tests.support.closed_loop import PERIOD_S, Thing, stands, walks
-from tests.support.governed import GovernedDrive, after, rules, sentence_at_the_end
+from tests.support.closed_loop import PERIOD_S, Box, standing_at, walking
+from tests.support.governed_drive import GovernedDrive, after, last_sentence, rules
 from vision.scene import Scene
 
 LIMITS = Robot().limits
@@ -53,12 +53,12 @@ def test_turning_the_other_way_goes_through_standstill() -> None:
 
 
 def test_no_turn_in_place_beside_a_wall_that_its_corners_would_touch() -> None:
-    wall = Thing(stands(8.0, 0.7), length_m=20.0, width_m=0.2)
+    wall = Box(standing_at(8.0, 0.7), length_m=20.0, width_m=0.2)
     steps = GovernedDrive(stop_then_turn, [wall]).run(14.0)
     assert all(one.governed.w_radps == 0.0 for one in steps)
     assert rules(steps)[-1] == "turn"
-    assert "something stands 0.0 m ahead and 0.5 m to the left" in sentence_at_the_end(steps)
-    free = GovernedDrive(stop_then_turn, [Thing(stands(8.0, 1.2), length_m=20.0, width_m=0.2)]).run(14.0)
+    assert "something stands 0.0 m ahead and 0.5 m to the left" in last_sentence(steps)
+    free = GovernedDrive(stop_then_turn, [Box(standing_at(8.0, 1.2), length_m=20.0, width_m=0.2)]).run(14.0)
     assert free[-1].governed.w_radps == pytest.approx(0.5)
 
 
@@ -66,12 +66,12 @@ def test_no_turn_in_place_on_floor_that_was_seen_too_long_ago() -> None:
     drive = GovernedDrive(stop_then_turn, config=GovernorConfig(turn_memory_s=2.0))
     steps = drive.run(14.0)
     assert all(one.governed.w_radps == 0.0 for one in steps)
-    assert "has not been seen within 2 s" in sentence_at_the_end(steps)
+    assert "has not been seen within 2 s" in last_sentence(steps)
 
 
 def test_a_person_who_comes_near_stops_a_turn() -> None:
     # They walk straight at the robot's side from ahead, where the camera sees them.
-    person = Thing(walks(5.0, 0.3, -1.0, 0.0, from_s=0.0, to_s=3.9))
+    person = Box(walking(5.0, 0.3, -1.0, 0.0, from_s=0.0, to_s=3.9))
     steps = GovernedDrive(lambda _: Twist(0.0, 0.02), [person]).run(6.0)
     assert rules(steps)[:3] == ["camera", "requested", "turn"]
     stood = next(one for one in steps if one.governed.decision.reason.rule == "turn" and one.t_s > 1.0)
@@ -89,4 +89,4 @@ def test_nobody_turns_into_who_stands_too_near_to_be_measured() -> None:
     assert max(one.governed.w_radps for one in steps) == pytest.approx(0.1)
     assert steps[-1].governed.w_radps == 0.0
     assert rules(steps)[-1] == "turn"
-    assert "right before the camera nothing is seen" in sentence_at_the_end(steps)
+    assert "right before the camera nothing is seen" in last_sentence(steps)

@@ -12,7 +12,7 @@ from controller.realtime.perception_process import RemoteBody, perceive_forever
 from controller.realtime.runner import Farewell, StepMessage
 from controller.record.recorder import RecordingOptions
 from hal.types import CameraMount, PlanarPose
-from tests.support.drives import control_step
+from tests.support.runner_doubles import control_step
 from tests.support.scenes import chassis_state
 
 MS = 1_000_000

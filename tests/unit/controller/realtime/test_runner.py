@@ -16,7 +16,7 @@ from controller.realtime.runner import (
 )
 from controller.realtime.service import ServiceManager, StopRequest
 from hal.types import PlanarPose
-from tests.support.drives import NotingDrive, control_step
+from tests.support.runner_doubles import RecordingDrive, control_step
 from tests.support.scenes import scene
 
 MS = 1_000_000
@@ -49,7 +49,7 @@ def ends() -> Iterator[Ends]:
 
 
 def steps_of(
-    loop: NotingDrive, link: PerceptionLink, clock: LateClock, runner: RealtimeRunner = RUNNER
+    loop: RecordingDrive, link: PerceptionLink, clock: LateClock, runner: RealtimeRunner = RUNNER
 ) -> Punctuality:
     punctuality = Punctuality()
     stop = StopRequest()
@@ -60,7 +60,7 @@ def steps_of(
 
 def test_steps_keep_absolute_deadlines(ends: Ends) -> None:
     link, _there = ends
-    loop = NotingDrive(steps=4)
+    loop = RecordingDrive(steps=4)
     steps_of(loop, link, LateClock({20: 3}))
     # 3 ms late once: the next step is on time again, not 3 ms later.
     assert [now_ns // MS for now_ns, _ in loop.seen] == [0, 23, 40, 60]
@@ -68,7 +68,7 @@ def test_steps_keep_absolute_deadlines(ends: Ends) -> None:
 
 def test_an_overrun_skips_whole_periods_and_keeps_the_phase(ends: Ends) -> None:
     link, _there = ends
-    loop = NotingDrive(steps=3)
+    loop = RecordingDrive(steps=3)
     punctuality = steps_of(loop, link, LateClock({20: 50}))
     assert [now_ns // MS for now_ns, _ in loop.seen] == [0, 70, 80]
     assert punctuality.skipped == 2
@@ -87,7 +87,7 @@ def test_the_newest_scene_is_used_and_none_is_lost(ends: Ends) -> None:
 def test_perception_that_ends_says_why_and_the_robot_stops(ends: Ends) -> None:
     link, there = ends
     there.send(Farewell("camera: unplugged"))
-    loop = NotingDrive(steps=100)
+    loop = RecordingDrive(steps=100)
     steps_of(loop, link, LateClock({}))
     assert loop.stop_reasons == ["perception is lost: camera: unplugged"]
     assert loop.endings == [Outcome.BROKEN_OFF]
@@ -117,7 +117,7 @@ def test_an_output_that_ends_is_no_loss_of_perception(ends: Ends) -> None:
 def test_perception_that_dies_without_a_word_stops_the_robot_too(ends: Ends) -> None:
     link, there = ends
     there.close()
-    loop = NotingDrive(steps=100)
+    loop = RecordingDrive(steps=100)
     steps_of(loop, link, LateClock({}))
     assert len(loop.stop_reasons) == 1
     assert loop.stop_reasons[0].startswith("perception is lost: the other process")
@@ -125,7 +125,7 @@ def test_perception_that_dies_without_a_word_stops_the_robot_too(ends: Ends) -> 
 
 def test_a_stop_signal_becomes_a_stop_request(ends: Ends) -> None:
     link, _there = ends
-    loop, stop = NotingDrive(steps=100), StopRequest()
+    loop, stop = RecordingDrive(steps=100), StopRequest()
     stop.reason = "SIGTERM"
     moments = run_realtime(
         RUNNER, LateClock({}), None, link, loop, ServiceManager({}, 1), stop, Punctuality()
@@ -137,7 +137,7 @@ def test_a_stop_signal_becomes_a_stop_request(ends: Ends) -> None:
 
 def test_a_drive_in_real_time_may_be_limited(ends: Ends) -> None:
     link, _there = ends
-    loop = NotingDrive(steps=100)
+    loop = RecordingDrive(steps=100)
     steps_of(loop, link, LateClock({}), RealtimeRunner(kind="realtime", max_duration_s=0.1))
     assert loop.stop_reasons == ["max_duration_s of 0.1 s is over"]
     assert len(loop.seen) == 7
@@ -145,7 +145,7 @@ def test_a_drive_in_real_time_may_be_limited(ends: Ends) -> None:
 
 def test_perception_hears_every_step(ends: Ends) -> None:
     link, there = ends
-    steps_of(NotingDrive(steps=3), link, LateClock({}))
+    steps_of(RecordingDrive(steps=3), link, LateClock({}))
     heard = [there.receive() for _ in range(4)]
     assert heard.pop() is None
     steps = [message for message in heard if isinstance(message, StepMessage)]
@@ -170,7 +170,7 @@ def test_perception_hears_where_the_world_has_the_robot(ends: Ends) -> None:
         LateClock({}),
         Merry(),
         link,
-        NotingDrive(steps=3),
+        RecordingDrive(steps=3),
         ServiceManager({}, 1),
         StopRequest(),
         Punctuality(),

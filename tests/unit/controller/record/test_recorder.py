@@ -12,7 +12,7 @@ from config.robot import Body, Robot
 from controller.path.path import Path
 from controller.record.observations import ObservationFile
 from controller.record.recorder import (
-    MOST_WAITING,
+    MAX_WAITING,
     Recorder,
     RecordingOptions,
     RunRecorder,
@@ -21,7 +21,7 @@ from controller.record.recorder import (
     path_ahead,
 )
 from hal.types import CameraMount, ColourImage, PlanarPose
-from tests.support.drives import PlainEyes, TickingCamera, control_step
+from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera, control_step
 from tests.support.video_moments import frame
 
 AROUND = Surroundings(CameraMount(0.45, 0.0, 0.6, 0.07), Body(), 0.54, 30.0, 1.5, 10.0)
@@ -33,15 +33,15 @@ def written(path: FilePath) -> list[dict[str, object]]:
 
 
 def test_a_frame_is_written_with_the_first_decision_that_knew_it(tmp_path: FilePath) -> None:
-    camera, eyes = TickingCamera(33_000_000), PlainEyes()
+    camera, eyes = PeriodicCamera(33_000_000), EmptyScenePerceiver()
     with ObservationFile(tmp_path / "o.jsonl") as observations:
         recorder = RunRecorder(Recorder(observations, None, None, AROUND, timed=False), STRAIGHT)
-        recorder.saw(eyes.look(camera.read(0.0)))
-        recorder.decided(control_step(20_000_000, None))
-        recorder.saw(eyes.look(camera.read(0.0)))
-        recorder.decided(control_step(40_000_000, 0))
-        recorder.decided(control_step(60_000_000, 0))
-        recorder.saw(eyes.look(camera.read(0.0)))
+        recorder.add_look(eyes.look(camera.read(0.0)))
+        recorder.add_step(control_step(20_000_000, None))
+        recorder.add_look(eyes.look(camera.read(0.0)))
+        recorder.add_step(control_step(40_000_000, 0))
+        recorder.add_step(control_step(60_000_000, 0))
+        recorder.add_look(eyes.look(camera.read(0.0)))
         recorder.finish()
     lines = written(tmp_path / "o.jsonl")
     assert [line["frame"] for line in lines] == [0, 1, 2]
@@ -50,13 +50,13 @@ def test_a_frame_is_written_with_the_first_decision_that_knew_it(tmp_path: FileP
 
 def test_a_camera_that_counts_anew_is_paired_all_the_same(tmp_path: FilePath) -> None:
     """It was re-plugged: its numbers begin at 0, and its time may be an earlier one."""
-    eyes = PlainEyes()
+    eyes = EmptyScenePerceiver()
     with ObservationFile(tmp_path / "o.jsonl") as observations:
         recorder = RunRecorder(Recorder(observations, None, None, AROUND, timed=False), STRAIGHT)
         for captured_ms, sequence in ((100, 7), (133, 8), (33, 0), (66, 1)):
-            recorder.saw(eyes.look(frame(sequence, captured_ms * 1_000_000)))
-            recorder.decided(control_step(200_000_000, captured_ms * 1_000_000))
-        recorder.saw(eyes.look(frame(2, 99_000_000)))
+            recorder.add_look(eyes.look(frame(sequence, captured_ms * 1_000_000)))
+            recorder.add_step(control_step(200_000_000, captured_ms * 1_000_000))
+        recorder.add_look(eyes.look(frame(2, 99_000_000)))
         recorder.finish()
     lines = written(tmp_path / "o.jsonl")
     assert [line["frame"] for line in lines] == [7, 8, 0, 1, 2]
@@ -66,22 +66,22 @@ def test_a_camera_that_counts_anew_is_paired_all_the_same(tmp_path: FilePath) ->
 def test_frames_that_no_decision_comes_for_do_not_pile_up(
     tmp_path: FilePath, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    camera, eyes = TickingCamera(33_000_000), PlainEyes()
+    camera, eyes = PeriodicCamera(33_000_000), EmptyScenePerceiver()
     frames: list[weakref.ref[ColourImage]] = []
     with ObservationFile(tmp_path / "o.jsonl") as observations:
         recorder = RunRecorder(Recorder(observations, None, None, AROUND, timed=False), STRAIGHT)
-        for _ in range(MOST_WAITING + 10):
+        for _ in range(MAX_WAITING + 10):
             taken = camera.read(0.0)
             frames.append(weakref.ref(taken.colour))
-            recorder.saw(eyes.look(taken))
+            recorder.add_look(eyes.look(taken))
         del taken
         gc.collect()
-        assert [kept() is None for kept in frames] == [True] * 10 + [False] * MOST_WAITING
-        recorder.decided(control_step(20_000_000, 33_000_000 * (MOST_WAITING + 9)))
+        assert [kept() is None for kept in frames] == [True] * 10 + [False] * MAX_WAITING
+        recorder.add_step(control_step(20_000_000, 33_000_000 * (MAX_WAITING + 9)))
         recorder.finish()
     lines = written(tmp_path / "o.jsonl")
-    assert [line["frame"] for line in lines] == list(range(MOST_WAITING + 10))
-    assert [line["decision"] is None for line in lines] == [True] * 10 + [False] * MOST_WAITING
+    assert [line["frame"] for line in lines] == list(range(MAX_WAITING + 10))
+    assert [line["decision"] is None for line in lines] == [True] * 10 + [False] * MAX_WAITING
     assert capsys.readouterr().err == (
         "treadwatch: 10 frames were recorded without a decision: none came within 45 frames\n"
     )
@@ -90,9 +90,9 @@ def test_frames_that_no_decision_comes_for_do_not_pile_up(
 def test_where_nothing_is_recorded_no_frame_is_kept() -> None:
     with open_recorder(RecordingOptions(), AROUND) as nothing:
         recorder = RunRecorder(nothing, STRAIGHT)
-        taken = TickingCamera(33_000_000).read(0.0)
+        taken = PeriodicCamera(33_000_000).read(0.0)
         kept = weakref.ref(taken.colour)
-        recorder.saw(PlainEyes().look(taken))
+        recorder.add_look(EmptyScenePerceiver().look(taken))
         del taken
         gc.collect()
         assert kept() is None
@@ -102,16 +102,16 @@ def test_durations_are_written_only_where_time_is_real(tmp_path: FilePath) -> No
     for timed in (True, False):
         options = RecordingOptions(tmp_path / f"{timed}.jsonl", timed=timed)
         with open_recorder(options, AROUND) as recorder:
-            recorder.record(PlainEyes().look(TickingCamera(1).read(0.0)), None)
+            recorder.record(EmptyScenePerceiver().look(PeriodicCamera(1).read(0.0)), None)
     assert written(tmp_path / "True.jsonl")[0]["timing_ms"] == {"detect": 1.0, "track": 0.5}
     assert written(tmp_path / "False.jsonl")[0]["timing_ms"] == {}
 
 
 def test_a_video_gets_one_picture_a_look(tmp_path: FilePath) -> None:
-    camera = TickingCamera(33_000_000)
+    camera = PeriodicCamera(33_000_000)
     with open_recorder(RecordingOptions(video=tmp_path / "v.mp4"), AROUND) as recorder:
         for _ in range(3):
-            recorder.record(PlainEyes().look(camera.read(0.0)), None, 0.5, 0.5)
+            recorder.record(EmptyScenePerceiver().look(camera.read(0.0)), None, 0.5, 0.5)
     video = cv2.VideoCapture(str(tmp_path / "v.mp4"))
     assert int(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 3
     video.release()

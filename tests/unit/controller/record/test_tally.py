@@ -120,7 +120,7 @@ def test_the_first_command_after_a_latch_is_judged() -> None:
 def test_what_is_beyond_comfort_is_told_apart() -> None:
     def beyond(*sent: tuple[float, float]) -> tuple[int, int, int]:
         tally = tally_of(*sent)
-        return tally.emergency_count, tally.harder_count, tally.sharper_count
+        return tally.emergency_count, tally.hard_braking_count, tally.high_jerk_count
 
     comfort = LIMITS.max_jerk_mps3 * 0.02
     assert beyond((1.0, 0.0), (1.0, -comfort)) == (0, 0, 0)
@@ -147,24 +147,24 @@ def test_standing_is_counted_from_the_first_zero_on() -> None:
     standstill = Standstill()
     for seconds, v_mps in ((0, 0.0), (5, 0.3), (6, 0.0), (7, 0.0)):
         standstill.add(Setpoint(seconds * 1000 * MS, v_mps, 0.0, 0.0))
-    assert standstill.lasted_s(10_000 * MS) == 4.0
+    assert standstill.elapsed_s(10_000 * MS) == 4.0
     standstill.add(Setpoint(10_000 * MS, 0.01, 0.3, 0.0))
-    assert standstill.lasted_s(11_000 * MS) == 0.0
+    assert standstill.elapsed_s(11_000 * MS) == 0.0
 
 
 def test_frames_that_were_not_looked_at_are_told_and_a_camera_that_begins_anew_loses_none() -> None:
     frames = FrameTally()
     for sequence in (7, 8, 9, 0, 1):
         frames.add(sequence)
-    assert (frames.looked_at, frames.counted, frames.line()) == (5, 5, "")
+    assert (frames.processed, frames.captured, frames.line()) == (5, 5, "")
     frames.add(4)
     assert frames.line().startswith("6 of the camera's 8 were looked at: perception did not keep up")
 
 
 def test_zero_to_a_base_that_stands_though_it_was_told_to_go_breaks_no_limit() -> None:
     tally = tally_of((0.5, 0.3))
-    tally.add(Setpoint(20 * MS, 0.0, 0.0, 0.0), stands=True)
+    tally.add(Setpoint(20 * MS, 0.0, 0.0, 0.0), standing=True)
     tally.add(Setpoint(40 * MS, 0.00012, 0.012, 0.0))
     assert tally.violations == 0
-    tally.add(Setpoint(60 * MS, 0.02, 0.0, 0.0), stands=True)
+    tally.add(Setpoint(60 * MS, 0.02, 0.0, 0.0), standing=True)
     assert tally.violations == 1, "only zero is free"

@@ -7,8 +7,8 @@ import pytest
 from controller.video.colour_view import ColourView
 from controller.video.corridor import corridor_ahead
 from controller.video.moment import VideoMoment
-from controller.video.picture import placement
-from controller.video.seen import seen_obstacles
+from controller.video.placement import placement
+from controller.video.seen_obstacles import seen_obstacles
 from controller.video.style import (
     ALARM,
     COLOUR_VIEW,

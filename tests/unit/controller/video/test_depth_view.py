@@ -5,7 +5,7 @@ import pytest
 
 from controller.video.depth_view import DepthView, colour_table
 from controller.video.moment import VideoMoment
-from controller.video.seen import seen_obstacles
+from controller.video.seen_obstacles import seen_obstacles
 from controller.video.style import DEPTH_SCALE, DEPTH_VIEW, NO_DEPTH, OWN, Image
 from hal.types import DepthImage
 from tests.support import video_moments as build

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.video import text
-from controller.video.labels import MOST_LABELS, Label, arrange, draw_labels
+from controller.video.labels import MAX_LABELS, Label, arrange, draw_labels
 from controller.video.style import DARK_TEXT, MOVING, STATIC, Rect
 
 BOUNDS = Rect(0, 0, 400, 300)
@@ -66,8 +66,8 @@ def test_the_first_label_has_the_first_choice() -> None:
 
 def test_there_are_never_more_labels_than_can_be_read() -> None:
     crowd = [label(x, y, x + 5, y + 5, "#1") for x in range(0, 380, 60) for y in range(30, 280, 40)]
-    assert len(crowd) > MOST_LABELS
-    assert len(arrange(crowd, BOUNDS)) == MOST_LABELS
+    assert len(crowd) > MAX_LABELS
+    assert len(arrange(crowd, BOUNDS)) == MAX_LABELS
 
 
 def test_what_moves_is_filled_and_what_stands_is_not() -> None:

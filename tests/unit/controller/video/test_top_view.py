@@ -6,7 +6,7 @@ import pytest
 
 from controller.video.corridor import corridor_ahead
 from controller.video.moment import VideoMoment
-from controller.video.seen import seen_obstacles
+from controller.video.seen_obstacles import seen_obstacles
 from controller.video.style import FREE_SPACE, MOVING, OWN, PANEL, STATIC, SURFACE, TOP_VIEW, Colour, Image
 from controller.video.top_view import TopView
 from hal.types import FloatArray
@@ -196,7 +196,7 @@ def test_what_decides_comes_first_then_what_moves_then_the_nearest() -> None:
     )
     seen = seen_obstacles(build.moment(things, decided=build.decision(obstacle_id=4)))
     assert [one.obstacle.id for one in seen] == [4, 3, 1, 2]
-    assert [one.decides for one in seen] == [True, False, False, False]
+    assert [one.is_deciding for one in seen] == [True, False, False, False]
 
 
 def test_an_obstacle_without_a_position_is_not_placed_anywhere() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from controller.errors import UserError
-from controller.video import room
+from controller.video import disk_reservation
 from controller.video.style import Image
 from controller.video.writer import CODECS, VideoError, VideoWriter
 
@@ -183,7 +183,7 @@ def refuse_after(count: int, code: int, monkeypatch: pytest.MonkeyPatch) -> None
         given.append(offset)
         return 0 if len(given) <= count else code
 
-    monkeypatch.setattr(room, "fallocate", fallocate)
+    monkeypatch.setattr(disk_reservation, "fallocate", fallocate)
 
 
 @pytest.mark.parametrize("suffix", CODECS)

@@ -64,8 +64,8 @@ def test_texture_coordinates_lead_to_texels() -> None:
     sheet = TextureStore(1).sheet("cardboard/1", 0, 0, 1, 1)
     height, width = draw(1, "cardboard/1").shape[:2]
     # The middle of the first texel is half a texel from the corner, and lies at pixel 1 behind the rim.
-    first = sheet.from_tiles @ np.array([0.5 / width, 0.5 / height, 1.0])
-    last = sheet.from_tiles @ np.array([1.0 - 0.5 / width, 1.0 - 0.5 / height, 1.0])
+    first = sheet.texture_to_pixel @ np.array([0.5 / width, 0.5 / height, 1.0])
+    last = sheet.texture_to_pixel @ np.array([1.0 - 0.5 / width, 1.0 - 0.5 / height, 1.0])
     assert first[:2] == pytest.approx([1.0, 1.0])
     assert last[:2] == pytest.approx([width, height])
 

@@ -99,7 +99,7 @@ def test_a_wall_that_comes_into_range_has_not_arrived() -> None:
 def test_nor_has_one_that_comes_to_where_16_bits_end() -> None:
     """With units of 0.1 mm a wall 6.9 m away was cut off to 6.55 m, and was not seen through up to 10 m."""
     ahead, kept = Pose(np.eye(3), np.array([0.0, 0.0, 0.6])), ViewMemory(NOISE)
-    kept.remember(grid_of(wall(6.9), most_m=6.55), AT_ORIGIN, 0)
+    kept.remember(grid_of(wall(6.9), max_m=6.55), AT_ORIGIN, 0)
     assert not arrived(kept, wall(6.3), pose=ahead).any()
 
 

@@ -97,11 +97,11 @@ def test_two_alike_are_merged_once_and_not_into_each_other() -> None:
 
 
 def test_of_two_that_a_part_may_belong_to_the_closer_one_comes_first() -> None:
-    front, back = Body(0.0, z=3.6, width=0.6, deep=0.6, cells=900), Body(0.0, z=4.1)
+    front, back = Body(0.0, z=3.6, width=0.6, depth=0.6, cells=900), Body(0.0, z=4.1)
     shank = Body(0.3, y=0.5, z=4.15, width=0.15, height=0.5, cells=60)
     assert merged(front, back, shank) == [(2, 1), (1, 0), (2, 0)]  # gaps of 0.03, 0.1 and 0.15 m
     # Both touch it: the one at whose depth it is.
-    deep = Body(0.0, z=3.8, width=0.6, deep=0.8, cells=900)
+    deep = Body(0.0, z=3.8, width=0.6, depth=0.8, cells=900)
     assert merged(deep, Body(0.1, z=4.1, width=0.4), shank)[0] == (2, 1)
 
 
@@ -134,8 +134,8 @@ def test_what_is_low_beside_a_mover_and_goes_much_as_it_does_is_what_it_pushes()
 
 
 def test_what_is_tiny_close_to_a_mover_and_goes_exactly_as_it_does_is_its_own() -> None:
-    cart = Body(0.0, z=3.0, width=0.64, height=1.0, deep=0.6, cells=580)
-    wheel = Body(-0.42, y=0.3, z=4.0, width=0.1, height=0.2, deep=0.5, cells=58)  # 0.45 m behind it
+    cart = Body(0.0, z=3.0, width=0.64, height=1.0, depth=0.6, cells=580)
+    wheel = Body(-0.42, y=0.3, z=4.0, width=0.1, height=0.2, depth=0.5, cells=58)  # 0.45 m behind it
     assert merged(cart, wheel) == [(1, 0)]
     assert merged(cart, replace(wheel, cells=59)) == []
     assert merged(cart, replace(wheel, x=-1.1)) == []  # 0.86 m
@@ -144,8 +144,8 @@ def test_what_is_tiny_close_to_a_mover_and_goes_exactly_as_it_does_is_its_own() 
     assert merged(cart, wheel, sigma=0.4) == []  # not known well enough
 
 
-REAR = Body(-0.6, z=3.0, width=1.0, height=1.2, deep=0.1, cells=900)
-WHEEL = Body(0.6, y=0.3, z=3.2, width=0.4, height=0.6, deep=0.1, cells=480)  # 0.51 m from the rear
+REAR = Body(-0.6, z=3.0, width=1.0, height=1.2, depth=0.1, cells=900)
+WHEEL = Body(0.6, y=0.3, z=3.2, width=0.4, height=0.6, depth=0.1, cells=480)  # 0.51 m from the rear
 
 
 def test_pieces_of_something_wide_with_nothing_seen_between_them_are_one() -> None:

@@ -11,7 +11,7 @@ from itertools import takewhile
 from types import ModuleType
 
 from tests.support.chassis_rig import COUNTS_PER_M, PLANT, SLIP_FACTOR, Rig, serial_ends
-from tests.support.pages import ROOT, Page
+from tests.support.docs_pages import ROOT, Page
 from tests.support.wires import PluggedSerial
 
 PAGE = Page("docs/add-a-chassis.md")

@@ -5,21 +5,21 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Self
 
-from hal.api import Closing
+from hal.api import Device
 
 
-class Enclosing:
-    """A device that is open while the enclosed device is open."""
+class DeviceWrapper:
+    """A device that is open while the wrapped device is open."""
 
-    def __init__(self, enclosed: Closing) -> None:
-        self._enclosed = enclosed
+    def __init__(self, wrapped: Device) -> None:
+        self._wrapped = wrapped
 
     def __enter__(self) -> Self:
-        """Open the enclosed device. Raises DeviceNotFound, DeviceRefused."""
-        self._enclosed.__enter__()
+        """Open the wrapped device. Raises DeviceNotFound, DeviceRefused."""
+        self._wrapped.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._enclosed.__exit__(kind, error, trace)
+        self._wrapped.__exit__(kind, error, trace)

@@ -1,4 +1,4 @@
-"""Room on the disk for a file that somebody else writes and does not tell whether it succeeds."""
+"""Reserves disk space for a file that another library writes without reporting whether it succeeds."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-# Ahead of the file's end. A muxer keeps up to 5 MB (WebM) in memory before it writes them, and a table of all
-# pictures for the end: without it the whole file cannot be read.
+# Reserved beyond the end of the file. A muxer keeps up to 5 MB (WebM) in memory before it writes them, and an
+# index of all pictures for the end of the file, without which the file cannot be read.
 _AHEAD_BYTES = 8_000_000
 _BYTES_A_PICTURE = 40
 _STEP_BYTES = 1_000_000
@@ -19,10 +19,10 @@ _KEEP_SIZE = 1  # FALLOC_FL_KEEP_SIZE
 _NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 
 
-class Room:
+class DiskReservation:
     """Reserves the blocks that the file will need, beyond its end, while the file is open in the block.
 
-    Where the file system reserves nothing (NFS, vfat), its free space is looked at.
+    If the file system cannot reserve blocks (NFS, vfat), its free space is checked instead.
     """
 
     def __init__(self, path: Path) -> None:
@@ -39,14 +39,15 @@ class Room:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Gives back what was not needed: the file must be complete."""
+        """Release what was not needed. The file must be complete."""
         try:
             os.ftruncate(self._fd, os.fstat(self._fd).st_size)
         finally:
             os.close(self._fd)
 
-    def claim(self) -> None:
-        """Before each picture. Raises OSError if there is no room for it and for the end of the file."""
+    def reserve_next(self) -> None:
+        """Reserve space for the next picture. Raises OSError if there is none for it and for the end of the
+        file."""
         self._pictures += 1
         needed = os.fstat(self._fd).st_size + _AHEAD_BYTES + self._pictures * _BYTES_A_PICTURE
         while self._reserved < needed:
@@ -54,11 +55,11 @@ class Room:
             if code in _NO_ROOM:
                 raise OSError(code, os.strerror(code))
             if code:
-                self._look(needed)
+                self._check_free_space(needed)
                 return
             self._reserved += _STEP_BYTES
 
-    def _look(self, needed: int) -> None:
+    def _check_free_space(self, needed: int) -> None:
         disk = os.fstatvfs(self._fd)
         if disk.f_bavail * disk.f_frsize < needed - os.fstat(self._fd).st_size:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -12,14 +12,14 @@ from controller.video.writer import VideoError, VideoWriter
 from hal.cameras.tum_replay import TumReplay
 from hal.cameras.tum_writer import TumWriter
 from hal.errors import DeviceRefused
-from tests.support.drives import PlainEyes, TickingCamera
+from tests.support.runner_doubles import EmptyScenePerceiver, PeriodicCamera
 from tests.unit.controller.record.test_recorder import AROUND
 
 
 def record(recorder: Recorder, frames: int) -> None:
-    camera = TickingCamera(33_000_000)
+    camera = PeriodicCamera(33_000_000)
     for _ in range(frames):
-        recorder.record(PlainEyes().look(camera.read(0.0)), None, 0.5, 0.5)
+        recorder.record(EmptyScenePerceiver().look(camera.read(0.0)), None, 0.5, 0.5)
 
 
 @pytest.fixture

@@ -14,11 +14,11 @@ from controller.evaluation.baselines.box_tracking import BoxTracking
 from controller.evaluation.baselines.dense_flow import DenseFlow
 from controller.evaluation.baselines.low_rank import LowRank
 from controller.evaluation.baselines.trajectories import Trajectories
-from controller.evaluation.drive import MOUNT, ScriptedDrive
-from controller.evaluation.eligibility import Standing, calls
+from controller.evaluation.eligibility import Eligibility, judge_eligibility
 from controller.evaluation.lidar_baseline import LidarTracker
 from controller.evaluation.lidar_scan import Lidar, LidarModel
 from controller.evaluation.ours import Treadwatch
+from controller.evaluation.scripted_drive import MOUNT, ScriptedDrive
 from controller.evaluation.sequences import Sequence
 from controller.evaluation.simulate import SimulatedFrame
 from controller.evaluation.types import Answer, Method
@@ -43,48 +43,50 @@ ALWAYS = (OURS, OURS_ALONE, LIDAR)
 BASELINES = (BACKGROUND, TRAJECTORIES, TRACKING, LOW_RANK, DENSE_FLOW)
 
 
-class Contestant(Protocol):
+class TimedMethod(Protocol):
     """Answers the frames of one sequence in order."""
 
-    def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
+    def answer(self, simulated: SimulatedFrame) -> tuple[Answer, float]:
         """The answer, and its processing time in milliseconds; NaN if there was nothing to process."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class CameraContestant:
+class CameraMethod:
     """A method that processes the camera's frames."""
 
     method: Method
     with_odometry: bool
     stopwatch_ns: Stopwatch
 
-    def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
-        begun_ns = self.stopwatch_ns()
-        answer = self.method.observe(seen.frame, seen.odometry if self.with_odometry else None)
-        return answer, (self.stopwatch_ns() - begun_ns) / NS_PER_MS
+    def answer(self, simulated: SimulatedFrame) -> tuple[Answer, float]:
+        start_ns = self.stopwatch_ns()
+        answer = self.method.observe(simulated.frame, simulated.odometry if self.with_odometry else None)
+        return answer, (self.stopwatch_ns() - start_ns) / NS_PER_MS
 
 
-class TrackingContestant:
+class TrackingMethod:
     """Object tracking. It is given the true box of each object once, when the object becomes eligible."""
 
     def __init__(self, stopwatch_ns: Stopwatch) -> None:
         self._tracking = BoxTracking()
         self._stopwatch_ns = stopwatch_ns
-        self._told: set[int] = set()
+        self._initialised: set[int] = set()
 
-    def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
-        for identity, call in calls([seen.truth])[0].items():
-            if call.standing is Standing.ELIGIBLE and identity not in self._told:
-                self._told.add(identity)
-                self._tracking.give(identity, next(o.box for o in seen.truth.objects if o.id == identity))
-        begun_ns = self._stopwatch_ns()
-        answer = self._tracking.observe(seen.frame, None)
-        duration_ms = (self._stopwatch_ns() - begun_ns) / NS_PER_MS
+    def answer(self, simulated: SimulatedFrame) -> tuple[Answer, float]:
+        for identity, verdict in judge_eligibility([simulated.truth])[0].items():
+            if verdict.eligibility is Eligibility.ELIGIBLE and identity not in self._initialised:
+                self._initialised.add(identity)
+                self._tracking.add_object(
+                    identity, next(o.box for o in simulated.truth.objects if o.id == identity)
+                )
+        start_ns = self._stopwatch_ns()
+        answer = self._tracking.observe(simulated.frame, None)
+        duration_ms = (self._stopwatch_ns() - start_ns) / NS_PER_MS
         return answer, duration_ms if answer.detections else math.nan
 
 
-class LidarContestant:
+class LidarMethod:
     """Scans the same world at the lidar's own rate; only clustering and tracking are timed."""
 
     def __init__(
@@ -97,34 +99,34 @@ class LidarContestant:
         self._stopwatch_ns = stopwatch_ns
         self._next_scan = 0
 
-    def answer(self, seen: SimulatedFrame) -> tuple[Answer, float]:
-        now_s = seen.truth.stamp_s
+    def answer(self, simulated: SimulatedFrame) -> tuple[Answer, float]:
+        now_s = simulated.truth.stamp_s
         odometry = self._drive.odometry(now_s)
         scan = None
         if now_s >= self._next_scan / self._model.rate_hz - 1e-6:
             self._next_scan += 1
-            scan = self._lidar.scan(now_s, self._drive.pose(now_s), seen.bodies)
-        begun_ns = self._stopwatch_ns()
+            scan = self._lidar.scan(now_s, self._drive.pose(now_s), simulated.bodies)
+        start_ns = self._stopwatch_ns()
         if scan is not None:
             self._tracker.update(scan, odometry)
         answer = self._tracker.answer(now_s, odometry)
-        duration_ms = (self._stopwatch_ns() - begun_ns) / NS_PER_MS
+        duration_ms = (self._stopwatch_ns() - start_ns) / NS_PER_MS
         return answer, duration_ms if scan is not None else math.nan
 
 
-def line_up(
+def build_methods(
     names: tuple[str, ...], sequence: Sequence, intrinsics: Intrinsics, stopwatch_ns: Stopwatch
-) -> dict[str, Contestant]:
+) -> dict[str, TimedMethod]:
     """The named methods, newly made for one sequence."""
-    makers: dict[str, Callable[[], Contestant]] = {
-        OURS: lambda: CameraContestant(ours(), True, stopwatch_ns),
-        OURS_ALONE: lambda: CameraContestant(ours(), False, stopwatch_ns),
-        LIDAR: lambda: LidarContestant(sequence, sequence.drive(), intrinsics, stopwatch_ns),
-        BACKGROUND: lambda: CameraContestant(BackgroundModel(), False, stopwatch_ns),
-        TRAJECTORIES: lambda: CameraContestant(Trajectories(), False, stopwatch_ns),
-        TRACKING: lambda: TrackingContestant(stopwatch_ns),
-        LOW_RANK: lambda: CameraContestant(LowRank(), False, stopwatch_ns),
-        DENSE_FLOW: lambda: CameraContestant(DenseFlow(), False, stopwatch_ns),
+    makers: dict[str, Callable[[], TimedMethod]] = {
+        OURS: lambda: CameraMethod(ours(), True, stopwatch_ns),
+        OURS_ALONE: lambda: CameraMethod(ours(), False, stopwatch_ns),
+        LIDAR: lambda: LidarMethod(sequence, sequence.drive(), intrinsics, stopwatch_ns),
+        BACKGROUND: lambda: CameraMethod(BackgroundModel(), False, stopwatch_ns),
+        TRAJECTORIES: lambda: CameraMethod(Trajectories(), False, stopwatch_ns),
+        TRACKING: lambda: TrackingMethod(stopwatch_ns),
+        LOW_RANK: lambda: CameraMethod(LowRank(), False, stopwatch_ns),
+        DENSE_FLOW: lambda: CameraMethod(DenseFlow(), False, stopwatch_ns),
     }
     return {name: makers[name]() for name in names}
 

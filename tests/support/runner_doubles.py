@@ -1,4 +1,4 @@
-"""Stand-ins for what the runners step: they note what they are given."""
+"""Test doubles of what the runners step; they record what they are given."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def control_step(now_ns: int, scene_ns: int | None, decision: Decision = KEEP) -
     return ControlStep(now_ns, ORIGIN, 0.0, 0.0, scene_ns, decision, setpoint, chassis_state(now_ns))
 
 
-class NotingDrive:
+class RecordingDrive:
     """Finishes after a number of steps, or one step after it was asked to stop."""
 
     def __init__(self, steps: int) -> None:
-        self._left = steps
+        self._steps_left = steps
         self.seen: list[tuple[int, int | None]] = []
         self.stop_reasons: list[str] = []
         self.endings: list[Outcome] = []
@@ -35,23 +35,23 @@ class NotingDrive:
     @property
     def finished(self) -> bool:
         """No steps left."""
-        return self._left <= 0
+        return self._steps_left <= 0
 
     def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
         """Note the reason; one more step."""
         self.endings.append(outcome)
         self.stop_reasons.append(reason)
-        self._left = min(self._left, 1)
+        self._steps_left = min(self._steps_left, 1)
 
     def step(self, seen: Scene | None, now_ns: int) -> ControlStep:
         """Note which scene was known when."""
-        self._left -= 1
+        self._steps_left -= 1
         sequence = None if seen is None else seen.sequence
         self.seen.append((now_ns, sequence))
         return control_step(now_ns, None if seen is None else seen.captured_ns)
 
 
-class TickingCamera:
+class PeriodicCamera:
     """Exposes every period_ns from 0 on."""
 
     def __init__(self, period_ns: int) -> None:
@@ -70,7 +70,7 @@ class TickingCamera:
         return taken
 
 
-class PlainEyes:
+class EmptyScenePerceiver:
     """Sees an empty scene in every frame."""
 
     def look(self, taken: RgbdFrame) -> Look:
@@ -80,7 +80,7 @@ class PlainEyes:
         )
 
 
-class NotingOutside:
+class RecordingOutside:
     """Notes how far it was moved on."""
 
     def __init__(self) -> None:

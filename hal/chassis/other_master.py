@@ -18,25 +18,25 @@ HOST_FRAMES: Mapping[int, str] = MappingProxyType(
 )
 
 # The bus counts as free again this long after the last such frame. The base stops half a second after it.
-_GONE_NS = NS_PER_S
+_CLEAR_AFTER_NS = NS_PER_S
 
 
-class BusRival:
+class OtherMaster:
     """sentence: "" while nobody else commands the base."""
 
     def __init__(self) -> None:
         self.sentence = ""
-        self._heard_ns: int | None = None
+        self._last_frame_ns: int | None = None
 
-    def hear(self, arbitration_id: int, now_ns: int) -> None:
-        """A frame of a host came. The first kind of it is told until the bus is free again."""
-        self._heard_ns = now_ns
+    def note_frame(self, arbitration_id: int, now_ns: int) -> None:
+        """A frame of another host came. The first kind is reported until the bus is free again."""
+        self._last_frame_ns = now_ns
         self.sentence = self.sentence or (
             f"somebody else sends {HOST_FRAMES[arbitration_id]} (0x{arbitration_id:X}) on this bus; stop the "
             "other program or computer first: a base has one master"
         )
 
     def step(self, now_ns: int) -> None:
-        """The time goes on."""
-        if self._heard_ns is not None and now_ns - self._heard_ns > _GONE_NS:
-            self.sentence, self._heard_ns = "", None
+        """Forget the other master once the bus has been free of its frames for long enough."""
+        if self._last_frame_ns is not None and now_ns - self._last_frame_ns > _CLEAR_AFTER_NS:
+            self.sentence, self._last_frame_ns = "", None

@@ -12,10 +12,10 @@ from pathlib import Path
 from config.loader import CONFIG_DIR
 
 ROOT = CONFIG_DIR.parent
-PROGRAM = ("config", "controller", "hal", "sim", "vision")
+PACKAGES = ("config", "controller", "hal", "sim", "vision")
 # What is compiled (hal/compiled.py) is copied, too: it is of the text, and making it anew takes minutes. Not
 # what is just being written.
-LEFT_OUT = shutil.ignore_patterns("*.pyc", "*.tmp.*")
+IGNORED = shutil.ignore_patterns("*.pyc", "*.tmp.*")
 
 
 class Page:
@@ -40,33 +40,35 @@ class Page:
         """What it quotes of this pattern, sorted, each once."""
         return sorted({word for word in self.quoted if re.fullmatch(pattern, word)})
 
-    def paste(self, project: Path, folders: tuple[str, ...] = PROGRAM) -> None:
+    def paste(self, project: Path, folders: tuple[str, ...] = PACKAGES) -> None:
         """A copy of these folders into project, with all that the page says in it."""
         for folder in folders:
-            shutil.copytree(ROOT / folder, project / folder, ignore=LEFT_OUT)
+            shutil.copytree(ROOT / folder, project / folder, ignore=IGNORED)
         shutil.copy(ROOT / "pyproject.toml", project)
         for name, text in self.files:
             assert not (project / name).exists(), name
             (project / name).write_text(text, encoding="utf-8")
         for name, change in self.changes:
             path = project / name
-            where = f"{self.name}: {name}"
-            path.write_text(changed(path.read_text(encoding="utf-8"), change, where), encoding="utf-8")
+            location = f"{self.name}: {name}"
+            path.write_text(changed(path.read_text(encoding="utf-8"), change, location), encoding="utf-8")
         _sort_imports(project, [name for name, _ in self.changes])
 
 
-def changed(text: str, change: str, where: str) -> str:
+def changed(text: str, change: str, location: str) -> str:
     """text with the lines of a change: + comes in, - goes, and the others are found in this order.
 
     Raises LookupError for a line that is not in text; where: the page and the file, to say so.
     """
-    lines, at = text.splitlines(), 0
+    lines, position = text.splitlines(), 0
 
-    def find(line: str, begin: int) -> int:
+    def find(line: str, start: int) -> int:
         try:
-            return lines.index(line, begin)
+            return lines.index(line, start)
         except ValueError:
-            raise LookupError(f"{where}: this line has changed, change it on the page too: {line}") from None
+            raise LookupError(
+                f"{location}: this line has changed, change it on the page too: {line}"
+            ) from None
 
     for index, line in enumerate(change.splitlines()):
         mark, content = line[:1], line[1:]
@@ -74,22 +76,22 @@ def changed(text: str, change: str, where: str) -> str:
             if index == 0:
                 # What comes before the first line that is found goes right before it.
                 first = next(line[1:] for line in change.splitlines() if line[:1] in "- ")
-                at = find(first, 0)
-            lines.insert(at, content)
-            at += 1
+                position = find(first, 0)
+            lines.insert(position, content)
+            position += 1
             continue
-        at = find(content, at)
+        position = find(content, position)
         if mark == "-":
-            del lines[at]
+            del lines[position]
         else:
-            at += 1
+            position += 1
     return "\n".join(lines) + "\n"
 
 
 def _sort_imports(project: Path, names: list[str]) -> None:
     """A page says below which import its own goes, and whoever has added a kind may have one between them."""
-    done = python_in(project, "-m", "ruff", "check", "--no-cache", "--select", "I", "--fix", *names)
-    assert done.returncode == 0, done.stdout + done.stderr
+    result = python_in(project, "-m", "ruff", "check", "--no-cache", "--select", "I", "--fix", *names)
+    assert result.returncode == 0, result.stdout + result.stderr
 
 
 def python_in(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -105,8 +107,8 @@ def python_in(project: Path, *arguments: str) -> subprocess.CompletedProcess[str
     )
 
 
-def complaints_of_ruff(project: Path) -> str:
+def ruff_findings(project: Path) -> str:
     """What ruff says about the code and the format of a pasted project; nothing if all is well."""
     checks = [("check", "--no-cache", "."), ("format", "--no-cache", "--check", ".")]
-    told = [python_in(project, "-m", "ruff", *check) for check in checks]
-    return "".join(done.stdout + done.stderr for done in told if done.returncode != 0)
+    results = [python_in(project, "-m", "ruff", *check) for check in checks]
+    return "".join(result.stdout + result.stderr for result in results if result.returncode != 0)

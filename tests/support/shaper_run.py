@@ -21,10 +21,10 @@ class Run:
 
     def step(self, target: float = 1.5, emergency: bool = False) -> ShapedSpeed:
         command = self.shaper.step(target, emergency=emergency, distance_to_end_m=self.length_m - self.x_m)
-        share = 1.0 - math.exp(-PERIOD_S / self.lag_s) if self.lag_s else 1.0
-        following = self.v_mps + share * (self.gain * command.v_mps - self.v_mps)
-        self.x_m += 0.5 * (self.v_mps + following) * PERIOD_S
-        self.v_mps = following
+        gain = 1.0 - math.exp(-PERIOD_S / self.lag_s) if self.lag_s else 1.0
+        next_mps = self.v_mps + gain * (self.gain * command.v_mps - self.v_mps)
+        self.x_m += 0.5 * (self.v_mps + next_mps) * PERIOD_S
+        self.v_mps = next_mps
         self.time_s += PERIOD_S
         self.commands.append(command)
         return command

@@ -17,21 +17,21 @@ from vision.scene import Obstacle
 # Without a mount the top view is the camera's own: level, standing at the origin.
 LEVEL_CAMERA = CameraMount(0.0, 0.0, 0.0, 0.0)
 # A surface seen edge-on, or one whose size is not known, is still drawn.
-_SMALLEST_M = 0.12
+_MIN_EXTENT_M = 0.12
 # Nearer than this, a projection would fill the image and be useless.
-_NEAREST_PROJECTED_M = 0.1
+_MIN_PROJECTION_M = 0.1
 _CORNERS: FloatArray = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class SeenObstacle:
     """An obstacle on the floor of the body frame.
 
     centre_m, velocity_mps: (2,), forward and left.
     velocity_cov: (2, 2).
     corners_m: (4, 2), its visible surface from above.
     distance_m: from the camera, along the floor.
-    decides: the decision is based on it.
+    is_deciding: the decision is based on it.
     """
 
     obstacle: Obstacle
@@ -40,7 +40,7 @@ class Seen:
     velocity_mps: FloatArray
     velocity_cov: FloatArray
     distance_m: float
-    decides: bool
+    is_deciding: bool
 
     @property
     def colour(self) -> Colour:
@@ -66,7 +66,7 @@ class Seen:
         if not self.predicted:
             return np.reshape(self.obstacle.bbox_px, (2, 2))
         centre_m, z = self.obstacle.position_m[:2], self.obstacle.position_m[2]
-        if not z > _NEAREST_PROJECTED_M:
+        if not z > _MIN_PROJECTION_M:
             return np.full((2, 2), np.nan)
         half_m = 0.5 * self.obstacle.extent_m[:2]
         corners_m = np.stack([centre_m - half_m, centre_m + half_m])
@@ -82,10 +82,10 @@ class Seen:
 
     def label(self, words: str, box: FloatArray) -> Label:
         """A label with these words beside box, in the style of this obstacle."""
-        return Label(words, self.colour, box, filled=self.obstacle.moving, outlined=self.decides)
+        return Label(words, self.colour, box, filled=self.obstacle.moving, outlined=self.is_deciding)
 
 
-def seen_obstacles(moment: VideoMoment) -> list[Seen]:
+def seen_obstacles(moment: VideoMoment) -> list[SeenObstacle]:
     """The obstacles with a known position, in the order in which their labels get room."""
     camera = camera_in_body(moment.mount or LEVEL_CAMERA)
     deciding_id = None if moment.decision is None else moment.decision.reason.obstacle_id
@@ -94,20 +94,27 @@ def seen_obstacles(moment: VideoMoment) -> list[Seen]:
         if not np.isfinite(obstacle.position_m).all():
             continue
         centre_m = camera.apply(obstacle.position_m[np.newaxis])[0, :2]
-        half_m = 0.5 * np.fmax(obstacle.extent_m[[2, 0]], _SMALLEST_M)
+        half_m = 0.5 * np.fmax(obstacle.extent_m[[2, 0]], _MIN_EXTENT_M)
         in_body = camera.rotation[:2]
         seen.append(
-            Seen(
+            SeenObstacle(
                 obstacle=obstacle,
                 centre_m=centre_m,
                 corners_m=centre_m + _CORNERS * half_m,
                 velocity_mps=in_body @ _known(obstacle.velocity_mps),
                 velocity_cov=in_body @ _known(obstacle.velocity_cov) @ in_body.T,
                 distance_m=math.hypot(*(centre_m - camera.translation_m[:2])),
-                decides=obstacle.id == deciding_id,
+                is_deciding=obstacle.id == deciding_id,
             )
         )
-    return sorted(seen, key=lambda one: (not one.decides, not one.obstacle.moving, one.distance_m))
+    return sorted(
+        seen,
+        key=lambda seen_obstacle: (
+            not seen_obstacle.is_deciding,
+            not seen_obstacle.obstacle.moving,
+            seen_obstacle.distance_m,
+        ),
+    )
 
 
 def _known(values: FloatArray) -> FloatArray:

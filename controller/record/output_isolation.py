@@ -1,4 +1,4 @@
-"""Outputs of a drive in real time fail apart from each other, and from the drive."""
+"""Isolates the outputs of a real-time drive: the failure of one affects neither the others nor the drive."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from hal.errors import HalError
 Output = TypeVar("Output")
 
 
-class Apart:
-    """What becomes of a failure to write.
+class OutputIsolation:
+    """Handles a failure to write.
 
-    cut_off: told once of each output that ends, with the reason; what else it is given is not written, and
-    everything else goes on. None: the failure ends the run, as where nothing moves by itself.
+    cut_off: called once for each output that fails, with the reason. Nothing more is written to that output,
+    and everything else goes on. None: the failure ends the run, as in simulations and replays.
     """
 
     def __init__(self, cut_off: Callable[[str], None] | None = None) -> None:
         self._cut_off = cut_off
         self._ended: set[int] = set()
 
-    def goes_on(self, output: object) -> bool:
-        """It is wanted and has not failed."""
+    def is_active(self, output: object) -> bool:
+        """Whether the output exists and has not failed."""
         return output is not None and id(output) not in self._ended
 
     @contextmanager
-    def attempt(self, output: object) -> Iterator[None]:
-        """To write to this output, or to close it."""
+    def guard(self, output: object) -> Iterator[None]:
+        """Inside the block, a failure of this output is handled."""
         try:
             yield
         except (UserError, HalError) as failure:
             if self._cut_off is None:
                 raise
-            if self.goes_on(output):
+            if self.is_active(output):
                 self._ended.add(id(output))
                 self._cut_off(str(failure))
 
     @contextmanager
-    def closing(self, files: AbstractContextManager[Output]) -> Iterator[Output]:
-        """The output is open in the block. Raises UserError, HalError where it cannot be opened."""
+    def open(self, files: AbstractContextManager[Output]) -> Iterator[Output]:
+        """The output is open inside the block. Raises UserError, HalError if it cannot be opened."""
         if self._cut_off is None:
             with files as output:
                 yield output
@@ -50,6 +50,6 @@ class Apart:
         try:
             yield output
         finally:
-            # Without the error that ends the block: it would have a failure printed, and not told.
-            with self.attempt(output):
+            # Without the error that ends the block: with it, a failure would be printed instead of reported.
+            with self.guard(output):
                 files.__exit__(None, None, None)

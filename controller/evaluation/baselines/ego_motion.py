@@ -12,10 +12,10 @@ from hal.types import FloatArray, Intrinsics, Pose
 Points = NDArray[np.float32]
 
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.01)
-_BACK_PX = 1.0  # greatest error of the forward-backward check
+_MAX_FORWARD_BACKWARD_PX = 1.0  # greatest error of the forward-backward check
 _MIN_POINTS = 8
 _SEED = 20200127
-_APART_PX = 7  # least distance of two corners
+_MIN_CORNER_DISTANCE_PX = 7  # least distance of two corners
 
 
 def seed_ransac() -> None:
@@ -23,34 +23,34 @@ def seed_ransac() -> None:
     cv2.setRNGSeed(_SEED)
 
 
-def corners(grey: Mask, count: int, taken: Points | None = None) -> Points:
+def corners(grey: Mask, count: int, existing: Points | None = None) -> Points:
     """(N, 2) corners (good features to track), at most count; none near the points in taken."""
     mask = None
-    if taken is not None and len(taken):
+    if existing is not None and len(existing):
         mask = np.full(grey.shape, 255, np.uint8)
-        for u, v in np.rint(taken).astype(int):
-            cv2.circle(mask, (int(u), int(v)), _APART_PX, 0, -1)
-    found: object = cv2.goodFeaturesToTrack(grey, count, 0.01, _APART_PX, mask=mask)
+        for u, v in np.rint(existing).astype(int):
+            cv2.circle(mask, (int(u), int(v)), _MIN_CORNER_DISTANCE_PX, 0, -1)
+    found: object = cv2.goodFeaturesToTrack(grey, count, 0.01, _MIN_CORNER_DISTANCE_PX, mask=mask)
     return np.empty((0, 2), np.float32) if found is None else np.asarray(found, np.float32).reshape(-1, 2)
 
 
-def follow(before: Mask, now: Mask, points: Points) -> tuple[Points, NDArray[np.bool_]]:
+def track_points(before: Mask, now: Mask, points: Points) -> tuple[Points, NDArray[np.bool_]]:
     """Track points by pyramidal Lucas-Kanade with a forward-backward check: (N, 2), and found (N,)."""
     if len(points) == 0:
         return points, np.empty(0, np.bool_)
     shaped = points.reshape(-1, 1, 2)
     options = {"winSize": (15, 15), "maxLevel": 3, "criteria": _CRITERIA}
-    there, there_ok, _ = cv2.calcOpticalFlowPyrLK(before, now, shaped, None, **options)  # type: ignore[call-overload]  # the stub lacks None
-    back, back_ok, _ = cv2.calcOpticalFlowPyrLK(now, before, there, None, **options)  # type: ignore[call-overload]  # the stub lacks None
-    close = np.hypot(*(back.reshape(-1, 2) - points).T) <= _BACK_PX
-    found = (there_ok.ravel() == 1) & (back_ok.ravel() == 1) & close
-    return np.asarray(there, np.float32).reshape(-1, 2), found
+    tracked, tracked_ok, _ = cv2.calcOpticalFlowPyrLK(before, now, shaped, None, **options)  # type: ignore[call-overload]  # the stub lacks None
+    back, back_ok, _ = cv2.calcOpticalFlowPyrLK(now, before, tracked, None, **options)  # type: ignore[call-overload]  # the stub lacks None
+    close = np.hypot(*(back.reshape(-1, 2) - points).T) <= _MAX_FORWARD_BACKWARD_PX
+    found = (tracked_ok.ravel() == 1) & (back_ok.ravel() == 1) & close
+    return np.asarray(tracked, np.float32).reshape(-1, 2), found
 
 
 def homography(before: Mask, now: Mask) -> FloatArray | None:
     """(3, 3) from the previous image to the current one, by RANSAC over tracked corners; None if it fails."""
     start = corners(before, 300)
-    end, found = follow(before, now, start)
+    end, found = track_points(before, now, start)
     if np.count_nonzero(found) < _MIN_POINTS:
         return None
     matrix: object = cv2.findHomography(start[found], end[found], cv2.RANSAC, 2.0)[0]
@@ -82,18 +82,25 @@ def rigid_motion(points_m: FloatArray, pixels: Points, k: Intrinsics, tolerance_
     if len(points_m) < _MIN_POINTS:
         return None
     matrix = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
-    ok, turn, way, found = cv2.solvePnPRansac(
+    ok, rotation, translation, found = cv2.solvePnPRansac(
         points_m, pixels.astype(np.float64), matrix, None,
         iterationsCount=100, reprojectionError=tolerance_px, flags=cv2.SOLVEPNP_EPNP,
     )  # fmt: skip
     inliers: object = found
     if not ok or inliers is None or len(found) < _MIN_POINTS:
         return None
-    agree = np.asarray(found).ravel()
-    turn, way = cv2.solvePnPRefineLM(
-        points_m[agree], pixels[agree].astype(np.float64), matrix, np.zeros(4), turn, way
+    inlier_index = np.asarray(found).ravel()
+    rotation, translation = cv2.solvePnPRefineLM(
+        points_m[inlier_index],
+        pixels[inlier_index].astype(np.float64),
+        matrix,
+        np.zeros(4),
+        rotation,
+        translation,
     )
-    return Pose(np.asarray(cv2.Rodrigues(turn)[0], np.float64), np.asarray(way, np.float64).ravel())
+    return Pose(
+        np.asarray(cv2.Rodrigues(rotation)[0], np.float64), np.asarray(translation, np.float64).ravel()
+    )
 
 
 def project(points_m: FloatArray, k: Intrinsics) -> FloatArray:

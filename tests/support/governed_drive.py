@@ -16,7 +16,7 @@ from controller.governor.request import Twist
 from hal.clocks import NS_PER_S
 from hal.geometry import advance_pose
 from hal.types import PlanarPose
-from tests.support.closed_loop import FRAME_S, LATENCY_S, MOUNT, PERIOD_S, Mission, Noise, Thing, straight
+from tests.support.closed_loop import FRAME_S, LATENCY_S, MOUNT, PERIOD_S, Box, Mission, Noise, straight
 from vision.scene import Scene
 
 Planner = Callable[[float], Twist | None]
@@ -43,7 +43,7 @@ class GovernedDrive:
     def __init__(
         self,
         planner: Planner,
-        things: list[Thing] | None = None,
+        boxes: list[Box] | None = None,
         alter: Callable[[Scene, float], Scene | None] | None = None,
         noise: Noise | None = None,
         lag_s: float = 0.1,
@@ -56,13 +56,13 @@ class GovernedDrive:
         self.governor = SpeedGovernor(
             config or GovernorConfig(), decision or DecisionConfig(), self.robot, MOUNT, PERIOD_S
         )
-        self._eyes = Mission(straight(1.0), things or [], noise)
+        self._camera_model = Mission(straight(1.0), boxes or [], noise)
         self._lag_s, self._yaw_ratio = lag_s, yaw_ratio
         self.pose = PlanarPose(0.0, 0.0, 0.0)
         self.t_s, self.v_mps, self.w_radps = 0.0, 0.0, 0.0
         self.steps: list[Step] = []
         self._frames = 0
-        self._on_way: deque[tuple[float, Scene]] = deque()
+        self._in_transit: deque[tuple[float, Scene]] = deque()
         self.scene: Scene | None = None
 
     def run(self, until_s: float) -> list[Step]:
@@ -71,41 +71,41 @@ class GovernedDrive:
         return self.steps
 
     def step(self) -> None:
-        eyes = self._eyes
-        eyes.pose, eyes.t = self.pose, self.t_s
+        camera = self._camera_model
+        camera.pose, camera.t = self.pose, self.t_s
         if self.t_s >= self._frames * FRAME_S - 1e-9:
             self._frames += 1
-            eyes._frames = self._frames
-            scene: Scene | None = eyes.look()
+            camera._frames = self._frames
+            scene: Scene | None = camera.look()
             if self.alter is not None and scene is not None:
                 scene = self.alter(scene, self.t_s)
             if scene is not None:
-                self._on_way.append((self.t_s + LATENCY_S, scene))
-        while self._on_way and self._on_way[0][0] <= self.t_s:
-            self.scene = self._on_way.popleft()[1]
+                self._in_transit.append((self.t_s + LATENCY_S, scene))
+        while self._in_transit and self._in_transit[0][0] <= self.t_s:
+            self.scene = self._in_transit.popleft()[1]
         requested = self.planner(self.t_s)
         governed = self.governor.step(
             round(self.t_s * NS_PER_S), self.scene, requested, self.pose, self.v_mps
         )
-        share = 1.0 - math.exp(-PERIOD_S / self._lag_s)
-        self.v_mps += share * (governed.v_mps - self.v_mps)
-        self.w_radps += share * (governed.w_radps - self.w_radps)
+        gain = 1.0 - math.exp(-PERIOD_S / self._lag_s)
+        self.v_mps += gain * (governed.v_mps - self.v_mps)
+        self.w_radps += gain * (governed.w_radps - self.w_radps)
         self.pose = advance_pose(self.pose, self.v_mps, self._yaw_ratio * self.w_radps, PERIOD_S)
-        eyes.pose = self.pose
-        self.steps.append(Step(self.t_s, requested, governed, self.pose, eyes.clearance()))
+        camera.pose = self.pose
+        self.steps.append(Step(self.t_s, requested, governed, self.pose, camera.clearance()))
         self.t_s += PERIOD_S
 
 
 def rules(steps: list[Step]) -> list[str]:
     """Each rule once, in the order in which it held."""
-    return [rule for rule, _ in itertools.groupby(one.governed.decision.reason.rule for one in steps)]
+    return [rule for rule, _ in itertools.groupby(step.governed.decision.reason.rule for step in steps)]
 
 
-def sentence_at_the_end(steps: list[Step]) -> str:
+def last_sentence(steps: list[Step]) -> str:
     """Why it does what it does then."""
     return steps[-1].governed.decision.reason.sentence
 
 
 def after(steps: list[Step], t_s: float) -> list[Step]:
     """From t_s on."""
-    return [one for one in steps if one.t_s >= t_s - 1e-9]
+    return [step for step in steps if step.t_s >= t_s - 1e-9]

@@ -26,6 +26,6 @@ def decision(
 
 def free_speed(path: Path, on_path: OnPath, limits: Limits) -> float:
     """The speed that the path and its end allow without obstacles: the same for all policies."""
-    left_m = max(path.length_m - on_path.s_m, 0.0) + 0.02
-    end_mps = braking.speed_for_distance(left_m, braking.comfort(limits))
+    remaining_m = max(path.length_m - on_path.s_m, 0.0) + 0.02
+    end_mps = braking.speed_for_distance(remaining_m, braking.comfort(limits))
     return min(path.speed_limit(on_path.s_m), limits.max_speed_mps, end_mps)

@@ -7,22 +7,24 @@ import math
 import numpy as np
 
 from controller.campaign.contacts import Contact
-from controller.campaign.drive import DriveLog
+from controller.campaign.drive_log import DriveLog
 from controller.campaign.stage import Stage
-from controller.campaign.view import PlanarEye
+from controller.campaign.view import PlanarCamera
 from controller.profile import SpeedRamps
 from hal.types import FloatArray, PlanarPose
 from sim.planar import overlap
 
 AT_FAULT_MPS = 0.02
-_SIGHT_STEPS = 5
+_STEPS_PER_LOOK = 5
 _SEEN_MOVING_MPS = 0.1
-_AVOIDING_S = 15.0
+_HORIZON_S = 15.0
 # The reference driver brakes hard after this time without a new image.
-_PATIENCE_S = 0.6
+_BLIND_TIMEOUT_S = 0.6
 
 
-def at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reaction_s: float) -> bool:
+def at_fault(
+    contact: Contact, stage: Stage, log: DriveLog, planar_camera: PlanarCamera, reaction_s: float
+) -> bool:
     """Whether the robot moved at the contact, and a reference driver avoids the contact.
 
     The reference driver has the same field of view, reaction_s and limits. It knows the whole motion of a
@@ -37,52 +39,52 @@ def at_fault(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye, reac
     hard = (limits.emergency_decel_mps2, limits.emergency_jerk_mps3)
     blind_s = stage.case.faults.blind_since(contact.t_s, reaction_s)
     if blind_s is not None:
-        last, waits_s = int(np.searchsorted(log.times_s, blind_s)), _PATIENCE_S + reaction_s
-        if not _touches(contact.body, stage, log, last, waits_s, 0.0, *hard):
+        last, delay_s = int(np.searchsorted(log.times_s, blind_s)), _BLIND_TIMEOUT_S + reaction_s
+        if not _would_touch(contact.body, stage, log, last, delay_s, 0.0, *hard):
             return True  # It drove on blind.
-    seen = _first_seen(contact, stage, log, eye)
+    seen = _first_seen(contact, stage, log, planar_camera)
     if seen is None:
         return False
     reaction_s += stage.case.faults.late_by(log.times_s[seen])
-    choices = ((0.0, *hard), (0.0, *soft), (log.v_mps[seen], *soft), (limits.max_speed_mps, *soft))
+    manoeuvres = ((0.0, *hard), (0.0, *soft), (log.v_mps[seen], *soft), (limits.max_speed_mps, *soft))
     return not all(
-        _touches(contact.body, stage, log, seen, reaction_s, target, accel, jerk)
-        for target, accel, jerk in choices
+        _would_touch(contact.body, stage, log, seen, reaction_s, target, accel, jerk)
+        for target, accel, jerk in manoeuvres
     )
 
 
-def _first_seen(contact: Contact, stage: Stage, log: DriveLog, eye: PlanarEye) -> int | None:
+def _first_seen(contact: Contact, stage: Stage, log: DriveLog, planar_camera: PlanarCamera) -> int | None:
     """The step at which the motion of the touched body could first be seen; None: not before the contact.
 
     Two looks are needed, 0.1 s apart. If a mover stands still in between, this starts anew once it moves
     again, because its next motion cannot be seen while it stands.
     """
-    body, first, before = contact.body, None, None
+    body, first, previous = contact.body, None, None
     moves = bool(stage.world.moves[body])
-    stage.world.foresee(np.array(log.times_s[::_SIGHT_STEPS]))
-    for k in range(0, len(log.times_s), _SIGHT_STEPS):
+    stage.world.precompute(np.array(log.times_s[::_STEPS_PER_LOOK]))
+    for k in range(0, len(log.times_s), _STEPS_PER_LOOK):
         if log.times_s[k] >= contact.t_s:
             break
-        polygons, velocity = stage.world.look(log.times_s[k])
+        polygons, velocity = stage.world.snapshot(log.times_s[k])
         if moves and math.hypot(*velocity[body]) < _SEEN_MOVING_MPS:
-            first = before = None
+            first = previous = None
             continue
         if stage.case.faults.blind_since(log.times_s[k]) is not None:
-            before = None
+            previous = None
             continue
         if first is None:
-            seen = _in_view(body, polygons, PlanarPose(*log.poses[k]), eye)
-            first, before = (before if seen else None), (k if seen else None)
+            seen = _in_view(body, polygons, PlanarPose(*log.poses[k]), planar_camera)
+            first, previous = (previous if seen else None), (k if seen else None)
     return first
 
 
-def _in_view(body: int, polygons: FloatArray, pose: PlanarPose, eye: PlanarEye) -> bool:
-    view = eye.look(polygons, pose)
+def _in_view(body: int, polygons: FloatArray, pose: PlanarPose, planar_camera: PlanarCamera) -> bool:
+    view = planar_camera.look(polygons, pose)
     row = np.flatnonzero(view.bodies == body)
     return bool(len(row) and np.isfinite(view.forward_m[row[0]]).any())
 
 
-def _touches(
+def _would_touch(
     body: int,
     stage: Stage,
     log: DriveLog,
@@ -94,24 +96,24 @@ def _touches(
 ) -> bool:
     """Whether a robot that changes its speed to target_mps, reaction_s after step start, touches the body. It
     starts with the speed and acceleration of the real robot: an accelerating robot needs longer to brake."""
-    earlier = max(start - _SIGHT_STEPS, 0)
-    since_s = log.times_s[start] - log.times_s[earlier]
+    earlier = max(start - _STEPS_PER_LOOK, 0)
+    elapsed_s = log.times_s[start] - log.times_s[earlier]
     gain_mps = log.v_mps[start] - log.v_mps[earlier]
-    t = np.arange(0.0, _AVOIDING_S, 0.02)
+    t = np.arange(0.0, _HORIZON_S, 0.02)
     ramp = SpeedRamps(
         log.v_mps[start],
-        gain_mps / since_s if since_s > 0.0 else 0.0,
+        gain_mps / elapsed_s if elapsed_s > 0.0 else 0.0,
         np.array([target_mps]),
         accel_mps2=accel_mps2,
         decel_mps2=accel_mps2,
         jerk_mps3=jerk_mps3,
         latency_s=reaction_s,
     )
-    way, speed, _ = ramp.state(t[None])
-    s = log.s_m[start] + way[0]
+    travel, speed, _ = ramp.state(t[None])
+    s = log.s_m[start] + travel[0]
     moving = (speed[0] > AT_FAULT_MPS) & (s <= stage.path.length_m)
     if not moving.any():
         return False
     poses = stage.path_poses(s[moving])
-    polygons = stage.world.over(log.times_s[start] + t[moving], body)
-    return bool(overlap(stage.robots(poses), polygons).any())
+    polygons = stage.world.sample(log.times_s[start] + t[moving], body)
+    return bool(overlap(stage.robot_polygons(poses), polygons).any())

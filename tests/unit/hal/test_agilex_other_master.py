@@ -34,10 +34,10 @@ RIVALS: dict[str, AgilexMessage] = {
 def test_who_hears_another_master_refuses_to_arm_and_does_not_say_a_word(sentence: str) -> None:
     """A zero or a standby would stop a drive that is somebody else's."""
     bench = Bench()
-    bench.say(state(CAN), MotionFeedback(0.4, 0.0), RIVALS[sentence])
+    bench.deliver(state(CAN), MotionFeedback(0.4, 0.0), RIVALS[sentence])
     bench.chassis.arm(bench.now_ns)
     for _ in range(3):
-        bench.say(state(CAN), MotionFeedback(0.4, 0.0), RIVALS[sentence])
+        bench.deliver(state(CAN), MotionFeedback(0.4, 0.0), RIVALS[sentence])
         seen = bench.exchange(0.0)
         assert seen.mode is ChassisMode.ESTOP
         assert seen.sent is None
@@ -52,7 +52,7 @@ def test_another_master_latches_a_drive_which_ends_with_zero_and_standby(sentenc
     bench = Bench()
     bench.arm()
     assert bench.exchange(0.3).mode is ChassisMode.ARMED
-    bench.say(state(CAN), MotionFeedback(0.3, 0.0), RIVALS[sentence])
+    bench.deliver(state(CAN), MotionFeedback(0.3, 0.0), RIVALS[sentence])
     seen = bench.exchange(0.3)
     assert seen.mode is ChassisMode.ESTOP
     assert sentence in seen.reason
@@ -71,10 +71,10 @@ def test_a_frame_of_any_length_counts() -> None:
 def test_once_the_bus_is_free_for_a_second_a_person_may_arm() -> None:
     bench = Bench()
     bench.arm()
-    bench.say(MotionCommand(0.0, 0.0))
+    bench.deliver(MotionCommand(0.0, 0.0))
     bench.exchange(0.0)
     for k in range(60):
-        bench.say(state(CAN), MotionFeedback(0.0, 0.0))
+        bench.deliver(state(CAN), MotionFeedback(0.0, 0.0))
         seen = bench.exchange(0.0)
         assert seen.mode is ChassisMode.ESTOP
         assert ("arm again" in seen.reason) == (k >= 50), f"heard {20 * (k + 1)} ms ago"

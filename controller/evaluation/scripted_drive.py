@@ -50,11 +50,13 @@ class ScriptedDrive:
         steps = math.ceil(duration_s / _STEP_S) + 1
         origin = PlanarPose(0.0, 0.0, 0.0)
         self._true = [origin]
-        self._told = [origin]
+        self._odometry = [origin]
         for step in range(steps):
             v_mps, w_radps = self.twist((step + 0.5) * _STEP_S)
             self._true.append(advance_pose(self._true[-1], v_mps, w_radps, _STEP_S))
-            self._told.append(advance_pose(self._told[-1], *self._believed(v_mps, w_radps), _STEP_S))
+            self._odometry.append(
+                advance_pose(self._odometry[-1], *self._measured_twist(v_mps, w_radps), _STEP_S)
+            )
 
     def twist(self, t_s: float) -> tuple[float, float]:
         """True speed in m/s and yaw rate in rad/s."""
@@ -62,21 +64,21 @@ class ScriptedDrive:
 
     def pose(self, t_s: float) -> PlanarPose:
         """The robot's true pose."""
-        return self._at(self._true, t_s, self.twist(t_s))
+        return self._interpolate(self._true, t_s, self.twist(t_s))
 
     def odometry(self, t_s: float) -> PlanarPose:
         """The robot's pose by odometry."""
-        return self._at(self._told, t_s, self._believed(*self.twist(t_s)))
+        return self._interpolate(self._odometry, t_s, self._measured_twist(*self.twist(t_s)))
 
     def odometry_camera(self, stamp_ns: int) -> Pose:
         """The camera's pose by dead reckoning, which does not contain the vibration."""
         return camera_in_floor(self.odometry(stamp_ns / NS_PER_S), MOUNT)
 
-    def _believed(self, v_mps: float, w_radps: float) -> tuple[float, float]:
+    def _measured_twist(self, v_mps: float, w_radps: float) -> tuple[float, float]:
         error = self._error
         return v_mps * error.distance_ratio, w_radps * error.yaw_ratio + error.drift_radps
 
     @staticmethod
-    def _at(poses: list[PlanarPose], t_s: float, twist: tuple[float, float]) -> PlanarPose:
+    def _interpolate(poses: list[PlanarPose], t_s: float, twist: tuple[float, float]) -> PlanarPose:
         index = min(int(t_s / _STEP_S), len(poses) - 1)
         return advance_pose(poses[index], *twist, t_s - index * _STEP_S)
