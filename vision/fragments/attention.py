@@ -18,7 +18,7 @@ from hal.compiled import compiled
 from hal.types import FloatArray, RgbdFrame
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.tracks import Tracks
-from vision.depth.depth_mask import SurfaceDepth
+from vision.depth.depth_mask import SurfaceDepth, surface_depth
 from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.fragments.candidates import (
@@ -29,6 +29,7 @@ from vision.fragments.candidates import (
     on_one_surface,
     trackable_segments,
 )
+from vision.fragments.corners import corners, pairs
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
@@ -172,6 +173,19 @@ class Attention:
         ends, tensor = trackable_segments(grey, longest_px, ends_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE)
         surface = depth_along(ends, frame, self._config)
         picked = self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]).nonzero()[0]
+        if len(picked) < _AT_ONCE:
+            depth_m, gate_m = bodies.depth_m[one], bodies.gate_m[one]
+            near, far = max((depth_m - gate_m) / frame.depth_scale_m, 1.0), (depth_m + gate_m) / frame.depth_scale_m
+            points = corners(grey[top:bottom, left:right], frame.depth[top:bottom, left:right], near, far)
+            points += np.array((left, top), np.float32)
+            at = surface_depth(frame.depth, frame.depth_scale_m, points, self._config.min_depth_m, self._config.max_depth_m, self._config.depth_noise)
+            good = (np.abs(at.near_m - depth_m) <= gate_m) & (at.far_m - at.near_m <= _ONE_SURFACE * gate_m) & (at.holes <= _HOLES)
+            more = pairs(points[good])
+            both_px = np.concatenate((ends_px, ends[picked]))
+            ends2, tensor2 = trackable_segments(grey, more, both_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE)
+            ends, tensor = np.concatenate((ends[picked], ends2)), np.concatenate((tensor[picked], tensor2))
+            surface = depth_along(ends, frame, self._config)
+            picked = self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]).nonzero()[0]
         return new_fragments(picked[: min(room, _AT_ONCE)], ends, tensor, surface, settings)
 
     def _on_it(self, surface: SurfaceDepth, depth_m: float, gate_m: float) -> NDArray[np.bool_]:
