@@ -18,17 +18,19 @@ from hal.compiled import compiled
 from hal.types import FloatArray, RgbdFrame
 from vision.bodies.births import MIN_CELLS
 from vision.bodies.tracks import Tracks
-from vision.depth.depth_mask import SurfaceDepth
+from vision.depth.depth_mask import surface_depth
 from vision.depth.depth_noise import depth_sigma_of
 from vision.detection import Detection
 from vision.fragments.candidates import (
     NOTHING_NEW,
     NewFragments,
     depth_along,
+    joined,
     new_fragments,
     on_one_surface,
     trackable_segments,
 )
+from vision.fragments.corners import corners_within, in_pairs
 from vision.fragments.edges import GreyImage, find_edges
 from vision.fragments.segments import find_segments, longest_first
 
@@ -51,6 +53,9 @@ _MIN_EIGENVALUE = 600.0
 # with it the velocities were not known any better.
 _CONTRAST = 60.0
 _CANDIDATES = 48  # only the longest segments: bounds the time of one look
+_MAX_CORNER_AREA_PX = (
+    40_000  # of the image around a body: larger ones are near, and their surface is known well
+)
 _AT_ONCE = 4  # maximum per look: takes a body from none to enough, and leaves room for other bodies
 # Gate on depth around the centre of the body: the sum of the depth of a body, of two sigmas of noise (95 %),
 # and of half of its measured extent in depth, which counts up to 1 m: more is noise or a wall.
@@ -143,6 +148,41 @@ def _needing_fragments(
     return chosen[:count], depth_m[:count], gate_m[:count], urgent[:count]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Body:
+    """A body that is looked at.
+
+    grey: the part of the image around its box. corner_px: column and row of its upper left corner.
+    depth_m, gate_m: as in NeedsFragments.
+    """
+
+    grey: GreyImage
+    corner_px: tuple[int, int]
+    depth_m: float
+    gate_m: float
+
+
+def _around(grey: GreyImage, bodies: NeedsFragments, one: int) -> _Body | None:
+    """The body with this index; None if it is too small in the image."""
+    height, width = grey.shape
+    u0, v0, u1, v1 = bodies.box_px[one].astype(int).tolist()
+    left, right = max(0, u0 - _MARGIN_PX), min(width, u1 + _MARGIN_PX)
+    top, bottom = max(0, v0 - _MARGIN_PX), min(height, v1 + _MARGIN_PX)
+    if min(right - left, bottom - top) < _MIN_SIDE_PX:
+        return None
+    return _Body(grey[top:bottom, left:right], (left, top), bodies.depth_m[one], bodies.gate_m[one])
+
+
+def _alone_on_it(near_m: FloatArray, far_m: FloatArray, holes: FloatArray, body: _Body) -> NDArray[np.bool_]:
+    """Where depth, of any shape, is that of the body, and of nothing else.
+
+    An end between two surfaces, or beside pixels without depth, may belong to either.
+    """
+    here = np.abs(near_m - body.depth_m) <= body.gate_m
+    result: NDArray[np.bool_] = here & (far_m - near_m <= _ONE_SURFACE * body.gate_m) & (holes <= _HOLES)
+    return result
+
+
 class Attention:
     """Searches one body per frame for fragments. Keeps when each body was looked at last."""
 
@@ -158,32 +198,60 @@ class Attention:
         settings = self._config.fragments
         room = settings.max_fragments + settings.closer_fragments - len(ends_px)
         one = self._next(bodies, frame.captured_ns) if room > 0 else None
-        if one is None:
+        body = None if one is None else _around(grey, bodies, one)
+        if body is None:
             return NOTHING_NEW
-        height, width = grey.shape
-        u0, v0, u1, v1 = bodies.box_px[one].astype(int).tolist()
-        left, right = max(0, u0 - _MARGIN_PX), min(width, u1 + _MARGIN_PX)
-        top, bottom = max(0, v0 - _MARGIN_PX), min(height, v1 + _MARGIN_PX)
-        if min(right - left, bottom - top) < _MIN_SIDE_PX:
-            return NOTHING_NEW
-        edges = find_edges(grey[top:bottom, left:right], _CONTRAST)
-        segments_px = find_segments(edges, _MIN_LENGTH * settings.min_length_px, (left, top))
-        longest_px = longest_first(segments_px)[:_CANDIDATES]
-        ends, tensor = trackable_segments(grey, longest_px, ends_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE)
+        wanted = min(room, _AT_ONCE)
+        new = self._by_edges(frame, grey, ends_px, body, wanted)
+        wanted -= len(new.ends_px)
+        if wanted == 0 or body.grey.size > _MAX_CORNER_AREA_PX:
+            return new
+        present_px = np.concatenate((ends_px, new.ends_px))
+        return joined(new, self._by_corners(frame, grey, present_px, body, wanted))
+
+    def _by_edges(
+        self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], body: _Body, wanted: int
+    ) -> NewFragments:
+        """At most wanted fragments, of the segments on a body."""
+        settings = self._config.fragments
+        edges = find_edges(body.grey, _CONTRAST)
+        segments_px = find_segments(edges, _MIN_LENGTH * settings.min_length_px, body.corner_px)
+        return self._on_it(frame, grey, longest_first(segments_px)[:_CANDIDATES], ends_px, body, wanted)
+
+    def _by_corners(
+        self, frame: RgbdFrame, grey: GreyImage, ends_px: NDArray[np.float32], body: _Body, wanted: int
+    ) -> NewFragments:
+        """At most wanted fragments, of pairs of corners on a body."""
+        config, scale_m = self._config, frame.depth_scale_m
+        (left, top), (rows, columns) = body.corner_px, body.grey.shape
+        points = corners_within(
+            body.grey,
+            frame.depth[top : top + rows, left : left + columns],
+            (body.depth_m - body.gate_m) / scale_m,
+            (body.depth_m + body.gate_m) / scale_m,
+        )
+        points = points + np.array((left, top), np.float32)
+        surface = surface_depth(
+            frame.depth, scale_m, points, config.min_depth_m, config.max_depth_m, config.depth_noise
+        )
+        usable = _alone_on_it(surface.near_m, surface.far_m, surface.holes, body)
+        return self._on_it(frame, grey, in_pairs(points[usable]), ends_px, body, wanted)
+
+    def _on_it(
+        self,
+        frame: RgbdFrame,
+        grey: GreyImage,
+        segments_px: NDArray[np.float32],
+        ends_px: NDArray[np.float32],
+        body: _Body,
+        wanted: int,
+    ) -> NewFragments:
+        """At most wanted fragments, of segments (N, 2, 2) that lie on a body and can be tracked."""
+        ends, tensor = trackable_segments(grey, segments_px, ends_px, _MIN_END_DISTANCE_PX, _MIN_EIGENVALUE)
         surface = depth_along(ends, frame, self._config)
-        picked = self._on_it(surface, bodies.depth_m[one], bodies.gate_m[one]).nonzero()[0]
-        return new_fragments(picked[: min(room, _AT_ONCE)], ends, tensor, surface, settings)
-
-    def _on_it(self, surface: SurfaceDepth, depth_m: float, gate_m: float) -> NDArray[np.bool_]:
-        """(N,) segments that lie on the body at depth_m.
-
-        A segment with an end between two surfaces, or beside pixels without depth, may belong to either.
-        """
-        near_m, far_m, holes = surface.near_m[:, ::4], surface.far_m[:, ::4], surface.holes[:, ::4]
-        here = np.abs(near_m - depth_m) <= gate_m
-        alone = (far_m - near_m <= _ONE_SURFACE * gate_m) & (holes <= _HOLES)
-        result: NDArray[np.bool_] = on_one_surface(surface.near_m, self._config)
-        return result & (here & alone).all(axis=1)
+        at_ends = surface.near_m[:, ::4], surface.far_m[:, ::4], surface.holes[:, ::4]
+        here = on_one_surface(surface.near_m, self._config) & _alone_on_it(*at_ends, body).all(axis=1)
+        return new_fragments(here.nonzero()[0][:wanted], ends, tensor, surface, self._config.fragments)
 
     def _next(self, bodies: NeedsFragments, now_ns: int) -> int | None:
         """Index of the body whose turn it is: urgent ones first, of these the one that has waited longest."""

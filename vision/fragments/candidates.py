@@ -51,6 +51,16 @@ NOTHING_NEW = NewFragments(
 )
 
 
+def joined(first: NewFragments, second: NewFragments) -> NewFragments:
+    """The fragments of both."""
+    return NewFragments(
+        np.concatenate((first.ends_px, second.ends_px)),
+        np.concatenate((first.near_m, second.near_m)),
+        np.concatenate((first.far_m, second.far_m)),
+        np.concatenate((first.pixel_cov, second.pixel_cov)),
+    )
+
+
 def trackable_segments(
     grey: GreyImage,
     segments_px: NDArray[np.float32],

@@ -243,3 +243,19 @@ def test_the_cameras_motion_does_not_rest_on_witnesses(monkeypatch: pytest.Monke
     found = witnesses(SMALL.model_copy(update={"fragments": few}), monkeypatch)
     assert max(present for present, _ in found) >= 4
     assert max(asked for _, asked in found) == 0
+
+
+def test_a_body_without_straight_edges_gets_fragments_between_its_corners(frame: RgbdFrame) -> None:
+    plain_body = frame.colour.copy()
+    plain_body[170:330, 270:370] = 90
+    assert look(replace(frame, colour=plain_body), one_body()) == 0
+    dotted = plain_body.copy()
+    for u, v in ((300, 200), (330, 215), (310, 240), (335, 265), (305, 290)):
+        cv2.circle(dotted, (u, v), 2, (230, 230, 230), -1)
+    found = awake(frame).find(
+        replace(frame, colour=dotted), grey_of(replace(frame, colour=dotted)), NO_ENDS, one_body()
+    )
+    assert len(found.ends_px) == 2
+    lower = found.ends_px[:, 1, 1] > found.ends_px[:, 0, 1]
+    assert lower.all()
+    np.testing.assert_allclose(found.near_m, FRONT_M, atol=0.2)
