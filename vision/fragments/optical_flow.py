@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
 from hal.compiled import compiled
+from vision.fragments import lucas_kanade
 from vision.fragments.edges import GreyImage
 from vision.numerics.order import median
 
-_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)  # px: far below an end's own sigma
-_MIN_EIGENVALUE = 1e-5  # low, so that straight edges pass: along the edge the expectation holds them
-# The minimum eigenvalue is available anyway; OpenCV would compute its other error measure pixel by pixel.
-_FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 _EXPECTATION_PX = 2.0  # sigma of an expected position, after the median error of all ends has been removed
 _RIM_PX = 2  # of the image border: an end this close is about to leave the image
 
@@ -89,26 +86,13 @@ def _search(
     guess: NDArray[np.float32],
     window_px: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Search for pixels (N, 2) from guess (N, 2), coarse to fine; positions (N, 2) and whether found (N,).
-
-    OpenCV is called level by level: one call for all levels would build the pyramids of both images again,
-    twice a frame.
-    """
-    there, found = guess * np.float32(0.5 ** len(now)), np.empty((0, 1), np.uint8)
+    """Search for pixels (N, 2) from guess (N, 2), coarse to fine; positions (N, 2) and whether found (N,)."""
+    there, found = guess * np.float32(0.5 ** len(now)), np.zeros(len(guess), np.bool_)
     for level in reversed(range(len(now))):
-        ends, status, _ = cv2.calcOpticalFlowPyrLK(
-            before[level],
-            now[level],
-            pixels * np.float32(0.5**level),
-            2.0 * there,
-            winSize=(window_px, window_px),
-            maxLevel=0,
-            criteria=_CRITERIA,
-            flags=_FLAGS,
-            minEigThreshold=_MIN_EIGENVALUE,
+        there, found = lucas_kanade.search(
+            before[level], now[level], pixels, 2.0 * there, 0.5**level, window_px
         )
-        there, found = np.asarray(ends, np.float32), np.asarray(status, np.uint8)
-    return there, found[:, 0].astype(np.bool_)
+    return there, found
 
 
 @compiled("float32[:, ::1], float32[:, ::1]")
