@@ -1,15 +1,15 @@
 """Lucas-Kanade: where points of one image are in another, on one level of the pyramids (Bouguet 2000).
 
 The window around a point of the first image is compared with windows in the second. Its gradient, times the
-difference of grey levels and summed over the window, is the mismatch; the inverse of the structure tensor makes
-a step of it. Grey levels between pixels are interpolated from four pixels, so the sum of gradient times grey
-level is a weighted mean of four sums, for the windows at the four whole pixels around. Iterations that stay
-between the same pixels share these sums and take no pass over the window. OpenCV's function takes one in each
-iteration, and makes the gradient of the whole image first.
+difference of grey levels and summed over the window, is the mismatch; the inverse of the structure tensor
+makes a step of it. Grey levels between pixels are interpolated from four pixels, so the sum of gradient times
+grey level is a weighted mean of four sums, for the windows at the four whole pixels around. Iterations that
+stay between the same pixels share these sums and take no pass over the window. OpenCV's function takes one in
+each iteration, and makes the gradient of the whole image first.
 
 Windows are flat arrays, row by row. A row is a multiple of 16 values, which the processor handles at a time;
-the gradient is 0 in what does not belong to the window. Offsets into them are unsigned (np.uintp): the compiler
-then need not check for negative indices, and takes several values at once.
+the gradient is 0 in what does not belong to the window. Offsets into windows are unsigned (np.uintp): the
+compiler then need not check for negative indices, and takes several values at once.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ FourSums = tuple[float, float, float, float]  # upper left, upper right, lower l
 _ITERATIONS = 10
 _CONVERGED_PX = 0.02  # a shorter step is the last one: far below an end's own sigma
 _OSCILLATION_PX = 0.01  # a step that takes back the one before, up to this, is halved, and is the last one
-# Minimum of the smaller eigenvalue of the structure tensor, per pixel of the window, in (grey levels / px)^2. It
-# is low, so that straight edges pass: along the edge the expectation holds them (optical_flow.py).
+# Minimum of the smaller eigenvalue of the structure tensor, per pixel of the window, in (grey levels / px)^2.
+# It is low, so that straight edges pass: along the edge the expectation holds them (optical_flow.py).
 _MIN_EIGENVALUE = 0.01
 _MIN_DETERMINANT = 0.125  # of the structure tensor, a sum over the window
 _ROW, _WINDOW = 16, 64  # a row is a multiple of the first, a window of the second
 _SHARE_BITS = 15  # of a number between 0 and 1
-_EIGHTHS_BITS = 3  # grey levels of the first window are in eighths
-# Scharr's filter (3, 10, 3) gives 32 times the gradient, and at most 16 times the largest grey level. A sum of
-# 41 x 41 products of that with grey levels fits 32 bits.
+_EIGHTHS, _EIGHTHS_BITS = 8.0, 3  # grey levels of the first window are in eighths
+# Scharr's filter (3, 10, 3) gives 32 times the gradient, and at most 16 times the largest grey level. A sum
+# of 41 x 41 products of that with grey levels fits 32 bits.
 _SCHARR = 32.0
 _NEXT = np.uintp(1)
 
@@ -87,14 +87,21 @@ def _differ(values: Values, step: np.uintp, bits: int, count: np.uintp, into: Va
 
 @inlined
 def _gradient(
-    patch: Values, u: float, v: float, row: int, count: int, work: Values, grey: Values, gx: Values, gy: Values
+    patch: Values,
+    u: float,
+    v: float,
+    row: int,
+    work: Values,
+    grey: Values,
+    gx: Values,
+    gy: Values,
 ) -> None:
     """Put the gradient (gx, gy) of a window into the arrays of these names, and its grey levels into grey.
 
     patch: pixels, from one column to the left and one row above the window on. u, v: how far the window is
     beyond that pixel. grey: as patch, but at the places of the window, and in eighths. work: of this size.
     """
-    down, window = np.uintp(row), np.uintp(count)
+    down, window = np.uintp(row), np.uintp(len(gx))
     _blend(patch, _NEXT, u, _EIGHTHS_BITS, window + down + down + down, work)
     _blend(work, down, v, 0, window + down + down, grey)
     _smooth(grey, down, 0, window, work)
@@ -165,6 +172,55 @@ def _in_reach(top: int, left: int, side: int, image: GreyImage) -> bool:
     return -side <= top < image.shape[0] and -side <= left < image.shape[1]
 
 
+@inlined
+def _inverse(xx: float, xy: float, yy: float, side: int) -> tuple[bool, float, float, float]:
+    """Whether a structure tensor can be inverted, and its inverse, for mismatches in the scale of _SCHARR."""
+    smaller = 0.5 * (xx + yy - math.sqrt((xx - yy) ** 2 + 4.0 * xy * xy))
+    determinant = xx * yy - xy * xy
+    usable = smaller >= _MIN_EIGENVALUE * side * side and determinant >= _MIN_DETERMINANT
+    scale = 1.0 / (_SCHARR * determinant) if usable else 0.0
+    return usable, scale * yy, -scale * xy, scale * xx
+
+
+@inlined
+def _follow(
+    image: GreyImage,
+    u: float,
+    v: float,
+    side: int,
+    row: int,
+    gx: Values,
+    gy: Values,
+    aim: tuple[float, float],
+    inverse: tuple[float, float, float],
+    patch: Values,
+) -> tuple[bool, float, float]:
+    """Move a window in image, from its upper left corner u, v, until it matches. False: it left the image.
+
+    gx, gy: of the window looked for. aim: the sums of its gradient times its grey levels. inverse: of its
+    structure tensor, xx, xy, yy. patch: work space.
+    """
+    down, window, left, top = np.uintp(row), np.uintp(len(gx)), 0, 0
+    last_u, last_v = math.inf, math.inf
+    for iteration in range(_ITERATIONS):
+        if iteration == 0 or math.floor(u) != left or math.floor(v) != top:
+            left, top = math.floor(u), math.floor(v)
+            if not _in_reach(top, left, side, image):
+                return False, u, v
+            _load(image, top, left, side + 1, row, patch)
+            sums_x, sums_y = _four_sums(gx, patch, down, window), _four_sums(gy, patch, down, window)
+        miss_x = aim[0] - _between(sums_x, u - left, v - top)
+        miss_y = aim[1] - _between(sums_y, u - left, v - top)
+        du, dv = inverse[0] * miss_x + inverse[1] * miss_y, inverse[1] * miss_x + inverse[2] * miss_y
+        u, v = u + du, v + dv
+        if du * du + dv * dv <= _CONVERGED_PX**2:
+            break
+        if abs(du + last_u) < _OSCILLATION_PX and abs(dv + last_v) < _OSCILLATION_PX:
+            return True, u - 0.5 * du, v - 0.5 * dv
+        last_u, last_v = du, dv
+    return True, u, v
+
+
 @compiled("uint8[:, ::1], uint8[:, ::1], float32[:, ::1], float32[:, ::1], float64, int64")
 def search(
     before: GreyImage,
@@ -176,8 +232,8 @@ def search(
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Where points of before are in now, searched from guess (N, 2); and which are found, (N,).
 
-    pixels (N, 2): the points; scale times that is in pixels of these images, as guess is. side: of the window,
-    odd, at most 41. What is not found is at its guess, or where it left the image.
+    pixels (N, 2): the points; scale times that is in pixels of these images, as guess is. side: of the
+    window, at most 41. A point whose window is plain, or out of the image, stays at its guess.
     """
     row = -(-(side + 3) // _ROW) * _ROW
     count = -(-side * row // _WINDOW) * _WINDOW
@@ -185,48 +241,29 @@ def search(
     patch, work, grey = np.zeros(size, np.int16), np.zeros(size, np.int16), np.zeros(size, np.int16)
     gx, gy, inside = np.zeros(count, np.int16), np.zeros(count, np.int16), np.zeros(count, np.int16)
     there, found = guess.copy(), np.zeros(len(guess), np.bool_)
-    down, window, half = np.uintp(row), np.uintp(count), 0.5 * (side - 1)
-    marked = False
+    first, window, half = np.uintp(row + 1), np.uintp(count), 0.5 * (side - 1)
+    height, width = before.shape
+    marked = False  # inside is that of a window that lies in the image as a whole
     for n in range(len(pixels)):
         u, v = scale * pixels[n, 0] - half, scale * pixels[n, 1] - half
         left, top = math.floor(u), math.floor(v)
         if not _in_reach(top, left, side, before):
             continue
         _load(before, top - 1, left - 1, side + 3, row, patch)
-        _gradient(patch, u - left, v - top, row, count, work, grey, gx, gy)
-        whole = 0 <= top < before.shape[0] - side and 0 <= left < before.shape[1] - side
+        _gradient(patch, u - left, v - top, row, work, grey, gx, gy)
+        whole = 0 <= top <= height - side and 0 <= left <= width - side
         if not (whole and marked):
-            _mark(top, left, side, row, before.shape[0], before.shape[1], inside)
+            _mark(top, left, side, row, height, width, inside)
             marked = whole
         _blank(inside, window, gx)
         _blank(inside, window, gy)
-        xx, xy, yy = _tensor(gx, gy, window)
-        smaller = 0.5 * (xx + yy - math.sqrt((xx - yy) ** 2 + 4.0 * xy * xy))
-        determinant = xx * yy - xy * xy
-        if smaller < _MIN_EIGENVALUE * side * side or determinant < _MIN_DETERMINANT:
+        usable, xx, xy, yy = _inverse(*_tensor(gx, gy, window), side)
+        if not usable:
             continue
-        aim_x = _sum(gx, grey, down + _NEXT, window) / (1 << _EIGHTHS_BITS)
-        aim_y = _sum(gy, grey, down + _NEXT, window) / (1 << _EIGHTHS_BITS)
-        weight = 1.0 / (_SCHARR * determinant)
-        u, v, last_u, last_v = guess[n, 0] - half, guess[n, 1] - half, math.inf, math.inf
-        found[n] = True
-        for iteration in range(_ITERATIONS):
-            if iteration == 0 or math.floor(u) != left or math.floor(v) != top:
-                left, top = math.floor(u), math.floor(v)
-                if not _in_reach(top, left, side, now):
-                    found[n] = False
-                    break
-                _load(now, top, left, side + 1, row, patch)
-                sums_x, sums_y = _four_sums(gx, patch, down, window), _four_sums(gy, patch, down, window)
-            miss_x = weight * (aim_x - _between(sums_x, u - left, v - top))
-            miss_y = weight * (aim_y - _between(sums_y, u - left, v - top))
-            du, dv = yy * miss_x - xy * miss_y, xx * miss_y - xy * miss_x
-            u, v = u + du, v + dv
-            if du * du + dv * dv <= _CONVERGED_PX**2:
-                break
-            if abs(du + last_u) < _OSCILLATION_PX and abs(dv + last_v) < _OSCILLATION_PX:
-                u, v = u - 0.5 * du, v - 0.5 * dv
-                break
-            last_u, last_v = du, dv
-        there[n, 0], there[n, 1] = u + half, v + half
+        aim = _sum(gx, grey, first, window) / _EIGHTHS, _sum(gy, grey, first, window) / _EIGHTHS
+        found[n], u, v = _follow(
+            now, guess[n, 0] - half, guess[n, 1] - half, side, row, gx, gy, aim, (xx, xy, yy), patch
+        )
+        if found[n]:
+            there[n, 0], there[n, 1] = u + half, v + half
     return there, found
