@@ -131,9 +131,9 @@ def _tensor(gx: Values, gy: Values, count: np.uintp) -> tuple[float, float, floa
     xx, xy, yy = 0, 0, 0
     for k in range(count):
         x, y = np.int32(gx[k]), np.int32(gy[k])
-        xx += np.int64(np.int32(x * x))
-        xy += np.int64(np.int32(x * y))
-        yy += np.int64(np.int32(y * y))
+        xx += int(np.int32(x * x))
+        xy += int(np.int32(x * y))
+        yy += int(np.int32(y * y))
     return xx / _SCHARR**2, xy / _SCHARR**2, yy / _SCHARR**2
 
 
@@ -169,7 +169,8 @@ def _between(sums: FourSums, u: float, v: float) -> float:
 @inlined
 def _in_reach(top: int, left: int, side: int, image: GreyImage) -> bool:
     """Whether a window overlaps the image."""
-    return -side <= top < image.shape[0] and -side <= left < image.shape[1]
+    result: bool = -side <= top < image.shape[0] and -side <= left < image.shape[1]
+    return result
 
 
 @inlined
