@@ -35,7 +35,8 @@ def find_contours(edges: GreyImage, min_length_px: float) -> Contours:
     kept = [curve for curve in found if len(curve) >= 2.0 * min_length_px]
     if not kept:
         return Contours(np.empty((0, 2, 2), np.float32), np.zeros_like(edges))
-    lengths, points = np.array([len(curve) for curve in kept]), np.concatenate(kept)
+    lengths = np.array([len(curve) for curve in kept])
+    points = np.asarray(np.concatenate(kept), np.int32)
     return Contours(*_drawn(points, lengths, _PIECE * min_length_px, *edges.shape))
 
 
