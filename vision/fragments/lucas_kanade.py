@@ -86,36 +86,37 @@ def _differ(values: Values, step: np.uintp, bits: int, count: np.uintp, into: Va
 
 
 @inlined
-def _gradient(
-    patch: Values,
-    u: float,
-    v: float,
-    row: int,
-    work: Values,
-    grey: Values,
-    gx: Values,
-    gy: Values,
+def _interpolate(
+    values: Values, u: float, v: float, bits: int, row: int, count: int, work: Values, into: Values
 ) -> None:
-    """Put the gradient (gx, gy) of a window into the arrays of these names, and its grey levels into grey.
-
-    patch: pixels, from one column to the left and one row above the window on. u, v: how far the window is
-    beyond that pixel. grey: as patch, but at the places of the window, and in eighths. work: of this size.
-    """
-    down, window = np.uintp(row), np.uintp(len(gx))
-    _blend(patch, _NEXT, u, _EIGHTHS_BITS, window + down + down + down, work)
-    _blend(work, down, v, 0, window + down + down, grey)
-    _smooth(grey, down, 0, window, work)
-    _differ(work, _NEXT, _EIGHTHS_BITS, window, gx)
-    _differ(grey, down, 0, window, work)
-    _smooth(work, _NEXT, _EIGHTHS_BITS, window, gy)
+    """Put values at u, v beyond each of count pixels, times 2^bits, into into. work: as long as values."""
+    down, wanted = np.uintp(row), np.uintp(count)
+    _blend(values, _NEXT, u, bits, wanted + down, work)
+    _blend(work, down, v, 0, wanted, into)
 
 
 @inlined
-def _mark(top: int, left: int, side: int, row: int, height: int, width: int, inside: Values) -> None:
-    """Put 1 into inside for the pixels of the window that are in the image, else 0."""
-    for i in range(side):
-        for j in range(side):
-            inside[i * row + j] = 0 <= top + i < height and 0 <= left + j < width
+def _scharr(values: Values, bits: int, row: int, count: int, work: Values, gx: Values, gy: Values) -> None:
+    """Put Scharr's derivatives of values, divided by 2^bits, into gx and gy, for count pixels.
+
+    values: from one column to the left and one row above these on. work: as long as values.
+    """
+    down, wanted = np.uintp(row), np.uintp(count)
+    _smooth(values, down, 0, wanted, work)
+    _differ(work, _NEXT, bits, wanted, gx)
+    _differ(values, down, 0, wanted, work)
+    _smooth(work, _NEXT, bits, wanted, gy)
+
+
+@inlined
+def _blank_outside(
+    top: int, left: int, rows: int, row: int, image: GreyImage, gx: Values, gy: Values
+) -> None:
+    """Set the derivatives gx, gy, in rows of pixels from top, left on, to 0 outside of image."""
+    for i in range(rows):
+        for j in range(row):
+            if not (0 <= top + i < image.shape[0] and 0 <= left + j < image.shape[1]):
+                gx[i * row + j] = gy[i * row + j] = 0
 
 
 @inlined
@@ -240,22 +241,27 @@ def search(
     count = -(-side * row // _WINDOW) * _WINDOW
     size = count + 4 * row
     patch, work, grey = np.zeros(size, np.int16), np.zeros(size, np.int16), np.zeros(size, np.int16)
+    pixel_gx, pixel_gy = np.zeros(size, np.int16), np.zeros(size, np.int16)
     gx, gy, inside = np.zeros(count, np.int16), np.zeros(count, np.int16), np.zeros(count, np.int16)
+    for i in range(side):
+        inside[i * row : i * row + side] = 1
     there, found = guess.copy(), np.zeros(len(guess), np.bool_)
     first, window, half = np.uintp(row + 1), np.uintp(count), 0.5 * (side - 1)
-    height, width = before.shape
-    marked = False  # inside is that of a window that lies in the image as a whole
     for n in range(len(pixels)):
         u, v = scale * pixels[n, 0] - half, scale * pixels[n, 1] - half
         left, top = math.floor(u), math.floor(v)
         if not _in_reach(top, left, side, before):
             continue
+        u, v = u - left, v - top
         _load(before, top - 1, left - 1, side + 3, row, patch)
-        _gradient(patch, u - left, v - top, row, work, grey, gx, gy)
-        whole = 0 <= top <= height - side and 0 <= left <= width - side
-        if not (whole and marked):
-            _mark(top, left, side, row, height, width, inside)
-            marked = whole
+        _interpolate(patch, u, v, _EIGHTHS_BITS, row, count + 2 * row, work, grey)
+        if 0 <= top < before.shape[0] - side and 0 <= left < before.shape[1] - side:
+            _scharr(grey, _EIGHTHS_BITS, row, count, work, gx, gy)
+        else:
+            _scharr(patch, 0, row, count + row, work, pixel_gx, pixel_gy)
+            _blank_outside(top, left, side + 1, row, before, pixel_gx, pixel_gy)
+            _interpolate(pixel_gx, u, v, 0, row, count, work, gx)
+            _interpolate(pixel_gy, u, v, 0, row, count, work, gy)
         _blank(inside, window, gx)
         _blank(inside, window, gy)
         usable, xx, xy, yy = _inverse(*_tensor(gx, gy, window), side)
