@@ -258,6 +258,8 @@ def search(
         if 0 <= top < before.shape[0] - side and 0 <= left < before.shape[1] - side:
             _scharr(grey, _EIGHTHS_BITS, row, count, work, gx, gy)
         else:
+            # Only the derivatives at pixels of the image count. What is mirrored beyond them would move the
+            # ends at the border by up to a tenth of a pixel.
             _scharr(patch, 0, row, count + row, work, pixel_gx, pixel_gy)
             _blank_outside(top, left, side + 1, row, before, pixel_gx, pixel_gy)
             _interpolate(pixel_gx, u, v, 0, row, count, work, gx)
