@@ -9,6 +9,7 @@ The files in the order in which they come into play:
 * reel.py - frames to measure perception on
 * perception.py - perception, compared with bare OpenCV calls
 * opencv_calls.py - records perception's OpenCV calls and times them alone
+* own_search.py - OpenCV's Lucas-Kanade in place of perception's own, for the bare calls
 * whole_images.py - the paper's OpenCV calls on whole images
 * stages.py - time of each function inside perception
 * rendering.py - the simulated camera

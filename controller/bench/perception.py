@@ -12,6 +12,7 @@ import vision
 from config.perception import FragmentSettings
 from controller.bench.figures import Durations, Stopwatches, median_ratio
 from controller.bench.opencv_calls import recorded_calls, time_bare
+from controller.bench.own_search import recorded_searches
 from controller.bench.reel import Reel, Tick
 from controller.bench.stages import (
     FunctionTime,
@@ -43,7 +44,7 @@ class PairedTimes:
 
     detect_ns, track_ns: processor time of the two steps of perception.
     elapsed_ns: elapsed time of both together.
-    bare_ns: processor time of the bare OpenCV calls.
+    bare_ns: processor time of the bare OpenCV calls, with OpenCV's Lucas-Kanade (own_search.py).
     whole_ns: processor time of the paper's calls, see WholeImages.
     opencv_ns: bare calls by function name.
     first_ns: the first frame of each pass, which is in none of the other lists.
@@ -82,7 +83,7 @@ class PerceptionFigures:
 
     total: detect and track together, in processor time.
     elapsed: the same in wall-clock time.
-    bare: the same OpenCV calls alone.
+    bare: the same OpenCV calls alone, with OpenCV's Lucas-Kanade in place of perception's own.
     whole: the paper's calls on whole images.
     first: the first frame of each pass.
     ratio_of_medians: median of perception over median of bare OpenCV.
@@ -176,14 +177,14 @@ def run_side_by_side(
 ) -> None:
     """Process every frame four times, and add the times to result.
 
-    By a perception that records its OpenCV calls, by these calls alone, by an unchanged perception, and by
-    the paper's calls on the whole image. The bare calls and the unchanged perception take turns in going
-    first, so that neither always finds warm caches. The first frame is kept apart, because perception then
-    searches the whole image, as after every restart.
+    By a perception that records its OpenCV calls, by these calls alone (with OpenCV's Lucas-Kanade in place
+    of its own), by an unchanged perception, and by the paper's calls on the whole image. The bare calls and
+    the unchanged perception take turns in going first, so that neither always finds warm caches. The first
+    frame is kept apart, because perception then searches the whole image, as after every restart.
     """
     timed, recorded, whole = make(), make(), WholeImages(settings, stopwatches.processor_ns)
     for index, (frame, odometry) in enumerate(zip(reel.frames, reel.odometry, strict=True)):
-        with recorded_calls(modules) as calls:
+        with recorded_calls(modules) as calls, recorded_searches(calls):
             recorded.perceive(frame, odometry, None)
         if index % 2 == 0:
             opencv_ns = time_bare(calls, stopwatches.processor_ns)

@@ -106,7 +106,8 @@ def _perception_lines(reels: Mapping[str, PerceptionFigures]) -> Iterator[str]:
             f"{figures.first.median_ms:8.2f}{figures.elapsed.median_ms:9.2f}{figures.elapsed.p99_ms:8.2f}"
         )
     yield "processor time, but for the last two columns; first: the first frame, a search of the whole image"
-    yield "bare OpenCV: the calls that perception makes on the same frames, without anything around them"
+    yield "bare OpenCV: the calls that perception makes on the same frames, without anything around them,"
+    yield "and OpenCV's Lucas-Kanade, in place of which perception has its own"
     yield "ratio: perception over bare OpenCV, of the medians; by frame: median of the ratios of all frames"
     yield "whole images: the paper's calls on them (Canny, contours, Hough, Lucas-Kanade); ratio: over that"
 

@@ -93,12 +93,25 @@ def _without_jumps(inverse: FloatGrid, mask: BoolGrid) -> NDArray[np.uint8]:
     return kept
 
 
+@inlined
+def _cell_counts(labels: IntGrid, count: int) -> NDArray[np.int64]:
+    """(count,) number of cells of each label, summed up by runs of the same label in a row."""
+    height, width = labels.shape
+    cells = np.zeros(count, np.int64)
+    for i in range(height):
+        start = 0
+        for j in range(1, width):
+            if labels[i, j] != labels[i, start]:
+                cells[labels[i, start]] += j - start
+                start = j
+        cells[labels[i, start]] += width - start
+    return cells
+
+
 @compiled("int32[:, ::1], int64")
 def _without_speckles(labels: IntGrid, count: int) -> tuple[int, IntGrid]:
     """n, and labels (h, w) renumbered 1..n in their order, without speckles. count: labels, with 0."""
-    cells = np.zeros(count, np.int64)
-    for part in labels.flat:
-        cells[part] += 1
+    cells = _cell_counts(labels, count)
     number, parts = np.zeros(count, np.int32), 0
     for label in range(1, len(cells)):
         if cells[label] >= MIN_PART_CELLS:

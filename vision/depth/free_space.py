@@ -7,6 +7,8 @@ black, too near) is not free. vision/tracker.py calls it in each frame, and the 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,28 +108,55 @@ def _nearest_m(forward_m: FloatGrid, obstacle: BoolGrid, band: NDArray[np.int32]
     return nearest[:, -1].copy()
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _FloorRows:
+    """The rows of the grid whose rays meet the floor, k of them, from the bottom of the image upwards.
+
+    depth_m, forward_m: where they meet it, (k,). limit_m: maximum depth of floor there, (k,).
+    reach_m: forward distance up to which floor is seen if the rows below are floor, (k + 1,).
+    """
+
+    depth_m: FloatArray
+    forward_m: FloatArray
+    limit_m: FloatGrid
+    reach_m: FloatArray
+
+
+@lru_cache(maxsize=4)
+def _floor_rows(
+    rays_y: bytes, pitch_rad: float, camera_height_m: float, max_depth_m: float
+) -> _FloorRows | None:
+    """None if no ray meets the floor. Cached, since it is the same in every frame. rays_y: y of the grid."""
+    cos_pitch, sin_pitch = math.cos(pitch_rad), math.sin(pitch_rad)
+    y = np.frombuffer(rays_y, np.float32).astype(float)
+    drop = y * cos_pitch + sin_pitch
+    below = drop > camera_height_m / (1.5 * max_depth_m)
+    rows = below.nonzero()[0][::-1]  # from the bottom of the image upwards, nearest floor first
+    if len(rows) == 0:
+        return None
+    depth_m = camera_height_m / drop[rows]
+    forward_m = depth_m * (cos_pitch - y[rows] * sin_pitch)
+    limit_m = (FLOOR_EXCESS * depth_m).astype(np.float32)
+    # If even the uppermost row meets the floor, nothing beyond that is in view.
+    horizon_m = max_depth_m if len(rows) < len(y) else forward_m[-1]
+    reach_m = np.minimum(np.concatenate((forward_m, (horizon_m,))), max_depth_m)
+    return _FloorRows(depth_m, forward_m, limit_m, reach_m)
+
+
 def _known_m(
     grid: DepthGrid, bands: LevelBands, max_depth_m: float, measurable_from_m: float
 ) -> tuple[FloatArray, float]:
     """(B,) forward distance up to which the floor is seen without a hole; and FreeSpace.blind_m."""
-    cos_pitch, sin_pitch = math.cos(grid.pitch_rad), math.sin(grid.pitch_rad)
-    y = grid.y.astype(float)
-    drop = y * cos_pitch + sin_pitch
-    below = drop > grid.camera_height_m / (1.5 * max_depth_m)
-    rows = below.nonzero()[0][::-1]  # from the bottom of the image upwards, nearest floor first
-    if len(rows) == 0:
+    floor = _floor_rows(grid.y.tobytes(), grid.pitch_rad, grid.camera_height_m, max_depth_m)
+    if floor is None:
         return np.zeros(len(bands)), 0.0
-    floor_depth = grid.camera_height_m / drop[rows]
-    floor_forward = floor_depth * (cos_pitch - y[rows] * sin_pitch)
-    limit_m = (FLOOR_EXCESS * floor_depth).astype(np.float32)
-    unmeasured = int(np.count_nonzero(floor_depth < measurable_from_m))
-    # If even the uppermost row meets the floor, nothing beyond that is in view.
-    horizon_m = max_depth_m if len(rows) < len(grid.y) else floor_forward[-1]
-    reach_m = np.minimum(np.concatenate((floor_forward, (horizon_m,))), max_depth_m)
-    first = _first_hole(grid.valid, grid.beyond, grid.depth_m, bands.cells, bands.width, limit_m, unmeasured)
+    unmeasured = int(np.count_nonzero(floor.depth_m < measurable_from_m))
+    first = _first_hole(
+        grid.valid, grid.beyond, grid.depth_m, bands.cells, bands.width, floor.limit_m, unmeasured
+    )
     # With a hole in the lowest row nothing is known, since nothing nearer is in view.
-    known: FloatArray = np.where(first == 0, 0.0, reach_m[first])
-    return known, float(floor_forward[unmeasured - 1]) if unmeasured else 0.0
+    known: FloatArray = np.where(first == 0, 0.0, floor.reach_m[first])
+    return known, float(floor.forward_m[unmeasured - 1]) if unmeasured else 0.0
 
 
 @compiled("boolean[:, ::1], boolean[:, ::1], float32[:, ::1], int32[:, ::1], int64, float32[::1], int64")

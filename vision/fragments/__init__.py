@@ -4,6 +4,7 @@ Files, in the order in which they come into play within one frame:
 
 * store - the fragments with their history; gives the anchors.
 * optical_flow - the end points are tracked into the new image.
+* lucas_kanade - the search for points in one level of the pyramid.
 * renewal - new fragments are searched where they have become few.
 * edges - Canny edges.
 * contours - runs of edge pixels, cut into pieces.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -35,24 +36,26 @@ def find_contours(edges: GreyImage, min_length_px: float) -> Contours:
     if not kept:
         return Contours(np.empty((0, 2, 2), np.float32), np.zeros_like(edges))
     lengths = np.array([len(curve) for curve in kept])
-    pieces = np.ceil(lengths / (_PIECE * min_length_px)).astype(np.intp)
-    points = np.asarray(np.concatenate(kept)[:, 0, :], np.int32)
-    return Contours(*_drawn(points, lengths, pieces, int(pieces.sum()), *edges.shape))
+    points = np.asarray(np.concatenate(kept), np.int32)
+    return Contours(*_drawn(points, lengths, _PIECE * min_length_px, *edges.shape))
 
 
-@compiled("int32[:, :], int64[::1], int64[::1], int64, int64, int64")
+@compiled("int32[:, :, ::1], int64[::1], float64, int64, int64")
 def _drawn(
     points: NDArray[np.int32],
     lengths: NDArray[np.intp],
-    pieces: NDArray[np.intp],
-    count: int,
+    longest_px: float,
     height: int,
     width: int,
 ) -> tuple[NDArray[np.float32], GreyImage]:
-    """The two ends of each of count pieces, (count, 2, 2), and an image (height, width) of all points (N, 2).
+    """The two ends of each piece, (N, 2, 2), and an image (height, width) of all points (P, 1, 2).
 
-    lengths: number of points of each curve, in turn. pieces: into how many pieces each curve is cut.
+    lengths: number of points of each curve, in turn. longest_px: maximum length of a piece.
     """
+    pieces, count = np.empty(len(lengths), np.intp), 0
+    for curve in range(len(lengths)):
+        pieces[curve] = math.ceil(lengths[curve] / longest_px)
+        count += pieces[curve]
     ends_px, image = np.empty((count, 2, 2), np.float32), np.zeros((height, width), np.uint8)
     start, one = 0, 0
     for curve in range(len(lengths)):
@@ -60,10 +63,10 @@ def _drawn(
         for rank in range(pieces[curve]):
             last = min(int((rank + 1) * step), lengths[curve] - 1)
             for axis in range(2):
-                ends_px[one, 0, axis] = points[start + int(rank * step), axis]
-                ends_px[one, 1, axis] = points[start + last, axis]
+                ends_px[one, 0, axis] = points[start + int(rank * step), 0, axis]
+                ends_px[one, 1, axis] = points[start + last, 0, axis]
             one += 1
         start += lengths[curve]
     for n in range(len(points)):
-        image[points[n, 1], points[n, 0]] = 255
+        image[points[n, 0, 1], points[n, 0, 0]] = 255
     return ends_px, image

@@ -10,13 +10,9 @@ from numpy.typing import NDArray
 
 from config.perception import FragmentSettings
 from hal.compiled import compiled
+from vision.fragments import lucas_kanade
 from vision.fragments.edges import GreyImage
-from vision.numerics.order import median
 
-_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)  # px: far below an end's own sigma
-_MIN_EIGENVALUE = 1e-5  # low, so that straight edges pass: along the edge the expectation holds them
-# The minimum eigenvalue is available anyway; OpenCV would compute its other error measure pixel by pixel.
-_FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
 _EXPECTATION_PX = 2.0  # sigma of an expected position, after the median error of all ends has been removed
 _RIM_PX = 2  # of the image border: an end this close is about to leave the image
 
@@ -64,9 +60,7 @@ def track(
     if len(pixels) == 0:
         return Flow(np.empty((0, 2), np.float32), np.empty(0, np.bool_))
     there, there_ok = _search(before, now, pixels, guess, settings.lk_window_px)
-    # The median difference is an error common to all guesses: a camera rotation that they do not include.
-    expected = guess + median((there - guess).T)
-    back_guess = there - (expected - pixels)
+    expected, back_guess = _expected(there, guess, pixels)
     back, back_ok = _search(now[:2], before[:2], there, back_guess, settings.lk_window_px)
     height, width = now[0].shape
     end, returned = _confirmed(
@@ -89,26 +83,35 @@ def _search(
     guess: NDArray[np.float32],
     window_px: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Search for pixels (N, 2) from guess (N, 2), coarse to fine; positions (N, 2) and whether found (N,).
-
-    OpenCV is called level by level: one call for all levels would build the pyramids of both images again,
-    twice a frame.
-    """
-    there, found = guess * np.float32(0.5 ** len(now)), np.empty((0, 1), np.uint8)
+    """Search for pixels (N, 2) from guess (N, 2), coarse to fine; positions (N, 2) and whether found (N,)."""
+    there, found = guess * np.float32(0.5 ** len(now)), np.zeros(len(guess), np.bool_)
     for level in reversed(range(len(now))):
-        ends, status, _ = cv2.calcOpticalFlowPyrLK(
-            before[level],
-            now[level],
-            pixels * np.float32(0.5**level),
-            2.0 * there,
-            winSize=(window_px, window_px),
-            maxLevel=0,
-            criteria=_CRITERIA,
-            flags=_FLAGS,
-            minEigThreshold=_MIN_EIGENVALUE,
+        there, found = lucas_kanade.search(
+            before[level], now[level], pixels, 2.0 * there, 0.5**level, window_px
         )
-        there, found = np.asarray(ends, np.float32), np.asarray(status, np.uint8)
-    return there, found[:, 0].astype(np.bool_)
+    return there, found
+
+
+@compiled("float32[:, ::1], float32[:, ::1], float32[:, ::1]")
+def _expected(
+    there: NDArray[np.float32], guess: NDArray[np.float32], pixels: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Where pixels (N, 2) are expected, (N, 2), and from where they are searched on the way back, (N, 2).
+
+    The median difference between what was found there and guess is an error common to all guesses: a camera
+    rotation that they do not include.
+    """
+    expected, back_guess = np.empty_like(guess), np.empty_like(guess)
+    middle, even = len(guess) // 2, len(guess) % 2 == 0
+    for axis in range(2):
+        ordered = np.sort(there[:, axis] - guess[:, axis])
+        error = ordered[middle]
+        if even:
+            error = np.float32(0.5) * (ordered[middle - 1] + error)
+        for n in range(len(guess)):
+            expected[n, axis] = guess[n, axis] + error
+            back_guess[n, axis] = there[n, axis] - (expected[n, axis] - pixels[n, axis])
+    return expected, back_guess
 
 
 @compiled("float32[:, ::1], float32[:, ::1]")

@@ -11,6 +11,7 @@ import vision
 from config.perception import PerceptionConfig
 from controller.bench.figures import Stopwatches
 from controller.bench.opencv_calls import recorded_calls
+from controller.bench.own_search import recorded_searches
 from controller.bench.perception import (
     FrameTime,
     PairedTimes,
@@ -67,7 +68,7 @@ def test_side_by_side_times_perception_and_its_calls(reel: Reel) -> None:
     expected: list[int] = []
     perception = make()
     for frame in reel.frames:
-        with recorded_calls(MODULES) as calls:
+        with recorded_calls(MODULES) as calls, recorded_searches(calls):
             perception.perceive(frame, None, None)
         expected.append(1000 * len(calls))
     assert expected[1] > 0

@@ -96,7 +96,7 @@ def test_a_plain_area_has_no_flow() -> None:
     assert not track(plain, plain, start, start, steady(len(start)), SETTINGS).found.any()
 
 
-def test_searching_level_by_level_finds_what_one_call_for_all_of_them_finds() -> None:
+def test_searching_level_by_level_finds_what_opencv_finds_on_all_of_them() -> None:
     before, start = pattern(1), points()
     now, window = shifted(before, 9.5, 6.25), SETTINGS.lk_window_px
     whole, _, _ = cv2.calcOpticalFlowPyrLK(
@@ -112,7 +112,7 @@ def test_searching_level_by_level_finds_what_one_call_for_all_of_them_finds() ->
     )
     # So sure of every end that what is expected of it has no weight.
     flow = track(before, now, start, start, 1e-9 * steady(len(start)), SETTINGS)
-    np.testing.assert_allclose(flow.pixels, np.asarray(whole), atol=1e-4)
+    np.testing.assert_allclose(flow.pixels, np.asarray(whole), atol=1e-3)
 
 
 @pytest.mark.parametrize(("size", "levels"), [((480, 640), 4), ((45, 200), 3), ((22, 200), 1)])

@@ -1,0 +1,61 @@
+"""OpenCV's Lucas-Kanade for what perception searches by its own: with it, the bare calls do the same work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.bench.opencv_calls import OpenCvCall
+from vision.fragments import lucas_kanade
+from vision.fragments.edges import GreyImage
+
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.02)  # as in lucas_kanade.py
+_MIN_EIGENVALUE = 1e-5  # the same as there, in OpenCV's units
+# The minimum eigenvalue is available anyway; OpenCV would compute its other error measure pixel by pixel.
+_FLAGS = cv2.OPTFLOW_USE_INITIAL_FLOW | cv2.OPTFLOW_LK_GET_MIN_EIGENVALS
+
+
+def by_opencv(
+    before: GreyImage,
+    now: GreyImage,
+    pixels: NDArray[np.float32],
+    guess: NDArray[np.float32],
+    scale: float,
+    side: int,
+) -> OpenCvCall:
+    """The call that finds what lucas_kanade.search finds with these arguments."""
+    options = {
+        "winSize": (side, side),
+        "maxLevel": 0,
+        "criteria": _CRITERIA,
+        "flags": _FLAGS,
+        "minEigThreshold": _MIN_EIGENVALUE,
+    }
+    return OpenCvCall("calcOpticalFlowPyrLK", (before, now, pixels * np.float32(scale), guess), options)
+
+
+@contextmanager
+def recorded_searches(calls: list[OpenCvCall]) -> Iterator[None]:
+    """Inside the block, OpenCV's counterpart of each search of perception is appended to calls."""
+    own = lucas_kanade.search
+
+    def caught(
+        before: GreyImage,
+        now: GreyImage,
+        pixels: NDArray[np.float32],
+        guess: NDArray[np.float32],
+        scale: float,
+        side: int,
+    ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        calls.append(by_opencv(before, now, pixels, guess, scale, side).fresh())
+        return own(before, now, pixels, guess, scale, side)
+
+    vars(lucas_kanade)["search"] = caught
+    try:
+        yield
+    finally:
+        vars(lucas_kanade)["search"] = own
