@@ -130,9 +130,12 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     """The mistakes of a validation in one line: ``key: reason; key: reason``."""
     parts = []
     told: set[str] = set()
-    for detail in error.errors(include_url=False):
+    details = error.errors(include_url=False)
+    for detail in details:
         if detail["type"] == "default_factory_not_called":
             continue  # a default that depends on a wrong key, which has its own error
+        if detail["type"] == "too_short" and any(_is_in(one, detail) for one in details):
+            continue  # wrong items are not counted, and have their own errors
         unknown = detail["type"] == "extra_forbidden"
         key = written(model, detail["loc"], last_is_key=unknown)
         reason = detail["msg"].removeprefix("Value error, ")
@@ -157,6 +160,12 @@ def describe(error: ValidationError, model: type[BaseModel]) -> str:
     if len(parts) > _MOST_MISTAKES:
         parts[_MOST_MISTAKES:] = [f"and {len(parts) - _MOST_MISTAKES} more mistakes"]
     return "; ".join(parts)
+
+
+def _is_in(inner: ErrorDetails, outer: ErrorDetails) -> bool:
+    """Whether inner is a mistake in a part of what outer is about."""
+    place = outer["loc"]
+    return len(inner["loc"]) > len(place) and inner["loc"][: len(place)] == place
 
 
 def _what_to_write(detail: ErrorDetails) -> str:

@@ -21,12 +21,13 @@ from controller.decision.limits import (
     BACKWARDS_MPS,
     BLOCKING_RULES,
     STANDING_MPS,
+    STANDING_RULES,
     Limit,
     Motion,
     allowed_text,
     min_start_mps,
 )
-from controller.decision.release import ReleaseGate
+from controller.decision.release import ReleaseGate, StartDelay
 from controller.decision.situation import Situation
 from controller.decision.speed_limits import SpeedLimits
 from controller.decision.world_model import WorldModel
@@ -67,7 +68,7 @@ class DecisionMaker:
         self._path: Path | None = None
         self._known: WorldModel | None = None
         self._speed_limits = SpeedLimits(config, robot.limits, mount)
-        self._gate = ReleaseGate(config.release)
+        self._gate, self._start_delay = ReleaseGate(config.release), StartDelay()
         self._now_ns: int | None = None
         self._emergency = False
         self._stuck_since_ns: int | None = None
@@ -201,11 +202,14 @@ class DecisionMaker:
         top_mps = self._robot.limits.max_speed_mps
         least = _least(limits)
         raw_mps = self._start_or_creep(least, motion)
+        blocked = raw_mps <= 0.0 and least.reason.rule in STANDING_RULES
+        waits = self._start_delay.step(blocked, motion.v_mps, now_ns)
         watched: Reason | None = None
         let_go_mps = max(motion.v_mps - motion.a_mps2**2 / (2.0 * self._comfort.jerk_mps3), 0.0)
         if raw_mps < min(top_mps, on_way.speed_mps):
             self._last = watched = _reason_for(least, raw_mps)
-        gated_mps = self._gate.step(min(raw_mps, top_mps), motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
+        released_mps = 0.0 if waits else min(raw_mps, top_mps)
+        gated_mps = self._gate.step(released_mps, motion.v_mps, let_go_mps, now_ns, on_way.speed_mps)
         target_mps = min(gated_mps, on_way.speed_mps)
         if on_way.speed_mps <= gated_mps:
             reason = on_way.reason

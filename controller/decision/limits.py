@@ -30,6 +30,8 @@ UNSEEN_ERROR_SIGMAS = 2.0
 BLOCKING_RULES: frozenset[Rule] = frozenset(
     {"static", "oncoming", "leader", "crossing", "depth", "unseen", "worst case"}
 )
+# Those among them that mean: it does not move.
+STANDING_RULES: frozenset[Rule] = frozenset({"static", "depth"})
 
 
 @record(frozen=True, slots=True)

@@ -13,6 +13,27 @@ from controller.decision.limits import STANDING_MPS
 from hal.clocks import NS_PER_S
 
 
+# What stood in the way of a standing robot must have been out of sight this long before it starts. Something
+# low at the lower edge of the view is seen in some frames only, with gaps of up to half a second; the robot
+# would creep on in each gap until it is below the view. What goes away is seen to move.
+_GONE_S = 1.0
+
+
+class StartDelay:
+    """Keeps a standing robot standing for _GONE_S after something last stood in its way."""
+
+    def __init__(self) -> None:
+        self._blocked_ns: int | None = None
+
+    def step(self, blocked: bool, v_mps: float, now_ns: int) -> bool:
+        """Whether the robot must not start yet. blocked: something that does not move makes it stand."""
+        if v_mps > STANDING_MPS:
+            self._blocked_ns = None
+        elif blocked:
+            self._blocked_ns = now_ns
+        return self._blocked_ns is not None and (now_ns - self._blocked_ns) / NS_PER_S < _GONE_S
+
+
 class _RunningMin:
     """Running minimum over the last delay_s, or since the first value if that is less."""
 

@@ -36,6 +36,8 @@ _LANES = 5  # points across the width of a cell
 _MAX_ABOVE_M = 3.0
 # The median of this many scenes counts: one outlier must not brake; three frames are a tenth of a second.
 _FRAMES = 5
+# A surface that recedes by more than this has left the view; less is depth noise.
+_RECEDES_M = 0.05
 
 
 class Sight:
@@ -62,7 +64,7 @@ class Sight:
         self._edges = math.nan, math.nan
         self._assumed_free_s_m = start_s_m + mount.forward_m + self._near_m + _CELL_M
         self._nearest: deque[float] = deque(maxlen=_FRAMES)
-        self._held_s_m = math.inf
+        self._held_s_m = self._closest_s_m = math.inf
         self.surface_s_m = math.inf
         self.known_s_m = self._assumed_free_s_m
         self.corners = BlindCorners(config.sight)
@@ -137,15 +139,17 @@ class Sight:
 
     def _note_surface(self, nearest_s_m: float, s_m: float, standing: bool) -> None:
         self._nearest.append(nearest_s_m)
-        before = self.surface_s_m
         steady = sorted(self._nearest)[len(self._nearest) // 2]
-        # A surface that leaves the view below or above it because the robot drives on is still there, so it
-        # is held. One that vanishes while the robot stands has gone away.
+        # A surface that leaves the view below, above or beside it because the robot drives on is still there,
+        # so it is held. A long wall beside the corridor leaves the view little by little: its nearest visible
+        # point recedes as fast as the robot drives. One that vanishes while the robot stands has gone away.
         blind_s_m = s_m + self._mount.forward_m + self._out_of_view_within_m
         if standing or self._held_s_m < s_m:
             self._held_s_m = math.inf
-        elif steady > before + _CELL_M and before < blind_s_m:
-            self._held_s_m = min(self._held_s_m, before)
+        elif steady > self._closest_s_m + _RECEDES_M and self._closest_s_m < blind_s_m:
+            self._held_s_m = min(self._held_s_m, self._closest_s_m)
+        keeps = not standing and s_m < self._closest_s_m < blind_s_m
+        self._closest_s_m = min(steady, self._closest_s_m) if keeps else steady
         self.surface_s_m = min(steady, self._held_s_m)
 
     def _note_floor(

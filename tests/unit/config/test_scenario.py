@@ -89,6 +89,13 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, wrong: str, key: st
     assert "\n" not in message
 
 
+def test_a_list_whose_items_are_wrong_is_not_called_empty_as_well(tmp_path: Path) -> None:
+    wrong = GOOD.replace("y_m: 1.0", "y_m: 1.0, motion: {steps: [{kind: wait}]}")
+    with pytest.raises(ConfigError) as caught:
+        load_scenario(write(tmp_path, wrong))
+    assert str(caught.value).endswith("yaml: bodies.0.motion.steps.0.duration_s: missing key")
+
+
 def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
     with pytest.raises(ConfigError, match=r"moon.*warehouse"):
         load_scenario("moon")

@@ -121,6 +121,20 @@ def test_a_surface_that_sinks_below_the_view_while_driving_is_still_there() -> N
     assert watch.look(free(), s_m=4.7, times=5).surface_s_m == math.inf
 
 
+def test_a_long_wall_within_the_margin_that_leaves_the_view_beside_it_is_still_there() -> None:
+    """A wall from 3 m on, 0.1 m beside the swept width: its nearest visible point stays 0.83 m ahead."""
+    watch = Watch()
+    for step in range(60):
+        s_m = 1.2 + 0.02 * step
+        with np.errstate(divide="ignore"):
+            ahead = 0.5 / BEARING
+        wall = np.where((BEARING > 0.0) & (ahead > 2.6 - s_m), ahead, math.inf)
+        watch.look(free(wall), s_m=s_m)
+    assert watch.sight.surface_s_m == pytest.approx(3.0, abs=0.2)
+    # While the robot stands only what is seen counts.
+    assert watch.look(free(wall), s_m=s_m, standing=True).surface_s_m > s_m + 1.2
+
+
 def test_a_surface_that_goes_while_the_robot_stands_has_gone() -> None:
     watch = Watch()
     watch.look(free(nearest_m=1.2), s_m=3.0, times=5, standing=True)
