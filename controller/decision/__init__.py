@@ -17,6 +17,8 @@ The files in the order of one control step:
 * sight.py - how far the corridor was seen free, and unexplained surfaces in it
 * blind_corners.py - where somebody may step out
 * limits.py - a speed limit with its reason
+* path_limit.py - top speed, sections and bends, the target
+* camera_limits.py - how far the camera sees, and whether it works
 * speed_limits.py - asks the advisers: depth (sight.py), then those from here to reachability.py
 * standing_limits.py - bodies that stand in the corridor
 * outline.py - in bends, how far beside the corridor a body stands

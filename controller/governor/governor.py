@@ -18,6 +18,7 @@ from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller.answer import ANSWERS, Answer
 from controller.decision.bodies import SceneError, bodies_of
+from controller.decision.camera_limits import condition_limit
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Action, Decision, Reason
 from controller.decision.lens_cover import COVERED
@@ -227,7 +228,7 @@ class SpeedGovernor:
         assert self._known is not None
         if decision.reason.rule == "fault":
             return self._with(decision, 0.0, decision.reason, emergency=False)
-        camera = self._decide.camera_limit(self._known)
+        camera = condition_limit(self._known, self._decision.sight)
         if camera is not None and camera.speed_mps <= 0.0:
             return self._with(decision, 0.0, camera.reason, emergency=False)
         objection = f"{COVERED}: stop" if self._known.lens.covered else turn_objection(
