@@ -15,9 +15,9 @@ from typing import Protocol
 from config.app import AppConfig, RealtimeRunner
 from controller.build import build_path, build_simulation, require_camera
 from controller.build_chassis import build_base
-from controller.console import Console
 from controller.control import Drive
 from controller.ending import Ending, Outcome
+from controller.mission.result import MissionOptions
 from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.perception_process import perceive_forever
 from controller.realtime.punctual import PunctualChassis
@@ -25,7 +25,7 @@ from controller.realtime.runner import PerceptionLink, Punctuality, RealtimeMome
 from controller.realtime.scheduling import become_realtime
 from controller.realtime.service import ServiceManager, StopRequest
 from controller.record.recorder import RecordingOptions, require_writable
-from controller.result import MissionOptions
+from controller.terminal.console import Console
 from controller.workers import held
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import DeviceRefused

@@ -11,7 +11,7 @@ import yaml
 from config.loader import CONFIG_DIR
 from tests.support.command_line import refusal, treadwatch
 
-DESK = Path(__file__).resolve().parents[2] / "recordings" / "desk_rpy"
+DESK = Path(__file__).resolve().parents[3] / "recordings" / "desk_rpy"
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from controller.decision.decision import Decision
-from controller.outlet import Outlet, Words, write
+from controller.terminal.outlet import Outlet, Words, write
 
 BAR = 24
 # A reason gets a line of its own only if it holds for this long.
