@@ -8,6 +8,7 @@ The files and folders in the order in which they come into play:
 * lockstep.py, realtime/ - the loops: when a frame is looked at, and when the control steps
 * perceive.py - a frame through vision/
 * control.py - one control step, through all files from here to guard.py
+* driven_base.py - the chassis with its pose, its answer to commands, and ending.py: how a drive begins and ends
 * localise.py - where the robot is
 * decision/ - how fast it may go, and why
 * answer.py - whether the base does what it is told
@@ -15,7 +16,6 @@ The files and folders in the order in which they come into play:
 * braking.py, profile.py - formulas of stops and of speed profiles, for decision and shape
 * follow.py - the yaw rate that keeps it on the path
 * guard.py - the last check before the base
-* ending.py - how a drive begins and ends
 * record/, video/ - what is kept of a run; terminal/ - what is told of it
 * bench/, campaign/, evaluation/, faults/ - measure speed, missions, perception and faults; workers.py - in
   parallel processes
