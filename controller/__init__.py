@@ -8,7 +8,7 @@ The files and folders in the order in which they come into play:
 * lockstep.py, realtime/ - the loops: when a frame is looked at, and when the control steps
 * perceive.py - a frame through vision/
 * control.py - one control step, through all files from here to guard.py
-* driven_base.py - the chassis with its pose, its answer to commands, and ending.py: how a drive begins and ends
+* driven_base.py - the chassis with its pose and its answer; ending.py: how a drive begins and ends
 * localise.py - where the robot is
 * decision/ - how fast it may go, and why
 * answer.py - whether the base does what it is told
