@@ -27,7 +27,7 @@ from controller.governor.arc_ahead import ArcAhead
 from controller.governor.arcs import Kind, Wish, corner_m, driveable, understand, why_stop
 from controller.governor.ground import GroundMemory
 from controller.governor.request import Twist
-from controller.governor.surroundings import near_limits, turn_objection
+from controller.governor.surroundings import GroundLimits
 from controller.localise import PoseHistory
 from controller.path.path import OnPath, Path
 from controller.shape import SpeedShaper
@@ -70,11 +70,12 @@ class SpeedGovernor:
         period_s: float,
         noise: DepthNoise = TYPICAL_DEPTH_NOISE,
     ) -> None:
-        self._config, self._decision, self._robot, self._mount = config, decision, robot, mount
+        self._decision, self._robot, self._mount = decision, robot, mount
         self._latency_s = period_s + decision.chassis_delay_s
         self._decide = DecisionMaker(decision, robot, mount, period_s, noise)
         self._shape = SpeedShaper(robot.limits, period_s, decision.chassis_delay_s)
         self._ground = GroundMemory(robot, mount, decision)
+        self._ground_limits = GroundLimits(self._ground, robot, decision, config.turn_memory_s)
         self._ahead = ArcAhead(self._decide, robot, decision.sight.range_m, _NEAR_EXTRA_M)
         self._poses = PoseHistory()
         # How the robot moves now: kept until it stands, whatever is asked for meanwhile.
@@ -176,18 +177,10 @@ class SpeedGovernor:
         if self._motion.kind is Kind.ARC and decision.reason.rule != "fault":
             assert self._ahead.known is not None
             motion = Motion(v_mps, a_mps2, self._latency_s)
-            near = near_limits(
-                self._ground, self._ahead.known.corridor, on_path.s_m, self._near_m, motion,
-                self._robot, self._decision, now_ns,
-            )  # fmt: skip
-            for limit in near:
+            corridor, to_s_m = self._ahead.known.corridor, self._ground.consent_m + _NEAR_EXTRA_M
+            for limit in self._ground_limits.arc_limits(corridor, on_path.s_m, to_s_m, motion, now_ns):
                 decision = self._least(decision, limit)
         return decision
-
-    @property
-    def _near_m(self) -> float:
-        """Up to where along the arc the remembered floor stands in for the camera."""
-        return self._ground.consent_m + _NEAR_EXTRA_M
 
     def _lay_out_arc(self, pose: PlanarPose) -> Path:
         """The arc of the present motion; a straight line if the motion is no arc."""
@@ -208,10 +201,8 @@ class SpeedGovernor:
         camera = condition_limit(known, self._decision.sight)
         if camera is not None and camera.speed_mps <= 0.0:
             return self._with(decision, 0.0, camera.reason, emergency=False)
-        objection = f"{COVERED}: stop" if known.lens.covered else turn_objection(
-            self._ground, known.bodies, pose, self._robot, self._decision,
-            self._config.turn_memory_s, now_ns,
-        )  # fmt: skip
+        covered = f"{COVERED}: stop" if known.lens.covered else ""
+        objection = covered or self._ground_limits.turn_objection(known.bodies, pose, now_ns)
         if objection:
             return self._with(decision, 0.0, Reason("turn", objection), emergency=True)
         speed_mps = self._motion.speed_mps
