@@ -20,6 +20,7 @@ from controller.decision.decision import Reason
 from controller.decision.limits import (
     ALONGSIDE_M,
     UNSEEN_ERROR_SIGMAS,
+    Gap,
     Limit,
     Motion,
     allowed_text,
@@ -101,22 +102,18 @@ class WorstCase:
             return None
         urgent = False
         if motion.v_mps > speed:
-            now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
-            urgent = count_safe_stops(now, s_m, reached, rows) == 0
+            urgent = self._too_late(motion, s_m, reached, rows)
             if not urgent and motion.v_mps <= speed + _TOLERATED_EXCESS_MPS:
                 # An emergency stop is still in time. Braking for each small fluctuation would only cost time.
                 speed = motion.v_mps
-        row = int(np.where(rows, placed.block_from_s_m[:, 0], math.inf).argmin())
-        track_id = int(bodies.ids[row])
-        gap_m = float(placed.block_from_s_m[row, 0]) - s_m
+        nearest = int(np.where(rows, placed.block_from_s_m[:, 0], math.inf).argmin())
+        gap = Gap(float(placed.block_from_s_m[nearest, 0]) - s_m, obstacle_id=int(bodies.ids[nearest]))
+        return Limit(speed, lambda: _reason(gap, speed), urgent)
 
-        def why() -> Reason:
-            ahead = f"obstacle {track_id}, {max(gap_m, 0.0):.1f} m ahead"
-            return Reason(
-                "worst case", f"{ahead}, could step into the way: {allowed_text(speed)}", track_id, gap_m
-            )
-
-        return Limit(speed, why, urgent)
+    def _too_late(self, motion: Motion, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> bool:
+        """Whether even an emergency stop that begins now would touch a body in the mask counts (N,)."""
+        now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
+        return count_safe_stops(now, s_m, reached, counts) == 0
 
     def _speed(
         self, reached: Reach, young: NDArray[np.bool_], enters: NDArray[np.bool_], s_m: float
@@ -177,3 +174,9 @@ class WorstCase:
             latency_s=latency_s,
         )
         return stops(ramps, self.times_s)
+
+
+def _reason(gap: Gap, speed_mps: float) -> Reason:
+    ahead = f"{gap.name}, {max(gap.distance_m, 0.0):.1f} m ahead"
+    sentence = f"{ahead}, could step into the way: {allowed_text(speed_mps)}"
+    return Reason("worst case", sentence, gap.obstacle_id, gap.distance_m)
