@@ -11,7 +11,7 @@ from controller.errors import INTERRUPTED
 def main() -> None:
     """The whole program; Ctrl-C where no command makes more of it is one line and exit code 130."""
     try:
-        from controller.cli import main as run_command
+        from controller.cli.commands import main as run_command
 
         run_command()
     except KeyboardInterrupt:

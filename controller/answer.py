@@ -39,9 +39,13 @@ _REPORTS = 2
 
 @record(frozen=True, slots=True)
 class Answer:
-    """cap_mps: no command beyond it (inf: the base answers). hard: get there with the jerk of an emergency.
-    dips: nothing can be learnt of the base's lag now. zero: why zero is said now and the profile begun anew;
-    "" if it is not. ends: that is no help, and the drive has to end.
+    """Whether the base answers, as instructions for the next command.
+
+    cap_mps: greatest command; inf: the base answers.
+    hard: slow down to cap_mps with the jerk of an emergency.
+    zero: why zero is commanded now and the profile begins anew; "" if it is not.
+    ends: commanding zero does not help, and the drive has to end.
+    dips: nothing can be learnt of the base's lag now.
     """
 
     cap_mps: float = math.inf
@@ -74,12 +78,12 @@ class BaseAnswer:
         self._answer = ANSWERS
 
     def restart(self) -> None:
-        """The base does not obey now: what it does is no answer."""
+        """Forget all reports: the base does not obey now, so what it does is no answer."""
         self._forget()
         self._went_back = False
 
     def step(self, commanded_mps: float, measured_mps: float, feedback_ns: int | None, now_ns: int) -> Answer:
-        """commanded_mps: commanded until now_ns. measured_mps: by the report of feedback_ns."""
+        """Compare commanded_mps, commanded until now_ns, with measured_mps, reported at feedback_ns."""
         if self._since_ns is None:
             self._since_ns = now_ns
         self._least.add(commanded_mps, now_ns)
@@ -99,7 +103,7 @@ class BaseAnswer:
                 f"the base fell to {measured_mps:.2f} m/s while at least {least_mps:.2f} m/s was commanded"
             )
         if self._runs >= _REPORTS:
-            # No less than now: where it runs away the driver sees that best, and latches it.
+            # Not lower than now: the driver sees a base that runs away best at this command, and latches it.
             self._answer = Answer(commanded_mps, hard=True)
         elif self._behind >= _REPORTS:
             self._answer = Answer(max(measured_mps, _BREAKS_LOOSE_MPS))
@@ -120,8 +124,11 @@ class BaseAnswer:
         self._back = self._back + 1 if measured_mps < _BACKWARDS_MPS and commanded_mps > 0.0 else 0
 
     def _goes_back(self, measured_mps: float) -> Answer:
-        """Once it may have rolled back. One that goes back again before it has followed would do so for ever,
-        each time too briefly for rolling_back.py."""
+        """Begin anew the first time, since the base may have rolled back; end the drive the second time.
+
+        A base that goes back again before it has followed would do so for ever, each time too briefly for
+        rolling_back.py.
+        """
         why = f"the base goes back at {-measured_mps:.2f} m/s while told to go ahead"
         again, self._went_back = self._went_back, True
         if not again:

@@ -21,10 +21,10 @@ _DRIFT_SIGMA = 0.03
 # Errors of odometry are correlated from step to step, so this is far more than the noise of one reading.
 _NOISE_M = 0.03
 _OUTLIER_M = 0.25  # a larger residual starts the measurement anew
-# What was known is kept every so many steps, so often: at 50 a second the oldest is 1.5 to 2 s old. That is
-# longer than any base goes on at its last command when it hears nothing.
+# The estimate is stored every _KEPT_EVERY steps, and the last _KEPT are kept: at 50 Hz the oldest is 1.5 to
+# 2 s old. That is longer than any base goes on at its last command when it receives nothing.
 _KEPT_EVERY, _KEPT = 25, 4
-# Then it may still coast for so many steps, by nobody's command.
+# After that, it may coast without a command for this many steps.
 _COASTS = 50
 # Greatest lag and drift that are used.
 _LONGEST_S = 0.6
@@ -80,7 +80,7 @@ class ChassisLag:
             self._skipped -= 1
             return
         if self._started_at_m is None:
-            # Measured from where it will have followed what was commanded before.
+            # Measured from where the robot will be once the chassis has followed what was commanded before.
             self._started_at_m = to_end_m - self.seconds * max(v_mps - self.seconds * a_mps2, 0.0)
             return
         self._until_kept -= 1

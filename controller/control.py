@@ -1,4 +1,8 @@
-"""One control step: chassis state and scene in, decision, shaped setpoint out. Both runners step it."""
+"""One control step along a path: chassis state and scene in, decision and shaped setpoint out.
+
+All loops step it (controller/lockstep.py, controller/realtime/runner.py). What it shares with the governor's
+control step is in controller/driven_base.py.
+"""
 
 from __future__ import annotations
 
@@ -10,30 +14,35 @@ from controller.answer import BaseAnswer
 from controller.decision.decision import Decision
 from controller.decision.limits import speed_to_decide_by
 from controller.decision.situation import Situation
+from controller.driven_base import DrivenBase
 from controller.ending import Ending, Outcome
 from controller.follow import PathFollower
 from controller.localise import Localiser
 from controller.path.path import OnPath, Path
 from controller.shape import SpeedShaper
 from hal.api import Chassis
-from hal.types import ChassisMode, ChassisState, FloatArray, PlanarPose, Setpoint
+from hal.types import ChassisState, FloatArray, PlanarPose, Setpoint
 from vision.scene import Scene
 
-# At rest within this of the path's end counts as arrived.
+# A robot at rest has arrived if it stands within this distance of the path's end.
 ARRIVED_M = 0.05
-# Further past it, the target was missed.
+# A robot farther past the end than this has missed the target.
 PASSED_M = 0.10
 
 
 @dataclass(frozen=True, slots=True)
 class ControlStep:
-    """What one step knew, decided and sent.
+    """What one control step knew, decided and sent.
 
-    pose: the body in the path's frame; progress_m along the path, lateral_m to its left.
-    scene_ns: when the frame was taken that the decision used, None if there was none yet. ahead_m: (N, 2) the
-    way ahead in the body frame, where it is not the path that the runner knows. fault: why the shaper had to
-    brake by the stop profile, "" if it had not. unanswered: why the base was told zero at once instead of the
-    profile, "" if it was not.
+    now_ns: time of the step.
+    pose: of the body, in the path's frame.
+    progress_m, lateral_m: its place along the path and to its left.
+    scene_ns: when the frame was captured that the decision used; None if there was none yet.
+    setpoint: what was asked for.
+    chassis: the state that came back.
+    ahead_m: (N, 2) the way ahead in the body frame, if it is not the path that the runner knows.
+    fault: why the shaper had to brake by the stop profile; "" if it did not.
+    unanswered: why the base was told zero at once instead of the profile; "" if it was not.
     """
 
     now_ns: int
@@ -50,7 +59,7 @@ class ControlStep:
 
 
 class Drive(Protocol):
-    """What a runner steps; ControlLoop is the real one."""
+    """What a loop steps: ControlLoop, or the governor's GovernorLoop."""
 
     @property
     def finished(self) -> bool: ...
@@ -61,13 +70,13 @@ class Drive(Protocol):
 
 
 class Decides(Protocol):
-    """What a drive is decided by; DecisionMaker is ours, a campaign compares it with others."""
+    """What decides in a control step: DecisionMaker, or another policy that a campaign compares with it."""
 
     def step(self, at: Situation) -> Decision: ...
 
 
 class ControlLoop:
-    """Owns the order of things within a control period; every part in it is stepped, none runs by itself."""
+    """One control period along a path: steps every part in its order; none of them runs by itself."""
 
     def __init__(
         self,
@@ -84,70 +93,57 @@ class ControlLoop:
         self._decide = decide
         self._shape = shape
         self._follow = follow
-        self._chassis = chassis
-        self._answer = answer
-        self.ending = Ending(chassis)
-        self._state: ChassisState | None = None
+        self._base = DrivenBase(chassis, localiser, answer)
         self._progress_m = 0.0
-        self._scene_ns: int | None = None
+
+    @property
+    def ending(self) -> Ending:
+        """Whether, how and why the drive has ended."""
+        return self._base.ending
 
     @property
     def finished(self) -> bool:
-        """The drive has ended, one way or the other; the chassis has been told to stop."""
-        return self.ending.outcome is not None
+        """Whether the drive has ended; then the chassis has been told to stop."""
+        return self._base.finished
 
     def request_stop(self, reason: str, outcome: Outcome = Outcome.STOPPED) -> None:
-        """Come to rest by the comfort profile, then end with this outcome. The first reason stays."""
+        """Stop by the comfort profile, then end with this outcome. The first reason is kept."""
         self.ending.request_stop(reason, outcome)
 
     def step(self, scene: Scene | None, now_ns: int) -> ControlStep:
         """Decide on what is known, shape, send, and take in what the chassis answers."""
-        self.ending.begin(now_ns)
-        self._learn(scene)
+        self._base.begin(scene, now_ns)
         pose = self.localiser.pose
         on_path = self.path.project(pose, self._progress_m)
         if math.isfinite(on_path.s_m):
             self._progress_m = on_path.s_m
-        measured_mps = math.nan if self._state is None else self._state.v_mps
-        speed_mps = speed_to_decide_by(self._shape.v_mps, measured_mps)
+        speed_mps = speed_to_decide_by(self._shape.v_mps, self._base.measured_mps)
         decision = self._decide.step(
             Situation(scene, self.path, pose, on_path, speed_mps, self._shape.a_mps2, now_ns)
         )
         setpoint, fault, unanswered = self._setpoint(decision, on_path, now_ns)
-        # None asks for zero at once; as a setpoint it would be a step that the output guard refuses.
-        self._state = self._chassis.exchange(None if unanswered else setpoint, now_ns)
-        self.localiser.add_odometry(self._state.stamp_ns, self._state.pose)
+        state = self._base.exchange(setpoint, now_ns, zero=unanswered != "")
         to_go_m = self.path.length_m - on_path.s_m
         if to_go_m < -PASSED_M:
             self.request_stop("went past the target", Outcome.BROKEN_OFF)
-        arrived = -PASSED_M <= to_go_m <= ARRIVED_M
-        self.ending.conclude(self._state, setpoint, now_ns, arrived=arrived)
+        self._base.conclude(setpoint, now_ns, arrived=-PASSED_M <= to_go_m <= ARRIVED_M)
         scene_ns = None if scene is None else scene.captured_ns
         return ControlStep(
-            now_ns, pose, on_path.s_m, on_path.d_m, scene_ns, decision, setpoint, self._state,
+            now_ns, pose, on_path.s_m, on_path.d_m, scene_ns, decision, setpoint, state,
             fault=fault, unanswered=unanswered,
         )  # fmt: skip
 
-    def _learn(self, scene: Scene | None) -> None:
-        """Each scene's ego-motion corrects the yaw once."""
-        if scene is not None and scene.captured_ns != self._scene_ns:
-            self._scene_ns = scene.captured_ns
-            self.localiser.add_ego_motion(scene.captured_ns, scene.ego_motion)
-
     def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> tuple[Setpoint, str, str]:
-        """What to send, the shaper's fault, and why zero is said instead of the profile."""
-        state = self._state
-        if state is None or state.mode is not ChassisMode.ARMED:
-            # What the chassis does now is not ours to shape; whenever it obeys again, begin at rest.
+        """What to send, the shaper's fault, and why zero is asked for instead of the profile."""
+        stand = Setpoint(now_ns, 0.0, 0.0, 0.0)
+        answer = self._base.answer(self._shape.v_mps, now_ns)
+        if not self._base.obeys:
+            # The chassis does not follow setpoints now. When it does again, shaping begins from standstill.
             self._shape.reset()
-            self._answer.restart()
-            return Setpoint(now_ns, 0.0, 0.0, 0.0), "", ""
-        answer = self._answer.step(self._shape.v_mps, state.v_mps, state.feedback_ns, now_ns)
-        if answer.ends:
-            self.request_stop(answer.zero, Outcome.BROKEN_OFF)
+            return stand, "", ""
         if answer.zero:
             self._shape.begin_anew()
-            return Setpoint(now_ns, 0.0, 0.0, 0.0), "", answer.zero
+            return stand, "", answer.zero
         if answer.dips:
             self._shape.unlearn_lag()
         target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps

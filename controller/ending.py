@@ -1,4 +1,7 @@
-"""How every drive begins and ends, whoever steers it: arming, a wish to stop, rest, the last zero."""
+"""How a drive begins and ends: it arms the chassis, takes requests to stop, and tells when the robot rests.
+
+Both control loops (controller/control.py, controller/governor/loop.py) call it in each step.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,14 @@ from hal.api import Chassis
 from hal.clocks import NS_PER_S
 from hal.types import LATCHED_MODES, ChassisMode, ChassisState, Setpoint
 
-# At rest, by command and by what the chassis measures, for this long.
+# The robot has come to rest once it has been commanded to stand, and measured to stand, for this long.
 SETTLE_S = 0.5
-# A base that does not arm within this will not: say so instead of waiting for ever.
+# A base that has not armed after this time will not; the drive ends instead of waiting for ever.
 ARM_TIMEOUT_S = 5.0
-# A base that lags by two seconds has come to rest this long after the last command that moved it.
+# A base that lags by 2 s has come to rest this long after the last command that moved it.
 STILL_GOING_S = 6.0
 
-# Slower is at rest: some counts of jitter of a coarse encoder, the noise of a gyro.
+# Below these, measured speeds count as rest: the jitter of a coarse encoder, the noise of a gyro.
 REST_MPS = 0.02
 REST_RADPS = 0.05
 
@@ -32,12 +35,13 @@ class Outcome(Enum):
 
 
 class Ending:
-    """Arms the chassis at the drive's first step, tells whether, how and why the drive is over, and stops
-    the chassis then. A chassis that latches or is lost ends every drive; only a person starts it again. So
-    does one that is told to stand and goes on.
+    """Arms the chassis at the first step of a drive; decides whether, how and why the drive is over.
 
-    stop_reason: why the robot comes to rest, from the moment that this is asked for. outcome: how the drive
-    ended, None as long as it goes on.
+    Then it stops the chassis. A chassis that latches a fault or is lost ends every drive, and only a person
+    can start it again. So does a base that keeps moving although it is commanded to stand.
+
+    stop_reason: why the robot comes to rest, from the request on; None: nobody has requested it.
+    outcome: how the drive ended; None while it goes on.
     """
 
     def __init__(self, chassis: Chassis) -> None:
@@ -51,19 +55,22 @@ class Ending:
         self._resting_since_ns: int | None = None
 
     def request_stop(self, reason: str, outcome: Outcome) -> None:
-        """Have the drive end with this outcome once the robot is at rest. The first reason stays."""
+        """Let the drive end with this outcome once the robot is at rest. The first reason is kept."""
         if self.stop_reason is None:
             self.stop_reason = reason
             self._asked_for = outcome
 
     def begin(self, now_ns: int) -> None:
-        """Before each step; the first one arms the chassis."""
+        """Call before each step; the first call arms the chassis."""
         if self._started_ns is None:
             self._started_ns = now_ns
             self._chassis.arm(now_ns)
 
     def conclude(self, state: ChassisState, setpoint: Setpoint, now_ns: int, *, arrived: bool) -> None:
-        """After each step, with what was sent and answered. arrived: where this drive leads to."""
+        """Call after each step, with what was sent and answered.
+
+        arrived: whether the robot is where this drive leads to.
+        """
         assert self._started_ns is not None, "concluded before it began"
         if state.mode is ChassisMode.ARMED:
             self._was_armed = True
@@ -85,8 +92,11 @@ class Ending:
             self._end(Outcome.CHASSIS_FAULT, _goes_on(state), now_ns)
 
     def _settled(self, state: ChassisState, now_ns: int) -> bool:
-        """It has measured rest for long enough, and told so since: what it told before is no evidence. Before
-        it was armed nobody has moved it, and it need not have told anything."""
+        """Whether the base has measured rest for long enough, and has reported since then.
+
+        A report from before is no evidence of rest. A base that was never armed has not been moved, so it
+        need not have reported anything.
+        """
         trusted = not self._was_armed
         slow = abs(state.v_mps) <= REST_MPS and abs(state.w_radps) <= REST_RADPS  # NaN is not
         if not (slow or trusted):

@@ -194,7 +194,7 @@ class GuardedChassis(DeviceWrapper):
         self._chassis.stop(now_ns)
 
     def _unlatch_if_followed(self, state: ChassisState) -> None:
-        """The driver may refuse the consent: then it ends nothing here either."""
+        """Release the latch if the driver has accepted the consent, too; otherwise keep its refusal."""
         if state.mode in (ChassisMode.ARMING, ChassisMode.ARMED):
             self._violation = ""
         elif self._violation and state.mode not in LATCHED_MODES:  # whose reason is told beside ours

@@ -10,8 +10,8 @@ The slip belongs to the base and its floor, so a better estimate holds for the p
 path is stored as legs (distance, raw turn by odometry) and re-integrated with each new yaw ratio. The pose
 therefore moves a little with each estimate.
 
-Odometry that is not a number says nothing: as long as it does not, the pose is not known, and whoever decides
-stops for that. When it says something again, it has gone on from where it was.
+While the odometry is not finite, the pose is not known (NaN), and the decision stops the robot. The first
+finite odometry after that includes what was driven meanwhile.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from vision.scene import EgoMotion
 
 HISTORY_S = 2.0
 _HISTORY_NS = round(HISTORY_S * NS_PER_S)
-# The way behind is kept as legs so short that each is straight; beyond this many the oldest are settled.
+# The path driven is stored as legs, each so short that it counts as straight.
 LEG_M = 0.05
 LEG_RAD = 0.02
-MOST_LEGS = 2000
+MOST_LEGS = 2000  # older legs are no longer re-integrated
 # Prior of the yaw ratio (true / odometry): 1 +/- 0.15, a skid-steered base on a hard floor.
 PRIOR_RATIO_SIGMA = 0.15
 
@@ -40,8 +40,11 @@ UNKNOWN = PlanarPose(math.nan, math.nan, math.nan)
 
 
 class PoseHistory:
-    """The last poses with their times, interpolated. Beyond the last, for a short reach, what moved goes on
-    as it did for as long as the last two are apart: to stand there would be a jolt in every other frame."""
+    """The last poses with their times, interpolated.
+
+    For up to reach_s after the last pose, it is extrapolated by at most the time between the last two. If the
+    pose stood still there, every other frame would see a jolt.
+    """
 
     def __init__(self, reach_s: float = 0.1) -> None:
         self._stamps_ns: deque[int] = deque()
@@ -49,8 +52,10 @@ class PoseHistory:
         self._reach_ns = int(reach_s * NS_PER_S)
 
     def append(self, stamp_ns: int, pose: PlanarPose) -> None:
-        """Add a pose; a stamp that does not advance replaces the last one. A pose that is not known is not
-        kept, so that after it the last one grows old."""
+        """Add a pose; a stamp that does not advance replaces the last one.
+
+        A pose that is not known is not stored, so that the last one grows old.
+        """
         if not pose.finite:
             return
         stamps_ns, poses, oldest_ns = self._stamps_ns, self._poses, stamp_ns - _HISTORY_NS
@@ -130,8 +135,10 @@ class Localiser:
         return self._sum_odometry_visual / self._sum_odometry_odometry
 
     def add_odometry(self, stamp_ns: int, odometry: PlanarPose) -> PlanarPose:
-        """Dead reckoning of the chassis at stamp_ns, in its own frame; returns the fused pose. One that is
-        not finite is missing, and what is driven meanwhile is in the next that is."""
+        """Take in the dead reckoning of the chassis at stamp_ns, in its own frame; returns the fused pose.
+
+        Odometry that is not finite counts as missing; the next finite one includes what was driven meanwhile.
+        """
         self._lost = not odometry.finite
         if self._lost:
             return UNKNOWN
@@ -147,7 +154,7 @@ class Localiser:
     def add_ego_motion(self, captured_ns: int, ego: EgoMotion) -> None:
         """Learn from the rotation that the camera saw between the frame before and captured_ns.
 
-        What is not finite teaches nothing: the sums would never be rid of it.
+        Motion that is not finite is ignored: the sums would stay NaN for ever.
         """
         if not (math.isfinite(ego.dt_s) and ego.motion.finite):
             return

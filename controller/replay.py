@@ -22,7 +22,6 @@ from controller.build import (
     replay_surroundings,
     straight_ahead,
 )
-from controller.console import Console
 from controller.decision.decide import DecisionMaker
 from controller.decision.decision import Decision
 from controller.decision.situation import Situation
@@ -32,6 +31,7 @@ from controller.perceive import Look
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, open_recorder, require_two_files
 from controller.record.tally import TimingTally
+from controller.terminal.console import Console
 from hal.cameras.bag_topics import WantedTopics
 from hal.clocks import NS_PER_S
 from hal.errors import EndOfStream

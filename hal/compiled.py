@@ -68,12 +68,16 @@ def compiled(arguments: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     signature = tuple(_read_only(argument) for argument in parsed)
 
     def build(function: Callable[P, R]) -> Callable[P, R]:
-        try:
-            return _kept(function, signature)
-        except NumbaError:
-            raise  # an error in the step itself
-        except _NOT_KEPT as error:
-            _say(_EVERY_TIME, str(error).partition("\n")[0])
+        why = ""
+        # The second attempt replaces a damaged cache, for example where power was cut while it was written.
+        for anew in (False, True):
+            try:
+                return _build(function, signature, kept=True, anew=anew)
+            except NumbaError:
+                raise  # an error in the step itself
+            except _NOT_KEPT as error:
+                why = str(error).partition("\n")[0]
+        _say(_EVERY_TIME, why)
         return _build(function, signature, kept=False)
 
     return build
@@ -85,36 +89,34 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     return result
 
 
-def _kept(function: Callable[P, R], signature: tuple[types.Type, ...]) -> Callable[P, R]:
-    """The step from the cache, or compiled and cached. Raises NumbaError, and what reading or writing the
-    cache may raise."""
-    try:
-        step = _build(function, signature, kept=True)
-    except NumbaError:
-        raise
-    except _NOT_KEPT:
-        # The cache is damaged, for example because power was cut while it was written.
-        step = _build(function, signature, kept=True, anew=True)
-    if isinstance(step, Dispatcher) and step.stats.cache_misses:
-        _say(_FIRST_TIME)
-    return step
-
-
 def _build(
     function: Callable[P, R], signature: tuple[types.Type, ...], *, kept: bool, anew: bool = False
 ) -> Callable[P, R]:
-    """Compile function for signature. kept: use the cache. anew: ignore what is cached and replace it."""
+    """Compile function for signature. kept: use the cache. anew: ignore what is cached and replace it.
+
+    Raises NumbaError, and what reading or writing the cache may raise.
+    """
     step: Any = njit(error_model="numpy")(function)
-    if isinstance(step, Dispatcher):  # else plain Python, with NUMBA_DISABLE_JIT=1
+    if not isinstance(step, FunctionType):  # it is one with NUMBA_DISABLE_JIT=1: plain Python
         if kept:
-            # As Dispatcher.enable_caching does, but the cache's stamp covers all that the step rests on.
-            setattr(step, "_cache", _Cache(function))  # noqa: B010
+            step._cache = _Cache(step.py_func)  # as Dispatcher.enable_caching does
         if anew:
             step.recompile()  # nothing is compiled yet, but this drops the cached form
         step.compile(signature)
         step.disable_compile()
+        if kept and step.stats.cache_misses:
+            _say(_FIRST_TIME)
     result: Callable[P, R] = step
     return result
+
+
+class _Cache(caching.FunctionCache):  # type: ignore[misc]  # Numba has no types
+    """Numba's cache of one step, with a stamp that covers everything that the compiled form rests on."""
+
+    def __init__(self, function: FunctionType) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp(), *_rests_on(function, set())
+        self._cache_file = caching.IndexDataCacheFile(self.cache_path, self._impl.filename_base, stamp)
 
 
 def _rests_on(function: FunctionType, known: set[FunctionType]) -> Iterator[object]:
@@ -136,32 +138,6 @@ def _rests_on(function: FunctionType, known: set[FunctionType]) -> Iterator[obje
             yield name, getattr(value, "_fields", ())
         elif isinstance(value, _CONSTANTS):
             yield name, repr(value)
-
-
-def _stamped(place: Any) -> Any:
-    """A cache locator of Numba whose stamp covers everything that a compiled form rests on."""
-
-    class Stamped(place):  # type: ignore[misc]
-        def __init__(self, function: FunctionType, file: str) -> None:
-            super().__init__(function, file)
-            self._function = function
-
-        def get_source_stamp(self) -> tuple[object, ...]:
-            return super().get_source_stamp(), *_rests_on(self._function, set())
-
-    return Stamped
-
-
-class _Forms(caching.CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes = (
-        _stamped(caching.UserProvidedCacheLocator),
-        _stamped(caching.InTreeCacheLocator),
-        _stamped(caching.UserWideCacheLocator),
-    )
-
-
-class _Cache(caching.FunctionCache):  # type: ignore[misc]
-    _impl_class = _Forms
 
 
 def _say(sentence: str, *values: str) -> None:

@@ -37,7 +37,7 @@ from controller.build import (
 )
 from controller.build_chassis import build_base
 from controller.errors import UserError
-from controller.outlet import say
+from controller.terminal.outlet import say
 from hal.clocks import SimulatedClock
 from sim.rendering.camera import SimulatedCamera
 from sim.rendering.render import Renderer

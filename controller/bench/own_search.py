@@ -51,7 +51,7 @@ def recorded_searches(calls: list[OpenCvCall]) -> Iterator[None]:
         scale: float,
         side: int,
     ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        calls.append(by_opencv(before, now, pixels, guess, scale, side).fresh())
+        calls.append(by_opencv(before, now, pixels, guess, scale, side).copied())
         return own(before, now, pixels, guess, scale, side)
 
     vars(lucas_kanade)["search"] = caught

@@ -23,12 +23,12 @@ from config.app import AppConfig, RealtimeRunner, load_app
 from config.camera import SimulatedCameraConfig
 from config.chassis import CanLinkConfig
 from config.loader import CONFIG_DIR
-from controller.console import Console
 from controller.errors import UserError
-from controller.outlet import say
+from controller.mission.result import MissionOptions
 from controller.realtime.mission import drive_realtime
 from controller.realtime.service import handlers_kept
-from controller.result import MissionOptions
+from controller.terminal.console import Console
+from controller.terminal.outlet import say
 from hal.api import Clock
 from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 

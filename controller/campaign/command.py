@@ -22,7 +22,7 @@ from controller.campaign.summary import Summary, why_failed
 from controller.campaign.task import Mode, Task, failed, run_task, time_ratio
 from controller.errors import Interrupted, UserError
 from controller.evaluation import markdown
-from controller.outlet import say
+from controller.terminal.outlet import say
 from sim.families import FAMILY_NAMES
 
 FAILING = "failing"

@@ -23,7 +23,7 @@ from controller.campaign.stop_and_go import StopAndGo
 from controller.campaign.task import Mode
 from controller.errors import UserError
 from controller.evaluation import markdown
-from controller.outlet import say
+from controller.terminal.outlet import say
 from sim.families.step_in import step_in
 
 TO_STOP_S, HOLD, TO_RESUME_S, FALSE_STOPS = 0.6, 0.95, 0.6, 0.01

@@ -17,14 +17,18 @@ The files in the order of one control step:
 * sight.py - how far the corridor was seen free, and unexplained surfaces in it
 * blind_corners.py - where somebody may step out
 * limits.py - a speed limit with its reason
-* speed_limits.py - asks the advisers: depth (sight.py), then those from here to reachability.py
+* path_limit.py - top speed, sections and bends, the target
+* camera_limits.py - how far the camera sees, and whether it works
+* speed_limits.py - asks the advisers: depth (sight.py), standing, moving, worst case
 * standing_limits.py - bodies that stand in the corridor
 * outline.py - in bends, how far beside the corridor a body stands
-* debounce.py - debounced flags: which bodies enter the corridor
+* watched.py - the bodies that move or are young: where they will be, which enter the corridor
+* crossing.py - which are likely to enter; the conflicts with them, and which speeds solve these
+* debounce.py - debounced flags for that
 * moving_limits.py - bodies that cross, come towards the robot or drive ahead
-* crossing.py - the conflicts with them: when and where, and which speeds solve them
 * worst_case_limit.py - what bodies could do at worst
-* reachability.py - its geometry: what bodies could reach, and where emergency stops end
+* manoeuvres.py - how far each may change its velocity
+* reachability.py - what they could reach by that, and where emergency stops end
 * release.py - slower at once, faster after a delay
 * decision.py - the output: action, target speed, reason
 
@@ -35,7 +39,8 @@ Words of this folder:
 * Corridor, swept width: the floor that the robot sweeps along its path. Path coordinates: s_m, d_m.
 * Surface: a point that depth sees. Explained: it belongs to a body. Band: one bearing of the scan.
 * Known: the floor was seen free. Assumed free: floor below the view at the start, taken as free unseen.
-* Enters: is in the corridor or is likely to come into it. Conflict: the time and place of that.
+* Watched: moves or is young. Enters: is in the corridor or is likely to come into it. Conflict: the time
+  and place of that.
 * Innovation: by how much the newest velocity differs from the average beyond noise, counted twice.
 * Position uncertainty: of a body out of view; it grows until the body is seen again.
 * Limit: a speed not to be exceeded now. Urgent: comfortable braking no longer suffices.

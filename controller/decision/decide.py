@@ -1,9 +1,8 @@
 """Scene, path and state -> Decision: how fast to go now, and why.
 
-Each control step collects all limits of the speed (from obstacles and depth in
-controller/decision/speed_limits.py; from path, range, camera and faults here) and takes the least. An
-increase is delayed, a decrease is not (controller/decision/release.py). Input that cannot be relied on leads
-to a jerk-limited stop.
+Each control step collects all limits of the speed and takes the least: from the path (path_limit.py), the
+camera (camera_limits.py), obstacles and depth (speed_limits.py). An increase is delayed, a decrease is not
+(release.py). Input that cannot be relied on leads to a jerk-limited stop.
 """
 
 from __future__ import annotations
@@ -16,7 +15,8 @@ from config.decision import DecisionConfig
 from config.perception import TYPICAL_DEPTH_NOISE, DepthNoise
 from config.robot import Robot
 from controller import braking
-from controller.decision.decision import Action, Decision, Reason, Rule
+from controller.decision.camera_limits import CameraLimits
+from controller.decision.decision import Action, Decision, Reason
 from controller.decision.limits import (
     BACKWARDS_MPS,
     BLOCKING_RULES,
@@ -24,9 +24,9 @@ from controller.decision.limits import (
     STANDING_RULES,
     Limit,
     Motion,
-    allowed_text,
     min_start_mps,
 )
+from controller.decision.path_limit import path_limit
 from controller.decision.release import ReleaseGate, StartDelay
 from controller.decision.situation import Situation
 from controller.decision.speed_limits import SpeedLimits
@@ -34,14 +34,11 @@ from controller.decision.world_model import WorldModel
 from controller.path.path import OnPath, Path
 from hal.clocks import NS_PER_S
 from hal.types import CameraMount
-from vision.scene import CameraCondition
 
 __all__ = ["Action", "Decision", "DecisionMaker", "Reason"]
 
 # Emergency braking goes on until the speed exceeds what is allowed by no more than this.
 _EMERGENCY_EXIT_MPS = 0.05
-# The shaper brakes for the target point exactly; this slack keeps the limit from braking earlier than it.
-_END_SLACK_M = 0.02
 _AT_END_M = 0.02  # the robot is at its target
 _speed_of = attrgetter("speed_mps")
 
@@ -62,11 +59,10 @@ class DecisionMaker:
     ) -> None:
         self._config, self._robot, self._mount, self._noise = config, robot, mount, noise
         self._comfort = braking.comfort(robot.limits)
-        self._range_brake = braking.emergency(robot.limits) if config.emergency_caps_range else self._comfort
         self._latency_s = period_s + config.chassis_delay_s
-        self._sees_m = config.sight.range_m + mount.forward_m - robot.body.front_m
         self._path: Path | None = None
         self._known: WorldModel | None = None
+        self._camera_limits = CameraLimits(config, robot, mount, self._latency_s)
         self._speed_limits = SpeedLimits(config, robot.limits, mount)
         self._gate, self._start_delay = ReleaseGate(config.release), StartDelay()
         self._now_ns: int | None = None
@@ -95,8 +91,8 @@ class DecisionMaker:
             reason = Reason("camera", f"{known.fault}: stop")
             return Decision(self._action(0.0, v_mps), 0.0, reason)
         motion = Motion(v_mps, at.a_mps2, self._latency_s)
-        on_way = self._path_limit(path, on_path, motion)
-        limits = self._camera_limits(known)
+        on_way = path_limit(path, on_path, motion, self._robot.limits.max_speed_mps, self._comfort)
+        limits = self._camera_limits.limits(known)
         base_mps = min(on_way.speed_mps, _least(limits).speed_mps)
         limits += self._speed_limits.limits(known, on_path.s_m, motion, base_mps, now_ns / NS_PER_S)
         return self._conclude(on_way, limits, motion, now_ns)
@@ -131,72 +127,6 @@ class DecisionMaker:
             self._path = path
             self._known = self.world_model(path, on_path.s_m)
         return self._known
-
-    def _path_limit(self, path: Path, on_path: OnPath, motion: Motion) -> Limit:
-        """The least of the limits by the robot, and by sections, bends and the end of the path."""
-        left_m = path.length_m - on_path.s_m
-        ahead_s = on_path.s_m + motion.v_mps * motion.latency_s
-        section = path.speed_limit(ahead_s)
-        if motion.a_mps2 > 0.0:
-            # Braking begins only once a present acceleration has ended, so look that much farther ahead. But
-            # the limit of the present section holds until it is left, hence the minimum.
-            steady_s = ahead_s + braking.letting_go_distance(motion.v_mps, motion.a_mps2, self._comfort)
-            section = min(section, path.speed_limit(steady_s))
-        end = braking.speed_for_distance(left_m + _END_SLACK_M, self._comfort)
-        if section <= end:
-            rule: Rule = "free" if section >= self._robot.limits.max_speed_mps else "section"
-            return Limit(section, lambda: Reason(rule, f"{left_m:.1f} m to go: {allowed_text(section)}"))
-
-        def why() -> Reason:
-            required = braking.required_distance(motion.v_mps, motion.a_mps2, 0.0, 0.0, self._comfort)
-            return Reason(
-                "target",
-                f"the target is {max(left_m, 0.0):.2f} m ahead: {allowed_text(end)}",
-                distance_m=left_m,
-                closing_mps=0.0,
-                required_m=required,
-                margin_m=left_m - required,
-            )
-
-        return Limit(end, why)
-
-    def camera_limit(self, known: WorldModel) -> Limit | None:
-        """What the camera's condition alone allows, wherever the robot goes; None: it limits nothing."""
-        sight = self._config.sight
-        if known.fault:
-            # Brake hard if bodies were moving when the camera failed, or if it failed so long ago that
-            # somebody may have come since.
-            urgent = bool(known.bodies.moving.any()) or known.since_s > sight.blind_s
-            reason = Reason("camera", f"{known.fault}: stop")
-            return Limit(0.0, lambda: reason, urgent=urgent)
-        if known.health.condition is not CameraCondition.DEGRADED:
-            return None
-        sentence = f"the camera is degraded ({known.health.reason}): {allowed_text(sight.degraded_mps)}"
-        return Limit(sight.degraded_mps, lambda: Reason("camera", sentence))
-
-    def _camera_limits(self, known: WorldModel) -> list[Limit]:
-        by_condition = self.camera_limit(known)
-        if known.fault and by_condition is not None:
-            return [by_condition]
-        by_range = self._range_limit(known.age_s)
-        return [by_range] if by_condition is None else [by_range, by_condition]
-
-    def _range_limit(self, age_s: float) -> Limit:
-        """The limit by the camera's range: stand before an obstacle arrives from beyond it at V_omax.
-
-        age_s: age of the newest scene.
-        """
-        sees_m = self._sees_m
-        speed = braking.speed_for_distance(
-            sees_m,
-            self._range_brake,
-            latency_s=self._latency_s + age_s,
-            closing_mps=self._robot.limits.max_obstacle_speed_mps,
-            margin_m=self._config.margins.least_m,
-        )
-        return Limit(
-            speed, lambda: Reason("range", f"the camera sees {sees_m:.1f} m ahead: {allowed_text(speed)}")
-        )
 
     def _conclude(self, on_way: Limit, limits: list[Limit], motion: Motion, now_ns: int) -> Decision:
         top_mps = self._robot.limits.max_speed_mps

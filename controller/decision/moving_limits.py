@@ -17,7 +17,6 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.decision.bodies import Bodies
-from controller.decision.corridor import PathVelocities, Placed
 from controller.decision.crossing import Choice, Conflict, choices, find_conflicts
 from controller.decision.decision import Reason, Rule
 from controller.decision.limits import (
@@ -29,6 +28,7 @@ from controller.decision.limits import (
     allowed_text,
     stop_before,
 )
+from controller.decision.watched import Watched
 from controller.profile import SpeedRamps, comfortable
 from hal.types import FloatArray
 
@@ -69,79 +69,67 @@ class MovingLimits:
         self._leaves_s.clear()
 
     def limits(
-        self,
-        bodies: Bodies,
-        placed: Placed,
-        velocities: PathVelocities,
-        enters: NDArray[np.bool_],
-        s_m: float,
-        motion: Motion,
-        base_mps: float,
-        now_s: float,
+        self, watched: Watched, s_m: float, motion: Motion, base_mps: float, now_s: float
     ) -> tuple[list[Limit], float]:
-        """The limits for a robot at s_m whose speed is otherwise base_mps, and the speed that they leave.
-
-        enters (N,): which bodies are, or are likely to come, within the swept width.
-        """
-        ahead = placed.s_m[:, 0] + placed.half_s_m[:, 0] > s_m
-        # A standing robot does not start while a body is about to walk into its side, or to pass along it
-        # within the lateral margin. A driving robot is past before that happens.
+        """The limits for a robot at s_m whose speed is otherwise base_mps, and the speed that they leave."""
         standing = motion.v_mps <= STANDING_MPS
-        behind_m = math.inf if standing else ALONGSIDE_M
-        if standing:
-            gap_m = placed.block_from_s_m[:, 0] - s_m
-            passes = gap_m <= np.maximum(-velocities.along_mps, 0.0) * _WAIT_FOR_PASSING_S
-            enters = enters | (passes & (placed.clearance_m[:, 0] <= self._config.margins.lateral_m))
-        rows = (bodies.moving & ahead & enters).nonzero()[0]
+        rows = self._in_the_way(watched, s_m, standing)
         if not len(rows):
             self.forget()
-            self._note_inside(bodies, placed, set())
+            self._note_inside(watched, set())
             return [], base_mps
-        conflicts = self._conflicts(bodies, placed, s_m, s_m - behind_m, velocities, rows, now_s)
+        conflicts = self._conflicts(watched, rows, s_m, -math.inf if standing else s_m - ALONGSIDE_M, now_s)
         if not conflicts:
             return [], base_mps
         ramps = comfortable(self._limits, motion, self._speeds)
         offers = []
         for one in conflicts:
-            along_mps = float(velocities.along_mps[one.row])
-            leader_mps = along_mps - float(velocities.sigma_along_mps[one.row])
-            stays = self._when_it_stays(one, bodies, placed, s_m, motion, along_mps, leader_mps)
-            offers.append((one, *self._offer(one, int(bodies.ids[one.row]), ramps, s_m, stays)))
-        return self._settle(offers, bodies, base_mps)
+            stays = self._when_it_stays(one, watched, s_m, motion)
+            offers.append((one, *self._offer(one, int(watched.bodies.ids[one.row]), ramps, s_m, stays)))
+        return self._settle(offers, watched.bodies, base_mps)
+
+    def _in_the_way(self, watched: Watched, s_m: float, standing: bool) -> NDArray[np.intp]:
+        """(R,) rows of the moving bodies ahead that enter.
+
+        A standing robot also waits for a body that is about to walk into its side, or to pass along it within
+        the lateral margin. A driving robot is past before that happens.
+        """
+        placed, enters = watched.placed, watched.enters
+        ahead = placed.s_m[:, 0] + placed.half_s_m[:, 0] > s_m
+        if standing:
+            gap_m = placed.block_from_s_m[:, 0] - s_m
+            passes = gap_m <= np.maximum(-watched.velocities.along_mps, 0.0) * _WAIT_FOR_PASSING_S
+            enters = enters | (passes & (placed.clearance_m[:, 0] <= self._config.margins.lateral_m))
+        return (watched.bodies.moving & ahead & enters).nonzero()[0]
 
     def _conflicts(
-        self,
-        bodies: Bodies,
-        placed: Placed,
-        s_m: float,
-        from_s_m: float,
-        velocities: PathVelocities,
-        rows: NDArray[np.intp],
-        now_s: float,
+        self, watched: Watched, rows: NDArray[np.intp], s_m: float, from_s_m: float, now_s: float
     ) -> list[Conflict]:
-        margins = self._config.margins
-        grazes = np.array([track_id in self._inside for track_id in bodies.ids.tolist()])
+        """The conflicts with the bodies rows that are not behind s_m and begin beyond from_s_m."""
+        margins, ids = self._config.margins, watched.bodies.ids
+        grazes = np.array([track_id in self._inside for track_id in ids.tolist()])
         beside_m = margins.lateral_m + margins.graze_m * grazes
-        sigma_mps = velocities.sigma_left_mps * self._config.prediction.sigmas
+        sigma_mps = watched.velocities.sigma_left_mps * self._config.prediction.sigmas
         found = [
             one
-            for one in find_conflicts(placed, self._times_s, sigma_mps, beside_m, rows)
+            for one in find_conflicts(watched.placed, self._times_s, sigma_mps, beside_m, rows)
             if one.hi_in_m > s_m and one.lo_in_m > from_s_m
         ]
-        track_ids = {int(bodies.ids[one.row]) for one in found}
-        self._note_inside(bodies, placed, track_ids)
+        track_ids = {int(ids[one.row]) for one in found}
+        self._note_inside(watched, track_ids)
         self._robot_passes_first &= track_ids
-        found = [self._steadied(one, int(bodies.ids[one.row]), now_s) for one in found]
+        found = [self._steadied(one, int(ids[one.row]), now_s) for one in found]
         self._leaves_s = {
             track_id: when for track_id, when in self._leaves_s.items() if track_id in track_ids
         }
         return found
 
-    def _note_inside(self, bodies: Bodies, placed: Placed, in_the_way: set[int]) -> None:
+    def _note_inside(self, watched: Watched, in_the_way: set[int]) -> None:
         """The bodies with these ids count as in the corridor; of the others, those that moved away do not."""
         if self._inside:
+            bodies = watched.bodies
             away_m = self._config.margins.lateral_m + self._config.margins.graze_m
-            away = bodies.moving & (placed.clearance_m[:, 0] > away_m)
+            away = bodies.moving & (watched.placed.clearance_m[:, 0] > away_m)
             self._inside.difference_update(bodies.ids[away].tolist())
         self._inside |= in_the_way
 
@@ -155,31 +143,24 @@ class MovingLimits:
         self._leaves_s[track_id] = before_s + _LEAVE_TIME_WEIGHT * (leaves_s - before_s)
         return replace(conflict, out_s=max(self._leaves_s[track_id] - now_s, conflict.in_s))
 
-    def _when_it_stays(
-        self,
-        conflict: Conflict,
-        bodies: Bodies,
-        placed: Placed,
-        s_m: float,
-        motion: Motion,
-        along_mps: float,
-        leader_mps: float,
-    ) -> Limit:
+    def _when_it_stays(self, conflict: Conflict, watched: Watched, s_m: float, motion: Motion) -> Limit:
         """The limit if the body does not leave the corridor: stop before it, or follow it."""
-        margins = self._config.margins
+        margins, velocities = self._config.margins, watched.velocities
+        along_mps = float(velocities.along_mps[conflict.row])
         leader_stop_m = 0.0
         rule: Rule
         rule, what = "oncoming", f"comes at {-along_mps:.1f} m/s"
         if along_mps > _DRIVES_AHEAD_MPS:
+            leader_mps = along_mps - float(velocities.sigma_along_mps[conflict.row])
             leader_stop_m = max(leader_mps, 0.0) ** 2 / (2.0 * self._config.prediction.leader_decel_mps2)
             rule, what = "leader", f"drives ahead at {along_mps:.1f} m/s"
         elif along_mps > -_DRIVES_AHEAD_MPS:
             rule, what = "crossing", "is on the path"
         gap = Gap(
-            float(placed.block_from_s_m[conflict.row, 0]) - s_m,
+            float(watched.placed.block_from_s_m[conflict.row, 0]) - s_m,
             closing_mps=-along_mps,
             leader_stop_m=leader_stop_m,
-            obstacle_id=int(bodies.ids[conflict.row]),
+            obstacle_id=int(watched.bodies.ids[conflict.row]),
         )
         return stop_before(gap, motion, self._comfort, margins.stop_m, margins.least_m, rule, what)
 

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.decision.corridor import Placed
+from controller.decision.manoeuvres import Manoeuvres
 from controller.profile import SpeedRamps
-from hal.compiled import compiled, inlined
+from hal.compiled import compiled
 from hal.records import record
 from hal.types import FloatArray
 
@@ -44,46 +45,35 @@ class Reach:
 def reach(
     placed: Placed,
     times_s: FloatArray,
-    since_s: FloatArray,
-    spread_mps: tuple[FloatArray, FloatArray],
-    speed_mps: FloatArray,
-    manoeuvre_mps2: tuple[FloatArray, FloatArray],
+    manoeuvres: Manoeuvres,
     max_mps: float,
     margin_m: float,
-    position_uncertainty_m: tuple[FloatArray, FloatArray] | None = None,
-    counts: NDArray[np.bool_] | None = None,
+    counts: NDArray[np.bool_],
 ) -> Reach:
     """Grow N bodies by what they could do until times_s (K,) from now.
 
     placed: the bodies at these times, and maybe later ones, if they keep their velocity.
-    since_s: (N,) time before now for which their motion is uncertain, too.
-    spread_mps: uncertainty of their velocities, along the path and across it, (N,) each.
-    speed_mps: (N,) measured speed.
-    manoeuvre_mps2: greatest change of their velocities, along the path and across it, (N,) each.
     max_mps: top speed of any obstacle.
     margin_m: added before each body.
-    position_uncertainty_m: of their positions, along the path and across it, (N,) each; None: 0.
-    counts: (N,) which bodies count, the others block nothing; None: all count.
+    counts: (N,) which bodies count; the others block nothing.
     """
-    certain = np.zeros(len(since_s))
-    uncertain_along, uncertain_across = position_uncertainty_m or (certain, certain)
     return Reach(
         *_grown(
             placed.clearance_m,
             placed.block_from_s_m,
             placed.block_to_s_m,
             times_s,
-            since_s,
-            spread_mps[0],
-            spread_mps[1],
-            speed_mps,
-            manoeuvre_mps2[0],
-            manoeuvre_mps2[1],
-            uncertain_along,
-            uncertain_across,
+            manoeuvres.since_s,
+            manoeuvres.spread_along_mps,
+            manoeuvres.spread_left_mps,
+            manoeuvres.speed_mps,
+            manoeuvres.change_along_mps2,
+            manoeuvres.change_left_mps2,
+            manoeuvres.uncertain_along_m,
+            manoeuvres.uncertain_left_m,
             max_mps,
             margin_m,
-            np.ones(len(since_s), np.bool_) if counts is None else counts,
+            counts,
         )
     )
 
@@ -102,21 +92,19 @@ def stops(ramps: SpeedRamps, times_s: FloatArray) -> Stops:
     return Stops(distance, speed > _STANDING_MPS)
 
 
-def room(stopping: Stops, s_m: float, reached: Reach) -> FloatArray:
-    """(R,) for each stop of a robot at s_m: the least room left before any body while it still moves.
-
-    Negative where the robot could touch something; inf where nothing is in the way.
-    """
-    return _min_room(
-        stopping.distance_m, stopping.moves, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m
-    )
-
-
 def count_safe_stops(stopping: Stops, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> int:
-    """How many of the stops, from the first one on, stay short of all bodies in the mask counts (N,)."""
-    moves = stopping.moves
-    return _first_too_far(
-        stopping.distance_m, moves, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m, counts
+    """How many of the stops, from the first one on, touch none of the bodies in the mask counts (N,).
+
+    The robot starts at s_m. Once it stands, being touched is no fault of its own.
+    """
+    return _first_that_touches(
+        stopping.distance_m,
+        stopping.moves,
+        s_m,
+        reached.inside,
+        reached.block_from_s_m,
+        reached.block_to_s_m,
+        counts,
     )
 
 
@@ -126,9 +114,10 @@ def last_stop_before_entry(stopping: Stops, reached: Reach) -> int:
 
 
 def passes_clear(ramp: SpeedRamps, s_m: float, times_s: FloatArray, reached: Reach) -> bool:
-    """Whether the robot stays clear of all that could be blocked, at all times, along a single ramp."""
-    way_m = ramp.distance(times_s[None, :])[0]
-    return _passes_clear(way_m, s_m, reached.inside, reached.block_from_s_m, reached.block_to_s_m)
+    """Whether the robot touches nothing that could be blocked, at any time, along a single ramp."""
+    distance_m = ramp.distance(times_s[None, :])
+    always, all_bodies = np.ones(distance_m.shape, np.bool_), np.ones(len(reached.inside), np.bool_)
+    return count_safe_stops(Stops(distance_m, always), s_m, reached, all_bodies) == 1
 
 
 @compiled(
@@ -142,12 +131,12 @@ def _grown(
     times_s: FloatArray,
     since_s: FloatArray,
     spread_along_mps: FloatArray,
-    spread_across_mps: FloatArray,
+    spread_left_mps: FloatArray,
     speed_mps: FloatArray,
     change_along_mps2: FloatArray,
-    change_across_mps2: FloatArray,
+    change_left_mps2: FloatArray,
     uncertain_along_m: FloatArray,
-    uncertain_across_m: FloatArray,
+    uncertain_left_m: FloatArray,
     max_mps: float,
     margin_m: float,
     counts: NDArray[np.bool_],
@@ -161,8 +150,8 @@ def _grown(
         for j in range(shape[1]):
             t = times_s[j] + since_s[k]
             furthest = (max_mps + speed_mps[k]) * t
-            across = min(spread_across_mps[k] * t + 0.5 * change_across_mps2[k] * t * t, furthest)
-            if counts[k] and clearance_m[k, j] - (uncertain_across_m[k] + across) <= 0.0:
+            across = min(spread_left_mps[k] * t + 0.5 * change_left_mps2[k] * t * t, furthest)
+            if counts[k] and clearance_m[k, j] - (uncertain_left_m[k] + across) <= 0.0:
                 along = min(spread_along_mps[k] * t + 0.5 * change_along_mps2[k] * t * t, furthest)
                 along += uncertain_along_m[k]
                 was_inside = True
@@ -172,42 +161,8 @@ def _grown(
     return inside, lo, hi
 
 
-@inlined
-def _room(
-    at_m: float,
-    j: int,
-    inside: NDArray[np.bool_],
-    block_from_s_m: FloatArray,
-    block_to_s_m: FloatArray,
-    k: int,
-) -> float:
-    """Distance from at_m to what body k could block at time j; inf: it blocks nothing ahead of at_m."""
-    return float(block_from_s_m[k, j] - at_m) if inside[k, j] and at_m < block_to_s_m[k, j] else math.inf
-
-
-@compiled("float64[:, :], boolean[:, :], float64, boolean[:, :], float64[:, :], float64[:, :]")
-def _min_room(
-    distance_m: FloatArray,
-    moves: NDArray[np.bool_],
-    s_m: float,
-    inside: NDArray[np.bool_],
-    block_from_s_m: FloatArray,
-    block_to_s_m: FloatArray,
-) -> FloatArray:
-    """room() in arrays: (R,) for R stops, K times and N bodies."""
-    least = np.full(len(distance_m), math.inf)
-    for i in range(len(distance_m)):
-        for j in range(distance_m.shape[1]):
-            if not moves[i, j]:
-                continue
-            for k in range(len(inside)):
-                room_m = _room(s_m + distance_m[i, j], j, inside, block_from_s_m, block_to_s_m, k)
-                least[i] = min(least[i], room_m)
-    return least
-
-
 @compiled("float64[:, :], boolean[:, :], float64, boolean[:, :], float64[:, :], float64[:, :], boolean[:]")
-def _first_too_far(
+def _first_that_touches(
     distance_m: FloatArray,
     moves: NDArray[np.bool_],
     s_m: float,
@@ -216,14 +171,14 @@ def _first_too_far(
     block_to_s_m: FloatArray,
     counts: NDArray[np.bool_],
 ) -> int:
-    """Index of the first of R stops that does not stay short of the bodies in counts (N,); R: none."""
+    """Index of the first of R stops that touches a body in counts (N,) while it moves; R: none."""
     for i in range(len(distance_m)):
         for j in range(distance_m.shape[1]):
             if not moves[i, j]:
                 continue
+            at_m = s_m + distance_m[i, j]
             for k in range(len(inside)):
-                room_m = _room(s_m + distance_m[i, j], j, inside, block_from_s_m, block_to_s_m, k)
-                if counts[k] and room_m < 0.0:
+                if counts[k] and inside[k, j] and block_from_s_m[k, j] < at_m < block_to_s_m[k, j]:
                     return i
     return len(distance_m)
 
@@ -239,18 +194,3 @@ def _last_stop_before_entry(moves: NDArray[np.bool_], inside: NDArray[np.bool_])
         if not moves[i, max(first - 1, 0)]:
             return i
     return -1
-
-
-@compiled("float64[:], float64, boolean[:, :], float64[:, :], float64[:, :]")
-def _passes_clear(
-    way_m: FloatArray,
-    s_m: float,
-    inside: NDArray[np.bool_],
-    block_from_s_m: FloatArray,
-    block_to_s_m: FloatArray,
-) -> bool:
-    for k in range(len(inside)):
-        for j in range(len(way_m)):
-            if inside[k, j] and block_from_s_m[k, j] < s_m + way_m[j] < block_to_s_m[k, j]:
-                return False
-    return True

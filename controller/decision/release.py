@@ -12,7 +12,6 @@ from config.decision import Release
 from controller.decision.limits import STANDING_MPS
 from hal.clocks import NS_PER_S
 
-
 # What stood in the way of a standing robot must have been out of sight this long before it starts. Something
 # low at the lower edge of the view is seen in some frames only, with gaps of up to half a second; the robot
 # would creep on in each gap until it is below the view. What goes away is seen to move.

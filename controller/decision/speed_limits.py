@@ -1,7 +1,7 @@
 """Obstacles and depth -> speed limits with their reasons, for one control step.
 
-controller/decision/decide.py calls SpeedLimits.limits and takes the least of these limits and its own (path,
-range, camera). The advisers, in the order in which they are called:
+controller/decision/decide.py calls SpeedLimits.limits and takes the least of these limits and those by path
+and camera. The advisers, in the order in which they are called:
 
 1. Depth (controller/decision/sight.py, lens_cover.py): a blind corner, the nearest surface that no obstacle
    explains, a covered lens, and the end of the floor that was seen free.
@@ -13,9 +13,8 @@ range, camera). The advisers, in the order in which they are called:
 
 Words for the bodies that controller/decision/world_model.py knows:
 
-* watched: bodies that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone.
-* enters: watched bodies that are in the swept corridor or are likely to come into it
-  (crossing.likely_enters), debounced.
+* watched: bodies that move or have been seen for less than confirm_s. Advisers 3 and 4 look at these alone
+  (controller/decision/watched.py).
 * remembered: bodies out of the camera's view, kept by controller/decision/out_of_view.py.
 """
 
@@ -29,26 +28,21 @@ from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
 from controller.decision.blind_corners import BlindCorner
-from controller.decision.bodies import Bodies, no_bodies
-from controller.decision.corridor import path_velocities, place
-from controller.decision.crossing import likely_enters
-from controller.decision.debounce import Debounced
+from controller.decision.bodies import Bodies
+from controller.decision.corridor import place
 from controller.decision.decision import Reason
 from controller.decision.lens_cover import COVERED
-from controller.decision.limits import UNSEEN_ERROR_SIGMAS, Gap, Limit, Motion, allowed_text, stop_before
+from controller.decision.limits import Gap, Limit, Motion, allowed_text, stop_before
 from controller.decision.moving_limits import MovingLimits
 from controller.decision.standing_limits import StandingLimits
+from controller.decision.watched import Watch
 from controller.decision.world_model import WorldModel
 from controller.decision.worst_case_limit import WorstCase
 from hal.types import CameraMount
 
 _COARSE_S = 0.5  # step of the times beyond those of the worst case
-_NONE = np.zeros(0, np.bool_)
 # A surface within this distance of a tracked obstacle, along the path, is named after it.
 _SAME_SURFACE_M = 0.8
-# A body must head for the corridor for this long until it counts as coming in, and head elsewhere for as long
-# until it does not. Meanwhile the worst case covers it.
-_DEBOUNCE_S = 0.3
 
 
 class SpeedLimits:
@@ -59,14 +53,12 @@ class SpeedLimits:
         self._worst_case = WorstCase(config, limits)
         fine = self._worst_case.times_s
         coarse = np.arange(fine[-1] + _COARSE_S, config.prediction.horizon_s + _COARSE_S, _COARSE_S)
-        self._times_s = np.concatenate((fine, coarse))
+        times_s = np.concatenate((fine, coarse))
         self._inside: set[int] = set()
         self._standing = StandingLimits(config, limits, mount, self._inside)
-        self._moving = MovingLimits(config, limits, self._times_s, self._inside)
-        self._enters = Debounced(_DEBOUNCE_S)
+        self._moving = MovingLimits(config, limits, times_s, self._inside)
+        self._watch = Watch(config, times_s)
         self._taken_from: Bodies | None = None
-        self._watched = no_bodies(0)
-        self._remembered = _NONE
 
     def limits(
         self, known: WorldModel, s_m: float, motion: Motion, base_mps: float, now_s: float
@@ -79,48 +71,25 @@ class SpeedLimits:
             self._take_in(known)
         found = self._depth(known, s_m, motion)
         found += self._standing.limits(known, s_m, motion)
-        watched = self._watched
-        if not len(watched):
+        watched = self._watch.step(known, s_m, now_s)
+        if watched is None:
             self._moving.forget()
-            self._enters.pause()
             return found
-        placed = place(
-            watched, known.corridor, known.since_s + self._times_s, s_m, self._config.sight.range_m + 2.0
-        )
-        velocities = path_velocities(watched, placed.heading_rad[:, 0])
-        sigma_left = velocities.sigma_left_mps * self._config.prediction.sigmas
-        comes = likely_enters(placed, self._times_s, sigma_left)
-        # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
-        # there is no noise.
-        at_once = np.where(comes, placed.clearance_m[:, 0] <= 0.0, self._remembered)
-        enters = self._enters.update(watched.ids, comes, at_once, now_s)
         for limit in found:
             base_mps = min(base_mps, limit.speed_mps)
-        in_the_way, chosen_mps = self._moving.limits(
-            watched, placed, velocities, enters, s_m, motion, base_mps, now_s
-        )
+        in_the_way, chosen_mps = self._moving.limits(watched, s_m, motion, base_mps, now_s)
         found += in_the_way
-        if self._remembered.any():
-            # A body out of view that approaches the path may be nearer to it than expected.
-            unsure_mps = UNSEEN_ERROR_SIGMAS * velocities.sigma_left_mps
-            inwards = -np.sign(placed.d_m[:, 0]) * velocities.left_mps > unsure_mps
-            nearer = likely_enters(placed, self._times_s, sigma_left, unsure_mps * watched.unseen_s)
-            enters |= self._remembered & inwards & nearer
-        worst = self._worst_case.limit(
-            watched, placed, velocities, enters, s_m, motion, known.since_s, chosen_mps
-        )
+        worst = self._worst_case.limit(watched, s_m, motion, chosen_mps)
         if worst is not None:
             found.append(worst)
         return found
 
     def _take_in(self, known: WorldModel) -> None:
         """Once a scene: select the watched bodies, and forget those that are gone."""
-        self._taken_from = bodies = known.bodies
-        watched = bodies.moving | (bodies.age_s < self._config.prediction.confirm_s)
-        self._watched = bodies.select(watched)
-        self._remembered = known.remembered[watched] if len(self._watched) else _NONE
+        self._taken_from = known.bodies
+        self._watch.take_in(known)
         if self._inside:
-            self._inside.intersection_update(bodies.ids.tolist())
+            self._inside.intersection_update(known.bodies.ids.tolist())
 
     def _depth(self, known: WorldModel, s_m: float, motion: Motion) -> list[Limit]:
         """The limits from depth alone (adviser 1 of the module's list)."""

@@ -1,9 +1,9 @@
 """The worst case as a speed limit: how fast may the robot go and still stand before a body could touch it?
 
-controller/decision/reachability.py has the geometry: what each body could reach, and how much room a stop
-leaves. This file decides how much each body may change its velocity, tries emergency stops from many speeds,
-and makes a Limit of the greatest speed that is safe. controller/decision/speed_limits.py calls it last, after
-the other advisers.
+controller/decision/manoeuvres.py tells how far each body may change its velocity, and
+controller/decision/reachability.py what it could reach by that. This file tries emergency stops from many
+speeds, and makes a Limit of the greatest speed that is safe. controller/decision/speed_limits.py calls it
+last, after the other advisers.
 """
 
 from __future__ import annotations
@@ -16,17 +16,16 @@ from numpy.typing import NDArray
 from config.decision import DecisionConfig
 from config.robot import Limits
 from controller import braking
-from controller.decision.bodies import Bodies
-from controller.decision.corridor import PathVelocities, Placed
 from controller.decision.decision import Reason
 from controller.decision.limits import (
-    ALONG_TO_SIDE_RATIO,
     ALONGSIDE_M,
     UNSEEN_ERROR_SIGMAS,
+    Gap,
     Limit,
     Motion,
     allowed_text,
 )
+from controller.decision.manoeuvres import manoeuvres_of
 from controller.decision.reachability import (
     Reach,
     Stops,
@@ -34,12 +33,10 @@ from controller.decision.reachability import (
     last_stop_before_entry,
     passes_clear,
     reach,
-    room,
     stops,
 )
+from controller.decision.watched import Watched
 from controller.profile import SpeedRamps, comfortable
-from hal.compiled import compiled
-from hal.records import record
 from hal.types import FloatArray
 
 # Times that are looked at: every 0.1 s up to 2 s, where stops from low speeds end, then every 0.2 s.
@@ -51,26 +48,8 @@ _PERIOD_S, _MIN_WAIT_S = 0.5, 1.0
 # The robot begins to slow for the worst case this much earlier than an emergency stop would have to, so that
 # comfortable braking suffices.
 _FORESIGHT_S = 0.1
-# Least sideways speed that is assumed when a body's direction of motion is judged.
-_MIN_SIDEWAYS_MPS = 0.1
-# A body that comes towards the robot and was seen for this long has seen the robot, too.
-_AWARE_AFTER_S = 1.0
 # The robot does not slow yet if it is faster than the worst case allows by no more than this.
 _TOLERATED_EXCESS_MPS = 0.1
-
-
-@record(frozen=True, slots=True, eq=False)
-class _MayDo:
-    """What N bodies may do: arguments of reach(), (N,) each; along the path, and sideways."""
-
-    since_s: FloatArray
-    spread_along_mps: FloatArray
-    spread_left_mps: FloatArray
-    speed_mps: FloatArray
-    change_along_mps2: FloatArray
-    change_left_mps2: FloatArray
-    uncertain_along_m: FloatArray
-    uncertain_left_m: FloatArray
 
 
 class WorstCase:
@@ -95,37 +74,27 @@ class WorstCase:
         self._stops_early = self._stops_now = self._stops(self._speeds, 0.0, 0.0)
         self._stops_after_confirming = self._stops_now
 
-    def limit(
-        self,
-        bodies: Bodies,
-        placed: Placed,
-        velocities: PathVelocities,
-        enters: NDArray[np.bool_],
-        s_m: float,
-        motion: Motion,
-        since_s: float,
-        chosen_mps: float,
-    ) -> Limit | None:
+    def limit(self, watched: Watched, s_m: float, motion: Motion, chosen_mps: float) -> Limit | None:
         """The greatest speed from which the robot at s_m could still stop in time; None: no need to slow.
 
-        placed: the bodies, since_s after their scene; its first times are times_s.
-        enters (N,): which bodies' measured motion leads into the corridor.
+        watched: the bodies; the first times of watched.placed are times_s.
         chosen_mps: the speed that the other limits leave. If a comfortable ramp to it gets past all bodies,
         whatever they do, the robot need not be able to stop.
 
         The limit is urgent if even an emergency stop that begins now would be too late. That may hold for a
         robot that is already slowing down to a safe chosen_mps: then it has to brake harder.
         """
-        position_uncertainty_m = UNSEEN_ERROR_SIGMAS * velocities.sigma_along_mps * bodies.unseen_s
+        bodies, placed = watched.bodies, watched.placed
+        position_uncertainty_m = UNSEEN_ERROR_SIGMAS * watched.velocities.sigma_along_mps * bodies.unseen_s
         rows = placed.block_from_s_m[:, 0] + position_uncertainty_m > s_m - ALONGSIDE_M
         if not np.count_nonzero(rows):
             return None
-        reached = self._reach(bodies, placed, velocities, since_s, rows)
+        reached = self._reach(watched, rows)
         self._prepare(motion.latency_s)
         if min(reached.block_from_s_m[:, -1].tolist()) > s_m + self._furthest_m:
             return None
         young = bodies.age_s < self._config.prediction.confirm_s
-        speed = self._speed(reached, young, enters, s_m)
+        speed = self._speed(reached, young, watched.could_enter, s_m)
         if speed >= min(chosen_mps, self._limits.max_speed_mps) and speed >= motion.v_mps:
             return None
         go = comfortable(self._limits, motion, np.array([chosen_mps]))
@@ -133,22 +102,18 @@ class WorstCase:
             return None
         urgent = False
         if motion.v_mps > speed:
-            now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
-            urgent = bool(room(now, s_m, reached)[0] < 0.0)
+            urgent = self._too_late(motion, s_m, reached, rows)
             if not urgent and motion.v_mps <= speed + _TOLERATED_EXCESS_MPS:
                 # An emergency stop is still in time. Braking for each small fluctuation would only cost time.
                 speed = motion.v_mps
-        row = int(np.where(rows, placed.block_from_s_m[:, 0], math.inf).argmin())
-        track_id = int(bodies.ids[row])
-        gap_m = float(placed.block_from_s_m[row, 0]) - s_m
+        nearest = int(np.where(rows, placed.block_from_s_m[:, 0], math.inf).argmin())
+        gap = Gap(float(placed.block_from_s_m[nearest, 0]) - s_m, obstacle_id=int(bodies.ids[nearest]))
+        return Limit(speed, lambda: _reason(gap, speed), urgent)
 
-        def why() -> Reason:
-            ahead = f"obstacle {track_id}, {max(gap_m, 0.0):.1f} m ahead"
-            return Reason(
-                "worst case", f"{ahead}, could step into the way: {allowed_text(speed)}", track_id, gap_m
-            )
-
-        return Limit(speed, why, urgent)
+    def _too_late(self, motion: Motion, s_m: float, reached: Reach, counts: NDArray[np.bool_]) -> bool:
+        """Whether even an emergency stop that begins now would touch a body in the mask counts (N,)."""
+        now = self._stops(np.array([motion.v_mps]), motion.a_mps2, motion.latency_s)
+        return count_safe_stops(now, s_m, reached, counts) == 0
 
     def _speed(
         self, reached: Reach, young: NDArray[np.bool_], enters: NDArray[np.bool_], s_m: float
@@ -192,48 +157,11 @@ class WorstCase:
         waits = self._stops_early, self._stops_after_confirming
         self._furthest_m = float(max(stop.distance_m.max() for stop in waits))
 
-    def _reach(
-        self,
-        bodies: Bodies,
-        placed: Placed,
-        velocities: PathVelocities,
-        since_s: float,
-        counts: NDArray[np.bool_],
-    ) -> Reach:
-        prediction = self._config.prediction
-        fields = _may_do(
-            velocities.along_mps,
-            velocities.left_mps,
-            velocities.sigma_along_mps,
-            velocities.sigma_left_mps,
-            velocities.innovation_along_mps,
-            velocities.innovation_left_mps,
-            placed.d_m[:, 0],
-            placed.clearance_m[:, 0],
-            bodies.moving,
-            bodies.age_s,
-            bodies.unseen_s,
-            since_s,
-            prediction.sigmas,
-            prediction.cut_in_mps2,
-            prediction.manoeuvre_mps2,
-            prediction.oncoming_mps2,
-            ALONG_TO_SIDE_RATIO,
-            UNSEEN_ERROR_SIGMAS,
-        )
-        may_do = _MayDo(*fields)
-        return reach(
-            placed,
-            self.times_s,
-            may_do.since_s,
-            spread_mps=(may_do.spread_along_mps, may_do.spread_left_mps),
-            speed_mps=may_do.speed_mps,
-            manoeuvre_mps2=(may_do.change_along_mps2, may_do.change_left_mps2),
-            max_mps=self._limits.max_obstacle_speed_mps,
-            margin_m=self._config.margins.least_m,
-            position_uncertainty_m=(may_do.uncertain_along_m, may_do.uncertain_left_m),
-            counts=counts,
-        )
+    def _reach(self, watched: Watched, counts: NDArray[np.bool_]) -> Reach:
+        manoeuvres = manoeuvres_of(watched, self._config.prediction)
+        margin_m = self._config.margins.least_m
+        max_mps = self._limits.max_obstacle_speed_mps
+        return reach(watched.placed, self.times_s, manoeuvres, max_mps, margin_m, counts)
 
     def _stops(self, speeds: FloatArray, a_mps2: float, latency_s: float) -> Stops:
         ramps = SpeedRamps(
@@ -248,53 +176,7 @@ class WorstCase:
         return stops(ramps, self.times_s)
 
 
-@compiled(
-    "float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64[:], float64[:],"
-    "boolean[:], float64[:], float64[:], float64, float64, float64, float64, float64, float64, float64"
-)
-def _may_do(
-    along_mps: FloatArray,
-    left_mps: FloatArray,
-    sigma_along_mps: FloatArray,
-    sigma_left_mps: FloatArray,
-    innovation_along_mps: FloatArray,
-    innovation_left_mps: FloatArray,
-    d_m: FloatArray,
-    clearance_m: FloatArray,
-    moving: NDArray[np.bool_],
-    age_s: FloatArray,
-    unseen_s: FloatArray,
-    since_s: float,
-    sigmas: float,
-    cut_in_mps2: float,
-    manoeuvre_mps2: float,
-    oncoming_mps2: float,
-    along_to_side_ratio: float,
-    unseen_error_sigmas: float,
-) -> FloatArray:
-    """(8, N) the fields of _MayDo."""
-    answers = np.zeros((8, len(along_mps)))
-    since, spread_along, spread_left, speed, along, sideways, uncertain_along, uncertain_left = answers
-    for k in range(len(along_mps)):
-        # unaware: goes in the robot's direction, so it does not see the robot coming and is beside it for
-        # long. comes: comes towards the robot, sees it after a while and keeps its lane. leaves: moves away
-        # from the path. All but comes and leaves may have changed their velocity since they left the view.
-        aslant_mps = max(abs(left_mps[k]), _MIN_SIDEWAYS_MPS)
-        outwards, beside = left_mps[k] * d_m[k] > 0.0, clearance_m[k] > 0.0
-        unaware = along_mps[k] > (along_to_side_ratio if outwards else 1.0) * aslant_mps
-        comes = along_mps[k] < -aslant_mps
-        leaves = outwards and beside and not unaware
-        if moving[k]:
-            # A body that turns into the way also slows down along the path.
-            along[k] = cut_in_mps2 if unaware and beside else manoeuvre_mps2
-            sideways[k] = cut_in_mps2 if unaware else manoeuvre_mps2
-            if comes and age_s[k] >= _AWARE_AFTER_S:
-                sideways[k] = oncoming_mps2
-        since[k] = since_s + (0.0 if comes or leaves else unseen_s[k])
-        speed[k] = math.hypot(along_mps[k], left_mps[k])
-        spread_along[k] = max(sigmas * sigma_along_mps[k], abs(innovation_along_mps[k]))
-        spread_left[k] = max(sigmas * sigma_left_mps[k], abs(innovation_left_mps[k]))
-        if not leaves:
-            uncertain_along[k] = unseen_error_sigmas * unseen_s[k] * sigma_along_mps[k]
-            uncertain_left[k] = unseen_error_sigmas * unseen_s[k] * sigma_left_mps[k]
-    return answers
+def _reason(gap: Gap, speed_mps: float) -> Reason:
+    ahead = f"{gap.name}, {max(gap.distance_m, 0.0):.1f} m ahead"
+    sentence = f"{ahead}, could step into the way: {allowed_text(speed_mps)}"
+    return Reason("worst case", sentence, gap.obstacle_id, gap.distance_m)

@@ -30,7 +30,7 @@ from controller.evaluation.sequences import Sequence, sequences
 from controller.evaluation.summary import Summary, as_json, summarise
 from controller.evaluation.targets import TARGETS
 from controller.evaluation.timed_methods import OURS, OURS_ALONE
-from controller.outlet import say
+from controller.terminal.outlet import say
 
 
 @dataclass(frozen=True, slots=True)

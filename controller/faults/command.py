@@ -12,7 +12,7 @@ from config.loader import CONFIG_DIR
 from controller.errors import UserError
 from controller.faults.kills import KILLS, KillResult, run_kill
 from controller.faults.trials import FAULTS, KINDS, TrialResult, run_trial
-from controller.outlet import say
+from controller.terminal.outlet import say
 
 HEADING = "## Faults"
 

@@ -9,6 +9,7 @@
 * inbox.py - which request holds now
 * governor.py - limits the request by the mission's decision
 * arcs.py - from (v, w) to an arc as path
+* arc_ahead.py - the arc that is looked along, and what is known of the way along it
 * ground.py - remembers the floor around the robot
 * surroundings.py - limits by the remembered floor: start of an arc, turn in place
 """

@@ -7,21 +7,21 @@ from dataclasses import dataclass
 from config.app import AppConfig, RealtimeRunner, load_app
 from config.governor import GovernorConfig, InputConfig, UdpInputConfig
 from controller.build import open_commands
-from controller.console import Console
 from controller.control import ControlStep
 from controller.ending import Outcome
 from controller.errors import UserError
 from controller.governor.build import build_governor_loop, build_inbox
 from controller.governor.inbox import Inbox
 from controller.governor.loop import GovernorLoop
-from controller.mission import with_overrides
-from controller.possible_world import require_possible_world
+from controller.mission.command import with_overrides
+from controller.mission.possible_world import require_possible_world
+from controller.mission.result import DriveResult, MissionOptions
 from controller.realtime.rig import realtime_rig
 from controller.realtime.service import ServiceManager
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.tally import SetpointTally
-from controller.result import DriveResult, MissionOptions
-from controller.summary import drive_rows
+from controller.terminal.console import Console
+from controller.terminal.summary import drive_rows
 
 
 @dataclass(kw_only=True)

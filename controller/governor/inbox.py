@@ -1,8 +1,8 @@
-"""Which command holds now: from the newest valid message of one planner, until it falls silent.
+"""Which request holds now: that of the newest valid message of one planner, until it falls silent.
 
-A message that is not obeyed is dropped and counted; the first of each kind is told. The planner that is heard
-first has the command until it has been silent for timeout_s; a planner that restarts is heard again after
-that, whatever number it begins with.
+A message that is not obeyed is dropped and counted, with a warning for the first of each kind. The planner
+that is heard first has the command until it has been silent for timeout_s. After that a planner that has
+restarted is heard again, whatever sequence number it begins with.
 """
 
 from __future__ import annotations
@@ -19,20 +19,24 @@ from hal.clocks import NS_PER_MS, NS_PER_S
 from hal.errors import LinkLost
 from hal.types import Sender
 
-# A flood must not keep a control step busy; what is left over waits for the next one.
+# Messages read per control step, so that a flood does not hold it up; the rest waits for the next step.
 _MOST_A_POLL = 64
-# Two clocks drift apart by less than this; the fastest message so far is forgotten at this rate.
+# Two clocks drift apart by less than this share, so the offset of the fastest message grows at this rate.
 _DRIFT = 1e-3
-# Of what is allowed: so late the message before a late one was where lateness grows.
+# If the message before a late one was late by this share of late_s, too, lateness grows: a clock runs slow.
 _GROWN = 0.5
-# Of resume_s: what one wait for a message counts for at most, so that two messages alone do not keep coming.
+# The time between two messages counts for at most this share of resume_s: two messages alone are no stream.
 _ONE_WAIT = 0.5
 _ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """twist: what is asked for now; None: nothing, and then silence says why in a sentence."""
+    """What is asked for now.
+
+    twist: None if nothing is.
+    silence: why nothing is asked for.
+    """
 
     twist: Twist | None
     silence: str = ""
@@ -40,9 +44,13 @@ class Asked:
 
 @dataclass(slots=True)
 class _Session:
-    """One planner while it has the command. least_offset_s: our clock minus its, of its fastest message.
-    late_s: how much later than that one the last one came. steady_s: for how long its messages have kept
-    coming, up to the last one: the time since then proves nothing."""
+    """One planner while it has the command.
+
+    last, last_ns: its last message, and when it arrived.
+    least_offset_s: the clock here minus the planner's, for its fastest message.
+    late_s: by how much later than that one its last message arrived.
+    steady_s: for how long its messages have kept coming, up to the last one.
+    """
 
     sender: Sender | None
     last: Request
@@ -52,12 +60,12 @@ class _Session:
     steady_s: float = 0.0
 
     def lateness_s(self, offset_s: float, now_ns: int) -> float:
-        """Of a message that comes now."""
+        """How late a message with this offset is that arrives now."""
         return offset_s - self.least_offset_s - _DRIFT * (now_ns - self.last_ns) / NS_PER_S
 
 
 class Inbox:
-    """Polled once a control step. warn: told the first message of each kind that is dropped."""
+    """Polled once a control step. warn: called for the first dropped message of each kind."""
 
     def __init__(self, link: DatagramLink, config: GovernorConfig, warn: Callable[[str], None]) -> None:
         self._link, self._config, self._warn = link, config, warn
@@ -150,7 +158,7 @@ class Inbox:
             return self._drop("clock went back", f"t_s of seq {request.seq} went back by {back_s:.3f} s")
         late_s = session.lateness_s(offset_s, now_ns)
         if late_s > self._config.late_s:
-            # A message that was held up comes after one in time. Where each is later, it is rather the clock.
+            # A message that was held up follows one that was in time. If each is later, the clock runs slow.
             grows = session.late_s > _GROWN * self._config.late_s
             slow = ", each later than the one before: does its clock run slow?" if grows else ""
             return self._drop("late", f"seq {request.seq} came {late_s:.2f} s late{slow}")

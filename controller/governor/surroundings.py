@@ -25,41 +25,76 @@ _STEP_M = 0.1  # distance of the points along it
 _STOP_S = 1.5
 
 
-def near_limits(
-    ground: GroundMemory,
-    corridor: Corridor,
-    s_m: float,
-    to_s_m: float,
-    motion: Motion,
-    robot: Robot,
-    config: DecisionConfig,
-    now_ns: int,
-) -> list[Limit]:
-    """Limits by the corridor's floor up to to_s_m, which is too near for the camera to see.
+class GroundLimits:
+    """Limits by the remembered floor.
 
-    It begins at the robot's rear, because the rear swings out in a bend. s_m: the robot's place on the path.
+    turn_memory_s: for how long floor that was seen free counts as free in a turn in place.
     """
-    cells = np.arange(s_m - corridor.rear_m + 0.5 * _STEP_M, to_s_m, _STEP_M)
-    points = _across(corridor.path, cells, corridor.half_width(cells))
-    flat = points.reshape(-1, 2)
-    # Surfaces in view are left to the decision, which knows them more precisely than this grid.
-    stands = ground.blocked(flat, now_ns, now_ns - IN_VIEW_NS).reshape(len(cells), _LANES).any(axis=1)
-    unknown = ground.free(flat).reshape(len(cells), _LANES).mean(axis=1) < config.sight.known_share
-    comfort, margins = braking.comfort(robot.limits), config.margins
-    found = []
-    front_s_m = s_m + corridor.front_m + 0.5 * _STEP_M
-    if stands.any():
-        gap = Gap(max(float(cells[stands.argmax()]) - front_s_m, 0.0))
-        what = "stood when it was last seen,"
-        found.append(stop_before(gap, motion, comfort, margins.stop_m, margins.least_m, "depth", what))
-    if unknown.any():
-        gap = Gap(max(float(cells[unknown.argmax()]) - front_s_m, 0.0))
-        limit = stop_before(gap, motion, comfort, margins.least_m, -math.inf, "unseen", "")
-        sentence = f"the floor of the arc was never seen beyond {gap.distance_m:.1f} m: "
-        sentence += allowed_text(limit.speed_mps)
-        reason = Reason("unseen", sentence, distance_m=gap.distance_m, required_m=limit.reason.required_m)
-        found.append(Limit(limit.speed_mps, lambda: reason))
-    return found
+
+    def __init__(
+        self, ground: GroundMemory, robot: Robot, config: DecisionConfig, turn_memory_s: float
+    ) -> None:
+        self._ground, self._config, self._turn_memory_s = ground, config, turn_memory_s
+        self._comfort = braking.comfort(robot.limits)
+        self._sweep_m = corner_m(robot) + config.margins.lateral_m
+
+    def arc_limits(
+        self, corridor: Corridor, s_m: float, to_s_m: float, motion: Motion, now_ns: int
+    ) -> list[Limit]:
+        """Limits by the corridor's floor up to to_s_m, which is too near for the camera to see.
+
+        It begins at the robot's rear, because the rear swings out in a bend. s_m: the robot's place.
+        """
+        ground, margins, comfort = self._ground, self._config.margins, self._comfort
+        cells = np.arange(s_m - corridor.rear_m + 0.5 * _STEP_M, to_s_m, _STEP_M)
+        points = _across(corridor.path, cells, corridor.half_width(cells))
+        flat = points.reshape(-1, 2)
+        # Surfaces in view are left to the decision, which knows them more precisely than this grid.
+        stands = ground.blocked(flat, now_ns, now_ns - IN_VIEW_NS).reshape(len(cells), _LANES).any(axis=1)
+        unknown = ground.free(flat).reshape(len(cells), _LANES).mean(axis=1) < self._config.sight.known_share
+        found = []
+        front_s_m = s_m + corridor.front_m + 0.5 * _STEP_M
+        if stands.any():
+            gap = Gap(max(float(cells[stands.argmax()]) - front_s_m, 0.0))
+            what = "stood when it was last seen,"
+            found.append(stop_before(gap, motion, comfort, margins.stop_m, margins.least_m, "depth", what))
+        if unknown.any():
+            gap = Gap(max(float(cells[unknown.argmax()]) - front_s_m, 0.0))
+            limit = stop_before(gap, motion, comfort, margins.least_m, -math.inf, "unseen", "")
+            sentence = f"the floor of the arc was never seen beyond {gap.distance_m:.1f} m: "
+            sentence += allowed_text(limit.speed_mps)
+            reason = Reason("unseen", sentence, distance_m=gap.distance_m, required_m=limit.reason.required_m)
+            found.append(Limit(limit.speed_mps, lambda: reason))
+        return found
+
+    def turn_objection(self, bodies: Bodies, pose: PlanarPose, now_ns: int) -> str:
+        """Why the robot must not turn in place at pose; "" if the circle that it sweeps is free."""
+        sweep_m = self._sweep_m
+        if len(bodies):
+            comes = np.hypot(bodies.velocity_mps[:, 0], bodies.velocity_mps[:, 1]) * bodies.moving * _STOP_S
+            room = _distance_m(bodies, pose) - comes - sweep_m
+            nearest = int(room.argmin())
+            if room[nearest] < 0.0:
+                return f"obstacle {bodies.ids[nearest]} is too near to turn in place: stop"
+        around = _disc(sweep_m)
+        points = around + np.array((pose.x_m, pose.y_m))
+        sweeps = f"and a turn in place sweeps {sweep_m:.2f} m around: stop"
+        stands = self._ground.blocked(points, now_ns)
+        if stands.any():
+            return f"something stands {_where(around[stands], pose)}, {sweeps}"
+        unknown = ~self._ground.free(points, now_ns - round(self._turn_memory_s * NS_PER_S))
+        if unknown.any():
+            where = _where(around[unknown], pose)
+            return f"the floor {where} has not been seen within {self._turn_memory_s:g} s, {sweeps}"
+        return ""
+
+
+def _disc(radius_m: float) -> FloatArray:
+    """(P, 2) offsets of points CELL_M apart within radius_m."""
+    steps = np.arange(-radius_m, radius_m + CELL_M, CELL_M)
+    x, y = np.meshgrid(steps, steps)
+    inside = x * x + y * y <= radius_m * radius_m
+    return np.stack((x[inside], y[inside]), axis=-1)
 
 
 def _across(path: Path, s_m: FloatArray, half_m: FloatArray) -> FloatArray:
@@ -69,43 +104,6 @@ def _across(path: Path, s_m: FloatArray, half_m: FloatArray) -> FloatArray:
     return np.stack(
         (x[:, None] - np.sin(heading)[:, None] * side, y[:, None] + np.cos(heading)[:, None] * side), axis=-1
     )
-
-
-def turn_objection(
-    ground: GroundMemory,
-    bodies: Bodies,
-    pose: PlanarPose,
-    robot: Robot,
-    config: DecisionConfig,
-    memory_s: float,
-    now_ns: int,
-) -> str:
-    """Why the robot must not turn in place at pose; "" if the circle that it sweeps is free."""
-    sweep_m = corner_m(robot) + config.margins.lateral_m
-    if len(bodies):
-        comes = np.hypot(bodies.velocity_mps[:, 0], bodies.velocity_mps[:, 1]) * bodies.moving * _STOP_S
-        room = _distance_m(bodies, pose) - comes - sweep_m
-        nearest = int(room.argmin())
-        if room[nearest] < 0.0:
-            return f"obstacle {bodies.ids[nearest]} is too near to turn in place: stop"
-    steps = np.arange(-sweep_m, sweep_m + CELL_M, CELL_M)
-    x, y = np.meshgrid(steps, steps)
-    inside = x * x + y * y <= sweep_m * sweep_m
-    around = np.stack((x[inside], y[inside]), axis=-1)
-    points = around + np.array((pose.x_m, pose.y_m))
-    stands = ground.blocked(points, now_ns)
-    if stands.any():
-        return (
-            f"something stands {_where(around[stands], pose)}, and a turn in place sweeps {sweep_m:.2f} m "
-            "around: stop"
-        )
-    unknown = ~ground.free(points, now_ns - round(memory_s * NS_PER_S))
-    if unknown.any():
-        return (
-            f"the floor {_where(around[unknown], pose)} has not been seen within {memory_s:g} s, and a turn "
-            f"in place sweeps {sweep_m:.2f} m around: stop"
-        )
-    return ""
 
 
 def _distance_m(bodies: Bodies, pose: PlanarPose) -> FloatArray:

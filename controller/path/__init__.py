@@ -1,4 +1,4 @@
-"""The planned path: where it goes, how fast it may be driven, which bends the camera cannot see round.
+"""The planned path: where it goes and how fast it may be driven.
 
 The files in the order in which they come into play:
 
@@ -6,5 +6,4 @@ The files in the order in which they come into play:
 * path_pieces.py - the path as a chain of pieces of constant curvature
 * projection.py - path coordinates of points
 * path_speeds.py - greatest speed along the path
-* blind_bends.py - before a drive: a warning about bends where the robot would wait without end
 """

@@ -1,16 +1,16 @@
-"""Drives along a path in real time; called by `treadwatch run` (controller/mission.py)."""
+"""Drives along a path in real time; called by `treadwatch run` (controller/mission/command.py)."""
 
 from __future__ import annotations
 
 from config.app import AppConfig, RealtimeRunner
 from config.chassis import AgilexChassisConfig, AnyChassisConfig, CanLinkConfig
 from controller.build import build_control
-from controller.console import Console
 from controller.ending import Outcome
+from controller.mission.result import MissionOptions, MissionResult
 from controller.realtime.rig import realtime_rig
 from controller.record.tally import SetpointTally
-from controller.result import MissionOptions, MissionResult
-from controller.summary import report
+from controller.terminal.console import Console
+from controller.terminal.summary import report
 from hal.errors import DeviceRefused
 from hal.types import ChassisMode
 

@@ -16,10 +16,10 @@ from controller.build import build_path, build_perceiver, mount_of, open_camera,
 from controller.control import ControlStep
 from controller.errors import UserError
 from controller.localise import PoseHistory
-from controller.outlet import say
 from controller.realtime.channel import Channel, PeerGone
 from controller.realtime.runner import CutOff, Farewell, SceneMessage, StepMessage
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
+from controller.terminal.outlet import say
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import EndOfStream, FrameTimeout, HalError
 from hal.geometry import advance_pose, body_in_floor, camera_in_floor, planar

@@ -15,9 +15,9 @@ from typing import Protocol
 from config.app import AppConfig, RealtimeRunner
 from controller.build import build_path, build_simulation, require_camera
 from controller.build_chassis import build_base
-from controller.console import Console
 from controller.control import Drive
 from controller.ending import Ending, Outcome
+from controller.mission.result import MissionOptions
 from controller.realtime.channel import Channel, channel_sockets
 from controller.realtime.perception_process import perceive_forever
 from controller.realtime.punctual import PunctualChassis
@@ -25,7 +25,7 @@ from controller.realtime.runner import PerceptionLink, Punctuality, RealtimeMome
 from controller.realtime.scheduling import become_realtime
 from controller.realtime.service import ServiceManager, StopRequest
 from controller.record.recorder import RecordingOptions, require_writable
-from controller.result import MissionOptions
+from controller.terminal.console import Console
 from controller.workers import held
 from hal.clocks import NS_PER_S, MonotonicClock
 from hal.errors import DeviceRefused
@@ -70,7 +70,7 @@ class RealtimeRig:
     ) -> Iterator[Iterator[RealtimeMoment]]:
         """The control steps of a drive with this loop, until it has finished. Perception ends with the block.
 
-        Signals are wishes to stop from now on, and stay so after the block: see StopRequest.
+        From now on signals are requests to stop, after the block, too: see StopRequest.
         on_ready: called once, when the first scene has arrived.
         """
         service = ServiceManager(os.environ, os.getpid())
@@ -99,7 +99,7 @@ class RealtimeRig:
         self._take_cut_off(link, console, "")
 
     def _take_cut_off(self, link: PerceptionLink, console: Console, more: str) -> None:
-        """Tells of the outputs that have ended since the last call."""
+        """Warn of the outputs that have ended since the last call."""
         while link.cut_off:
             self.cut_off.append(link.cut_off.pop(0))
             console.warning(self.cut_off[-1] + more)
@@ -164,10 +164,10 @@ def _recording(options: MissionOptions) -> RecordingOptions:
 def perception_beside(
     config: AppConfig, config_path: Path, start_ns: int, recording: RecordingOptions
 ) -> Iterator[PerceptionLink]:
-    """Run the perception process. At the end of the block it hears nothing more, which makes it end; what it
-    tells of its files until then is in the link.
+    """Run the perception process during the block.
 
-    start_ns: time zero of a simulated world.
+    At the end of the block its channel closes, which makes it end. What it reports of its files until then is
+    in the link. start_ns: time zero of a simulated world.
     """
     here, there = channel_sockets()
     process: BaseProcess = multiprocessing.get_context("spawn").Process(

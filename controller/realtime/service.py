@@ -1,6 +1,7 @@
-"""What a service owes its manager: readiness, a watchdog that the control loop itself feeds, a clean end.
+"""The service manager (systemd) and the signals that stop a drive.
 
-The notify protocol is the one of sd_notify(3): datagrams to the socket named in NOTIFY_SOCKET.
+systemd hears when the drive is ready and when it stops. In between, the control loop feeds its watchdog.
+The protocol is that of sd_notify(3): datagrams to the socket named in NOTIFY_SOCKET.
 """
 
 from __future__ import annotations
@@ -16,19 +17,19 @@ from typing import Self
 
 from hal.clocks import NS_PER_S
 
-# What systemd writes. str.isdigit() is also true of what int() does not take: superscripts, or 5000 digits.
+# A number as systemd writes it. str.isdigit() also accepts what int() refuses: superscripts, or 5000 digits.
 _UINT64 = re.compile("[0-9]{1,20}")
 
 _STOPPING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-# The first Ctrl-C while a drive closes, and the second of somebody who is impatient, lose no files.
+# While a drive closes, only this many signals end the process: one or two impatient ones lose no files.
 _MOST_PATIENT = 3
 
 
 class ServiceManager:
-    """Speaks to systemd if it started us, to nobody otherwise.
+    """Notifies systemd, if systemd has started this process; does nothing otherwise.
 
-    A notice that cannot be delivered must not stop a robot: it is counted in ``lost_notices``, and
-    systemd will notice the missing watchdog by itself.
+    A notice that cannot be delivered must not stop a robot. It is counted in lost_notices, and systemd
+    notices a missing watchdog by itself.
     """
 
     def __init__(self, environment: Mapping[str, str], pid: int) -> None:
@@ -40,11 +41,11 @@ class ServiceManager:
         self.lost_notices = 0
 
     def ready(self, status: str) -> None:
-        """The loop runs and the devices answer (Type=notify waits for this)."""
+        """Tell that the loop runs and the devices answer; Type=notify waits for this."""
         self._send(f"READY=1\nSTATUS={status}")
 
     def stopping(self, status: str) -> None:
-        """The stop has begun, or the drive is over; told once. From now on no watchdog waits to be fed."""
+        """Tell, once, that the stop has begun or the drive is over. The watchdog then waits no longer."""
         if not self._told_stopping:
             self._told_stopping = True
             self._send(f"STOPPING=1\nSTATUS={status}")
@@ -79,9 +80,9 @@ def _watchdog_interval_ns(environment: Mapping[str, str], pid: int) -> int | Non
 class StopRequest:
     """Set by SIGTERM, SIGINT or SIGHUP; read by the runner once per control step.
 
-    While a drive closes (its files, perception, the summary), signals change nothing: the drive has ended,
-    and closing takes seconds at most. Only the _MOST_PATIENT-th of them ends the process at once, for whoever
-    waits for a disk or a terminal that hangs.
+    While a drive closes (files, perception, summary), signals have no effect: the drive has ended, and
+    closing takes seconds. Only the _MOST_PATIENT-th of them ends the process at once, in case a disk or a
+    terminal hangs.
     """
 
     def __init__(self) -> None:
@@ -93,7 +94,7 @@ class StopRequest:
         return self.reason is not None
 
     def listen(self) -> Self:
-        """From now on until the process ends, its last moments included; not to SIGHUP under nohup."""
+        """Handle the signals from now on until the process has ended; SIGHUP not under nohup."""
         for number in _STOPPING:
             if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self.handle)
@@ -101,11 +102,11 @@ class StopRequest:
         return self
 
     def closing(self) -> None:
-        """The drive has ended: nothing is left to be stopped."""
+        """Note that the drive has ended, so that nothing is left to be stopped."""
         self._closing = True
 
     def handle(self, number: int, _frame: FrameType | None) -> None:
-        """A signal handler: it only notes the wish, the loop does the stopping."""
+        """The signal handler. It only notes the request; the loop stops the robot."""
         self.reason = signal.Signals(number).name
         self._while_closing += self._closing
         if self._while_closing >= _MOST_PATIENT:
@@ -114,7 +115,7 @@ class StopRequest:
 
 
 def _ignore_once_over(request: StopRequest) -> None:
-    """The interpreter takes Python's handlers away while it ends: the exit code is decided by then."""
+    """Ignore the signals while the interpreter ends and removes Python's handlers: the exit code is set."""
     for number in _STOPPING:
         if signal.getsignal(number) == request.handle:
             signal.signal(number, signal.SIG_IGN)
@@ -122,7 +123,7 @@ def _ignore_once_over(request: StopRequest) -> None:
 
 @contextmanager
 def handlers_kept() -> Iterator[None]:
-    """The handlers of the stopping signals are the same after the block as before."""
+    """Restore the handlers of the stopping signals after the block."""
     before = {number: signal.getsignal(number) for number in _STOPPING}
     try:
         yield

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from controller.outlet import say
+from controller.terminal.outlet import say
 from hal.cameras.tum_writer import TumWriter
 from hal.errors import DeviceRefused
 from hal.types import Pose, RgbdFrame

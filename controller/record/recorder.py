@@ -15,12 +15,12 @@ from config.robot import Body
 from controller.control import ControlStep
 from controller.decision.decision import Decision
 from controller.errors import UserError
-from controller.outlet import say
 from controller.path.path import Path
 from controller.perceive import Look
 from controller.record.frame_recorder import FrameRecorder
 from controller.record.observations import ObservationFile
 from controller.record.output_isolation import OutputIsolation
+from controller.terminal.outlet import say
 from controller.video.compose import Composer
 from controller.video.moment import VideoMoment
 from controller.video.writer import VideoWriter

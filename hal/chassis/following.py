@@ -1,6 +1,13 @@
-"""Does the base move as it is told? Its motors may be held or run away, its encoders dead, its reports long
-old, the scale of its speed wrong, and no fault bit says so: then the robot stands for ever, drives on with
-nobody knowing how far, goes faster than it may, or sets off though it is told to stand."""
+"""Whether the base moves as commanded, judged by its odometry.
+
+No fault bit tells that motors are held or run away, that encoders are dead, that reports are long old or that
+a speed has the wrong scale. Then the robot would stand for ever, drive on while nobody knows how far, exceed
+its speed limit, or set off although it is commanded to stand.
+
+Following compares the reported poses with the commands in two ways. Over each distance commanded, the base
+must report a minimum share of it and about the commanded turn. At all times, it must not report a speed or
+yaw rate well above the commands of the last seconds. hal/chassis/driver.py steps it and latches its sentence.
+"""
 
 from __future__ import annotations
 
@@ -13,35 +20,36 @@ from hal.clocks import NS_PER_S
 from hal.geometry import wrap_angle_rad
 from hal.types import PlanarPose, Setpoint
 
-# What a turn counts beside a distance: travel this far from the turning centre.
+# A turn counts as the distance that a point this far from the turning centre travels.
 _ARM_M = 0.3
 
-# Judged when so much was commanded, and after so long at least: by then a base that lags by half a second has
-# done a quarter of it from rest, and one that lags by two a tenth.
+# Too little motion is judged each time that at least this distance was commanded in at least this time. By
+# then a base that lags by 0.5 s has travelled a quarter of it from rest, and one that lags by 2 s a tenth.
 _JUDGED_M = 0.3
 _JUDGED_NS = NS_PER_S
-_LEAST_SHARE = 0.05
+_MIN_SHARE = 0.05  # of the commanded distance that must be reported
 
-# How far a turn may be from the commanded one, and the share of all turning either way that may come on top:
-# lag, where one bend follows another, and slip.
+# Greatest difference between reported and commanded turn, plus this share of all turning in both directions:
+# for lag, where one bend follows another, and for slip.
 _TURN_SLACK_RAD = 0.6
 _TURN_RATIO = 0.5
 
-# How fast it may tell of going: this many times what was commanded at any time in the last seconds, whatever
-# its lag, and a little more; not twice in a row is it faster, over so long each. A turn counts with its arm.
-_FASTEST_SHARE, _FASTEST_MPS = 1.5, 0.15
+# Greatest speed that may be reported: this many times the fastest command of the last _LAG_NS, whatever the
+# base's lag, plus a constant. For a yaw rate the constant is divided by _ARM_M.
+_MAX_SHARE, _MAX_EXTRA_MPS = 1.5, 0.15
 _LAG_NS = 6 * NS_PER_S
-_GLANCE_NS = NS_PER_S // 2
+# The reported speed is averaged over windows of this length; two in a row must exceed the limit.
+_WINDOW_NS = NS_PER_S // 2
 
-# Told to stand for so long, a base that lags by two seconds has slowed to a fiftieth, and may move no more
-# than one that rolls back (rolling_back.py). Who pushes or turns it by hand, by more than 5 cm or 10 degrees
-# in a second, latches it too: it tells the same when a motor runs away.
+# A base that lags by 2 s has slowed to a fiftieth when it has been commanded to stand for _REST_NS. From then
+# on it may move no faster than a base that rolls back (rolling_back.py). Whoever pushes or turns it by hand,
+# by more than 5 cm or 10 degrees in a second, latches it, too: a motor that runs away is reported the same.
 _REST_NS = 8 * NS_PER_S
-_RESTING_MPS = 0.05
+_RESTING_EXTRA_MPS = 0.05
 
 
 class _Ordered(NamedTuple):
-    """How fast, m/s and rad/s without sign, was commanded until until_ns."""
+    """The magnitudes of speed and yaw rate that were commanded until until_ns."""
 
     until_ns: int
     mps: float
@@ -49,95 +57,107 @@ class _Ordered(NamedTuple):
 
 
 class Following:
-    """sentence: "" while the base follows, and as long as too little was commanded to tell."""
+    """Compares each reported pose with the command before it.
+
+    sentence: what is wrong; "" while the base follows, or as long as too little was commanded to judge.
+    """
 
     def __init__(self) -> None:
         self.sentence = ""
         self._ordered: Setpoint | None = None
         self._pose: PlanarPose | None = None
         self._last_ns = self._since_ns = 0
-        self._commanded_m = self._told_m = 0.0
-        self._commanded_rad = self._turning_rad = self._told_rad = 0.0
-        self._lately: deque[_Ordered] = deque()
-        self._glance_ns, self._glanced_m, self._glanced_rad = 0, 0.0, 0.0
+        self._commanded_m = self._reported_m = 0.0
+        self._commanded_rad = self._turning_rad = self._reported_rad = 0.0
+        self._orders: deque[_Ordered] = deque()
+        self._window_began_ns, self._window_m, self._window_rad = 0, 0.0, 0.0
         self._too_fast = self._turns_too_fast = False
 
     def step(self, pose: PlanarPose, now_ns: int) -> None:
-        """What the base has told since the last step, beside what it was ordered since."""
+        """Compare what the base has reported since the last step with what was commanded meanwhile."""
         before, self._pose = self._pose, pose
         elapsed_s, self._last_ns = (now_ns - self._last_ns) / NS_PER_S, now_ns
         self._note_order(now_ns)
         if before is None or self._ordered is None:
             self.sentence = ""
             self._restart(now_ns)
-            self._glance_anew(now_ns)
+            self._begin_window(now_ns)
             self._too_fast = self._turns_too_fast = False
             return
         way_m = _way_m(before, pose)
         turn_rad = wrap_angle_rad(pose.heading_rad - before.heading_rad)
-        too_much = self._too_much(way_m, turn_rad, now_ns)
+        excess = self._excess(way_m, turn_rad, now_ns)
         if is_zero(self._ordered):
-            self.sentence = too_much
+            self.sentence = excess
             self._restart(now_ns)
             return
         self._commanded_m += (abs(self._ordered.v_mps) + _ARM_M * abs(self._ordered.w_radps)) * elapsed_s
         self._commanded_rad += self._ordered.w_radps * elapsed_s
         self._turning_rad += abs(self._ordered.w_radps) * elapsed_s
-        self._told_rad += turn_rad
-        self._told_m += abs(way_m) + _ARM_M * abs(turn_rad)
+        self._reported_rad += turn_rad
+        self._reported_m += abs(way_m) + _ARM_M * abs(turn_rad)
         if self._commanded_m >= _JUDGED_M and now_ns - self._since_ns >= _JUDGED_NS:
-            self.sentence = self._judged((now_ns - self._since_ns) / NS_PER_S)
+            self.sentence = self._shortfall((now_ns - self._since_ns) / NS_PER_S)
             self._restart(now_ns)
-        self.sentence = self.sentence or too_much
+        self.sentence = self.sentence or excess
 
     def ordered(self, command: Setpoint | None) -> None:
-        """What the base is told from now on. Zero ends the comparison with how much was commanded, not that
-        with how fast; None ends both: it is not armed, and may be pushed or driven by somebody else."""
+        """Take the command that holds from now on.
+
+        Zero ends the check for too little motion, but not that for too much. None ends both: the base is not
+        armed, so somebody may push it or drive it otherwise.
+        """
         self._ordered = command
 
     def _note_order(self, now_ns: int) -> None:
-        """What was commanded until now_ns. A change is enough: a base may stand for days."""
+        """Store what was commanded until now_ns.
+
+        Equal commands share one entry, because a base may stand for days.
+        """
         order = self._ordered
         mps, radps = (0.0, 0.0) if order is None else (abs(order.v_mps), abs(order.w_radps))
-        if self._lately and self._lately[-1][1:] == (mps, radps):
-            self._lately.pop()
-        self._lately.append(_Ordered(now_ns, mps, radps))
-        while self._lately[0].until_ns < self._glance_ns - _REST_NS:
-            self._lately.popleft()
+        if self._orders and self._orders[-1][1:] == (mps, radps):
+            self._orders.pop()
+        self._orders.append(_Ordered(now_ns, mps, radps))
+        while self._orders[0].until_ns < self._window_began_ns - _REST_NS:
+            self._orders.popleft()
 
-    def _too_much(self, way_m: float, turn_rad: float, now_ns: int) -> str:
-        """What is wrong if the base, way_m on and turn_rad further, tells of going or turning faster than it
-        was told of late."""
-        # With their signs: the jitter of a counter at rest is no travel.
-        self._glanced_m += way_m
-        self._glanced_rad += turn_rad
-        if now_ns - self._glance_ns < _GLANCE_NS:
+    def _excess(self, way_m: float, turn_rad: float, now_ns: int) -> str:
+        """What is wrong if the base reports a speed or yaw rate above the limit; "" if it does not.
+
+        way_m, turn_rad: reported since the last step.
+        """
+        # Signed sums, so that the jitter of a counter at rest adds up to nothing.
+        self._window_m += way_m
+        self._window_rad += turn_rad
+        if now_ns - self._window_began_ns < _WINDOW_NS:
             return ""
-        seconds = (now_ns - self._glance_ns) / NS_PER_S
-        told_mps, told_radps = abs(self._glanced_m) / seconds, abs(self._glanced_rad) / seconds
-        resting = not any(one.mps or one.radps for one in self._lately)
-        recent = [one for one in self._lately if one.until_ns >= self._glance_ns - _LAG_NS]
+        seconds = (now_ns - self._window_began_ns) / NS_PER_S
+        reported_mps, reported_radps = abs(self._window_m) / seconds, abs(self._window_rad) / seconds
+        resting = not any(one.mps or one.radps for one in self._orders)
+        recent = [one for one in self._orders if one.until_ns >= self._window_began_ns - _LAG_NS]
         mps, radps = max(one.mps for one in recent), max(one.radps for one in recent)
-        slack_mps = _RESTING_MPS if resting else _FASTEST_MPS
-        before, self._too_fast = self._too_fast, told_mps > _FASTEST_SHARE * mps + slack_mps
+        slack_mps = _RESTING_EXTRA_MPS if resting else _MAX_EXTRA_MPS
+        before, self._too_fast = self._too_fast, reported_mps > _MAX_SHARE * mps + slack_mps
         too_fast = before and self._too_fast
-        fastest_radps = _FASTEST_SHARE * radps + slack_mps / _ARM_M
-        before, self._turns_too_fast = self._turns_too_fast, told_radps > fastest_radps
+        max_radps = _MAX_SHARE * radps + slack_mps / _ARM_M
+        before, self._turns_too_fast = self._turns_too_fast, reported_radps > max_radps
         turns_too_fast = before and self._turns_too_fast
-        self._glance_anew(now_ns)
+        self._begin_window(now_ns)
         stood = mps == 0.0 and radps == 0.0
         if too_fast:
-            return _overdone(f"{told_mps:.2f} m/s", f"{mps:.2f} m/s", stood)
+            return _excess_text(f"{reported_mps:.2f} m/s", f"{mps:.2f} m/s", stood)
         if turns_too_fast:
-            return _overdone(f"{told_radps:.2f} rad/s", f"{radps:.2f} rad/s", stood)
+            return _excess_text(f"{reported_radps:.2f} rad/s", f"{radps:.2f} rad/s", stood)
         return ""
 
-    def _judged(self, seconds: float) -> str:
-        apart_rad = abs(self._told_rad - self._commanded_rad)
-        if self._told_m < _LEAST_SHARE * self._commanded_m:
-            told, commanded = f"{self._told_m:.2f} m", f"{self._commanded_m:.2f} m"
+    def _shortfall(self, seconds: float) -> str:
+        """What is wrong if the base has moved too little or turned otherwise in these seconds, else ""."""
+        apart_rad = abs(self._reported_rad - self._commanded_rad)
+        if self._reported_m < _MIN_SHARE * self._commanded_m:
+            told, commanded = f"{self._reported_m:.2f} m", f"{self._commanded_m:.2f} m"
         elif apart_rad > _TURN_SLACK_RAD + _TURN_RATIO * self._turning_rad:
-            told, commanded = f"{self._told_rad:.2f} rad", f"{self._commanded_rad:.2f} rad"
+            told, commanded = f"{self._reported_rad:.2f} rad", f"{self._commanded_rad:.2f} rad"
         else:
             return ""
         return (
@@ -145,24 +165,24 @@ class Following:
             "commanded; are its tracks free and its encoders connected?"
         )
 
-    def _glance_anew(self, now_ns: int) -> None:
-        self._glance_ns, self._glanced_m, self._glanced_rad = now_ns, 0.0, 0.0
+    def _begin_window(self, now_ns: int) -> None:
+        self._window_began_ns, self._window_m, self._window_rad = now_ns, 0.0, 0.0
 
     def _restart(self, now_ns: int) -> None:
         self._since_ns = now_ns
-        self._commanded_m = self._told_m = 0.0
-        self._commanded_rad = self._turning_rad = self._told_rad = 0.0
+        self._commanded_m = self._reported_m = 0.0
+        self._commanded_rad = self._turning_rad = self._reported_rad = 0.0
 
 
 def _way_m(before: PlanarPose, after: PlanarPose) -> float:
-    """From one pose to the next, negative backwards."""
+    """Distance from one pose to the next; negative if it leads backwards."""
     x_m, y_m = after.x_m - before.x_m, after.y_m - before.y_m
     ahead_m = x_m * math.cos(before.heading_rad) + y_m * math.sin(before.heading_rad)
     return math.copysign(math.hypot(x_m, y_m), ahead_m)
 
 
-def _overdone(told: str, commanded: str, stood: bool) -> str:
-    """stood: no motion was commanded at all."""
+def _excess_text(told: str, commanded: str, stood: bool) -> str:
+    """The sentence on too much motion. stood: no motion at all was commanded."""
     ask = (
         "does it hold itself where it stands, and do its motors obey?"
         if stood

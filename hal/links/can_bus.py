@@ -160,7 +160,7 @@ def _open(config: CanLinkConfig, where: str) -> can.BusABC:
         )
         if isinstance(bus, slcanBus):
             # It would wait after every frame until the adapter has taken it: for ever if the adapter hangs.
-            bus.serialPortOrig.flush = _skip_flush  # type: ignore[method-assign]
+            bus.serialPortOrig.flush = _skip_flush  # type: ignore[method-assign]  # of this one port
         return bus
     except _OPEN_ERRORS as error:
         error_number = _errno(error)

@@ -15,10 +15,10 @@ from typing import Any
 
 from config.app import LockstepRunner, load_app
 from config.loader import CONFIG_DIR
-from controller.console import Console
-from controller.mission import drive_lockstep, with_overrides
+from controller.mission.command import drive_lockstep, with_overrides
+from controller.mission.result import MissionOptions
 from controller.replay import ReplayOptions, run_replay
-from controller.result import MissionOptions
+from controller.terminal.console import Console
 from tests.support.recordings import DESK_RPY
 
 Observation = dict[str, Any]

@@ -19,7 +19,7 @@ from config.app import load_app
 from config.chassis import AnyChassisConfig, CanLinkConfig
 from config.loader import CONFIG_DIR
 from controller.build_chassis import build_can_driver, build_serial_driver
-from controller.emulate import EmulateOptions, can_link, with_wire
+from controller.cli.emulate import EmulateOptions, can_link, with_wire
 from hal.clocks import MonotonicClock
 from hal.errors import HalError
 from hal.links.can_bus import CanBusLink

@@ -11,7 +11,7 @@ import yaml
 
 from config.chassis import CHASSIS_KINDS, AnyChassisConfig
 from config.loader import CONFIG_DIR
-from controller.emulate import FAULTS
+from controller.cli.emulate import FAULTS
 from controller.faults.trials import KINDS as EVERY_BASE
 from hal.chassis.driver import ChassisDriver, ChassisFeedback
 from hal.links.scripted import serial_pair

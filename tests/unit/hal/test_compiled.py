@@ -10,7 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -185,7 +185,7 @@ def test_a_full_disk_keeps_nothing_and_hinders_nobody(tmp_path: Path) -> None:
 
 def test_an_error_in_a_step_is_told_when_its_module_is_imported() -> None:
     def wrong(value: float) -> float:
-        return value + "one"  # type: ignore[operator]
+        return value + "one"  # type: ignore[operator]  # wrong on purpose
 
     with pytest.raises(Exception, match="No implementation of function"):
         compiled("float64")(wrong)
@@ -231,3 +231,13 @@ def test_a_step_reads_no_constant_by_way_of_a_module() -> None:
     }
     assert len(steps()) > 10
     assert foreign == set()
+
+
+def test_a_step_has_no_code_within_its_code() -> None:
+    """Constants that only a comprehension or an inner function reads would not be noticed, either."""
+    nested = {
+        (step.py_func.__module__, step.py_func.__name__)
+        for step in steps()
+        if any(isinstance(constant, CodeType) for constant in step.py_func.__code__.co_consts)
+    }
+    assert nested == set()

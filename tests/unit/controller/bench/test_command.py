@@ -15,7 +15,7 @@ from controller.bench.perception import PerceptionFigures
 from controller.bench.rendering import RendererFigures
 from controller.bench.report import BenchReport
 from controller.bench.stages import StageFigures
-from controller.cli import cli
+from controller.cli.commands import cli
 from controller.errors import UserError
 
 MACHINE: dict[str, str | int] = {

@@ -18,7 +18,7 @@ from controller.campaign.plan import Mission, missions, run_local
 from controller.campaign.store import MISSIONS, SETTINGS, MissionStore
 from controller.campaign.summary import summarise, totals
 from controller.campaign.task import Task, run_task
-from controller.cli import cli
+from controller.cli.commands import cli
 from controller.errors import UserError
 from tests.support.campaign import CONFIG
 

@@ -148,30 +148,6 @@ def test_who_comes_so_near_that_depth_fails_is_not_driven_into() -> None:
     assert bench.settle(v_mps=0.0).target_speed_mps == 1.5
 
 
-@pytest.mark.parametrize("somebody_walks", [False, True])
-def test_who_goes_blind_beside_somebody_brakes_hard(somebody_walks: bool) -> None:
-    bench = Bench()
-    people = [obstacle(6.0, 2.0, vx_mps=1.0)] if somebody_walks else []
-    bench.settle(*people)
-    decision = bench.settle(*people, free=free_space(known_m=0.0))
-    assert decision.target_speed_mps == 0.0
-    assert decision.emergency == somebody_walks
-
-
-def test_who_sees_nothing_for_long_brakes_hard_though_nobody_was_there() -> None:
-    """A frozen camera, with a new stamp every 20 ms, and one that falls silent."""
-    covered = CameraHealth(CameraCondition.UNTRUSTWORTHY, "frozen", 0.9)
-    for silent in (False, True):
-        bench = Bench()
-        bench.settle()
-        last = bench.scene()
-        bench.step(last)
-        blind = [bench.step(last if silent else bench.scene(health=covered)) for _ in range(40)]
-        hard_s = [(AGE_NS + (2 + k) * STEP_NS) / 1e9 for k, found in enumerate(blind) if found.emergency]
-        assert min(hard_s) == pytest.approx(0.62)
-        assert not bench.step(bench.scene(), 0.1).emergency
-
-
 def test_the_pose_and_the_place_on_the_path_are_each_needed() -> None:
     nowhere = PlanarPose(math.nan, 0.0, 0.0)
     for pose, on_path, word in (

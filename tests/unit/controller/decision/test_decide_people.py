@@ -214,4 +214,4 @@ def test_one_frame_after_a_time_in_which_nobody_was_watched_is_no_sign_of_going_
         bench.step(bench.scene(turning))
     bench.settle(obstacle(5.0, 1.5))
     bench.step(bench.scene(turning))
-    assert bench.maker._speed_limits._enters._flags == {5: True}
+    assert bench.maker._speed_limits._watch._enters._flags == {5: True}

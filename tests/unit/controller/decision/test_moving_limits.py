@@ -12,6 +12,7 @@ from controller.decision.corridor import Corridor, path_velocities, place
 from controller.decision.crossing import likely_enters
 from controller.decision.limits import Motion
 from controller.decision.moving_limits import MovingLimits
+from controller.decision.watched import Watched
 from tests.support.floor_bodies import box, line_path
 
 TIMES = np.arange(0.0, 8.1, 0.2)
@@ -23,7 +24,8 @@ def asked(moving: MovingLimits, bodies: Bodies, now_s: float) -> None:
     placed = place(bodies, CORRIDOR, TIMES, 0.0, 12.0)
     velocities = path_velocities(bodies, placed.heading_rad[:, 0])
     enters = likely_enters(placed, TIMES, np.zeros(len(bodies)))
-    moving.limits(bodies, placed, velocities, enters, 0.0, Motion(1.0, 0.0, 0.2), 1.5, now_s)
+    watched = Watched(bodies, 0.0, placed, velocities, enters, enters)
+    moving.limits(watched, 0.0, Motion(1.0, 0.0, 0.2), 1.5, now_s)
 
 
 @pytest.mark.parametrize("besides", [False, True])

@@ -8,28 +8,42 @@ import pytest
 from config.robot import Body
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, place
-from controller.decision.reachability import Reach, last_stop_before_entry, passes_clear, reach, room, stops
+from controller.decision.manoeuvres import Manoeuvres
+from controller.decision.reachability import (
+    Reach,
+    count_safe_stops,
+    last_stop_before_entry,
+    passes_clear,
+    reach,
+    stops,
+)
 from controller.profile import SpeedRamps
-from hal.types import FloatArray
 from tests.support.floor_bodies import box, line_path
 
 TIMES = np.arange(0.0, 4.01, 0.1)
 CORRIDOR = Corridor(line_path(), Body(width_m=0.8, length_m=1.0, rear_m=0.5))
 
 
-def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, since_s: float = 0.0) -> Reach:
+def manoeuvres(
+    since_s: float = 0.0,
+    spread_mps: tuple[float, float] = (0.0, 0.0),
+    speed_mps: float = 0.0,
+    change_mps2: float = 0.0,
+    uncertain_m: tuple[float, float] = (0.0, 0.0),
+) -> Manoeuvres:
+    """Of one body; pairs: along the path and across it."""
+    each = (since_s, *spread_mps, speed_mps, change_mps2, change_mps2, *uncertain_m)
+    return Manoeuvres(*(np.array([value]) for value in each))
+
+
+def grown(body: Bodies, may_do: Manoeuvres, since_s: float = 0.0) -> Reach:
     placed = place(body, CORRIDOR, TIMES + since_s, 0.0, 12.0)
-    speed = np.linalg.norm(body.velocity_mps, axis=1)
-    return reach(
-        placed,
-        TIMES,
-        np.full(len(body), since_s),
-        (np.full(len(body), sigma_mps), np.full(len(body), sigma_mps)),
-        speed,
-        (np.full(len(body), manoeuvre_mps2), np.full(len(body), manoeuvre_mps2)),
-        max_mps=1.5,
-        margin_m=0.2,
-    )
+    return reach(placed, TIMES, may_do, max_mps=1.5, margin_m=0.2, counts=np.array([True]))
+
+
+def reached(body: Bodies, sigma_mps: float = 0.0, manoeuvre_mps2: float = 0.0, since_s: float = 0.0) -> Reach:
+    speed_mps = float(np.linalg.norm(body.velocity_mps))
+    return grown(body, manoeuvres(since_s, (sigma_mps, sigma_mps), speed_mps, manoeuvre_mps2), since_s)
 
 
 def stop_from(v_mps: float, latency_s: float = 0.0) -> SpeedRamps:
@@ -44,8 +58,9 @@ def stop_from(v_mps: float, latency_s: float = 0.0) -> SpeedRamps:
     )
 
 
-def room_for(v_mps: float, body: Reach, latency_s: float = 0.0) -> float:
-    return float(room(stops(stop_from(v_mps, latency_s), TIMES), 0.0, body)[0])
+def stops_in_time(v_mps: float, body: Reach, latency_s: float = 0.0, s_m: float = 0.0) -> bool:
+    stopping = stops(stop_from(v_mps, latency_s), TIMES)
+    return count_safe_stops(stopping, s_m, body, np.array([True])) == 1
 
 
 def test_a_crosser_may_stop_dead_in_the_way() -> None:
@@ -74,13 +89,9 @@ def test_it_does_not_become_faster_than_obstacles_are() -> None:
 
 def test_how_well_its_place_was_known_counts_from_the_first_moment() -> None:
     body = box(5.0, 1.65, 0.01, 0.0)
-    placed, none = place(body, CORRIDOR, TIMES, 0.0, 12.0), np.zeros(1)
 
     def unsure(along_m: float, across_m: float) -> Reach:
-        at = (np.array([along_m]), np.array([across_m]))
-        return reach(
-            placed, TIMES, none, (none, none), none, (none, none), 1.5, 0.2, position_uncertainty_m=at
-        )
+        return grown(body, manoeuvres(uncertain_m=(along_m, across_m)))
 
     assert not unsure(0.0, 0.9).inside.any()
     assert unsure(0.0, 1.1).inside.all()
@@ -94,32 +105,41 @@ def test_the_age_of_the_scene_counts() -> None:
     assert int(fresh.inside[0].argmax()) - int(old.inside[0].argmax()) == 10
 
 
-def test_room_is_what_the_stop_leaves() -> None:
+@pytest.mark.parametrize("latency_s", [0.0, 0.5])
+def test_a_stop_is_in_time_where_it_ends_before_what_is_blocked(latency_s: float) -> None:
     """An emergency stop from 1 m/s takes 1 / 1.4 + 0.175 m; the way is blocked at 4.1 m."""
     standing = reached(box(5.0, 0.0))
-    assert room_for(1.0, standing) == pytest.approx(4.1 - (1 / 1.4 + 0.175), abs=0.01)
-    assert room_for(1.0, standing, latency_s=0.5) == pytest.approx(4.1 - (1 / 1.4 + 0.675), abs=0.01)
+    last_m = 4.1 - (1 / 1.4 + 0.175 + latency_s)
+    assert stops_in_time(1.0, standing, latency_s, s_m=last_m - 0.01)
+    assert not stops_in_time(1.0, standing, latency_s, s_m=last_m + 0.01)
+
+
+def test_the_stops_that_are_in_time_are_counted_from_the_slowest_on() -> None:
+    """2 m before something that stands: v^2 / 1.4 + 0.175 v is 1.71 m from 1.43 m/s, 2.2 m from 1.64 m/s."""
+    speeds = np.array([0.0, 1.0, 1.43, 1.64, 2.0])
+    ramps = SpeedRamps(speeds, 0.0, np.zeros(5), accel_mps2=0.3, decel_mps2=0.7, jerk_mps3=2.0)
+    stopping, standing = stops(ramps, TIMES), reached(box(5.0, 0.0))
+    assert count_safe_stops(stopping, 2.1, standing, np.array([True])) == 3
+    assert count_safe_stops(stopping, 2.1, standing, np.array([False])) == 5, "it does not count"
 
 
 def test_an_oncoming_one_takes_room_while_the_robot_brakes_only() -> None:
     """Once the robot stands, being reached is all that can be promised."""
     oncoming = reached(box(5.0, 0.0, -1.0, 0.0))
-    assert room_for(1.0, oncoming) > 0.0
-    assert room_for(1.5, oncoming) < room_for(1.0, oncoming)
-    assert room_for(0.0, oncoming) == np.inf
-    near = reached(box(2.5, 0.0, -1.0, 0.0))
-    assert room_for(1.0, near) < 0.0
+    assert stops_in_time(1.0, oncoming)
+    assert not stops_in_time(1.0, reached(box(2.5, 0.0, -1.0, 0.0)))
+    assert stops_in_time(0.0, reached(box(2.5, 0.0, -1.0, 0.0)))
 
 
 def test_who_is_past_something_needs_no_room_before_it() -> None:
     """Its far end is at 5.2 m; the robot's rear, 0.5 m behind, leaves it at 5.9 m with a margin of 0.2 m."""
     standing = reached(box(5.0, 0.0))
-    assert room(stops(stop_from(1.0), TIMES), 5.6, standing)[0] < 0.0
-    assert room(stops(stop_from(1.0), TIMES), 6.0, standing)[0] == np.inf
+    assert not stops_in_time(1.0, standing, s_m=5.6)
+    assert stops_in_time(1.0, standing, s_m=6.0)
 
 
 def test_what_is_never_in_the_way_takes_no_room() -> None:
-    assert room_for(1.5, reached(box(5.0, 2.0, -1.0, 0.0))) == np.inf
+    assert stops_in_time(1.5, reached(box(5.0, 2.0, -1.0, 0.0)), s_m=4.5)
 
 
 def go(v_mps: float, target_mps: float) -> SpeedRamps:
@@ -135,14 +155,8 @@ def test_getting_through_before_it_comes() -> None:
 def test_what_may_happen_along_and_across_is_told_apart() -> None:
     """0.5 m/s more along the path brings nobody into it, 0.5 m/s across it does."""
     body = box(5.0, 0.65 + 0.9, 0.01, 0.0)
-    placed = place(body, CORRIDOR, TIMES, 0.0, 12.0)
-    none, half = np.zeros(1), np.full(1, 0.5)
-
-    def worst(spread: tuple[FloatArray, FloatArray]) -> Reach:
-        return reach(placed, TIMES, none, spread, none, (none, none), max_mps=1.5, margin_m=0.2)
-
-    assert not worst((half, none)).inside.any()
-    assert worst((none, half)).inside.any()
+    assert not grown(body, manoeuvres(spread_mps=(0.5, 0.0))).inside.any()
+    assert grown(body, manoeuvres(spread_mps=(0.0, 0.5))).inside.any()
 
 
 def test_a_stop_that_is_over_in_time_needs_no_room() -> None:

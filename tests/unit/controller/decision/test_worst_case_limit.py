@@ -13,6 +13,7 @@ from controller import braking
 from controller.decision.bodies import Bodies
 from controller.decision.corridor import Corridor, path_velocities, place
 from controller.decision.limits import Limit, Motion
+from controller.decision.watched import Watched
 from controller.decision.worst_case_limit import WorstCase
 from tests.support.floor_bodies import box, line_path
 
@@ -26,8 +27,9 @@ def asked(worst: WorstCase, body: Bodies, v_mps: float, chosen_mps: float | None
     placed = place(body, CORRIDOR, worst.times_s, 0.0, 12.0)
     velocities = path_velocities(body, placed.heading_rad[:, 0])
     motion = Motion(v_mps, 0.0, LATENCY_S)
-    chosen_mps = v_mps if chosen_mps is None else chosen_mps
-    return worst.limit(body, placed, velocities, np.array([True]), 0.0, motion, 0.0, chosen_mps)
+    enters = np.array([True])
+    watched = Watched(body, 0.0, placed, velocities, enters, enters)
+    return worst.limit(watched, 0.0, motion, v_mps if chosen_mps is None else chosen_mps)
 
 
 def limit(lo_m: float, age_s: float, confirm_s: float) -> Limit | None:

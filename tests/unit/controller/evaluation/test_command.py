@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from config.app import ReplayConfig
-from controller.cli import cli
+from controller.cli.commands import cli
 from controller.errors import UserError
 from controller.evaluation.evaluate import EvaluationOptions, choose, command_of, run_evaluation
 from controller.evaluation.recording_report import recording_lines, write_recording_pictures

@@ -276,9 +276,9 @@ def test_who_has_left_the_view_is_remembered_through_every_new_arc() -> None:
     arcs, remembered = set(), []
     for step in itertools.count():
         drive.step()
-        known = drive.governor._known
+        known = drive.governor._ahead.known
         assert known is not None
-        arcs.add(id(drive.governor._path))
+        arcs.add(id(drive.governor.path))
         remembered.append(len(known._out_of_view._bodies))
         if step > 14.0 / PERIOD_S:
             break

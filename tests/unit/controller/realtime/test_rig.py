@@ -13,16 +13,16 @@ import pytest
 from config.app import RealtimeRunner, load_app
 from config.loader import CONFIG_DIR
 from controller.build import build_control
-from controller.console import Console
 from controller.control import ControlLoop
 from controller.ending import Outcome
+from controller.mission.result import MissionOptions
 from controller.realtime import rig as realtime_rig
 from controller.realtime.channel import Channel, PeerGone, channel_sockets
 from controller.realtime.punctual import PunctualChassis
 from controller.realtime.rig import RealtimeRig, perception_beside
 from controller.realtime.runner import CutOff, PerceptionLink, Punctuality
 from controller.record.recorder import RecordingOptions
-from controller.result import MissionOptions
+from controller.terminal.console import Console
 from hal.clocks import MonotonicClock
 from hal.types import ChassisMode
 from tests.support.obedient_chassis import ObedientChassis

@@ -125,7 +125,7 @@ def test_the_detector_knows_its_turn_from_samples_that_came_too_early(
     told: list[float] = []
 
     def noted(*args: object) -> object:
-        prior = with_gyro(*args)  # type: ignore[arg-type]
+        prior = with_gyro(*args)  # type: ignore[arg-type]  # whatever it is called with
         told.append(float(vector_from_rotation(prior.motion.rotation)[0]))
         return prior
 

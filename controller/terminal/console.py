@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from controller.decision.decision import Decision
-from controller.outlet import Outlet, Words, write
+from controller.terminal.outlet import Outlet, Words, write
 
 BAR = 24
 # A reason gets a line of its own only if it holds for this long.
@@ -86,8 +86,10 @@ class Console:
             )
 
     def complaints(self, stamp_s: float, new: Sequence[str], battery_v: float = math.nan) -> None:
-        """One line for each new fault that the base reports without stopping, with the voltage where it is
-        known: not every base has a bit that says that its battery is low."""
+        """One line for each new fault that the base reports without stopping.
+
+        The voltage is added where it is known, because not every base has a bit for a low battery.
+        """
         battery = f" (battery {battery_v:.1f} V)" if math.isfinite(battery_v) else ""
         for complaint in new:
             self.event(f"{stamp_s:7.2f} s  the base says: {complaint}{battery}")

@@ -4,8 +4,8 @@ from typing import TextIO
 
 import pytest
 
-from controller.console import Console
 from controller.decision.decision import Action, Decision, Reason, Rule
+from controller.terminal.console import Console
 
 
 def decided(rule: Rule, number: int | None = None) -> Decision:

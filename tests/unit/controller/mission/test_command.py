@@ -10,7 +10,7 @@ import yaml
 
 from config.loader import CONFIG_DIR
 
-SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+SCENARIOS = Path(__file__).resolve().parents[3] / "scenarios"
 
 
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

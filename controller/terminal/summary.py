@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from config.app import AppConfig
-from controller.console import STUCK_S, Console
 from controller.control import ControlStep
 from controller.ending import Outcome
+from controller.mission.result import DriveResult, MissionResult
 from controller.realtime.runner import Punctuality
 from controller.record.tally import SetpointTally, mean_speed_mps
-from controller.result import DriveResult, MissionResult
+from controller.terminal.console import STUCK_S, Console
 from sim.simulation import Simulation
 
 

@@ -9,7 +9,7 @@ import pytest
 import config
 from config.app import load_app
 from config.robot import Limits
-from controller.envelope import Latency, describe_envelope, envelope, envelope_of
+from controller.cli.envelope import Latency, describe_envelope, envelope, envelope_of
 
 TAU = Latency(0.06, 0.02, 0.12)
 

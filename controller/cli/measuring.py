@@ -10,7 +10,7 @@ from typing import Literal
 import click
 
 from config.camera import OdometryChoice
-from controller.cli_options import (
+from controller.cli.options import (
     BASES,
     FILE,
     FOLDER,

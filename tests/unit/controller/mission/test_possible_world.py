@@ -9,12 +9,12 @@ import pytest
 from config.app import load_app
 from config.loader import CONFIG_DIR, ConfigError
 from config.scenario import scenario_names
-from controller.mission import run_mission
-from controller.possible_world import require_possible_world
-from controller.result import MissionOptions
+from controller.mission.command import run_mission
+from controller.mission.possible_world import require_possible_world
+from controller.mission.result import MissionOptions
 
 SIM = CONFIG_DIR / "sim.yaml"
-OURS = sorted((Path(__file__).resolve().parents[2] / "scenarios").glob("*.yaml"))
+OURS = sorted((Path(__file__).resolve().parents[3] / "scenarios").glob("*.yaml"))
 WORLD = """
 name: mine
 path: {{start: {{x_m: {x}, y_m: 0.0}}, segments: [{{kind: line, length_m: {length}}}]}}

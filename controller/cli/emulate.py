@@ -26,8 +26,8 @@ from config.chassis import (
 from config.loader import CONFIG_DIR, describe
 from controller.build_chassis import build_can_emulator, build_pseudo_terminal, build_serial_emulator
 from controller.errors import UserError
-from controller.outlet import say
 from controller.realtime.service import StopRequest, stop_on_signals
+from controller.terminal.outlet import say
 from hal.api import Clock
 from hal.clocks import NS_PER_MS, NS_PER_S, MonotonicClock
 from sim.plant import TrackedPlant

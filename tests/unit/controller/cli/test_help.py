@@ -2,7 +2,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from controller.cli import cli
+from controller.cli.commands import cli
 
 RECORDED = ("--observations", "--video", "--quiet")
 

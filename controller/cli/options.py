@@ -14,7 +14,7 @@ from config.chassis import CHASSIS_KINDS
 from config.loader import CONFIG_DIR
 
 if TYPE_CHECKING:
-    from controller.result import MissionOptions
+    from controller.mission.result import MissionOptions
 
 
 class WholeNumber(click.IntRange):
@@ -94,7 +94,7 @@ def mission_options(command: Callable[[MissionOptions], None]) -> Callable[..., 
     @wraps(command)
     def with_options(**given: Any) -> None:
         # Imported here: `treadwatch --help` needs no NumPy.
-        from controller.result import MissionOptions
+        from controller.mission.result import MissionOptions
 
         command(MissionOptions(**given))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-import controller.mission
+import controller.mission.command
 from controller.__main__ import main
 from controller.campaign import command
 from controller.campaign.judge import Row
@@ -35,7 +35,7 @@ def test_before_a_command_can_make_more_of_it(
     def interrupted(*_: object) -> int:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(controller.mission, "run_mission", interrupted)
+    monkeypatch.setattr(controller.mission.command, "run_mission", interrupted)
     assert ended(monkeypatch, "run") == 130
     assert capsys.readouterr().err.strip() == "treadwatch: interrupted"
 
@@ -45,10 +45,10 @@ def test_while_the_program_is_still_being_imported(
 ) -> None:
     class Interrupting:
         def find_spec(self, name: str, *_: object) -> None:
-            if name == "controller.cli":
+            if name == "controller.cli.commands":
                 raise KeyboardInterrupt
 
-    monkeypatch.delitem(sys.modules, "controller.cli", raising=False)
+    monkeypatch.delitem(sys.modules, "controller.cli.commands", raising=False)
     monkeypatch.setattr(sys, "meta_path", [Interrupting(), *sys.meta_path])
     assert ended(monkeypatch, "run") == 130
     assert capsys.readouterr().err.strip() == "treadwatch: interrupted"

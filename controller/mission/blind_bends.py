@@ -95,7 +95,8 @@ def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
         return None
     where, spec = path_spec(config, config_path)
     path = build_path(config, config_path)
-    bend = first_blind_bend(spec, path, config.robot, mount_of(config), view, config.decision)
+    check = BendCheck(config.robot, mount_of(config), view, config.decision)
+    bend = check.first_blind_bend(spec, path)
     if bend is None:
         return None
     wider = (
@@ -108,24 +109,82 @@ def blind_bend_warning(config: AppConfig, config_path: FilePath) -> str | None:
     )
 
 
-def first_blind_bend(
-    spec: PathSpec, path: Path, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
-) -> BlindBend | None:
-    """The first bend of path, which is made of spec, in which a robot that stands would not start again."""
-    ends = np.cumsum([segment.length_m for segment in spec.segments])
-    arcs = [k for k, segment in enumerate(spec.segments) if isinstance(segment, ArcSpec)]
-    for begin_m, end_m in _around(ends, arcs, path.length_m):
-        found = _first_deadlock(path, robot, mount, view, decision, begin_m, end_m)
-        if found is None:
-            continue
-        stop_s_m, unseen_s_m = found
-        # The hidden floor may lie behind the bend, so the bend is the last one that begins before it.
-        segment = max((k for k in arcs if ends[k] - spec.segments[k].length_m <= unseen_s_m), default=arcs[0])
-        bend = spec.segments[segment]
-        assert isinstance(bend, ArcSpec)
-        min_radius_m = _min_radius_m(bend, robot, mount, view, decision)
-        return BlindBend(stop_s_m, segment, bend.radius_m, min_radius_m)
-    return None
+@dataclass(frozen=True, slots=True)
+class BendCheck:
+    """Looks for blind bends, for one robot and its camera."""
+
+    robot: Robot
+    mount: CameraMount
+    view: CameraView
+    decision: DecisionConfig
+
+    def first_blind_bend(self, spec: PathSpec, path: Path) -> BlindBend | None:
+        """The first bend of path, made of spec, in which a robot that stands would not start again."""
+        ends = np.cumsum([segment.length_m for segment in spec.segments])
+        arcs = [k for k, segment in enumerate(spec.segments) if isinstance(segment, ArcSpec)]
+        for begin_m, end_m in _around(ends, arcs, path.length_m):
+            found = self._first_deadlock(path, begin_m, end_m)
+            if found is None:
+                continue
+            stop_s_m, unseen_s_m = found
+            # The hidden floor may lie behind the bend, so the bend is the last one that begins before it.
+            segment = max(
+                (k for k in arcs if ends[k] - spec.segments[k].length_m <= unseen_s_m), default=arcs[0]
+            )
+            bend = spec.segments[segment]
+            assert isinstance(bend, ArcSpec)
+            min_radius_m = self._min_radius_m(bend)
+            return BlindBend(stop_s_m, segment, bend.radius_m, min_radius_m)
+        return None
+
+    def _first_deadlock(self, path: Path, begin_m: float, end_m: float) -> tuple[float, float] | None:
+        """Where from begin_m to end_m the robot would wait for ever; how far the floor is known there."""
+        view, decision, comfort = self.view, self.decision, braking.comfort(self.robot.limits)
+        corridor = Corridor(path, self.robot.body)
+        sight = Sight(corridor, self.mount, decision, begin_m)
+        half_width = 0.5 * (view.left_tan + view.right_tan) / _BANDS
+        free = FreeSpace(
+            half_width * (2.0 * np.arange(_BANDS, dtype=np.float64) + 1.0) - view.left_tan,
+            half_width,
+            np.full(_BANDS, math.inf),
+            np.full(_BANDS, view.range_m),
+        )
+        go_mps = min_start_mps(decision.release, comfort)
+        # Longer from step to step than floor is remembered, so that of the floor out of view only that right
+        # ahead is still known, as after a stop.
+        step_ns = round((decision.sight.memory_s + 1.0) * NS_PER_S)
+        for k, s_m in enumerate(np.arange(begin_m, end_m, _STEP_M).tolist()):
+            sight.look(free, NO_SURFACES, path.pose(s_m), s_m, k * step_ns, no_bodies(0), True)
+            if sight.known_s_m >= path.length_m + corridor.front_m:
+                continue
+            allowed_mps = braking.speed_for_distance(
+                sight.known_s_m - (s_m + corridor.front_m) - _SPARE_M,
+                comfort,
+                latency_s=decision.chassis_delay_s,
+                margin_m=decision.margins.least_m,
+            )
+            if allowed_mps < go_mps:
+                return s_m, sight.known_s_m
+        return None
+
+    def _min_radius_m(self, bend: ArcSpec) -> float | None:
+        """The least radius that this camera sees round in a half turn, rounded up to 0.1 m; None above 20."""
+        low_m, high_m = bend.radius_m, _WIDEST_BEND_M
+        if low_m >= high_m or self._half_turn_blind(high_m):
+            return None
+        while high_m - low_m > _RADIUS_PRECISION_M:
+            middle_m = 0.5 * (low_m + high_m)
+            if self._half_turn_blind(middle_m):
+                low_m = middle_m
+            else:
+                high_m = middle_m
+        return math.ceil(high_m * 10.0) / 10.0
+
+    def _half_turn_blind(self, radius_m: float) -> bool:
+        line = LineSpec(kind="line", length_m=_RUN_IN_M)
+        turn = ArcSpec(kind="arc", radius_m=radius_m, angle_deg=180.0)
+        path = Path(PathSpec(segments=(line, turn, line)), self.robot)
+        return self._first_deadlock(path, 0.0, path.length_m - _RUN_IN_M) is not None
 
 
 def _around(ends: FloatArray, arcs: list[int], length_m: float) -> Iterator[tuple[float, float]]:
@@ -140,66 +199,3 @@ def _around(ends: FloatArray, arcs: list[int], length_m: float) -> Iterator[tupl
         end_m = min(float(ends[k]), length_m)
     if end_m > begin_m:
         yield begin_m, end_m
-
-
-def _first_deadlock(
-    path: Path,
-    robot: Robot,
-    mount: CameraMount,
-    view: CameraView,
-    decision: DecisionConfig,
-    begin_m: float,
-    end_m: float,
-) -> tuple[float, float] | None:
-    """Where from begin_m to end_m the robot would stand for ever, and how far the floor is known there."""
-    corridor = Corridor(path, robot.body)
-    sight = Sight(corridor, mount, decision, begin_m)
-    half_width = 0.5 * (view.left_tan + view.right_tan) / _BANDS
-    free = FreeSpace(
-        half_width * (2.0 * np.arange(_BANDS, dtype=np.float64) + 1.0) - view.left_tan,
-        half_width,
-        np.full(_BANDS, math.inf),
-        np.full(_BANDS, view.range_m),
-    )
-    go_mps = min_start_mps(decision.release, braking.comfort(robot.limits))
-    # Longer from step to step than floor is remembered, so that of the floor out of view only that right
-    # ahead is still known, as after a stop.
-    step_ns = round((decision.sight.memory_s + 1.0) * NS_PER_S)
-    for k, s_m in enumerate(np.arange(begin_m, end_m, _STEP_M).tolist()):
-        sight.look(free, NO_SURFACES, path.pose(s_m), s_m, k * step_ns, no_bodies(0), True)
-        if sight.known_s_m >= path.length_m + corridor.front_m:
-            continue
-        allowed_mps = braking.speed_for_distance(
-            sight.known_s_m - (s_m + corridor.front_m) - _SPARE_M,
-            braking.comfort(robot.limits),
-            latency_s=decision.chassis_delay_s,
-            margin_m=decision.margins.least_m,
-        )
-        if allowed_mps < go_mps:
-            return s_m, sight.known_s_m
-    return None
-
-
-def _min_radius_m(
-    bend: ArcSpec, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
-) -> float | None:
-    """The least radius that this camera sees round in a half turn, rounded up to 0.1 m; None above 20."""
-    low_m, high_m = bend.radius_m, _WIDEST_BEND_M
-    if low_m >= high_m or _half_turn_blind(high_m, robot, mount, view, decision):
-        return None
-    while high_m - low_m > _RADIUS_PRECISION_M:
-        middle_m = 0.5 * (low_m + high_m)
-        if _half_turn_blind(middle_m, robot, mount, view, decision):
-            low_m = middle_m
-        else:
-            high_m = middle_m
-    return math.ceil(high_m * 10.0) / 10.0
-
-
-def _half_turn_blind(
-    radius_m: float, robot: Robot, mount: CameraMount, view: CameraView, decision: DecisionConfig
-) -> bool:
-    line = LineSpec(kind="line", length_m=_RUN_IN_M)
-    turn = ArcSpec(kind="arc", radius_m=radius_m, angle_deg=180.0)
-    path = Path(PathSpec(segments=(line, turn, line)), robot)
-    return _first_deadlock(path, robot, mount, view, decision, 0.0, path.length_m - _RUN_IN_M) is not None

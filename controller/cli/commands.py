@@ -10,8 +10,8 @@ import click
 
 from config.camera import OdometryChoice
 from config.loader import CONFIG_DIR, ConfigError
-from controller.cli_measure import bench, campaign, evaluate, faults, stop_and_go
-from controller.cli_options import (
+from controller.cli.measuring import bench, campaign, evaluate, faults, stop_and_go
+from controller.cli.options import (
     BASES,
     FOLDER_OR_FILE,
     ODOMETRY,
@@ -25,7 +25,7 @@ from controller.errors import INTERRUPTED, Interrupted, UserError
 from hal.errors import HalError
 
 if TYPE_CHECKING:
-    from controller.result import MissionOptions
+    from controller.mission.result import MissionOptions
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -43,7 +43,7 @@ def run(options: MissionOptions) -> None:
     Exit code 0 if the target was reached, or the robot came to rest before it because a signal (Ctrl-C,
     SIGTERM) asked for that, and nothing was touched, the limits were kept and all files were written; else 1.
     """
-    from controller.mission import run_mission
+    from controller.mission.command import run_mission
 
     sys.exit(run_mission(options))
 
@@ -105,8 +105,8 @@ def envelope(config_path: Path) -> None:
     First the paper's numbers, then the same with jerk and latency.
     """
     from config.app import load_app
-    from controller.envelope import describe_envelope
-    from controller.outlet import say
+    from controller.cli.envelope import describe_envelope
+    from controller.terminal.outlet import say
 
     for line in describe_envelope(load_app(config_path)):
         say(line)
@@ -136,7 +136,7 @@ def emulate(
 
     Type estop, release, restart, freeze or thaw and Enter to see what the driver makes of it.
     """
-    from controller.emulate import EmulateOptions, run_emulator
+    from controller.cli.emulate import EmulateOptions, run_emulator
 
     run_emulator(EmulateOptions(kind, channel, interface, port, config_path, tell), sys.stdin)
 
@@ -173,6 +173,6 @@ def _refuse(mistake: str) -> NoReturn:
 
 
 def _say(line: str) -> None:
-    from controller.outlet import say
+    from controller.terminal.outlet import say
 
     say(f"treadwatch: {' '.join(line.split())}", to_stderr=True)

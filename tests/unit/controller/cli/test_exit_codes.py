@@ -9,11 +9,11 @@ import pytest
 from click.testing import CliRunner
 
 from config.robot import Limits
-from controller.cli import cli
+from controller.cli.commands import cli
 from controller.ending import Outcome
 from controller.governor.command import Governing
+from controller.mission.result import DriveResult, MissionResult
 from controller.record.tally import SetpointTally
-from controller.result import DriveResult, MissionResult
 from tests.support.docs_pages import ROOT
 
 

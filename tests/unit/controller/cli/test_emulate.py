@@ -15,7 +15,7 @@ import yaml
 from config.app import load_app
 from config.chassis import CanLinkConfig, SerialLinkConfig
 from config.loader import CONFIG_DIR
-from controller.emulate import EmulateOptions, _linked, can_link, run_in_real_time, with_wire
+from controller.cli.emulate import EmulateOptions, _linked, can_link, run_in_real_time, with_wire
 from controller.errors import UserError
 from controller.faults.trials import KINDS
 from controller.realtime.service import StopRequest

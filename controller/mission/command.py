@@ -16,19 +16,19 @@ from controller.build import (
     surroundings,
 )
 from controller.build_chassis import build_base
-from controller.console import Console
 from controller.ending import Outcome
 from controller.errors import UserError
 from controller.lockstep import run_lockstep
-from controller.path.blind_bends import blind_bend_warning
-from controller.possible_world import require_possible_world
+from controller.mission.blind_bends import blind_bend_warning
+from controller.mission.possible_world import require_possible_world
+from controller.mission.result import MissionOptions, MissionResult
 from controller.realtime.mission import drive_realtime
 from controller.realtime.service import StopRequest
 from controller.record.observations import STANDARD_OUTPUT
 from controller.record.recorder import RecordingOptions, RunRecorder, open_recorder
 from controller.record.tally import SetpointTally
-from controller.result import MissionOptions, MissionResult
-from controller.summary import report, summary_rows
+from controller.terminal.console import Console
+from controller.terminal.summary import report, summary_rows
 from hal.clocks import SimulatedClock
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from controller.outlet import Outlet, Words, write
+from controller.terminal.outlet import Outlet, Words, write
 
 PATIENCE_S = 30.0
 

@@ -1,0 +1,87 @@
+"""The watched bodies: those that move or are young, with where they will be and which of them enter the way.
+
+Watch selects them once a scene, and places and judges them in each control step. The advisers that deal with
+motion (moving_limits.py and worst_case_limit.py) get them as one record, Watched.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.decision import DecisionConfig
+from controller.decision.bodies import Bodies, no_bodies
+from controller.decision.corridor import PathVelocities, Placed, path_velocities, place
+from controller.decision.crossing import likely_enters
+from controller.decision.debounce import Debounced
+from controller.decision.limits import UNSEEN_ERROR_SIGMAS
+from controller.decision.world_model import WorldModel
+from hal.records import record
+from hal.types import FloatArray
+
+# A body must head for the corridor for this long until it counts as coming in, and head elsewhere for as long
+# until it does not. Meanwhile the worst case covers it.
+_DEBOUNCE_S = 0.3
+_BEYOND_RANGE_M = 2.0  # bodies are placed along the path up to this far beyond the camera's range
+
+
+@record(frozen=True, slots=True, eq=False)
+class Watched:
+    """N watched bodies in one control step.
+
+    bodies: as they were in their scene.
+    since_s: time since that scene.
+    placed: where they will be, at times from now, if they keep their velocity.
+    velocities: relative to the path.
+    enters: (N,) which are in the swept corridor or are likely to come into it, debounced.
+    could_enter: (N,) enters, and those out of view that may be nearer to the path than expected.
+    """
+
+    bodies: Bodies
+    since_s: float
+    placed: Placed
+    velocities: PathVelocities
+    enters: NDArray[np.bool_]
+    could_enter: NDArray[np.bool_]
+
+
+class Watch:
+    """Selects the watched bodies and judges which of them enter.
+
+    times_s (K,): times from now at which they are placed.
+    """
+
+    def __init__(self, config: DecisionConfig, times_s: FloatArray) -> None:
+        self._config, self._times_s = config, times_s
+        self._enters = Debounced(_DEBOUNCE_S)
+        self._bodies = no_bodies(0)
+        self._remembered = np.zeros(0, np.bool_)
+
+    def take_in(self, known: WorldModel) -> None:
+        """Select the watched bodies of a new scene."""
+        watched = known.bodies.moving | (known.bodies.age_s < self._config.prediction.confirm_s)
+        self._bodies = known.bodies.select(watched)
+        self._remembered = known.remembered[watched]
+
+    def step(self, known: WorldModel, s_m: float, now_s: float) -> Watched | None:
+        """The watched bodies at now_s, for a robot at s_m; None: there are none."""
+        bodies = self._bodies
+        if not len(bodies):
+            self._enters.pause()
+            return None
+        range_m = self._config.sight.range_m + _BEYOND_RANGE_M
+        placed = place(bodies, known.corridor, known.since_s + self._times_s, s_m, range_m)
+        velocities = path_velocities(bodies, placed.heading_rad[:, 0])
+        sigma_left_mps = velocities.sigma_left_mps * self._config.prediction.sigmas
+        comes = likely_enters(placed, self._times_s, sigma_left_mps)
+        # No debounce for a body that is in the corridor now, nor for one out of view: without measurements
+        # there is no noise.
+        at_once = np.where(comes, placed.clearance_m[:, 0] <= 0.0, self._remembered)
+        enters = could_enter = self._enters.update(bodies.ids, comes, at_once, now_s)
+        if self._remembered.any():
+            # A body out of view that approaches the path may be nearer to it than expected.
+            unsure_mps = UNSEEN_ERROR_SIGMAS * velocities.sigma_left_mps
+            inwards = -np.sign(placed.d_m[:, 0]) * velocities.left_mps > unsure_mps
+            nearer = likely_enters(placed, self._times_s, sigma_left_mps, unsure_mps * bodies.unseen_s)
+            could_enter = enters | (self._remembered & inwards & nearer)
+        return Watched(bodies, known.since_s, placed, velocities, enters, could_enter)

@@ -1,0 +1,9 @@
+"""`treadwatch run`: a drive along a path. It begins in command.py.
+
+The files in the order in which they come into play:
+
+* command.py - checks, drives in lock-step or in real time (realtime/mission.py), prints the summary
+* possible_world.py - refuses a simulated world in which the robot cannot drive
+* blind_bends.py - warns of bends that the camera cannot see round
+* result.py - the options of a drive; its result, added up from step to step
+"""
