@@ -1,6 +1,7 @@
 """The release gate: slower at once, faster only after a delay, so that noisy limits cause no jerky drive.
+The start delay: a standing robot waits until what stood in its way has certainly gone.
 
-controller/decision/decide.py passes the least limit through it in each control step.
+controller/decision/decide.py passes the least limit through them in each control step.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from collections import deque
 from config.decision import Release
 from controller.decision.limits import STANDING_MPS
 from hal.clocks import NS_PER_S
-
 
 # What stood in the way of a standing robot must have been out of sight this long before it starts. Something
 # low at the lower edge of the view is seen in some frames only, with gaps of up to half a second; the robot
