@@ -1,8 +1,8 @@
 """How far beside the corridor a body stands, by the outline that depth shows of it.
 
-A body's box is aligned with the direction of view. On a straight path that is as good as any other direction.
-But in a bend, the box of something seen corner-on may reach into the corridor although the body does not.
-controller/decision/standing_limits.py asks for the outlines of bodies near a bend.
+A body's box is aligned with the direction of view. In a bend, the box of something seen corner-on may reach
+into the corridor although the body does not. On a straight path the box is only some centimetres too wide.
+controller/decision/standing_limits.py asks for the outlines of bodies close beside the corridor.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """The release gate: slower at once, faster only after a delay, so that noisy limits cause no jerky drive.
+The start delay: a standing robot waits until what stood in its way has certainly gone.
 
-controller/decision/decide.py passes the least limit through it in each control step.
+controller/decision/decide.py passes the least limit through them in each control step.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Speed limits for bodies that stand in the corridor: stop before each, where it can still be seen to leave.
 
 controller/decision/speed_limits.py calls StandingLimits in each control step. Bodies are placed along the
-path once a scene; in bends controller/decision/outline.py tells how far beside the corridor they are.
+path once a scene; controller/decision/outline.py tells how far beside the corridor they are.
 """
 
 from __future__ import annotations
@@ -125,13 +125,17 @@ class StandingLimits:
         """(N,) free floor between the bodies and the corridor.
 
         In bends it comes from each body's outline when it was last seen whole, unless a part that is nearer
-        to the corridor is seen now. before: by id, these clearances up to the last scene.
+        to the corridor is seen now. On a straight path the box fits, but mixed pixels at its edges make it
+        some centimetres too wide: there the outline counts only for boxes that do not reach into the corridor
+        itself. before: by id, these clearances up to the last scene.
         """
-        if known.corridor.straight:
-            return placed.clearance_m[:, 0]
         clearance_m = placed.clearance_m[:, 0].copy()
-        standing, near_m = ~known.bodies.moving, self._config.margins.lateral_m + _BESIDE_M
-        beside = standing & (clearance_m <= near_m) & (placed.block_to_s_m[:, 0] > s_m)
+        margins, straight = self._config.margins, known.corridor.straight
+        least_m, most_m = (0.0, margins.graze_m) if straight else (-math.inf, _BESIDE_M)
+        near = (clearance_m > least_m) & (clearance_m <= margins.lateral_m + most_m)
+        beside = near & ~known.bodies.moving & (placed.block_to_s_m[:, 0] > s_m)
+        if not beside.any():
+            return clearance_m
         bodies, depth_m = known.bodies.select(beside), self._config.prediction.body_depth_m
         own = known.surfaces.of(bodies)
         for k, row in enumerate(beside.nonzero()[0].tolist()):

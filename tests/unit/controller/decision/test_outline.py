@@ -148,6 +148,21 @@ def look(bench: Bench, one: Obstacle, seen: FreeSpace, path: Path = BEND) -> Dec
     return decision
 
 
+@pytest.mark.parametrize(("beside_m", "blocks"), [(0.12, False), (0.04, True), (-0.02, True)])
+def test_on_a_straight_path_depth_corrects_a_box_that_only_reaches_into_the_margin(
+    beside_m: float, blocks: bool
+) -> None:
+    """A box 0.6 m wide and beside_m beside the swept width. Depth shows 6 cm less of it on both sides, as
+    mixed pixels do: that is outside of the margin of 0.15 m, inside it, or not looked at."""
+    middle_m = 0.5 * Body().width_m + beside_m + 0.3
+    one = obstacle(3.0, middle_m, size_m=(0.6, 1.0))
+    ahead_m = 3.0 - MOUNT.forward_m
+    shown = np.abs(-TANGENTS * ahead_m - middle_m) < 0.24
+    nearest_m = np.where(shown, ahead_m, math.inf)
+    seen = FreeSpace(TANGENTS, HALF_BAND, nearest_m, np.minimum(nearest_m, 9.0))
+    assert (look(Bench(), one, seen, line_path()).reason.rule == "static") == blocks
+
+
 def test_a_crate_seen_corner_on_beside_a_bend_is_passed() -> None:
     assert look(Bench(), crate(), depth(corner_on=True)).reason.rule != "static"
     assert look(Bench(), crate(), depth(corner_on=False)).reason.rule == "static"
