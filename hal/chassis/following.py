@@ -33,6 +33,11 @@ _FASTEST_SHARE, _FASTEST_MPS = 1.5, 0.15
 _LAG_NS = 6 * NS_PER_S
 _GLANCE_NS = NS_PER_S // 2
 
+# How slow it may tell of going: this share of the least that was commanded in so many glances, by when a base
+# that lags by two seconds makes three quarters of it; not twice in a row is it slower. Counters with half the
+# scale take a robot twice as far as its path goes.
+_SLOWEST_SHARE, _SLOWEST_MPS, _SLOW_GLANCES = 0.6, -0.03, 6
+
 # Told to stand for so long, a base that lags by two seconds has slowed to a fiftieth, and may move no more
 # than one that rolls back (rolling_back.py). Who pushes or turns it by hand, by more than 5 cm or 10 degrees
 # in a second, latches it too: it tells the same when a motor runs away.
@@ -60,7 +65,9 @@ class Following:
         self._commanded_rad = self._turning_rad = self._told_rad = 0.0
         self._lately: deque[_Ordered] = deque()
         self._glance_ns, self._glanced_m, self._glanced_rad = 0, 0.0, 0.0
-        self._too_fast = self._turns_too_fast = False
+        self._too_fast = self._turns_too_fast = self._too_slow = False
+        self._least_mps = math.inf
+        self._leasts_mps: deque[float] = deque(maxlen=_SLOW_GLANCES)
 
     def step(self, pose: PlanarPose, now_ns: int) -> None:
         """What the base has told since the last step, beside what it was ordered since."""
@@ -71,7 +78,8 @@ class Following:
             self.sentence = ""
             self._restart(now_ns)
             self._glance_anew(now_ns)
-            self._too_fast = self._turns_too_fast = False
+            self._too_fast = self._turns_too_fast = self._too_slow = False
+            self._leasts_mps.clear()
             return
         way_m = _way_m(before, pose)
         turn_rad = wrap_angle_rad(pose.heading_rad - before.heading_rad)
@@ -99,6 +107,7 @@ class Following:
         """What was commanded until now_ns. A change is enough: a base may stand for days."""
         order = self._ordered
         mps, radps = (0.0, 0.0) if order is None else (abs(order.v_mps), abs(order.w_radps))
+        self._least_mps = min(self._least_mps, mps)
         if self._lately and self._lately[-1][1:] == (mps, radps):
             self._lately.pop()
         self._lately.append(_Ordered(now_ns, mps, radps))
@@ -107,7 +116,7 @@ class Following:
 
     def _too_much(self, way_m: float, turn_rad: float, now_ns: int) -> str:
         """What is wrong if the base, way_m on and turn_rad further, tells of going or turning faster than it
-        was told of late."""
+        was told of late, or of going much slower all the time."""
         # With their signs: the jitter of a counter at rest is no travel.
         self._glanced_m += way_m
         self._glanced_rad += turn_rad
@@ -124,13 +133,25 @@ class Following:
         fastest_radps = _FASTEST_SHARE * radps + slack_mps / _ARM_M
         before, self._turns_too_fast = self._turns_too_fast, told_radps > fastest_radps
         turns_too_fast = before and self._turns_too_fast
+        least_mps, too_slow = self._much_too_slow(told_mps)
         self._glance_anew(now_ns)
         stood = mps == 0.0 and radps == 0.0
         if too_fast:
             return _overdone(f"{told_mps:.2f} m/s", f"{mps:.2f} m/s", stood)
         if turns_too_fast:
             return _overdone(f"{told_radps:.2f} rad/s", f"{radps:.2f} rad/s", stood)
-        return ""
+        return _underdone(told_mps, least_mps) if too_slow else ""
+
+    def _much_too_slow(self, told_mps: float) -> tuple[float, bool]:
+        """The least that was commanded in the last glances, and whether the base tells of much less."""
+        self._leasts_mps.append(self._least_mps)
+        least_mps = min(self._leasts_mps)
+        slow = (
+            len(self._leasts_mps) == _SLOW_GLANCES
+            and told_mps < _SLOWEST_SHARE * least_mps + _SLOWEST_MPS
+        )
+        before, self._too_slow = self._too_slow, slow
+        return least_mps, before and slow
 
     def _judged(self, seconds: float) -> str:
         apart_rad = abs(self._told_rad - self._commanded_rad)
@@ -147,6 +168,7 @@ class Following:
 
     def _glance_anew(self, now_ns: int) -> None:
         self._glance_ns, self._glanced_m, self._glanced_rad = now_ns, 0.0, 0.0
+        self._least_mps = math.inf
 
     def _restart(self, now_ns: int) -> None:
         self._since_ns = now_ns
@@ -169,3 +191,10 @@ def _overdone(told: str, commanded: str, stood: bool) -> str:
         else "are the scales of its speed and of its counters right in chassis:?"
     )
     return f"the base does not follow: it tells of {told} while at most {commanded} was commanded; {ask}"
+
+
+def _underdone(told_mps: float, least_mps: float) -> str:
+    return (
+        f"the base does not follow: it tells of {told_mps:.2f} m/s while at least {least_mps:.2f} m/s was "
+        "commanded for 3 s; is the scale of its counters right in chassis:, and can its motors go that fast?"
+    )
