@@ -129,10 +129,12 @@ class ControlLoop:
         )  # fmt: skip
 
     def _learn(self, scene: Scene | None) -> None:
-        """Each scene's ego-motion corrects the yaw once."""
+        """Each scene's ego-motion corrects the yaw once, or ends a drive that goes elsewhere than is told."""
         if scene is not None and scene.captured_ns != self._scene_ns:
             self._scene_ns = scene.captured_ns
             self.localiser.add_ego_motion(scene.captured_ns, scene.ego_motion)
+            if self.localiser.contradiction:
+                self.request_stop(self.localiser.contradiction, Outcome.BROKEN_OFF)
 
     def _setpoint(self, decision: Decision, on_path: OnPath, now_ns: int) -> tuple[Setpoint, str, str]:
         """What to send, the shaper's fault, and why zero is said instead of the profile."""
@@ -153,7 +155,7 @@ class ControlLoop:
         target_mps = 0.0 if self.ending.stop_reason is not None else decision.target_speed_mps
         shaped = self._shape.step(
             min(target_mps, answer.cap_mps),
-            emergency=decision.emergency or answer.hard,
+            emergency=decision.emergency or answer.hard or self.localiser.contradiction != "",
             distance_to_end_m=self.path.length_m - self._progress_m,
         )
         w_radps = self._follow.step(on_path, shaped.v_mps)

@@ -72,6 +72,8 @@ class GovernorLoop:
         if scene is not None and scene.captured_ns != self._scene_ns:
             self._scene_ns = scene.captured_ns
             self.localiser.add_ego_motion(scene.captured_ns, scene.ego_motion)
+            if self.localiser.contradiction:
+                self.request_stop(self.localiser.contradiction, Outcome.BROKEN_OFF)
         asked = self._commands.poll(now_ns)
         if self.ending.stop_reason is not None:
             asked = Asked(None, self.ending.stop_reason)

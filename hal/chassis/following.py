@@ -146,10 +146,7 @@ class Following:
         """The least that was commanded in the last glances, and whether the base tells of much less."""
         self._leasts_mps.append(self._least_mps)
         least_mps = min(self._leasts_mps)
-        slow = (
-            len(self._leasts_mps) == _SLOW_GLANCES
-            and told_mps < _SLOWEST_SHARE * least_mps + _SLOWEST_MPS
-        )
+        slow = len(self._leasts_mps) == _SLOW_GLANCES and told_mps < _SLOWEST_SHARE * least_mps + _SLOWEST_MPS
         before, self._too_slow = self._too_slow, slow
         return least_mps, before and slow
 
