@@ -122,6 +122,9 @@ def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
         # The link may work again while the base does not answer yet.
         heard = seen.status_ns is not None and seen.feedback_ns is not None
         return replace(state, cleared=heard and not loss and not seen.stop_cause)
+    # A loop that stood still has heard nothing meanwhile, and the base is not to blame for that.
+    if state.mode is ChassisMode.ARMED and not seen.link_error and (stall := _stall(state, seen, limits)):
+        return Arming(ChassisMode.ESTOP, stall, seen.now_ns)
     if loss:
         return Arming(ChassisMode.LOST, loss, seen.now_ns)
     if seen.stop_cause and not (state.mode is ChassisMode.ARMING and seen.resettable):
@@ -129,7 +132,7 @@ def _next(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     if state.mode is ChassisMode.ARMING:
         return _arming(state, seen, limits)
     if state.mode is ChassisMode.ARMED:
-        return _armed(state, seen, limits)
+        return _armed(state, seen)
     if state.mode is ChassisMode.STOPPING and seen.standing and seen.disobeys:
         return Arming(ChassisMode.STANDBY, "stopped", seen.now_ns)
     return state
@@ -156,15 +159,18 @@ def _arming(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
     return replace(state, cause=f"arming: {waiting}")
 
 
-def _armed(state: Arming, seen: Evidence, limits: ArmingLimits) -> Arming:
+def _armed(state: Arming, seen: Evidence) -> Arming:
     if seen.disobeys:
         return Arming(ChassisMode.ESTOP, f"the base no longer obeys: {seen.disobeys}", seen.now_ns)
-    gap_ns = seen.now_ns - state.stepped_ns
-    if not 0 <= gap_ns <= limits.stall_ns:
-        return Arming(
-            ChassisMode.ESTOP, f"the control loop stood still for {gap_ns / NS_PER_MS:.0f} ms", seen.now_ns
-        )
     return state
+
+
+def _stall(state: Arming, seen: Evidence, limits: ArmingLimits) -> str:
+    """That the control loop stood still since the last step; "" if it did not."""
+    gap_ns = seen.now_ns - state.stepped_ns
+    if 0 <= gap_ns <= limits.stall_ns:
+        return ""
+    return f"the control loop stood still for {gap_ns / NS_PER_MS:.0f} ms"
 
 
 def _refusal(state: Arming, seen: Evidence, limits: ArmingLimits) -> str:
